@@ -89,9 +89,7 @@ def fill_gaps(
         rows, moved = rows[keep], moved[np.flatnonzero(keep)]
         if len(rows) == 0:
             break
-        positions, normals = points.positions.copy(), points.normals.copy()
-        positions[rows], normals[rows] = moved.positions, moved.normals
-        points = OrientedPoints(positions, normals, points.surface_ids)
+        points = _replaced(points, rows, moved)
     return points
 
 
@@ -140,9 +138,7 @@ def center_outsized(
         rows, moved = rows[keep], moved[keep]
         if len(rows) == 0:
             break
-        positions, normals = centers.positions.copy(), centers.normals.copy()
-        positions[rows], normals[rows] = moved.positions, moved.normals
-        trial = OrientedPoints(positions, normals, centers.surface_ids)
+        trial = _replaced(centers, rows, moved)
         count = min(NEIGHBORS, len(centers))
         around = cKDTree(centers.positions).query(centers.positions[rows], k=np.arange(1, count + 1))[1]
         turned = aim(trial)
@@ -151,11 +147,18 @@ def center_outsized(
         if worse.any():
             back = rows[worse]
             movable[back] = False
-            positions[back], normals[back] = centers.positions[back], centers.normals[back]
+            trial = _replaced(trial, back, centers[back])
             turned = aim(trial)
             after = _cells(turned, nearest)
         centers, decals, (radii, owners) = trial, turned, after
     return decals
+
+
+def _replaced(points: OrientedPoints, rows: Int64Array, others: OrientedPoints) -> OrientedPoints:
+    """Return points with some of them at others' places."""
+    positions, normals = points.positions.copy(), points.normals.copy()
+    positions[rows], normals[rows] = others.positions, others.normals
+    return OrientedPoints(positions, normals, points.surface_ids)
 
 
 def _cells(decals: OrientedPoints, nearest: NearestFacing) -> tuple[Float64Array, Int64Array]:

@@ -240,7 +240,7 @@ class NearestFacing:
         tree = FacingTree(centers, normals)
         found, which = tree.nearest(self._positions[rows], self._normals[rows])
         self._distances[rows], self._indices[rows] = found[:, 0], which[:, 0]
-        self._centers, self._center_normals = centers, normals
+        self._centers, self._center_normals = centers.copy(), normals.copy()
         return self._distances.copy(), self._indices.copy()
 
     def _outdated(self, centers: Float32Array, normals: Float32Array) -> Int64Array:
