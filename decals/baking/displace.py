@@ -45,6 +45,9 @@ EDGES_PER_RADIUS = 16
 ESTIMATE_SAMPLES = 2000
 """Points on each object by which the number of triangles is estimated."""
 
+MAX_MOVE = 0.25
+"""Largest distance of the middle of an edge from its place on a tree's surface, in lengths of the edge."""
+
 BLOCK = 1 << 18
 """Points that are evaluated at once."""
 
@@ -307,7 +310,11 @@ def _fine_tree(
 
     def midpoints(rows: Float64Array, ends: Int64Array) -> Float64Array:
         report("dividing triangles", 0.5)
-        return np.hstack(surface.project(means(rows, ends)[:, :3])).astype(np.float64)
+        middles = means(rows, ends)[:, :3]
+        places, normals = surface.project(middles)
+        lengths = np.linalg.norm(rows[ends[:, 0], :3] - rows[ends[:, 1], :3], axis=1)
+        near = np.linalg.norm(places - middles, axis=1) <= MAX_MOVE * lengths  # so that every half is shorter
+        return np.hstack([np.where(near[:, None], places, middles), normals])
 
     corners = np.hstack([mesh.vertices, mesh.normals]).astype(np.float64)
     rows, faces = subdivided(corners, mesh.faces.astype(np.int64), need.are_long, midpoints)

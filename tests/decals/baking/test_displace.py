@@ -17,6 +17,7 @@ from decals.baking.displace import DisplacedScene
 from decals.errors import InvalidMesh, InvalidScene
 from decals.scenes.pose import PosedMesh
 from decals.surfaces import subdivide
+from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.subdivide import subdivided
 from tests.decals.baking.glb import Array, ball_and_cube, need, read_attribute, read_glb
@@ -144,6 +145,19 @@ def test_textures_of_a_posed_mesh_have_the_colours_of_its_rest_pose(tmp_path: Pa
     distance = np.linalg.norm((points - [5, 0, 0]) / 3, axis=1)
     assert (texels[distance < 0.45] == [255, 0, 0]).all()
     assert (texels[distance > 0.55] == 255).all()
+
+
+def test_a_surface_that_jumps_is_divided_to_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    def jumping(_: ImplicitSurface, points: Array) -> tuple[Array, Array]:
+        return np.add(points, [0.0, 0.0, 0.05]), np.tile([0.0, 0.0, 1.0], (len(points), 1))
+
+    scene = decals.cover(Point((0, 0, 0), radius=1.0), count=20, images=[hills(1, relief=0.4)])
+    monkeypatch.setattr(ImplicitSurface, "project", jumping)
+    monkeypatch.setattr(subdivide, "MAX_FACES", 50_000)
+    (item,) = decals.displace(scene, edge_length=0.04).objects
+    assert isinstance(item, PosedMesh)
+    corners = item.rest.vertices[item.rest.faces].astype(float)
+    assert np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max() < 0.2
 
 
 def test_too_many_triangles_are_refused(monkeypatch: pytest.MonkeyPatch, hilly: Scene) -> None:
