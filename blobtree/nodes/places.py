@@ -1,7 +1,7 @@
 """The place of a node in the world: maps of points through the transforms, warps and mirrors above it."""
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from itertools import product
 from typing import Any
 
@@ -40,7 +40,7 @@ class Place:
     Raises
     ------
     InvalidNode
-        A warp above the node has no room for it, or takes no point to the node's middle.
+        The node is too large for a warp above it, or the warp takes no point to the node's middle.
     """
 
     def __init__(self, tree: Node, path: Path) -> None:
@@ -82,7 +82,7 @@ class Place:
                 result = step[:3, :3] @ result + step[:3, 3]
         return result
 
-    @property
+    @cached_property
     def middle(self) -> Float64Array:
         """The middle of the node's box, in the world, shape (3,)."""
         return self.world(self.own_middle)
@@ -124,7 +124,10 @@ class Place:
         return np.stack(columns, axis=1)
 
     def _preimage(
-        self, forward: Callable[[Float64Array], Float64Array], goal: Float64Array, box: Any
+        self,
+        forward: Callable[[Float64Array], Float64Array],
+        goal: Float64Array,
+        box: tuple[Float64Array, Float64Array],
     ) -> Float64Array:
         """Return a point that a warp takes to another one, by Newton's method."""
         low, high = box
@@ -151,10 +154,10 @@ class Place:
         return None
 
 
-def images(tree: Node, path: Path) -> list[Float64Array]:
+def mirror_maps(tree: Node, path: Path) -> list[Float64Array]:
     """Return the maps, float64[4, 4], from a node in the world to itself and to its mirror images.
 
-    Mirrors below warps are left out: their images are no affine ones.
+    Mirrors below warps are left out: their maps are not affine.
     """
     world, found = np.eye(4), [np.eye(4)]
     for node in list(nodes_along(tree, path))[:-1]:

@@ -8,7 +8,7 @@ from blobtree import ISO, Node
 from blobtree._typing import Float32Array, Float64Array, IndexArray, Int64Array
 from blobtree.lazy import Lazy
 from blobtree.nodes.paths import Path, inside_support, moved, node_at, node_in_world, with_node
-from blobtree.nodes.places import Place, images
+from blobtree.nodes.places import Place, mirror_maps
 from decals.editing.document import Document, ForkFamily
 from decals.editing.queries import SurfacePoints, nearest_points
 from decals.scenes.objects import SceneObject, TreeObject
@@ -119,7 +119,7 @@ class DragAnchor:
     @Lazy
     def images(self) -> list[Float64Array]:
         """Return the maps from the node in the world to itself and to its mirror images."""
-        return images(self._tree, self._key[2])
+        return mirror_maps(self._tree, self._key[2])
 
     @Lazy
     def weights(self) -> Float64Array:

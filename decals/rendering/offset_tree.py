@@ -45,8 +45,8 @@ class Shell:
     Attributes
     ----------
     texels
-        float32[nx ny nz, 4]: for each cell a point of the surface near its middle, and a distance to the
-        middle that no point of the surface is below.
+        float32[nx ny nz, 4]: for each cell a point of the surface near its middle, and a lower
+        bound of the distance from the surface to the middle.
     lower, cell, counts
         Lowest corner (3,), side of the cells, number of cells along each axis.
     reach

@@ -602,7 +602,7 @@ def _search_gaps(
     sample_distance: float,
     rng: np.random.Generator,
 ) -> _OwnedPoints:
-    """Grow radii, up to limits, until searches around points find no bare one; return all points of the last.
+    """Grow radii, up to limits, until searches around points find no bare one; return the searched points.
 
     Points whose nearest decals have not grown for `CLEAN_SEARCHES` of the last rounds are not searched again.
     """

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from blobtree import InvalidNode, Mirror, Node, Point, Sum
 from blobtree.nodes.paths import node_at
-from blobtree.nodes.places import Place, images
+from blobtree.nodes.places import Place, mirror_maps
 from tests.blobtree.custom_kinds import Sway
 
 BALL = Point((1, 0.2, 0.5), radius=0.3)
@@ -53,12 +53,12 @@ def test_images_are_those_of_all_mirrors_above() -> None:
     tree = Sum(BALL, Mirror(Mirror(BALL, "x").translate((0, 1, 0)), "z").rotate((0, 0, 1), 90))
     path, points = (1, 0, 0, 0, 0), [(1, 0.2, 0.5), (-1, 0.2, 0.5), (1, 0.2, -0.5), (-1, 0.2, -0.5)]
     assert node_at(tree, path) is BALL
-    assert len(images(tree, (0,))) == 1
+    assert len(mirror_maps(tree, (0,))) == 1
     middle = Place(tree, path).middle
     np.testing.assert_allclose(middle, (-1.2, 1.0, 0.5), atol=1e-6)
-    found = sorted((image @ (*middle, 1.0))[:3].round(6).tolist() for image in images(tree, path))
+    found = sorted((image @ (*middle, 1.0))[:3].round(6).tolist() for image in mirror_maps(tree, path))
     np.testing.assert_allclose(found, sorted([-y - 1, x, z] for x, y, z in points), atol=1e-6)
-    assert len(images(tree.twist(10), (0, *path))) == 1
+    assert len(mirror_maps(tree.twist(10), (0, *path))) == 1
 
 
 def test_what_no_warp_shows_is_refused() -> None:
