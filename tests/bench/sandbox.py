@@ -1,11 +1,14 @@
 """The sandbox in headless Chromium: milliseconds from a slider or a drag to the next frame in the browser.
 
 ``server_ms`` is the time of a drag on the server alone: from its message until the picture is sent.
+``server_slider_ms`` is that of a slider.
 
     python -m tests.bench.sandbox
     python -m tests.bench.sandbox --decals 1000 --events 20 --json sandbox.json
+    python -m tests.bench.sandbox --server-only     # no browser: for a remote machine with a graphics card
 
-Needs playwright and Chromium. Frames are drawn by this process; without a graphics card, on the processor.
+Needs playwright and Chromium, except with ``--server-only``. Frames are drawn by this process; without a
+graphics card, on the processor.
 """
 
 import argparse
@@ -14,10 +17,9 @@ import json
 import time
 from collections.abc import Callable, Coroutine
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from playwright.async_api import Page
 from trame.app import get_server
 
 import decals
@@ -26,7 +28,9 @@ from decals.apps.sandbox.page import Page as SandboxPage
 from decals.window import EditWindow
 from decals.window.host_plotter import new_plotter
 from tests.decals.window.driver import Driver
-from tests.frontends.browsing import PICTURE, served, until
+
+if TYPE_CHECKING:
+    from playwright.async_api import Page
 
 SIZE = 1200, 800
 REST_SECONDS = 0.5
@@ -70,7 +74,7 @@ LONGEST = 5.0
 """Seconds after which an event without a new frame counts as missed."""
 
 
-async def measure(count: int, events: int) -> dict[str, float]:
+async def measure(count: int, events: int, *, server_only: bool = False) -> dict[str, float]:
     """Return the figures for a number of decals and of events."""
     began = time.perf_counter()
     scene = decals.cover(TREE, count=count, images=["scale"])
@@ -79,6 +83,16 @@ async def measure(count: int, events: int) -> dict[str, float]:
     window = EditWindow(scene, plotter=plotter)
     window.show()
     page = SandboxPage(server, window)
+    figures = await (_on_server if server_only else _in_browser)(server, page, window, events, began)
+    window.close()
+    return figures
+
+
+async def _in_browser(
+    server: Any, page: SandboxPage, window: EditWindow, events: int, began: float
+) -> dict[str, float]:
+    from tests.frontends.browsing import PICTURE, served, until
+
     on_server = _clock(page, window)
     async with served(server, size=SIZE) as browser:
         await until(lambda: not window.subplot.warming_up)
@@ -95,12 +109,10 @@ async def measure(count: int, events: int) -> dict[str, float]:
         figures |= _summary("slider", times) | _summary("server_slider", on_server)
         on_server.clear()
         page.sandbox.select("")
-        driver = Driver(window)
-        number, (x, y) = next(driver.visible())
-        window.actions.state.selection = (number,)
+        x, y = _picked_decal(window)
         box = await browser.locator(PICTURE).first.bounding_box()
         assert box is not None
-        left, top = box["x"] + x, box["y"] + plotter.window_size[1] - y
+        left, top = box["x"] + x, box["y"] + window.plotter.window_size[1] - y
         await browser.mouse.move(left, top)
         await browser.mouse.down()
         await until(lambda: window.tools.drags_decals)
@@ -111,9 +123,53 @@ async def measure(count: int, events: int) -> dict[str, float]:
             first, event = browser.mouse.move(x - 1, top), browser.mouse.move(x, top)
             times.append(await _timed(browser, event, first))  # the page sends no first move after a rest
         await browser.mouse.up()
-        figures |= _summary("drag", times) | _summary("server", on_server)
-    window.close()
-    return figures
+        return figures | _summary("drag", times) | _summary("server", on_server)
+
+
+async def _on_server(
+    server: Any, page: SandboxPage, window: EditWindow, events: int, began: float
+) -> dict[str, float]:
+    """Return the figures of the server alone, from the calls that a browser's messages lead to."""
+    on_server = _clock(page, window)
+    task = server.start(
+        exec_mode="task", port=0, timeout=0, open_browser=False, show_connection_info=False, host="127.0.0.1"
+    )
+    await server.ready
+    while window.subplot.warming_up:
+        await asyncio.sleep(0.05)
+    figures = {"first_picture_warm_s": time.perf_counter() - began}
+    window.plotter.render_window.SetSize(SIZE)
+    point = next(row["key"] for row in page.values()["outline"] if row["label"] == "Point")
+    page.sandbox.select(point)
+    for step in range(events):
+        await asyncio.sleep(REST_SECONDS)
+        page.sandbox.set_value("radius", 1.0 + 0.05 * (1 + step % 2), last=False)
+    await asyncio.sleep(REST_SECONDS)
+    figures |= _summary("server_slider", on_server)
+    page.sandbox.select("")
+    x, y = _picked_decal(window)
+    driver = Driver(window)
+    driver.event("MouseMoveEvent", (x, y))
+    driver.event("LeftButtonPressEvent", (x, y))
+    assert window.tools.drags_decals
+    await asyncio.sleep(REST_SECONDS)
+    on_server.clear()
+    for step in range(events):
+        await asyncio.sleep(REST_SECONDS)
+        driver.event("MouseMoveEvent", (x + 20 + 20 * (step % 2), y))
+        page.view.update()  # as after each message of the view
+    await asyncio.sleep(REST_SECONDS)
+    driver.event("LeftButtonReleaseEvent", (x, y))
+    await server.stop()
+    await task
+    return figures | _summary("server", on_server)
+
+
+def _picked_decal(window: EditWindow) -> tuple[int, int]:
+    """Select the decal in the middle of the view, and return its pixel, counted from the lower left."""
+    number, (x, y) = next(Driver(window).visible())
+    window.actions.state.selection = (number,)
+    return x, y
 
 
 def _clock(page: SandboxPage, window: EditWindow) -> list[float]:
@@ -142,7 +198,7 @@ def _clock(page: SandboxPage, window: EditWindow) -> list[float]:
 
 
 async def _timed(
-    browser: Page, event: Coroutine[Any, Any, None], first: Coroutine[Any, Any, None] | None = None
+    browser: "Page", event: Coroutine[Any, Any, None], first: Coroutine[Any, Any, None] | None = None
 ) -> float:
     """Return the milliseconds from an event to another picture by the page's clock, −1 for none.
 
@@ -177,9 +233,10 @@ def main() -> None:
     )
     parser.add_argument("--decals", type=int, default=1000)
     parser.add_argument("--events", type=int, default=20)
+    parser.add_argument("--server-only", action="store_true", help="no browser, only the server's times")
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    figures = asyncio.run(measure(options.decals, options.events))
+    figures = asyncio.run(measure(options.decals, options.events, server_only=options.server_only))
     for name, value in figures.items():
         print(f"{name:24} {value:10.1f}")
     if options.json is not None:
