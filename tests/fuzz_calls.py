@@ -538,6 +538,8 @@ def _commands(whole: decals.Scene, number: int, path: tuple[int, ...]) -> Calls:
         "RemoveImage": {"number": 0},
         "RemoveObject": {"number": 0},
         "RemovePrimitive": node,
+        "RenameLayer": {"layer": 0, "name": "other"},
+        "RenameNode": {**node, "name": "other"},
         "RenameObject": {"number": 0, "name": "other"},
         "ReplaceDecals": {"objects": (0,), "decals": whole.decals[:2]},
         "ReplaceImage": {"number": 0, "image": whole.images[0]},

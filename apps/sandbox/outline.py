@@ -31,7 +31,7 @@ class Row:
     key
         Text that names the row: "object/path".
     label
-        Name of the object, or class of the node.
+        Name of the object, node or layer; the class of a node without a name.
     kind
         "object", "combination", "modifier", "primitive", "mesh", "layer", "image" or "more".
     depth
@@ -73,7 +73,8 @@ def outline(document: Document) -> list[dict[str, Any]]:
     hidden = document.hidden.decals.layers
     for layer in np.unique(np.concatenate([document.decals.column("layers"), hidden])).tolist():
         flags = layer in hidden, layer in document.locked_layers
-        rows.append(Row(f"layer {layer}", f"layer {layer}", "layer", 0, *flags))
+        label = document.layer_names.get(layer, f"layer {layer}")
+        rows.append(Row(f"layer {layer}", label, "layer", 0, *flags))
     for number, image in enumerate(document.images):
         name, picture = Path(image.source).name, _picture(image)
         rows.append(Row(f"image {number}", name, "image", 0, picture=picture))
@@ -105,6 +106,7 @@ def _nodes(number: int, item: TreeObject) -> list[Row]:
         count = len(node.children)
         kind = "primitive" if count == 0 else "modifier" if count == 1 else "combination"
         hidden, locked = (bool(path) and path in paths for paths in (item.hidden, item.locked))
-        rows.append(Row(key_of(number, path), type(node).__name__, kind, 1 + len(path), hidden, locked))
+        label = item.names.get(path, type(node).__name__)
+        rows.append(Row(key_of(number, path), label, kind, 1 + len(path), hidden, locked))
         pending.extend(((*path, i), child) for i, child in reversed(list(enumerate(node.children))))
     return rows

@@ -72,11 +72,18 @@ HANDLE_FILL = (
 """Colours of the handles: strong for axes, light for turns, yellow for the scale, white for points."""
 
 OPEN_MENU = (
-    "menu = {open: true, x: $event.clientX, y: $event.clientY, key: row.key, label: row.label, "
-    "object: ['object', 'mesh'].includes(row.kind), image: ['image', 'more', 'layer'].includes(row.kind), "
-    "flags: !['image', 'more'].includes(row.kind)}"
+    "menu = {open: row.kind !== 'more', x: $event.clientX, y: $event.clientY, key: row.key, "
+    "label: row.label, kind: ['combination', 'modifier', 'primitive'].includes(row.kind) "
+    "? 'node' : row.kind}"
 )
 """Open the menu of a row at the pointer."""
+
+RENAME_ROW = "!['image', 'more'].includes(row.kind) && (renamed = {key: row.key, name: row.label})"
+SEND_NAME = (
+    "renamed.key && (renamed.name !== row.label && trigger('rename', [renamed.key, renamed.name]), "
+    "renamed = {key: '', name: ''})"
+)
+"""Show the field of a row's name; send what stands there, unless it is as before, and hide the field."""
 
 
 ALT = "new MutationObserver(() => document.querySelectorAll('img:not([alt])').forEach(i => i.alt = ''))"
@@ -151,7 +158,7 @@ class Page:
         self._task: asyncio.Task[None] | None = None
         constants = {"catalog": self.sandbox.catalog(), "thumbnails": thumbnails(), "theme": "light"}
         renamed, dropped = {"key": "", "name": ""}, None
-        server.state.menu = {"open": False, "x": 0, "y": 0, "key": "", "object": False, "image": False}
+        server.state.menu = {"open": False, "x": 0, "y": 0, "key": "", "label": "", "kind": ""}
         server.state.update({**constants, **self.values(), "renamed": renamed, "dropped": dropped})
         server.state.change("dropped")(self._take_dropped)
         server.controller.trigger("handle")(self.sandbox.drag_handle)
@@ -165,11 +172,6 @@ class Page:
         if dropped:
             self._server.state.dropped = None
             self.sandbox.upload(dropped)
-
-    def _rename(self, key: str, name: str, kind: str) -> None:
-        """Open the field for the name of an object."""
-        if kind in ("object", "mesh"):
-            self._server.state.renamed = {"key": key, "name": name}
 
     # -- values -----------------------------------------------------------------------------------------
 
@@ -310,7 +312,21 @@ class Page:
                 raw_attrs=['role="listitem"'],
             ),
         ):
+            vuetify3.VTextField(
+                v_if="renamed.key === row.key",
+                v_model="renamed.name",
+                autofocus=True,
+                raw_attrs=[
+                    *named("'new name of ' + row.label"),
+                    f'@keyup.enter="{SEND_NAME}"',
+                    f'@blur="{SEND_NAME}"',
+                ],
+                __events=[("escape", "keyup.esc")],
+                escape="renamed = {key: '', name: ''}",
+                **FIELD,
+            )
             vuetify3.VListItem(
+                v_if="renamed.key !== row.key",
                 title=("row.label",),
                 raw_attrs=['role="button"'],
                 prepend_icon=(f"row.picture ? '' : {ROW_ICONS}",),
@@ -327,7 +343,7 @@ class Page:
                     self.sandbox.change_row,
                     "[($event.preventDefault(), $event.dataTransfer.getData('text/plain')), 'move', row.key]",
                 ),
-                dblclick=(self._rename, "[row.key, row.label, row.kind]"),
+                dblclick=RENAME_ROW,
                 __events=["dragstart", "dragover", "drop", "dblclick", "contextmenu"],
                 __properties=["draggable"],
             )
@@ -339,13 +355,6 @@ class Page:
                     raw_attrs=[f':aria-pressed="row.{flag}"', *named(f"'{change} ' + row.label")],
                 )
         self._build_row_menu()
-        with html.Div(v_if="renamed.key", classes="d-flex ga-2 pa-2"):
-            vuetify3.VTextField(v_model="renamed.name", raw_attrs=named("'new name'"), **FIELD)
-            vuetify3.VBtn(
-                "Rename",
-                size="small",
-                click="trigger('rename', [renamed.key, renamed.name]); renamed = {key: '', name: ''}",
-            )
         with html.Div(v_if="selected", classes="d-flex ga-1 px-2"):
             for change, icon in ROW_CHANGES.items():
                 panels.icon_button(
@@ -366,17 +375,17 @@ class Page:
             ),
             vuetify3.VList(density="compact"),
         ):
-            for title, shown, event in (
-                ("Rename", "menu.object", (self._rename, "[menu.key, menu.label, 'object']")),
-                ("Duplicate", "!menu.image", (change, "[menu.key, 'duplicate']")),
-                ("Group", "!menu.object && !menu.image", (change, "[menu.key, 'group']")),
-                ("Remove", "!menu.image", (change, "[menu.key, 'remove']")),
-                ("Hide or show", "menu.flags", (change, "[menu.key, 'hide']")),
-                ("Lock or unlock", "menu.flags", (change, "[menu.key, 'lock']")),
-                ("Isolate, or show all", "menu.flags", (change, "[menu.key, 'isolate']")),
-                ("Frame", "!menu.image", (self._frame, "[menu.key]")),
+            for title, kinds, event in (
+                ("Rename", "object mesh node layer", "renamed = {key: menu.key, name: menu.label}"),
+                ("Duplicate", "object mesh node", (change, "[menu.key, 'duplicate']")),
+                ("Group", "node", (change, "[menu.key, 'group']")),
+                ("Remove", "object mesh node layer image", (change, "[menu.key, 'remove']")),
+                ("Hide or show", "object mesh node layer", (change, "[menu.key, 'hide']")),
+                ("Lock or unlock", "object mesh node layer", (change, "[menu.key, 'lock']")),
+                ("Isolate, or show all", "object mesh node layer", (change, "[menu.key, 'isolate']")),
+                ("Frame", "object mesh node", (self._frame, "[menu.key]")),
             ):
-                vuetify3.VListItem(title=title, v_if=shown, click=event)
+                vuetify3.VListItem(title=title, v_if=f"'{kinds}'.includes(menu.kind)", click=event)
 
     def _frame(self, key: str) -> None:
         """Select a row, and show it as large as it fits."""

@@ -8,7 +8,7 @@ import math
 import re
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from typing import Any
 from PIL import Image
 
 from blobtree import Node
+from blobtree._typing import Int64Array
 from blobtree.custom.definition import custom_kinds
 from blobtree.nodes.paths import Path as TreePath
 from blobtree.progress import Cancel, Progress
@@ -36,16 +37,18 @@ from decals.apps.sandbox.display import Display
 from decals.apps.sandbox.folder import MODELS, plain_name, read_upload, unused, values_of_start
 from decals.apps.sandbox.outline import key_of, outline, parse_key
 from decals.apps.views import THREE_QUARTER, UPRIGHT
-from decals.editing.commands import AddImage
+from decals.editing.commands import AddImage, DeleteDecals, RemoveImage, SetValues
+from decals.editing.document import Document
 from decals.editing.file_actions import PICTURE_SUFFIXES
 from decals.editing.recovery import recovery_path
 from decals.editing.scatter_commands import AddObject, RemoveObject
 from decals.editing.session import UndoEntry
 from decals.editing.tree_commands import RenameObject
+from decals.editing.visibility import RenameLayer, RenameNode
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.camera import Camera
 from decals.scenes.files import is_scene_file, load_model
-from decals.scenes.objects import MeshObject, SceneObject, bounds_of
+from decals.scenes.objects import MeshObject, SceneObject, bounds_of, flagged
 from decals.scenes.scene import DecalImage, Scene
 from decals.validation import describe, one_of, whole_number
 from decals.window import EditWindow
@@ -118,7 +121,7 @@ class Sandbox:
         self._step: Callable[[], None] | None = None
         self._rows: list[dict[str, Any]] = []
         self._marked: list[str] = []
-        self._outlined: tuple[Any, ...] = (None,) * 4
+        self._outlined: tuple[Any, ...] = (None,) * 5
         self._measured: tuple[object, float] = None, 1.0
         self._reported_pick: tuple[object, dict[str, str]] = None, {}
 
@@ -187,7 +190,8 @@ class Sandbox:
     def _outline(self) -> list[dict[str, Any]]:
         """Return the rows of the outline; they change only with the document."""
         document = self._window.document
-        shown = document.objects, document.images, document.locked_layers, document.decals.version
+        layers = document.locked_layers, document.layer_names, document.decals.version
+        shown = document.objects, document.images, *layers
         if any(a is not b and a != b for a, b in zip(shown, self._outlined, strict=True)):
             rows = outline(document)
             if rows != self._rows:  # a key may stand for another node now
@@ -236,9 +240,10 @@ class Sandbox:
             if key == "":
                 self._window.actions.state.primitive = None
                 return
-            if (layer := _layer_of(key)) is not None:
-                decals, state = self._window.document.decals, self._window.actions.state
-                state.selection = state.selectable(decals.numbers[decals.column("layers") == layer])
+            family, number, path = _parsed(key)
+            if family == "layer":
+                state = self._window.actions.state
+                state.selection = state.selectable(_decals_of(self._window.document, number))
                 return
             number, path = self._row(key)
             trees.select_node(number, path)
@@ -560,59 +565,74 @@ class Sandbox:
             Action: "rename", "remove", "duplicate", "group", "move", "hide", "lock" or "isolate".
             "hide" shows a hidden row, and "lock" unlocks a locked one.
         value
-            New name of an object; or the key of the row to which a node is moved.
+            New name; or the key of the row to which a row is moved: a node, or the layer of an image.
         """
         with self._reported():
-            actions = self._window.actions
-            flag = {"hide": "hidden", "lock": "locked"}.get(str(change))
-            if (layer := _layer_of(key)) is not None:
-                if flag is not None:
-                    actions.visibility.flag_layer(flag, layer)
-                elif change == "isolate":
-                    actions.visibility.isolate_layer(layer)
-                return
-            is_object = isinstance(key, str) and key.startswith("object ")
+            family, number, path = _parsed(key)
+            actions, document = self._window.actions, self._window.document
+            run, flag = actions.state.run, {"hide": "hidden", "lock": "locked"}.get(str(change), "")
             marked = self._marked if key in self._marked else [key]
-            number, path = self._row(key)
-            match change:
-                case "hide" | "lock":
+            match family, change:
+                case "layer", "hide" | "lock":
+                    actions.visibility.flag_layer(flag, number)
+                case "layer", "isolate":
+                    actions.visibility.isolate_layer(number)
+                case "layer", "remove":
+                    run(DeleteDecals(_decals_of(document, number)))
+                case "layer", "rename":
+                    run(RenameLayer(number, value))
+                case "image", "remove":
+                    run(RemoveImage(number))
+                case "image", "move":
+                    self._show_image(number, value)
+                case "object" | "node", "hide" | "lock":
                     for row in marked:
-                        actions.visibility.flag_node(str(flag), *self._row(row))
-                case "isolate":
+                        actions.visibility.flag_node(flag, *self._row(row))
+                case "object" | "node", "isolate":
                     actions.visibility.isolate_node(number, path)
-                case "group" if not is_object:
+                case "node", "rename":
+                    run(RenameNode(number, path, value))
+                case "node", "group":
                     actions.trees.group_nodes(number, [self._row(other)[1] for other in marked])
-                case "remove" if len(marked) > 1:
+                case "node", "remove" if len(marked) > 1:
                     actions.trees.delete_nodes(number, [self._row(other)[1] for other in marked])
-                case "rename" if is_object:
-                    actions.state.run(RenameObject(number, value))
-                case "remove" if is_object:
-                    actions.state.run(RemoveObject(number))
-                case "remove" | "duplicate" | "move" if not is_object:
+                case "node", "remove" | "duplicate" | "move":
+                    target = self._row(value) if change == "move" else (number, ())
+                    if target[0] != number:
+                        raise InvalidEdit("a node can be moved inside its own object only")
                     actions.trees.select_node(number, path)
                     if change == "move":
-                        other, target = self._row(value)
-                        if other != number:
-                            raise InvalidEdit("a node can be moved inside its own object only")
-                        actions.trees.move_node(target)
+                        actions.trees.move_node(target[1])
                     elif change == "remove":
                         actions.trees.delete_selected()
                     else:
                         actions.trees.duplicate_selected()
-                case "duplicate":
-                    item = self._window.document.object(number)
-                    taken = {other.name for other in self._window.document.objects}
-                    actions.state.run(AddObject(replace(item, name=unused(item.name, taken))))
+                case "object", "rename":
+                    run(RenameObject(number, value))
+                case "object", "remove":
+                    run(RemoveObject(number))
+                case "object", "duplicate":
+                    item = document.object(number)
+                    name = unused(item.name, {other.name for other in document.objects})
+                    run(AddObject(flagged(item, name=name)))
                 case _:
                     raise InvalidEdit(f"change: {describe(change)} is none for {describe(key)}")
+
+    def _show_image(self, number: int, key: object) -> None:
+        """Let the decals of a layer show an image."""
+        family, layer, _ = _parsed(key)
+        if family != "layer":
+            raise InvalidEdit(f"an image can be moved onto a layer only, got {describe(key)}")
+        numbers = _decals_of(self._window.document, layer)
+        self._window.actions.state.run(SetValues.each(numbers, "change the image", images=number))
 
     @staticmethod
     def _row(key: object) -> tuple[int, TreePath]:
         """Return object and path of a row's key, or raise `InvalidEdit`."""
-        try:
-            return parse_key(str(key).removeprefix("object "))
-        except ValueError:
-            raise InvalidEdit(f"row: expected one of an object or a node, got {describe(key)}") from None
+        family, number, path = _parsed(key)
+        if family not in ("object", "node"):
+            raise InvalidEdit(f"row: expected one of an object or a node, got {describe(key)}")
+        return number, path
 
     @contextmanager
     def _reported(self, *, whole: bool = True) -> Iterator[None]:
@@ -630,10 +650,21 @@ def first_line(kind: type[Node]) -> str:
     return (kind.__doc__ or "").strip().split("\n")[0].replace("`", "")
 
 
-def _layer_of(key: object) -> int | None:
-    """Return the layer of a row's key; None for other rows."""
-    text = str(key).removeprefix("layer ")
-    return int(text) if text != key and text.lstrip("-").isdigit() else None
+def _parsed(key: object) -> tuple[str, int, TreePath]:
+    """Return family, number and path of a row's key, or raise `InvalidEdit`."""
+    family, _, rest = str(key).rpartition(" ")
+    with suppress(ValueError):
+        number, path = parse_key(rest)
+        if family in ("object", "layer", "image") and not path:
+            return family, number, path
+        if family == "":
+            return "node", number, path
+    raise InvalidEdit(f"row: expected one of an object, a node, a layer or an image, got {describe(key)}")
+
+
+def _decals_of(document: Document, layer: int) -> Int64Array:
+    numbers: Int64Array = document.decals.numbers[document.decals.column("layers") == layer]
+    return numbers
 
 
 def _bare_scene(item: SceneObject) -> Scene:

@@ -172,7 +172,14 @@ def _path_after(before: Node, after: Node, path: Path) -> Path | None:
     try:
         return path_of(after, node)
     except InvalidNode:
-        return path if type(at_path) is type(node) else None
+        same = at_path is not None and (type(at_path) is type(node) or _same_operands(at_path, node))
+        return path if same else None
+
+
+def _same_operands(one: Node, other: Node) -> bool:
+    """Return True for two combinations of the very same operands."""
+    pairs = zip(one.children, other.children, strict=False)
+    return len(one.children) == len(other.children) > 1 and all(a is b for a, b in pairs)
 
 
 def move_branch(tree: Node, path: Path, target: Path) -> tuple[Node, Path]:

@@ -39,7 +39,7 @@ from .tree_commands import (
     SetParameter,
     TransformPrimitive,
 )
-from .visibility import FlagNodes, HideDecals, LockLayers, ShowDecals
+from .visibility import FlagNodes, HideDecals, LockLayers, RenameLayer, RenameNode, ShowDecals
 
 __all__ = [
     "KEYS",
@@ -73,6 +73,8 @@ __all__ = [
     "RemoveImage",
     "RemoveObject",
     "RemovePrimitive",
+    "RenameLayer",
+    "RenameNode",
     "RenameObject",
     "ReplaceDecals",
     "ReplaceImage",

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array, Int64Array
 from blobtree.validation import point_array, truth
-from decals.editing.document import Document, Edit, hidden_states
+from decals.editing.document import Document, Edit, SceneParts
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points, shortest_rotations
 from decals.errors import InvalidEdit
 from decals.images.load import AnyImage
@@ -472,13 +472,7 @@ class ReplaceScene:
         addition = document.compute_replacement(
             np.arange(first, first + len(scene.decals)),
             scene.decals,
-            objects=scene.objects,
-            images=scene.images,
-            camera=scene.camera,
-            drawing=scene.drawing,
-            recipes=() if scene.recipe is None else (scene.recipe,),
-            hidden=hidden_states(scene, first + len(scene.decals)),
-            locked_layers=scene.locked_layers,
+            **vars(SceneParts.of(scene, first + len(scene.decals))),
         )
         return document.compute_deletion(document.decals.numbers).then(addition)
 

@@ -92,7 +92,10 @@ def hidden_states(scene: Scene, first: int | None = None) -> DecalStates:
 
 @dataclass(frozen=True, eq=False)
 class SceneParts:
-    """Parts of a scene that an edit replaces; None for parts that stay."""
+    """Parts of a scene beside its decals; in an edit, None for parts that stay.
+
+    ``recipes`` has the recipe in a tuple, ``hidden`` the hidden decals under their numbers.
+    """
 
     objects: Any = None
     images: Any = None
@@ -101,11 +104,23 @@ class SceneParts:
     recipes: Any = None
     hidden: Any = None
     locked_layers: Any = None
+    layer_names: Any = None
+
+    @classmethod
+    def of(cls, scene: Scene, first: int | None = None) -> Self:
+        """Return all parts of a scene; its hidden decals get numbers from a first one on."""
+        same = {name: getattr(scene, name) for name in SAME_PARTS}
+        recipes = () if scene.recipe is None else (scene.recipe,)
+        return cls(**same, recipes=recipes, hidden=hidden_states(scene, first))
 
     def overlaid_on(self, other: "SceneParts") -> "SceneParts":
         """Return these parts, and the other ones where these are None."""
         given = {name: part for name, part in vars(self).items() if part is not None}
         return replace(other, **given)
+
+
+SAME_PARTS = ("objects", "images", "camera", "drawing", "locked_layers", "layer_names")
+"""Parts that a scene has under the same names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,24 +179,12 @@ class Document:
 
     Parameters
     ----------
-    objects
-        Meshes and trees.
-    images
-        Images that the decals show.
-    camera
-        Camera of the scene.
     decals
         The decals by number.
+    parts
+        All other parts of the scene.
     family
         The family of the document that this one is a fork of. Default: a new family.
-    drawing
-        How the scene is drawn.
-    recipe
-        How its decals were made, if that is known.
-    hidden
-        Decals that are hidden.
-    locked_layers
-        Layers whose decals no command changes.
 
     Examples
     --------
@@ -194,22 +197,9 @@ class Document:
     (4, 1)
     """
 
-    def __init__(
-        self,
-        objects: tuple[SceneObject, ...],
-        images: tuple[DecalImage, ...],
-        camera: Camera,
-        decals: DecalEditor,
-        family: ForkFamily | None = None,
-        drawing: Drawing | None = None,
-        recipe: Recipe | None = None,
-        hidden: DecalStates = NO_DECALS,
-        locked_layers: tuple[int, ...] = (),
-    ) -> None:
-        self._objects, self._images, self._camera, self._decals = objects, images, camera, decals
-        self._first_drawing = self._drawing = Drawing() if drawing is None else drawing
-        self._recipes = () if recipe is None else (recipe,)
-        self._hidden, self._locked_layers = hidden, locked_layers
+    def __init__(self, decals: DecalEditor, parts: SceneParts, family: ForkFamily | None = None) -> None:
+        self._decals, self._parts = decals, parts
+        self._first_drawing = parts.drawing
         self._family = ForkFamily() if family is None else family
 
     @classmethod
@@ -222,58 +212,70 @@ class Document:
             The argument is not a `Scene`.
         """
         instance("scene to edit", scene, Scene, InvalidScene, "decals.cover makes one")
-        editor = DecalEditor(scene.decals)
-        kept = scene.drawing, scene.recipe, hidden_states(scene), scene.locked_layers
-        return cls(scene.objects, scene.images, scene.camera, editor, None, *kept)
+        return cls(DecalEditor(scene.decals), SceneParts.of(scene))
 
     @property
     def objects(self) -> tuple[SceneObject, ...]:
         """Meshes and trees."""
-        return self._objects
+        objects: tuple[SceneObject, ...] = self._parts.objects
+        return objects
 
     @property
     def shown_objects(self) -> list[SceneObject]:
         """The objects without their hidden parts, see `decals.scenes.objects.shown_objects`."""
-        return shown_objects(self._objects)
+        return shown_objects(self.objects)
 
     @property
     def hidden(self) -> DecalStates:
         """The hidden decals, under the numbers that they had."""
-        return self._hidden
+        hidden: DecalStates = self._parts.hidden
+        return hidden
 
     @property
     def locked_layers(self) -> tuple[int, ...]:
         """Layers whose decals no command changes, ascending."""
-        return self._locked_layers
+        layers: tuple[int, ...] = self._parts.locked_layers
+        return layers
+
+    @property
+    def layer_names(self) -> dict[int, str]:
+        """Names of layers, by their numbers."""
+        names: dict[int, str] = self._parts.layer_names
+        return names
 
     @property
     def images(self) -> tuple[DecalImage, ...]:
         """Images that the decals show."""
-        return self._images
+        images: tuple[DecalImage, ...] = self._parts.images
+        return images
 
     @property
     def camera(self) -> Camera:
         """Camera of the scene."""
-        return self._camera
+        camera: Camera = self._parts.camera
+        return camera
 
     @property
     def drawing(self) -> Drawing:
         """How the scene is drawn."""
-        return self._drawing
+        drawing: Drawing = self._parts.drawing
+        return drawing
 
     def draw_as(self, drawing: Drawing) -> None:
         """Draw the scene in another way from now on; that is no edit, and saved with the next one."""
-        self._drawing = instance("drawing", drawing, Drawing, InvalidScene, "a scene has .drawing")
+        instance("drawing", drawing, Drawing, InvalidScene, "a scene has .drawing")
+        self._parts = replace(self._parts, drawing=drawing)
 
     @property
     def recipe(self) -> Recipe | None:
         """How the decals were made, if that is known."""
-        return self._recipes[0] if self._recipes else None
+        return self.recipes[0] if self.recipes else None
 
     @property
     def recipes(self) -> tuple[Recipe, ...]:
         """The recipe, if it is known, in a tuple: the part of the scene that edits replace."""
-        return self._recipes
+        recipes: tuple[Recipe, ...] = self._parts.recipes
+        return recipes
 
     @property
     def origin(self) -> Origin:
@@ -293,16 +295,8 @@ class Document:
     @property
     def scene(self) -> Scene:
         """Immutable copy; its decals are in the order of their numbers."""
-        return Scene(
-            objects=self.objects,
-            images=self.images,
-            camera=self.camera,
-            decals=self.decals.decals,
-            drawing=self.drawing,
-            recipe=self.recipe,
-            hidden_decals=self.hidden.decals,
-            locked_layers=self.locked_layers,
-        )
+        same: dict[str, Any] = {name: getattr(self._parts, name) for name in SAME_PARTS}
+        return Scene(decals=self.decals.decals, recipe=self.recipe, hidden_decals=self.hidden.decals, **same)
 
     def object(self, number: int) -> SceneObject:
         """Return an object by its index, or raise `InvalidEdit`."""
@@ -312,21 +306,17 @@ class Document:
 
     def fork(self) -> "Document":
         """Return an independent copy; objects and images are shared."""
-        kept = self._family, self._drawing, self.recipe, self._hidden, self._locked_layers
-        return Document(self._objects, self._images, self._camera, self._decals.copy(), *kept)
+        return Document(self._decals.copy(), self._parts, self._family)
 
     def adopt(self, fork: "Document") -> None:
         """Take over the state of a fork, which must not be used afterwards; renderers keep this document."""
-        self._objects, self._images, self._camera = fork._objects, fork._images, fork._camera
-        self._recipes = fork._recipes
-        self._hidden, self._locked_layers = fork._hidden, fork._locked_layers
-        if fork._drawing is not fork._first_drawing:
-            self._drawing = fork._drawing
+        keeps_drawing = fork.drawing is fork._first_drawing
+        self._parts = replace(fork._parts, drawing=self.drawing) if keeps_drawing else fork._parts
         self._decals.adopt(fork._decals)
 
     def prepare_surfaces(self) -> None:
         """Build what the surfaces build on their first query, such as bounding volume hierarchies."""
-        for item in self._objects:
+        for item in self.objects:
             with suppress(InvalidMesh):  # a tree without a visible surface
                 item.surface.project(ANY_POINT)
                 item.surface.raycast(ANY_POINT, ANY_DIRECTION)
@@ -390,17 +380,4 @@ class Document:
     def apply(self, states: DecalStates, parts: SceneParts) -> None:
         """Apply one side of an edit."""
         states.apply_to(self._decals)
-        if parts.objects is not None:
-            self._objects = parts.objects
-        if parts.images is not None:
-            self._images = parts.images
-        if parts.camera is not None:
-            self._camera = parts.camera
-        if parts.drawing is not None:
-            self._drawing = parts.drawing
-        if parts.recipes is not None:
-            self._recipes = parts.recipes
-        if parts.hidden is not None:
-            self._hidden = parts.hidden
-        if parts.locked_layers is not None:
-            self._locked_layers = parts.locked_layers
+        self._parts = parts.overlaid_on(self._parts)

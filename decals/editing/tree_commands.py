@@ -36,7 +36,7 @@ from decals.editing.document import Document, Edit
 from decals.editing.followers import followers
 from decals.editing.queries import move_decals
 from decals.errors import InvalidEdit
-from decals.scenes.objects import SceneObject, TreeObject, check_names, with_tree
+from decals.scenes.objects import SceneObject, TreeObject, check_names, flagged, with_tree
 from decals.validation import describe, finite_number, finite_vector, instance, member, whole_number
 
 DRAGGED = (
@@ -717,7 +717,7 @@ class RenameObject:
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
-        renamed = replace(document.object(self.number), name=self.name)
+        renamed = flagged(document.object(self.number), name=self.name)
         objects = (*document.objects[: self.number], renamed, *document.objects[self.number + 1 :])
         check_names(objects)
         return document.compute_parts(objects=objects)

@@ -1,8 +1,8 @@
-"""Commands that hide and lock parts of a scene, and the check that others change no locked part."""
+"""Commands that hide, lock and name parts of a scene, and the check that others change no locked part."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,7 @@ from decals.editing.queries import move_decals, nearest_points
 from decals.errors import InvalidEdit
 from decals.index.rows import as_numbers
 from decals.scenes.objects import Paths, SceneObject, TreeObject, flagged
-from decals.scenes.scene import as_layers
+from decals.scenes.scene import as_layer_names, as_layers
 
 FOLLOW_DISTANCE = 0.02
 """Decals that were hidden go back to the surface if it is farther away than this, in their radii."""
@@ -188,6 +188,85 @@ class LockLayers:
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
         return document.compute_parts(locked_layers=as_layers("layers", self.layers, InvalidEdit))
+
+
+@dataclass(frozen=True, eq=False)
+class RenameNode:
+    """Give a node of a BlobTree a name, which it keeps while the tree is edited.
+
+    Parameters
+    ----------
+    object
+        Index of the object.
+    path
+        Path of the node in the object's tree.
+    name
+        Its name; "" to name it by its class again.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, RenameNode
+    >>> tree = Point((0, 0, 0), radius=1.0) + Point((1.2, 0, 0), radius=0.6)
+    >>> session = EditSession(decals.cover(tree, count=3, images=["eye"]))
+    >>> edit = session.do(RenameNode(0, (1,), "head"))
+    >>> session.document.objects[0].names
+    {(1,): 'head'}
+    """
+
+    object: int
+    path: Path
+    name: str
+    label: ClassVar[str] = "rename"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        item, objects = document.object(self.object), list(document.objects)
+        if not isinstance(item, TreeObject):
+            raise InvalidEdit(f"expected a BlobTree, object {item.name!r} is a mesh; rename the object")
+        names = _renamed(item.names, self.path, self.name)
+        objects[self.object] = flagged(item, names=names)
+        return Edit() if names == item.names else document.compute_parts(objects=tuple(objects))
+
+
+@dataclass(frozen=True, eq=False)
+class RenameLayer:
+    """Give a layer of decals a name.
+
+    Parameters
+    ----------
+    layer
+        Number of the layer.
+    name
+        Its name; "" to name it by its number again.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, RenameLayer
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(RenameLayer(0, "scales"))
+    >>> session.document.layer_names
+    {0: 'scales'}
+    """
+
+    layer: int
+    name: str
+    label: ClassVar[str] = "rename"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        (layer,) = as_layers("layer", (self.layer,), InvalidEdit)
+        names = as_layer_names(_renamed(document.layer_names, layer, self.name))
+        return Edit() if names == document.layer_names else document.compute_parts(layer_names=names)
+
+
+def _renamed(names: dict[Any, str], key: Any, name: str) -> dict[Any, str]:
+    """Return names with another one; without it if it is empty."""
+    key = tuple(key) if isinstance(key, list) else key
+    return {other: text for other, text in {**names, key: name}.items() if other != key or name != ""}
 
 
 def check_locks(document: Document, edit: Edit) -> None:

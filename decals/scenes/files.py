@@ -20,8 +20,8 @@
 
 The last seven of a decal are written where they are not contact, 0, white, 1, any object and no fades.
 Image -1 is the plain tint. A file without "drawing" was drawn in the contact mode "product"; "recipe" is
-there if it is known, "hidden_decals" and "locked_layers" if there are any; objects name hidden and locked
-nodes by their paths.
+there if it is known, "hidden_decals", "locked_layers" and "layer_names" if there are any; objects give the
+paths of hidden, locked and named nodes.
 
 Numbers are the shortest decimals that give the same float32 again. Paths are relative to the scene file.
 """
@@ -107,6 +107,7 @@ class _SceneRecord(Struct, forbid_unknown_fields=True):
     recipe: _RecipeRecord | None = None
     hidden_decals: list[DecalRecord] = []
     locked_layers: list[int] = []
+    layer_names: dict[int, str] = {}
 
 
 def save_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress | None = None) -> None:
@@ -215,8 +216,9 @@ def to_json(scene: Scene, *, folder: Path, progress: Progress | None = None) -> 
         parts["recipe"] = vars(scene.recipe)
     if len(scene.hidden_decals):
         parts["hidden_decals"] = _lines(records_of(scene.hidden_decals))
-    if scene.locked_layers:
-        parts["locked_layers"] = scene.locked_layers
+    for name in ("locked_layers", "layer_names"):
+        if getattr(scene, name):
+            parts[name] = getattr(scene, name)
     fields = [
         b"  %b: %b" % (msgspec.json.encode(key), msgspec.json.encode(value)) for key, value in parts.items()
     ]
@@ -242,6 +244,7 @@ def from_json(
         recipe=None if record.recipe is None else Recipe(**msgspec.structs.asdict(record.recipe)),
         hidden_decals=decals_of(record.hidden_decals),
         locked_layers=tuple(record.locked_layers),
+        layer_names=record.layer_names,
     )
 
 

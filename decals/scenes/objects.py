@@ -2,7 +2,7 @@
 
 import operator
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, cast
@@ -30,6 +30,9 @@ from decals.validation import describe, instance, is_unicode, real_number
 Color = tuple[float, float, float]
 Paths = tuple[Path, ...]
 """Paths of nodes in a tree; ``()`` is the path of its root."""
+
+Names = dict[Path, str]
+"""Names of nodes by their paths."""
 
 Box = tuple[Float32Array, Float32Array]
 """Lower and upper corner, ``float32[3]`` each."""
@@ -120,7 +123,7 @@ class MeshObject(Immutable):
         vertices, origin = given or local_vertices(self.vertices)
         surface = MeshSurface(vertices, self.faces)
         checked = {
-            "name": _name(self.name),
+            "name": checked_name("an object's name", self.name),
             "color": color_rgb(f"object {self.name!r}, colour", self.color, InvalidScene),
             "source": _source(self.name, self.source),
             "crease_angle": as_crease_angle(self.crease_angle),
@@ -168,11 +171,13 @@ class TreeObject(Immutable):
     hidden, locked : tuple of paths
         Nodes that are not drawn, and nodes that the editor does not change. A path has the index of the child
         at each step from the root; ``()`` is the whole object.
+    names : mapping of path to str
+        Names of nodes; nodes without one are named by their class.
 
     Raises
     ------
     InvalidScene
-        If the name is empty, the tree is not a BlobTree, or a path leads to no node of it.
+        If a name is empty, the tree is not a BlobTree, or a path leads to no node of it.
 
     Examples
     --------
@@ -189,6 +194,7 @@ class TreeObject(Immutable):
     locked: Paths = field(default=(), repr=False)
     labels: tuple[str, ...] = ()
     named_only: bool = False
+    names: Names = field(default_factory=dict, repr=False)
 
     if TYPE_CHECKING:
 
@@ -201,10 +207,11 @@ class TreeObject(Immutable):
             locked: Paths = (),
             labels: str | Iterable[str] = (),
             named_only: bool = False,
+            names: Mapping[Path, str] = ...,
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "name", _name(self.name))
+        object.__setattr__(self, "name", checked_name("an object's name", self.name))
         if not isinstance(self.tree, Node):
             raise InvalidScene(f"object {self.name!r}: expected a BlobTree, got {type(self.tree).__name__}")
         if self.origin is None:
@@ -226,7 +233,9 @@ class TreeObject(Immutable):
         from blobtree.nodes.surgery import without_branches  # most scenes hide nothing
 
         try:
-            return replace(self, tree=without_branches(self.tree, self.hidden), hidden=(), locked=())
+            return replace(
+                self, tree=without_branches(self.tree, self.hidden), hidden=(), locked=(), names={}
+            )
         except InvalidNode:  # all nodes are hidden
             return None
 
@@ -259,54 +268,61 @@ def _labels(item: SceneObject) -> dict[str, Any]:
     }
 
 
-def _flags(item: SceneObject) -> dict[str, Paths]:
-    """Return the checked paths of hidden and locked nodes, each once, in order; a mesh has its root alone."""
+def _flags(item: SceneObject) -> dict[str, Any]:
+    """Return the checked paths of hidden, locked and named nodes, in order; a mesh has its root alone."""
     tree = item.tree if isinstance(item, TreeObject) else None
-    checked = {}
-    for name in ("hidden", "locked"):
-        given = getattr(item, name)
+    checked: dict[str, Any] = {}
+    for flag in ("hidden", "locked", "names")[: 2 if tree is None else 3]:
+        given = getattr(item, flag)
         try:
-            paths = {tuple(map(operator.index, path)) for path in given}
-            known = paths <= {()} if tree is None else all(node_at(tree, path) for path in paths)
+            by_path = {tuple(map(operator.index, path)): path for path in given}
+            known = by_path.keys() <= {()} if tree is None else all(node_at(tree, path) for path in by_path)
+            if flag == "names":
+                what = f"object {item.name!r}, name of a node"
+                checked[flag] = {path: checked_name(what, given[by_path[path]]) for path in sorted(by_path)}
+            else:
+                checked[flag] = tuple(sorted(by_path))
         except (TypeError, InvalidNode):
             known = False
         if not known:
-            raise InvalidScene(
-                f"object {item.name!r}, {name}: expected paths of its nodes, such as ((0, 1),), "
-                f"got {describe(given)}"
-            )
-        checked[name] = tuple(sorted(paths))
+            example = "names by paths of its nodes, such as {(0, 1): 'head'}"
+            expected = example if flag == "names" else "paths of its nodes, such as ((0, 1),)"
+            raise InvalidScene(f"object {item.name!r}, {flag}: expected {expected}, got {describe(given)}")
     return checked
 
 
-def flagged(item: SceneObject, **flags: Paths) -> SceneObject:
-    """Return an object with other nodes ``hidden`` or ``locked``; its surface is not built again."""
+def flagged(item: SceneObject, **changed: Any) -> SceneObject:
+    """Return an object with another ``name``, ``hidden`` or ``locked`` nodes, or ``names`` of nodes.
+
+    Its surface is not built again.
+    """
     twin = object.__new__(type(item))
     vars(twin).update(vars(item))
     vars(twin).pop("_shown_part", None)
-    for name, paths in flags.items():
-        object.__setattr__(twin, name, paths)
-    for name, paths in _flags(twin).items():
-        object.__setattr__(twin, name, paths)
+    vars(twin).update(changed)
+    vars(twin).update(name=checked_name("an object's name", twin.name), **_flags(twin))
     return twin
 
 
-def _paths_after(item: TreeObject, tree: Node) -> dict[str, Paths]:
-    """Return the flags of an object for another tree, of which most nodes are the same."""
+def _paths_after(item: TreeObject, tree: Node) -> dict[str, Any]:
+    """Return the flags and names of an object for another tree, of which most nodes are the same."""
     from blobtree.nodes.surgery import paths_after
 
-    given = {name: getattr(item, name) for name in ("hidden", "locked")}
-    return {
-        name: (*((),) * (() in paths), *paths_after(item.tree, tree, [path for path in paths if path]))
-        for name, paths in given.items()
-        if paths
-    }
+    kept: dict[str, Any] = {}
+    for name in ("hidden", "locked"):
+        paths = getattr(item, name)
+        if paths:
+            found = paths_after(item.tree, tree, [path for path in paths if path])
+            kept[name] = (*((),) * (() in paths), *found)
+    if item.names:
+        each = ((paths_after(item.tree, tree, [path]), name) for path, name in item.names.items())
+        kept["names"] = {found[0]: name for found, name in each if found}
+    return kept
 
 
 def with_tree(item: TreeObject, tree: Node) -> TreeObject:
-    """Return an object with another tree; nodes that stay are hidden and locked as before."""
-    paths: dict[str, Any] = {**_paths_after(item, tree)}
-    return replace(item, tree=tree, **paths)
+    """Return an object with another tree; nodes that stay are hidden, locked and named as before."""
+    return replace(item, tree=tree, **_paths_after(item, tree))
 
 
 def shown_objects(objects: Iterable[SceneObject]) -> list[SceneObject]:
@@ -421,13 +437,15 @@ def check_names(objects: Sequence[SceneObject]) -> None:
             raise InvalidScene(f"expected a different name for each object, got {name!r} twice; rename one")
 
 
-def _name(name: str) -> str:
-    instance("an object's name", name, str, InvalidScene, "give it a name of letters")
+def checked_name(what: str, name: Any) -> str:
+    """Return the name of an object, a node or a layer; InvalidScene if it is empty, or no Unicode text."""
+    instance(what, name, str, InvalidScene, "give it a name of letters")
     if not name.strip():
-        raise InvalidScene("expected a name for the object, got an empty one; give it a name")
+        raise InvalidScene(f"expected {what}, got an empty one; give it a name")
     if not is_unicode(name):
-        raise InvalidScene(f"expected a name of Unicode characters for the object, got {name!r}; rename it")
-    return name
+        raise InvalidScene(f"expected {what} of Unicode characters, got {name!r}; rename it")
+    checked: str = name
+    return checked
 
 
 def _source(name: str, source: object) -> str | None:

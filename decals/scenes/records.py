@@ -65,6 +65,7 @@ class TreeRecord(Struct, tag="tree", tag_field="type", forbid_unknown_fields=Tru
     locked: Paths = ()
     labels: tuple[str, ...] = ()
     named_only: bool = False
+    names: tuple[tuple[tuple[int, ...], str], ...] = ()
 
 
 def record_of(item: SceneObject, folder: Path) -> MeshRecord | TreeRecord:
@@ -72,7 +73,7 @@ def record_of(item: SceneObject, folder: Path) -> MeshRecord | TreeRecord:
     origin = None if item.origin == WORLD else item.origin
     kept: dict[str, Any] = {name: getattr(item, name) for name in _OPTIONS} | {"origin": origin}
     if isinstance(item, TreeObject):
-        return TreeRecord(item.name, to_tree_file(item.tree), **kept)
+        return TreeRecord(item.name, to_tree_file(item.tree), **kept, names=tuple(item.names.items()))
     if item.crease_angle != CREASE_ANGLE:
         kept["crease_angle"] = item.crease_angle
     if item.source is not None:
@@ -91,7 +92,8 @@ def object_of(record: MeshRecord | TreeRecord, folder: Path, samples: SampleLoad
     """
     kept: dict[str, Any] = {name: getattr(record, name) for name in _OPTIONS}
     if isinstance(record, TreeRecord):
-        return TreeObject(record.name, from_tree_file(record.tree), record.origin or WORLD, **kept)
+        tree, names = from_tree_file(record.tree), dict(record.names)
+        return TreeObject(record.name, tree, record.origin or WORLD, **kept, names=names)
     if (record.source is None) == (record.data is None):
         raise InvalidScene(f"mesh {record.name!r}: expected either 'source' or 'data'; give one of them")
     origin, angle = record.origin or WORLD, record.crease_angle

@@ -17,7 +17,15 @@ from decals.images.texels import Pixels
 from decals.model import LAYER_LIMIT, Decals
 from decals.receivers import check_receivers
 from decals.scenes.camera import Camera
-from decals.scenes.objects import Box, SceneObject, as_object, bounds_of, check_names, with_common_origin
+from decals.scenes.objects import (
+    Box,
+    SceneObject,
+    as_object,
+    bounds_of,
+    check_names,
+    checked_name,
+    with_common_origin,
+)
 from decals.scenes.origin import WORLD, Origin
 from decals.scenes.recipe import Recipe
 from decals.surfaces.convert import Model
@@ -110,6 +118,16 @@ def as_layers(name: str, layers: Any, error: type[ImplicitDecalsError]) -> tuple
     return tuple(sorted(numbers))
 
 
+def as_layer_names(names: Any) -> dict[int, str]:
+    """Return names of layers by their numbers, in order; raise `InvalidScene` for other values."""
+    if not isinstance(names, Mapping):
+        raise InvalidScene(
+            f"layer_names: expected names by layers, such as {{1: 'rust'}}, got {describe(names)}"
+        )
+    layers = as_layers("layer_names", names, InvalidScene)
+    return {layer: checked_name(f"a name of layer {layer}", names[layer]) for layer in layers}
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scene:
     """Everything that a picture shows.
@@ -134,6 +152,8 @@ class Scene:
         Decals that are not drawn; the editor shows them again.
     locked_layers : tuple of int
         Layers whose decals the editor does not change.
+    layer_names : mapping of int to str
+        Names of layers, by their numbers.
 
     Raises
     ------
@@ -164,6 +184,7 @@ class Scene:
     recipe: Recipe | None = field(default=None, repr=False)
     hidden_decals: Decals = field(default_factory=Decals.empty)
     locked_layers: tuple[int, ...] = ()
+    layer_names: dict[int, str] = field(default_factory=dict)
 
     if TYPE_CHECKING:  # models and images of any kind are converted
 
@@ -178,6 +199,7 @@ class Scene:
             recipe: Recipe | None = None,
             hidden_decals: Decals = ...,
             locked_layers: Iterable[int] = (),
+            layer_names: Mapping[int, str] = ...,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -203,6 +225,7 @@ class Scene:
         object.__setattr__(
             self, "locked_layers", as_layers("locked_layers", self.locked_layers, InvalidScene)
         )
+        object.__setattr__(self, "layer_names", as_layer_names(self.layer_names))
         shown_images = self.decals.images, self.hidden_decals.images
         last = max(int(images.max(initial=-1)) for images in shown_images)
         if last >= len(self.images):
@@ -297,6 +320,7 @@ class Scene:
         recipe: Recipe | None = None,
         hidden_decals: Decals | None = None,
         locked_layers: Iterable[int] | None = None,
+        layer_names: Mapping[int, str] | None = None,
     ) -> "Scene":
         """Return the same scene with some parts replaced."""
         given: dict[str, Any] = {
@@ -308,5 +332,6 @@ class Scene:
             "recipe": recipe,
             "hidden_decals": hidden_decals,
             "locked_layers": locked_layers,
+            "layer_names": layer_names,
         }
         return replace(self, **{key: value for key, value in given.items() if value is not None})

@@ -135,7 +135,11 @@ class _Script:
                 if len(scene.hidden_decals)
                 else []
             ),
-            *([f"    locked_layers={scene.locked_layers!r},"] if scene.locked_layers else []),
+            *(
+                f"    {name}={value!r},"
+                for name in ("locked_layers", "layer_names")
+                if (value := getattr(scene, name))
+            ),
             ")",
             "",
             'if __name__ == "__main__":',
@@ -284,7 +288,7 @@ def _value_text(value: Any) -> str:
 
 
 def _more(item: SceneObject) -> str:
-    """Return the arguments of an object's origin, hidden and locked nodes, and labels, unless default."""
-    standard = {"origin": WORLD, "hidden": (), "locked": (), "labels": (), "named_only": False}
-    given = {name: getattr(item, name) for name in standard}
+    """Return the arguments of an object's origin, flags, labels and names of nodes, unless default."""
+    standard = {"origin": WORLD, "hidden": (), "locked": (), "labels": (), "named_only": False, "names": {}}
+    given = {name: getattr(item, name, standard[name]) for name in standard}
     return "".join(f", {name}={value!r}" for name, value in given.items() if value != standard[name])

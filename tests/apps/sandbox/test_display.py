@@ -13,6 +13,7 @@ from blobtree.nodes.surgery import move_branch
 from decals.apps.sandbox.display import MODES, OVERLAYS
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.apps.views import PRESETS
+from decals.editing.commands import AddImage
 from decals.errors import InvalidScene
 from decals.record import Contact
 from decals.scenes.objects import MeshObject
@@ -265,11 +266,28 @@ def test_rows_are_renamed_duplicated_moved_and_removed(sandbox: Sandbox, shared:
     finish(shared)
     sandbox.change_row("object 2", "remove")
     finish(shared)
+    sandbox.change_row("0/1", "rename", "head")
+    sandbox.change_row("layer 0", "rename", "scales")
+    labels = {row["key"]: row["label"] for row in sandbox.values()["outline"]}
+    assert (labels["0/1"], labels["layer 0"], labels["0/0"]) == ("head", "scales", "Point")
+    shared.session.do(AddImage("eye"))
+    sandbox.change_row("image 1", "move", "layer 0")
+    assert set(shared.document.decals.decals.images.tolist()) == {1}
+    sandbox.change_row("image 0", "remove")
+    assert [image.source for image in shared.document.images] == ["eye"]
+    sandbox.change_row("layer 0", "remove")
+    assert len(shared.document.decals) == 0
     changes: list[Any] = [
         ("object 0", "rename", "crate"),
         ("object 0", "rename", ""),
         ("object 0", "rename", None),
-        ("0/0", "rename", "x"),
+        ("0/0", "rename", None),
+        ("image 0", "rename", "x"),
+        ("image 7", "remove", None),
+        ("image 0", "move", "0/0"),
+        ("layer 0", "move", "0"),
+        ("layer 0/1", "hide", None),
+        ("layer 0", "rename", 3),
         ("0/0", "move", "1"),
         ("0/0", "move", "0/0"),
         ("0/0", "move", None),

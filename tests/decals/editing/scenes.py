@@ -40,7 +40,8 @@ def one(position: Any = (0, 0, 1), radius: Any = 0.2, **values: Any) -> Any:
 def digest(document: Document) -> str:
     """Everything that a document holds; parts by identity, as renderers tell them apart."""
     decals = document.decals
-    parts = (decals.numbers.tolist(), *map(id, (document.objects, document.images, document.camera)))
+    same = document.objects, document.images, document.camera
+    parts = (decals.numbers.tolist(), *map(id, same), document.layer_names)
     arrays = [
         getattr(decals.decals, name) for name in ("positions", "normals", "tangents", "radii", "images")
     ]

@@ -1,5 +1,7 @@
 """Hidden and locked objects, nodes and layers: what is drawn, picked, edited, undone and saved."""
 
+import pickle
+import runpy
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +22,10 @@ from decals.editing import (
     MovePrimitive,
     RemoveObject,
     RemovePrimitive,
+    RenameLayer,
+    RenameNode,
     RenameObject,
+    ReplaceNode,
     SetValues,
     ShowDecals,
     pick,
@@ -28,6 +33,7 @@ from decals.editing import (
 from decals.editing.visibility import isolating
 from decals.errors import InvalidEdit, InvalidScene
 from decals.scenes.objects import MeshObject, TreeObject
+from decals.scenes.script import write_script
 from tests.decals.editing.scenes import box, digest, goes_back_and_forth, scene, tree_of
 
 CORNERS, FACES = box((0, 0, 0), (1, 1, 1))
@@ -219,3 +225,52 @@ def test_wrong_paths_are_refused(wrong: Any) -> None:
         TreeObject("t", TREE, hidden=wrong)
     with pytest.raises(InvalidScene, match="expected paths of its nodes"):
         MeshObject("box", CORNERS, FACES, locked=wrong)
+
+
+def test_names_stay_with_their_nodes_and_layers_and_are_saved(tmp_path: Path) -> None:
+    session = EditSession(scene())
+    surface = session.document.objects[0].surface
+    for command in (RenameNode(0, (0,), "left"), RenameNode(0, (1,), "right"), RenameNode(0, (), "body")):
+        session.do(command)
+    session.do(RenameLayer(3, "rust"))
+    session.do(RenameLayer(0, "scales"))
+    session.do(RenameObject(0, "snail"))
+    assert session.document.objects[0].surface is surface
+    session.do(RenameNode(0, (1,), "right"))  # it has that name
+    assert session.labels == ("rename",) * 6
+    session.do(FlagNodes(hidden={0: ((1,),)}))
+    tree = tree_of(session.document)
+    session.do(ReplaceNode(0, (), Union(tree.children)))  # of the same operands
+    session.do(MovePrimitive(0, (0, 0), (0.1, 0, 0)))
+    session.save(tmp_path / "scene.json")
+    write_script(session.document.scene, tmp_path / "scene.py")
+    loaded = decals.load_scene(tmp_path / "scene.json")
+    for rebuilt in (loaded, runpy.run_path(str(tmp_path / "scene.py"))["scene"], session.document.scene):
+        assert rebuilt.layer_names == {0: "scales", 3: "rust"}
+        item = rebuilt.objects[0]
+        assert isinstance(item, TreeObject)
+        assert item.names == {(): "body", (0,): "left", (1,): "right"}
+        assert item.hidden == ((1,),)
+    assert pickle.loads(pickle.dumps(loaded)).layer_names == loaded.layer_names
+    session.do(FlagNodes(hidden={0: ()}))
+    session.do(RenameLayer(3, ""))
+    session.do(RenameNode(0, (), ""))
+    session.do(RemovePrimitive(0, (0,)))
+    item = session.document.objects[0]
+    assert isinstance(item, TreeObject)
+    assert (item.names, session.document.layer_names) == ({(): "right"}, {0: "scales"})
+    goes_back_and_forth(session)
+    wrong: list[Any] = [
+        RenameNode(0, (7,), "x"),
+        RenameNode(1, (), "x"),
+        RenameNode(0, (), 3),  # type: ignore[arg-type]
+        RenameNode(0, (), "\ud800"),
+        RenameLayer(0, " "),
+        RenameLayer("x", "x"),  # type: ignore[arg-type]
+    ]
+    for one in wrong:
+        with pytest.raises((InvalidEdit, InvalidScene, InvalidNode), match="expected"):
+            session.do(one)
+    for names in ((), "ab", {(5,): "x"}, {0: "x"}, {(): ""}):
+        with pytest.raises(InvalidScene, match="expected"):
+            TreeObject("t", TREE, names=names or [(0,)])  # type: ignore[arg-type]
