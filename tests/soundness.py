@@ -27,7 +27,7 @@ PROFILED = 0.3
 
 def random_tree(rng: Rng, depth: int = 2) -> Node:
     """Return a tree whose nodes are of any class, all equally probable."""
-    kinds = list(NODE_KINDS.values())
+    kinds = [NODE_KINDS[tag] for tag in sorted(NODE_KINDS)]  # their own order is that of imports
 
     def operand(rng: Rng) -> Node:
         node = random_tree(rng, depth - 1) if depth and rng.random() < 0.5 else random_leaf(rng)

@@ -34,7 +34,18 @@ def golden_renderer(renderer: Renderer) -> Renderer:
     return renderer
 
 
-@pytest.mark.slow_cases("custom_nodes", "deforming", "painted", "particles", "pressed_solids", "relief")
+@pytest.mark.slow_cases(
+    "by_hand",
+    "custom_nodes",
+    "deforming",
+    "materials",
+    "painted",
+    "particles",
+    "posing",
+    "pressed_solids",
+    "relief",
+    "stain",
+)
 @pytest.mark.parametrize("name", gallery.EXAMPLES)
 def test_an_example_draws_its_golden_image(golden_renderer: Renderer, name: str) -> None:
     if name in gallery.DOWNLOADED and "PYVISTA_DATA" not in os.environ:

@@ -52,7 +52,14 @@ def test_a_public_name_has_an_example(name: str) -> None:
     assert ">>>" in text
 
 
-@pytest.mark.slow_cases("blobtree.ContactSurface", "decals.define_contact")
+@pytest.mark.slow_cases(
+    "blobtree.ContactSurface",
+    "blobtree.SolidContact",
+    "decals.Scene",
+    "decals.define_contact",
+    "decals.editing.ReplaceScene",
+    "decals.editing.ScatterDecals",
+)
 @pytest.mark.parametrize("name", OBJECTS)
 def test_an_example_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if name == "decals.bake":

@@ -216,6 +216,7 @@ def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     "decals",
     "many-runs",
     "modelling",
+    "published-nodes",
     "pyvista",
     "rendering",
     "scattering",

@@ -232,6 +232,7 @@ def some_decals(rng: np.random.Generator, *, layered: bool) -> Decals:
     )
 
 
+@pytest.mark.slow_cases("ELASTIC-chord-one layer")
 @pytest.mark.parametrize("layered", [False, True], ids=["one layer", "layers"])
 @pytest.mark.parametrize("mapping", [ImageMapping.CHORD, ImageMapping.CORRECTED], ids=["chord", "corrected"])
 @pytest.mark.parametrize("contact", list(Contact), ids=lambda contact: contact.name)

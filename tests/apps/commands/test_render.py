@@ -96,7 +96,7 @@ def test_a_camera_for_a_saved_scene(folder: Path) -> None:
     assert not np.array_equal(picture(folder / "a.png"), picture(folder / "b.png"))
 
 
-@pytest.mark.ordinary_cases("top", "0,3,0")
+@pytest.mark.ordinary_cases("0,3,0")
 @pytest.mark.parametrize("camera", ["top", "bottom", "left", "-1,0.5,2", "0,3,0"])
 def test_cameras_see_the_model(folder: Path, camera: str) -> None:
     assert run([*small("knot"), f"--camera={camera}", "-o", "a.png"]) == 0

@@ -50,7 +50,7 @@ MORE = {"built_in": None, "solids": SOLIDS, "shapes": SHAPES, "blends": BLENDED,
 SEEDS = [("built_in", 0), ("built_in", 1), *((kinds, 0) for kinds in MORE if MORE[kinds])]
 
 
-@pytest.mark.slow_cases("built_in-1", "shapes-0", "custom-0")
+@pytest.mark.slow_cases("blends-0", "built_in-1", "custom-0", "shapes-0")
 @pytest.mark.parametrize(("kinds", "seed"), SEEDS)
 def test_sparse_and_dense_give_the_same_quads(kinds: str, seed: int) -> None:
     surfaces = 0

@@ -111,6 +111,7 @@ def test_values_and_gradients_under_every_map_are_those_of_float64(node: Node, p
     )
 
 
+@pytest.mark.slow_cases("arc")
 @EACH
 def test_the_visible_radius_is_the_distance_of_the_surface_from_the_skeleton(node: Node) -> None:
     mesh = polygonize(node, resolution=40)
@@ -122,6 +123,7 @@ def test_the_visible_radius_is_the_distance_of_the_surface_from_the_skeleton(nod
     np.testing.assert_allclose(oracle.value(node, hits.positions[hits.hit]), ISO, atol=1e-3)
 
 
+@pytest.mark.slow_cases("steep")
 @pytest.mark.parametrize("node", [WORM, STEEP, GROUND], ids=["stroke", "steep", "half_space"])
 def test_strokes_and_half_spaces_are_those_of_float64(node: Leaf) -> None:
     turned = node.rotate((1, 2, 3), 50).scale(0.8)

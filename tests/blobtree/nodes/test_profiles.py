@@ -201,6 +201,7 @@ def test_the_width_of_a_stroke_is_in_proportion_to_its_radius() -> None:
         assert 0.0 < float(grown(start)) < 0.01
 
 
+@pytest.mark.slow_cases("2.0")
 @pytest.mark.parametrize("weight", [2.0, -1.5])
 def test_direct_fields_have_weights(weight: float) -> None:
     for plain in DIRECT:

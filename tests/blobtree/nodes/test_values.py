@@ -51,6 +51,7 @@ def mixed(last: float) -> Node:
 DEEP = pytest.mark.parametrize("make", [differences, translations, mixed])
 
 
+@pytest.mark.slow_cases("differences", "translations")
 @DEEP
 def test_a_deep_tree_compares_and_hashes(make: Callable[[float], Node]) -> None:
     tree, same, other = make(0.4375), make(0.4375), make(0.8125)
@@ -75,7 +76,7 @@ def test_a_deep_tree_is_written(make: Callable[[float], Node]) -> None:
     assert sum(line.split()[0] == f"[{DEPTH}]" for line in lines) == expected
 
 
-@pytest.mark.slow_cases("differences")
+@pytest.mark.slow_cases("differences", "translations")
 @DEEP
 def test_a_deep_tree_is_pickled_and_copied(make: Callable[[float], Node]) -> None:
     tree = make(0.4375)

@@ -118,6 +118,7 @@ def test_no_ray_passes_through_a_random_tree_unseen(seed: int) -> None:
     assert hits > 25
 
 
+@pytest.mark.slow_cases("400.0")
 @pytest.mark.parametrize("degrees", [120.0, 400.0])
 def test_no_ray_hits_where_only_the_bound_is_steep(degrees: float) -> None:
     """Behind nested warps bounds exceed slopes by far; each hit is on the surface all the same."""

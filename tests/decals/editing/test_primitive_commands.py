@@ -161,7 +161,7 @@ def test_a_quick_move_is_the_same_move_without_a_surface(way: Any) -> None:
     assert np.abs(tree(decals.positions) - ISO).max() < 1e-4
 
 
-@pytest.mark.ordinary_cases("path0-tree0", "path1-tree1")
+@pytest.mark.ordinary_cases("path0-tree0")
 @pytest.mark.parametrize(
     "tree", [A + B, Ricci((A, B.scale(1.2)), exponent=3), A - Point((0, 0, 1.2), radius=0.6)]
 )

@@ -106,7 +106,7 @@ def worst(got: Any, want: Any, rows: Any) -> Any:
     return np.maximum(uv, np.abs(got.field - want.field))[rows]
 
 
-@pytest.mark.slow_cases("unlike_sizes-0", "even_sphere-0", "small_model-0", "far_away-0")
+@pytest.mark.slow_cases("even_sphere-0", "far_away-0", "small_model-0", "unlike_sizes-0", "unlike_sizes-1")
 @pytest.mark.parametrize("mapping", [ImageMapping.CHORD, ImageMapping.CORRECTED])
 @pytest.mark.parametrize("make", SETS)
 def test_against_brute_force(make: Any, mapping: ImageMapping) -> None:

@@ -65,6 +65,7 @@ def constant(decals: Decals) -> Any:
     return color_of
 
 
+@pytest.mark.slow_cases("2-3")
 @pytest.mark.parametrize("contact", MODES)
 @pytest.mark.parametrize("seed", range(3))
 def test_owner_place_field_and_colour_are_the_oracles(contact: Contact, seed: int) -> None:

@@ -255,6 +255,7 @@ def test_nothing_folds_where_the_arc_grows_no_slower_than_the_chord(
     assert (np.diff(distances(rim[inside], chord[inside], length[inside])) >= -3e-7).all()
 
 
+@pytest.mark.slow_cases("torus")
 @pytest.mark.parametrize("name", ["torus", "ellipsoid", "sphere", "cylinder"])
 def test_radial_contact_does_not_fold_on_curved_surfaces(name: str) -> None:
     """Along geodesics from the centre of a decal among neighbours of other sizes, as long as it is drawn."""

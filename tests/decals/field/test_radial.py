@@ -53,6 +53,7 @@ def launch(kernel: Any, count: int, decals: Decals, before: Any, after: Any) -> 
     return [array.numpy() for array in after]
 
 
+@pytest.mark.slow_cases("False-2", "True-2")
 @pytest.mark.parametrize("contact", CELLS)
 @pytest.mark.parametrize("flat", [False, True])
 def test_nothing_folds_on_many_rays(flat: bool, contact: Contact) -> None:

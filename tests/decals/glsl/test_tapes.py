@@ -82,7 +82,7 @@ def test_the_trees_use_everything_that_a_tape_can_hold() -> None:
     assert sum(tree.tape.stretched for tree in TREES) > 5
 
 
-@pytest.mark.ordinary_cases("0", "24")
+@pytest.mark.ordinary_cases("0")
 @pytest.mark.parametrize("start", range(0, len(TREES), 6))
 def test_whole_tapes_are_the_same_in_both_languages(context: Context, start: int) -> None:
     assert_same_in_both_languages(context, TREES[start : start + 6], ALL_KINDS, start)
@@ -212,7 +212,7 @@ MODELS = {
 }
 
 
-@pytest.mark.slow_cases("a twist in a twist")
+@pytest.mark.slow_cases("a twist in a twist", "a volume", "random trees side by side")
 @pytest.mark.parametrize("name", MODELS)
 def test_a_traced_picture_is_what_warp_traces(renderer: Renderer, name: str) -> None:
     tree, (width, height) = MODELS[name], (160, 120)

@@ -77,7 +77,7 @@ def index_without_nested(*arguments: Any) -> Any:
     return index
 
 
-@pytest.mark.slow_cases("800-radii2-0")
+@pytest.mark.slow_cases("800-radii2-0", "800-radii2-1")
 @pytest.mark.parametrize("mapping", [ImageMapping.CHORD, ImageMapping.CORRECTED])
 @pytest.mark.parametrize(("count", "radii"), [(1, (0.5, 0.6)), (40, (0.2, 0.6)), (800, (0.004, 0.4))])
 def test_every_pixel_is_the_oracles(
@@ -220,6 +220,7 @@ def test_what_lies_over_what_is_the_same_from_every_side(renderer: Renderer, tur
     compare(view, buffers, ImageMapping.CORRECTED)
 
 
+@pytest.mark.slow_cases("3-70")
 @pytest.mark.parametrize(("contact", "count"), [(Contact.PRODUCT, 300), (Contact.ELASTIC, 70)])
 def test_many_decals_on_one_point(renderer: Renderer, contact: Contact, count: int) -> None:
     """In elastic contact the oracle compares each decal with each: its time grows with the square."""

@@ -34,6 +34,13 @@ def difference(drawer: Renderer, angle: float, kind: str, contact: str = "elasti
     return found
 
 
+@pytest.mark.slow_cases(
+    "fragment-80-waves-elastic-46",
+    "fragment-45-layers-elastic-44",
+    "compute-0-waves-elastic-44",
+    "compute-45-waves-product-42",
+    "compute-45-waves-radial-43",
+)
 @pytest.mark.parametrize(
     ("angle", "kind", "contact", "least"),
     [

@@ -47,6 +47,7 @@ def oracle(camera: Camera, shapes: tuple[Shape, ...], size: tuple[int, int]) -> 
     ]
 
 
+@pytest.mark.slow_cases("0.001")
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e4])
 def test_two_meshes_against_rays(renderer: Renderer, scale: float) -> None:
     pair = torus(), torus(0.8, 0.3, shift=(0.7, 0, 0.5))

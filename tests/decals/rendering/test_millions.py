@@ -62,6 +62,7 @@ def camera_of(shape: Shape) -> Camera:
     return Camera.fitting(shape.vertices, direction=(0.5, -0.9, 0.8), up=(0, 0, 1))
 
 
+@pytest.mark.slow_cases("0.3-thousands")
 @pytest.mark.parametrize(
     "count", [30_000, pytest.param(MILLION, marks=pytest.mark.slow)], ids=["thousands", "a million"]
 )

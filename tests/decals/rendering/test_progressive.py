@@ -31,7 +31,7 @@ def bits(targets: Targets) -> dict[str, bytes]:
     return {name: texture.read() for name, texture in named.items()}
 
 
-@pytest.mark.slow_cases("fragment-0.0-1", "compute-0.0-1")
+@pytest.mark.slow_cases("compute-0.0-1", "compute-0.0-2", "fragment-0.0-1")
 @pytest.mark.parametrize("samples", [1, 2])
 @pytest.mark.parametrize("seconds", [0.0, 0.01])
 def test_a_picture_in_parts_has_the_bits_of_one_at_once(

@@ -85,6 +85,7 @@ def seen(renderer: Renderer, scene: Scene) -> tuple[Buffers, Array]:
     return buffers, inner
 
 
+@pytest.mark.slow_cases("compute-2")
 @pytest.mark.parametrize(("backend", "layers"), [("fragment", 1), ("compute", 2)])
 def test_rays_meet_the_relief_where_they_do_in_float64(
     renderers: dict[str, Renderer], backend: str, layers: int

@@ -45,6 +45,7 @@ def test_stacks(renderer: Renderer, count: int, order: str, contact: Contact) ->
     assert owned.sum() > 60
 
 
+@pytest.mark.slow_cases("1000")
 @pytest.mark.parametrize("count", [1000, 3000, 6000])
 def test_deep_stacks_in_layers_are_whole_or_refused(renderer: Renderer, count: int) -> None:
     """Translucent plain decals over each other: all of them in the colour, or a clear error."""

@@ -82,6 +82,7 @@ def test_after_the_warm_up_a_picture_compiles_nothing(
     assert len(compiled) - made == clearing
 
 
+@pytest.mark.slow_cases("compute")
 def test_a_frame_runs_one_task_at_a_time(renderer: Renderer) -> None:
     scene = both()
     tasks = renderer.warmup(scene, PLAIN).tasks

@@ -50,7 +50,7 @@ def distances_from(surface: Surface, positions: Float32Array) -> Any:
     return np.linalg.norm(surface.project(positions)[0] - positions, axis=1)
 
 
-@pytest.mark.ordinary_cases("thin wall", "open")
+@pytest.mark.ordinary_cases("thin wall")
 @pytest.mark.parametrize("name", SURFACES)
 def test_particles_lie_on_the_surface_without_gaps(name: str) -> None:
     surface = SURFACES[name]()

@@ -62,7 +62,7 @@ def test_images_bend_over_the_edges_of_parts(name: str) -> None:
     assert found.bare == 0  # though images end at the arc, which is longer than the chord
 
 
-@pytest.mark.slow_cases("cup-5")
+@pytest.mark.slow_cases("cup-1", "cup-5")
 @pytest.mark.parametrize(("name", "seed"), [("cup", 1), ("cup", 5), ("bowl", 3)])
 def test_lips_and_ragged_borders_get_no_outsized_decals(name: str, seed: int) -> None:
     """A cup's wall is thinner than the spacing: its floor faces decals outside, its lip few decals."""

@@ -68,6 +68,7 @@ def cone() -> MeshSurface:
     return MeshSurface(np.concatenate([*rings, [[0.0, 0.0, 2.0]]]), np.concatenate(faces))
 
 
+@pytest.mark.slow_cases("0")
 @pytest.mark.parametrize("seed", [0, 1])
 def test_tip_of_a_slender_cone_is_covered(seed: int) -> None:
     relaxation = Relaxation([cone()], count=200, seed=seed)

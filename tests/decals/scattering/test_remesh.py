@@ -11,6 +11,7 @@ from tests.decals.meshes import box, plane, sphere
 from tests.oracles.sized_decals import nearest_facing
 
 
+@pytest.mark.slow_cases("surface0", "surface2")
 @pytest.mark.parametrize("surface", [sphere(), plane(), box()])
 def test_remeshed_points_are_even(surface: MeshSurface) -> None:
     pytest.importorskip("pyacvd", reason="pyacvd is not installed")

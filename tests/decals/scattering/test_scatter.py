@@ -32,7 +32,7 @@ def count_bare(decals: Decals, surface: Surface, count: int = 10_000) -> int:
     return int((~covered(decals, *surface.sample(count, seed=123))).sum())
 
 
-@pytest.mark.slow_cases("1.0")
+@pytest.mark.slow_cases("1.0", "1000.0")
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
 def test_sphere_is_covered_evenly_at_any_size(scale: float) -> None:
     ball = sphere(scale)

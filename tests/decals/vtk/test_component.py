@@ -167,6 +167,7 @@ def test_a_plotter_that_was_cleared_shows_what_was_added_since_alone(plotter: Fa
     assert (shot(pl) != empty).any()
 
 
+@pytest.mark.slow_cases("clear_actors")
 @pytest.mark.parametrize("wipe", WIPES)
 def test_a_cleared_plotter_takes_the_same_scene_again(plotter: Factory, wipe: str) -> None:
     pl = plotter()

@@ -93,6 +93,7 @@ def click(pl: Plotter, x: int, y: int, *, left: bool = False) -> None:
         interactor.InvokeEvent(("Left" if left else "Right") + event)
 
 
+@pytest.mark.slow_cases("right")
 @pytest.mark.parametrize("left", [False, True], ids=["right", "left"])
 def test_a_click_reports_object_decal_and_position(plotter: Factory, left: bool) -> None:
     pl, _ = filled(plotter, ours=True)

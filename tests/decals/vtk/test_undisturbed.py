@@ -140,7 +140,7 @@ def picture(plotter: Factory, mode: str, *, ours: bool) -> tuple[Plotter, np.nda
     return pl, seen
 
 
-@pytest.mark.ordinary_cases("plain", "parallel", "depth peeling", "volume and msaa", "widgets")
+@pytest.mark.ordinary_cases("plain", "volume and msaa", "widgets")
 @pytest.mark.parametrize("mode", MODES)
 def test_outside_our_objects_nothing_changes(plotter: Factory, mode: str) -> None:
     _, without = picture(plotter, mode, ours=False)
