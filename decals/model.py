@@ -4,17 +4,19 @@ from collections.abc import Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass, fields, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Int32Array
+from blobtree.colors import Rgb
 from blobtree.formulas.falloff import RIM
 from blobtree.immutable import Immutable
 from blobtree.validation import items
 from decals.errors import InvalidDecals, InvalidRow
 from decals.images.texels import decode_srgb
+from decals.options import Values
 from decals.receivers import codes_of, receiver_array
 from decals.validation import (
     bool_array,
@@ -111,7 +113,7 @@ class Decals(Immutable):
         True if a decal also colours surface that faces away from it, such as the far side of a thin wall; one
         each, or one for all. Default False.
     interactions : int32[n], optional
-        An `Interaction` or its name (``"overlap"``) each, or one for all. Default PUSH.
+        How decals meet: an `Interaction` or its name (``"overlap"``) each, or one for all. Default PUSH.
     layers : int32[n], optional
         Layers are drawn from the lowest up; one each, or one for all. Overlapping or independent decals of
         one layer are drawn in the order of their numbers. Default 0.
@@ -163,17 +165,17 @@ class Decals(Immutable):
     positions: Float32Array
     normals: Float32Array
     tangents: Float32Array
-    radii: Float32Array
+    radii: Annotated[Float32Array, Values(kind=float, unit="model units")]
     _: KW_ONLY
     images: Int32Array = None  # type: ignore[assignment]  # filled in by __post_init__
-    spill: BoolArray = None  # type: ignore[assignment]  # filled in by __post_init__
-    interactions: Int32Array = None  # type: ignore[assignment]  # filled in by __post_init__
-    layers: Int32Array = None  # type: ignore[assignment]  # filled in by __post_init__
-    tints: Float32Array = None  # type: ignore[assignment]  # filled in by __post_init__
-    opacities: Float32Array = None  # type: ignore[assignment]  # filled in by __post_init__
+    spill: Annotated[BoolArray, Values(kind=bool)] = None  # type: ignore[assignment]  # filled in by __post_init__
+    interactions: Annotated[Int32Array, Values(kind=Interaction)] = None  # type: ignore[assignment]  # filled in by __post_init__
+    layers: Annotated[Int32Array, Values(-8, 8, kind=int)] = None  # type: ignore[assignment]  # filled in by __post_init__
+    tints: Annotated[Float32Array, Values(kind=Rgb)] = None  # type: ignore[assignment]  # filled in by __post_init__
+    opacities: Annotated[Float32Array, Values(0.0, 1.0, kind=float)] = None  # type: ignore[assignment]  # filled in by __post_init__
     receivers: NDArray[Any] = None  # type: ignore[assignment]  # filled in by __post_init__
-    fade_angles: Float32Array = None  # type: ignore[assignment]  # filled in by __post_init__
-    fade_depths: Float32Array = None  # type: ignore[assignment]  # filled in by __post_init__
+    fade_angles: Annotated[Float32Array, Values(0.0, 180.0, "°", kind=float)] = None  # type: ignore[assignment]  # filled in by __post_init__
+    fade_depths: Annotated[Float32Array, Values(0.0, 2.0, "radii", kind=float)] = None  # type: ignore[assignment]  # filled in by __post_init__
 
     if TYPE_CHECKING:
 

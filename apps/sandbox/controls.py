@@ -3,14 +3,17 @@
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
+from math import isfinite
 from typing import Any
 
 from blobtree import Node
+from blobtree.colors import Rgb, Rgba
 from blobtree.formulas.falloff import Falloff
 from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.nodes.parameters import UNITS, Parameter, Quantity, describe, parameters_of
 from blobtree.transpile.python import plain_python
 from decals.errors import InvalidEdit
+from decals.options import Option
 from decals.validation import finite_number, one_of
 
 SLIDER_REACH = 4.0
@@ -104,6 +107,31 @@ def _control(parameter: Parameter, value: Any, size: float) -> Control:
         rows = [list(row) if isinstance(row, tuple) else row for row in value]
         return Control(parameter.name, "list", rows, doc, unit)
     return Control(parameter.name, "text", _shortened(value), doc, unit)
+
+
+def option_control(
+    option: Option, value: Any, low: float | None = None, high: float | None = None
+) -> dict[str, Any]:
+    """Return the control of an option of a function or a class, with other ends of its slider, if given."""
+    name, doc, unit = option.name, option.doc, option.values.unit
+    if option.kind is bool:
+        return asdict(Control(name, "switch", bool(value), doc))
+    if option.choices:
+        shown = (
+            "none"
+            if value is None
+            else (value if hasattr(value, "name") else option.kind(value)).name.lower()
+        )
+        return asdict(Control(name, "choice", shown, doc, choices=option.choices))
+    if option.kind in (Rgb, Rgba):
+        return asdict(Control(name, "color", hex_color(tuple(value)[:3]), doc))
+    low, high = option.values.low if low is None else low, option.values.high if high is None else high
+    if value is not None:
+        low, high = min(low, value), max(high, value)
+    if not isfinite(high - low):
+        return asdict(Control(name, "field", value, doc, unit, optional=option.optional))
+    step = 1.0 if option.kind is int else (high - low) / STEPS
+    return asdict(Control(name, "number", value, doc, unit, low, high, step, optional=option.optional))
 
 
 def _ends(parameter: Parameter, value: float | None, size: float) -> tuple[float, float]:

@@ -1,92 +1,83 @@
 """The panel of the selected decals, of the brush and of the contact modes."""
 
-from collections.abc import Callable
-from dataclasses import asdict
-from enum import Enum
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from blobtree.colors import color_rgb
-from decals.apps.sandbox.controls import STEPS, Control, hex_color, number_of
+from decals.apps.sandbox.controls import STEPS, Control, number_of, option_control
+from decals.apps.sandbox.outline import picture
 from decals.editing.action_state import ActionState
 from decals.editing.brushes import Brush, BrushSettings, default_decal_radius, default_radius, positive_number
-from decals.editing.commands import SetValues
+from decals.editing.commands import ReplaceImage, SetDrawing, SetValues
 from decals.editing.document import Document
 from decals.errors import InvalidEdit
-from decals.field.mapping import ImageMapping
-from decals.model import FADE_ANGLES, FADE_DEPTHS, NO_IMAGE, Interaction
+from decals.model import FADE_ANGLES, FADE_DEPTHS, NO_IMAGE, Decals
+from decals.options import arguments_of, described, options_of, values_of
 from decals.receivers import labels_of
-from decals.record import Contact
+from decals.rendering.options import Drawing
+from decals.scattering.scatter import scatter
+from decals.scenes.material import DecalMaterial
 from decals.scenes.objects import bounds_of
+from decals.scenes.scene import DecalImage
 from decals.validation import describe, one_of
 
 PLAIN = "tint alone"
 """Choice of an image that stands for none."""
 
 COLUMNS = {
-    "radius": ("radii", "visible radius, in model units"),
-    "opacity": ("opacities", "from invisible to opaque"),
-    "image": ("images", "image"),
-    "tint": ("tints", "colour that multiplies the image"),
-    "interaction": ("interactions", "push neighbours, lie above them, or below"),
-    "layer": ("layers", "drawn from the lowest up"),
-    "spill": ("spill", "also colours surface that faces away"),
-    "receivers": ("receivers", "objects that it lies on"),
-    "fade_angle": ("fade_angles", "degrees between the normals at which it has faded away; 0: no fade"),
-    "fade_depth": (
-        "fade_depths",
-        "distance from its plane, in radii, at which it has faded away; 0: no fade",
-    ),
+    "radius": "radii",
+    "opacity": "opacities",
+    "image": "images",
+    "tint": "tints",
+    "interaction": "interactions",
+    "layer": "layers",
+    "spill": "spill",
+    "receivers": "receivers",
+    "fade_angle": "fade_angles",
+    "fade_depth": "fade_depths",
 }
-"""Arrays of `decals.Decals` by the names of their controls, and what they mean."""
+"""Arrays of `decals.Decals` by the names of their controls."""
+
+NOT_OF_SCATTER = ("images", "spacing")
+"""Options of `decals.scatter` that the scene decides, or another option."""
+
+MATTE = {"roughness": 1.0, "metallic": 0.0, "occlusion": 1.0, "relief": 0.0}
+"""Numbers of an image without maps."""
+
+PREVIEW_SIZE = 240
+"""Width and height of the picture of the selected image, in pixels."""
+
+MAP_SHARE = 255.0
+"""Level of a map that stands for 1."""
 
 ANY_OBJECT = "any object"
 """Choice of receivers that stands for all objects."""
-
-MAX_DEPTH = 2.0
-"""End of the slider of fade depths, in radii."""
-
-LAYERS = 8
-"""Ends of the slider of layers; the field takes any layer."""
-
-MAX_STIFFNESS = 8.0
 
 
 def decal_controls(document: Document, selection: tuple[int, ...]) -> list[dict[str, Any]]:
     """Return the controls of the selected decals, with the values of the last one."""
     if not selection:
         return []
-    last = document.decals[selection[-1]]
-    value = {name: getattr(last, array)[0] for name, (array, _) in COLUMNS.items()}
+    last, options = document.decals[selection[-1]], options_of(Decals)
     low, high = bounds_of(document.objects) if document.objects else (np.zeros(3), np.ones(3))
-    reach = max(0.25 * float((high - low).max()), float(value["radius"]))
-    layers, depth = max(LAYERS, abs(int(value["layer"]))), max(MAX_DEPTH, float(value["fade_depth"]))
-    ends = {
-        "radius": (reach / STEPS, reach),
-        "opacity": (0.0, 1.0),
-        "layer": (-layers, layers),
-        "fade_angle": (0.0, FADE_ANGLES[1]),
-        "fade_depth": (0.0, depth),
-    }
-    names, receivers = image_names(document), str(value["receivers"])
-    others: dict[str, tuple[str, Any, tuple[str, ...]]] = {
-        "image": ("choice", names[int(value["image"]) + 1], tuple(names)),
-        "tint": ("color", hex_color(tuple(value["tint"].tolist())), ()),
-        "interaction": ("choice", Interaction(int(value["interaction"])).name.lower(), _names(Interaction)),
-        "spill": ("switch", bool(value["spill"]), ()),
-        "receivers": ("choice", receivers or ANY_OBJECT, tuple(receiver_choices(document, receivers))),
-    }
+    reach = 0.25 * float((high - low).max())
+    names, receivers = image_names(document), str(last.receivers[0])
     controls = []
-    for name, (_, doc) in COLUMNS.items():
-        if name in ends:
-            step = 1.0 if name == "layer" else None
-            controls.append(_slider(name, value[name].item(), *ends[name], doc, step=step))
+    for name, array in COLUMNS.items():
+        value = getattr(last, array)[0]
+        if name == "image":
+            controls.append(
+                asdict(Control(name, "choice", names[int(value) + 1], "image", choices=tuple(names)))
+            )
+        elif name == "receivers":
+            choices, doc = tuple(receiver_choices(document, receivers)), described(Decals)[array]
+            controls.append(asdict(Control(name, "choice", receivers or ANY_OBJECT, doc, choices=choices)))
         else:
-            kind, shown, choices = others[name]
-            controls.append(Control(name, kind, shown, doc, choices=choices))
-    return [asdict(control) for control in controls]
+            ends = (reach / STEPS, reach) if name == "radius" else ()
+            controls.append(option_control(replace(options[array], name=name), value.tolist(), *ends))
+    return controls
 
 
 def _slider(name: str, value: float, low: float, high: float, doc: str, step: float | None = None) -> Control:
@@ -111,25 +102,17 @@ def receiver_choices(document: Document, present: str) -> list[str]:
 def parsed_decal_value(document: Document, name: str, raw: Any) -> Any:
     """Return what a page sent for a value of decals, or raise `InvalidEdit`."""
     match name:
-        case "radius" | "opacity":
-            return number_of(name, raw)
-        case "layer":
-            return round(number_of(name, raw))
         case "image":
             names = image_names(document)
             return names.index(one_of(name, raw, names, InvalidEdit)) + NO_IMAGE
-        case "tint":
-            return color_rgb("tint", raw, InvalidEdit)
-        case "interaction":
-            return int(Interaction[one_of(name, raw, _names(Interaction), InvalidEdit).upper()])
-        case "spill":
-            return bool(raw)
         case "receivers":
             return "" if raw == ANY_OBJECT else raw
         case "fade_angle" | "fade_depth":
             least = (FADE_ANGLES if name == "fade_angle" else FADE_DEPTHS)[0]
             number = number_of(name, raw)
             return 0.0 if 0.0 <= number < least else number
+        case str() if name in COLUMNS:
+            return replace(options_of(Decals)[COLUMNS[name]], name=name).parsed(raw, InvalidEdit)
     raise InvalidEdit(f"value of decals: expected one of {', '.join(COLUMNS)}, got {describe(name)}")
 
 
@@ -137,11 +120,7 @@ def set_decal_value(state: ActionState, name: str, raw: Any, *, last: bool) -> N
     """Set a value of all selected decals; moves of a slider are one undo entry."""
     numbers = state.selected_numbers
     value = parsed_decal_value(state.session.document, name, raw)
-    label = f"set {name}"
-    state.begin_series((label, state.selection), label)
-    state.run_latest(SetValues.each(numbers, label, **{COLUMNS[name][0]: value}))
-    if last:
-        state.end_stroke()
+    state.run_step(SetValues.each(numbers, f"set {name}", **{COLUMNS[name]: value}), last=last)
 
 
 # -- brush and modes ------------------------------------------------------------------------------------
@@ -178,30 +157,62 @@ def set_brush(brush: BrushSettings, name: str, raw: Any) -> None:
     setattr(brush, name, number)
 
 
-def mode_controls(state: ActionState) -> list[dict[str, Any]]:
-    """Return the controls of contact mode, image mapping and stiffness."""
-    modes = state.modes
+# -- options of functions and classes -------------------------------------------------------------------
+
+
+def drawing_controls(drawing: Drawing) -> list[dict[str, Any]]:
+    """Return the controls of how the scene is drawn."""
+    values = values_of(Drawing, drawing)
+    return [option_control(option, values[name]) for name, option in options_of(Drawing).items()]
+
+
+def set_drawing(state: ActionState, name: str, raw: Any, *, last: bool) -> None:
+    """Set an option of how the scene is drawn; moves of a slider are one undo entry."""
+    drawing, options = state.session.document.drawing, options_of(Drawing)
+    value = options[one_of("option", name, options, InvalidEdit)].parsed(raw, InvalidEdit)
+    given = arguments_of(Drawing, values_of(Drawing, drawing) | {name: value})
+    state.run_step(SetDrawing(replace(drawing, **given), f"set {name}"), last=last)
+
+
+def first_scatter_values() -> dict[str, Any]:
+    """Return the options of `decals.scatter` at the beginning."""
+    options = options_of(scatter).values()
+    return {o.name: o.default for o in options if o.name not in NOT_OF_SCATTER} | {"count": 100}
+
+
+def scatter_controls(values: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the controls of options of `decals.scatter`."""
+    return [option_control(options_of(scatter)[name], value) for name, value in values.items()]
+
+
+def image_values(document: Document, number: int | None) -> dict[str, Any]:
+    """Return name, picture and controls of an image; without a number, of none."""
+    if number is None or number >= len(document.images):
+        return {"name": "", "picture": "", "controls": []}
+    image = document.images[number]
     controls = [
-        Control("contact", "choice", modes.contact.name.lower(), "how decals meet", choices=_names(Contact)),
-        Control(
-            "mapping", "choice", modes.mapping.name.lower(), "how images lie", choices=_names(ImageMapping)
-        ),
+        option_control(option, _level(image, name)) for name, option in options_of(DecalMaterial).items()
     ]
-    if modes.contact is Contact.ELASTIC:
-        reach = max(MAX_STIFFNESS, modes.stiffness)
-        controls.append(_slider("stiffness", modes.stiffness, 1.0, reach, "of elastic contact", step=0.1))
-    return [asdict(control) for control in controls]
-
-
-def _names(kind: type[Enum]) -> tuple[str, ...]:
-    return tuple(one.name.lower() for one in kind)
-
-
-def set_mode(state: ActionState, name: str, raw: Any) -> None:
-    """Set a mode to what a page sent; errors are those of the window's renderer."""
-    parse: dict[str, Callable[[Any], Any]] = {
-        "contact": lambda text: text,
-        "mapping": lambda text: text,
-        "stiffness": lambda raw: number_of("stiffness", raw),
+    return {
+        "name": image_names(document)[number + 1],
+        "picture": picture(image, PREVIEW_SIZE),
+        "controls": controls,
     }
-    setattr(state.modes, name, parse[one_of("mode", name, parse, InvalidEdit)](raw))
+
+
+def _level(image: DecalImage, name: str) -> float | None:
+    """Return a number of a material, or that of a map which is the same everywhere, else None."""
+    value = getattr(image, name, MATTE[name])
+    if not isinstance(value, np.ndarray):
+        return float(value)
+    return value.flat[0] / MAP_SHARE if value.min() == value.max() else None
+
+
+def set_image_value(state: ActionState, number: int, name: str, raw: Any, *, last: bool) -> None:
+    """Set a number of an image, which becomes a material."""
+    image, options = state.session.document.images[number], options_of(DecalMaterial)
+    value = options[one_of("option", name, options, InvalidEdit)].parsed(raw, InvalidEdit)
+    if not isinstance(image, DecalMaterial):
+        image = DecalMaterial(image.source, image.pixels)
+    values: dict[str, Any] = {name: value}
+    state.run_step(ReplaceImage(number, replace(image, **values), f"set {name}"), last=last)

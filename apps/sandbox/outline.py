@@ -12,6 +12,7 @@ from PIL import Image
 
 from blobtree.nodes.paths import Path as TreePath
 from decals.editing.document import Document
+from decals.images.texels import as_bytes
 from decals.scenes.objects import TreeObject
 from decals.scenes.scene import DecalImage
 
@@ -76,23 +77,22 @@ def outline(document: Document) -> list[dict[str, Any]]:
         label = document.layer_names.get(layer, f"layer {layer}")
         rows.append(Row(f"layer {layer}", label, "layer", 0, *flags))
     for number, image in enumerate(document.images):
-        name, picture = Path(image.source).name, _picture(image)
-        rows.append(Row(f"image {number}", name, "image", 0, picture=picture))
+        name = Path(image.source).name
+        rows.append(Row(f"image {number}", name, "image", 0, picture=picture(image)))
     return [asdict(row) for row in rows]
 
 
-_pictures: WeakKeyDictionary[DecalImage, str] = WeakKeyDictionary()
+_pictures: WeakKeyDictionary[DecalImage, dict[int, str]] = WeakKeyDictionary()
 
 
-def _picture(image: DecalImage) -> str:
-    """Return a small picture as a URL with its data; "" for images that are no bytes."""
-    if image.pixels.dtype != np.uint8:
-        return ""
-    if image not in _pictures:
+def picture(image: DecalImage, size: int = PICTURE_SIZE) -> str:
+    """Return a picture of an image, of a width and height in pixels, as a URL with its data."""
+    known = _pictures.setdefault(image, {})
+    if size not in known:
         file = BytesIO()
-        Image.fromarray(image.pixels).resize((PICTURE_SIZE, PICTURE_SIZE)).save(file, "PNG")
-        _pictures[image] = f"data:image/png;base64,{b64encode(file.getvalue()).decode('ascii')}"
-    return _pictures[image]
+        Image.fromarray(as_bytes(image.pixels)).resize((size, size)).save(file, "PNG")
+        known[size] = f"data:image/png;base64,{b64encode(file.getvalue()).decode('ascii')}"
+    return known[size]
 
 
 def _nodes(number: int, item: TreeObject) -> list[Row]:

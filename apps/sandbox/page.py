@@ -2,6 +2,7 @@
 
 import asyncio
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from trame.ui.vuetify3 import VAppLayout
@@ -77,6 +78,12 @@ OPEN_MENU = (
     "? 'node' : row.kind}"
 )
 """Open the menu of a row at the pointer."""
+
+DROP_ON_ROW = (
+    "$event.preventDefault(); $event.dataTransfer.files.length ? (dropped_on = row.key, "
+    f"{DROP.format('dataTransfer')}) : trigger('move', [$event.dataTransfer.getData('text/plain'), row.key])"
+)
+"""Send the files, or the key of the other row, that are dropped on a row."""
 
 RENAME_ROW = "!['image', 'more'].includes(row.kind) && (renamed = {key: row.key, name: row.label})"
 SEND_NAME = (
@@ -159,19 +166,29 @@ class Page:
         constants = {"catalog": self.sandbox.catalog(), "thumbnails": thumbnails(), "theme": "light"}
         renamed, dropped = {"key": "", "name": ""}, None
         server.state.menu = {"open": False, "x": 0, "y": 0, "key": "", "label": "", "kind": ""}
-        server.state.update({**constants, **self.values(), "renamed": renamed, "dropped": dropped})
+        server.state.update(
+            {**constants, **self.values(), "renamed": renamed, "dropped": dropped, "dropped_on": ""}
+        )
         server.state.change("dropped")(self._take_dropped)
         server.controller.trigger("handle")(self.sandbox.drag_handle)
-        server.controller.trigger("rename")(lambda key, name: self.sandbox.change_row(key, "rename", name))
+        for change in ("rename", "move"):
+            server.controller.trigger(change)(partial(self._change_row, change))
         self._build()
         server.controller.on_server_ready.add(self._start)
         server.controller.on_server_exited.add(self._stop)
 
+    def _change_row(self, change: str, key: str, value: str) -> None:
+        self.sandbox.change_row(key, change, value)
+
     def _take_dropped(self, dropped: Any, **_: Any) -> None:
         """Take files that the browser sent."""
         if dropped:
-            self._server.state.dropped = None
-            self.sandbox.upload(dropped)
+            key, self._server.state.dropped, self._server.state.dropped_on = (
+                self._server.state.dropped_on,
+                None,
+                "",
+            )
+            self.sandbox.upload(dropped, key)
 
     # -- values -----------------------------------------------------------------------------------------
 
@@ -258,6 +275,7 @@ class Page:
     def _build_panels(self) -> None:
         """Build the panels of decals and nodes, and the history."""
         panels.build_scatter(self.sandbox)
+        panels.build_options(self.sandbox)
         panels.build_decal_panel(self.sandbox)
         self._build_panel()
         panels.build_pick()
@@ -328,7 +346,7 @@ class Page:
             vuetify3.VListItem(
                 v_if="renamed.key !== row.key",
                 title=("row.label",),
-                raw_attrs=['role="button"'],
+                raw_attrs=['role="button"', 'draggable="true"'],
                 prepend_icon=(f"row.picture ? '' : {ROW_ICONS}",),
                 prepend_avatar=("row.picture",),
                 active=("row.key === selected || marked.includes(row.key)",),
@@ -336,16 +354,11 @@ class Page:
                 classes="flex-grow-1",
                 click=(self._click, "[row.key, $event.ctrlKey || $event.metaKey, selected]"),
                 contextmenu=f"$event.preventDefault(); {OPEN_MENU}",
-                draggable=True,
                 dragstart="$event.dataTransfer.setData('text/plain', row.key)",
                 dragover="$event.preventDefault()",
-                drop=(
-                    self.sandbox.change_row,
-                    "[($event.preventDefault(), $event.dataTransfer.getData('text/plain')), 'move', row.key]",
-                ),
+                drop=DROP_ON_ROW,
                 dblclick=RENAME_ROW,
                 __events=["dragstart", "dragover", "drop", "dblclick", "contextmenu"],
-                __properties=["draggable"],
             )
             for change, flag, icons in ROW_FLAGS:
                 html.Button(

@@ -35,7 +35,7 @@ BRUSH_TEXTS = {
     Brush.ERASE: "erase brush: drag to delete decals",
     Brush.RELAX: "relax brush: drag to even decals out",
 }
-WORDS = "c.name.replaceAll('_', ' ')"
+WORDS = "c.name.replaceAll(/[_.]/g, ' ')"
 """Name of the control ``c`` in words."""
 
 CURVE = """<svg viewBox="-0.02 -0.02 1.04 1.04" preserveAspectRatio="none"
@@ -336,7 +336,7 @@ def build_brushes(sandbox: Sandbox) -> None:
 
 
 def build_decal_panel(sandbox: Sandbox) -> None:
-    """Build the panels of the brush, the selected decals, scattering, and the contact modes."""
+    """Build the panels of the brush, the selected decals, the selected image, and the drawing."""
     for shown, title, source, event in (
         ("brush.controls.length", "{{ brush.brush }} brush", "brush.controls", sandbox.set_brush),
         (
@@ -345,27 +345,34 @@ def build_decal_panel(sandbox: Sandbox) -> None:
             "decal.controls",
             sandbox.set_decals,
         ),
-        ("decals", "Contact of {{ decals }} decals", "modes", sandbox.set_mode),
+        ("image.name", "Image {{ image.name }}", "image.controls", sandbox.set_image),
     ):
         with html.Div(v_if=shown, classes="pa-3"):
             html.H2(title, classes="text-subtitle-1")
+            if source == "image.controls":
+                html.Img(src=("image.picture",), alt="", style="width: 50%; border-radius: 50%")
             build_controls(source, event)
+
+
+def build_options(sandbox: Sandbox) -> None:
+    """Build the panels, closed at first, of scattering and of the drawing."""
+    with vuetify3.VExpansionPanels(v_if="outline.length > 1", multiple=True, flat=True, elevation=0):
+        for title, source, event in (
+            ("Scattering", "scattering", sandbox.set_scattering),
+            ("Drawing", "drawing", sandbox.set_drawing),
+        ):
+            with vuetify3.VExpansionPanel(title=title), vuetify3.VExpansionPanelText():
+                build_controls(source, event)
 
 
 def build_scatter(sandbox: Sandbox) -> None:
     """Build the button that covers an object with decals."""
     with html.Div(v_if="outline.length > 1", classes="d-flex align-center ga-2 px-3 pt-3"):
-        vuetify3.VTextField(
-            v_model=("scatter_count", 100),
-            raw_attrs=named("'number of decals'"),
-            style="max-width: 84px",
-            **FIELD,
-        )
         vuetify3.VBtn(
             "{{ decals ? 'Scatter again' : 'Scatter decals' }}",
             size="small",
             variant="tonal",
-            click=(sandbox.scatter, "[scatter_count]"),
+            click=sandbox.scatter,
         )
 
 

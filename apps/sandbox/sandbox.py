@@ -24,20 +24,24 @@ from decals import cover
 from decals.apps.models.samples import SAMPLES, axes_of, sample
 from decals.apps.models.scenes import empty_scene, new_file
 from decals.apps.sandbox import catalog
-from decals.apps.sandbox.controls import controls_of, number_of, parsed
+from decals.apps.sandbox.controls import controls_of, parsed
 from decals.apps.sandbox.decal_panel import (
     brush_values,
     decal_controls,
-    mode_controls,
+    drawing_controls,
+    first_scatter_values,
+    image_values,
+    scatter_controls,
     set_brush,
     set_decal_value,
-    set_mode,
+    set_drawing,
+    set_image_value,
 )
 from decals.apps.sandbox.display import Display
 from decals.apps.sandbox.folder import MODELS, plain_name, read_upload, unused, values_of_start
 from decals.apps.sandbox.outline import key_of, outline, parse_key
 from decals.apps.views import THREE_QUARTER, UPRIGHT
-from decals.editing.commands import AddImage, DeleteDecals, RemoveImage, SetValues
+from decals.editing.commands import AddImage, DeleteDecals, RemoveImage, ReplaceImage, SetValues
 from decals.editing.document import Document
 from decals.editing.file_actions import PICTURE_SUFFIXES
 from decals.editing.recovery import recovery_path
@@ -46,12 +50,15 @@ from decals.editing.session import UndoEntry
 from decals.editing.tree_commands import RenameObject
 from decals.editing.visibility import RenameLayer, RenameNode
 from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.options import arguments_of, options_of
+from decals.scattering.scatter import scatter
 from decals.scenes.camera import Camera
 from decals.scenes.files import is_scene_file, load_model
 from decals.scenes.objects import MeshObject, SceneObject, bounds_of, flagged
 from decals.scenes.scene import DecalImage, Scene
 from decals.validation import describe, one_of, whole_number
 from decals.window import EditWindow
+from decals.window.host_plotter import show_background
 
 REST_SECONDS = 1.0
 """A slider that rests so long has ended its edit: one moved by keys does not tell its end."""
@@ -121,6 +128,9 @@ class Sandbox:
         self._step: Callable[[], None] | None = None
         self._rows: list[dict[str, Any]] = []
         self._marked: list[str] = []
+        self._image: int | None = None
+        self._scattering = first_scatter_values()
+        self._background = window.document.drawing.background
         self._outlined: tuple[Any, ...] = (None,) * 5
         self._measured: tuple[object, float] = None, 1.0
         self._reported_pick: tuple[object, dict[str, str]] = None, {}
@@ -136,7 +146,7 @@ class Sandbox:
             "status": self.status,
             "busy": window.busy,
             "outline": self._outline(),
-            "selected": "" if state.primitive is None else key_of(*state.primitive),
+            "selected": self._selected(),
             "marked": self._marked,
             "panel": self._panel(),
             "done": list(session.labels[-MAX_HISTORY:]),
@@ -149,10 +159,18 @@ class Sandbox:
                 "controls": decal_controls(self._window.document, state.selection),
             },
             "brush": brush_values(window.document, state.brush),
-            "modes": mode_controls(state),
+            "drawing": drawing_controls(window.document.drawing),
+            "scattering": scatter_controls(self._scattering),
+            "image": image_values(window.document, self._shown_image),
             "pick": self._pick(),
             "decals": len(window.document.decals),
         }
+
+    def _selected(self) -> str:
+        """Return the key of the selected row."""
+        if (primitive := self._window.actions.state.primitive) is not None:
+            return key_of(*primitive)
+        return "" if self._shown_image is None else f"image {self._shown_image}"
 
     def _pick(self) -> dict[str, str]:
         """Return what the last click met."""
@@ -233,21 +251,29 @@ class Sandbox:
             )
 
     def select(self, key: str) -> None:
-        """Select the node of a row; the row of an object selects its root, "" selects nothing."""
-        self._marked = []
+        """Select a node, the root of an object, the decals of a layer, or an image; "" selects nothing."""
+        self._marked, self._image = [], None
         with self._reported():
-            trees = self._window.actions.trees
+            state, document = self._window.actions.state, self._window.document
             if key == "":
-                self._window.actions.state.primitive = None
+                state.primitive = None
                 return
             family, number, path = _parsed(key)
             if family == "layer":
-                state = self._window.actions.state
-                state.selection = state.selectable(_decals_of(self._window.document, number))
-                return
-            number, path = self._row(key)
-            trees.select_node(number, path)
-            self._marked = [key_of(number, path)]
+                state.selection = state.selectable(_decals_of(document, number))
+            elif family == "image":
+                self._image = whole_number("image", number, 0, len(document.images) - 1, InvalidEdit)
+                state.primitive, state.selection = None, ()
+            else:
+                self._window.actions.trees.select_node(number, path)
+                self._marked = [key_of(number, path)]
+
+    @property
+    def _shown_image(self) -> int | None:
+        """The selected image, unless something else has been selected since, or it was removed."""
+        state, count = self._window.actions.state, len(self._window.document.images)
+        kept = state.primitive is None and not state.selection and (self._image or 0) < count
+        return self._image if kept else None
 
     def set_value(self, name: str, raw: Any, last: bool = True, index: object = ()) -> None:
         """Set a parameter of the selected node to what a control sent; see `TreeActions.set_parameter`.
@@ -291,6 +317,10 @@ class Sandbox:
 
     def settle(self) -> None:
         """Keep the view up to date, and end the edit of a slider that has rested; call this regularly."""
+        if self._background != self._window.document.drawing.background:
+            self._background = self._window.document.drawing.background
+            show_background(self._window.plotter, self._background)
+            self._window.redraw(whole=True)
         if self.display.update():
             self._window.redraw(whole=True)
         if time.monotonic() - self._last_step > REST_SECONDS:
@@ -444,8 +474,11 @@ class Sandbox:
             is_scene = path.suffix == ".json" and (not path.exists() or is_scene_file(path))
             self._open(load, path if is_scene else self._new_file(f"{path.stem}-decals"))
 
-    def upload(self, files: object) -> None:
-        """Take files that were dropped on the page: images and models are added, a scene is opened."""
+    def upload(self, files: object, key: str = "") -> None:
+        """Take files that were dropped on the page: images and models are added, a scene is opened.
+
+        An image that was dropped on the row of a layer shows on its decals, on that of an image replaces it.
+        """
         for file in files if isinstance(files, list | tuple) else [files]:
             with self._reported():
                 found, window = read_upload(file), self._window
@@ -453,15 +486,28 @@ class Sandbox:
                 if isinstance(found, Scene):
                     self._open(_given(found), self._new_file(name))
                 elif isinstance(found, DecalImage):
-                    window.actions.state.run(AddImage(found))
-                    count = len(window.document.images)
-                    window.actions.state.show(f"added image {count - 1}; choose it for the selected decals")
+                    self._take_image(found, key)
                 else:
                     taken = {item.name for item in window.document.objects}
                     renamed = replace(found, name=unused(name, taken))
                     if isinstance(renamed, MeshObject):
                         renamed = replace(renamed, source=None)  # the file that was read exists no more
                     self._add_object(renamed)
+
+    def _take_image(self, image: DecalImage, key: str) -> None:
+        """Add an image that was dropped on a row, or replace that of the row."""
+        family, row, _ = _parsed(key) if key else ("", 0, ())
+        session, state = self._window.session, self._window.actions.state
+        count, shown = len(session.document.images), ""
+        if family == "image":
+            state.run(ReplaceImage(row, image))
+            return
+        with session.stroke("add an image"):
+            session.do(AddImage(image))
+            if family == "layer":
+                session.do(_showing(session.document, count, row))
+                shown = f" and shown on {session.document.layer_names.get(row, f'layer {row}')}"
+        state.show(f"added image {count}{shown or '; choose it for the selected decals'}")
 
     def _add_object(self, item: SceneObject) -> None:
         first = not self._window.document.objects
@@ -529,13 +575,35 @@ class Sandbox:
             }
             moves[one_of("camera", name, moves, InvalidEdit)]()
 
-    def scatter(self, count: object) -> None:
-        """Cover the object of the selected node, or every object, with decals."""
+    def scatter(self) -> None:
+        """Cover the object of the selected node, or every object, with decals; each time another seed."""
         with self._reported():
-            state = self._window.actions.state
+            state, values = self._window.actions.state, self._scattering
             objects = range(len(self._window.document.objects))
             numbers = tuple(objects) if state.primitive is None else (state.primitive[0],)
-            self._window.actions.decals.scatter_over(numbers, round(number_of("count", count)))
+            self._window.actions.decals.scatter_over(numbers, **arguments_of(scatter, values))
+            self._scattering = values | {"seed": values["seed"] + 1}
+
+    def set_scattering(self, name: str, raw: Any, _last: bool = True) -> None:
+        """Set an option of the next scattering."""
+        with self._reported():
+            option = options_of(scatter)[one_of("option", name, self._scattering, InvalidEdit)]
+            self._scattering |= {name: option.parsed(raw, InvalidEdit)}
+
+    def set_drawing(self, name: str, raw: Any, last: bool = True) -> None:
+        """Set how the scene is drawn: contact mode, mapping, background and more."""
+        state = self._window.actions.state
+        self._slide(lambda: set_drawing(state, name, raw, last=bool(last)), last=bool(last))
+
+    def set_image(self, name: str, raw: Any, last: bool = True) -> None:
+        """Set a number of the material of the selected image."""
+
+        def step() -> None:
+            if (number := self._shown_image) is None:
+                raise InvalidEdit("no image is selected; click on one in the outline")
+            set_image_value(self._window.actions.state, number, name, raw, last=bool(last))
+
+        self._slide(step, last=bool(last))
 
     def set_decals(self, name: str, raw: Any, last: bool = True) -> None:
         """Set a value of the selected decals to what a control sent."""
@@ -546,11 +614,6 @@ class Sandbox:
         """Set the brush, or one of its numbers."""
         with self._reported():
             set_brush(self._window.actions.state.brush, name, raw)
-
-    def set_mode(self, name: str, raw: Any, _last: bool = True) -> None:
-        """Set contact mode, stiffness or image mapping of the window."""
-        with self._reported():
-            set_mode(self._window.actions.state, name, raw)
 
     def change_row(self, key: str, change: str, value: Any = None) -> None:
         """Change what a row of the outline stands for.
@@ -623,8 +686,7 @@ class Sandbox:
         family, layer, _ = _parsed(key)
         if family != "layer":
             raise InvalidEdit(f"an image can be moved onto a layer only, got {describe(key)}")
-        numbers = _decals_of(self._window.document, layer)
-        self._window.actions.state.run(SetValues.each(numbers, "change the image", images=number))
+        self._window.actions.state.run(_showing(self._window.document, number, layer))
 
     @staticmethod
     def _row(key: object) -> tuple[int, TreePath]:
@@ -660,6 +722,11 @@ def _parsed(key: object) -> tuple[str, int, TreePath]:
         if family == "":
             return "node", number, path
     raise InvalidEdit(f"row: expected one of an object, a node, a layer or an image, got {describe(key)}")
+
+
+def _showing(document: Document, image: int, layer: int) -> SetValues:
+    """Return the command that lets the decals of a layer show an image."""
+    return SetValues.each(_decals_of(document, layer), "change the image", images=image)
 
 
 def _decals_of(document: Document, layer: int) -> Int64Array:

@@ -13,6 +13,7 @@ from .commands import (
     ReplaceScene,
     ScaleDecals,
     SetCamera,
+    SetDrawing,
     SetValues,
     TurnDecals,
 )
@@ -84,6 +85,7 @@ __all__ = [
     "ScaleDecals",
     "ScatterDecals",
     "SetCamera",
+    "SetDrawing",
     "SetParameter",
     "SetValues",
     "ShowDecals",

@@ -218,6 +218,13 @@ class ActionState:
             return False
         return True
 
+    def run_step(self, command: Command, *, last: bool) -> None:
+        """Carry out a step of a slider; steps with one label and selection are one undo entry."""
+        self.begin_series((command.label, self.selection), command.label)
+        self.run_latest(command)
+        if last:
+            self.end_stroke()
+
     def run_latest(self, command: Command) -> None:
         """Carry out a command of a drag; errors become the message."""
         self.run_latest_step(command.label, step_of(command), long=takes_long(command))

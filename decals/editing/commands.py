@@ -15,6 +15,7 @@ from decals.errors import InvalidEdit
 from decals.images.load import AnyImage
 from decals.index.rows import as_numbers
 from decals.model import LAYER_LIMIT, NO_IMAGE, Decals, Interaction
+from decals.rendering.options import Drawing
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage, Scene
 from decals.surfaces.surface import unit_rows
@@ -531,7 +532,7 @@ class ReplaceImage:
 
     number: int
     image: AnyImage
-    label: ClassVar[str] = "replace an image"
+    label: str = "replace an image"
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
@@ -602,6 +603,37 @@ class SetCamera:
         """Return the edit."""
         instance("camera", self.camera, Camera, InvalidEdit, "Camera.framing makes one")
         return document.compute_parts(camera=self.camera)
+
+
+@dataclass(frozen=True, eq=False)
+class SetDrawing:
+    """Replace how the scene is drawn: contact mode, mapping, samples, background.
+
+    Parameters
+    ----------
+    drawing
+        The new options.
+    label
+        Name of the undo entry.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, SetDrawing
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(SetDrawing(decals.rendering.Drawing(contact="radial")))
+    >>> session.document.scene.drawing.contact
+    <Contact.RADIAL: 2>
+    """
+
+    drawing: Drawing
+    label: str = "set the drawing"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        instance("drawing", self.drawing, Drawing, InvalidEdit, "a scene has .drawing")
+        return Edit() if self.drawing == document.drawing else document.compute_parts(drawing=self.drawing)
 
 
 def _without_image(decals: Decals, index: int) -> Decals:

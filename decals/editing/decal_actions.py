@@ -1,6 +1,7 @@
 """Actions on decals: add, resize, turn, recolour, reorder, relax and scatter."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -228,17 +229,23 @@ class DecalActions:
         """Replace the decals on an object by as many scattered ones, with another seed each time."""
         self.scatter_over((require_pick(cursor).object,))
 
-    def scatter_over(self, numbers: tuple[int, ...], count: int | None = None) -> None:
-        """Replace the decals on objects by scattered ones; without a count, by as many as there are."""
+    def scatter_over(
+        self, numbers: tuple[int, ...], count: int | None = None, seed: int | None = None, **options: Any
+    ) -> None:
+        """Replace the decals on objects by scattered ones; without a count, by as many as there are.
+
+        The options are those of `ScatterDecals`. Default: another seed each time.
+        """
         document = self._state.session.document
         self._scatter_count += 1
-        seed, objects, images = self._scatter_count, document.objects, len(document.images)
+        seed = self._scatter_count if seed is None else seed
+        objects, images = document.objects, len(document.images)
         positions = document.decals.column("positions")
 
         def compute(progress: Progress, cancel: Callable[[], bool]) -> Command:
             on = nearest_points(objects, positions).objects if count is None else np.zeros(0)
             wanted = (int(np.isin(on, numbers).sum()) or FIRST_DECAL_COUNT) if count is None else count
-            command = ScatterDecals(numbers, wanted, seed)
+            command = ScatterDecals(numbers, wanted, seed, options)
             return command.compute_command(objects, images, progress=progress, cancel=cancel)
 
         self._state.background.compute("scatter", compute)

@@ -1,8 +1,8 @@
 """Commands for whole objects and many decals: scatter, relax, add and remove objects."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,12 +19,15 @@ from decals.scattering.polish import PUSHING_RADIUS, relax_near
 from decals.scattering.scatter import scatter
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject, check_names, relative_to
 from decals.scenes.recipe import Recipe
-from decals.validation import describe, finite_vector, whole_number
+from decals.validation import describe, finite_vector, instance, one_of, whole_number
 
 SPACING = 3.0**0.5 / 1.03
 """Distance of neighbours among decals without gaps, in radii (see `sizing.RADIUS_MARGIN`)."""
 
 MAX_SCATTERED_DECALS = 1_000_000
+
+SCATTER_OPTIONS = ("regularity", "sizing", "factor", "direction", "choice", "jitter", "weights")
+"""Arguments of `decals.scatter` that a command may have besides count and seed."""
 
 RELAXED_DISTANCE = 1.01 * PUSHING_RADIUS
 """Distance up to which decals take part when a neighbourhood is relaxed, in spacings."""
@@ -98,6 +101,8 @@ class ScatterDecals:
         Number of decals.
     seed
         Random seed.
+    options
+        More arguments of `decals.scatter`, such as ``{"regularity": 0.5}``.
 
     Examples
     --------
@@ -113,6 +118,7 @@ class ScatterDecals:
     objects: tuple[int, ...]
     count: int
     seed: int = 0
+    options: dict[str, Any] = field(default_factory=dict)
     label: ClassVar[str] = "scatter"
 
     def compute_command(
@@ -139,6 +145,8 @@ class ScatterDecals:
         whole_number("count", self.count, 0, MAX_SCATTERED_DECALS, InvalidEdit)
         if images < 1:
             raise InvalidEdit("expected an image for the decals to show, got none; add one first")
+        for name in instance("options", self.options, dict, InvalidEdit, "such as {'factor': 0.5}"):
+            one_of("option", name, SCATTER_OPTIONS, InvalidEdit)
         covered = tuple(objects[number] for number in self.objects)
         decals = scatter(
             [item.surface for item in covered],
@@ -147,9 +155,11 @@ class ScatterDecals:
             images=images,
             progress=progress,
             cancel=cancel,
+            **self.options,
         )
         names = [item.name for item in covered]
-        recipe = Recipe.of("decals.scatter", seed=self.seed, models=names, count=self.count, images=images)
+        given = {"models": names, "count": self.count, "images": images, **self.options}
+        recipe = Recipe.of("decals.scatter", seed=self.seed, **given)
         return ReplaceDecals(self.objects, decals, covered, recipe)
 
     def compute(self, document: Document) -> Edit:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, Self, TypeAlias
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from decals.field.mapping import ImageMapping
 from decals.images.texels import Pixels
 from decals.index.editor import DecalEditor
 from decals.model import Decals
+from decals.options import Values
 from decals.receivers import takes_named_only
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS
 from decals.rendering.lights import Lighting
@@ -108,12 +109,12 @@ class Drawing:
     <Contact.RADIAL: 2>
     """
 
-    samples: int = 2
+    samples: Annotated[int, Values(1, 8)] = 2
     contact: AnyContact = DEFAULT_CONTACT
     mapping: ImageMapping = ImageMapping.CORRECTED
     background: Background = STUDIO
     lights: Lighting | None = None
-    stiffness: float = DEFAULT_STIFFNESS
+    stiffness: Annotated[float, Values(1.0, 8.0)] = DEFAULT_STIFFNESS
     filtered: bool = False
 
     if TYPE_CHECKING:  # names of modes are converted

@@ -1,7 +1,7 @@
 """`scatter`: cover surfaces with decals in one call."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import warp as wp
 from numpy.typing import ArrayLike
@@ -12,6 +12,7 @@ from blobtree.progress import Progress, reporting
 from decals.errors import InvalidScattering
 from decals.index.build_kernels import list_cells
 from decals.model import Decals
+from decals.options import Values
 from decals.scattering.appearance import Appearance
 from decals.scattering.domain import Density, Mask, as_surfaces
 from decals.scattering.orientation import Direction
@@ -42,15 +43,15 @@ RELAXATION_SHARE = 0.8
 def scatter(
     surfaces: "Surface | HasSurface | Model | Sequence[Surface | HasSurface | Model]",
     *,
-    count: int | None = None,
-    spacing: float | None = None,
+    count: Annotated[int | None, Values(1, 1000)] = None,
+    spacing: Annotated[float | None, Values(unit="model units")] = None,
     seed: int = 0,
     density: Density | None = None,
     mask: Mask | None = None,
     fixed: ArrayLike | None = None,
-    regularity: float = 1.0,
+    regularity: Annotated[float, Values(0.0, 1.0)] = 1.0,
     sizing: Sizing | str = Sizing.COVERING,
-    factor: float = 1.0,
+    factor: Annotated[float, Values(0.2, 2.0)] = 1.0,
     direction: Direction = None,
     images: int = 1,
     weights: ArrayLike | None = None,

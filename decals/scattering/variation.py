@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,6 +10,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
 from decals.errors import InvalidScattering
 from decals.model import MAX_IMAGES
+from decals.options import Values
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.surfaces.surface import unit_rows
 from decals.validation import real_array, real_number, whole_number
@@ -44,9 +46,9 @@ class Jitter:
     True
     """
 
-    position: float = 0.0
-    size: float = 0.0
-    angle: float = 0.0
+    position: Annotated[float, Values(0.0, 1.0, "spacings")] = 0.0
+    size: Annotated[float, Values(0.0, 1.0)] = 0.0
+    angle: Annotated[float, Values(0.0, 180.0, "°")] = 0.0
 
     def __post_init__(self) -> None:
         for name in ("position", "size", "angle"):

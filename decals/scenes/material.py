@@ -4,7 +4,7 @@ import os
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from blobtree._typing import Float32Array, UInt8Array
 from decals.errors import InvalidImage
 from decals.images.load import AnyImage, image_pixels
 from decals.images.texels import Pixels, as_bytes, decode_srgb, unit_levels, without_excess
+from decals.options import Values
 from decals.scenes.scene import DecalImage
 from decals.validation import describe, is_file, real_number
 
@@ -86,12 +87,12 @@ class DecalMaterial(DecalImage):
 
     pixels: Pixels = field(repr=False)
     normal: UInt8Array = field(default=UNSET, repr=False)
-    roughness: UInt8Array = field(default=UNSET, repr=False)
-    metallic: UInt8Array = field(default=UNSET, repr=False)
-    occlusion: UInt8Array = field(default=UNSET, repr=False)
+    roughness: Annotated[UInt8Array, Values(0.0, 1.0, kind=float)] = field(default=UNSET, repr=False)
+    metallic: Annotated[UInt8Array, Values(0.0, 1.0, kind=float)] = field(default=UNSET, repr=False)
+    occlusion: Annotated[UInt8Array, Values(0.0, 1.0, kind=float)] = field(default=UNSET, repr=False)
     emission: UInt8Array = field(default=UNSET, repr=False)
     height: Float32Array | None = field(default=None, repr=False)
-    relief: float = 0.0
+    relief: Annotated[float, Values(-0.5, 0.5, "radii")] = 0.0
 
     if TYPE_CHECKING:  # images of any kind are converted
 

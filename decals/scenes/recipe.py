@@ -2,7 +2,8 @@
 
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
+from enum import Enum
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Self
 
@@ -78,6 +79,10 @@ def plain(value: Any) -> Any:
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple) and len(value) <= MAX_ITEMS:
         return [plain(item) for item in value]
+    if isinstance(value, Enum):
+        return plain(value.value)
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(vars(value))
     return getattr(value, "__qualname__", None) or describe(value)
 
 

@@ -212,8 +212,8 @@ class EditWindow:
 
     def _content_version(self) -> tuple[object, ...]:
         subplot, document = self.subplot, self.document
-        modes = subplot.contact, subplot.shown_mapping, subplot.stiffness
-        return id(document.objects), id(document.images), document.decals.version, *modes
+        drawing = subplot.drawing, subplot.shown_mapping
+        return id(document.objects), id(document.images), document.decals.version, *drawing
 
     # -- frames -----------------------------------------------------------------------------------------
 

@@ -1,10 +1,12 @@
 """View, decal panel and outline changes of the sandbox, without a browser."""
 
+import io
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import decals
 from blobtree import Point, Transform
@@ -13,9 +15,10 @@ from blobtree.nodes.surgery import move_branch
 from decals.apps.sandbox.display import MODES, OVERLAYS
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.apps.views import PRESETS
-from decals.editing.commands import AddImage
+from decals.editing.commands import AddImage, ReplaceImage
 from decals.errors import InvalidScene
 from decals.record import Contact
+from decals.rendering.options import Background
 from decals.scenes.objects import MeshObject
 from decals.window import EditWindow
 from tests.apps.sandbox.test_sandbox import TREE, finish
@@ -210,7 +213,7 @@ def test_values_of_decals_are_set_as_one_entry_each(sandbox: Sandbox, shared: Ed
     assert digest(shared.document) == before
 
 
-def test_brush_and_modes_are_set(sandbox: Sandbox, shared: EditWindow) -> None:
+def test_brush_and_drawing_are_set(sandbox: Sandbox, shared: EditWindow) -> None:
     sandbox.set_brush("brush", "scatter")
     sandbox.set_brush("radius", "0.7")
     sandbox.set_brush("density", 0.5)
@@ -221,14 +224,86 @@ def test_brush_and_modes_are_set(sandbox: Sandbox, shared: EditWindow) -> None:
         sandbox.set_brush(name, value)
         assert "expected" in sandbox.status
     sandbox.set_brush("brush", "select")
-    sandbox.set_mode("contact", "elastic")
-    sandbox.set_mode("stiffness", 3)
-    assert (shared.subplot.contact, shared.subplot.stiffness) == (Contact.ELASTIC, 3.0)
-    for name, value in (("contact", "x"), ("stiffness", 0), ("stiffness", "x"), ("color", 1)):
-        sandbox.set_mode(name, value)
+    before = shared.document.drawing
+    sandbox.set_drawing("contact", "radial")
+    for stiffness in (4, "3.5", 3):
+        sandbox.set_drawing("stiffness", stiffness, False)
+    sandbox.set_drawing("stiffness", 3)
+    sandbox.set_drawing("background.top", "#ff0000")
+    sandbox.settle()
+    drawing = shared.document.scene.drawing
+    assert (shared.subplot.contact, shared.subplot.stiffness) == (Contact.RADIAL, 3.0)
+    assert drawing.background == Background((1, 0, 0), before.background.bottom)
+    assert shared.plotter.renderer.GetBackground2() == (1.0, 0.0, 0.0)
+    assert sandbox.values()["done"] == ["set contact", "set stiffness", "set background.top"]
+    wrong: list[Any] = [("contact", "x"), ("stiffness", 0), ("stiffness", "x"), ("color", 1), (None, 1)]
+    for name, value in [*wrong, ("filtered", 3), ("samples", ""), ("background.top", None)]:
+        sandbox.set_drawing(name, value)
         assert "expected" in sandbox.status
-    sandbox.set_mode("stiffness", 1)
-    sandbox.set_mode("contact", "product")
+    sandbox.go_to(0)
+    assert shared.document.drawing == before
+
+
+def test_scattering_takes_the_options_of_its_panel(sandbox: Sandbox, shared: EditWindow) -> None:
+    values = {"count": "30", "regularity": 0.2, "sizing": "touching", "jitter.size": 0.3, "direction": "none"}
+    for name, value in values.items():
+        sandbox.set_scattering(name, value)
+    shown = {control["name"]: control["value"] for control in sandbox.values()["scattering"]}
+    assert shown["sizing"] == "touching"
+    for wrong in (("count", "x"), ("images", 3), ("sizing", "x"), (None, 1)):
+        sandbox.set_scattering(*wrong)
+        assert "expected" in sandbox.status
+    sandbox.scatter()
+    finish(shared)
+    recipe = shared.document.recipe
+    assert recipe is not None
+    assert (len(shared.document.decals), recipe.parameters["jitter"]["size"]) == (30, 0.3)
+    expected = decals.scatter(
+        [item.surface for item in shared.document.objects],
+        count=30,
+        images=1,
+        regularity=0.2,
+        sizing="touching",
+        jitter=decals.scattering.Jitter(size=0.3),
+    )
+    np.testing.assert_array_equal(shared.document.scene.decals.positions, expected.positions)
+    np.testing.assert_array_equal(shared.document.scene.decals.radii, expected.radii)
+    assert sandbox.values()["scattering"][1]["value"] == 1  # the next seed
+
+
+def test_images_become_materials_and_are_dropped_on_rows(sandbox: Sandbox, shared: EditWindow) -> None:
+    before = digest(shared.document)
+    sandbox.set_image("roughness", 0.5)
+    assert "no image is selected" in sandbox.status
+    sandbox.select("image 0")
+    for roughness in (0.7, 0.5, 0.2):
+        sandbox.set_image("roughness", roughness, False)
+    sandbox.set_image("roughness", 0.2)
+    material = shared.document.images[0]
+    assert isinstance(material, decals.DecalMaterial)
+    assert material.roughness.max() == 51
+    assert sandbox.values()["selected"] == "image 0"
+    shown = sandbox.values()["image"]
+    assert shown["picture"].startswith("data:image/png")
+    assert [control["value"] for control in shown["controls"]] == pytest.approx([0.2, 0, 1, 0])
+    assert sandbox.values()["done"] == ["set roughness"]
+    for name, value in (("roughness", 2), ("relief", 0.2), ("height", 1), ("metallic", "")):
+        sandbox.set_image(name, value)
+        assert "expected" in sandbox.status
+    shared.session.do(ReplaceImage(0, decals.DecalMaterial("m", material.pixels, roughness=material.pixels)))
+    assert sandbox.values()["image"]["controls"][0]["value"] is None  # a map
+    file = io.BytesIO()
+    Image.new("RGBA", (8, 8), "red").save(file, "PNG")
+    given = [{"name": "red.png", "content": file.getvalue()}]
+    sandbox.upload(given, "layer 0")
+    assert set(shared.document.decals.decals.images.tolist()) == {1}
+    sandbox.upload(given, "image 0")
+    assert [image.pixels.shape for image in shared.document.images] == [(8, 8, 4)] * 2
+    assert sandbox.values()["done"][-2:] == ["add an image", "replace an image"]
+    sandbox.upload(given, "image 9")
+    assert "expected" in sandbox.status
+    sandbox.go_to(0)
+    assert digest(shared.document) == before
 
 
 def test_a_click_reports_what_it_meets(sandbox: Sandbox, shared: EditWindow) -> None:
