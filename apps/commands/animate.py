@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
@@ -18,6 +18,7 @@ from decals.apps.commands.options import (
     MappingName,
     OptionalWhole,
     Trust,
+    UpAxis,
     check_count,
     parse_size,
 )
@@ -58,7 +59,7 @@ def animate(
     decals: OptionalWhole = None,
     image: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
     camera: str | None = None,
-    up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
+    up: UpAxis = None,
     size: str = "800x600",
     samples: OptionalWhole = None,
     contact: ContactName = None,
@@ -96,8 +97,6 @@ def animate(
         Image of the decals, as for render. Can be repeated.
     camera
         View of the first frame, as for render.
-    up
-        The axis that points upward. Default: y, or the axis of the sample.
     size
         Width and height of the pictures in pixels.
     samples
@@ -108,11 +107,6 @@ def animate(
         Image mapping, as for render.
     seed
         Seed of the random numbers of decals.
-    define
-        A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
-        repeated.
-    trust
-        Let a scene read files outside its folder, and any number of images.
     """
     pixels = parse_size(size)
     view = parse_view(camera, axes_of(model[0]) if up is None else UPRIGHT[up])

@@ -65,14 +65,6 @@ def bake(
         Cells along the longest side of each implicit object. Default: 64.
     creases
         Keep the edges that unions, intersections and differences leave.
-    crease_angle
-        Angle between two faces of a mesh, in degrees from 0 to 180, from which their edge is sharp. Default:
-        35, or that of a saved scene.
-    define
-        A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
-        repeated.
-    trust
-        Let a scene read files outside its folder, and any number of images.
     """
     check_output(output, (".glb",))
     check_count("--samples", samples, 1, MAX_SAMPLES)

@@ -1,7 +1,7 @@
 """``implicit-decals edit``: the editor window."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -11,8 +11,11 @@ from decals.apps.commands.options import (
     Definitions,
     MappingName,
     OptionalWhole,
+    Seed,
+    StartImages,
     Stiffness,
     Trust,
+    UpAxis,
     parse_size,
 )
 from decals.apps.models.loading import import_definitions
@@ -26,15 +29,13 @@ def edit(
     /,
     *,
     decals: OptionalWhole = None,
-    image: Annotated[
-        list[str] | None, Parameter(name=("--image", "--images"), negative=(), show_default=False)
-    ] = None,
-    up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
+    image: StartImages = None,
+    up: UpAxis = None,
     size: str = "1200x800",
     contact: ContactName = None,
     stiffness: Stiffness = None,
     mapping: MappingName = None,
-    seed: OptionalWhole = None,
+    seed: Seed = None,
     save: Path | None = None,
     define: Definitions = None,
     trust: Trust = False,
@@ -50,11 +51,6 @@ def edit(
         which N adds a ball.
     decals
         Number of decals scattered at the start. Default: 500.
-    image
-        Image of the decals, as for render. Can be repeated. A saved scene keeps its images, and these are
-        added. Default: scale.
-    up
-        The axis that points upward. Default: y, or the axis of the sample.
     size
         Width and height of the window in pixels.
     contact
@@ -63,16 +59,9 @@ def edit(
         Stiffness of elastic contact at the beginning, likewise. Shift + P changes it.
     mapping
         Image mapping at the beginning, likewise. U changes it in the window.
-    seed
-        Seed of the random numbers: equal seeds give equal decals. Default: 0.
     save
         The JSON file that Ctrl + S writes. Default: the opened scene, or a new file such as MODEL-decals.json
         or scene.json.
-    define
-        A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
-        repeated.
-    trust
-        Let a scene read files outside its folder, and any number of images.
     """
     pixels = parse_size(size)
     check_options(decals, seed, save)

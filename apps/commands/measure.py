@@ -71,11 +71,6 @@ def measure(
         Seed of these points.
     json_output
         Print one JSON object in place of a table, with the measures of each decal.
-    define
-        A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
-        repeated.
-    trust
-        Let a scene read files outside its folder, and any number of images.
     """
     import_definitions(define)
     with progress_bars() as progress:

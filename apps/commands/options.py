@@ -38,8 +38,40 @@ OptionalWhole = Annotated[int | None, Parameter(converter=_whole, show_default=F
 """An optional whole number on the command line."""
 
 
-Definitions = Annotated[list[str] | None, Parameter(name="--define", negative=(), show_default=False)]
+Definitions = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--define",
+        negative=(),
+        show_default=False,
+        help="A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. "
+        "Can be repeated.",
+    ),
+]
 """Modules that define custom nodes."""
+
+Seed = Annotated[
+    OptionalWhole, Parameter(help="Seed of the random numbers: equal seeds give equal decals. Default: 0.")
+]
+"""An optional seed of scattered decals."""
+
+StartImages = Annotated[
+    list[str] | None,
+    Parameter(
+        name=("--image", "--images"),
+        negative=(),
+        show_default=False,
+        help="Image of the decals, as for render. Can be repeated. A saved scene keeps its images, and these "
+        "are added. Default: scale.",
+    ),
+]
+"""Images that an editor opens with."""
+
+UpAxis = Annotated[
+    Literal["x", "y", "z"] | None,
+    Parameter(show_default=False, help="The axis that points upward. Default: y, or the axis of the sample."),
+]
+"""An optional upward axis on the command line."""
 
 ContactName = Annotated[Literal["product", "min", "radial", "elastic"] | None, Parameter(show_default=False)]
 """An optional contact mode on the command line."""
@@ -50,10 +82,25 @@ Stiffness = Annotated[float | None, Parameter(show_default=False)]
 MappingName = Annotated[Literal["corrected", "chord", "walked"] | None, Parameter(show_default=False)]
 """An optional image mapping on the command line."""
 
-CreaseAngle = Annotated[float | None, Parameter(show_default=False)]
+CreaseAngle = Annotated[
+    float | None,
+    Parameter(
+        show_default=False,
+        help="Angle between two faces of a mesh, in degrees from 0 to 180, from which their edge is sharp. "
+        "Default: 35, or that of a saved scene.",
+    ),
+]
 """An optional crease angle of meshes, in degrees, on the command line."""
 
-Trust = Annotated[bool, Parameter(name="--trust", negative=(), show_default=False)]
+Trust = Annotated[
+    bool,
+    Parameter(
+        name="--trust",
+        negative=(),
+        show_default=False,
+        help="Let a scene read files outside its folder, and any number of images.",
+    ),
+]
 """Permission for a scene to read files outside its folder."""
 
 

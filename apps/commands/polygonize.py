@@ -56,11 +56,6 @@ def polygonize(
         Put vertices on the edges and corners that unions, intersections and differences leave.
     split_normals
         As --creases, with separate vertices and normals on the sides of a crease, so that it looks sharp.
-    define
-        A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
-        repeated.
-    trust
-        Let a scene read files outside its folder, and any number of images.
     """
     check_output(output, MESH_SUFFIXES)
     import_definitions(define)

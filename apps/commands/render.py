@@ -2,7 +2,7 @@
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -15,8 +15,10 @@ from decals.apps.commands.options import (
     Definitions,
     MappingName,
     OptionalWhole,
+    Seed,
     Stiffness,
     Trust,
+    UpAxis,
     check_count,
     parse_size,
 )
@@ -38,14 +40,14 @@ def render(
     decals: OptionalWhole = None,
     image: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
     camera: str | None = None,
-    up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
+    up: UpAxis = None,
     size: str = "1200x900",
     samples: OptionalWhole = None,
     contact: ContactName = None,
     stiffness: Stiffness = None,
     filtered: Annotated[bool | None, Parameter(negative=(), show_default=False)] = None,
     mapping: MappingName = None,
-    seed: OptionalWhole = None,
+    seed: Seed = None,
     save: Path | None = None,
     crease_angle: CreaseAngle = None,
     define: Definitions = None,
@@ -71,8 +73,6 @@ def render(
     camera
         View: three-quarter, front, back, left, right, top, bottom, or a direction x,y,z toward the camera.
         Default: three-quarter.
-    up
-        The axis that points upward. Default: y, or the axis of the sample.
     size
         Width and height of the picture in pixels.
     samples
@@ -90,18 +90,8 @@ def render(
     mapping
         Image mapping: corrected for the curvature of the surface, chord (the paper's projection), or walked
         along the shortest path, for edges and corners. Default: that of a saved scene, or corrected.
-    seed
-        Seed of the random numbers: equal seeds give equal decals. Default: 0.
     save
         Also write the scene to this JSON file, which render and edit can open.
-    crease_angle
-        Angle between two faces of a mesh, in degrees from 0 to 180, from which their edge is sharp. Default:
-        35, or that of a saved scene.
-    define
-        A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
-        repeated.
-    trust
-        Let a scene read files outside its folder, and any number of images.
     """
     pixels = parse_size(size)
     view = parse_view(camera, axes_of(model[0]) if up is None else UPRIGHT[up])

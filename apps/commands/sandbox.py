@@ -16,12 +16,21 @@ from importlib import import_module
 from itertools import count
 from pathlib import Path
 from subprocess import PIPE
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 from rich.console import Console
 
-from decals.apps.commands.options import Definitions, OptionalWhole, Trust, Whole, check_count
+from decals.apps.commands.options import (
+    Definitions,
+    OptionalWhole,
+    Seed,
+    StartImages,
+    Trust,
+    UpAxis,
+    Whole,
+    check_count,
+)
 from decals.errors import InvalidInput, MissingPackage
 
 HOST = "127.0.0.1"
@@ -46,11 +55,9 @@ def sandbox(
     /,
     *,
     decals: OptionalWhole = None,
-    image: Annotated[
-        list[str] | None, Parameter(name=("--image", "--images"), negative=(), show_default=False)
-    ] = None,
-    up: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
-    seed: OptionalWhole = None,
+    image: StartImages = None,
+    up: UpAxis = None,
+    seed: Seed = None,
     save: Path | None = None,
     define: Definitions = None,
     port: Whole = 8080,
@@ -76,19 +83,9 @@ def sandbox(
         Mesh files, BlobTrees in JSON, samples, or one saved scene, as for render. Default: a start page.
     decals
         Number of decals scattered at the start. Default: 500.
-    image
-        Image of the decals, as for render. Can be repeated. A saved scene keeps its images, and these are
-        added. Default: scale.
-    up
-        The axis that points upward. Default: y, or the axis of the sample.
-    seed
-        Seed of the random numbers: equal seeds give equal decals. Default: 0.
     save
         The JSON file that Ctrl + S writes. Default: the opened scene, or a new file such as MODEL-decals.json
         or scene.json.
-    define
-        A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
-        repeated.
     port
         Port of the page; 0 takes a free one.
     host
@@ -102,8 +99,6 @@ def sandbox(
         Open the page in the default browser.
     desktop
         Show the page in a window of its own. Needs pywebview.
-    trust
-        Let a scene read files outside its folder, and any number of images.
     lab
         Open the contact lab: six lessons on decals and solids in contact.
     lessons

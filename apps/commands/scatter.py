@@ -95,14 +95,6 @@ def scatter(
         From 0 (random positions) to 1 (as even as possible).
     seed
         Seed of the random numbers: equal seeds give equal decals.
-    crease_angle
-        Angle between two faces of a mesh, in degrees from 0 to 180, from which their edge is sharp. Default:
-        35, or that of a saved scene.
-    define
-        A Python file or module that defines the custom nodes of BlobTrees in JSON. Its code is run. Can be
-        repeated.
-    trust
-        Let a scene read files outside its folder, and any number of images.
     """
     if count is not None and spacing is not None:
         raise InvalidInput("expected --count or --spacing, got both; leave one of them out")
