@@ -1,7 +1,7 @@
 """Paths through a tree: find nodes by path, place them in the world, move, resize and replace them."""
 
 import reprlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +15,6 @@ from blobtree.nodes.primitives import Cone, Leaf, Point, Segment
 from blobtree.nodes.tree import Node, Transform
 from blobtree.nodes.values import operands_of
 from blobtree.tape.model import checked_tree
-from blobtree.validation import finite_vector
 
 _RADII = (Quantity.RADIUS, Quantity.SEMI_AXES, Quantity.RADII)
 _LENGTHS = (Quantity.LENGTH, Quantity.EXTENTS)
@@ -76,12 +75,6 @@ def primitive_path(tree: Node, path: Path) -> Path:
     return path
 
 
-def primitive_near(tree: Node, point: ArrayLike) -> Path:
-    """Return the path of the primitive with the highest field at `point` (3,), the first of equal ones."""
-    points: Float32Array = np.array([finite_vector("point", point)], np.float32)
-    return max(primitives_around(tree, points), key=lambda path: float(node_in_world(tree, path)(points)[0]))
-
-
 def primitives_around(tree: Node, point: Float32Array) -> list[Path]:
     """Return the paths of the primitives whose boxes hold a point float32[1, 3]; of all if no box does."""
     paths = primitive_paths(tree)
@@ -140,12 +133,17 @@ def world_matrix(tree: Node, path: Path) -> Float64Array:
 
 def world_transform(tree: Node, path: Path) -> Float64Array:
     """Return the map, float64[4, 4], from a node's own space to the world; errors as `world_matrix`."""
+    return common_transform(list(nodes_along(tree, path))[:-1], "primitive")
+
+
+def common_transform(nodes: Iterable[Node], what: str) -> Float64Array:
+    """Return the map, float64[4, 4], of nodes one below the other; `what` lies below them, for errors."""
     matrix = np.eye(4)
-    for node in list(nodes_along(tree, path))[:-1]:
+    for node in nodes:
         if isinstance(node, Transform):
             matrix = matrix @ square_matrix(node.matrix)
         elif node.warp is not None:
-            raise InvalidNode(f"the primitive lies below a {type(node).__name__}; move that as a whole")
+            raise InvalidNode(f"the {what} lies below a {type(node).__name__}; move that as a whole")
     return matrix
 
 

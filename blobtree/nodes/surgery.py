@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree._typing import Float32Array, Float64Array
+from blobtree._typing import Float32Array
 from blobtree.errors import InvalidNode
 from blobtree.formulas.operators import Support
 from blobtree.nodes.contact import SolidContact
 from blobtree.nodes.paths import (
     Path,
+    common_transform,
     mapped,
     moved,
     node_at,
@@ -24,7 +25,6 @@ from blobtree.nodes.paths import (
     primitive_at,
     primitives_around,
     resized,
-    square_matrix,
     with_node,
     world_matrix,
     world_transform,
@@ -233,19 +233,9 @@ def _placed(tree: Node, path: Path, target: Path, branch: Node) -> Node:
     old, new = path[:-1], target[:-1]
     common = next((i for i, pair in enumerate(zip(old, new, strict=False)) if pair[0] != pair[1]), None)
     shared = 1 + (min(len(old), len(new)) if common is None else common)
-    change = np.linalg.solve(_matrix(tree, new, shared), _matrix(tree, old, shared))
+    maps = [common_transform(list(nodes_along(tree, each))[shared:], "place") for each in (new, old)]
+    change = np.linalg.solve(*maps)
     return branch if np.allclose(change, np.eye(4)) else branch.transform(change)
-
-
-def _matrix(tree: Node, path: Path, first: int) -> Float64Array:
-    """Return the map, float64[4, 4], of the nodes along a path from the one of this index on."""
-    matrix = np.eye(4)
-    for node in list(nodes_along(tree, path))[first:]:
-        if isinstance(node, Transform):
-            matrix = matrix @ square_matrix(node.matrix)
-        elif node.warp is not None:
-            raise InvalidNode(f"the place lies below a {type(node).__name__}; move that as a whole")
-    return matrix
 
 
 def _without(tree: Node, path: Path, placed: Node) -> tuple[Node, Path]:

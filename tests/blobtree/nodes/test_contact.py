@@ -25,7 +25,7 @@ from blobtree import (
 )
 from blobtree.meshing.clip import clipped, enclosed_volume, outlines_of
 from blobtree.nodes import surgery
-from blobtree.nodes.paths import node_at, primitive_near, primitive_paths, with_node
+from blobtree.nodes.paths import node_at, primitive_paths, with_node
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
 from tests.oracles import blobtree as oracle
 
@@ -224,7 +224,6 @@ def test_paths_and_surgery() -> None:
         SolidContact(THREE, stiffness=(1, 2, 3), height=(0.01, 0.02, 0.03), names=("a", "b", "c")) | PAIR[0]
     )
     assert primitive_paths(model) == [(0, 0), (0, 1), (0, 2), (1,)]
-    assert primitive_near(model, (1.5, 0, 0)) == (0, 0)
     smaller = with_node(model, (0, 0), Point((0.7, 0, 0), radius=0.5))
     assert node_at(smaller, (0, 0)) == Point((0.7, 0, 0), radius=0.5)
     rest = node_at(surgery.remove_branch(model, (0, 1)), (0,))

@@ -11,7 +11,7 @@ import pytest
 from blobtree import Ellipsoid, InvalidNode, Node, Point, Sum, Transform, from_json, polygonize, to_json
 from blobtree.lazy import Lazy
 from blobtree.nodes import surgery
-from blobtree.nodes.paths import node_at, primitive_at, primitive_near, primitive_paths, resized, with_node
+from blobtree.nodes.paths import node_at, primitive_at, primitive_paths, resized, with_node
 from blobtree.nodes.tree import Macro
 from blobtree.tape.program import compile_program
 
@@ -101,7 +101,6 @@ def test_paths_and_surgery_treat_an_ellipsoid_as_a_primitive() -> None:
     tree = BALL + EGG.rotate((0, 0, 1), 30)
     assert primitive_paths(tree) == [(0,), (1, 0)]
     assert primitive_at(tree, (1,)) is EGG
-    assert primitive_near(tree, (0.5, 0.4, 0.1)) == (1, 0)
     surface = polygonize(tree, resolution=24).vertices
     right = surface[surface[:, 0].argmax()]
     assert surgery.dominant_primitive(tree, right) == (1, 0)

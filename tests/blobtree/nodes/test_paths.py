@@ -8,7 +8,6 @@ from blobtree.nodes.paths import (
     moved,
     node_in_world,
     primitive_at,
-    primitive_near,
     primitive_paths,
     with_node,
 )
@@ -35,8 +34,6 @@ def test_a_primitive_alone_lies_where_it_lies_in_the_tree() -> None:
     tree = A.translate((3, 0, 0)) + B
     points = np.random.default_rng(0).normal(0, 3, (200, 3)).astype(np.float32)
     np.testing.assert_array_equal(node_in_world(tree, (0, 0))(points), A.translate((3, 0, 0))(points))
-    assert primitive_near(tree, (3, 0, 1)) == (0, 0)
-    assert primitive_near(tree, (1.5, 0, 0.5)) == (1,)
 
 
 def test_moving_keeps_what_a_primitive_is() -> None:

@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from blobtree import InvalidNode
-from blobtree.nodes.paths import primitive_near, primitive_paths
+from blobtree.nodes.paths import primitive_paths
+from blobtree.nodes.surgery import dominant_primitive
 from decals.editing import (
     AddDecals,
     AddImage,
@@ -187,7 +188,7 @@ def do_and_undo(session: EditSession, name: str, x: Any) -> None:
         (lambda x: pick(Document.from_scene(scene()), (0, 0, 1), x), InvalidPoints),
         (lambda x: first_hit(scene().objects, x, (0, 0, 1)), InvalidPoints),
         (lambda x: outline(Document.from_scene(scene()), x), InvalidEdit),
-        (lambda x: primitive_near(TREE, x), InvalidNode),
+        (lambda x: dominant_primitive(TREE, x), InvalidNode),
         (lambda x: primitive_paths(x), InvalidNode),
     ],
 )

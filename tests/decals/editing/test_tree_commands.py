@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from blobtree import ISO, Difference, Intersection, InvalidNode, Point, Ricci, Segment, Sum, Union
-from blobtree.nodes.paths import moved, node_at, node_in_world, primitive_near, primitive_paths, with_node
+from blobtree.nodes.paths import moved, node_at, node_in_world, primitive_paths, with_node
 from blobtree.nodes.surgery import (
     SOFTNESS,
     Join,
@@ -181,7 +181,6 @@ def test_a_copy_and_a_new_primitive_lie_at_the_given_place(tree: Any, choice: An
 def test_the_primitive_that_shows_is_the_tool_in_a_hole() -> None:
     tree = A - Point((0, 0, 1), radius=0.5) - B
     assert dominant_primitive(tree, (0, 0, 0.5)) == (0, 1)
-    assert primitive_near(tree, (0, 0, 0.5)) == (0, 0)
     assert dominant_primitive(tree, (0.7, 0, 0)) == (1,)
     assert dominant_primitive(tree, (-1, 0, 0)) == (0, 0)
     assert dominant_primitive(A + B, (2.1, 0, 0)) == (1,)
