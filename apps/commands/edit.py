@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from decals.apps.commands.opening import check_options, opened, report_unsaved
+from decals.apps.commands.opening import check_options, keep_memory_low, opened, report_unsaved
 from decals.apps.commands.options import (
     ContactName,
     Definitions,
@@ -84,6 +84,7 @@ def edit(
     opening.add_images(window)
     try:
         with window:
+            keep_memory_low()
             window.show()
     finally:
         report_unsaved(window, "edit")

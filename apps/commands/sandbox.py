@@ -119,7 +119,12 @@ def sandbox(
         if desktop:
             return _show_window(command(1))
         return _serve_sessions(command, sessions, host, port, browser=browser)
-    from decals.apps.commands.opening import check_options, opened, report_unsaved
+    from decals.apps.commands.opening import (
+        check_options,
+        keep_memory_low,
+        opened,
+        report_unsaved,
+    )
     from decals.apps.models.loading import import_definitions
     from decals.window import EditWindow
     from decals.window.host_plotter import new_plotter
@@ -149,6 +154,7 @@ def sandbox(
                 ready.add(lambda **_: threading.Thread(target=_end_with_input, daemon=True).start())
             else:
                 ready.add(lambda **_: _announce(host, server.port, query, open_browser=own_browser))
+            keep_memory_low()
             with _port_in_use_reported(port):
                 server.start(
                     host=host,

@@ -37,12 +37,24 @@ OF_SERVER = "driving", "trame__template"
 MAX_MESSAGE_BYTES = 250_000_000
 """Longest message: the server reserves as much as its first part announces."""
 
+RANGES = {
+    "viewport.image.animation.fps.max": ((1, 240),),
+    "viewport.image.push.quality": (None, (0, 100), (0.1, 8)),
+    "viewport.image.push.original.size": (None, (0, 16384), (0, 16384)),
+}
+"""Least and greatest values of arguments that trame keeps unchecked; None for those that it checks."""
+
+MAX_WAITING_BYTES = 32_000_000
+"""Bytes of messages that wait for a browser, from which on its connection is ended."""
+
 PICTURES, HEAD_BYTES = b"viewport.image.push.subscription", 256
 """Name that messages with pictures have among their first bytes."""
 
 
 class Outbox:
     """Sends messages to one browser: no other waits for it, and only the newest picture is sent.
+
+    If more than `MAX_WAITING_BYTES` wait, the connection is ended: the browser can load the page again.
 
     Parameters
     ----------
@@ -54,7 +66,9 @@ class Outbox:
         self._socket = socket
         self._messages: deque[bytes] = deque()
         self._picture = b""
+        self._waiting = 0
         self._task: asyncio.Task[None] | None = None
+        self._end: asyncio.Task[None] | None = None
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._socket, name)
@@ -66,24 +80,36 @@ class Outbox:
 
     async def send_bytes(self, message: bytes) -> None:
         """Send a message soon, in the order of calls but for pictures."""
+        if self._end is not None:
+            return
+        loop = asyncio.get_running_loop()
         if PICTURES in message[:HEAD_BYTES]:
             self._picture = message
         else:
             self._messages.append(message)
-        if self._task is None:
-            self._task = asyncio.get_running_loop().create_task(self._send(), name="messages of a browser")
+            self._waiting += len(message)
+        if self._waiting > MAX_WAITING_BYTES:
+            self._forget()
+            close = self._socket.close(code=WSCloseCode.TRY_AGAIN_LATER, drain=False)
+            self._end = loop.create_task(close, name="end of a browser")
+        elif self._task is None:
+            self._task = loop.create_task(self._send(), name="messages of a browser")
+
+    def _forget(self) -> None:
+        self._messages.clear()
+        self._picture, self._waiting = b"", 0
 
     async def _send(self) -> None:
         try:
             while self._messages or self._picture:
                 if self._messages:
                     message = self._messages.popleft()
+                    self._waiting -= len(message)
                 else:
                     message, self._picture = self._picture, b""
                 await self._socket.send_bytes(message)
         except ConnectionError:  # the browser has left
-            self._messages.clear()
-            self._picture = b""
+            self._forget()
         finally:
             self._task = None
 
@@ -197,6 +223,9 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
                     raise KeyError(change["key"])
         elif name == LIFECYCLE and not first.startswith("client"):
             raise ValueError(first)
+        for value, limits in zip((first, *others), RANGES.get(name, ()), strict=False):
+            if limits is not None and not limits[0] <= value <= limits[1]:
+                raise ValueError(f"expected a number from {limits[0]} to {limits[1]}")
 
     def _keep_mouse(self, client: str, call: Callable[[Any], Any], event: dict[str, Any]) -> None:
         """Remember a button that is down, to release it if its browser leaves."""

@@ -372,7 +372,7 @@ class BackgroundJobs:
                 message = request.step(fork)
                 fork.prepare(surfaces=not following)
             except ImplicitDecalsError as error:
-                failure = error
+                failure = error.with_traceback(None)  # its frames would keep the fork in a cycle
 
             def complete() -> Job | None:
                 if failure is not None and fork.current:

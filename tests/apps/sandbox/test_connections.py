@@ -6,6 +6,7 @@ import logging
 import posixpath
 import re
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -47,7 +48,7 @@ class Browser:
     def __init__(self, page: Any, server: Any) -> None:
         self._page, self._server = page, server
 
-    async def open(self) -> "Browser":
+    async def open(self, token: object = "wslink-secret") -> "Browser":
         import aiohttp
         from trame_server.client import WsLinkSession
 
@@ -55,7 +56,11 @@ class Browser:
         self.socket = await self._http.ws_connect(f"ws://127.0.0.1:{self._server.port}/ws", autoping=True)
         self._session = WsLinkSession(self.socket)
         self._listens = asyncio.create_task(self._session.listen())
-        await (await self._session.auth(secret="wslink-secret"))
+        answer = await self._session.auth(secret=token)
+        await asyncio.wait((answer, self._listens), return_when=asyncio.FIRST_COMPLETED)
+        if not answer.done() or answer.exception() is not None:
+            await self.close()
+            raise PermissionError("the server refused the token")
         self.driving = (await self.call("trame.state.get"))["state"]["driving"]
         self._session.register_subscription("trame.state.topic", self._take)
         return self
@@ -76,18 +81,35 @@ class Browser:
         x, y = (at[0] + 0.5) / SIZE[0], (at[1] + 0.5) / SIZE[1]
         return await self.call("viewport.mouse.interaction", {**event, "x": x, "y": y})
 
+    async def ended(self, seconds: float = 10.0) -> None:
+        """Wait until the server has ended the connection; `TimeoutError` if it does not."""
+        await asyncio.wait_for(asyncio.shield(self._listens), seconds)
+
+    async def watch_slowly(self, seconds: float) -> None:
+        """Read all messages, but take so long for each picture."""
+        from decals.apps.sandbox.connections import HEAD_BYTES, PICTURES
+
+        self._listens.cancel()
+        async for message in self.socket:
+            if PICTURES in message.data[:HEAD_BYTES]:
+                await asyncio.sleep(seconds)
+
     async def close(self) -> None:
         """Vanish without a word to the page."""
         await self.socket.close()
-        await self._listens
+        with suppress(asyncio.CancelledError):
+            await self._listens
         await self._http.close()
 
 
-Check = Callable[[EditWindow, Any, Callable[[], Awaitable[Browser]]], Awaitable[None]]
+Connect = Callable[..., Awaitable[Browser]]
+"""Opens a connection, with a token."""
+
+Check = Callable[[EditWindow, Any, Connect], Awaitable[None]]
 
 
-def serve(check: Check, *, shared: bool = False) -> None:
-    """Serve a page to a check."""
+def serve(check: Check, **options: Any) -> None:
+    """Serve a page with options to a check."""
     from trame.app import get_server
 
     from decals.apps.sandbox.page import Page
@@ -97,11 +119,11 @@ def serve(check: Check, *, shared: bool = False) -> None:
         with EditWindow(scene, off_screen=True, size=SIZE) as window:
             window.show()
             server = get_server(f"connections {id(window)}", client_type="vue3")
-            page = Page(server, window, shared=shared)
-            options: dict[str, Any] = {"exec_mode": "task", "port": 0, "timeout": 0, "open_browser": False}
-            task = server.start(host="127.0.0.1", show_connection_info=False, **options)
+            page = Page(server, window, **options)
+            network: dict[str, Any] = {"exec_mode": "task", "port": 0, "timeout": 0, "open_browser": False}
+            task = server.start(host="127.0.0.1", show_connection_info=False, **network)
             await server.ready
-            await check(window, page, lambda: Browser(page, server).open())
+            await check(window, page, lambda *token: Browser(page, server).open(*token))
             await server.stop()
             await task
 
@@ -115,7 +137,7 @@ async def until(true: Callable[[], object]) -> None:
 
 
 def test_one_browser_drives_and_passes_control(vtk_display: None) -> None:
-    async def check(window: EditWindow, page: Any, connect: Callable[[], Awaitable[Browser]]) -> None:
+    async def check(window: EditWindow, page: Any, connect: Connect) -> None:
         first, second, third = [await connect() for _ in range(3)]
         assert [browser.driving["drives"] for browser in (first, second, third)] == [True, False, False]
         await second.trigger(page.sandbox.select, "0/1")
@@ -145,7 +167,7 @@ def test_one_browser_drives_and_passes_control(vtk_display: None) -> None:
 def test_a_browser_that_leaves_in_a_drag_ends_it_as_one_entry(
     vtk_display: None, caplog: pytest.LogCaptureFixture
 ) -> None:
-    async def check(window: EditWindow, page: Any, connect: Callable[[], Awaitable[Browser]]) -> None:
+    async def check(window: EditWindow, page: Any, connect: Connect) -> None:
         before = digest(window.document)
         for times in (1, 2):  # a button that was never released would swallow the next press
             browser, other = await connect(), await connect()
@@ -176,7 +198,7 @@ def test_malformed_messages_are_refused_without_an_exception(
 ) -> None:
     odd: list[Any] = [None, 3, "x", [], {}, [1, 2], {"view": "-1"}, {"key": 3}]
 
-    async def check(window: EditWindow, page: Any, connect: Callable[[], Awaitable[Browser]]) -> None:
+    async def check(window: EditWindow, page: Any, connect: Connect) -> None:
         before, browser = digest(window.document), await connect()
         templates = {
             key: page._server.state[key] for key in page._server.state.to_dict() if "template" in key
@@ -192,6 +214,12 @@ def test_malformed_messages_are_refused_without_an_exception(
         await browser.call("trame.state.update", changes)
         assert {key: page._server.state[key] for key in templates} == templates
         assert digest(window.document) == before
+        for name, *values in (
+            ("viewport.image.animation.fps.max", "x"),
+            ("viewport.image.push.quality", "-1", 50, "2"),
+            ("viewport.image.push.original.size", "-1", 1e9, 1e9),
+        ):
+            assert "refused" in (await browser.call(name, *values))["error"]
         await browser.close()
         announced = (3_000_000_000).to_bytes(4, "little")  # the whole message, of which the rest never comes
         for data in (b"", b"x", bytes(12), b"x" * 40, bytes(8) + announced + b"x", "text"):
@@ -199,7 +227,7 @@ def test_malformed_messages_are_refused_without_an_exception(
             await (
                 browser.socket.send_str(data) if isinstance(data, str) else browser.socket.send_bytes(data)
             )
-            await asyncio.wait_for(asyncio.shield(browser._listens), 10)  # the server ends the connection
+            await browser.ended()
             await browser.close()
 
     serve(check)
@@ -207,7 +235,7 @@ def test_malformed_messages_are_refused_without_an_exception(
 
 
 def test_the_page_is_small_and_names_no_other_server(vtk_display: None) -> None:
-    async def check(_: EditWindow, page: Any, _connect: Callable[[], Awaitable[Browser]]) -> None:
+    async def check(_: EditWindow, page: Any, _connect: Connect) -> None:
         import aiohttp
 
         state, base = page._server.state, f"http://127.0.0.1:{page._server.port}/"
@@ -234,8 +262,11 @@ def test_the_page_is_small_and_names_no_other_server(vtk_display: None) -> None:
     serve(check)
 
 
-def test_nobody_waits_for_a_slow_browser_which_gets_the_newest_picture() -> None:
+def test_nobody_waits_for_a_slow_browser_which_gets_the_newest_picture(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     pytest.importorskip("aiohttp")
+    from decals.apps.sandbox import connections
     from decals.apps.sandbox.connections import PICTURES, Outbox
 
     class Socket:
@@ -244,6 +275,9 @@ def test_nobody_waits_for_a_slow_browser_which_gets_the_newest_picture() -> None
         def __init__(self) -> None:
             self.sent: list[bytes] = []
             self.goes = asyncio.Event()
+
+        async def close(self, **_: object) -> None:
+            self.closed = True
 
         async def send_bytes(self, message: bytes) -> None:
             await self.goes.wait()
@@ -265,6 +299,12 @@ def test_nobody_waits_for_a_slow_browser_which_gets_the_newest_picture() -> None
         while len(socket.sent) < 4:
             await asyncio.sleep(0)
         assert socket.sent == [b"a", b"b", pictures[-1], b"c"]
+        monkeypatch.setattr(connections, "MAX_WAITING_BYTES", 100)
+        socket.goes.clear()
+        for _ in range(30):
+            await outbox.send_bytes(b"0123456789")
+        await asyncio.sleep(0)
+        assert outbox.closed
         outbox = Outbox(Broken())
         await outbox.send_bytes(PICTURES)
         while outbox.behind:

@@ -1,0 +1,317 @@
+"""Random messages of two browsers to the sandbox's server: valid, malformed and torn.
+
+    python -m tests.apps.sandbox.messages --count 10000
+
+Browsers vanish while they drag and while they wait for answers; a third one takes 2 s for each picture. The
+figures are printed as JSON: errors of the server, whether undoing all restores the first scene bit for bit,
+the growth of the memory once the first third has been sent, and for how long the server's loop was busy.
+"""
+
+import argparse
+import asyncio
+import contextlib
+import json
+import logging
+import random
+import sys
+import tempfile
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from decals.apps.commands.opening import keep_memory_low
+from decals.editing.actions import KEYS
+from decals.window import EditWindow
+from tests.apps.sandbox.test_connections import CALLS, SIZE, Browser, Connect, serve
+from tests.decals.editing.scenes import digest
+
+ODD: list[Any] = [None, "", "x", -1, 0, 7, 0.5, 1e308, float("nan"), True, [], {}, [1, 2, 3], "0", "#00ff00"]
+ODD += [{"a": 1}, "\0", "x" * 3000, [[1, [2]]], -(2**40), b"\xff"]
+KEYS_OF_ROWS = ["", "0", "0/0", "0/1", "0/1/0", "object 0", "object 1", "image 0", "1", "9/9", "-1", "a/b"]
+UNDONE = ("close", "camera", "move", "add_image", "save", "save_as", "export")
+ACTIONS = [binding.action for binding in KEYS.bindings if binding.action not in UNDONE]
+KINDS = ["Point", "Torus", "Box", "Twist", "Offset", "Union", "Difference", "Nothing"]
+NAMES = ["radius", "center", "degrees", "color", "opacity", "layer", "image", "tint", "spill", "interaction"]
+OPTIONS = ["mode", "overlay", "slice_axis", "slice_position", "orthographic", "axes"]
+SHOWN = ["traced", "polygonized", "normals", "none", "seeds", "owners", "folds", "contact lines", "x", "z"]
+CHANGES = ["rename", "remove", "duplicate", "move", "group", "hide", "lock", "isolate"]
+HANDLES = ["move", "move x", "turn y", "scale", "start 0"]
+EVENTS: dict[str, list[list[Any]]] = {
+    "select": [KEYS_OF_ROWS],
+    "mark": [KEYS_OF_ROWS],
+    "open_lesson": [[0, 1]],
+    "set_value": [NAMES, [0.2, 0.9, "3", [0, 0, 1], "#ff0000"], [True, False], [[], [], [0], [1], [9]]],
+    "scatter": [],
+    "add": [KINDS],
+    "wrap": [KINDS],
+    "combine": [KINDS],
+    "unwrap": [],
+    "perform": [ACTIONS],
+    "go_to": [[0, 1, 2, 3, 5]],
+    "set_display": [OPTIONS, [*SHOWN, 0.3, True, False]],
+    "move_camera": [["frame", "look", "keep", "go"], ["front", "top", 0, 3]],
+    "set_decals": [NAMES, [0.1, 0.5, 2, "overlap", "tint alone", "#0000ff", True], [True, False]],
+    "set_brush": [["brush", "radius", "density"], ["select", "scatter", "push", "lasso", 0.3]],
+    "set_drawing": [["contact", "mapping", "stiffness", "filtered"], ["product", "elastic", "walked", 2.0]],
+    "set_scattering": [["count", "factor", "sizing", "jitter.size"], [3, "10", 0.5, "touching"]],
+    "set_image": [["roughness", "relief"], [0.2, 0.5], [True, False]],
+    "change_row": [KEYS_OF_ROWS, CHANGES, ["name", "0/1", "0"]],
+    "drag_handle": [HANDLES, ["begin", "move", "end"], [0.1, 0.5, 0.8], [0.3, 0.6], [True, False]],
+    "open_file": [["../x.json", "none.json", "a\0.json"]],
+    "write_file": [["../x.py", "x.exe", "no/x.json"]],
+    "upload": [[[{}], [{"name": "a.ply", "content": b"x"}], 3], KEYS_OF_ROWS],
+}
+"""Arguments of the page's events."""
+
+WAIT_SECONDS = 60.0
+"""Longest time until an answer comes, and until background work ends."""
+
+PICTURE_SECONDS = 2.0
+"""Time that the slow browser takes for a picture."""
+
+SAMPLES = 20
+"""Looks at the memory during a run."""
+
+FIRST_PART = 0.3
+"""Part of a run after which the memory should not grow."""
+
+LATE_MS = 100.0
+"""Milliseconds within which any input should be answered."""
+
+
+class Messages:
+    """Sends random messages to a page, and counts what happens.
+
+    Parameters
+    ----------
+    window, page, connect
+        What `serve` gives to its check.
+    seed
+        Seed of the messages.
+    """
+
+    def __init__(self, window: EditWindow, page: Any, connect: Connect, seed: int) -> None:
+        self._window, self._page, self._connect = window, page, connect
+        self._rng = random.Random(seed)
+        self._browsers: list[Browser] = []
+        self._tasks: list[asyncio.Task[None]] = []
+        self._busy_ms = [0.0]
+        self._memory: list[tuple[int, float]] = []
+        self.changed = self.unanswered = 0
+        self.restored = True
+        self.slowest: dict[str, float] = {}
+
+    async def run(self, count: int, report: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
+        """Send messages and return the figures; now and then, undo all that they did."""
+        before = self._saved()
+        self._browsers = [await self._connect(), await self._connect()]
+        self._tasks = [asyncio.create_task(self._watch_loop()), asyncio.create_task(self._read_slowly())]
+        for number in range(1, count + 1):
+            labels = self._window.session.labels
+            await self._send()
+            self.changed += labels != self._window.session.labels
+            self._window.actions.state.prompt.close()
+            if len(self._window.document.objects) > 4 or len(self._window.document.decals) > 300:
+                await self._answer("go_to", self._trigger(0, "go_to", 0))
+            if number % max(count // SAMPLES, 1) == 0:
+                await self._undo_all()
+                self.restored = self.restored and self._saved() == before
+                self._window.session.forget_history()
+                self._memory.append((number, resident_megabytes()))
+                report({"sent": number, **self.figures()})
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        for browser in self._browsers:
+            await browser.close()
+        return {"sent": count, **self.figures()}
+
+    def figures(self) -> dict[str, Any]:
+        """Return the figures so far."""
+        busy = np.array(self._busy_ms)
+        numbers, megabytes = np.transpose(self._memory or [(0, 0.0)])
+        steady = numbers >= FIRST_PART * numbers[-1]
+        slope = np.polyfit(numbers[steady], megabytes[steady], 1)[0] if steady.sum() > 1 else 0.0
+        return {
+            "changed": self.changed,
+            "restored": self.restored,
+            "unanswered": self.unanswered,
+            "memory_mb": round(float(megabytes[-1])),
+            "growth_mb_per_1000": round(1000.0 * float(slope), 2),
+            "loop_busy_p99_ms": round(float(np.percentile(busy, 99)), 1),
+            "loop_busy_max_ms": round(float(busy.max()), 1),
+            "loop_late": int((busy > LATE_MS).sum()),
+            "slowest": dict(sorted(self.slowest.items(), key=lambda item: -item[1])[:5]),
+        }
+
+    def _saved(self) -> tuple[str, bytes]:
+        """Return the identities of all parts of the document, and the bytes of its file."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "scene.json"
+            self._window.document.scene.save(path)
+            return digest(self._window.document), path.read_bytes()
+
+    async def _watch_loop(self) -> None:
+        """Note for how long the loop's thread computes between two turns of this task, by its own clock."""
+        while True:
+            before = time.thread_time()
+            await asyncio.sleep(0.001)
+            self._busy_ms.append(1000.0 * (time.thread_time() - before))
+
+    async def _read_slowly(self) -> None:
+        browser = await self._connect()
+        try:
+            await browser.watch_slowly(PICTURE_SECONDS)
+        finally:
+            await browser.close()
+
+    async def _undo_all(self) -> None:
+        """End all input, undo everything, and wait until nothing is to be done."""
+        for number in range(len(self._browsers)):
+            await self._answer("mouse", self._mouse(number, "up"))
+        self._page.sandbox.end_input()
+        await self._wait_until(lambda: not self._window.background.busy)
+        self._page.sandbox.go_to(0)
+        await self._wait_until(lambda: not self._window.busy)
+
+    @staticmethod
+    async def _wait_until(true: Callable[[], bool]) -> None:
+        end = time.monotonic() + WAIT_SECONDS
+        while not true() and time.monotonic() < end:
+            await asyncio.sleep(0.01)
+
+    # -- messages ---------------------------------------------------------------------------------------
+
+    async def _send(self) -> None:
+        """Send one message, or two at once."""
+        rng = self._rng
+        kind, number = rng.random(), rng.randrange(len(self._browsers))
+        if kind < 0.02:
+            await self._reconnect(number, rng.choice((self._tear, self._vanish, self._leave)))
+        elif kind < 0.10:
+            name = rng.choice(CALLS)
+            odd = [rng.choice(ODD) for _ in range(rng.randrange(4))]
+            await self._answer(name, self._browsers[number].call(name, *odd))
+        elif kind < 0.35:
+            await self._answer("mouse", self._mouse(number))
+        elif kind < 0.45:
+            await asyncio.gather(*(self._event(number) for number in range(len(self._browsers))))
+        else:
+            await self._event(number)
+        if rng.random() < 0.5:
+            if self._window.tools.dragging:
+                await self._answer("mouse", self._mouse(number, "up"))
+            await self._wait_until(lambda: not self._window.background.busy)
+
+    async def _event(self, number: int) -> None:
+        rng = self._rng
+        name = rng.choice([*EVENTS])
+        arguments = [rng.choice(ODD if rng.random() < 0.15 else choices) for choices in EVENTS[name]]
+        if name != "perform" or arguments[0] in ACTIONS:
+            await self._answer(f"{name} {arguments[:1]}"[:40], self._trigger(number, name, *arguments))
+
+    def _trigger(self, number: int, name: str, *arguments: Any) -> Awaitable[Any]:
+        return self._browsers[number].trigger(getattr(self._page.sandbox, name), *arguments)
+
+    def _mouse(self, number: int, action: str = "") -> Awaitable[Any]:
+        at = self._rng.uniform(0, SIZE[0]), self._rng.uniform(0, SIZE[1])
+        action = action or self._rng.choice(("down", "move", "move", "up"))
+        return self._browsers[number].mouse(at, down=action != "up", action=action)
+
+    async def _answer(self, name: str, call: Awaitable[Any]) -> None:
+        """Wait for the answer to a message; a refusal is one."""
+        began = time.thread_time()
+        try:
+            await asyncio.wait_for(call, WAIT_SECONDS)
+        except TimeoutError:
+            self.unanswered += 1
+        except Exception as error:  # the client raises a bare one for each refusal
+            if type(error) is not Exception:
+                raise
+        spent = 1000.0 * (time.thread_time() - began)
+        self.slowest[name] = round(max(spent, self.slowest.get(name, 0.0)), 1)
+
+    async def _reconnect(self, number: int, end: Callable[[int], Awaitable[None]]) -> None:
+        await end(number)
+        await self._browsers[number].close()
+        with contextlib.suppress(PermissionError):
+            await self._connect(self._rng.choice(ODD))
+            raise AssertionError("a wrong token was accepted")
+        self._browsers[number] = await self._connect()
+
+    async def _tear(self, number: int) -> None:
+        """Send bytes that are no message; the server ends the connection."""
+        browser, rng = self._browsers[number], self._rng
+        if rng.random() < 0.3:
+            await browser.socket.send_str("x{]")
+        else:
+            await browser.socket.send_bytes(rng.randbytes(rng.randrange(1, 60)))
+        with contextlib.suppress(TimeoutError):  # a first part of a longer message is waited for
+            await browser.ended(1.0)
+
+    async def _vanish(self, number: int) -> None:
+        """Leave in a drag."""
+        for action in ("down", "move"):
+            await self._answer("mouse", self._mouse(number, action))
+
+    async def _leave(self, number: int) -> None:
+        """Leave before the answer comes."""
+        task = asyncio.ensure_future(self._trigger(number, "scatter"))
+        await asyncio.sleep(0)
+        await self._browsers[number].close()
+        task.cancel()
+
+
+def resident_megabytes() -> float:
+    """Return the memory of this process that is in use (Linux)."""
+    fields = Path("/proc/self/statm").read_text(encoding="ascii").split()
+    return int(fields[1]) * 4096 / 1e6
+
+
+def measure(
+    count: int, seed: int, report: Callable[[dict[str, Any]], None] = lambda _: None
+) -> dict[str, Any]:
+    """Send random messages to a server of this process, and return the figures."""
+    figures: dict[str, Any] = {}
+    errors: list[str] = []
+
+    class Noted(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            errors.append(record.getMessage())
+
+    async def check(window: EditWindow, page: Any, connect: Connect) -> None:
+        keep_memory_low()
+        loop = asyncio.get_running_loop()
+        loop.set_exception_handler(lambda _, context: errors.append(repr(context)))
+        figures.update(await Messages(window, page, connect, seed).run(count, report))
+
+    noted = Noted(logging.ERROR)
+    logging.getLogger().addHandler(noted)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            serve(check, folder=Path(folder))
+    finally:
+        logging.getLogger().removeHandler(noted)
+    return {**figures, "errors": len(errors), "first_errors": errors[:3]}
+
+
+def main() -> int:
+    """Print the figures as JSON; the exit code is 1 after an error or a wrong scene."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--count", type=int, default=500)
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    figures = measure(
+        options.count, options.seed, lambda part: print(json.dumps(part), file=sys.stderr, flush=True)
+    )
+    print(json.dumps(figures))
+    return int(figures["errors"] > 0 or figures["unanswered"] > 0 or not figures["restored"])
+
+
+if __name__ == "__main__":
+    sys.exit(main())
