@@ -7,6 +7,7 @@ the greatest rate at which the gap can shrink: the distance shrinks at most by t
 rises at most by the slope of a cone over the image that contains all its heights (cone step mapping, Dummer
 2006). As most cones are far steeper than the heights, a longer step is tried first; where the cones at both
 of its ends do not cover it, the ray goes back to the end of the shorter one (Keinert et al. 2014).
+Cones around the rays of squares of pixels first find where these begin (``shaders/offset_start.glsl``).
 """
 
 from dataclasses import dataclass
@@ -21,11 +22,10 @@ from decals.field.law import ContactLaw
 from decals.rendering.context import Context
 from decals.rendering.decal_pass import DecalSource, decal_functions
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.pixel_pass import GROUP, PassBackend, Program, attach_camera, set_uniform
+from decals.rendering.pixel_pass import GROUP, PassBackend, PixelPass, Program, attach_camera, set_uniform
 from decals.rendering.rest_buffer import RestBuffer
 from decals.rendering.tree import Kinds, TreeDrawable, covered_rectangle, draw_box, tracing_slots
-from decals.rendering.uploads import DataTexture
-from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
+from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile
 from decals.shaders import Source, compose
 
 SHELL_CELLS = 48
@@ -33,6 +33,9 @@ SHELL_CELLS = 48
 
 SHELL_RESOLUTION = 64
 """Cells of the mesh whose vertices are the points of a shell, along the longest side of the support."""
+
+BLOCK = 4
+"""Side, in samples, of the squares whose rays begin at one distance."""
 
 REACH_MARGIN = 1.25
 """Reach of a new shell over the heights at hand, so that edits seldom take another."""
@@ -68,16 +71,19 @@ class Shell:
         points = mesh.vertices.astype(np.float64)
         if not len(points):
             return cls(np.full((1, 4), 1e30, np.float32), np.zeros(3), 1.0, (1, 1, 1), reach)
-        corners = points[mesh.faces]
-        gap = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
+        edges = mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+        edges = edges[edges[:, 0] < edges[:, 1]]
+        ends = points[edges]
+        gap = 0.5 * float(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).max())
         lower, upper = points.min(axis=0), points.max(axis=0)
-        size = upper - lower + 2.0 * (reach + gap)
+        size = upper - lower + 2.0 * (reach + 2.0 * gap)
         cell = float(size.max()) * (1.0 + 1e-6) / SHELL_CELLS
         counts = np.ceil(size / cell).astype(int)
         lower = 0.5 * (lower + upper) - 0.5 * cell * counts
         middles = lower + (np.indices(counts).reshape(3, -1).T + 0.5) * cell
-        distances, nearest = cKDTree(points).query(middles)
-        texels = np.column_stack([points[nearest], distances - gap]).astype(np.float32)
+        near = np.concatenate([np.arange(len(points)), edges[:, 0]])
+        distances, nearest = cKDTree(np.concatenate([points, ends.mean(axis=1)])).query(middles)
+        texels = np.column_stack([points[near[nearest]], distances - gap]).astype(np.float32)
         x, y, z = counts.tolist()
         return cls(texels, lower, cell, (x, y, z), reach)
 
@@ -90,13 +96,16 @@ class Shell:
 class OffsetTreeDrawable(TreeDrawable):
     """A tree's tracing cells on the GPU, and for scenes with relief its shell."""
 
-    _shell: tuple[Shell, DataTexture] | None = None
+    _shell: tuple[Shell, moderngl.Texture3D] | None = None
+    _starts: moderngl.Texture | None = None
+    _start_pass: PixelPass | None = None
     _box_of: tuple[Program, moderngl.VertexArray] | None = None
 
     def prepare(self, source: DecalSource) -> None:
         """Make everything that `draw_offset` needs at the first call."""
         assert source.relief is not None
         self._shell_for(source.relief.reach)
+        start_program(self._context, self.kinds, source)
         offset_program(self._context, self.kinds, source)
 
     def draw_offset(
@@ -110,11 +119,51 @@ class OffsetTreeDrawable(TreeDrawable):
     ) -> None:
         """Trace the rays to the surface that heights move, or those of a part of the rows."""
         assert source.relief is not None
-        shell, texels = self._shell_for(source.relief.reach)
+        bounds = self._shell_for(source.relief.reach)[0].bounds
         program = offset_program(self._context, self.kinds, source)
-        textures = *self._textures, texels
-        for unit, texture in enumerate(textures):
+        rows = covered_rectangle(bounds, tile).rows(part)
+        if isinstance(program, moderngl.Program):
+            rows = Rectangle(0, 0, tile.width, tile.height).rows(part)
+        if rows.area == 0:
+            return
+        starts = self._draw_starts(object_id, rows, gbuffer, source)
+        unit = self._use(program, object_id, source)
+        starts.use(unit)
+        set_uniform(program, "starts", unit)
+        if isinstance(program, moderngl.Program):
+            rest.use_with_surface(tile.width, tile.height, part)
+            draw_box(self._gl, program, self._vertices(program), bounds)
+            return
+        rest.bind_images(first_unit=3)
+        self.trace_rows(program, rows, gbuffer)
+
+    def _draw_starts(
+        self, object_id: int, rows: Rectangle, gbuffer: GBuffer, source: DecalSource
+    ) -> moderngl.Texture:
+        """Draw where the rays begin in all squares that contain these samples; return the texture."""
+        program = start_program(self._context, self.kinds, source)
+        size = -(-gbuffer.size[0] // BLOCK), -(-gbuffer.size[1] // BLOCK)
+        if self._starts is None or size[0] > self._starts.width or size[1] > self._starts.height:
+            self._release_starts()
+            self._starts = self._context.texture(size, "f4")
+            self._starts.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        if self._start_pass is None or self._start_pass.program is not program:
+            if self._start_pass is not None:
+                self._start_pass.release()
+            self._start_pass = PixelPass(self._gl, program, [self._starts])
+        self._use(program, object_id, source)
+        x, y = rows.x // BLOCK, rows.y // BLOCK
+        right, top = (rows.x + rows.width - 1) // BLOCK, (rows.y + rows.height - 1) // BLOCK
+        self._start_pass.run(Rectangle(x, y, right - x + 1, top - y + 1))
+        return self._starts
+
+    def _use(self, program: Program, object_id: int, source: DecalSource) -> int:
+        """Bind all textures, and set the uniforms; return the next texture unit."""
+        assert source.relief is not None
+        shell, texels = self._shell_for(source.relief.reach)
+        for unit, texture in enumerate(self._textures):
             texture.use(unit)
+        texels.use(2)
         uniforms = {
             **self._uniforms,
             "object_id": object_id,
@@ -125,23 +174,19 @@ class OffsetTreeDrawable(TreeDrawable):
         }
         for name, value in uniforms.items():
             set_uniform(program, name, value)
-        unit = source.use(program, len(textures))
+        unit = source.use(program, 3)
         source.relief.slopes.use(unit)
         set_uniform(program, "relief_slopes", unit)
-        if isinstance(program, moderngl.Program):
-            rest.use_with_surface(tile.width, tile.height, part)
-            draw_box(self._gl, program, self._vertices(program), shell.bounds)
-            return
-        rows = covered_rectangle(shell.bounds, tile).rows(part)
-        rest.bind_images(first_unit=3)
-        self.trace_rows(program, rows, gbuffer)
+        return unit + 1
 
-    def _shell_for(self, reach: float) -> tuple[Shell, DataTexture]:
+    def _shell_for(self, reach: float) -> tuple[Shell, moderngl.Texture3D]:
         if self._shell is None or not reach <= self._shell[0].reach <= 4.0 * max(reach, 1e-30):
             if self._shell is not None:
                 self._shell[1].release()
             shell = Shell.of(self._tree, REACH_MARGIN * reach)
-            self._shell = shell, DataTexture(self._context, shell.texels)
+            texture = self._gl.texture3d(shell.counts[::-1], 4, shell.texels.tobytes(), dtype="f4")
+            texture.repeat_x = texture.repeat_y = texture.repeat_z = False
+            self._shell = shell, texture
         return self._shell
 
     def _vertices(self, program: moderngl.Program) -> moderngl.VertexArray:
@@ -151,9 +196,16 @@ class OffsetTreeDrawable(TreeDrawable):
             self._box_of = program, self._gl.vertex_array(program, [])
         return self._box_of[1]
 
+    def _release_starts(self) -> None:
+        for resource in (self._start_pass, self._starts):
+            if resource is not None:
+                resource.release()
+        self._start_pass = self._starts = None
+
     def release(self) -> None:
         """Release the memory."""
         super().release()
+        self._release_starts()
         if self._shell is not None:
             self._shell[1].release()
         if self._box_of is not None:
@@ -162,19 +214,29 @@ class OffsetTreeDrawable(TreeDrawable):
 
 def offset_program(context: Context, kinds: Kinds, source: DecalSource) -> Program:
     """Return the program that traces moved trees of these kinds, for the context's backend."""
-    text = offset_shader(kinds, source.constants(), source.law, source.limited, context.backend)
+    slots, defines = offset_slots(kinds, source.constants(), source.law), _defines(source.limited)
     if context.backend is PassBackend.COMPUTE:
-        return attach_camera(context.compute_program(text))
+        defines |= {"GROUP": GROUP}
+        return attach_camera(
+            context.compute_program(compose("offset.comp", slots=slots, defines=defines, version="430 core"))
+        )
+    text = compose("offset.frag", slots=slots, defines=defines)
     return attach_camera(context.program(compose("box.vert"), text))
 
 
+def start_program(context: Context, kinds: Kinds, source: DecalSource) -> Program:
+    """Return the program that finds where the rays of squares of pixels begin."""
+    slots = offset_slots(kinds, source.constants(), source.law)
+    return attach_camera(
+        context.pixel_program("offset_start.glsl", 1, slots=slots, defines=_defines(source.limited))
+    )
+
+
 @lru_cache(maxsize=64)
-def offset_shader(
-    kinds: Kinds, constants: str, law: ContactLaw | None, limited: bool, backend: PassBackend
-) -> Source:
-    """``offset.frag`` or ``offset.comp`` with the cases of `kinds` and the formulas of decals."""
-    slots = tracing_slots(kinds, decal_functions(law)) | {"constants": constants, "functions": ""}
-    defines = {"OFFSET": True, "RELIEF": True, "LIMITED": limited}
-    if backend is PassBackend.COMPUTE:
-        return compose("offset.comp", slots=slots, defines=defines | {"GROUP": GROUP}, version="430 core")
-    return compose("offset.frag", slots=slots, defines=defines)
+def offset_slots(kinds: Kinds, constants: str, law: ContactLaw | None) -> dict[str, str | Source]:
+    """Return the fillings of ``offset_foot.glsl``: the cases of `kinds` and the formulas of decals."""
+    return tracing_slots(kinds, decal_functions(law)) | {"constants": constants, "functions": ""}
+
+
+def _defines(limited: bool) -> dict[str, str | int | float | bool]:
+    return {"OFFSET": True, "RELIEF": True, "LIMITED": limited, "BLOCK": BLOCK}

@@ -43,7 +43,7 @@ layout(binding = 0, rgba32f) uniform image2D target;
 void main() { imageStore(target, ivec2(0), vec4(0.0)); }
 """
 
-Defines: TypeAlias = Mapping[str, bool]
+Defines: TypeAlias = Mapping[str, str | int | float | bool]
 Slots: TypeAlias = Mapping[str, str | Source]
 Program: TypeAlias = moderngl.Program | moderngl.ComputeShader
 """A compiled program, which takes the uniforms of a pass."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ Array = NDArray[Any]
 
 SIZE = (28, 21)
 VIEW = Camera(position=(0.6, -4.0, 1.5), target=(0.0, 0.0, 0.0), up=(0.0, 0.0, 1.0), fov=36.0)
+CLOSE = replace(VIEW, target=(-0.5, 0.0, 0.62), fov=3.0)  # an edge, with pixels as small as in large pictures
 BALL = (((0.0, 0.0, 0.0), 1.0),)
 PAIR = (((-0.5, 0.0, 0.0), 0.7), ((0.6, 0.2, 0.1), 0.5))
 HIT_TOLERANCE = 1e-4
@@ -69,11 +71,11 @@ def raised(oracle: SumOfBalls, tree: Node, count: int, *, relief: float, layers:
     return Scene(objects=[tree], decals=rows, images=images, camera=VIEW)
 
 
-def rays_of(size: tuple[int, int]) -> tuple[Array, Array]:
+def rays_of(size: tuple[int, int], view: Camera) -> tuple[Array, Array]:
     """Origins and unit directions of the rays through pixels, the upper row first."""
     width, height = size
     row, column = np.mgrid[0:height, 0:width].reshape(2, -1)
-    rays = VIEW.rays(width, height)
+    rays = view.rays(width, height)
     x, y = column + 0.5, height - row - 0.5
     ways = rays.directions(x, y)
     return rays.origins(x, y) + 0 * ways, ways / np.linalg.norm(ways, axis=1, keepdims=True)
@@ -86,20 +88,22 @@ def distances_of(buffers: Buffers, origins: Array, ways: Array) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("backend", "balls", "count"),
+    ("backend", "balls", "count", "view"),
     [
-        ("fragment", PAIR, 12),
-        pytest.param("fragment", BALL, 9, marks=pytest.mark.slow),
-        pytest.param("compute", PAIR, 30, marks=pytest.mark.slow),
+        ("fragment", PAIR, 12, VIEW),
+        ("fragment", PAIR, 12, CLOSE),
+        pytest.param("fragment", BALL, 9, VIEW, marks=pytest.mark.slow),
+        pytest.param("compute", PAIR, 30, VIEW, marks=pytest.mark.slow),
+        pytest.param("compute", PAIR, 30, CLOSE, marks=pytest.mark.slow),
     ],
 )
 def test_first_hits_are_those_of_short_steps_in_float64(
-    renderers: dict[str, Renderer], backend: str, balls: Any, count: int
+    renderers: dict[str, Renderer], backend: str, balls: Any, count: int, view: Camera
 ) -> None:
     oracle = SumOfBalls(*balls)
     scene = raised(oracle, tree_of(balls), count, relief=0.5)
-    buffers = renderers[backend].buffers(scene, RenderOptions(size=SIZE))
-    origins, ways = rays_of(SIZE)
+    buffers = renderers[backend].buffers(scene, RenderOptions(size=SIZE), viewpoint=view)
+    origins, ways = rays_of(SIZE, view)
     found = distances_of(buffers, origins, ways)
     some = np.flatnonzero(np.isfinite(found))[::5]
     some = np.concatenate([some, np.flatnonzero(~np.isfinite(found))[::16]])
@@ -192,6 +196,17 @@ def test_cones_contain_all_heights(heights: Array) -> None:
     assert (at(places[1]) - at(places[0]) <= slopes * apart + 1e-6).all()
 
 
+def interpolated(values: Array, places: Array) -> Array:
+    """Values at places between the points of a grid, as textures interpolate them."""
+    low = np.minimum(places.astype(int), np.array(values.shape) - 2)
+    part = places - low
+    total = np.zeros(len(places))
+    for corner in np.ndindex(2, 2, 2):
+        weight = np.prod(np.abs(1 - np.array(corner) - part), axis=1)
+        total += weight * values[tuple((low + corner).T)]
+    return total
+
+
 def test_a_shell_knows_points_of_the_surface_and_free_space() -> None:
     oracle = SumOfBalls(*PAIR)
     shell = Shell.of(tree_of(PAIR), 0.2)
@@ -199,5 +214,10 @@ def test_a_shell_knows_points_of_the_surface_and_free_space() -> None:
     distances = oracle.tree.query(middles)[0]
     assert (shell.texels[:, 3] <= distances).all()
     assert np.abs(oracle.terms(shell.texels[:, :3].astype(float))[0] - 0.5).max() < 1e-3
+    rng = np.random.default_rng(3)
+    places = rng.uniform(0.5, np.array(shell.counts) - 0.5, (4000, 3))
+    near = interpolated(shell.texels[:, 3].reshape(shell.counts).astype(float), places - 0.5) / shell.cell
+    free = np.where(near > 1.31, 0.5 * (near + np.sqrt(np.maximum(near**2 - 1.5, 0))), near - 0.87)
+    assert (shell.cell * free <= oracle.tree.query(shell.lower + shell.cell * places)[0]).all()
     assert (shell.bounds[0] <= oracle.points.min(0) - 0.2).all()
     assert (shell.bounds[1] >= oracle.points.max(0) + 0.2).all()
