@@ -8,48 +8,14 @@ import numpy as np
 
 from decals import Camera, ImplicitDecalsError, MeshObject
 from decals.errors import InvalidInput
-from decals.scenes.camera import THREE_QUARTER as THREE_QUARTER_DIRECTION
+from decals.scenes.camera import PRESETS, Axes, Vector
 from decals.scenes.objects import SceneObject
 
-Vector = tuple[float, float, float]
 Size = tuple[int, int]
 
 THREE_QUARTER = "three-quarter"
-PRESETS: dict[str, Vector] = {
-    THREE_QUARTER: THREE_QUARTER_DIRECTION,
-    "front": (0.0, 0.0, 1.0),
-    "back": (0.0, 0.0, -1.0),
-    "left": (-1.0, 0.0, 0.0),
-    "right": (1.0, 0.0, 0.0),
-    "top": (0.0, 1.0, 0.0),
-    "bottom": (0.0, -1.0, 0.0),
-}
-"""Directions toward the camera by name, as parts to the right, upward, and toward the front."""
-
 _MARGIN = 1.08
 _SAMPLES = 4000
-
-
-@dataclass(frozen=True)
-class Axes:
-    """Which way a model stands: unit vectors upward and toward its front."""
-
-    up: Vector
-    front: Vector
-
-    def preset(self, name: str) -> Vector:
-        """Direction of a preset in the model's own coordinates."""
-        right = np.cross(self.up, self.front)
-        x, y, z = (np.asarray(PRESETS[name]) @ np.array([right, self.up, self.front])).tolist()
-        return x, y, z
-
-
-UPRIGHT = {
-    "x": Axes((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
-    "y": Axes((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
-    "z": Axes((0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),
-}
-"""Axes by the name of the one that points upward."""
 
 
 @dataclass(frozen=True)

@@ -32,9 +32,10 @@ from decals.apps.models.loading import (
 )
 from decals.apps.models.samples import axes_of
 from decals.apps.output import check_animation, print_path
-from decals.apps.views import UPRIGHT, frame, parse_view
+from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
 from decals.scenes.animation import MAX_FRAMES, VIDEO_SUFFIXES
+from decals.scenes.camera import UPRIGHT
 from decals.scenes.pose import PosedScene
 
 DEFAULT_FRAMES = 120

@@ -18,9 +18,10 @@ from decals.apps.models.loading import load_models
 from decals.apps.models.samples import axes_of
 from decals.apps.models.scenes import empty_scene, new_file
 from decals.apps.output import check_output
-from decals.apps.views import UPRIGHT, parse_view
+from decals.apps.views import parse_view
 from decals.editing import AddImage, recovery_path
 from decals.errors import InvalidInput
+from decals.scenes.camera import UPRIGHT
 from decals.window import EditWindow
 
 CYCLE_THRESHOLDS = 700, 10, 10

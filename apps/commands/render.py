@@ -27,9 +27,10 @@ from decals.apps.commands.scatter_options import ScatterOptions
 from decals.apps.models.loading import import_definitions, load_models
 from decals.apps.models.samples import axes_of
 from decals.apps.output import PICTURE_SUFFIXES, check_output, print_path
-from decals.apps.views import UPRIGHT, frame, parse_view
+from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
 from decals.rendering import Drawing, Picture, Renderer
+from decals.scenes.camera import UPRIGHT
 
 
 def render(

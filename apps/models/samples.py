@@ -8,8 +8,8 @@ from functools import partial
 from blobtree import Node
 from decals import MeshObject, TreeObject
 from decals.apps.models.shapes import creature, spheres, torus_knot
-from decals.apps.views import UPRIGHT, Axes
 from decals.errors import InvalidInput
+from decals.scenes.camera import UPRIGHT, Axes
 from decals.scenes.objects import SceneObject
 from decals.scenes.records import SAMPLE
 from decals.surfaces.mesh_file import MeshArrays, dataset_triangles

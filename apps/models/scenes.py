@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from decals import Camera, DecalImage, Scene
-from decals.apps.views import Axes, parse_view
+from decals.apps.views import parse_view
+from decals.scenes.camera import Axes
 
 
 def new_file(folder: Path, name: str) -> Path:

@@ -14,6 +14,7 @@ from blobtree.nodes.parameters import UNITS, Parameter, Quantity, describe, para
 from blobtree.transpile.python import plain_python
 from decals.errors import InvalidEdit
 from decals.options import Option
+from decals.validation import describe as described
 from decals.validation import finite_number, one_of
 
 SLIDER_REACH = 4.0
@@ -202,3 +203,13 @@ def number_of(name: str, raw: Any) -> float:
     with suppress(ValueError):
         raw = float(raw) if isinstance(raw, str) else raw
     return finite_number(name, raw, InvalidEdit)
+
+
+def exchanged(value: Any, index: object, raw: Any) -> Any:
+    """Return nested tuples with one number exchanged."""
+    if index in ((), []):
+        return raw
+    if not isinstance(index, list) or not isinstance(value, tuple) or index[0] not in range(len(value)):
+        raise InvalidEdit(f"index: expected that of a number of the parameter, got {described(index)}")
+    first, *rest = index
+    return (*value[:first], exchanged(value[first], rest, raw), *value[first + 1 :])

@@ -8,15 +8,16 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
 
-from blobtree._typing import Float32Array
-from blobtree.nodes.paths import node_in_world
-from decals.apps.sandbox.controls import Control, number_of
-from decals.apps.views import PRESETS
+from decals.apps.sandbox.controls import STEPS, Control, exchanged, number_of
+from decals.apps.sandbox.cube import cube_cells
+from decals.apps.sandbox.slicing import CHOICES as SLICES
+from decals.apps.sandbox.slicing import MOVE, NONE, TILT, TILTED, SliceDrag, SlicePlane
 from decals.editing.background import Job, Worker
 from decals.editing.document import Document
+from decals.editing.gizmo import AXES
 from decals.editing.overlays import contact_lines, sample_surface
 from decals.errors import ImplicitDecalsError, InvalidEdit
-from decals.scenes.camera import Camera
+from decals.scenes.camera import UPRIGHT, Camera
 from decals.scenes.meshes import as_polydata
 from decals.scenes.objects import SceneObject, TreeObject, bounds_of
 from decals.surfaces.surface import unit_rows
@@ -27,14 +28,14 @@ from decals.window.host_plotter import pixels_of, ray_through
 
 MODES = "traced", "polygonized", "wireframe", "normals", "curvature"
 OVERLAYS = "none", "contact lines", "owners", "stretch", "folds", "seeds"
-AXES = "x", "y", "z"
-NO_SLICE = "none"
-CHOICES = {"mode": MODES, "overlay": OVERLAYS, "slice_axis": (NO_SLICE, *AXES)}
+CHOICES = {"mode": MODES, "overlay": OVERLAYS, "slice_axis": SLICES, "up": tuple(UPRIGHT)}
 CHOICE_DOCS = {
     "mode": "how surfaces are drawn",
     "overlay": "what is measured on them",
     "slice_axis": "cut the model open across this axis",
+    "up": "axis that points upward in the model",
 }
+POSITION_DOC = "distance of the slice from the origin of the model"
 SNAP_DOC = "dragged primitives move by multiples of this distance; 0: freely"
 RESOLUTION = 96
 """Cells along the longest side of the meshes that modes and overlays use."""
@@ -48,6 +49,9 @@ OWNER_COLORS = np.array(
 """Colours of owners in turn (Okabe and Ito's, which the colour-blind tell apart)."""
 
 NO_OWNER = (150, 150, 150)
+SHOWN_FIELD = 0.002
+"""Least field that the slice shows."""
+
 FOLD_COLOR = "#d55e00"
 LINE_COLOR = "#111111"
 MAX_STRETCH = 5.0
@@ -55,6 +59,12 @@ MAX_STRETCH = 5.0
 
 GIZMO_SIZE = 0.12
 """Length of the axes of the gizmo, in heights of the view."""
+
+LINED = "move ", TILT
+"""First parts of the names of the handles at the end of an axis."""
+
+PHASES = "begin", "move", "end"
+"""Parts of a drag."""
 
 MAX_BOOKMARKS = 20
 CAMERA_VALUES = "position", "focal_point", "up", "view_angle", "parallel_scale", "parallel_projection"
@@ -70,16 +80,13 @@ class DisplayOptions:
     ----------
     mode, overlay
         One of `MODES`, and of `OVERLAYS`.
-    slice_axis
-        "none", or the axis that the slice is perpendicular to.
-    slice_position
-        Place of the slice between the ends of the scene, from 0 to 1.
+    slice
+        The plane that cuts the model open, if one does.
     """
 
     mode: str = MODES[0]
     overlay: str = OVERLAYS[0]
-    slice_axis: str = NO_SLICE
-    slice_position: float = 0.5
+    slice: SlicePlane | None = None
 
 
 Shown = list[tuple[str, Any, dict[str, Any]]]
@@ -115,20 +122,30 @@ class Display:
         self._names: list[str] = []
         self._decorated: list[Any] = []
         self._axes = False
+        self._slice_drag: SliceDrag | None = None
 
     def values(self) -> dict[str, Any]:
         """Return plain values for a page."""
-        options = self.options
+        plane, axes = self.options.slice, self._window.actions.view.axes
+        shown = {
+            "mode": self.options.mode,
+            "overlay": self.options.overlay,
+            "slice_axis": NONE if plane is None else plane.choice,
+            "up": next((name for name, known in UPRIGHT.items() if known == axes), "y"),
+        }
         controls = [
-            Control(name, "choice", getattr(options, name), doc, choices=CHOICES[name])
+            Control(name, "choice", shown[name], doc, choices=CHOICES[name])
             for name, doc in CHOICE_DOCS.items()
         ]
-        if options.slice_axis != NO_SLICE:
-            doc = "from one end of the scene to the other"
-            controls.append(
-                Control("slice_position", "number", options.slice_position, doc, "", 0.0, 1.0, 0.01)
+        if plane is not None:
+            low, high = plane.reach(*self._box())
+            step = (high - low) / STEPS
+            position = Control(
+                "slice_position", "number", plane.position, POSITION_DOC, "model units", low, high, step
             )
-        parallel = bool(self._window.subplot.vtk_renderer.camera.parallel_projection)
+            normal = Control("slice_normal", "vector", plane.normal, "direction across the slice")
+            controls[3:3] = [position, normal]
+        parallel = self._window.camera.parallel
         controls += [
             Control("snap", "field", self._window.actions.state.snap, SNAP_DOC, "model units"),
             Control("orthographic", "switch", parallel, "no perspective"),
@@ -143,18 +160,31 @@ class Display:
 
     # -- modes ------------------------------------------------------------------------------------------
 
-    def set_option(self, name: str, value: Any) -> None:
-        """Set an option of `DisplayOptions` by name, or "orthographic", "axes" or "snap".
+    def set_option(self, name: str, value: Any, index: object = ()) -> None:
+        """Set a choice by its name, or "slice_position", "slice_normal", "orthographic", "axes" or "snap".
+
+        ``index`` holds that of the number of the normal.
 
         Raises
         ------
         InvalidEdit
             There is no such option or value.
         """
-        view = self._window.subplot.vtk_renderer.camera
+        plane = self.options.slice
         match name:
             case "orthographic":
-                view.parallel_projection = bool(value)
+                self._window.camera.parallel = bool(value)
+            case "up":
+                self._window.actions.view.axes = UPRIGHT[one_of(name, value, UPRIGHT, InvalidEdit)]
+            case "slice_axis":
+                self.options = replace(self.options, slice=self._plane_of(value))
+            case "slice_position" | "slice_normal" if plane is not None:
+                if name == "slice_position":
+                    plane = plane.at(number_of(name, value))
+                else:
+                    normal = exchanged(plane.normal, index, number_of(name, value)) if index else value
+                    plane = SlicePlane.across(plane.point, normal)
+                self.options = replace(self.options, slice=plane)
             case "axes":
                 self._show_axes(bool(value))
             case "snap":
@@ -162,13 +192,23 @@ class Display:
                 if distance < 0.0:
                     raise InvalidEdit(f"snap: expected 0 or more, got {distance}")
                 self._window.actions.state.snap = distance
-            case "slice_position":
-                position = min(max(number_of(name, value), 0.0), 1.0)
-                self.options = replace(self.options, slice_position=position)
             case _:
                 chosen: Any = {one_of("view", name, CHOICES, InvalidEdit): value}
                 one_of(name, value, CHOICES[name], InvalidEdit)
                 self.options = replace(self.options, **chosen)
+
+    def _box(self) -> tuple[ArrayLike, ArrayLike]:
+        """Return the corners of the scene's box; those of a cube without objects."""
+        objects = self._window.document.objects
+        return bounds_of(objects) if objects else (-np.ones(3), np.ones(3))
+
+    def _plane_of(self, choice: object) -> SlicePlane | None:
+        """Return the plane of a choice, through the middle of the scene; a tilted one stays."""
+        chosen, plane = one_of("slice_axis", choice, SLICES, InvalidEdit), self.options.slice
+        if chosen == NONE or (plane is not None and chosen == plane.choice):
+            return None if chosen == NONE else plane
+        normal = np.ones(3) if chosen == TILTED else np.eye(3)[AXES.index(chosen)]
+        return SlicePlane.across(np.add(*self._box()) / 2, normal)
 
     def _show_axes(self, shown: bool) -> None:
         plotter = self._window.plotter
@@ -230,7 +270,7 @@ class Display:
             plotter.remove_actor(name, render=False, reset_camera=False)
         plotter.scalar_bars.clear()
         self._names, self.message = [name for name, _, _ in shown], message
-        replaced = bool(shown) and (options.mode != MODES[0] or options.slice_axis != NO_SLICE)
+        replaced = bool(shown) and (options.mode != MODES[0] or options.slice is not None)
         subplot.actor.SetVisibility(not replaced)
         if replaced:  # a scene that is not drawn needs no warm-up
             subplot.status, self._window.warmup.status = FrameStatus.EMPTY, ""
@@ -248,6 +288,7 @@ class Display:
 
     def show_from(self, camera: Camera) -> None:
         """Look from the camera of a scene."""
+        self._window.actions.view.stand(camera.up)
         view = self._window.subplot.vtk_renderer.camera
         view.parallel_projection = False
         view.position, view.focal_point, view.up = camera.position, camera.target, camera.up
@@ -255,19 +296,30 @@ class Display:
         self._window.subplot.vtk_renderer.reset_camera_clipping_range()
 
     def gizmo(self) -> dict[str, Any]:
-        """Return where the handles of the selected node lie in the view, in parts of its width and height."""
-        trees = self._window.actions.trees
-        if not trees.handles(1.0):
-            return {"handles": []}
-        handles = trees.handles(self._gizmo_length())
-        places = self._in_view(pixels_of(self._window.subplot, [handle.position for handle in handles]))
-        return {
-            "handles": [
-                {"name": handle.name, "x": x, "y": y}
-                for handle, (x, y) in zip(handles, places, strict=True)
-                if np.isfinite(x)
-            ]
-        }
+        """Return where the handles of the selected node and of the slice lie in the view.
+
+        Places are in parts of its width and height. A line leads to the end of each axis.
+        """
+        trees, plane = self._window.actions.trees, self.options.slice
+        groups = [] if plane is None else [plane.handles(self._gizmo_length(plane.point))]
+        if middle := trees.handles(1.0):
+            groups.append(trees.handles(self._gizmo_length(middle[0].position)))
+        handles: list[dict[str, Any]] = []
+        lines: list[list[float]] = []
+        for group in groups:
+            places = self._in_view(pixels_of(self._window.subplot, [handle.position for handle in group]))
+            for handle, (x, y) in zip(group, places, strict=True):
+                if np.isfinite(x):
+                    handles.append({"name": handle.name, "x": x, "y": y})
+                    if handle.name.startswith(LINED) and np.isfinite(places[0][0]):
+                        lines.append([*places[0], x, y])
+        return {"handles": handles, "lines": lines}
+
+    def cube(self) -> list[dict[str, Any]]:
+        """Return the orientation cube; see `cube_cells`."""
+        eye, target = self._window.camera.eye_and_target()
+        up = self._window.subplot.vtk_renderer.camera.up
+        return cube_cells(self._window.actions.view.axes, np.subtract(eye, target), up)
 
     def _in_view(self, pixels: ArrayLike) -> list[list[float]]:
         """Return pixels as parts of the view's width, and of its height from the top."""
@@ -280,23 +332,23 @@ class Display:
         """Return the box or lasso that is being drawn, as points of an SVG of the size 1."""
         return " ".join(f"{x},{y}" for x, y in self._in_view(self._window.tools.selection_line))
 
-    def _gizmo_length(self) -> float:
-        """Return the length of the gizmo's axes, in model units: the same in all pictures of a size."""
-        (middle, *_), subplot = self._window.actions.trees.handles(1.0), self._window.subplot
+    def _gizmo_length(self, middle: ArrayLike) -> float:
+        """Return the length of axes from a point, in model units: the same in all pictures of a size."""
+        subplot = self._window.subplot
         camera = subplot.vtk_renderer.camera
         back = np.subtract(camera.position, camera.focal_point)
         side = unit_rows(np.cross(camera.up, back)[None])[0].astype(np.float64)
-        ends = pixels_of(subplot, [middle.position, middle.position + side])
+        ends = pixels_of(subplot, [middle, middle + side])
         height: int = self._window.plotter.window_size[1]
         return GIZMO_SIZE * height / float(np.linalg.norm(ends[1] - ends[0]))
 
     def drag_handle(self, name: str, phase: str, x: float, y: float, *, snap: bool) -> None:
-        """Drag a handle of the selected node; the pointer is given in parts of the view's width and height.
+        """Drag a handle of the selected node or the slice, with the pointer in parts of the view's size.
 
         Parameters
         ----------
         name
-            Name of the handle; see `decals.editing.gizmo.Handle`.
+            Name of the handle; see `decals.editing.gizmo.Handle` and `SlicePlane.handles`.
         phase
             "begin", "move" or "end".
         x, y
@@ -304,46 +356,30 @@ class Display:
         snap
             Move, turn and scale in round steps.
         """
-        one_of("phase", phase, ("begin", "move", "end"), InvalidEdit)
+        one_of("phase", phase, PHASES, InvalidEdit)
         trees, (width, height) = self._window.actions.trees, self._window.plotter.window_size
         right, down = (min(max(finite_number("place", part, InvalidEdit), 0.0), 1.0) for part in (x, y))
         ray = ray_through(self._window.subplot, right * width - 0.5, (1.0 - down) * height - 0.5)
         assert ray is not None  # the place lies in the view
+        plane = self.options.slice
         if phase == "begin":
-            trees.begin_handle_drag(name, ray, self._gizmo_length() if trees.handles(1.0) else 1.0)
+            self._slice_drag = None
+            if plane is not None and name in (MOVE, TILT):
+                self._slice_drag = SliceDrag(name, plane, ray, self._gizmo_length(plane.point))
+                return
+            middle = trees.handles(1.0)
+            trees.begin_handle_drag(name, ray, self._gizmo_length(middle[0].position) if middle else 1.0)
+            return
+        if self._slice_drag is not None:
+            if plane is not None:
+                plane = self._slice_drag.dragged(ray, self._box(), snap=snap)
+                self.options = replace(self.options, slice=plane)
+            if phase == "end":
+                self._slice_drag = None
             return
         trees.drag_handle(ray, snap=snap)
         if phase == "end":
             trees.end_drag()
-
-    def frame_selection(self) -> None:
-        """Show the selected node or decals as large as they fit; without a selection, everything."""
-        state, document = self._window.actions.state, self._window.document
-        if state.selection:
-            chosen = document.decals.take(state.selected_numbers)
-            reach = 3.0 * chosen.radii[:, None]
-            low, high = (chosen.positions - reach).min(axis=0), (chosen.positions + reach).max(axis=0)
-        elif state.primitive is not None:
-            number, path = state.primitive
-            item = document.objects[number]
-            assert isinstance(item, TreeObject)
-            low, high = node_in_world(item.tree, path).bounds
-        elif document.objects:
-            low, high = bounds_of(document.objects)
-        else:
-            return
-        bounds = np.stack([low, high], axis=1).ravel().astype(float).tolist()
-        self._window.subplot.vtk_renderer.ResetCamera(bounds)
-
-    def look_from(self, name: str) -> None:
-        """Look at the present target from a side; see `PRESETS`."""
-        toward = np.array(PRESETS[one_of("side", name, PRESETS, InvalidEdit)])
-        view = self._window.subplot.vtk_renderer.camera
-        target = np.array(view.focal_point)
-        distance = float(np.linalg.norm(np.array(view.position) - target))
-        view.position = tuple((target + distance * toward).tolist())
-        view.up = (0.0, 0.0, -float(toward[1])) if toward[1] else (0.0, 1.0, 0.0)
-        self._window.subplot.vtk_renderer.reset_camera_clipping_range()
 
     def add_bookmark(self) -> None:
         """Keep the present camera."""
@@ -382,8 +418,8 @@ def show(
     mesh = first.append_polydata(*others) if others else first
     shown: Shown = []
     messages = []
-    if options.slice_axis != NO_SLICE:
-        shown += _sliced(document, mesh, options, low, high)
+    if options.slice is not None:
+        shown += _sliced(document, mesh, options.slice, LIFT * size)
     elif options.mode != MODES[0]:
         shown.append(_moded(document, mesh, parts, options.mode))
     if options.overlay != OVERLAYS[0]:
@@ -415,29 +451,24 @@ def _moded(document: Document, mesh: pv.PolyData, parts: list[pv.PolyData], mode
     return name, copy, {"scalars": "mean curvature", "cmap": "PuOr", "clim": (-reach, reach)}
 
 
-def _sliced(
-    document: Document, mesh: pv.PolyData, options: DisplayOptions, low: Float32Array, high: Float32Array
-) -> Shown:
+def _sliced(document: Document, mesh: pv.PolyData, cut: SlicePlane, lift: float) -> Shown:
     """Return the part of the mesh behind a plane, and the fields of the trees on it with iso-lines."""
-    axis = AXES.index(options.slice_axis)
-    origin = ((low + high) / 2).astype(float)
-    origin[axis] = low[axis] + options.slice_position * (high[axis] - low[axis])
-    normal = np.eye(3)[axis]
-    clipped = mesh.clip(normal=normal, origin=origin)
+    clipped = mesh.clip(normal=cut.normal, origin=cut.point)
     shown: Shown = []
     if clipped.n_points:
         shown.append((f"{PREFIX}mesh", clipped, {"scalars": "RGB", "rgb": True, "smooth_shading": True}))
     for number, item in enumerate(document.objects):
         if not isinstance(item, TreeObject):
             continue
-        field: Any = item.tree.slice(origin, normal, resolution=RESOLUTION)
+        field: Any = item.tree.slice(cut.point, cut.normal, resolution=RESOLUTION)
         plane = {"scalars": "field", "cmap": "cividis", "clim": (0.0, 1.0), "lighting": False}
-        shown.append((f"{PREFIX}plane {number}", field["plane"], plane))
+        shown.append(
+            (f"{PREFIX}plane {number}", field["plane"].threshold(SHOWN_FIELD, scalars="field"), plane)
+        )
         for part, width in (("lines", 1), ("surface", 4)):
             if field[part].n_points:
-                shown.append(
-                    (f"{PREFIX}{part} {number}", field[part], {"color": "white", "line_width": width})
-                )
+                lifted = field[part].translate(lift * np.array(cut.normal))
+                shown.append((f"{PREFIX}{part} {number}", lifted, {"color": "white", "line_width": width}))
     return shown
 
 

@@ -14,8 +14,6 @@ from decals.apps.sandbox.folder import thumbnails
 from decals.apps.sandbox.panels import DROP, FIELD, named
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.apps.sandbox.view import StreamedView
-from decals.editing.actions import KEYS
-from decals.editing.key_bindings import format_gestures
 from decals.window import EditWindow, browser_keys
 
 REFRESH_SECONDS = 0.1
@@ -26,12 +24,28 @@ NARROW = 900
 """Width of a window, in pixels, below which the panels lie above the view."""
 
 NARROW_WINDOW = f"$vuetify.display.width < {NARROW}"
+ONE_ROW = 1260
+"""Width of a window, in pixels, from which on the toolbar is one row."""
+
+TOOLBAR_HEIGHT = f"$vuetify.display.width < {ONE_ROW} ? 96 : 64"
+"""Height of the toolbar, of which its density takes 16."""
 
 STYLE = """.v-slider *, .v-field * { transition: none !important }
-.toolbar .v-toolbar__content { overflow-x: auto }
+.toolbar .v-toolbar__content { overflow-x: auto; flex-wrap: wrap; justify-content: flex-start }
+.toolbar h1 { min-width: 60px; max-width: 160px; flex: 0 1 auto; overflow: hidden; text-overflow: ellipsis;
+  white-space: nowrap }
+@media (max-width: 900px) {
+.toolbar .v-btn__prepend { display: none } .toolbar .v-btn--size-small:not(.v-btn--icon) { padding: 0 8px }
+.toolbar h1 { max-width: 100px } }
 .toolbar .v-btn-group { flex-shrink: 0 }
 .v-field__input { padding-inline: 8px }
-.row-flag { font-size: 18px; padding: 4px }"""
+.row-flag { font-size: 18px; padding: 4px }
+.cube { position: absolute; top: 8px; right: 8px; width: 104px; height: 104px; pointer-events: none }
+.cube polygon { fill: rgb(var(--v-theme-surface)); stroke: rgb(var(--v-theme-on-surface)); stroke-width: 0.02;
+  fill-opacity: 0.85; pointer-events: all; cursor: pointer }
+.cube polygon:hover { fill: #56b4e9 }
+.cube text { font-size: 0.42px; text-anchor: middle; dominant-baseline: central;
+  fill: rgb(var(--v-theme-on-surface)) }"""
 """A moved slider would otherwise repaint the panel for 0.3 s, which slows the pictures."""
 
 TOOLBAR = {
@@ -68,7 +82,7 @@ ROW_FLAGS = (
 HANDLE_FILL = (
     "h.name.startsWith('move ') ? ({x: '#d55e00', y: '#009e73', z: '#0072b2'})[h.name[5]] : "
     "h.name.startsWith('turn') ? ({x: '#f0b070', y: '#8fd8c0', z: '#90c4f0'})[h.name[5]] : "
-    "h.name === 'scale' ? '#f0e442' : '#ffffff'"
+    "h.name === 'scale' ? '#f0e442' : h.name.endsWith('slice') ? '#cc79a7' : '#ffffff'"
 )
 """Colours of the handles: strong for axes, light for turns, yellow for the scale, white for points."""
 
@@ -116,9 +130,8 @@ def _place(phase: str) -> str:
 
 
 GIZMO = f"""<svg style="position: absolute; inset: 0; width: 100%; height: 100%; pointer-events: none">
-<line v-for="h in gizmo.handles.filter(h => h.name.startsWith('move '))" :key="h.name" stroke="#111"
-  :x1="100 * gizmo.handles[0].x + '%'" :y1="100 * gizmo.handles[0].y + '%'"
-  :x2="100 * h.x + '%'" :y2="100 * h.y + '%'" stroke-width="3"/>
+<line v-for="(l, i) in gizmo.lines" :key="i" stroke="#111" stroke-width="3"
+  :x1="100 * l[0] + '%'" :y1="100 * l[1] + '%'" :x2="100 * l[2] + '%'" :y2="100 * l[3] + '%'"/>
 <circle v-for="h in gizmo.handles" :key="h.name" :cx="100 * h.x + '%'" :cy="100 * h.y + '%'" r="8"
   :fill="{HANDLE_FILL}" :data-handle="h.name" stroke="#111" stroke-width="2"
   style="pointer-events: all; cursor: grab; touch-action: none"
@@ -127,7 +140,34 @@ GIZMO = f"""<svg style="position: absolute; inset: 0; width: 100%; height: 100%;
   @pointerup.stop="{_place("end")}"
   @mousedown.stop><title>{{{{ h.name }}}}</title></circle>
 </svg>"""
-"""Handles of the selected node above the view: they cost no frame."""
+"""Handles of the selected node and the slice above the view: they cost no frame."""
+
+
+FINGERS = (
+    "const [a, b] = $event.touches, view = $event.currentTarget, h = view.clientHeight, last = view.fingers; "
+    "const now = [(a.clientX + b.clientX) / 2 / h, (a.clientY + b.clientY) / 2 / h, "
+    "Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY) / h]; view.fingers = now; "
+)
+"""Keep where the middle of two fingers is and how far apart they are, in heights of the view."""
+
+TOUCH_EVENTS = {
+    "touchstart": f"if ($event.touches.length === 2) {{ {FINGERS} trigger('pinch', [0, 0, 1, 'begin']) }}",
+    "touchmove": f"if ($event.touches.length === 2) {{ {FINGERS} "
+    "if (last) trigger('pinch', [now[0] - last[0], last[1] - now[1], now[2] / last[2], 'move']) }",
+    "touchend": "$event.currentTarget.fingers && trigger('pinch', [0, 0, 1, 'end'])",
+    "pointerdown": "$event.isPrimary ? $event.currentTarget.fingers = null : $event.stopPropagation()",
+    "pointermove": "$event.currentTarget.fingers && $event.stopPropagation()",
+    "pointerup": "$event.isPrimary || $event.stopPropagation()",
+}
+"""Two fingers move and zoom the view. The first alone does what the mouse does, until another one comes."""
+
+CUBE = """<svg viewBox="-1.8 -1.8 3.6 3.6" class="cube" aria-hidden="true">
+<polygon v-for="c in cube" :key="c.points" :points="c.points"
+  @pointerdown.stop @mousedown.stop @click.stop="trigger('look', [c.name])">
+<title>{{ c.title }}</title></polygon>
+<text v-for="c in cube.filter(c => c.label)" :key="c.name" :transform="c.label">{{ c.name }}</text>
+</svg>"""
+"""The orientation cube; the menu of the view has its sides as buttons."""
 
 
 LASSO = """<svg viewBox="0 0 1 1" preserveAspectRatio="none"
@@ -165,6 +205,7 @@ class Page:
         self._task: asyncio.Task[None] | None = None
         constants = {"catalog": self.sandbox.catalog(), "thumbnails": thumbnails(), "theme": "light"}
         renamed, dropped = {"key": "", "name": ""}, None
+        server.state.client_only("left_open", "right_open")  # another browser has its own panels
         server.state.menu = {"open": False, "x": 0, "y": 0, "key": "", "label": "", "kind": ""}
         server.state.update(
             {**constants, **self.values(), "renamed": renamed, "dropped": dropped, "dropped_on": ""}
@@ -173,6 +214,8 @@ class Page:
         server.controller.trigger("handle")(self.sandbox.drag_handle)
         for change in ("rename", "move"):
             server.controller.trigger(change)(partial(self._change_row, change))
+        server.controller.trigger("pinch")(self.sandbox.pinch)
+        server.controller.trigger("look")(lambda name: self.sandbox.move_camera("look", name))
         self._build()
         server.controller.on_server_ready.add(self._start)
         server.controller.on_server_exited.add(self._stop)
@@ -241,11 +284,15 @@ class Page:
                 with (
                     vuetify3.VMain(),
                     html.Div(
-                        style="height: 100%; position: relative",
+                        style="height: 100%; position: relative; touch-action: none",
                         dragover="$event.preventDefault()",
                         drop=f"$event.preventDefault(); {DROP.format('dataTransfer')}",
                         __events=["dragover", "drop"],
-                        raw_attrs=['role="application"', *named("'view of the scene'")],
+                        raw_attrs=[
+                            'role="application"',
+                            *named("'view of the scene'"),
+                            *(f'@{name}.capture="{code}"' for name, code in TOUCH_EVENTS.items()),
+                        ],
                         **browser_keys(self._window),
                     ),
                 ):
@@ -258,6 +305,7 @@ class Page:
                     self.sandbox.schedule = self.view.update
                     html.Div(LASSO, v_if="gizmo.line")
                     html.Div(GIZMO, v_if="gizmo.handles.length")
+                    html.Div(CUBE)
                 panels.build_start(self.sandbox)
                 with vuetify3.VFooter(app=True, height=28, classes="text-caption"):
                     html.Span("{{ status }}", raw_attrs=['role="status"'])
@@ -282,7 +330,9 @@ class Page:
         self._build_history()
 
     def _build_toolbar(self) -> None:
-        with vuetify3.VAppBar(density="compact", flat=True, border=True, classes="toolbar"):
+        with vuetify3.VAppBar(
+            density="compact", flat=True, border=True, height=(TOOLBAR_HEIGHT,), classes="toolbar"
+        ):
             html.H1("{{ title }}", classes="text-h6 mx-3")
             for side, icon in (("left", "mdi-file-tree-outline"), ("right", "mdi-tune")):
                 panels.icon_button(icon, f"{side} panel", f"{side}_open = !{side}_open", v_if=NARROW_WINDOW)
@@ -296,10 +346,8 @@ class Page:
             panels.build_actions(self.sandbox)
             panels.build_brushes(self.sandbox)
             vuetify3.VDivider(vertical=True, classes="mx-2")
-            gestures = {binding.action: binding for binding in KEYS.bindings}
             for action, icon in TOOLBAR.items():
-                text = f"{gestures[action].summary} ({format_gestures(gestures[action])})"
-                panels.icon_button(icon, text, (self.sandbox.perform, f"['{action}']"))
+                panels.icon_button(icon, panels.SUMMARIES[action], (self.sandbox.perform, f"['{action}']"))
             if self._ends:
                 vuetify3.VBtn("Done", color="primary", variant="flat", size="small", click=self._finish)
             theme = "theme = theme === 'light' ? 'dark' : 'light'"

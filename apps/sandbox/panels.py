@@ -6,11 +6,11 @@ from trame.widgets import html, vuetify3
 
 from decals.apps.sandbox.folder import IMAGES, MODELS
 from decals.apps.sandbox.sandbox import Sandbox
-from decals.apps.views import PRESETS
 from decals.editing.actions import KEYS
 from decals.editing.brushes import Brush
 from decals.editing.file_actions import Video
 from decals.editing.key_bindings import CAMERA, Binding, Group, format_gestures
+from decals.editing.view_actions import SIDE_KEYS
 
 FIELD = {"density": "compact", "variant": "outlined", "hide_details": True}
 COMPACT = {"density": "compact", "hide_details": True}
@@ -25,16 +25,9 @@ BRUSH_ICONS = {
     Brush.ERASE: "mdi-eraser",
     Brush.RELAX: "mdi-dots-hexagon",
 }
-BRUSH_TEXTS = {
-    Brush.SELECT: "select and move decals",
-    Brush.BOX: "box: drag to select decals",
-    Brush.LASSO: "lasso: drag around decals to select them",
-    Brush.PULL: "pull: drag the surface, and the selected node follows",
-    Brush.SCATTER: "scatter brush: drag to place decals",
-    Brush.PUSH: "push brush: drag to push decals, neighbours yield",
-    Brush.ERASE: "erase brush: drag to delete decals",
-    Brush.RELAX: "relax brush: drag to even decals out",
-}
+SUMMARIES = {b.action: f"{b.summary} ({format_gestures(b)})" for b in KEYS.bindings}
+"""What each action does, and its keys."""
+
 WORDS = "c.name.replaceAll(/[_.]/g, ' ')"
 """Name of the control ``c`` in words."""
 
@@ -298,9 +291,12 @@ def build_view_menu(sandbox: Sandbox) -> None:
         with vuetify3.VCard(width=320, classes="pa-3"):
             build_controls("display.controls", sandbox.set_display)
             with html.Div(classes="d-flex flex-wrap ga-1 my-2"):
-                vuetify3.VBtn("Frame selection", size="x-small", click=(sandbox.move_camera, "['frame']"))
-                for name in PRESETS:
-                    vuetify3.VBtn(name, size="x-small", click=(sandbox.move_camera, f"['look', '{name}']"))
+                for text, action in {
+                    "Frame selection": "frame",
+                    **{s: f"view_{s}" for s in SIDE_KEYS},
+                }.items():
+                    perform = sandbox.perform, f"['{action}']"
+                    vuetify3.VBtn(text, title=SUMMARIES[action], size="x-small", click=perform)
             with html.Div(classes="d-flex flex-wrap ga-1"):
                 vuetify3.VBtn("Keep this view", size="x-small", click=(sandbox.move_camera, "['keep']"))
                 vuetify3.VBtn(
@@ -330,8 +326,8 @@ def build_brushes(sandbox: Sandbox) -> None:
                 icon=BRUSH_ICONS[brush],
                 size="small",
                 width=36,
-                title=BRUSH_TEXTS[brush],
-                raw_attrs=named(f"'{BRUSH_TEXTS[brush]}'"),
+                title=SUMMARIES[f"brush_{brush}"],
+                raw_attrs=named(f"'{SUMMARIES[f'brush_{brush}']}'"),
             )
 
 

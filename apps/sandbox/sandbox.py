@@ -24,7 +24,7 @@ from decals import cover
 from decals.apps.models.samples import SAMPLES, axes_of, sample
 from decals.apps.models.scenes import empty_scene, new_file
 from decals.apps.sandbox import catalog
-from decals.apps.sandbox.controls import controls_of, parsed
+from decals.apps.sandbox.controls import controls_of, exchanged, parsed
 from decals.apps.sandbox.decal_panel import (
     brush_values,
     decal_controls,
@@ -37,10 +37,10 @@ from decals.apps.sandbox.decal_panel import (
     set_drawing,
     set_image_value,
 )
-from decals.apps.sandbox.display import Display
+from decals.apps.sandbox.display import PHASES, Display
 from decals.apps.sandbox.folder import MODELS, plain_name, read_upload, unused, values_of_start
 from decals.apps.sandbox.outline import key_of, outline, parse_key
-from decals.apps.views import THREE_QUARTER, UPRIGHT
+from decals.apps.views import THREE_QUARTER
 from decals.editing.commands import AddImage, DeleteDecals, RemoveImage, ReplaceImage, SetValues
 from decals.editing.document import Document
 from decals.editing.file_actions import PICTURE_SUFFIXES
@@ -52,11 +52,11 @@ from decals.editing.visibility import RenameLayer, RenameNode
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.options import arguments_of, options_of
 from decals.scattering.scatter import scatter
-from decals.scenes.camera import Camera
+from decals.scenes.camera import UPRIGHT, Camera
 from decals.scenes.files import is_scene_file, load_model
 from decals.scenes.objects import MeshObject, SceneObject, bounds_of, flagged
 from decals.scenes.scene import DecalImage, Scene
-from decals.validation import describe, one_of, whole_number
+from decals.validation import describe, finite_number, one_of, whole_number
 from decals.window import EditWindow
 from decals.window.host_plotter import show_background
 
@@ -65,6 +65,9 @@ REST_SECONDS = 1.0
 
 FIRST_IMAGES = ("scale",)
 """Images of a scene at the beginning."""
+
+MAX_ZOOM = 4.0
+"""Largest factor of one step of two fingers."""
 
 MAX_HISTORY = 200
 """Most entries of the history that a page lists."""
@@ -153,6 +156,7 @@ class Sandbox:
             "undone": list(session.undone_labels[:MAX_HISTORY]),
             "start": self._start,
             "display": self.display.values(),
+            "cube": self.display.cube(),
             "gizmo": {**self.display.gizmo(), "line": self.display.selection_line()},
             "decal": {
                 "count": len(state.selection),
@@ -283,7 +287,7 @@ class Sandbox:
 
         def step() -> None:
             trees = self._window.actions.trees
-            value = _exchanged(getattr(trees.selected_node, str(name), ()), index, raw)
+            value = exchanged(getattr(trees.selected_node, str(name), ()), index, raw)
             trees.set_parameter(name, parsed(trees.selected_node, name, value), last=bool(last))
 
         self._slide(step, last=bool(last))
@@ -514,7 +518,7 @@ class Sandbox:
 
         def added() -> None:
             if first:
-                self.display.frame_selection()
+                self.move_camera("frame")
 
         self._window.actions.state.run(AddObject(item), added)
         self._start = {**self._start, "open": False}
@@ -559,21 +563,40 @@ class Sandbox:
 
     # -- view, decals and outline -----------------------------------------------------------------------
 
-    def set_display(self, name: str, value: Any, _last: bool = True) -> None:
+    def set_display(self, name: str, value: Any, _last: bool = True, index: object = ()) -> None:
         """Set how the view shows the scene; see `Display.set_option`."""
         with self._reported():
-            self.display.set_option(name, value)
+            self.display.set_option(name, value, index)
 
     def move_camera(self, name: str, value: Any = None) -> None:
         """Move the camera: "frame", "look" from a side, "keep" a bookmark, or "go" to one."""
         with self._reported():
             moves: dict[str, Callable[[], None]] = {
-                "frame": self.display.frame_selection,
-                "look": lambda: self.display.look_from(value),
+                "frame": lambda: self._window.actions.view.frame(lambda: None),
+                "look": lambda: self._window.actions.view.look_from(value),
                 "keep": self.display.add_bookmark,
                 "go": lambda: self.display.go_to_bookmark(value),
             }
             moves[one_of("camera", name, moves, InvalidEdit)]()
+
+    def pinch(self, right: object, up: object, factor: object, phase: str) -> None:
+        """Move the scene in heights of the view and enlarge it, as two fingers do.
+
+        Parameters
+        ----------
+        right, up, factor
+            The move and the enlargement since the last call.
+        phase
+            "begin", which cancels what the first finger did alone, "move", or "end".
+        """
+        with self._reported(whole=phase == "end"):
+            one_of("phase", phase, PHASES, InvalidEdit)
+            if phase == "begin":
+                self._window.cancel_press()
+            moved, raised, ratio = (finite_number("pinch", one, InvalidEdit) for one in (right, up, factor))
+            self._window.begin_motion()
+            ratio = min(max(ratio, 1.0 / MAX_ZOOM), MAX_ZOOM)
+            self._window.camera.move_and_zoom(min(max(moved, -1.0), 1.0), min(max(raised, -1.0), 1.0), ratio)
 
     def scatter(self) -> None:
         """Cover the object of the selected node, or every object, with decals; each time another seed."""
@@ -742,13 +765,3 @@ def _bare_scene(item: SceneObject) -> Scene:
 
 def _given(scene: Scene) -> Callable[[Progress, Cancel], Scene]:
     return lambda *_: scene
-
-
-def _exchanged(value: Any, index: object, raw: Any) -> Any:
-    """Return nested tuples with one number exchanged."""
-    if index in ((), []):
-        return raw
-    if not isinstance(index, list) or not isinstance(value, tuple) or index[0] not in range(len(value)):
-        raise InvalidEdit(f"index: expected that of a number of the parameter, got {describe(index)}")
-    first, *rest = index
-    return (*value[:first], _exchanged(value[first], rest, raw), *value[first + 1 :])

@@ -50,6 +50,50 @@ class DefaultModes:
     stiffness: float = DEFAULT_STIFFNESS
 
 
+class ViewCamera(Protocol):
+    """The camera of a window."""
+
+    parallel: bool
+    """True for a parallel projection."""
+
+    def eye_and_target(self) -> tuple[ArrayLike, ArrayLike]:
+        """Return the position of the eye and the point that it looks at, shape (3,) each."""
+
+    def look(self, toward: ArrayLike, up: ArrayLike) -> None:
+        """Look at the same target from a direction, shape (3,)."""
+
+    def frame(self, low: ArrayLike, high: ArrayLike) -> None:
+        """Show a box, given by its corners, as large as it fits."""
+
+
+class StillCamera:
+    """The camera of a document without a window, which stays.
+
+    Parameters
+    ----------
+    session
+        The session.
+    """
+
+    parallel = False
+
+    def __init__(self, session: EditSession) -> None:
+        self._session = session
+
+    def eye_and_target(self) -> tuple[ArrayLike, ArrayLike]:
+        """Return eye and target of the document's camera."""
+        camera = self._session.document.camera
+        return camera.position, camera.target
+
+    def look(self, _toward: ArrayLike, _up: ArrayLike) -> None:
+        """Raise `InvalidEdit`: there is no window."""
+        raise InvalidEdit("no window is open whose camera could move; set the scene's camera")
+
+    def frame(self, low: ArrayLike, high: ArrayLike) -> None:
+        """Raise `InvalidEdit`, too."""
+        self.look(low, high)
+
+
 def require_pick(cursor: Cursor) -> SurfacePick:
     """Return the surface point under the cursor, or raise `InvalidEdit`."""
     pick = cursor()
@@ -88,8 +132,8 @@ class ActionState:
         The brush that a drag uses.
     snap
         A dragged primitive moves by multiples of this along each axis; 0 for any distance.
-    view
-        Returns the eye and its target. Default: the document camera's.
+    camera
+        The camera of the window. Default: the document's, which stays.
     background
         Long edits and saves.
     """
@@ -105,7 +149,7 @@ class ActionState:
         self.modes: DrawModes = DefaultModes()
         self.brush = BrushSettings()
         self.snap = 0.0
-        self.view: Callable[[], tuple[ArrayLike, ArrayLike]] = self._document_view
+        self.camera: ViewCamera = StillCamera(session)
         self.background = BackgroundJobs(session, self.show, self.end_stroke, threaded=threaded)
         self._series: tuple[str, object] | None = None
         self._stroke = object()
@@ -157,10 +201,6 @@ class ActionState:
                 self.primitive = None
         exist = self.session.document.decals.has(np.array(self.selection, np.int64))
         self.selection = tuple(n for n, kept in zip(self.selection, exist, strict=True) if kept)
-
-    def _document_view(self) -> tuple[ArrayLike, ArrayLike]:
-        camera = self.session.document.camera
-        return camera.position, camera.target
 
     # -- strokes ----------------------------------------------------------------------------------------
 

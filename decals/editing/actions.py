@@ -9,12 +9,14 @@ from os import PathLike
 
 from decals.editing.action_state import ActionState, Cursor
 from decals.editing.background import are_many
+from decals.editing.brush_actions import BrushActions
 from decals.editing.commands import DeleteDecals, DuplicateDecals
 from decals.editing.decal_actions import DecalActions
 from decals.editing.file_actions import FileActions
 from decals.editing.key_bindings import UNREGISTERED, Group, KeyTable, action, registered_actions
 from decals.editing.session import EditSession, UndoEntry
 from decals.editing.tree_actions import TreeActions
+from decals.editing.view_actions import ViewActions
 from decals.editing.visibility_actions import VisibilityActions
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.field.mapping import ImageMapping
@@ -49,6 +51,10 @@ class Actions:
         Actions on the scene's file.
     visibility : VisibilityActions
         Actions that hide and lock.
+    view : ViewActions
+        Actions that move the camera.
+    brush : BrushActions
+        Actions that choose the brush.
     help_page
         Page of the help that the window shows, from 1; 0 for none.
     help_pages
@@ -79,10 +85,11 @@ class Actions:
         self.trees = TreeActions(self.state)
         self.files = FileActions(self.state, path)
         self.visibility = VisibilityActions(self.state)
+        self.view, self.brush = ViewActions(self.state), BrushActions(self.state)
         self.help_page, self.help_pages = 0, 1
         self._actions = {
             name: (binding, method.__get__(owner))
-            for owner in (self, self.files, self.decals, self.trees, self.visibility)
+            for owner in (self, self.files, self.decals, self.brush, self.trees, self.visibility, self.view)
             for name, (binding, method) in registered_actions(type(owner)).items()
         }
 
@@ -280,7 +287,15 @@ KEYS = KeyTable(
     [
         *(
             binding
-            for owner in (Actions, FileActions, DecalActions, TreeActions, VisibilityActions)
+            for owner in (
+                Actions,
+                FileActions,
+                DecalActions,
+                BrushActions,
+                TreeActions,
+                VisibilityActions,
+                ViewActions,
+            )
             for binding, _ in registered_actions(owner).values()
         ),
         *UNREGISTERED,

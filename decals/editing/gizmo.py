@@ -132,6 +132,20 @@ def on_plane(point: ArrayLike, normal: ArrayLike, ray: Ray) -> Float64Array | No
     return met
 
 
+def nearest_on_sphere(center: ArrayLike, radius: float, near: ArrayLike, ray: Ray) -> Float64Array:
+    """Return the unit direction from a centre to a ray: where it meets a sphere, the nearer to a point.
+
+    A ray that misses the sphere gives the direction to its point closest to the centre.
+    """
+    middle, along = np.asarray(center, np.float64), _unit(ray[1])
+    start = np.asarray(ray[0], np.float64).reshape(3) - middle
+    closest = start - (start @ along) * along
+    half_chord = math.sqrt(max(radius**2 - float(closest @ closest), 0.0))
+    ends = closest - half_chord * along, closest + half_chord * along
+    offset = np.asarray(near, np.float64) - middle
+    return _unit(min(ends, key=lambda end: float(np.linalg.norm(end - offset))))
+
+
 def angle_about(axis: ArrayLike, first: ArrayLike, second: ArrayLike) -> float:
     """Return the angle in degrees from one offset to another, counter-clockwise about an axis."""
     line, a, b = _unit(axis), np.asarray(first, np.float64), np.asarray(second, np.float64)

@@ -14,6 +14,7 @@ class Group(Enum):
     SELECTION = "Selection"
     DECALS = "Decals"
     MANY = "Many decals"
+    BRUSHES = "Brushes"
     SHAPE = "Shape"
     SCENE = "Scene"
     CAMERA = "Camera"

@@ -208,6 +208,12 @@ class PointerTools:
             drag.end()
         return drag is not None or ctrl
 
+    def cancel(self) -> None:
+        """Forget the press of the button, and revert what its drag has changed."""
+        self._press, self.selection_line, self._drag, self._brush = Press.UP, [], None, None
+        self.actions.state.background.cancel()
+        self.actions.state.session.cancel_stroke()
+
     def _select_inside(self, line: list[tuple[float, float]]) -> None:
         """Select the visible decals whose centres appear in a polygon."""
         state = self.actions.state

@@ -263,7 +263,7 @@ class TreeActions:
         """Select a node of an object's tree, with its handle on the side that the camera sees."""
         self._state.session.document.object(number)  # raises for a number without an object
         low, high = node_in_world(self._tree(number), path).support
-        eye, _ = self._state.view()
+        eye, _ = self._state.camera.eye_and_target()
         toward = unit_rows((np.asarray(eye) - (low + high) / 2)[None])[0]
         self._state.select_primitive(number, path, float((high - low).min()) / 2 * toward)
 
@@ -301,7 +301,7 @@ class TreeActions:
         """
         state, middle = self._state, np.zeros(3, np.float32)
         if state.primitive is None:
-            objects, view = state.session.document.objects, state.view()
+            objects, view = state.session.document.objects, state.camera.eye_and_target()
             self._add_tree(kind.lower(), lambda: make(*_place_of_object(objects, *view)), middle)
             return
         number, path = state.primitive
@@ -450,7 +450,7 @@ class TreeActions:
     def duplicate_selected(self) -> None:
         """Add a copy of the selected primitive, to the right of it as seen."""
         assert self._state.primitive is not None
-        eye, target = (np.asarray(point, np.float64) for point in self._state.view())
+        eye, target = (np.asarray(point, np.float64) for point in self._state.camera.eye_and_target())
         toward = eye - target
         aside = np.cross(toward, np.eye(3)[np.abs(toward).argmin()])
         number, path = self._state.primitive
@@ -516,7 +516,7 @@ class TreeActions:
     def add_object(self, cursor: Cursor) -> None:
         """Add a ball as a new object, on the surface under the cursor or at the target of the camera."""
         objects, pick = self._state.session.document.objects, cursor()
-        eye, target = (np.asarray(point, np.float64) for point in self._state.view())
+        eye, target = (np.asarray(point, np.float64) for point in self._state.camera.eye_and_target())
         if objects:
             low, high = bounds_of(objects)
             radius = OBJECT_RADIUS * float(np.linalg.norm(high - low))
@@ -529,7 +529,7 @@ class TreeActions:
 
     def _add_first_limb(self) -> None:
         """Add a segment as the first object, at the target of the camera."""
-        eye, target = (np.asarray(point, np.float64) for point in self._state.view())
+        eye, target = (np.asarray(point, np.float64) for point in self._state.camera.eye_and_target())
         radius = FIRST_LIMB_RADIUS * float(np.linalg.norm(eye - target))
         half = 0.5 * LIMB_LENGTH / LIMB_RADIUS * radius * np.eye(3)[np.abs(eye - target).argmin()]
         limb = Segment(_coordinates(target - half), _coordinates(target + half), radius=radius)

@@ -28,6 +28,43 @@ THREE_QUARTER: Vector = (0.55, 0.35, 1.0)
 PARALLEL_SINE = 1e-9
 """Sine below which two directions count as parallel."""
 
+PRESETS: dict[str, Vector] = {
+    "three-quarter": THREE_QUARTER,
+    "front": (0.0, 0.0, 1.0),
+    "back": (0.0, 0.0, -1.0),
+    "left": (-1.0, 0.0, 0.0),
+    "right": (1.0, 0.0, 0.0),
+    "top": (0.0, 1.0, 0.0),
+    "bottom": (0.0, -1.0, 0.0),
+}
+"""Directions toward the camera by name, as parts to the right, upward, and toward the front."""
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Which way a model stands: unit vectors upward and toward its front."""
+
+    up: Vector
+    front: Vector
+
+    @property
+    def matrix(self) -> Float64Array:
+        """Unit vectors to the right, upward and toward the front, as rows, float64[3, 3]."""
+        return np.array([np.cross(self.up, self.front), self.up, self.front], np.float64)
+
+    def preset(self, name: str) -> Vector:
+        """Return the direction of a preset in the model's own coordinates."""
+        x, y, z = (np.asarray(PRESETS[name]) @ self.matrix).tolist()
+        return x, y, z
+
+
+UPRIGHT = {
+    "x": Axes((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    "y": Axes((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+    "z": Axes((0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),
+}
+"""Axes by the name of the one that points upward."""
+
 
 @dataclass(frozen=True, slots=True)
 class Camera:

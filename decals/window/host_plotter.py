@@ -1,5 +1,6 @@
 """Host plotters: the window of an editor, its own or one that the caller provides."""
 
+import math
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -146,10 +147,70 @@ def camera_of(subplot: SubplotRenderer) -> Camera | None:
     return Camera(tuple(camera.position), tuple(camera.focal_point), tuple(camera.up), camera.view_angle)
 
 
-def eye_and_target(subplot: SubplotRenderer) -> tuple[ArrayLike, ArrayLike]:
-    """Return the position of a subplot's camera, and its focal point."""
-    camera = subplot.vtk_renderer.camera
-    return camera.position, camera.focal_point
+class SubplotCamera:
+    """The camera of a subplot; a `decals.editing.action_state.ViewCamera`.
+
+    Parameters
+    ----------
+    subplot
+        The subplot.
+    """
+
+    def __init__(self, subplot: SubplotRenderer) -> None:
+        self._renderer: Any = subplot.vtk_renderer
+
+    @property
+    def parallel(self) -> bool:
+        """True for a parallel projection; what lies at the target keeps its size when this changes."""
+        return bool(self._renderer.camera.parallel_projection)
+
+    @parallel.setter
+    def parallel(self, parallel: bool) -> None:
+        camera = self._renderer.camera
+        if parallel == self.parallel:
+            return
+        half_height = math.tan(math.radians(camera.view_angle / 2.0))
+        if parallel:
+            camera.parallel_scale = camera.distance * half_height
+        else:
+            eye, target = map(np.array, self.eye_and_target())
+            camera.position = target + (eye - target) * (
+                camera.parallel_scale / half_height / camera.distance
+            )
+        camera.parallel_projection = parallel
+        self._renderer.reset_camera_clipping_range()
+
+    def eye_and_target(self) -> tuple[ArrayLike, ArrayLike]:
+        """Return the position of the camera, and its focal point."""
+        return self._renderer.camera.position, self._renderer.camera.focal_point
+
+    def look(self, toward: ArrayLike, up: ArrayLike) -> None:
+        """Look at the same target from a direction, shape (3,)."""
+        camera, direction = self._renderer.camera, np.asarray(toward, np.float64)
+        distance = camera.distance / np.linalg.norm(direction)
+        camera.position = tuple((np.array(camera.focal_point) + distance * direction).tolist())
+        camera.up = tuple(np.asarray(up, np.float64).tolist())
+        self._renderer.reset_camera_clipping_range()
+
+    def frame(self, low: ArrayLike, high: ArrayLike) -> None:
+        """Show a box, given by its corners, as large as it fits."""
+        self._renderer.ResetCamera(np.stack([low, high], axis=1).ravel().astype(float).tolist())
+
+    def move_and_zoom(self, right: float, up: float, factor: float) -> None:
+        """Move what lies at the target, in heights of the view, then enlarge it by a factor."""
+        camera = self._renderer.camera
+        eye, target = map(np.array, self.eye_and_target())
+        tangent = math.tan(math.radians(camera.view_angle / 2.0))
+        height = 2.0 * (camera.parallel_scale if self.parallel else camera.distance * tangent)
+        side = np.cross(target - eye, camera.up)
+        side /= np.linalg.norm(side)
+        upward = np.cross(side, target - eye) / camera.distance
+        shift = -height * (right * side + up * upward)
+        zoom = 1.0 if self.parallel else 1.0 / factor
+        camera.focal_point = tuple((target + shift).tolist())
+        camera.position = tuple((target + shift + zoom * (eye - target)).tolist())
+        camera.parallel_scale /= factor if self.parallel else 1.0
+        self._renderer.reset_camera_clipping_range()
 
 
 FRAME_SETTINGS = "draw_scale", "samples", "wait_for_gpu", "keep_previous_frame", "walks_in_thread"

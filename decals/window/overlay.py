@@ -36,7 +36,7 @@ MIN_HELP_SIZE, MAX_HELP_SIZE = 6, 18
 HELP_BORDER = 60
 """Space above and below the help, in pixels."""
 
-MAX_HELP_PAGES = 2
+MAX_HELP_PAGES = 3
 """Pages of the help, at most: so many are needed in a window of 400 × 300 pixels."""
 
 TEXT_MARGIN = 12

@@ -36,12 +36,12 @@ from decals.window.host_plotter import (
     DEFAULT_SIZE,
     HostPlotter,
     SubplotBackup,
+    SubplotCamera,
     before_screenshots,
     camera_of,
     checked_size,
     collected_interrupts,
     edits_at,
-    eye_and_target,
     pixels_of,
     ray_through,
 )
@@ -100,6 +100,8 @@ class EditWindow:
         Draws the scene.
     frames : FrameController
         Chooses the quality of frames.
+    camera : SubplotCamera
+        The camera of the subplot.
 
     Raises
     ------
@@ -165,7 +167,7 @@ class EditWindow:
         given = contact, mapping, stiffness
         for name, mode, present in zip(("contact", "mapping", "stiffness"), given, modes, strict=True):
             setattr(self.subplot, name, present if mode is None else mode)
-        self.actions.state.view = lambda: eye_and_target(self.subplot)
+        self.camera = self.actions.state.camera = SubplotCamera(self.subplot)
         self.tools = PointerTools(
             self.actions,
             lambda x, y: ray_through(self.subplot, x, y),
@@ -246,6 +248,11 @@ class EditWindow:
     def _wake_if_coarse(self) -> None:
         if self.frames.state is FrameState.COARSE:
             self._ticker.wake()
+
+    def cancel_press(self) -> None:
+        """Forget a press of the button: revert what its drag has changed, and let the camera stop."""
+        self.tools.cancel()
+        self._host.interactor.InvokeEvent("LeftButtonReleaseEvent")
 
     def draw_whole_frame(self) -> None:
         """Draw a whole frame now, however long it takes."""

@@ -5,8 +5,9 @@ import pytest
 
 from blobtree import Point
 from decals.apps.models.shapes import torus_knot
-from decals.apps.views import PRESETS, UPRIGHT, View, frame, parse_view
+from decals.apps.views import View, frame, parse_view
 from decals.errors import InvalidInput
+from decals.scenes.camera import PRESETS, UPRIGHT
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject
 
 

@@ -29,8 +29,8 @@ from decals.apps.lab.lesson import LESSONS, load_lessons
 from decals.apps.lab.page import LabPage
 from decals.apps.models.scenes import empty_scene
 from decals.apps.sandbox.page import Page as SandboxPage
-from decals.apps.views import UPRIGHT
 from decals.editing.scatter_commands import decals_on
+from decals.scenes.camera import UPRIGHT
 from decals.window import EditWindow
 from tests.apps.lab.answers import ANSWERS
 from tests.decals.editing.scenes import digest, scene, tree_of

@@ -35,10 +35,10 @@ UNDONE = ("close", "camera", "move", "add_image", "save", "save_as", "export")
 ACTIONS = [binding.action for binding in KEYS.bindings if binding.action not in UNDONE]
 KINDS = ["Point", "Torus", "Box", "Twist", "Offset", "Union", "Difference", "Nothing"]
 NAMES = ["radius", "center", "degrees", "color", "opacity", "layer", "image", "tint", "spill", "interaction"]
-OPTIONS = ["mode", "overlay", "slice_axis", "slice_position", "orthographic", "axes"]
+OPTIONS = ["mode", "overlay", "slice_axis", "slice_position", "slice_normal", "up", "orthographic", "axes"]
 SHOWN = ["traced", "polygonized", "normals", "none", "seeds", "owners", "folds", "contact lines", "x", "z"]
 CHANGES = ["rename", "remove", "duplicate", "move", "group", "hide", "lock", "isolate"]
-HANDLES = ["move", "move x", "turn y", "scale", "start 0"]
+HANDLES = ["move", "move x", "turn y", "scale", "start 0", "slice", "tilt slice"]
 EVENTS: dict[str, list[list[Any]]] = {
     "select": [KEYS_OF_ROWS],
     "mark": [KEYS_OF_ROWS],
@@ -51,7 +51,8 @@ EVENTS: dict[str, list[list[Any]]] = {
     "unwrap": [],
     "perform": [ACTIONS],
     "go_to": [[0, 1, 2, 3, 5]],
-    "set_display": [OPTIONS, [*SHOWN, 0.3, True, False]],
+    "set_display": [OPTIONS, [*SHOWN, 0.3, True, False], [True, False], [[], [], [0], [1], [9]]],
+    "pinch": [[0.1, 0.0], [-0.2, 0.0], [0.5, 1.0, 3.0], ["begin", "move", "end"]],
     "move_camera": [["frame", "look", "keep", "go"], ["front", "top", 0, 3]],
     "set_decals": [NAMES, [0.1, 0.5, 2, "overlap", "tint alone", "#0000ff", True], [True, False]],
     "set_brush": [["brush", "radius", "density"], ["select", "scatter", "push", "lasso", 0.3]],

@@ -14,13 +14,14 @@ from blobtree.nodes.paths import node_at
 from blobtree.nodes.surgery import move_branch
 from decals.apps.sandbox.display import MODES, OVERLAYS
 from decals.apps.sandbox.sandbox import Sandbox
-from decals.apps.views import PRESETS
 from decals.editing.commands import AddImage, ReplaceImage
 from decals.errors import InvalidScene
 from decals.record import Contact
 from decals.rendering.options import Background
+from decals.scenes.camera import PRESETS
 from decals.scenes.objects import MeshObject
 from decals.window import EditWindow
+from decals.window.host_plotter import pixels_of
 from tests.apps.sandbox.test_sandbox import TREE, finish
 from tests.decals.editing.scenes import box, digest, tree_of
 
@@ -66,7 +67,8 @@ def test_every_mode_and_overlay_changes_the_picture_and_all_go_back(
     pictures = [picture(shared)]
     choices: list[tuple[str, Any]] = [("mode", mode) for mode in MODES[1:]] + [("mode", MODES[0])]
     choices += [("overlay", overlay) for overlay in OVERLAYS[1:] if overlay != "folds"]
-    choices += [("overlay", "none"), ("slice_axis", "z"), ("slice_position", 0.3), ("slice_axis", "none")]
+    choices += [("overlay", "none"), ("slice_axis", "z"), ("slice_position", -0.3)]
+    choices += [("slice_normal", (1.0, 0.0, 2.0)), ("slice_axis", "none")]
     for name, value in choices:
         sandbox.set_display(name, value)
         settle(sandbox, shared)
@@ -152,14 +154,117 @@ def test_cameras(sandbox: Sandbox, shared: EditWindow) -> None:
         sandbox.move_camera("frame")
         distances.append(camera.distance)
     assert distances[1] < distances[0]
-    wrong: list[Any] = [("look", "up"), ("go", 9), ("go", True), ("fly", None), (None, None)]
+    wrong: list[Any] = [
+        ("look", "up"),
+        ("look", "top bottom"),
+        ("look", None),
+        ("go", 9),
+        ("go", True),
+        ("fly", None),
+        (None, None),
+    ]
     for name, value in wrong:
         sandbox.move_camera(name, value)
         assert "expected" in sandbox.status
-    wrong = [("mode", "x"), ("overlay", None), ("slice_position", "x"), (3, 3)]
+    sandbox.set_display("slice_axis", "tilted")
+    wrong = [("mode", "x"), ("overlay", None), ("slice_position", "x"), ("slice_position", float("inf"))]
+    wrong += [("slice_axis", "w"), ("slice_normal", (0, 0, 0)), ("slice_normal", 3), ("up", "w"), (3, 3)]
     for name, value in wrong:
         sandbox.set_display(name, value)
         assert "expected" in sandbox.status
+    for index in (["x"], [3], 0):
+        sandbox.set_display("slice_normal", 1.0, True, index)
+        assert "expected" in sandbox.status
+    sandbox.set_display("slice_axis", "none")
+    for pinch in ((0.0, 0.0, 0.0, "spin"), (None, 0.0, 1.0, "move"), (0.0, float("nan"), 1.0, "move")):
+        sandbox.pinch(*pinch)
+        assert "expected" in sandbox.status
+
+
+def test_the_model_keeps_its_size_when_the_projection_changes(sandbox: Sandbox, shared: EditWindow) -> None:
+    camera = shared.subplot.vtk_renderer.camera
+    point = np.array(camera.focal_point) + 0.3 * np.array(camera.up)
+    places = []
+    for action in ("view_three-quarter", "orthographic", "orthographic"):
+        sandbox.perform(action)
+        places.append(pixels_of(shared.subplot, point))
+    np.testing.assert_allclose(places[1], places[0], atol=0.5)
+    np.testing.assert_allclose(places[2], places[0], atol=1e-3)
+
+
+def test_two_fingers_move_and_zoom_what_lies_at_the_target(sandbox: Sandbox, shared: EditWindow) -> None:
+    camera, (_, height) = shared.subplot.vtk_renderer.camera, shared.plotter.window_size
+    for parallel in (False, True):
+        sandbox.perform("frame")
+        sandbox.set_display("orthographic", parallel)
+        point = np.array(camera.focal_point)
+        sides = np.stack([point, point + 0.2 * np.array(camera.up)])
+        before = pixels_of(shared.subplot, sides)
+        sandbox.pinch(0.0, 0.0, 1.0, "begin")
+        sandbox.pinch(0.1, -0.2, 1.0, "move")
+        moved = pixels_of(shared.subplot, sides)
+        np.testing.assert_allclose(moved[0] - before[0], (0.1 * height, -0.2 * height), atol=1e-3)
+        sandbox.pinch(0.0, 0.0, 2.0, "move")
+        sandbox.pinch(0.0, 0.0, 1.0, "end")
+        camera.focal_point, camera.position = (
+            tuple(np.array(one) + point - np.array(camera.focal_point))
+            for one in (camera.focal_point, camera.position)
+        )
+        zoomed = pixels_of(shared.subplot, sides)
+        np.testing.assert_allclose(zoomed[0], before[0], atol=1e-3)
+        np.testing.assert_allclose(zoomed[1] - zoomed[0], 2.0 * (before[1] - before[0]), rtol=0.15)
+
+
+def test_two_fingers_take_back_what_the_first_did(sandbox: Sandbox, shared: EditWindow) -> None:
+    before, camera = digest(shared.document), shared.subplot.vtk_renderer.camera
+    sandbox.perform("frame")
+    sandbox.set_brush("brush", "erase")
+    middle = [side // 2 for side in shared.plotter.window_size]
+    shared.tools.press(*middle)
+    assert digest(shared.document) != before
+    sandbox.pinch(0.0, 0.0, 1.0, "begin")
+    assert digest(shared.document) == before
+    assert sandbox.values()["done"] == []
+    sandbox.set_brush("brush", "select")
+    position = camera.position
+    shared.tools.press(*middle)
+    sandbox.pinch(0.0, 0.0, 1.0, "begin")
+    assert not shared.tools.release(*middle)
+    assert shared.actions.state.selection == ()
+    assert camera.position == position
+
+
+def test_the_slice_is_moved_and_tilted_in_the_view(sandbox: Sandbox, shared: EditWindow) -> None:
+    sandbox.perform("frame")
+    sandbox.perform("view_three-quarter")
+    sandbox.set_display("slice_axis", "x")
+    controls = {control["name"]: control for control in sandbox.values()["display"]["controls"]}
+    low, high = (controls["slice_position"][end] for end in ("low", "high"))
+    assert abs(controls["slice_position"]["value"] - (low + high) / 2) < 1e-6
+    places = {one["name"]: (one["x"], one["y"]) for one in sandbox.values()["gizmo"]["handles"]}
+    (line,) = sandbox.values()["gizmo"]["lines"]
+    assert line == [*places["slice"], *places["tilt slice"]]
+    for name in ("slice", "tilt slice"):
+        before = sandbox.display.options.slice
+        sandbox.drag_handle(name, "begin", *places[name])
+        sandbox.drag_handle(name, "move", places[name][0] + 0.05, places[name][1] + 0.1)
+        sandbox.drag_handle(name, "end", places[name][0] + 0.05, places[name][1] + 0.1)
+        after = sandbox.display.options.slice
+        assert before is not None
+        assert after is not None
+        assert (before.normal == after.normal) == (name == "slice")
+        assert (before.point == after.point) == (name == "tilt slice")
+    assert sandbox.values()["done"] == []
+    controls = {control["name"]: control for control in sandbox.values()["display"]["controls"]}
+    assert controls["slice_axis"]["value"] == "tilted"
+    sandbox.set_display("slice_normal", "0", True, [1])
+    sandbox.set_display("slice_normal", 0.0, True, [2])
+    controls = {control["name"]: control for control in sandbox.values()["display"]["controls"]}
+    assert controls["slice_axis"]["value"] == "x"
+    sandbox.set_display("slice_axis", "none")
+    assert sandbox.values()["gizmo"]["handles"] == []
+    sandbox.drag_handle("slice", "begin", 0.5, 0.5)
+    assert "expected" in sandbox.status
 
 
 def test_values_of_decals_are_set_as_one_entry_each(sandbox: Sandbox, shared: EditWindow) -> None:

@@ -1,6 +1,8 @@
 """The pictures that a page gets, without a browser."""
 
 import asyncio
+import html
+import re
 from io import BytesIO
 from typing import Any
 
@@ -8,6 +10,10 @@ import pytest
 from PIL import Image
 
 import decals
+from decals.editing.actions import KEYS
+from decals.editing.brushes import Brush
+from decals.editing.key_bindings import format_gestures
+from decals.editing.view_actions import SIDE_KEYS
 from decals.window import EditWindow
 from tests.apps.sandbox.test_sandbox import TREE
 
@@ -20,6 +26,34 @@ class Protocol:
 
     def getLinkProtocols(self) -> tuple[Any, ...]:
         return self.parts
+
+
+def test_each_action_shows_its_key_and_is_in_the_menu(vtk_display: None) -> None:
+    pytest.importorskip("trame_vtk")
+    from trame.app import get_server
+
+    from decals.apps.sandbox.page import TOOLBAR, Page
+
+    server = get_server("keys", client_type="vue3")
+    with EditWindow(decals.cover(TREE, count=0, images=["tile"]), off_screen=True, size=(80, 60)) as window:
+        Page(server, window)
+    page = str(server.state.trame__template_main)
+    bindings = {binding.action: binding for binding in KEYS.bindings if binding.action != "camera"}
+    menu = page[page.index("Actions") :]
+    by_pointer = {"select", "select_also", "move", "close"}
+    assert all(html.escape(bindings[name].summary) in menu for name in bindings.keys() - by_pointer)
+    assert all(format_gestures(binding) for binding in bindings.values())
+    buttons = [
+        *TOOLBAR,
+        *(f"brush_{brush}" for brush in Brush),
+        "frame",
+        *(f"view_{side}" for side in SIDE_KEYS),
+    ]
+    for name in buttons:
+        assert f"{bindings[name].summary} ({format_gestures(bindings[name])})" in page
+    icons = re.findall(r"<VBtn[^>]* icon=[^>]*>", page)
+    assert len(icons) > 20
+    assert all("title=" in icon and "aria-label=" in icon for icon in icons)
 
 
 def test_many_changes_are_one_picture_of_the_newest_state(vtk_display: None) -> None:

@@ -3,6 +3,7 @@
 from collections import Counter
 
 from decals.editing import KEYS, Actions, EditSession
+from decals.editing.brushes import Brush
 from decals.editing.key_bindings import CAMERA, gesture_name
 from tests.decals.editing.scenes import scene
 
@@ -14,6 +15,16 @@ def test_every_gesture_has_one_action_and_every_action_exists() -> None:
     actions = Actions(EditSession(scene()))
     for name in {binding.action for binding in bindings} - {"move"}:
         actions.perform(name, lambda: None)
+
+
+def test_brushes_are_chosen_by_keys_and_the_camera_needs_a_window() -> None:
+    actions = Actions(EditSession(scene()))
+    for brush in Brush:
+        actions.perform(f"brush_{brush}", lambda: None)
+        assert actions.state.brush.brush is brush
+    for name in ("view_front", "frame"):
+        actions.perform(name, lambda: None)
+        assert "no window is open" in actions.state.message
 
 
 def test_gestures_do_not_depend_on_the_keyboard() -> None:

@@ -51,7 +51,7 @@ def test_a_line_that_fits_is_left_as_it_is(opened: Any) -> None:
 
 
 @pytest.mark.slow_cases("size1-1")
-@pytest.mark.parametrize(("size", "pages"), [((400, 300), 2), ((1200, 800), 1)])
+@pytest.mark.parametrize(("size", "pages"), [((400, 300), 3), ((1200, 800), 1)])
 def test_the_help_fits_into_the_window(opened: Any, size: tuple[int, int], pages: int) -> None:
     driver = opened(
         Scene(objects=scene().objects[1:], camera=scene().camera)

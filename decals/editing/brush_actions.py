@@ -1,0 +1,48 @@
+"""Actions that choose the brush of a window."""
+
+from collections.abc import Callable
+
+from decals.editing.action_state import ActionState, Cursor
+from decals.editing.brushes import Brush
+from decals.editing.key_bindings import Group, action
+
+BRUSHES = {
+    Brush.SELECT: ("w", "select and move decals"),
+    Brush.BOX: ("b", "box: drag to select decals"),
+    Brush.LASSO: ("Shift+b", "lasso: drag around decals to select them"),
+    Brush.PULL: ("z", "pull: drag the surface, and the selected node follows"),
+    Brush.SCATTER: ("s", "scatter brush: drag to place decals"),
+    Brush.PUSH: ("y", "push brush: drag to push decals, neighbours yield"),
+    Brush.ERASE: ("e", "erase brush: drag to delete decals"),
+    Brush.RELAX: ("Shift+x", "relax brush: drag to even decals out"),
+}
+"""Key of each brush, and what it does."""
+
+
+class BrushActions:
+    """Actions that choose the brush: one per entry of `BRUSHES`, "brush_select" and so on.
+
+    Parameters
+    ----------
+    state
+        State of the window.
+    """
+
+    def __init__(self, state: ActionState) -> None:
+        self._state = state
+
+    def choose(self, brush: Brush) -> None:
+        """Drag with a brush from now on."""
+        self._state.brush.brush, self._state.message = brush, BRUSHES[brush][1]
+
+
+def _choosing(brush: Brush) -> Callable[[BrushActions, Cursor], None]:
+    def choose(actions: BrushActions, _cursor: Cursor) -> None:
+        actions.choose(brush)
+
+    return choose
+
+
+for _brush, (_key, _summary) in BRUSHES.items():
+    _register = action(f"brush_{_brush}", _key, summary=_summary, group=Group.BRUSHES)
+    setattr(BrushActions, f"choose_{_brush}", _register(_choosing(_brush)))
