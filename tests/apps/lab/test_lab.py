@@ -159,6 +159,7 @@ def test_wrong_events_change_nothing(lab: Lab, window: EditWindow, number: Any, 
 # -- plots ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow_cases("5")
 @pytest.mark.parametrize("number", range(6))
 def test_plots_are_pictures_without_addresses(lab: Lab, number: int) -> None:
     lab.start(number)

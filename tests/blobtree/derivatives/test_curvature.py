@@ -38,7 +38,7 @@ TREES: dict[str, Sequence[Node]] = {
 }
 
 
-@pytest.mark.slow_cases("custom", "shapes", "solids")
+@pytest.mark.slow_cases("custom", "fields", "shapes", "solids")
 @pytest.mark.parametrize("kind", TREES)
 def test_hessians_match_differences(kind: str) -> None:
     trees = TREES[kind]

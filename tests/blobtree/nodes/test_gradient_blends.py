@@ -178,6 +178,7 @@ def problems(tree: Node) -> list[str]:
     return [*_ranges(tree, rng), *_slopes(tree, rng), *_box(tree, rng), *_texts(tree)]
 
 
+@pytest.mark.slow_cases("a cube and a bar")
 @pytest.mark.parametrize("name", CORE)
 def test_a_gradient_blend_is_that_of_the_oracle(name: str) -> None:
     assert problems(CORE[name]) == []

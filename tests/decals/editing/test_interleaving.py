@@ -79,9 +79,25 @@ class ThreadedAndDirect:
         return digest(self.live.state.session.document) == digest(self.shadow.state.session.document)
 
 
-@settings(max_examples=40, deadline=None)
-@given(operations=st.lists(OPERATIONS, max_size=14), few=st.sampled_from([0, 5, 500]))
+RANDOM_OPERATIONS = given(operations=st.lists(OPERATIONS, max_size=14), few=st.sampled_from([0, 5, 500]))
+
+
+@settings(max_examples=15, deadline=None)
+@RANDOM_OPERATIONS
 def test_whatever_comes_between_nothing_is_lost(tmp_path_factory: Any, operations: Any, few: Any) -> None:
+    check_operations(tmp_path_factory, operations, few)
+
+
+@pytest.mark.slow
+@settings(max_examples=80, deadline=None)
+@RANDOM_OPERATIONS
+def test_whatever_comes_between_many_times_nothing_is_lost(
+    tmp_path_factory: Any, operations: Any, few: Any
+) -> None:
+    check_operations(tmp_path_factory, operations, few)
+
+
+def check_operations(tmp_path_factory: Any, operations: Any, few: Any) -> None:
     with patch("decals.editing.session.MAX_REPLAYED_DECALS", few):
         go_through(operations, tmp_path_factory)
 

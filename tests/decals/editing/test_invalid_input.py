@@ -140,7 +140,7 @@ ANY_NUMBER = settings(
 
 @pytest.mark.filterwarnings("ignore:overflow")
 @EACH_COMMAND
-@settings(ANY_NUMBER, max_examples=15)
+@settings(ANY_NUMBER, max_examples=6)
 @given(x=anything)
 def test_commands_do_something_or_say_why_not(session: Any, name: str, x: Any) -> None:
     do_and_undo(session, name, x)

@@ -259,9 +259,25 @@ def test_fixed_particles_on_the_boundary_stay_there() -> None:
     assert np.median(second) == pytest.approx(np.sqrt(0.75) * spacing, rel=0.15)
 
 
-@settings(max_examples=6, deadline=None)
-@given(number=st.integers(0, 10_000), count=st.integers(1, 80), scale=st.sampled_from([1e-3, 1.0, 1e3]))
+RANDOM_STRIPS = given(
+    number=st.integers(0, 10_000), count=st.integers(1, 80), scale=st.sampled_from([1e-3, 1.0, 1e3])
+)
+
+
+@settings(max_examples=2, deadline=None)
+@RANDOM_STRIPS
 def test_random_strips_and_fans_keep_the_invariants(number: int, count: int, scale: float) -> None:
+    check_strip_and_fan(number, count, scale)
+
+
+@pytest.mark.slow
+@settings(max_examples=12, deadline=None)
+@RANDOM_STRIPS
+def test_many_random_strips_and_fans_keep_the_invariants(number: int, count: int, scale: float) -> None:
+    check_strip_and_fan(number, count, scale)
+
+
+def check_strip_and_fan(number: int, count: int, scale: float) -> None:
     """A narrow strip and a fan: particles lie on them, and their number and energy are right."""
     rng = np.random.default_rng(number)
     turn = np.sort(rng.uniform(0, 2 * np.pi, 7))
