@@ -14,6 +14,9 @@ const float MAX_TAPS = 8.0;    // look-ups of an image along one side of a pixel
 const float SPACING = 0.67;   // of look-ups, relative to the shorter side
 const float SHARPNESS = 0.6;   // texels of a look-up relative to the distance between look-ups
 
+// A branch, as a loop: some drivers run the body of an `if` even where no pixel needs it.
+#define WHERE(condition) for (bool needed_ = condition; needed_; needed_ = false)
+
 struct Place {
     vec2 uv;
     vec2 uv_right;
@@ -50,30 +53,22 @@ vec3 contact_line(vec3 q, vec3 right, vec3 up, vec4 ball, vec4 other) {
     return pixel_line(value, vec2(dot(slope, right), dot(slope, up)));
 }
 
-// Elastic contact: z² of a neighbour, and its changes.
-vec3 push_steps(vec3 w, vec3 right, vec3 up, vec4 ball, vec4 other) {
-    vec3 result;
-    float same;
-    vec3 apart_ = other.xyz - ball.xyz;
-    push_square_along_w(w, right, apart_, RIM * ball.w, RIM * other.w, decal_stiffness, result.x, result.y);
-    push_square_along_w(w, up, apart_, RIM * ball.w, RIM * other.w, decal_stiffness, same, result.z);
-    return result;
+// Elastic contact: z² of a neighbour, after its gradient by w, which is relative to the centre, in visible radii.
+vec4 push_of(vec3 w, vec4 ball, vec4 other) {
+    return push_gradient(w, other.xyz - ball.xyz, RIM * ball.w, RIM * other.w, decal_stiffness);
 }
 
-// Where a point lies in a decal's image. `squares`: in elastic contact the sum of squares of all pushes, and its
-// changes; in other modes the first is the distance after contact.
-Place place_of(int decal, vec3 q, vec3 n, vec3 right, vec3 up, vec3 squares) {
-    vec4 ball = decal_texel(4 * decal);
+// Where a point lies in a decal's image. `pushes`: in elastic contact the sum of those of all neighbours; in other modes
+// its last number is the distance after contact.
+Place place_of(int decal, vec4 ball, vec3 q, vec3 n, vec3 right, vec3 up, vec4 pushes) {
     float per_radius = 1.0 / (RIM * ball.w);
     vec3 w = per_radius * (q - ball.xyz);
     vec3 x = per_radius * right, y = per_radius * up;
     float chord = length(w);
     vec2 chords = vec2(dot(w, x), dot(w, y)) / max(chord, 1e-6);
-    vec3 rim = vec3(squares.x, chords);
+    vec3 rim = vec3(pushes.w, chords);
     if (decal_contact == ELASTIC) {
-        float same;
-        pushed_distance_along_distance_squares(chord, chords.x, squares.x, squares.y, rim.x, rim.y);
-        pushed_distance_along_distance_squares(chord, chords.y, squares.x, squares.z, same, rim.z);
+        rim = pushed_steps(chord, chords, vec3(pushes.w, dot(pushes.xyz, x), dot(pushes.xyz, y)));
     }
     Place place;
     image_steps(w, x, y, decal_texel(4 * decal + 1).xyz, n, decal_texel(4 * decal + 2).xyz, rim, decal_mapping, place.uv,
@@ -178,20 +173,18 @@ vec4 image_average(int decal, Place place, vec3 q, vec3 n, float part) {
     return fade * tint.w * color * vec4(tint.rgb, 1.0);
 }
 
-// Distance after contact of a decal across a contact line; with the nearest two neighbours, for others are farther.
-vec3 contact_with(int decal, ivec2 others, vec3 q, vec3 n, vec3 right, vec3 up) {
-    vec4 ball = decal_texel(4 * decal);
-    float per_radius = 1.0 / (RIM * ball.w);
-    vec3 w = per_radius * (q - ball.xyz);
+// `pushes` of a decal across a contact line; of the nearest two neighbours, for others are farther.
+vec4 contact_with(vec4 ball, ivec2 others, vec3 q) {
+    vec3 w = (q - ball.xyz) / (RIM * ball.w);
     if (decal_contact != ELASTIC) {
-        return vec3(others.x < 0 ? min(length(w), 1.0) : 1.0, 0.0, 0.0);
+        return vec4(0.0, 0.0, 0.0, others.x < 0 ? min(length(w), 1.0) : 1.0);
     }
-    vec3 squares = vec3(0.0);
+    vec4 pushes = vec4(0.0);
     for (int i = 0; i < 2 && others.x >= 0; i++) {
-        squares += push_steps(w, per_radius * right, per_radius * up, ball, decal_texel(4 * others.x));
+        pushes += push_of(w, ball, decal_texel(4 * others.x));
         others = ivec2(others.y, -1);
     }
-    return squares;
+    return pushes;
 }
 
 // Premultiplied colour of the decals of one layer that share the pixel, with their owner at q. `boundaries` counts the
@@ -201,8 +194,8 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
     float per_radius = 1.0 / (RIM * ball.w);
     vec3 w = per_radius * (q - ball.xyz);
     int rank = decal_layered ? rank_of(owner, decal_records) : 0;
-    bool pushes = !decal_layered || is_contact_rank(rank);
-    vec3 squares = vec3(0.0);
+    bool touches = !decal_layered || is_contact_rank(rank);
+    vec4 pushes = vec4(0.0);
     Bumps bumps = Bumps(vec4(0.0), vec4(0.0), vec4(0.0));
     ivec2 beside = ivec2(-1);
     vec3 first_line = EVERYWHERE, second_line = EVERYWHERE;  // contact lines with `beside`
@@ -222,7 +215,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
             }
             bool outside = power(offset, RIM * other_ball.w) > 0.0;
             int other_rank = decal_layered ? rank_of(other, decal_records) : 0;
-            bool together = pushes && other_rank == rank;
+            bool together = touches && other_rank == rank;
             bool nested = decal_nested && together
                 && balls_nested(other_ball.xyz - ball.xyz, RIM * ball.w, RIM * other_ball.w);
             if (!together || nested) {
@@ -245,7 +238,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
                 continue;
             }
             if (decal_contact == ELASTIC) {
-                squares += push_steps(w, per_radius * right, per_radius * up, ball, other_ball);
+                pushes += push_of(w, ball, other_ball);
             }
             vec3 line = contact_line(q, right, up, ball, other_ball);
             boundaries += line.x < 0.5 ? (half_pixel > MAX_SIDE * RIM * other_ball.w ? MANY : 1) : 0;
@@ -260,7 +253,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
         }
     }
     if (decal_contact != ELASTIC) {
-        squares.x = contact_distance(contact_at(q, n, owner, decal_contact).x);
+        pushes.w = contact_distance(contact_at(q, n, owner, decal_contact).x);
     }
     // The owner, those beside it or the one below, and the one above in turn; in one loop, because some drivers run
     // code once even where no pixel needs it.
@@ -275,7 +268,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
         vec4 own_ball = decal_texel(4 * decal);
         vec3 part = vec3(1.0, 0.0, 0.0);
         ivec2 neighbours = ivec2(-1);
-        if (!first) {
+        WHERE (!first) {
             vec3 line = EVERYWHERE, other_line = EVERYWHERE;
             if (across) {
                 int third = decal == beside.x ? beside.y : beside.x;
@@ -288,8 +281,8 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
             part = inner_part(ball_line(q, right, up, own_ball), line, other_line);
         }
         vec3 at = first ? q : q + part.y * right + part.z * up;
-        vec3 contact = first ? squares : contact_with(decal, neighbours, at, n, right, up);
-        Place place = place_of(decal, at, n, right, up, contact);
+        vec4 contact = first ? pushes : contact_with(own_ball, neighbours, at);
+        Place place = place_of(decal, own_ball, at, n, right, up, contact);
         if (PARTED) {
             if (!first) {
                 bumps = Bumps(vec4(0.0), vec4(0.0), vec4(0.0));
@@ -301,7 +294,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
                 part_image(place, bumps, n, decal);
             }
         }
-        if (first) {
+        WHERE (first) {
             vec3 rim = rim_line(place.arc, per_radius * right, per_radius * up);
             boundaries += rim.x < 0.5 ? (lower_rims > 0 ? MANY : 1) : 0;
             if (boundaries > 0) {
@@ -312,7 +305,8 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
             if (below >= 0) {  // the owner lies on it
                 others = ivec2(part.x < 1.0 ? below : -1, -1);
             }
-        } else if (decal != above && !across) {
+        }
+        if (!first && decal != above && !across) {
             part.x = min(part.x, 1.0 - owner_part.x);
         }
 #ifdef MATERIALS
@@ -354,9 +348,66 @@ int nearest_rim(vec3 q, vec3 n, vec3 right, vec3 up) {
     return nearest;
 }
 
-// Premultiplied linear colour of all decals over each other, averaged over a pixel. Pixels with many boundaries, or with
-// sides that are long beside their owner, are the mean of several parts.
-vec4 filtered_color(vec3 q, vec3 n, vec3 right, vec3 up) {
+// True after `inner_color` of pixels that need `exact_color`: those through which a rim or contact line may go, and those
+// with long sides.
+bool pixel_divided = false;
+
+// Premultiplied linear colour of a pixel inside of one decal, or of none. One traversal keeps all candidates.
+vec4 inner_color(vec3 q, vec3 n, vec3 right, vec3 up) {
+    const int KEPT = 8;
+    int owner = -1, count = 0;
+    float least = 0.0, margin = 0.5 * (length(right) + length(up));
+    ivec4 a = ivec4(-1), b = ivec4(-1);
+    for (int level = 0; level < index_level_count; level++) {
+        ivec2 span = cell_range(q, level);
+        for (int j = span.x; j < span.y; j++) {
+            int decal = texelFetch(index_ids, ivec2(j & 4095, j >> 12), 0).x;
+            vec4 ball = decal_texel(4 * decal);
+            vec3 offset = q - ball.xyz;
+            float squared = dot(offset, offset);
+            float reach = max(REACH * ball.w, RIM * ball.w + margin);
+            if (squared < reach * reach && acts(offset, n, decal)) {
+                b = ivec4(a.w, b.xyz);
+                a = ivec4(decal, a.xyz);
+                count++;
+                float own = squared - RIM * RIM * ball.w * ball.w;
+                own /= has_cells(decal_contact) ? 1.0 : ball.w * ball.w;
+                owner = own < least ? decal : owner;
+                least = min(own, least);
+            }
+        }
+    }
+    pixel_divided = count > (owner < 0 ? 0 : KEPT);
+    if (owner < 0) {
+        return vec4(0.0);
+    }
+    vec4 ball = decal_texel(4 * owner);
+    float radius = RIM * ball.w;
+    vec3 w = (q - ball.xyz) / radius;
+    vec4 pushes = vec4(0.0);
+    for (int i = min(count, KEPT); i > 0; i--) {
+        int other = a.x;
+        a = ivec4(a.yzw, b.x);
+        b = ivec4(b.yzw, -1);
+        if (other != owner) {
+            vec4 other_ball = decal_texel(4 * other);
+            pixel_divided = pixel_divided || contact_line(q, right, up, ball, other_ball).x < 0.5
+                || (decal_nested && balls_nested(other_ball.xyz - ball.xyz, radius, RIM * other_ball.w));
+            pushes += push_of(w, ball, other_ball);
+        }
+    }
+    if (decal_contact != ELASTIC) {
+        pushes.w = contact_distance(contact_at(q, n, owner, decal_contact).x);
+    }
+    Place place = place_of(owner, ball, q, n, right, up, pushes);
+    pixel_divided = pixel_divided || max(length(right), length(up)) > MAX_SIDE * radius
+        || rim_line(place.arc, right / radius, up / radius).x < 0.5;
+    return image_average(owner, place, q, n, 1.0);
+}
+
+// The same of all decals over each other, in any pixel. Pixels with many boundaries, or with sides that are long beside
+// their owner, are the mean of several parts.
+vec4 exact_color(vec3 q, vec3 n, vec3 right, vec3 up) {
     vec4 sum = vec4(0.0);
     ivec2 parts = ivec2(1);
 #ifdef MATERIALS
@@ -366,12 +417,12 @@ vec4 filtered_color(vec3 q, vec3 n, vec3 right, vec3 up) {
         vec2 at = (vec2(float(i % parts.x), float(i / parts.x)) + 0.5) / vec2(parts) - 0.5;
         vec3 point = q + at.x * right + at.y * up;
         vec3 part_right = right / float(parts.x), part_up = up / float(parts.y);
+        bool whole = parts == ivec2(1);
         int owner = decal_single_layer ? int(single_layer_at(point, n, decal_contact).x)
                                        : owner_at(point, n, decal_contact);
-        if (owner < 0) {
+        WHERE (owner < 0) {
             owner = nearest_rim(point, n, part_right, part_up);
         }
-        bool whole = parts == ivec2(1);
         if (whole && owner >= 0) {
             float longest = MAX_SIDE * RIM * decal_texel(4 * owner).w;
             parts = ivec2(clamp(ceil(vec2(length(right), length(up)) / longest), 1.0, float(SIDE_PARTS)));
@@ -406,4 +457,16 @@ vec4 filtered_color(vec3 q, vec3 n, vec3 right, vec3 up) {
         sum += color;
     }
     return sum / float(parts.x * parts.y);
+}
+
+vec4 filtered_color(vec3 q, vec3 n, vec3 right, vec3 up, bool exact) {
+#ifdef MATERIALS
+    material_left = 1.0;
+    clear_materials();
+#endif
+    if (exact) {
+        return exact_color(q, n, right, up);
+    }
+    pixel_divided = decal_layered;
+    return decal_layered ? vec4(0.0) : inner_color(q, n, right, up);
 }

@@ -14,10 +14,10 @@ pixels would cross the edges between owners.
 
 import warp as wp
 
-from blobtree.transpile.derivative import directional_derivative
 from decals.field.contact import rim_distance
-from decals.field.elastic import MIN_DISTANCE, plane_push, pushed_distance, square_of_push
+from decals.field.elastic import MIN_SPARE, ROUNDING, push_width, pushed_distance
 from decals.field.mapping import ImageMapping, image_distance, tangent_coordinates, unroll, unroll_step
+from decals.record import balls_nested
 
 wp.set_module_options({"enable_backward": False})
 
@@ -26,6 +26,9 @@ MIN_SHARE = 1.0e-4
 
 MIN_CHANGE = 1.0e-30
 MIN_LENGTH = 1.0e-6
+
+MIN_REST = 1.0e-8
+"""Smallest divisor 1 − t − δ; squares of z, and their slopes, stay finite."""
 
 
 @wp.func
@@ -110,26 +113,60 @@ def inner_part(a: wp.vec3, b: wp.vec3, c: wp.vec3) -> wp.vec3:
 
 
 @wp.func
-def push_square(
+def push_gradient(
     w: wp.vec3, apart: wp.vec3, radius: wp.float32, other: wp.float32, stiffness: wp.float32
-) -> wp.float32:
-    """Return z² of one neighbour in elastic contact at an offset from the centre, in visible radii."""
+) -> wp.vec4:
+    """Return the gradient of z² of one neighbour in elastic contact, and z², at w in visible radii.
+
+    They are those of `decals.field.elastic.square_of_push`. The share t of the way to the plane is linear in
+    w, and z depends on t and |w| alone.
+    """
+    squared = wp.dot(apart, apart)
+    between = squared + (radius - other) * (radius + other)
     distance = wp.length(w)
-    ray = w / wp.max(distance, MIN_DISTANCE)
-    return square_of_push(distance, plane_push(ray, distance, apart, radius, other, stiffness))
+    t = 2.0 * radius * wp.dot(w, apart) / between
+    nothing = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    if between <= 0.0 or t <= distance:  # the ray meets the rim before the plane
+        return nothing
+    width = push_width(squared, radius, other)
+    x = 1.0 - (1.0 - t) / width
+    if x <= 0.0:
+        return nothing
+    if balls_nested(apart, radius, other):
+        return nothing
+    end = distance / t
+    spare = wp.max(1.0 - end, MIN_SPARE)
+    x = wp.min(x, 1.0)
+    power = stiffness + ROUNDING / spare
+    push = spare * wp.pow(x, power)
+    rest = wp.max(1.0 - distance - push, MIN_REST)
+    by_spare = push * (1.0 - ROUNDING * wp.log(x) / spare) / spare
+    by_t = by_spare * end / t + push * power / (x * width)
+    z = push / rest
+    scale = 2.0 * z / (rest * rest)
+    along = scale * (rest + push) * by_t * 2.0 * radius / between
+    outward = scale * (push - (rest + push) * by_spare / t) / wp.max(distance, MIN_LENGTH)
+    gradient = along * apart + outward * w
+    return wp.vec4(gradient[0], gradient[1], gradient[2], z * z)
+
+
+@wp.func
+def pushed_steps(distance: wp.float32, steps: wp.vec2, squares: wp.vec3) -> wp.vec3:
+    """Return `decals.field.elastic.pushed_distance` and its changes, given those of its arguments."""
+    z = wp.sqrt(squares[0])
+    kept = 1.0 / (1.0 + z)
+    by_squares = 0.5 * (1.0 - distance) * kept * kept / wp.max(z, MIN_LENGTH)
+    return wp.vec3(
+        pushed_distance(distance, squares[0]),
+        kept * steps[0] + by_squares * squares[1],
+        kept * steps[1] + by_squares * squares[2],
+    )
 
 
 @wp.func
 def contact_distance(complement: wp.float32) -> wp.float32:
     """Return the distance of `decals.field.contact.rim_distance`; contact laws have another one."""
     return rim_distance(complement)
-
-
-push_square_step = directional_derivative(push_square, ("w",))
-"""The same and its change along a step."""
-
-pushed_distance_step = directional_derivative(pushed_distance)
-"""Distance in the image, and its change."""
 
 
 @wp.func

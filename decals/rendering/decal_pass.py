@@ -18,8 +18,8 @@ from decals.field.pixel_filter import (
     image_steps,
     inner_part,
     pixel_line,
-    push_square_step,
-    pushed_distance_step,
+    push_gradient,
+    pushed_steps,
 )
 from decals.field.radial import is_above, lies_on_top, power
 from decals.field.receivers import acts, fade_at
@@ -30,9 +30,12 @@ from decals.rendering.gbuffer import GBuffer
 from decals.rendering.lights import Lighting
 from decals.rendering.materials import MaterialArray, Relief
 from decals.rendering.pixel_pass import (
+    ListedPass,
+    PassBackend,
     PixelPass,
     Program,
     attach_camera,
+    group_of,
     read_floats,
     set_uniform,
     use_textures,
@@ -167,7 +170,8 @@ class DecalPass:
         shining = source is not None and source.materials is not None
         walked = source is not None and source.walks is not None
         raised = source is not None and source.relief is not None
-        filtered = filtered and not raised and not walked  # these are not averaged over pixels
+        # relief and walked images are not averaged over pixels
+        filtered = filtered and source is not None and not raised and not walked
         variant = {
             "limited": source is not None and source.limited,
             "filtered": filtered,
@@ -176,14 +180,14 @@ class DecalPass:
         }
         library = "" if source is None else source.library(filtered=filtered)
         painting = self._pass(library, posed=rest is not None, **variant)
-        program = painting.program
         textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_color": gbuffer.color}
         textures |= rest.textures if rest is not None else {}
-        use_textures(program, textures)
-        if source is not None and images is not None:
-            images.use(len(textures))
-            set_uniform(program, "decal_images", len(textures))
-            source.use(program, len(textures) + 1)
+        for program in painting.programs:
+            use_textures(program, textures)
+            if source is not None and images is not None:
+                images.use(len(textures))
+                set_uniform(program, "decal_images", len(textures))
+                source.use(program, len(textures) + 1)
         painting.run(rectangle.rows(part))
 
     def read_decal(self, tile: Tile) -> Float32Array:
@@ -198,8 +202,13 @@ class DecalPass:
                 self.material_targets["g_material"] = self._context.texture(self._size, "f4")
                 self.material_targets["g_glow"] = self._context.texture(self._size, "f2")
             targets = [*self._targets, *(self.material_targets.values() if variant["materials"] else ())]
-            program = decal_program(self._context, library, len(self._targets), **variant)
-            self._passes[key] = PixelPass(self._context.gl, program, targets)
+            programs = decal_programs(self._context, library, len(self._targets), **variant)
+            group = group_of(filtered=variant["filtered"])
+            self._passes[key] = (
+                ListedPass(self._context.gl, programs, targets)
+                if len(programs) > 1
+                else PixelPass(self._context.gl, programs[0], targets, group=group)
+            )
         return self._passes[key]
 
     def release(self) -> None:
@@ -211,7 +220,7 @@ class DecalPass:
             target.release()
 
 
-def decal_program(
+def decal_programs(
     context: Context,
     library: str,
     targets: int = 1,
@@ -221,15 +230,24 @@ def decal_program(
     filtered: bool = False,
     materials: bool = False,
     relief: bool = False,
-) -> Program:
-    """Return the program with a library of decal formulas; an empty one is for scenes without decals."""
+) -> tuple[Program, ...]:
+    """Return the program with a library of decal formulas; an empty one is for scenes without decals.
+
+    Software rasterisers take two for filtered pictures, see `ListedPass`.
+    """
     file = "filtered_decals.glsl" if filtered else "decals.glsl"
     slots = {"decals": f"//@ include {file}", "functions": library} if library else {}
     variants = {"DECALS": True, "POSED": posed, "LIMITED": limited, "FILTERED": filtered}
     variants |= {"MATERIALS": materials, "RELIEF": relief}
     slots |= {"relief": "//@ include relief.glsl"} if relief and library else {}
     defines = {name: value and bool(library) for name, value in variants.items()}
-    return attach_camera(context.pixel_program(BODY, targets, slots=slots, defines=defines))
+    parts: list[dict[str, bool | int]] = [{}]
+    if defines["FILTERED"] and context.software and context.backend is PassBackend.FRAGMENT:
+        parts = [{"MARKED": targets + 2 * defines["MATERIALS"]}, {"LISTED": True}]
+    return tuple(
+        attach_camera(context.pixel_program(BODY, targets, slots=slots, defines={**defines, **part}))
+        for part in parts
+    )
 
 
 LIBRARY_FUNCTIONS = (
@@ -258,8 +276,8 @@ FILTER_FUNCTIONS = (
     has_cells,
     pixel_line,
     inner_part,
-    push_square_step,
-    pushed_distance_step,
+    push_gradient,
+    pushed_steps,
     image_steps,
     bump_at,
     join_bumps,

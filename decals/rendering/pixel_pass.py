@@ -7,14 +7,16 @@ both.
 
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from enum import StrEnum
 from typing import Self, TypeAlias, TypeVar
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
-from blobtree._typing import Float32Array
+from blobtree._typing import Float32Array, Int32Array
 from decals.errors import NoGraphics
 from decals.rendering.viewpoint import Rectangle, Tile
 from decals.shaders import Source, compile_error, compose
@@ -27,6 +29,15 @@ COMPUTE_VERSION = 430
 
 GROUP = 8
 """Side of a compute shader's square group of pixels."""
+
+FILTER_GROUP = 16
+"""The same of filtered passes, in which invocations of a group share the pixels on rims and contact lines."""
+
+LIST_WIDTH = 256
+"""Texels in a row of a list of pixels."""
+
+LIST_UNIT = 15
+"""Texture unit of the list, the last that every driver has."""
 
 MIN_COMPUTE_GAIN = 1.5
 """Gain in speed from which compute is chosen: near 1 the choice would change from run to run."""
@@ -96,9 +107,14 @@ def pass_source(
     all_defines: dict[str, str | int | float | bool] = {**(defines or {}), "TWO_TARGETS": targets > 1}
     all_slots = {"body": f"//@ include {body}", **(slots or {})}
     if backend is PassBackend.COMPUTE:
-        all_defines["GROUP"] = GROUP
+        all_defines["GROUP"] = group_of(filtered=bool(all_defines.get("FILTERED")))
         return compose("pixels.comp", slots=all_slots, defines=all_defines, version="430 core")
     return compose("pixels.frag", slots=all_slots, defines=all_defines)
+
+
+def group_of(*, filtered: bool) -> int:
+    """Return the side of a compute shader's groups."""
+    return FILTER_GROUP if filtered else GROUP
 
 
 # -- uniforms and targets -------------------------------------------------------------------------------
@@ -157,12 +173,24 @@ def read_floats(framebuffer: moderngl.Framebuffer, attachment: int, tile: Tile) 
 class PixelPass:
     """A program that fills textures of floats: a triangle over all pixels, or invocations for each pixel."""
 
-    def __init__(self, gl: moderngl.Context, program: Program, targets: Sequence[moderngl.Texture]) -> None:
-        self.program = program
-        self._targets, self._gl = tuple(targets), gl
+    def __init__(
+        self,
+        gl: moderngl.Context,
+        program: Program,
+        targets: Sequence[moderngl.Texture],
+        *,
+        group: int = GROUP,
+    ) -> None:
+        self.programs: tuple[Program, ...] = (program,)
+        self._targets, self._gl, self._group = tuple(targets), gl, group
         self._owned: tuple[moderngl.VertexArray, moderngl.Framebuffer] | None = None
         if isinstance(program, moderngl.Program):
             self._owned = gl.vertex_array(program, []), gl.framebuffer(list(targets))
+
+    @property
+    def program(self) -> Program:
+        """The program; the first of several."""
+        return self.programs[0]
 
     def run(self, rectangle: Rectangle) -> None:
         """Fill a rectangle of all targets."""
@@ -170,7 +198,7 @@ class PixelPass:
             assert isinstance(self.program, moderngl.ComputeShader)
             for unit, target in enumerate(self._targets):
                 target.bind_to_image(unit, read=False, write=True)
-            run_pixels(self.program, rectangle)
+            run_pixels(self.program, rectangle, self._group)
             self._gl.memory_barrier()
             return
         triangle, framebuffer = self._owned
@@ -187,16 +215,86 @@ class PixelPass:
             resource.release()
 
 
+class ListedPass(PixelPass):
+    """A pass that marks pixels which need more work, and draws these side by side with a second program.
+
+    A software rasteriser draws neighbours at once, each of them with the work of all. Marks and pixels are
+    read back, for which a graphics card would have to finish first.
+    """
+
+    def __init__(
+        self, gl: moderngl.Context, programs: Sequence[Program], targets: Sequence[moderngl.Texture]
+    ) -> None:
+        self._marks = gl.texture(targets[0].size, 1, dtype="f1")
+        super().__init__(gl, programs[0], [*targets, self._marks])
+        self.programs = tuple(programs)
+        assert isinstance(self.programs[1], moderngl.Program)
+        self._triangle = gl.vertex_array(self.programs[1], [])
+
+    def run(self, rectangle: Rectangle) -> None:
+        """Fill a rectangle of all targets."""
+        super().run(rectangle)
+        assert self._owned is not None
+        whole, area = self._owned[1], (rectangle.x, rectangle.y, rectangle.width, rectangle.height)
+        *targets, marks = self._targets
+        rows, columns = np.nonzero(_read_raw(whole, len(targets), marks, area).view(np.uint8))
+        if not len(rows):
+            return
+        texels = np.column_stack([columns, rows]).astype(np.int32) + area[:2]
+        with self._draw_listed(texels.astype(np.int32)) as drawn:
+            for number, target in enumerate(targets):
+                pixels = _read_raw(whole, number, target, area).copy()
+                exact = _read_raw(drawn, number, target, (0, 0, *drawn.size))
+                pixels[rows, columns] = exact.reshape(-1)[: len(rows)]
+                target.write(pixels, viewport=area)
+
+    @contextmanager
+    def _draw_listed(self, texels: Int32Array) -> Iterator[moderngl.Framebuffer]:
+        """Draw pixels, ``int32[n, 2]``, one after the other into new textures."""
+        size = LIST_WIDTH, -(-len(texels) // LIST_WIDTH)
+        padding = np.repeat(texels[:1], size[0] * size[1] - len(texels), axis=0)
+        listed = self._gl.texture(size, 2, np.concatenate([texels, padding]), dtype="i4")
+        drawn = [self._gl.texture(size, 4, dtype=target.dtype) for target in self._targets[:-1]]
+        framebuffer = self._gl.framebuffer(drawn)
+        listed.use(LIST_UNIT)
+        set_uniform(self.programs[1], "listed_texels", LIST_UNIT)
+        framebuffer.use()
+        self._gl.enable_only(moderngl.NOTHING)
+        self._triangle.render(vertices=3)
+        yield framebuffer
+        framebuffer.release()
+        for texture in (listed, *drawn):
+            texture.release()
+
+    def release(self) -> None:
+        """Release the memory, except targets and programs."""
+        super().release()
+        self._triangle.release()
+        self._marks.release()
+
+
+def _read_raw(
+    framebuffer: moderngl.Framebuffer,
+    attachment: int,
+    texture: moderngl.Texture,
+    area: tuple[int, int, int, int],
+) -> NDArray[np.void]:
+    """Read the bytes of each pixel in an area, ``[h, w]``; ``texture`` has those of the attachment."""
+    components, kind = texture.components, texture.dtype
+    data = framebuffer.read(area, components, attachment=attachment, alignment=1, dtype=kind)
+    return np.frombuffer(data, f"V{components * int(kind[1])}").reshape(area[3], area[2])
+
+
 def scissor_of(rectangle: Rectangle) -> tuple[int, int, int, int]:
     """Return a rectangle as OpenGL's scissors."""
     return rectangle.x, rectangle.y, rectangle.width, rectangle.height
 
 
-def run_pixels(program: moderngl.ComputeShader, rectangle: Rectangle) -> None:
+def run_pixels(program: moderngl.ComputeShader, rectangle: Rectangle, group: int = GROUP) -> None:
     """Invoke a compute shader for every pixel of a rectangle."""
     program["first_texel"] = rectangle.x, rectangle.y
     program["end_texel"] = rectangle.x + rectangle.width, rectangle.y + rectangle.height
-    program.run(-(-rectangle.width // GROUP), -(-rectangle.height // GROUP))
+    program.run(-(-rectangle.width // group), -(-rectangle.height // group))
 
 
 # -- choice of the backend ------------------------------------------------------------------------------

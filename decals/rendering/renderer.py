@@ -19,7 +19,7 @@ from decals.errors import InvalidPoints, InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.index.editor import DecalEditor
 from decals.rendering.context import Context
-from decals.rendering.decal_pass import decal_library, decal_program
+from decals.rendering.decal_pass import decal_library, decal_programs
 from decals.rendering.gbuffer import depth_program
 from decals.rendering.light_pass import light_file, light_program, resolve_program
 from decals.rendering.materials import has_materials, has_relief
@@ -422,7 +422,7 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
     tasks += [
         WarmupTask(
             SHADERS,
-            lambda: decal_program(
+            lambda: decal_programs(
                 context,
                 _library(uploads, scene, options),
                 limited=is_limited(scene),

@@ -53,7 +53,8 @@ def record(scene: Scene, path: Path, options: RenderOptions) -> None:
             Renderer(context) as renderer,
             _recording_calls(arrays, passes.setdefault(backend, {})),
         ):
-            context.part_samples = None  # the whole picture in one call, as with a graphics card
+            # as with a graphics card: the whole picture in one call, with one program a pass
+            context.part_samples, context.software = None, False
             renderer.render(scene, options)
     texts = {name: compose(name).text for name in ("mesh.vert", "mesh.frag", "screen.vert")}
     settings = {"size": options.size, "texts": texts, "passes": passes, "layered": scene.decals.layered}

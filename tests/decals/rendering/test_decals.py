@@ -16,7 +16,7 @@ from decals.model import Decals
 from decals.record import Contact
 from decals.rendering import viewpoint as tile
 from decals.rendering.context import Context
-from decals.rendering.decal_pass import decal_library, decal_program
+from decals.rendering.decal_pass import decal_library, decal_programs
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
 from decals.scenes.camera import Camera
@@ -122,7 +122,7 @@ def test_every_pixel_of_walked_images(renderer: Renderer, layered: bool) -> None
 def test_no_scene_needs_more_textures_than_every_driver_has(context: Context, other: str) -> None:
     library = decal_library(Contact.ELASTIC, layered=True, limited=True, nested=True, walked=True)
     variant = {"limited": True, "materials": True, other: True}
-    names = set(decal_program(context, library, **variant))
+    names = {name for program in decal_programs(context, library, **variant) for name in program}
     slots = {"decals": "//@ include decals.glsl", "functions": library, "relief": "//@ include relief.glsl"}
     text = compose("decal_pass.glsl", slots=slots, version=None).text
     samplers = names & set(re.findall(r"uniform i?sampler\w+ (\w+);", text))

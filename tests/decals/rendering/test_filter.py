@@ -2,6 +2,7 @@
 
 from functools import cache
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from blobtree.transpile.python import plain_python, vector
-from decals.field import pixel_filter
+from decals.field import elastic, pixel_filter
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
 from decals.rendering.uploads import filled_corners
@@ -71,15 +72,48 @@ def test_parts_of_a_pixel_inside_lines_are_exact(lines: list[tuple[float, tuple[
     directions = [np.array(along) / np.hypot(*along) for _, along in lines]
     # two lines that coincide are counted twice
     assume(all(abs(a[0] * b[1] - a[1] * b[0]) > 1e-4 for a, b in combinations(directions, 2)))
-    pixel_line, inner_part = (
-        plain_python(python_function(f)) for f in (pixel_filter.pixel_line, pixel_filter.inner_part)
-    )
+    pixel_line, inner_part = formulas(pixel_filter.pixel_line, pixel_filter.inner_part)
     drawn = [pixel_line(value, vector(*along)) for value, along in lines]
     part = inner_part(*drawn, *[vector(1.0, 0.0, 0.0)] * (3 - len(lines)))
     share, x, y = share_inside([(value, *along) for value, along in lines])
     assert part[0] == pytest.approx(share, abs=2e-4)
     if share > 0.01:
         assert (part[1], part[2]) == pytest.approx((x, y), abs=2e-3)
+
+
+def formulas(*functions: object) -> list[Any]:
+    """Return typed functions as plain Python, in double precision."""
+    return [plain_python(python_function(function)) for function in functions]
+
+
+def test_steps_of_elastic_contact_are_those_of_its_distance() -> None:
+    gradient, push, square = formulas(pixel_filter.push_gradient, elastic.plane_push, elastic.square_of_push)
+    steps, pushed = formulas(pixel_filter.pushed_steps, elastic.pushed_distance)
+    rng, h, pushing = np.random.default_rng(0), 1e-5, 0
+    for stiffness in np.tile([1.0, 2.0, 3.5], 60):
+        radius, other = rng.uniform(0.8, 1.2, 2)
+        apart = rng.normal(size=3)
+        w = 0.4 * apart / np.linalg.norm(apart) + 0.15 * rng.normal(size=3)
+
+        def value(at: Any) -> float:
+            distance = np.linalg.norm(at)
+            along = push(vector(*at / distance), distance, vector(*apart), radius, other, stiffness)  # noqa: B023
+            found: float = square(distance, along)
+            return found
+
+        expected = [(value(w + h * axis) - value(w - h * axis)) / (2 * h) for axis in np.eye(3)]
+        if not 1e-3 < value(w) < 1e4 or np.linalg.norm(w) > 0.95:
+            continue
+        pushing += 1
+        found = list(gradient(vector(*w), vector(*apart), radius, other, stiffness))
+        assert found == pytest.approx([*expected, value(w)], rel=1e-3, abs=1e-4 * np.abs(expected).max())
+        distance, squares = float(np.linalg.norm(w)), value(w)
+        step, change = rng.normal(size=2)
+        along = (pushed(distance + h * step, squares + h * change) - pushed(distance, squares)) / h
+        assert steps(distance, vector(step, 0.0), vector(squares, change, 0.0))[1] == pytest.approx(
+            along, rel=1e-2, abs=1e-3
+        )
+    assert pushing > 10
 
 
 def test_images_do_not_show_what_lies_outside_their_disc() -> None:

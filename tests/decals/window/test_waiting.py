@@ -239,7 +239,7 @@ def test_a_shader_that_is_refused_is_said_once_and_clearly(
     def refuse(*_: Any, **_options: Any) -> None:
         raise CompileError("decal_pass.glsl:7: nonsense")
 
-    monkeypatch.setattr("decals.rendering.renderer.decal_program", refuse)
+    monkeypatch.setattr("decals.rendering.renderer.decal_programs", refuse)
     window = waiting()
     with pytest.raises(CompileError, match=r"decal_pass\.glsl:7"):
         slices(window)
