@@ -7,6 +7,8 @@ from pathlib import Path
 
 from blobtree.progress import Cancel, Progress
 from blobtree.pyvista_views import MESH_SUFFIXES
+from decals.baking.bake import SUFFIX as BAKED_SUFFIX
+from decals.baking.bake import bake
 from decals.editing.action_state import ActionState, Cursor
 from decals.editing.commands import AddImage, ReplaceScene
 from decals.editing.key_bindings import Group, action
@@ -31,6 +33,9 @@ UNTITLED = "untitled"
 PICTURE_SUFFIXES = (".png", ".jpg")
 PICTURE_SIZE = (1280, 720)
 """Width and height of pictures and videos without a size, in pixels."""
+
+
+WRITTEN_SUFFIXES = (".json", ".py", *MESH_SUFFIXES, BAKED_SUFFIX, *PICTURE_SUFFIXES, *VIDEO_SUFFIXES)
 
 
 class Video(StrEnum):
@@ -148,11 +153,13 @@ class FileActions:
         text: str,
         replace: bool,
         *,
-        suffixes: tuple[str, ...] = (".json", ".py", *MESH_SUFFIXES, *PICTURE_SUFFIXES, *VIDEO_SUFFIXES),
+        suffixes: tuple[str, ...] = WRITTEN_SUFFIXES,
         size: Size = PICTURE_SIZE,
         video: str = "turntable",
     ) -> None:
         """Write a file whose suffix is the format: a scene, a script, a mesh, a picture or a video.
+
+        A GLB file has the decals in a texture.
 
         Parameters
         ----------
@@ -185,6 +192,8 @@ class FileActions:
                 write_script(shown, path)
             elif suffix in PICTURE_SUFFIXES:
                 render(shown, size=size).save(path)
+            elif suffix == BAKED_SUFFIX:
+                bake(shown, path, progress=progress)
             elif suffix in VIDEO_SUFFIXES:
                 turned = shows is Video.TURNTABLE
                 frames = turntable(shown) if turned else [s.replace(camera=camera) for s in fork.replay()]
@@ -192,7 +201,7 @@ class FileActions:
             else:
                 write_mesh(scene.objects, path, progress=progress)
 
-        self._state.background.write("export", write, f"exported to {path}")
+        self._state.background.write("export", write, f"exported to {text}")
 
     def open(
         self, load: Callable[[Progress, Cancel], Scene], path: str | PathLike[str], recover: bool = True

@@ -195,7 +195,7 @@ def test_files_outside_the_folder_are_refused(tmp_path: Path) -> None:
         actions.files.write("a.txt", False)
 
 
-@pytest.mark.parametrize("name", ["script.py", "mesh.stl"])
+@pytest.mark.parametrize("name", ["script.py", "mesh.stl", pytest.param("baked.glb", marks=pytest.mark.slow)])
 def test_the_suffix_is_the_format(name: str, tmp_path: Path) -> None:
     actions = Actions(EditSession(scene()), path=tmp_path / "scene.json")
     actions.files.folder = tmp_path
