@@ -79,7 +79,9 @@ class Lab:
         self._asking = False
         self._submitted: object = None
         self._last_step = math.inf
-        self._number = 0
+        self._number = self._first = self._step = self._target = 0
+        self._probe = self.lesson.settings.probe
+        self._recording: Recording | None = None
 
     # -- state ------------------------------------------------------------------------------------------
 
@@ -220,18 +222,22 @@ class Lab:
         window, lesson = self._window, self._lessons[number]
         settings, modes = lesson.settings, window.actions.state.modes
         self._end_edit()
-        self._number, self._asked, self._asking, self._probe = number, None, False, settings.probe
-        self._first = window.document.decals.next_number
-        self._step = self._target = 0
-        window.session.do(ReplaceScene(lesson.scene, f"lesson: {settings.title}"))
-        modes.contact = member("contact", settings.contact, Contact, InvalidLesson)
-        modes.mapping = member("mapping", settings.mapping, ImageMapping, InvalidLesson)
-        modes.stiffness = settings.stiffness
-        self._recording = self._recorded(0) if settings.steps else None
-        window.subplot.scene = window.document  # its bounds, before the camera's planes follow from them
-        show_camera(window.plotter, lesson.scene)
-        self._mark_probe()
-        window.redraw(whole=True)
+
+        def started() -> None:
+            self._number, self._asked, self._asking, self._probe = number, None, False, settings.probe
+            self._results = self._pending = None
+            self._first = window.document.decals.next_number - len(lesson.scene.decals)
+            self._step = self._target = 0
+            modes.contact = member("contact", settings.contact, Contact, InvalidLesson)
+            modes.mapping = member("mapping", settings.mapping, ImageMapping, InvalidLesson)
+            modes.stiffness = settings.stiffness
+            self._recording = self._recorded(0) if settings.steps else None
+            window.subplot.scene = window.document  # its bounds, before the camera's planes follow from them
+            show_camera(window.plotter, lesson.scene)
+            self._mark_probe()
+            window.redraw(whole=True)
+
+        window.actions.state.run(ReplaceScene(lesson.scene, f"lesson: {settings.title}"), started)
 
     def _recorded(self, seed: int) -> Recording:
         lesson = self.lesson

@@ -70,6 +70,7 @@ def test_wrong_and_right_answers_are_told_apart(lab: Lab, number: int) -> None:
 
 def test_the_first_even_step_is_the_answer(lab: Lab) -> None:
     lab.start(4)
+    assert lab.values()["lab_plots"] == []  # not those of another lesson
     lab.set_value(number_of(lab, STEP), 60)
     wait(lab)
     relaxed = lab.experiment().relaxed
