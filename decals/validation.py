@@ -281,6 +281,8 @@ def check_range(
     bad = (values < low) | (values > high)
     if bad.any():
         index = tuple(np.argwhere(bad)[0])
+        if low > 0.0 >= values[index]:
+            advice = "give positive numbers"
         raise InvalidDecals(
             f"{name}: expected values from {low:g} to {high:g}, got {values[index]:g} in row {index[0]};"
             f" {advice}"

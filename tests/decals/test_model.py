@@ -153,7 +153,7 @@ def test_tints_are_packed_as_linear_light() -> None:
         ("tangents", [[0, 0, 0], [1, 0, 0]], "zero vector in row 0"),
         ("tangents", [[1, 0, 0], [0, 0, -5]], "along normal .* in row 1"),
         ("radii", [1.0, 0.0], "in row 1"),
-        ("radii", [-1.0, 1.0], "in row 0"),
+        ("radii", [-1.0, 1.0], "in row 0; give positive numbers"),
         ("radii", [1.0, np.nan], "finite"),
         ("radii", [1e-20, 1.0], "got 1e-20"),
         ("radii", [1.0, 1e20], "got 1e[+]20"),
