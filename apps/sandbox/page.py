@@ -30,7 +30,9 @@ ONE_ROW = 1260
 TOOLBAR_HEIGHT = f"$vuetify.display.width < {ONE_ROW} ? 96 : 64"
 """Height of the toolbar, of which its density takes 16."""
 
-STYLE = """.v-slider *, .v-field * { transition: none !important }
+STYLE = """html { overflow-y: auto }
+.v-list-subheader { padding-inline-start: 12px !important }
+.v-slider *, .v-field * { transition: none !important }
 .toolbar .v-toolbar__content { overflow-x: auto; flex-wrap: wrap; justify-content: flex-start }
 .toolbar h1 { min-width: 60px; max-width: 160px; flex: 0 1 auto; overflow: hidden; text-overflow: ellipsis;
   white-space: nowrap }
