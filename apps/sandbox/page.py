@@ -205,6 +205,7 @@ class Page:
         self._connections = Connections(server, shared=shared, end_input=self.sandbox.end_input)
         self._shown: dict[str, Any] = {}
         self._task: asyncio.Task[None] | None = None
+        self._end: asyncio.Task[None] | None = None
         constants = {"catalog": self.sandbox.catalog(), "thumbnails": thumbnails(), "theme": "light"}
         renamed, dropped = {"key": "", "name": ""}, None
         server.state.client_only("left_open", "right_open")  # another browser has its own panels
@@ -270,7 +271,8 @@ class Page:
         self.sandbox.perform("save")
         while self._window.background.saving:
             await asyncio.sleep(REFRESH_SECONDS)
-        await self._server.stop()
+        # The server waits for this event, so a task of its own stops it.
+        self._end = asyncio.create_task(self._server.stop())
 
     # -- layout -----------------------------------------------------------------------------------------
 
@@ -336,6 +338,8 @@ class Page:
             density="compact", flat=True, border=True, height=(TOOLBAR_HEIGHT,), classes="toolbar"
         ):
             html.H1("{{ title }}", classes="text-h6 mx-3")
+            if self._ends:
+                vuetify3.VBtn("Done", color="primary", variant="flat", size="small", click=self._finish)
             for side, icon in (("left", "mdi-file-tree-outline"), ("right", "mdi-tune")):
                 panels.icon_button(icon, f"{side} panel", f"{side}_open = !{side}_open", v_if=NARROW_WINDOW)
             panels.build_driver()
@@ -350,8 +354,6 @@ class Page:
             vuetify3.VDivider(vertical=True, classes="mx-2")
             for action, icon in TOOLBAR.items():
                 panels.icon_button(icon, panels.SUMMARIES[action], (self.sandbox.perform, f"['{action}']"))
-            if self._ends:
-                vuetify3.VBtn("Done", color="primary", variant="flat", size="small", click=self._finish)
             theme = "theme = theme === 'light' ? 'dark' : 'light'"
             panels.icon_button("mdi-theme-light-dark", "light or dark", theme)
 

@@ -221,8 +221,8 @@ def build_files(sandbox: Sandbox) -> None:
                 "Open or new ...", size="small", variant="tonal", click=(sandbox.show_start, "[true]")
             )
             html.P(
-                "Save or export. The ending is the format: .json scene, .py script, .ply .stl .obj .vtp mesh, "
-                ".glb mesh with the decals, .png .jpg picture, .gif .mp4 video.",
+                "Save or export. The ending is the format: .json scene, .py script, "
+                ".ply .stl .obj .vtp mesh, .glb mesh with the decals, .png .jpg picture, .gif .mp4 video.",
                 classes="text-caption mt-3 mb-1",
             )
             with html.Div(classes="d-flex ga-2 align-center"):

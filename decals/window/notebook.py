@@ -45,8 +45,9 @@ def edit_in_notebook(scene: Scene, path: Path | None) -> Scene:
         file = Path(folder) / "scene.json" if path is None else path
         save_scene(scene, file)
         with _served(file) as (process, url):
-            _display(url)
+            shown = _display(url)
             process.wait()
+            shown.update({"text/plain": "The edited scene was returned."}, raw=True)
         unsaved = recovery_path(file)
         return load_scene(unsaved if unsaved.exists() else file, trust=True)
 
@@ -78,6 +79,7 @@ def _served(file: Path) -> Iterator[tuple[Any, str]]:
                 process.kill()
 
 
-def _display(url: str) -> None:
+def _display(url: str) -> Any:
+    """Show the page, and return the handle by which something else takes its place."""
     shown: Any = import_module("IPython.display")  # a notebook has it
-    shown.display(shown.IFrame(url, "100%", HEIGHT))
+    return shown.display(shown.IFrame(url, "100%", HEIGHT), display_id=True)

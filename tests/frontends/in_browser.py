@@ -31,13 +31,13 @@ from decals.apps.models.scenes import empty_scene
 from decals.apps.sandbox.page import Page as SandboxPage
 from decals.editing.scatter_commands import decals_on
 from decals.scenes.camera import UPRIGHT
-from decals.window import EditWindow
+from decals.window import EditWindow, notebook
 from tests.apps.lab.answers import ANSWERS
 from tests.decals.editing.scenes import digest, scene, tree_of
 from tests.decals.vtk.scenes import both
 from tests.decals.window.driver import Driver
 from tests.frontends import page as docs
-from tests.frontends.browsing import LOSS, PATIENCE, drag, drawn, point, seen, served, shows, until
+from tests.frontends.browsing import LOSS, PATIENCE, drag, drawn, opened, point, seen, served, shows, until
 
 BLOB = Point((0, 0, 0), radius=1.0) + Point((1.2, 0.4, 0), radius=0.6)
 
@@ -431,6 +431,17 @@ async def choose(browser: Page, label: str, option: str) -> None:
     await browser.get_by_role("option", name=option, exact=True).click()
 
 
+async def ended() -> None:
+    """Done saves the scene and ends the server of a notebook at once, while the page is still open."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "scene.json"
+        decals.save_scene(empty_scene(["scale"], UPRIGHT["y"]), file)
+        with notebook._served(file) as (process, url):
+            async with opened(url) as browser:
+                await browser.get_by_role("button", name="Done").click()
+                await asyncio.to_thread(process.wait, notebook.STOP_SECONDS)
+
+
 def main() -> None:
     """Run one of the functions above, by its name."""
     name, *arguments = sys.argv[1:]
@@ -442,6 +453,7 @@ def main() -> None:
         "start": sandbox_start,
         "creature": creature,
         "lab": lab,
+        "ended": ended,
     }
     asyncio.run(checks[name](*arguments))
     print("done")

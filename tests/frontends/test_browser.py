@@ -31,7 +31,9 @@ def require(*modules: str) -> None:
         pytest.skip(f"no OpenGL here: {install_advice(libraries)}")
 
 
-@pytest.mark.parametrize("check", ["page", "user", "streamed", "sandbox", "start", "creature", "lab"])
+@pytest.mark.parametrize(
+    "check", ["page", "user", "streamed", "sandbox", "start", "creature", "lab", "ended"]
+)
 def test_in_a_browser(check: str) -> None:
     require(*NEEDED)
     assert "done" in run_module("tests.frontends.in_browser", check)
