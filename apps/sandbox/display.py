@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike
 
 from decals.apps.sandbox.controls import STEPS, Control, exchanged, number_of
 from decals.apps.sandbox.cube import cube_cells
-from decals.apps.sandbox.slicing import CHOICES as SLICES
-from decals.apps.sandbox.slicing import MOVE, NONE, TILT, TILTED, SliceDrag, SlicePlane
 from decals.editing.background import Job, Worker
 from decals.editing.document import Document
 from decals.editing.gizmo import AXES
 from decals.editing.overlays import contact_lines, sample_surface
+from decals.editing.slicing import CHOICES as SLICES
+from decals.editing.slicing import MOVE, NONE, TILT, TILTED, SliceDrag, SlicePlane
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.camera import UPRIGHT, Camera
 from decals.scenes.meshes import as_polydata

@@ -34,7 +34,7 @@ STYLE = """html { overflow-y: auto }
 .v-list-subheader { padding-inline-start: 12px !important }
 .v-slider *, .v-field * { transition: none !important }
 .toolbar .v-toolbar__content { overflow-x: auto; flex-wrap: wrap; justify-content: flex-start }
-.toolbar h1 { min-width: 60px; max-width: 160px; flex: 0 1 auto; overflow: hidden; text-overflow: ellipsis;
+.toolbar h1 { min-width: 60px; max-width: 120px; flex: 0 1 auto; overflow: hidden; text-overflow: ellipsis;
   white-space: nowrap }
 @media (max-width: 900px) {
 .toolbar .v-btn__prepend { display: none } .toolbar .v-btn--size-small:not(.v-btn--icon) { padding: 0 8px }

@@ -19,11 +19,13 @@ BRUSH_ICONS = {
     Brush.SELECT: "mdi-cursor-default-outline",
     Brush.BOX: "mdi-selection-drag",
     Brush.LASSO: "mdi-lasso",
+    Brush.PAINT: "mdi-brush-variant",
     Brush.PULL: "mdi-hand-back-right-outline",
     Brush.SCATTER: "mdi-spray",
     Brush.PUSH: "mdi-gesture-swipe",
     Brush.ERASE: "mdi-eraser",
     Brush.RELAX: "mdi-dots-hexagon",
+    Brush.ALIGN: "mdi-arrow-right-bold-outline",
 }
 SUMMARIES = {b.action: f"{b.summary} ({format_gestures(b)})" for b in KEYS.bindings}
 """What each action does, and its keys."""
@@ -325,7 +327,7 @@ def build_brushes(sandbox: Sandbox) -> None:
                 value=str(brush),
                 icon=BRUSH_ICONS[brush],
                 size="small",
-                width=36,
+                width=34,
                 title=SUMMARIES[f"brush_{brush}"],
                 raw_attrs=named(f"'{SUMMARIES[f'brush_{brush}']}'"),
             )

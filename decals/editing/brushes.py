@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Int64Array
 from blobtree.validation import LARGEST_NUMBER, SMALLEST_NUMBER
-from decals.editing.commands import DeleteDecals
+from decals.editing.commands import DeleteDecals, SetValues
 from decals.editing.document import Document, Edit
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points
 from decals.editing.scatter_commands import SPACING, RelaxDecals
@@ -27,6 +27,9 @@ CLOSEST = 0.8
 CANDIDATES = 30
 """Random points that the scatter brush tries for each decal that fits into its disc."""
 
+STEEP = 0.2
+"""Cosine of the angle between a stroke and a surface beyond which the align brush skips a decal."""
+
 MAX_NEW_DECALS = 400
 """Decals that one touch of the scatter brush adds, at most."""
 
@@ -34,18 +37,20 @@ MAX_NEW_DECALS = 400
 class Brush(StrEnum):
     """What a drag with the left button does to decals.
 
-    SELECT selects and moves single ones, BOX and LASSO select those in a box, or in a line around them.
-    PULL drags the surface below them.
+    SELECT selects and moves single ones, BOX and LASSO select those in a box, or in a line around them, and
+    PAINT those that it touches. PULL drags the surface below them. ALIGN turns images along the stroke.
     """
 
     SELECT = "select"
     BOX = "box"
     LASSO = "lasso"
+    PAINT = "paint"
     PULL = "pull"
     SCATTER = "scatter"
     PUSH = "push"
     ERASE = "erase"
     RELAX = "relax"
+    ALIGN = "align"
 
 
 @dataclass
@@ -257,12 +262,18 @@ class BrushStroke:
         The brush.
     run
         Carries out a command.
+    select
+        Adds decals to the selection, by their numbers.
     """
 
     def __init__(
-        self, document: Callable[[], Document], settings: BrushSettings, run: Callable[[Command], None]
+        self,
+        document: Callable[[], Document],
+        settings: BrushSettings,
+        run: Callable[[Command], None],
+        select: Callable[[Int64Array], None],
     ) -> None:
-        self._document, self._settings, self._run = document, settings, run
+        self._document, self._settings, self._run, self._select = document, settings, run, select
         self._last: Float32Array | None = None
 
     @property
@@ -293,10 +304,35 @@ class BrushStroke:
                 numbers = decals_within(document, position, radius)
                 if len(numbers):
                     self._run(DeleteDecals(numbers))
-            case Brush.RELAX if last is None or np.linalg.norm(position - last) > radius / 4:
-                self._run(RelaxDecals(position))
-            case Brush.RELAX:
+            case Brush.PAINT:
+                self._select(decals_within(document, position, radius))
+            case Brush.RELAX | Brush.ALIGN if last is not None and distance(position, last) <= radius / 4:
                 self._last = last
+            case Brush.RELAX:
+                self._run(RelaxDecals(position))
+            case Brush.ALIGN if last is not None:
+                command = aligned(document, decals_within(document, position, radius), position - last)
+                if command is not None:
+                    self._run(command)
+
+
+def distance(point: Float32Array, other: Float32Array) -> float:
+    """Return the distance between two points, shape (3,) each."""
+    return float(np.linalg.norm(point - other))
+
+
+def aligned(document: Document, numbers: Int64Array, direction: Float32Array) -> SetValues | None:
+    """Return the command that turns images along a direction, shape (3,); None if it turns none.
+
+    Decals that the direction hits nearly at a right angle are left out.
+    """
+    rows = document.decals.take(numbers)
+    along = direction - (rows.normals @ direction)[:, None] * rows.normals
+    lengths = np.linalg.norm(along, axis=1)
+    kept = lengths > STEEP * np.linalg.norm(direction)
+    if not kept.any():
+        return None
+    return SetValues.each(numbers[kept], "align", tangents=along[kept] / lengths[kept, None])
 
 
 def default_radius(document: Document) -> float:

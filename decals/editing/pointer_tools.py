@@ -5,7 +5,7 @@ from enum import Enum, auto
 
 import numpy as np
 
-from blobtree._typing import Float32Array, Float64Array
+from blobtree._typing import Float32Array, Float64Array, Int64Array
 from decals.editing.actions import KEYS, Actions
 from decals.editing.brushes import Brush, BrushStroke
 from decals.editing.commands import MoveDecals
@@ -155,7 +155,11 @@ class PointerTools:
         surface_pick, state = self.at(x, y), self.actions.state
         if surface_pick is None:
             return False
-        self._brush = BrushStroke(lambda: state.session.document, state.brush, state.run_latest)
+        if state.brush.brush is Brush.PAINT:
+            state.primitive, state.selection = None, ()
+        self._brush = BrushStroke(
+            lambda: state.session.document, state.brush, state.run_latest, self._also_select
+        )
         state.begin_stroke(self._brush.label)
         self._brush.touch(surface_pick.position, surface_pick.normal)
         return True
@@ -213,6 +217,13 @@ class PointerTools:
         self._press, self.selection_line, self._drag, self._brush = Press.UP, [], None, None
         self.actions.state.background.cancel()
         self.actions.state.session.cancel_stroke()
+
+    def _also_select(self, numbers: Int64Array) -> None:
+        """Add decals to the selection."""
+        state = self.actions.state
+        others = [number for number in numbers.tolist() if number not in state.selection]
+        state.selection += state.selectable(others)
+        state.message = f"{len(state.selection)} decals"
 
     def _select_inside(self, line: list[tuple[float, float]]) -> None:
         """Select the visible decals whose centres appear in a polygon."""

@@ -9,7 +9,9 @@ import decals
 from blobtree import Point
 from decals.editing import Actions, EditSession, PointerTools
 from decals.editing.brushes import CLOSEST, Brush, BrushDecals, PushDecals
+from decals.editing.commands import SetValues
 from decals.editing.scatter_commands import SPACING
+from decals.editing.visibility import LockLayers
 from decals.errors import InvalidEdit
 from tests.decals.editing.scenes import digest
 
@@ -72,7 +74,7 @@ def test_wrong_values_are_refused(command: Any, message: str) -> None:
         covered_ball(3).do(command)
 
 
-@pytest.mark.parametrize("brush", [Brush.SCATTER, Brush.PUSH, Brush.ERASE, Brush.RELAX])
+@pytest.mark.parametrize("brush", [Brush.SCATTER, Brush.PUSH, Brush.ERASE, Brush.RELAX, Brush.ALIGN])
 def test_a_stroke_with_the_pointer_is_one_entry(brush: Brush) -> None:
     session = covered_ball(0 if brush is Brush.SCATTER else 60)
     before, count = digest(session.document), len(session.document.decals)
@@ -94,3 +96,50 @@ def test_a_stroke_with_the_pointer_is_one_entry(brush: Brush) -> None:
     )
     session.undo()
     assert digest(session.document) == before
+
+
+def stroke(session: EditSession, brush: Brush, places: list[tuple[int, int]]) -> tuple[Actions, list[Any]]:
+    """Drag a brush of the radius 0.3 over pixels, and return the actions and the points that it met."""
+    actions, rays = Actions(session), session.document.camera.rays(200, 200)
+    tools = PointerTools(actions, lambda x, y: (rays.origin, rays.directions(x, y)))
+    actions.state.brush.brush, actions.state.brush.radius = brush, 0.3
+    assert tools.press(*places[0])
+    for place in places[1:]:
+        tools.move(*place)
+    tools.release(*places[-1])
+    met = [tools.at(*place) for place in places]
+    return actions, [np.asarray(pick.position, np.float64) for pick in met if pick is not None]
+
+
+def test_the_align_brush_turns_images_along_the_stroke() -> None:
+    session = covered_ball(60)
+    before = session.document.decals.decals
+    actions, (start, end) = stroke(session, Brush.ALIGN, [(80, 90), (110, 105)])
+    after = session.document.decals.decals
+    touched = np.linalg.norm(before.positions - end, axis=1) < 0.3
+    assert 1 < touched.sum() < 30
+    np.testing.assert_array_equal(after.tangents[~touched], before.tangents[~touched])
+    np.testing.assert_array_equal(after.positions, before.positions)
+    for tangent, normal in zip(after.tangents[touched], after.normals[touched], strict=True):
+        assert abs(np.dot(tangent, normal)) < 1e-5
+        across = np.cross(normal, end - start)
+        assert abs(np.dot(tangent, across)) < 1e-5
+        assert np.dot(tangent, end - start) > 0.0
+    before = after
+    stroke(session, Brush.ALIGN, [(80, 90), (81, 90)])  # too short for a direction
+    np.testing.assert_array_equal(session.document.decals.decals.tangents, before.tangents)
+    assert actions.state.selection == ()
+
+
+def test_the_paint_brush_selects_what_it_touches() -> None:
+    session = covered_ball(60)
+    positions = session.document.decals.decals.positions
+    session.do(SetValues.each([0], layers=3))
+    session.do(LockLayers((3,)))
+    actions, met = stroke(session, Brush.PAINT, [(80, 90), (95, 95), (110, 105)])
+    gaps = np.linalg.norm(positions[:, None] - np.array(met)[None], axis=2).min(axis=1)
+    assert sorted(actions.state.selection) == [
+        number for number in np.flatnonzero(gaps < 0.3).tolist() if number
+    ]
+    assert session.labels == ("set values", LockLayers.label)
+    assert actions.state.message == f"{len(actions.state.selection)} decals"

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from decals.apps.sandbox.cube import cube_cells
-from decals.apps.sandbox.slicing import CHOICES, MOVE, TILT, SliceDrag, SlicePlane
 from decals.editing.gizmo import Ray, nearest_on_sphere
+from decals.editing.slicing import CHOICES, MOVE, TILT, SliceDrag, SlicePlane
 from decals.errors import InvalidEdit
 from decals.scenes.camera import PRESETS, UPRIGHT
 
