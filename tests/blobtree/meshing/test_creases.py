@@ -63,9 +63,11 @@ def test_two_balls_meet_in_a_circle(pair: Node, resolution: int) -> None:
     assert widest_gap(points) * RING.radius <= 2.5 * cell
 
 
-def test_profiles_of_primitives_leave_creases_in_place() -> None:
+@pytest.mark.slow_cases("gaussian")
+@pytest.mark.parametrize("falloff", ["wyvill", "gaussian"])
+def test_profiles_of_primitives_leave_creases_in_place(falloff: str) -> None:
     """The radii, and so the circle, stay the same."""
-    _, points, cell = sharp(replace(A, width=0.3) | replace(B, falloff="gaussian", width=1.5), 24)
+    _, points, cell = sharp(replace(A, width=0.3) | replace(B, falloff=falloff, width=1.5), 24)
     assert RING.distances(points).max() <= NEAR * cell
     assert widest_gap(points) * RING.radius <= 2.5 * cell
 
