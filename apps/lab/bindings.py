@@ -34,7 +34,8 @@ AXES = "xyz"
 COLUMNS = {"radius": "radii", "opacity": "opacities", "layer": "layers", "interaction": "interactions"}
 """Arrays of decals by their names in paths."""
 
-OWN = ("contact", "stiffness", "mapping", "step", "seed", *(f"probe.{axis}" for axis in AXES))
+MODES = ("contact", "stiffness", "mapping")
+OWN = (*MODES, "step", "seed", *(f"probe.{axis}" for axis in AXES))
 """Paths that are no parts of a scene."""
 
 DECALS = re.compile(r"decals\.(\d+|\*)\.(\w+)")

@@ -15,19 +15,17 @@ import numpy as np
 import pyvista as pv
 from markdown_it import MarkdownIt
 
-from decals.apps.lab.bindings import AXES, binding, exchanged, number_of
+from decals.apps.lab.bindings import AXES, MODES, binding, exchanged, number_of
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Scope
 from decals.apps.lab.lesson import Lesson, Slider
 from decals.apps.lab.plots import described, drawn
 from decals.apps.lab.relaxing import Recording
 from decals.apps.sandbox.controls import STEPS, Control
+from decals.apps.sandbox.decal_panel import set_drawing
 from decals.editing.commands import ReplaceScene, SetValues
 from decals.editing.queries import move_decals
 from decals.errors import ImplicitDecalsError
-from decals.field.mapping import ImageMapping
-from decals.record import Contact
-from decals.validation import member, stiffness_number
 from decals.vtk.component import show_camera
 from decals.window import EditWindow
 
@@ -102,8 +100,8 @@ class Lab:
 
     def experiment(self) -> Experiment:
         """Return the present state as immutable values."""
-        document, modes, lesson = self._window.document, self._window.actions.state.modes, self.lesson
-        settings = lesson.settings
+        document, lesson = self._window.document, self.lesson
+        settings, drawing = lesson.settings, document.drawing
         decals = document.decals.take(np.array(self.numbers, np.int64))
         relaxed = None
         if self._recording is not None:
@@ -112,9 +110,9 @@ class Lab:
         return Experiment(
             objects=document.objects,
             decals=decals,
-            contact=modes.contact,
-            stiffness=modes.stiffness,
-            mapping=modes.mapping,
+            contact=drawing.contact,
+            stiffness=drawing.stiffness,
+            mapping=drawing.mapping,
             probe=self._probe,
             camera=lesson.scene.camera,
             size=lesson.size,
@@ -124,8 +122,8 @@ class Lab:
         )
 
     def _key(self) -> object:
-        document, modes = self._window.document, self._window.actions.state.modes
-        drawn_with = modes.contact, modes.stiffness, modes.mapping, self._probe, self._step
+        document = self._window.document
+        drawn_with = document.drawing, self._probe, self._step
         return self._number, document.objects, document.decals.version, drawn_with
 
     def values(self) -> dict[str, Any]:
@@ -155,16 +153,12 @@ class Lab:
         return {"number": number, **asdict(control)}
 
     def _read(self, path: str) -> Any:
-        modes = self._window.actions.state.modes
         if path.startswith("probe."):
             return self._probe[AXES.index(path[-1])]
         match path:
-            case "contact":
-                return modes.contact.name.lower()
-            case "mapping":
-                return modes.mapping.name.lower()
-            case "stiffness":
-                return modes.stiffness
+            case mode if mode in MODES:
+                value = getattr(self._window.document.drawing, path)
+                return value if path == "stiffness" else value.name.lower()
             case "step":
                 return self._target
             case "seed":
@@ -220,7 +214,7 @@ class Lab:
             self._show(f"lesson: expected one from 0 to {len(self._lessons) - 1}, got {number!r:.40}")
             return
         window, lesson = self._window, self._lessons[number]
-        settings, modes = lesson.settings, window.actions.state.modes
+        settings = lesson.settings
         self._end_edit()
 
         def started() -> None:
@@ -228,16 +222,15 @@ class Lab:
             self._results = self._pending = None
             self._first = window.document.decals.next_number - len(lesson.scene.decals)
             self._step = self._target = 0
-            modes.contact = member("contact", settings.contact, Contact, InvalidLesson)
-            modes.mapping = member("mapping", settings.mapping, ImageMapping, InvalidLesson)
-            modes.stiffness = settings.stiffness
             self._recording = self._recorded(0) if settings.steps else None
             window.subplot.scene = window.document  # its bounds, before the camera's planes follow from them
             show_camera(window.plotter, lesson.scene)
             self._mark_probe()
             window.redraw(whole=True)
 
-        window.actions.state.run(ReplaceScene(lesson.scene, f"lesson: {settings.title}"), started)
+        modes = {name: getattr(settings, name) for name in MODES}
+        scene = lesson.scene.replace(drawing=window.document.drawing.overridden(**modes))
+        window.actions.state.run(ReplaceScene(scene, f"lesson: {settings.title}"), started)
 
     def _recorded(self, seed: int) -> Recording:
         lesson = self.lesson
@@ -259,12 +252,8 @@ class Lab:
             x, y, z = exchanged(self._probe, [AXES.index(path[-1])], number_of(raw))
             self._probe = x, y, z
             self._mark_probe()
-        elif path == "contact":
-            state.modes.contact = member("contact", raw, Contact, InvalidLesson)
-        elif path == "mapping":
-            state.modes.mapping = member("mapping", raw, ImageMapping, InvalidLesson)
-        elif path == "stiffness":
-            state.modes.stiffness = stiffness_number(number_of(raw), InvalidLesson)
+        elif path in MODES:
+            set_drawing(state, path, raw, last=last)
         elif path in ("step", "seed") and self._recording is not None:
             if path == "seed":
                 self._recording = self._recorded(round(max(number_of(raw), 0.0)))

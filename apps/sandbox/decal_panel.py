@@ -10,7 +10,7 @@ from decals.apps.sandbox.controls import STEPS, Control, number_of, option_contr
 from decals.apps.sandbox.outline import picture
 from decals.editing.action_state import ActionState
 from decals.editing.brushes import Brush, BrushSettings, default_decal_radius, default_radius, positive_number
-from decals.editing.commands import ReplaceImage, SetDrawing, SetValues
+from decals.editing.commands import ReplaceImage, SetValues
 from decals.editing.document import Document
 from decals.errors import InvalidEdit
 from decals.model import FADE_ANGLES, FADE_DEPTHS, NO_IMAGE, Decals
@@ -80,10 +80,6 @@ def decal_controls(document: Document, selection: tuple[int, ...]) -> list[dict[
     return controls
 
 
-def _slider(name: str, value: float, low: float, high: float, doc: str, step: float | None = None) -> Control:
-    return Control(name, "number", value, doc, "", low, high, step or (high - low) / STEPS)
-
-
 def image_names(document: Document) -> list[str]:
     """Return the names of the images, each once, after that of none."""
     names = [PLAIN]
@@ -130,31 +126,25 @@ def brush_values(document: Document, brush: BrushSettings) -> dict[str, Any]:
     """Return the brush and its controls; the sizes of brushes need the surface, which selecting does not."""
     if brush.brush in (Brush.SELECT, Brush.BOX, Brush.LASSO, Brush.PULL):
         return {"brush": str(brush.brush), "controls": []}
-    has_objects = bool(document.objects)
-    radius = brush.radius or (default_radius(document) if has_objects else 1.0)
-    size = brush.decal_radius or (default_decal_radius(document) if has_objects else 0.1)
-    usual = default_radius(document) if has_objects else 1.0
-    reach = max(4.0 * usual, radius)
-    controls = [_slider("radius", radius, reach / STEPS, reach, "radius of the brush, in model units")]
+    usual = default_radius(document) if document.objects else 1.0
+    decal = brush.decal_radius or (default_decal_radius(document) if document.objects else 0.1)
+    shown = {"radius": (brush.radius or usual, usual / STEPS, 4.0 * usual)}
     if brush.brush is Brush.SCATTER:
-        controls += [
-            _slider("decal_radius", size, usual / STEPS, max(usual, size), "radius of new decals"),
-            _slider("density", brush.density, 0.05, 1.0, "1 leaves no gaps"),
-        ]
-    return {"brush": str(brush.brush), "controls": [asdict(control) for control in controls]}
+        shown |= {"decal_radius": (decal, usual / STEPS, usual), "density": (brush.density, 0.05, 1.0)}
+    options = options_of(BrushSettings)
+    controls = [option_control(options[name], *values) for name, values in shown.items()]
+    return {"brush": str(brush.brush), "controls": controls}
 
 
 def set_brush(brush: BrushSettings, name: str, raw: Any) -> None:
     """Set the brush, or one of its numbers, to what a page sent."""
-    if name == "brush":
-        brush.brush = Brush(one_of("brush", raw, list(Brush), InvalidEdit))
-        return
-    if not isinstance(name, str) or name not in ("radius", "decal_radius", "density"):
-        raise InvalidEdit(f"brush: expected 'radius' or such, got {describe(name)}")
-    number = positive_number(name, number_of(name, raw))
-    if name == "density" and number > 1.0:
-        raise InvalidEdit(f"density: expected at most 1, got {number:g}")
-    setattr(brush, name, number)
+    options = options_of(BrushSettings)
+    value = options[one_of("brush", name, options, InvalidEdit)].parsed(raw, InvalidEdit)
+    if name != "brush":
+        positive_number(name, value)
+    if name == "density" and value > 1.0:
+        raise InvalidEdit(f"density: expected at most 1, got {value:g}")
+    setattr(brush, name, value)
 
 
 # -- options of functions and classes -------------------------------------------------------------------
@@ -168,10 +158,9 @@ def drawing_controls(drawing: Drawing) -> list[dict[str, Any]]:
 
 def set_drawing(state: ActionState, name: str, raw: Any, *, last: bool) -> None:
     """Set an option of how the scene is drawn; moves of a slider are one undo entry."""
-    drawing, options = state.session.document.drawing, options_of(Drawing)
+    values, options = values_of(Drawing, state.session.document.drawing), options_of(Drawing)
     value = options[one_of("option", name, options, InvalidEdit)].parsed(raw, InvalidEdit)
-    given = arguments_of(Drawing, values_of(Drawing, drawing) | {name: value})
-    state.run_step(SetDrawing(replace(drawing, **given), f"set {name}"), last=last)
+    state.draw_with(f"set {name}", last=last, **arguments_of(Drawing, values | {name: value}))
 
 
 def first_scatter_values() -> dict[str, Any]:

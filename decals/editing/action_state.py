@@ -3,8 +3,8 @@
 import time
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import replace
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,15 +14,13 @@ from blobtree.kernels import NotCompiled, without_compiling
 from blobtree.nodes.paths import Path
 from decals.editing.background import BackgroundJobs, Step, step_of, takes_long
 from decals.editing.brushes import BrushSettings
+from decals.editing.commands import SetDrawing
 from decals.editing.document import Edit
 from decals.editing.prompts import PromptLine
 from decals.editing.queries import SurfacePick
 from decals.editing.session import Command, EditSession
 from decals.editing.tree_commands import same_structure
 from decals.errors import ImplicitDecalsError, InvalidEdit
-from decals.field.law import AnyContact
-from decals.field.mapping import ImageMapping
-from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS
 from decals.validation import instance
 
 Cursor = Callable[[], SurfacePick | None]
@@ -31,23 +29,6 @@ Cursor = Callable[[], SurfacePick | None]
 
 SLOW_STEP = 0.08
 """Processor time in seconds from which on a step of a drag counts as slow."""
-
-
-class DrawModes(Protocol):
-    """Modes in which a window draws decals; the edited document keeps them."""
-
-    contact: AnyContact
-    mapping: ImageMapping
-    stiffness: float
-
-
-@dataclass
-class DefaultModes:
-    """Modes without a window."""
-
-    contact: AnyContact = DEFAULT_CONTACT
-    mapping: ImageMapping = ImageMapping.CORRECTED
-    stiffness: float = DEFAULT_STIFFNESS
 
 
 class ViewCamera(Protocol):
@@ -126,8 +107,6 @@ class ActionState:
         Result of the last action, in plain words.
     prompt
         The open prompt, if any; it receives all keys.
-    modes
-        Contact mode, image mapping and stiffness of the window.
     brush
         The brush that a drag uses.
     snap
@@ -146,7 +125,6 @@ class ActionState:
         self.picked: SurfacePick | None = None
         self.message = ""
         self.prompt = PromptLine(self.show)
-        self.modes: DrawModes = DefaultModes()
         self.brush = BrushSettings()
         self.snap = 0.0
         self.camera: ViewCamera = StillCamera(session)
@@ -257,6 +235,11 @@ class ActionState:
         except NotCompiled:
             return False
         return True
+
+    def draw_with(self, label: str, *, last: bool = True, **options: Any) -> None:
+        """Draw the scene with other options of `Drawing`; steps with one label are one undo entry."""
+        drawing = replace(self.session.document.drawing, **options)
+        self.run_step(SetDrawing(drawing, label), last=last)
 
     def run_step(self, command: Command, *, last: bool) -> None:
         """Carry out a step of a slider; steps with one label and selection are one undo entry."""

@@ -232,9 +232,8 @@ class Actions:
     )
     def next_contact(self, _cursor: Cursor) -> None:
         """Draw with the next contact mode."""
-        modes = self.state.modes
-        modes.contact = Contact((int(modes.contact) + 1) % len(Contact))
-        self.state.message = f"contact mode: {modes.contact.name.lower()}"
+        contact = Contact((int(self.state.session.document.drawing.contact) + 1) % len(Contact))
+        self.state.draw_with(f"contact mode: {contact.name.lower()}", contact=contact)
 
     @action(
         "next_stiffness",
@@ -244,9 +243,9 @@ class Actions:
     )
     def next_stiffness(self, _cursor: Cursor) -> None:
         """Draw with the next stiffness."""
-        modes = self.state.modes
-        modes.stiffness = next((one for one in STIFFNESSES if one > modes.stiffness), STIFFNESSES[0])
-        self.state.message = f"stiffness of elastic contact: {modes.stiffness:g}"
+        present = self.state.session.document.drawing.stiffness
+        stiffness = next((one for one in STIFFNESSES if one > present), STIFFNESSES[0])
+        self.state.draw_with(f"stiffness of elastic contact: {stiffness:g}", stiffness=stiffness)
 
     @action(
         "next_mapping",
@@ -256,9 +255,8 @@ class Actions:
     )
     def next_mapping(self, _cursor: Cursor) -> None:
         """Draw with the next image mapping."""
-        modes = self.state.modes
-        modes.mapping = ImageMapping((modes.mapping - 1) % len(ImageMapping))
-        self.state.message = f"image mapping: {modes.mapping.name.lower()}"
+        mapping = ImageMapping((self.state.session.document.drawing.mapping - 1) % len(ImageMapping))
+        self.state.draw_with(f"image mapping: {mapping.name.lower()}", mapping=mapping)
 
     @action("help", "h", "F1", summary="show this help, its next page, or hide it", group=Group.SCENE)
     def turn_help(self, _cursor: Cursor) -> None:

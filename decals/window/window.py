@@ -163,7 +163,6 @@ class EditWindow:
         self._end_screenshots = before_screenshots(self.plotter, weak_callback(self._before_screenshot))
         self.actions.files.camera = lambda: camera_of(self.subplot) if self._host.open else None
         self.actions.files.leave = self._host.leave
-        self.actions.state.modes = self.subplot
         given = contact, mapping, stiffness
         for name, mode, present in zip(("contact", "mapping", "stiffness"), given, modes, strict=True):
             setattr(self.subplot, name, present if mode is None else mode)

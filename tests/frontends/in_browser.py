@@ -1,7 +1,7 @@
 """Decals in a real browser, served by trame, as a program: ``python -m tests.frontends.in_browser NAME``.
 
-``page``, ``sandbox`` and ``lab`` take a path behind their name, where they save the picture of their page of
-docs.
+``page``, ``sandbox``, ``panels`` and ``lab`` take a path behind their name, where they save the picture of
+their page of docs.
 """
 
 import asyncio
@@ -382,6 +382,93 @@ async def sandbox_start(picture: str | None = None) -> None:
     window.close()
 
 
+DROP = """(label) => {
+  const files = new DataTransfer(), canvas = document.createElement('canvas');
+  const row = [...document.querySelectorAll('[role=button]')].find(one => one.innerText.trim() === label);
+  return new Promise(done => canvas.toBlob(blob => {
+    files.items.add(new File([blob], 'dropped.png', {type: 'image/png'}));
+    const event = {dataTransfer: files, bubbles: true, cancelable: true};
+    done(row.dispatchEvent(new DragEvent('drop', event)));
+  }, 'image/png'));
+}"""
+"""Drop a picture on a row of the outline."""
+
+
+async def panels(picture: str | None = None) -> None:
+    """A user renames and drags rows, drops an image on a layer, and sets material, scattering and drawing."""
+    plotter = pv.Plotter(off_screen=True)
+    server = get_server("panels", client_type="vue3")
+    window = EditWindow(decals.cover(BLOB, count=40, images=["tile", "scale"]), plotter=plotter)
+    window.show()
+    document, state = window.document, digest(window.document)
+    sandbox_page = SandboxPage(server, window)
+
+    def row(label: str) -> Any:
+        return browser.get_by_role("button", name=label, exact=True)
+
+    async def rename(label: str, name: str) -> None:
+        await row(label).first.dblclick()
+        await browser.keyboard.press("Control+a")
+        await browser.keyboard.type(name)
+        await browser.keyboard.press("Enter")
+        await row(name).wait_for()
+
+    async def done(label: str) -> None:
+        await until(lambda: window.session.labels[-1:] == (label,) and not window.background.busy)
+
+    async with served(server, size=(1280, 800)) as browser:
+        await rename("Point", "body")
+        await rename("layer 0", "armour")
+        await rename("model 1", "snail")
+        assert tree_of(document)(np.zeros((1, 3)))[0] > 0.5
+        await row("body").drag_to(row("Point"))
+        await done("move in the tree")
+        await row("scale").drag_to(row("armour"))
+        await done("change the image")
+        assert set(document.decals.decals.images.tolist()) == {1}
+        await browser.evaluate(DROP, "armour")
+        await done("add an image")
+        assert set(document.decals.decals.images.tolist()) == {2}
+        await row("body").click(button="right")
+        await browser.get_by_text("Isolate, or show all", exact=True).click()
+        await done("isolate")
+        await browser.get_by_label("hide Point").click()
+        await done("show")
+        await row("tile").click()
+        await browser.get_by_role("slider", name="metallic").press("End")
+        await done("set metallic")
+        await row("Scattering").click()
+        for name, value in (("count", "90"), ("factor", "0.8"), ("jitter size", "0.2")):
+            field = browser.get_by_role("textbox", name=name, exact=True)
+            await field.fill(value)
+            await field.press("Enter")
+        await choose(browser, "sizing", "touching")
+        await browser.get_by_role("button", name="Scatter again").click()
+        await done("scatter")
+        assert len(document.decals) == 90
+        if picture is not None:
+            window.subplot.vtk_renderer.ResetCamera()
+            window.redraw(whole=True)
+            await shows(browser, plotter)
+            image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
+            image.resize((960, 600), Image.Resampling.LANCZOS).save(picture, quality=80, optimize=True)
+        await row("Scattering").click()
+        await row("Drawing").click()
+        before = await shows(browser, plotter)
+        await browser.get_by_label("background top").evaluate(
+            "input => { input.value = '#204060'; input.dispatchEvent(new Event('change')); }"
+        )
+        await done("set background.top")
+        assert np.abs(await shows(browser, plotter) - before).mean() > 5
+        await choose(browser, "contact", "radial")
+        await done("set contact")
+        await accessible(browser)
+        await browser.get_by_text("Start", exact=True).click()
+        await until(lambda: digest(document) == state)
+        assert sandbox_page.sandbox.values()["done"] == []
+    window.close()
+
+
 async def lab(picture: str | None = None) -> None:
     """A student answers each lesson's question wrong, then right."""
     plotter = pv.Plotter(off_screen=True)
@@ -454,6 +541,7 @@ def main() -> None:
         "creature": creature,
         "lab": lab,
         "ended": ended,
+        "panels": panels,
     }
     asyncio.run(checks[name](*arguments))
     print("done")
