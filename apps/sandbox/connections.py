@@ -37,10 +37,13 @@ OF_SERVER = "driving", "trame__template"
 MAX_MESSAGE_BYTES = 250_000_000
 """Longest message: the server reserves as much as its first part announces."""
 
+SIZE = "viewport.image.push.original.size"
+"""Message with the size of a browser's view."""
+
 RANGES = {
     "viewport.image.animation.fps.max": ((1, 240),),
     "viewport.image.push.quality": (None, (0, 100), (0.1, 8)),
-    "viewport.image.push.original.size": (None, (0, 16384), (0, 16384)),
+    SIZE: (None, (0, 16384), (0, 16384)),
 }
 """Least and greatest values of arguments that trame keeps unchecked; None for those that it checks."""
 
@@ -164,6 +167,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         self._numbers: dict[str, int] = {}
         self._outboxes: dict[str, Outbox] = {}
         self._count = 0
+        self._resizes: dict[str, tuple[tuple[int, int], Callable[[], Any]]] = {}
         self._driver = ""
         self._asking: list[str] = []
         self._mouse: tuple[str, Callable[[], Any]] | None = None
@@ -187,13 +191,19 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
     def _checked(self, name: str, call: Callable[..., Any]) -> Callable[..., Any]:
         async def checked(part: Any, *arguments: Any, **options: Any) -> Any:
             client = self._web.last_active_client_id
-            if not self._allows(client, name, arguments):
+            allowed = self._allows(client, name, arguments)
+            if not allowed and name != SIZE:
                 return None
-            if name not in LOOKS:
+            if allowed and name not in LOOKS:
                 self._last_input = client
             try:
                 bound = inspect.signature(call).bind(part, *arguments, **options)
                 self._check(name, *bound.args[1:])
+                if name == SIZE:
+                    _, width, height = bound.args[1:4]
+                    self._resizes[client] = (int(width), int(height)), lambda: call(*bound.args)
+                if not allowed:
+                    return None
             except (TypeError, KeyError, ValueError, AttributeError) as error:
                 return {"error": f"refused: {error}"}
             try:
@@ -239,6 +249,11 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         """True if no browser is ready for another picture."""
         return bool(self._outboxes) and all(outbox.behind for outbox in self._outboxes.values())
 
+    @property
+    def sizes(self) -> dict[str, tuple[int, int]]:
+        """Sizes of the views of browsers that share the page, by browser; empty if none does."""
+        return {client: size for client, (size, _) in self._resizes.items()} if self._shared else {}
+
     # -- browsers ---------------------------------------------------------------------------------------
 
     def onConnect(self, _request: Any, client: str) -> None:  # noqa: N802  (wslink's name)
@@ -256,6 +271,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         """End what the browser was doing, and pass control on."""
         del self._numbers[client]
         self._outboxes.pop(client, None)
+        self._resizes.pop(client, None)
         self._asking = [other for other in self._asking if other != client]
         if self._mouse is not None and self._mouse[0] == client:
             release, self._mouse = self._mouse[1], None
@@ -266,6 +282,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         if self._driver == client:
             self._driver = next(iter([*self._asking, *self._numbers]), "")
             self._asking = [other for other in self._asking if other != self._driver]
+            self._take_size()
         self._tell()
 
     # -- who drives -----------------------------------------------------------------------------------
@@ -298,7 +315,13 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         if self._asking:
             self._end_input()
             self._driver = self._asking.pop(0)
+            self._take_size()
         self._tell()
+
+    def _take_size(self) -> None:
+        """Draw pictures of the driver's size."""
+        if self._driver in self._resizes:
+            self._resizes[self._driver][1]()
 
     def _tell(self) -> None:
         """Send each browser what it shows of who drives."""

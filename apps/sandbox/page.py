@@ -27,7 +27,7 @@ NARROW_WINDOW = f"$vuetify.display.width < {NARROW}"
 ONE_ROW = 1260
 """Width of a window, in pixels, from which on the toolbar is one row."""
 
-TOOLBAR_HEIGHT = f"$vuetify.display.width < {ONE_ROW} ? 96 : 64"
+TOOLBAR_HEIGHT = f"$vuetify.display.width < {ONE_ROW} + (driving.shared ? 320 : 0) ? 96 : 64"
 """Height of the toolbar, of which its density takes 16."""
 
 STYLE = """html { overflow-y: auto }
@@ -304,6 +304,7 @@ class Page:
                         self._window,
                         self.sandbox.take_step,
                         lambda: self._connections.behind,
+                        lambda: self._connections.sizes,
                         style="height: 100%",
                     )
                     self.sandbox.schedule = self.view.update

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from PIL import Image
+from PIL import Image, ImageOps
 from trame_pyvista.widgets import PyVistaRemoteView
 from trame_vtk.modules.vtk.protocols import vtkWebPublishImageDelivery
 from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
@@ -19,6 +19,9 @@ from decals.window.frames import FrameState
 
 QUALITY, COARSE_QUALITY = 92, 75
 """JPEG quality of a picture at rest, and of one while something moves."""
+
+MAX_PIXELS = 1 << 25
+"""Pixels of a picture for a browser that watches, at most."""
 
 PENDING_SECONDS = 0.01
 """Time between two looks at browsers that are not ready for another picture."""
@@ -38,6 +41,8 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
         Called before each frame.
     behind
         Returns True while no browser is ready for another picture.
+    sizes
+        Returns the size of the view of each browser that shares the page; empty if none does.
     options
         Options of the element.
     """
@@ -47,9 +52,11 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
         window: EditWindow,
         before_frame: Callable[[], None],
         behind: Callable[[], bool] = lambda: False,
+        sizes: Callable[[], dict[str, tuple[int, int]]] = dict,
         **options: Any,
     ) -> None:
         self._window, self._before_frame, self._behind = window, before_frame, behind
+        self._sizes = sizes
         self._outdated = False
         self._task: asyncio.Task[None] | None = None
         self._delivery: Any = None
@@ -91,8 +98,14 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
                     return
                 pixels = self._draw()
                 coarse = self._window.frames.state is FrameState.COARSE
-                image = await asyncio.to_thread(_encoded, pixels, COARSE_QUALITY if coarse else QUALITY)
-                self._publish(image, pixels)
+                quality, sizes = COARSE_QUALITY if coarse else QUALITY, self._sizes()
+                own = pixels.shape[1], pixels.shape[0]
+                images = await asyncio.to_thread(_encoded, pixels, quality, {own, *sizes.values()})
+                if not sizes:
+                    self._publish(images[own], own)
+                for client, size in sizes.items():
+                    if size in images:  # else the view is hidden
+                        self._publish(images[size], size, client_id=client)
         finally:
             self._task = None
 
@@ -122,23 +135,30 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
         if self._new_size() is not None:
             self.update()
 
-    def _publish(self, image: bytes, pixels: UInt8Array) -> None:
-        height, width, _ = pixels.shape
+    def _publish(self, image: bytes, size: tuple[int, int], **to: str) -> None:
         for view in self._delivery.tracking_views:
             message = {
                 "id": view,
                 "image": self._delivery.addAttachment(image),
                 "format": "jpeg",
-                "size": [width, height],
+                "size": list(size),
                 "memsize": len(image),
                 "workTime": 0,
                 "stale": False,
             }
-            self._delivery.publish("viewport.image.push.subscription", message)
+            self._delivery.publish("viewport.image.push.subscription", message, **to)
 
 
-def _encoded(pixels: UInt8Array, quality: int) -> bytes:
-    """Return a picture as JPEG."""
-    file = BytesIO()
-    Image.fromarray(pixels).save(file, "JPEG", quality=quality)
-    return file.getvalue()
+def _encoded(pixels: UInt8Array, quality: int, sizes: set[tuple[int, int]]) -> dict[tuple[int, int], bytes]:
+    """Return a picture as JPEG in each size, with bars where the proportions differ.
+
+    Browsers show no picture of another size than that of their view.
+    """
+    picture, files = (
+        Image.fromarray(pixels),
+        {size: BytesIO() for size in sizes if 0 < size[0] * size[1] <= MAX_PIXELS},
+    )
+    for size, file in files.items():
+        fitted = picture if size == picture.size else ImageOps.pad(picture, size, color="white")
+        fitted.save(file, "JPEG", quality=quality)
+    return {size: file.getvalue() for size, file in files.items()}

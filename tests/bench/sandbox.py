@@ -184,8 +184,8 @@ def _clock(page: SandboxPage, window: EditWindow) -> list[float]:
 
         return started
 
-    def publish(image: bytes, pixels: Any) -> None:
-        sent(image, pixels)
+    def publish(image: bytes, size: tuple[int, int], **to: str) -> None:
+        sent(image, size, **to)
         if began:
             times.append(1000.0 * (time.perf_counter() - began[0]))
             began.clear()

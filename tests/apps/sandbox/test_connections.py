@@ -148,11 +148,22 @@ def test_one_browser_drives_and_passes_control(vtk_display: None) -> None:
         await first.trigger(page.sandbox.select, "0/1")
         await first.call("trame.state.update", [{"key": "theme", "value": "dark"}])
         assert (window.actions.state.primitive, page._server.state.theme) == ((0, (1,)), "dark")
+        view = str(page.view._delivery.get_global_id(window.plotter.render_window))
+        pictures: list[dict[str, Any]] = []
+        await first.call("viewport.image.push.observer.add", view)
+        third._session.register_subscription("viewport.image.push.subscription", pictures.append)
+        for browser, size in ((first, SIZE), (third, (60, 90))):
+            await browser.call("viewport.image.push.original.size", view, *size)
+        page.view.update()
+        # Browsers show no picture of another size than theirs.
+        await until(lambda: pictures and pictures[-1]["size"] == [60, 90])
+        assert window.plotter.window_size == list(SIZE)
         for browser in (third, second):
             await browser.trigger("ask_to_drive")
         await until(lambda: first.driving["next"] == third.driving["number"] and second.driving["asks"])
         await first.trigger("pass_control")
         await until(lambda: third.driving["drives"] and not first.driving["drives"])
+        await until(lambda: window.plotter.window_size == [60, 90])
         assert (first.driving["driver"], first.driving["browsers"]) == (third.driving["number"], 3)
         await third.close()
         await until(lambda: second.driving["drives"])  # it asked
