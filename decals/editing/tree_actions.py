@@ -236,8 +236,8 @@ class TreeActions:
             session.do(command)
             return command.label
 
-        long = len(self._state.session.document.decals) > MAX_DECALS_IN_DRAG
-        self._state.run_latest_step(command.label, step, long=long)
+        many = len(self._state.session.document.decals) > MAX_DECALS_IN_DRAG
+        self._state.run_latest_step(command.label, step, long=many or isinstance(command, DragSurface))
 
     def end_drag(self) -> None:
         """End the drag; if the object has no visible surface left, the drag is reverted."""

@@ -97,6 +97,7 @@ class Messages:
     def __init__(self, window: EditWindow, page: Any, connect: Connect, seed: int) -> None:
         self._window, self._page, self._connect = window, page, connect
         self._rng = random.Random(seed)
+        self._modes = {name: getattr(window.subplot, name) for name in ("contact", "mapping", "stiffness")}
         self._browsers: list[Browser] = []
         self._tasks: list[asyncio.Task[None]] = []
         self._busy_ms = [0.0]
@@ -176,6 +177,8 @@ class Messages:
         self._page.sandbox.end_input()
         await self._wait_until(lambda: not self._window.background.busy)
         self._page.sandbox.go_to(0)
+        for name, mode in self._modes.items():  # keys change those of the window, as they move the camera
+            setattr(self._window.subplot, name, mode)
         await self._wait_until(lambda: not self._window.busy)
 
     @staticmethod

@@ -237,3 +237,13 @@ def test_the_pull_brush_drags_the_surface_under_the_pointer_as_one_entry() -> No
     while session.labels:
         session.undo()
     assert digest(session.document) == state
+
+
+def test_the_surface_is_dragged_in_the_background_of_a_window() -> None:
+    session = EditSession(decals.cover(TREE, count=12, images=["eye"]))
+    actions = Actions(session, threaded=True)
+    actions.trees.select_node(0, (0,))
+    actions.state.begin_stroke("drag the surface")
+    actions.trees.drag_surface((-1, 0, 0), (-1.2, 0, 0))
+    assert actions.state.background.following
+    actions.state.background.close()
