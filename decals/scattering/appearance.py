@@ -160,9 +160,10 @@ class Appearance:
             points = self._with_mean_normals(domain, centers, spacings)
             return points, delaunay_radii(points, samples)
 
-        def project(trials: OrientedPoints) -> OrientedPoints:
+        def project(trials: OrientedPoints) -> tuple[OrientedPoints, Int64Array]:
             projected, allowed = domain.project(trials)
-            return projected[np.flatnonzero(allowed)]
+            rows = np.flatnonzero(allowed)
+            return projected[rows], rows
 
         expected = EXPECTED_RADIUS * spacings.astype(np.float64)
         bent = self._with_mean_normals(domain, centers, spacings)
@@ -182,7 +183,9 @@ class Appearance:
         even = bool(spacings.max() <= EVEN * spacings.min())
         decals = center_outsized(domain, centers, movable, spacings, samples, aim) if even else aim(centers)
         trials = _stream(seed, _TRIAL_STREAM)
-        radii = covering_radii(decals, samples, project, trials, shade=domain.shaded, even=even)
+        radii = covering_radii(
+            decals, samples, project, trials, shade=domain.shaded, even=even, nearest=nearest
+        )
         return decals, radii
 
     def _chosen_images(self, points: OrientedPoints, radii: Float64Array, seed: int) -> Int32Array:

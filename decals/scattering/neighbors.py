@@ -162,8 +162,19 @@ class FacingTree:
         points face the point. With `skip_self` the points are the tree's own, and are not their own
         neighbours.
         """
+        distances, indices, _ = self.nearest_and_doubts(points, normals, count=count, skip_self=skip_self)
+        return distances, indices
+
+    def nearest_and_doubts(
+        self, points: Float32Array, normals: Float32Array, *, count: int = 1, skip_self: bool = False
+    ) -> tuple[Float64Array, Int64Array, Float32Array]:
+        """Return what `nearest` does, and how little decides which of the examined points face each, ``[n]``.
+
+        That is the least difference of a cosine between the normals from `FACING_LIMIT`.
+        """
         distances = np.full((len(points), count), np.inf)
         indices = np.full((len(points), count), -1, np.int64)
+        doubts = np.full(len(points), np.inf, np.float32)
         open_rows = np.arange(len(points))
         for width in self._widths(count + skip_self):
             if len(open_rows) == 0:
@@ -172,12 +183,11 @@ class FacingTree:
             for first in range(0, len(open_rows), ROWS_AT_ONCE):
                 rows = open_rows[first : first + ROWS_AT_ONCE]
                 own = rows if skip_self else None
-                sorted_arrays = self._nearest_among(points[rows], normals[rows], width, own)
-                distances[rows, columns], indices[rows, columns] = (
-                    array[:, columns] for array in sorted_arrays
-                )
+                found = self._nearest_among(points[rows], normals[rows], width, own)
+                distances[rows, columns], indices[rows, columns] = (array[:, columns] for array in found[:2])
+                doubts[rows] = np.minimum(doubts[rows], found[2])
             open_rows = open_rows[~np.isfinite(distances[open_rows, -1])]
-        return distances, indices
+        return distances, indices, doubts
 
     def around(self, count: int) -> tuple[Float64Array, Int64Array]:
         """Return distances and indices of the `count` points nearest to each point, itself first.
@@ -201,20 +211,21 @@ class FacingTree:
 
     def _nearest_among(
         self, points: Float32Array, normals: Float32Array, width: int, own: Int64Array | None
-    ) -> tuple[Float64Array, Int64Array]:
-        """Sort the facing ones to the front of the `width` nearest points."""
+    ) -> tuple[Float64Array, Int64Array, Float32Array]:
+        """Sort the facing ones to the front of the `width` nearest points, and return how little decides."""
         distances, indices = (
             array.reshape(len(points), width)
             for array in self._tree.query(points, k=np.arange(1, width + 1), workers=_workers(len(points)))
         )
-        facing = np.einsum("nki,ni->nk", self._normals[indices], normals) > FACING_LIMIT
+        cosines = np.einsum("nki,ni->nk", self._normals[indices], normals)
+        facing = cosines > FACING_LIMIT
         if own is not None:
             facing &= indices != own[:, None]
         order = np.argsort(~facing, axis=1, kind="stable")
         facing = np.take_along_axis(facing, order, axis=1)
         distances = np.where(facing, np.take_along_axis(distances, order, axis=1), np.inf)
         indices = np.where(facing, np.take_along_axis(indices, order, axis=1), -1)
-        return distances, indices
+        return distances, indices, np.abs(cosines - FACING_LIMIT).min(axis=1)
 
 
 class NearestFacing:

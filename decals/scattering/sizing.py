@@ -61,9 +61,12 @@ MAX_TURN = 20.0
 CORNER_TOLERANCE = 1.02
 """Ratio of the distances from two decals up to which a point is a corner of both Voronoi cells."""
 
-THIN_NEIGHBORS, THIN_COSINE = 9, 0.3
-"""Number of decals nearest to a decal, itself among them, and cosine between their normals below which the
-surface there is thin, or bent so much that smooth normals decide which decals face a point."""
+DOUBTFUL = 0.3
+"""Difference of the cosine between a decal's and a point's normal from the facing limit, below which the
+surface's smooth normals may decide whether the decal faces the point."""
+
+NEARLY_BARE = 0.975
+"""Distance of a point from its owner, in the owner's radii, from which smooth normals may make it bare."""
 
 CANDIDATES = 6
 """Nearest decals that face a point and may own it, whatever their radii."""
@@ -74,10 +77,13 @@ ARC_REACH = 2.0
 SPARE = 0.015
 """Share of its radius by which a decal grows beyond a bare point."""
 
-SEARCHES = ((0.5, 0.86, 4), (0.3, 0.92, 4), (0.2, 0.96, 8), (0.1, 0.97, 8))
+SEARCHES = ((0.5, 0.9, 1), (0.3, 0.93, 1), (0.15, 0.96, 2), (0.08, 0.97, 2), (0.04, 0.98, 2))
 """Rounds that look for bare points: spread of random points in mean distances of the samples, distance of the
 points around which they lie from their owners, in the owners' radii, and number of random points around each.
-The last round is repeated."""
+Another point lies a spread farther out. The last round is repeated."""
+
+ON_PLANE = 0.01
+"""Largest distance of a projected point from the plane of a face, in spreads, at which it lies there."""
 
 CUBE = 1.0
 """Side of the cubes of which one point each is searched around, in mean distances of the samples."""
@@ -87,6 +93,10 @@ TIE = 0.004
 
 MAX_CORNER = 0.5
 """Largest distance of a corner of a cell from the point by which it is found, in radii."""
+
+CORNER_SLACK = 0.1
+"""Power of a fourth decal at such a corner below that of its three, in squared radii, up to which it counts:
+the surface bends."""
 
 MAX_SEARCHES, CLEAN_SEARCHES, MAX_REPEATS = 12, 2, 4
 """Largest number of rounds, number of those without a bare point after which they end, and largest number of
@@ -101,10 +111,10 @@ CLEARANCE = 0.005
 SPECK = 0.01
 """Share of its radius by which an image may end before a point that only such a decal could cover."""
 
-TRIALS_PER_PEAK = 6
+TRIALS_PER_PEAK = 2
 """Random points around each peak in each round."""
 
-TRIAL_SPREADS = (1.0, 0.6, 0.3)
+TRIAL_SPREADS = (1.0, 0.4)
 """Standard deviation of the random points of each round, in mean distances of the samples."""
 
 
@@ -130,8 +140,8 @@ class Sizing(Enum):
     """The paper's rule: the field ends at the farthest Delaunay neighbour. It leaves small gaps."""
 
 
-Project: TypeAlias = Callable[[OrientedPoints], OrientedPoints]
-"""Project points onto their own surfaces, and drop those that are hidden there."""
+Project: TypeAlias = Callable[[OrientedPoints], tuple[OrientedPoints, Int64Array]]
+"""Project points onto their own surfaces, drop those hidden there, and return the rows of the rest."""
 
 Shade: TypeAlias = Callable[[OrientedPoints], OrientedPoints]
 """Return points on surfaces with the smooth normals of the picture; drop those whose normals are the same."""
@@ -183,17 +193,19 @@ def turned_normals(
         on_edge = toward.any(axis=1) & (np.einsum("ni,ni->n", turned, own) > ON_EDGE)
         normals[on_edge] = turned[on_edge]
         changed |= on_edge
-    offsets = samples.positions.astype(np.float64) - decals.positions[owners]
-    depths = np.einsum("ni,ni->n", offsets, normals[owners])
-    heights = np.einsum("ni,ni->n", offsets, samples.normals.astype(np.float64))
-    cosines = np.einsum("ni,ni->n", normals[owners], samples.normals.astype(np.float64))
+    cosines = np.einsum("ni,ni->n", normals.astype(np.float32)[owners], samples.normals)
+    seen = np.flatnonzero(owned & (cosines < max(MAX_BEHIND, MAX_ASIDE)))
+    rows, cosines = owners[seen], cosines[seen]
+    offsets = samples.positions[seen].astype(np.float64) - decals.positions[rows]
+    depths = np.einsum("ni,ni->n", offsets, normals[rows])
+    heights = np.einsum("ni,ni->n", offsets, samples.normals[seen].astype(np.float64))
     squared = np.einsum("ni,ni->n", offsets, offsets)
-    flat = (np.einsum("ni,ni->n", normals, own.astype(np.float64)) > EVEN_AROUND)[owners]
+    flat = (np.einsum("ni,ni->n", normals, own.astype(np.float64)) > EVEN_AROUND)[rows]
     seen_aside = (flat | (cosines > -MAX_ASIDE)) & (cosines < MAX_ASIDE)
     edge_on = seen_aside & (heights > MIN_ASIDE * np.sqrt(squared))
-    behind = owned & (((cosines < MAX_BEHIND) & (depths * heights > BEHIND * squared)) | edge_on)
-    rows = owners[behind]
-    away = unit_rows(_sums(samples.normals[behind], rows, len(decals))).astype(np.float64)
+    behind = ((cosines < MAX_BEHIND) & (depths * heights > BEHIND * squared)) | edge_on
+    rows = rows[behind]
+    away = unit_rows(_sums(samples.normals[seen[behind]], rows, len(decals))).astype(np.float64)
     worst = np.full(len(decals), -1.0)
     np.maximum.at(worst, rows, cosines[behind])
     angles = np.arccos(FACING_LIMIT - TURN_MARGIN) - np.arccos(np.clip(worst, -1.0, 1.0))
@@ -220,6 +232,7 @@ def covering_radii(
     *,
     shade: Shade | None = None,
     even: bool = False,
+    nearest: NearestFacing | None = None,
 ) -> Float64Array:
     """Return the least radii, up to a small margin, at which decals cover the surfaces they lie on.
 
@@ -250,47 +263,56 @@ def covering_radii(
         Seed of the trials.
     shade
         Returns points with the smooth normals of the picture, which decide there which decals face a point.
-        Points in thin places are covered with both normals.
+        Points that are nearly bare, or that a decal faces barely or barely not, are covered with both.
     even
         True if the decals should be of about equal size: before one becomes outsized, others grow.
+    nearest
+        Finds the decals nearest to the samples; a new one if None.
 
     Returns
     -------
     float64[n], above zero.
     """
     centers = _Centers.of(decals)
+    if nearest is None:
+        nearest = NearestFacing(samples.positions, samples.normals)
+    distances, owners = nearest.of(decals.positions, decals.normals)
+    limits = _max_radii(distances, owners, len(decals))
+    if even:  # no other decal is so large that it may own points near the middle of a cell
+        farthest = np.zeros(len(decals))
+        np.maximum.at(farthest, owners[owners >= 0], distances[owners >= 0])
+        outer = distances > PEAK_FRACTION * np.minimum(farthest, limits)[owners]
+        samples = samples[np.flatnonzero((owners < 0) | outer)]
+    sample_distance = np.sqrt(np.pi * len(decals) / max(len(distances), 1))
 
-    def find(trials: OrientedPoints) -> _OwnedPoints:
-        return _find_owners(centers, project(trials))
-
-    owned = _find_owners(centers, samples)
-    limits = _max_radii(owned, len(decals))
+    first = centers.find(samples)
     radii = np.zeros(len(decals))
-    _grow(radii, owned, limits)
+    _grow(radii, first, limits)
+    sample_distance *= float(np.median(radii))
+    sparse = first.risky(_without_zeros(radii, centers.tree, decals), PEAK_FRACTION, 2.0 * sample_distance)
+    outward = _outward(sparse, radii, sample_distance)  # into spikes between the samples
+    first = first.joined(centers.find(_projected([outward], sample_distance, project)))
+    _grow(radii, first, limits)
     rng = np.random.default_rng(seed)
-    sample_distance = float(np.median(radii)) * np.sqrt(np.pi * len(decals) / max(len(samples), 1))
-    first = owned
-    owned = owned.peaks(PEAK_FRACTION * radii)
-    owned = owned.joined(find(_circumcenters(owned, decals)))
+    owned = first.peaks(PEAK_FRACTION * radii)
+    owned = owned.joined(centers.find(project(_circumcenters(owned, decals))[0]))
     _grow(radii, owned, limits)
     with reporting() as report:
         for done, spread in enumerate(TRIAL_SPREADS, start=2):
             report("measuring radii", done / (len(TRIAL_SPREADS) + 3))
             least = np.maximum(PEAK_FRACTION * radii, radii - TRIAL_RANGE * spread * sample_distance)
             owned = owned.peaks(least)
-            trials = _random_points_around(owned.points, TRIALS_PER_PEAK, spread * sample_distance, rng)
-            owned = owned.joined(find(trials))
+            reach = spread * sample_distance
+            trials = [
+                _outward(owned, radii, reach),
+                _random_points_around(owned.points, TRIALS_PER_PEAK, reach, rng),
+            ]
+            owned = owned.joined(centers.find(_projected(trials, reach, project)))
             _grow(radii, owned, limits)
 
-        def with_shading(found: _OwnedPoints) -> _OwnedPoints:
-            thin = np.flatnonzero(centers.thin[found.decals[:, 0]] & (found.decals[:, 0] >= 0))
-            if shade is None or len(thin) == 0:
-                return found
-            return found.joined(_find_owners(centers, shade(found.points[thin])))
-
-        def search(trials: OrientedPoints) -> _OwnedPoints:
+        def project_reporting(trials: OrientedPoints) -> tuple[OrientedPoints, Int64Array]:
             report("measuring radii", (len(TRIAL_SPREADS) + 2) / (len(TRIAL_SPREADS) + 3))
-            return with_shading(find(trials))
+            return project(trials)
 
         stages = [(limits, -CLEARANCE)]
         if even:
@@ -298,13 +320,13 @@ def covering_radii(
             radii = np.minimum(radii, largest)
             stages = [(np.full(len(radii), largest), -CLEARANCE), (limits, SPECK)]
         radii = (1.0 + RADIUS_MARGIN) * _without_zeros(radii, centers.tree, decals)
-        owned = owned.joined(with_shading(first))
+        owned = owned.joined(first.with_shading(shade, radii))
         for limits, speck in stages:
             if speck > 0.0 and not (owned.shares(radii) > 1.0 + speck).any():
                 break
-            owned = _close_gaps(
-                radii, owned, (1.0 + RADIUS_MARGIN) * limits, speck, search, sample_distance, rng
-            )
+            largest_radii = (1.0 + RADIUS_MARGIN) * limits
+            growth = _Growth(largest_radii, speck, project_reporting, shade, sample_distance, rng)
+            owned = growth.close_gaps(radii, owned)
     return radii
 
 
@@ -321,7 +343,7 @@ def delaunay_radii(decals: OrientedPoints, samples: OrientedPoints) -> Float64Ar
     Two decals are neighbours in the surface's own Delaunay triangulation if their Voronoi cells meet: if a
     sample is nearest to the one and next nearest to the other.
     """
-    owned = _find_owners(_Centers.of(decals), samples)
+    owned = _Centers.of(decals).find(samples)
     pairs = owned.decals[(owned.decals[:, :2] >= 0).all(axis=1), :2]
     starts, ends = decals.positions[pairs[:, 0]], decals.positions[pairs[:, 1]]
     lengths = np.linalg.norm(starts.astype(np.float64) - ends, axis=1)
@@ -339,25 +361,33 @@ def _with_median(radii: Float64Array) -> Float64Array:
 
 @dataclass(frozen=True)
 class _Centers:
-    """All decals, in a search tree.
-
-    `gaps` are the distances to the nearest other decals, `thin` is True for decals in thin places; both are
-    ``[n]``.
-    """
+    """All decals, in a search tree; `gaps` are the distances to the nearest other decals, ``[n]``."""
 
     points: OrientedPoints
     tree: FacingTree
     gaps: Float64Array
-    thin: BoolArray
 
     @staticmethod
     def of(decals: OrientedPoints) -> "_Centers":
         """Return decals with their search tree."""
         tree = FacingTree(decals.positions, decals.normals)
-        distances, around = tree.around(THIN_NEIGHBORS)
+        distances, _ = tree.around(2)
         gaps = distances[:, 1] if distances.shape[1] > 1 else np.full(len(decals), np.inf)
-        cosines = np.einsum("nki,ni->nk", decals.normals[around], decals.normals)
-        return _Centers(decals, tree, gaps, cosines.min(axis=1, initial=1.0) < THIN_COSINE)
+        return _Centers(decals, tree, gaps)
+
+    def find(self, points: OrientedPoints) -> "_OwnedPoints":
+        """Return points with their nearest decals."""
+        decals = self.points
+        distances, indices, doubts = self.tree.nearest_and_doubts(
+            points.positions, points.normals, count=CANDIDATES
+        )
+        close = np.isfinite(distances) & (distances <= ARC_REACH * distances[:, :1])
+        rows, owners = np.nonzero(close)[0], indices[close]
+        offsets = points.positions[rows].astype(np.float64) - decals.positions[owners]
+        n_p, n_q = decals.normals[owners].astype(np.float64), points.normals[rows].astype(np.float64)
+        lengths = distances.copy()
+        lengths[close] = _arc_lengths(offsets, n_p, n_q)
+        return _OwnedPoints(points, lengths, distances, indices, doubts, self)
 
 
 @dataclass(frozen=True)
@@ -365,13 +395,14 @@ class _OwnedPoints:
     """Points, and the nearest `CANDIDATES` decals that face each: distances and indices, -1 for none.
 
     `lengths` are the distances along the surface, at which images end; straight ones for decals beyond
-    `ARC_REACH`. All three are ``[n, k]``.
+    `ARC_REACH`. All three are ``[n, k]``. `doubts` say how little decides which decals face it, ``[n]``.
     """
 
     points: OrientedPoints
     lengths: Float64Array
     distances: Float64Array
     decals: Int64Array
+    doubts: Float32Array
     centers: _Centers
 
     def __getitem__(self, rows: Int64Array) -> "_OwnedPoints":
@@ -381,7 +412,15 @@ class _OwnedPoints:
             lengths=self.lengths[rows],
             distances=self.distances[rows],
             decals=self.decals[rows],
+            doubts=self.doubts[rows],
         )
+
+    def with_shading(self, shade: Shade | None, radii: Float64Array) -> "_OwnedPoints":
+        """Return the points, doubtful and nearly bare ones with the normals of `shade` as well."""
+        if shade is None:
+            return self
+        rows = np.flatnonzero((self.doubts < DOUBTFUL) | (self.shares(radii) > NEARLY_BARE))
+        return self.joined(self.centers.find(shade(self.points[rows])))
 
     def powers(self, radii: Float64Array) -> Float64Array:
         """Return the powers of points, which decide between cells (`decals.field.radial`); ∞ for no decal."""
@@ -471,6 +510,7 @@ class _OwnedPoints:
             np.concatenate([part.lengths for part in parts]),
             np.concatenate([part.distances for part in parts]),
             np.concatenate([part.decals for part in parts]),
+            np.concatenate([part.doubts for part in parts]),
             self.centers,
         )
 
@@ -492,18 +532,6 @@ def _firsts(rows: Int64Array) -> BoolArray:
     first = np.ones(len(rows), np.bool_)
     first[1:] = (rows[1:] != rows[:-1]).any(axis=1)
     return first
-
-
-def _find_owners(centers: _Centers, points: OrientedPoints) -> _OwnedPoints:
-    decals = centers.points
-    distances, indices = centers.tree.nearest(points.positions, points.normals, count=CANDIDATES)
-    close = np.isfinite(distances) & (distances <= ARC_REACH * distances[:, :1])
-    rows, owners = np.nonzero(close)[0], indices[close]
-    offsets = points.positions[rows].astype(np.float64) - decals.positions[owners]
-    n_p, n_q = decals.normals[owners].astype(np.float64), points.normals[rows].astype(np.float64)
-    lengths = distances.copy()
-    lengths[close] = _arc_lengths(offsets, n_p, n_q)
-    return _OwnedPoints(points, lengths, distances, indices, centers)
 
 
 def _arc_lengths(w: Float64Array, n_p: Float64Array, n_q: Float64Array) -> Float64Array:
@@ -539,9 +567,8 @@ def _circumcenters(peaks: _OwnedPoints, decals: OrientedPoints) -> OrientedPoint
     return OrientedPoints(centers, normals, surface_ids)
 
 
-def _max_radii(owned: _OwnedPoints, count: int) -> Float64Array:
-    """Return the radius beyond which each decal is outsized."""
-    distances, owners = owned.distances[:, 0], owned.decals[:, 0]
+def _max_radii(distances: Float64Array, owners: Int64Array, count: int) -> Float64Array:
+    """Return the radius beyond which each decal is outsized, from the samples' nearest decals."""
     bare_samples = max(1, round(MAX_BARE_SHARE * len(owners) / count))
     order = np.lexsort((-distances, owners))
     order = order[owners[order] >= 0]
@@ -565,89 +592,147 @@ def _grow(radii: Float64Array, owned: _OwnedPoints, limits: Float64Array) -> Non
     np.maximum.at(radii, owned.decals[close], owned.lengths[close])
 
 
-def _close_gaps(
-    radii: Float64Array,
-    owned: _OwnedPoints,
-    limits: Float64Array,
-    speck: float,
-    find: Callable[[OrientedPoints], _OwnedPoints],
-    sample_distance: float,
-    rng: np.random.Generator,
-) -> _OwnedPoints:
-    """Grow radii, up to limits, until searches find no bare point; return the points nearest to bare.
+@dataclass(frozen=True)
+class _Growth:
+    """Rules by which radii grow until no point is bare.
 
-    Growth moves the cells of other decals, so all points near decals that grew are searched around again.
+    Attributes
+    ----------
+    limits
+        Largest radius of each decal, ``float64[n]``.
+    speck
+        Share of its radius by which an image may end before a point; below zero, it must end beyond.
+    project, shade
+        Those of `covering_radii`.
+    sample_distance
+        Mean distance of the samples.
+    rng
+        Draws the random points.
     """
-    every, grown = owned, np.ones(len(radii), np.bool_)
-    if speck > 0.0:  # all other points were searched with less tolerance
-        grown[:] = False
-        grown[owned.decals[owned.shares(radii) > 1.0 + speck]] = True
-    for _ in range(MAX_REPEATS):
-        before = radii.copy()
-        near = every[np.flatnonzero(grown[every.decals].any(axis=1))]
-        owned = _search_gaps(radii, near, limits, speck, find, sample_distance, rng)
-        grown = radii > before
-        every = every.joined(owned)
-        if not grown.any():
-            break
-    return every
+
+    limits: Float64Array
+    speck: float
+    project: Project
+    shade: Shade | None
+    sample_distance: float
+    rng: np.random.Generator
+
+    def close_gaps(self, radii: Float64Array, owned: _OwnedPoints) -> _OwnedPoints:
+        """Grow radii until searches find no bare point; return all searched points.
+
+        Growth moves the cells of other decals, so all points near decals that grew are searched around again.
+        """
+        every, grown = owned, np.ones(len(radii), np.bool_)
+        if self.speck > 0.0:  # all other points were searched with less tolerance
+            grown[:] = False
+            grown[owned.decals[owned.shares(radii) > 1.0 + self.speck]] = True
+        for _ in range(MAX_REPEATS):
+            before = radii.copy()
+            near = grown[every.decals].any(axis=1)
+            found = self._search(radii, every[np.flatnonzero(near)])
+            grown = radii > before
+            every = every.joined(found)
+            if not grown.any():
+                break
+        return every
+
+    def _search(self, radii: Float64Array, owned: _OwnedPoints) -> _OwnedPoints:
+        """Grow radii until searches around points find no bare one; return the searched points.
+
+        Points whose nearest decals have not grown for `CLEAN_SEARCHES` of the last rounds are not searched
+        again.
+        """
+        finest = len(SEARCHES) - 1
+        changed = np.full(len(radii), finest)  # first round after each decal's last growth
+        done: list[_OwnedPoints] = []
+        for turn in range(MAX_SEARCHES):
+            spread, share, count = SEARCHES[min(turn, finest)]
+            reach = spread * self.sample_distance
+            owned = owned.risky(radii, share, CUBE * self.sample_distance)
+            latest = np.where(owned.decals >= 0, changed[owned.decals], 0).max(axis=1, initial=0)
+            settled = turn - latest >= CLEAN_SEARCHES
+            done.append(owned[np.flatnonzero(settled)])
+            owned = owned[np.flatnonzero(~settled)]
+            if len(owned.points) == 0:
+                break
+            trials = [
+                _outward(owned, radii, reach),
+                _random_points_around(owned.points, count, reach, self.rng),
+                _power_corners(owned, radii),
+            ]
+            found = owned.centers.find(_projected(trials, reach, self.project))
+            owned = owned.joined(found.with_shading(self.shade, radii))
+            before = radii.copy()
+            self._cover(radii, owned)
+            changed[radii > before] = max(turn + 1, finest)
+        return owned.joined(*done)
+
+    def _cover(self, radii: Float64Array, owned: _OwnedPoints) -> None:
+        """Grow, for every bare point, the decal that must grow least to own and reach it.
+
+        Growth counts more where the length along the surface exceeds the distance: a decal that bends over an
+        edge gains more such points with every growth.
+        """
+        bare = owned[np.flatnonzero(owned.shares(radii) > 1.0 + self.speck)]
+        powers = bare.powers(radii)
+        lowest = np.sort(powers, axis=1)
+        others = np.minimum(np.where(powers == lowest[:, :1], lowest[:, 1:2], lowest[:, :1]), 0.0)
+        needed = np.maximum(bare.lengths, np.sqrt(np.maximum(bare.distances**2 - others, 0.0)))
+        columns, owners = np.arange(CANDIDATES), bare.owners(radii)[:, None]
+        on_top = owners != powers.argmin(axis=1)[:, None]
+        needed = np.where(on_top, bare.lengths, needed)
+        largest = self.limits[bare.decals]
+        possible = (bare.decals >= 0) & (needed <= largest) & (~on_top | (columns == owners))
+        needed = np.minimum((1.0 + SPARE) * needed, largest)
+        factors = np.full(needed.shape, np.inf)
+        bends = bare.lengths[possible] / np.maximum(bare.distances[possible], 1e-30)
+        factors[possible] = bends * (needed / radii[bare.decals])[possible]
+        best = factors.argmin(axis=1)
+        rows = np.flatnonzero(possible.any(axis=1))
+        np.maximum.at(radii, bare.decals[rows, best[rows]], needed[rows, best[rows]])
 
 
-def _search_gaps(
-    radii: Float64Array,
-    owned: _OwnedPoints,
-    limits: Float64Array,
-    speck: float,
-    find: Callable[[OrientedPoints], _OwnedPoints],
-    sample_distance: float,
-    rng: np.random.Generator,
-) -> _OwnedPoints:
-    """Grow radii, up to limits, until searches around points find no bare one; return the searched points.
+def _outward(owned: _OwnedPoints, radii: Float64Array, reach: float) -> OrientedPoints:
+    """Return points so far from given ones, away from their owners or along the border of the cells.
 
-    Points whose nearest decals have not grown for `CLEAN_SEARCHES` of the last rounds are not searched again.
+    On an edge or an open border of the surface, the point of a cell that is farthest from its decal is a
+    vertex, or lies where the edge meets the border of the cell. These trials approach both: they lie as high
+    above the surface, so that beyond an edge they are projected onto it, and so along it.
     """
-    finest = len(SEARCHES) - 1
-    changed = np.full(len(radii), finest)  # first round after each decal's last growth
-    done: list[_OwnedPoints] = []
-    for turn in range(MAX_SEARCHES):
-        spread, share, count = SEARCHES[min(turn, finest)]
-        owned = owned.risky(radii, share, CUBE * sample_distance)
-        latest = np.where(owned.decals >= 0, changed[owned.decals], 0).max(axis=1, initial=0)
-        settled = turn - latest >= CLEAN_SEARCHES
-        done.append(owned[np.flatnonzero(settled)])
-        owned = owned[np.flatnonzero(~settled)]
-        if len(owned.points) == 0:
-            break
-        trials = _random_points_around(owned.points, count, spread * sample_distance, rng)
-        owned = owned.joined(find(OrientedPoints.joined([trials, _power_corners(owned, radii)])))
-        before = radii.copy()
-        _cover(radii, owned, limits, speck)
-        changed[radii > before] = max(turn + 1, finest)
-    return owned.joined(*done)
+    powers = owned.powers(radii)
+    columns = np.argsort(powers, axis=1)[:, :2]
+    decals = np.take_along_axis(owned.decals, columns, axis=1)
+    powers = np.take_along_axis(powers, columns, axis=1)
+    positions = owned.points.positions.astype(np.float64)
+    normals = owned.points.normals.astype(np.float64)
+    w = owned.centers.points.positions[decals] - positions[:, None]
+    w -= np.einsum("nki,ni->nk", w, normals)[..., None] * normals[:, None]
+    step = -reach * unit_rows(w[:, 0]).astype(np.float64)
+    between = w[:, 1] - w[:, 0]
+    lengths = np.linalg.norm(between, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        height = 0.5 * (powers[:, 1] - powers[:, 0]) / lengths
+    near = np.flatnonzero((decals[:, 1] >= 0) & (height < reach))
+    across = between[near] / lengths[near, None]
+    along = np.cross(normals[near], across)
+    along *= -np.sign(np.einsum("ni,ni->n", along, w[near, 0]))[:, None]
+    height = height[near, None]
+    step[near] = height * across + np.sqrt(reach**2 - height**2) * along
+    lifted = (positions + step + reach * normals).astype(np.float32)
+    return OrientedPoints(lifted, owned.points.normals, owned.points.surface_ids)
 
 
-def _cover(radii: Float64Array, owned: _OwnedPoints, limits: Float64Array, speck: float) -> None:
-    """Grow, for every bare point, the decal that must grow least to own and reach it.
+def _projected(trials: list[OrientedPoints], height: float, project: Project) -> OrientedPoints:
+    """Return projected points; those of the first trials come from a height over planes, to which they keep.
 
-    Growth counts more where the length along the surface exceeds the distance: a decal that bends over an
-    edge gains more such points with every growth.
+    One that falls onto the edge of its plane gets the normal of the plane, not that of the other face.
     """
-    bare = owned[np.flatnonzero(owned.shares(radii) > 1.0 + speck)]
-    powers = bare.powers(radii)
-    lowest = np.sort(powers, axis=1)
-    others = np.minimum(np.where(powers == lowest[:, :1], lowest[:, 1:2], lowest[:, :1]), 0.0)
-    needed = np.maximum(bare.lengths, np.sqrt(np.maximum(bare.distances**2 - others, 0.0)))
-    columns, owners = np.arange(CANDIDATES), bare.owners(radii)[:, None]
-    on_top = owners != powers.argmin(axis=1)[:, None]
-    needed = np.where(on_top, bare.lengths, needed)
-    possible = (bare.decals >= 0) & (needed <= limits[bare.decals]) & (~on_top | (columns == owners))
-    needed = np.minimum((1.0 + SPARE) * needed, limits[bare.decals])
-    factors = np.full(needed.shape, np.inf)
-    bends = bare.lengths[possible] / np.maximum(bare.distances[possible], 1e-30)
-    factors[possible] = bends * (needed / radii[bare.decals])[possible]
-    best = factors.argmin(axis=1)
-    rows = np.flatnonzero(possible.any(axis=1))
-    np.maximum.at(radii, bare.decals[rows, best[rows]], needed[rows, best[rows]])
+    lifted, joined = len(trials[0]), OrientedPoints.joined(trials)
+    points, rows = project(joined)
+    normals = joined.normals[rows]
+    risen = np.einsum("ni,ni->n", points.positions - joined.positions[rows], normals) + height
+    on_plane = (rows < lifted) & (np.abs(risen) < ON_PLANE * height)
+    return replace(points, normals=np.where(on_plane[:, None], normals, points.normals))
 
 
 def _power_corners(owned: _OwnedPoints, radii: Float64Array) -> OrientedPoints:
@@ -679,7 +764,9 @@ def _power_corners(owned: _OwnedPoints, radii: Float64Array) -> OrientedPoints:
         squared = np.einsum("ni,ni->n", cross, cross)
         step = rises[:, :1] * np.cross(b, cross) + rises[:, 1:] * np.cross(cross, a)
         step /= np.where(squared > 0.0, squared, 1.0)[:, None]
+        there = powers[rows] - 2.0 * np.einsum("nki,ni->nk", offsets[rows], step)
         near = (squared > 0.0) & (np.einsum("ni,ni->n", step, step) < reach[rows] ** 2)
+        near &= there[:, triple[0]] <= there.min(axis=1) + CORNER_SLACK * radii[decals[rows, 0]] ** 2
         rows = rows[near]
         corners = (places[rows] + step[near]).astype(np.float32)
         found.append(OrientedPoints(corners, owned.points.normals[rows], owned.points.surface_ids[rows]))

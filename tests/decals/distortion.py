@@ -49,6 +49,16 @@ def distortion(layout: Decals, mesh: Arrays, count: int, seed: int = 7) -> Disto
     return Distortion(stretched / sure, folded / sure, bare / count)
 
 
+def bare_corners(layout: Decals, mesh: Arrays) -> int:
+    """Number of corners of faces, just inside them, where `decals.evaluate` shows no image."""
+    corners = np.asarray(mesh[0], np.float64)[mesh[1]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(normals, axis=1)
+    corners, normals = corners[areas > 0], normals[areas > 0] / areas[areas > 0, None]
+    points = corners + 1e-3 * (corners.mean(axis=1, keepdims=True) - corners)
+    return _measured(layout, points.reshape(-1, 3), normals.repeat(3, axis=0))[3]
+
+
 def _measured(layout: Decals, points: np.ndarray, normals: np.ndarray) -> tuple[int, int, int, int]:
     """Counts of stretched, folded, measured and bare points."""
     found = decals.evaluate(layout, points, normals, jacobian=True)

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from blobtree._typing import Float32Array, Float64Array
+from blobtree._typing import Float32Array, Float64Array, Int64Array
 from decals.scattering.domain import OrientedPoints
 from decals.scattering.orientation import Orientation, gradient_of, tangents
 from decals.scattering.sizing import RADIUS_MARGIN, covering_radii, delaunay_radii, touching_radii
@@ -22,8 +22,9 @@ def flat(points: ArrayLike) -> OrientedPoints:
 def radii_on_plane(points: ArrayLike, size: float = 1.0, sample_count: int = 4000) -> Float64Array:
     surface = plane(size)
 
-    def project(points: OrientedPoints) -> OrientedPoints:
-        return OrientedPoints(*surface.project(points.positions), points.surface_ids)
+    def project(points: OrientedPoints) -> tuple[OrientedPoints, Int64Array]:
+        rows = np.arange(len(points))
+        return OrientedPoints(*surface.project(points.positions), points.surface_ids), rows
 
     samples = OrientedPoints(*surface.sample(sample_count, 1), np.zeros(sample_count, np.int32))
     return covering_radii(flat(points), samples, project, seed=0)
