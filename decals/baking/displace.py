@@ -2,7 +2,9 @@
 
 import math
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -184,30 +186,34 @@ def displace(
             "expected a decal whose image has relief, got none; give a DecalMaterial height= and relief="
         )
     need = _Edges(rows, edge_length)
-    fewest = sum(need.fewest_triangles(item.surface) for item in known.objects)
-    if fewest > subdivide.MAX_FACES:
-        raise subdivide.too_many(f"about {fewest:.2g}")
+    fewest = [need.fewest_triangles(item.surface) for item in known.objects]
+    if sum(fewest) > subdivide.MAX_FACES:
+        raise subdivide.too_many(f"about {sum(fewest):.2g}")
     objects: list[SceneObject | PosedMesh] = []
     index = DecalIndex.of(known.decals)
     walks = walks_for(modes.mapping, known.decals, known.objects)
     with reporting(progress, cancel) as report:
         for number, item in enumerate(known.objects):
-            report("dividing triangles", number / len(known.objects))
+            report_part = partial(_report_part, report, number, len(known.objects))
+            are_long = partial(need.are_long, more=1.5 * fewest[number], report=report_part)
             rest, normals, colors = (
-                _fine_mesh(item, need)
+                _fine_mesh(item, are_long)
                 if isinstance(item, MeshObject)
-                else _fine_tree(item, need, resolution, creases, report)
+                else _fine_tree(item, are_long, resolution, creases, report_part)
             )
-            heights = np.concatenate(
-                [np.zeros(0, np.float32)]
-                + [
-                    _heights(known, modes, index, walks, item, rest.vertices[at], normals[at], report)
-                    for at in (slice(k, k + BLOCK) for k in range(0, len(normals), BLOCK))
-                ]
-            )
+            heights = np.zeros(len(normals), np.float32)
+            for first in range(0, len(normals), BLOCK):
+                report_part("reading heights", first / len(normals))
+                at = slice(first, first + BLOCK)
+                heights[at] = _heights(known, modes, index, walks, item, rest.vertices[at], normals[at])
             moved = (rest.vertices + heights[:, None].astype(np.float64) * normals).astype(np.float32)
             objects.append(PosedMesh(rest, moved, colors) if heights.any() else item)
     return DisplacedScene(tuple(objects), known.decals, known.images, known.camera, modes)
+
+
+def _report_part(report: Progress, number: int, count: int, stage: str, fraction: float) -> None:
+    """Report the progress of one of several objects as that of all of them."""
+    report(stage, (number + fraction) / count)
 
 
 def _is_positive(value: float) -> bool:
@@ -222,9 +228,7 @@ def _heights(
     item: SceneObject,
     points: Float32Array,
     normals: Float32Array,
-    report: Progress,
 ) -> Float32Array:
-    report("reading heights", 0.0)
     heights = evaluate(
         scene.decals,
         points,
@@ -260,10 +264,16 @@ class _Edges:
         with np.errstate(over="ignore", divide="ignore"):  # an infinite number is refused too
             return float(surface.area * np.mean(4.0 / math.sqrt(3.0) / limits**2))
 
-    def are_long(self, starts: Float64Array, ends: Float64Array) -> BoolArray:
-        """Return True for edges of which a part may lie in a decal, and that are longer than its limit."""
+    def are_long(
+        self, starts: Float64Array, ends: Float64Array, *, first: float, more: float, report: Progress
+    ) -> BoolArray:
+        """Return True for edges of which a part may lie in a decal, and that are longer than its limit.
+
+        For reports: ``first`` edges in the beginning, and about ``more`` new ones in the end.
+        """
         from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
 
+        report("dividing triangles", min(max(len(starts) - first, 0.0) / max(more, 1.0), 1.0))
         lengths = np.sqrt(((ends - starts) ** 2).sum(axis=1))
         long = np.zeros(len(lengths), np.bool_)
         rows = np.flatnonzero(lengths > self._limits.min())
@@ -282,11 +292,12 @@ FineMesh = tuple[MeshObject, Float32Array, Float32Array | None]
 """A mesh, and its normals and colours at vertices."""
 
 
-def _fine_mesh(item: MeshObject, need: _Edges) -> FineMesh:
+def _fine_mesh(item: MeshObject, are_long: Callable[..., BoolArray]) -> FineMesh:
     """Return a mesh with short edges, with one vertex at each position."""
     split = split_at_creases(item.vertices, item.faces, item.crease_angle)
     corners = np.hstack([item.vertices[split.rows], split.normals]).astype(np.float64)
-    rows, faces = subdivided(corners, split.faces.astype(np.int64), need.are_long)
+    faces = split.faces.astype(np.int64)
+    rows, faces = subdivided(corners, faces, partial(are_long, first=1.5 * len(faces)))
     same = welded(rows[:, :3].astype(np.float32))
     kept, number = np.unique(same, return_inverse=True)
     sums: Float64Array = np.stack([np.bincount(number, axis, len(kept)) for axis in rows[:, 3:].T], axis=1)
@@ -297,7 +308,11 @@ def _fine_mesh(item: MeshObject, need: _Edges) -> FineMesh:
 
 
 def _fine_tree(
-    item: TreeObject, need: _Edges, resolution: int | None, creases: bool, report: Progress
+    item: TreeObject,
+    are_long: Callable[..., BoolArray],
+    resolution: int | None,
+    creases: bool,
+    report: Progress,
 ) -> FineMesh:
     """Return the surface of a tree as a mesh with short edges, whose vertices lie on it."""
     mesh = polygonize(item.tree, resolution=resolution, creases=creases, progress=report)
@@ -309,7 +324,6 @@ def _fine_tree(
     surface = ImplicitSurface(item.tree)
 
     def midpoints(rows: Float64Array, ends: Int64Array) -> Float64Array:
-        report("dividing triangles", 0.5)
         middles = means(rows, ends)[:, :3]
         places, normals = surface.project(middles)
         lengths = np.linalg.norm(rows[ends[:, 0], :3] - rows[ends[:, 1], :3], axis=1)
@@ -317,7 +331,8 @@ def _fine_tree(
         return np.hstack([np.where(near[:, None], places, middles), normals])
 
     corners = np.hstack([mesh.vertices, mesh.normals]).astype(np.float64)
-    rows, faces = subdivided(corners, mesh.faces.astype(np.int64), need.are_long, midpoints)
+    faces = mesh.faces.astype(np.int64)
+    rows, faces = subdivided(corners, faces, partial(are_long, first=1.5 * len(faces)), midpoints)
     options: dict[str, Any] = {name: getattr(item, name) for name in ("labels", "named_only", "origin")}
     whole: dict[str, Any] = {
         name: ((),) if () in getattr(item, name) else () for name in ("hidden", "locked")

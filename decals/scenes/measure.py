@@ -124,6 +124,14 @@ class Measures:
     samples: int
     decals: DecalMeasures
 
+    def __repr__(self) -> str:
+        """Return all measures, to four digits."""
+        texts = (
+            f"{name}={value if isinstance(value, int) else format(value, '.4g')}"
+            for name, value in self.summary().items()
+        )
+        return f"Measures({', '.join(texts)}, decals={self.decals!r})"
+
     def summary(self) -> dict[str, float]:
         """Return the measures of the whole scene by name."""
         return {name: value for name, value in vars(self).items() if name != "decals"}

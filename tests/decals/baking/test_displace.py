@@ -32,8 +32,22 @@ def hilly() -> Scene:
 
 
 @pytest.fixture(scope="module")
-def moved(hilly: Scene) -> DisplacedScene:
-    return decals.displace(hilly, edge_length=0.09)
+def reports() -> list[tuple[str, float]]:
+    """Progress of `moved`."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def moved(hilly: Scene, reports: list[tuple[str, float]]) -> DisplacedScene:
+    return decals.displace(hilly, edge_length=0.09, progress=lambda *report: reports.append(report))
+
+
+def test_progress_grows_over_all_objects(moved: DisplacedScene, reports: list[tuple[str, float]]) -> None:
+    for stage in ("dividing triangles", "reading heights"):
+        fractions = [fraction for name, fraction in reports if name == stage]
+        assert fractions == sorted(fractions)
+        assert fractions[0] < 0.5 <= fractions[-1] <= 1.0
+    assert len({fraction for name, fraction in reports if name == "dividing triangles"}) > 4
 
 
 def test_vertices_move_by_the_heights_of_the_decals(hilly: Scene, moved: DisplacedScene) -> None:

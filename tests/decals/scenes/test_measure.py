@@ -34,6 +34,8 @@ def test_two_decals_on_a_plane(contact: str) -> None:
     lens = 2 * math.acos(half) - DISTANCE * math.sqrt(1 - half**2)
     union = 2 * math.pi - lens
     assert found.area == pytest.approx(16)
+    assert repr(found).startswith("Measures(area=16, coverage=0.3")
+    assert repr(found).endswith(f", samples={found.samples}, decals=DecalMeasures(2))")
     assert found.coverage == pytest.approx(union / 16, rel=0.01)
     assert found.gap_area == pytest.approx(16 - union, rel=0.01)
     assert found.overlap_area == pytest.approx(lens, rel=0.02)
