@@ -18,6 +18,7 @@ import numpy as np
 
 from blobtree import Node, polygonize
 from blobtree._typing import Float32Array, Float64Array
+from blobtree.progress import reporting
 from decals.field.law import ContactLaw
 from decals.rendering.context import Context
 from decals.rendering.decal_pass import DecalSource, decal_functions
@@ -82,7 +83,13 @@ class Shell:
         lower = 0.5 * (lower + upper) - 0.5 * cell * counts
         middles = lower + (np.indices(counts).reshape(3, -1).T + 0.5) * cell
         near = np.concatenate([np.arange(len(points)), edges[:, 0]])
-        distances, nearest = cKDTree(np.concatenate([points, ends.mean(axis=1)])).query(middles)
+        near_of = cKDTree(np.concatenate([points, ends.mean(axis=1)]))
+        found = []
+        with reporting() as report:
+            for done, layer in enumerate(np.array_split(middles, counts[0])):
+                report("measuring distances", done / counts[0])
+                found.append(near_of.query(layer))
+        distances, nearest = (np.concatenate(one) for one in zip(*found, strict=True))
         texels = np.column_stack([points[near[nearest]], distances - gap]).astype(np.float32)
         x, y, z = counts.tolist()
         return cls(texels, lower, cell, (x, y, z), reach)
@@ -97,6 +104,7 @@ class OffsetTreeDrawable(TreeDrawable):
     """A tree's tracing cells on the GPU, and for scenes with relief its shell."""
 
     _shell: tuple[Shell, moderngl.Texture3D] | None = None
+    _programs: tuple[object, tuple[Program, Program]] | None = None
     _starts: moderngl.Texture | None = None
     _start_pass: PixelPass | None = None
     _box_of: tuple[Program, moderngl.VertexArray] | None = None
@@ -105,8 +113,7 @@ class OffsetTreeDrawable(TreeDrawable):
         """Make everything that `draw_offset` needs at the first call."""
         assert source.relief is not None
         self._shell_for(source.relief.reach)
-        start_program(self._context, self.kinds, source)
-        offset_program(self._context, self.kinds, source)
+        self._programs_for(source)
 
     def draw_offset(
         self,
@@ -120,13 +127,13 @@ class OffsetTreeDrawable(TreeDrawable):
         """Trace the rays to the surface that heights move, or those of a part of the rows."""
         assert source.relief is not None
         bounds = self._shell_for(source.relief.reach)[0].bounds
-        program = offset_program(self._context, self.kinds, source)
+        start_program, program = self._programs_for(source)
         rows = covered_rectangle(bounds, tile).rows(part)
         if isinstance(program, moderngl.Program):
             rows = Rectangle(0, 0, tile.width, tile.height).rows(part)
         if rows.area == 0:
             return
-        starts = self._draw_starts(object_id, rows, gbuffer, source)
+        starts = self._draw_starts(start_program, object_id, rows, gbuffer, source)
         unit = self._use(program, object_id, source)
         starts.use(unit)
         set_uniform(program, "starts", unit)
@@ -138,10 +145,9 @@ class OffsetTreeDrawable(TreeDrawable):
         self.trace_rows(program, rows, gbuffer)
 
     def _draw_starts(
-        self, object_id: int, rows: Rectangle, gbuffer: GBuffer, source: DecalSource
+        self, program: Program, object_id: int, rows: Rectangle, gbuffer: GBuffer, source: DecalSource
     ) -> moderngl.Texture:
         """Draw where the rays begin in all squares that contain these samples; return the texture."""
-        program = start_program(self._context, self.kinds, source)
         size = -(-gbuffer.size[0] // BLOCK), -(-gbuffer.size[1] // BLOCK)
         if self._starts is None or size[0] > self._starts.width or size[1] > self._starts.height:
             self._release_starts()
@@ -178,6 +184,15 @@ class OffsetTreeDrawable(TreeDrawable):
         source.relief.slopes.use(unit)
         set_uniform(program, "relief_slopes", unit)
         return unit + 1
+
+    def _programs_for(self, source: DecalSource) -> tuple[Program, Program]:
+        """Return the programs that find where rays begin and trace them; composing takes long."""
+        variant = source.constants(), source.law, source.limited
+        if self._programs is None or self._programs[0] != variant:
+            makers = start_program, offset_program
+            start, offset = (make(self._context, self.kinds, source) for make in makers)
+            self._programs = variant, (start, offset)
+        return self._programs[1]
 
     def _shell_for(self, reach: float) -> tuple[Shell, moderngl.Texture3D]:
         if self._shell is None or not reach <= self._shell[0].reach <= 4.0 * max(reach, 1e-30):
