@@ -12,8 +12,8 @@ uniform sampler2D g_position;
 uniform sampler2D g_normal;
 uniform sampler2D g_color;
 #ifdef POSED
+//@ include octahedron.glsl
 uniform sampler2D r_position;
-uniform sampler2D r_normal;
 uniform sampler2D r_right;
 uniform sampler2D r_up;
 #endif
@@ -52,9 +52,11 @@ Pixel pixel_at(ivec2 texel) {
         is_posed = rest.w == visible.w;
         if (is_posed) {
             position = rest.xyz;
-            normal = texelFetch(r_normal, texel, 0).xyz;
-            rest_right = texelFetch(r_right, texel, 0).xyz;
-            rest_up = texelFetch(r_up, texel, 0).xyz;
+            vec4 right = texelFetch(r_right, texel, 0);
+            vec4 up = texelFetch(r_up, texel, 0);
+            rest_right = right.xyz;
+            rest_up = up.xyz;
+            normal = off_octahedron(vec2(right.w, up.w));
 #ifdef MATERIALS
             vec3 toward = ray_direction(vec2(texel) + 0.5);
             posed_normal = texelFetch(g_normal, texel, 0).xyz;

@@ -7,9 +7,8 @@ layout(binding = 0, rgba32f) uniform image2D g_position;
 layout(binding = 1) writeonly uniform image2D g_normal;
 layout(binding = 2) writeonly uniform image2D g_color;
 layout(binding = 3) writeonly uniform image2D r_position;
-layout(binding = 4) writeonly uniform image2D r_normal;
-layout(binding = 5) writeonly uniform image2D r_right;
-layout(binding = 6) writeonly uniform image2D r_up;
+layout(binding = 4) writeonly uniform image2D r_right;
+layout(binding = 5) writeonly uniform image2D r_up;
 
 void main() {
     ivec2 offset = ivec2(gl_GlobalInvocationID.xy);
@@ -28,7 +27,6 @@ void main() {
     imageStore(g_normal, texel, found.surface.normal);
     imageStore(g_color, texel, found.surface.color);
     imageStore(r_position, texel, found.rest);
-    imageStore(r_normal, texel, found.rest_normal);
     imageStore(r_right, texel, found.rest_right);
     imageStore(r_up, texel, found.rest_up);
 }

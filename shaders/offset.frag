@@ -2,9 +2,8 @@
 //@ include gbuffer.glsl
 //@ include offset.glsl
 layout(location = 3) out vec4 r_position;
-layout(location = 4) out vec4 r_normal;
-layout(location = 5) out vec4 r_right;
-layout(location = 6) out vec4 r_up;
+layout(location = 4) out vec4 r_right;
+layout(location = 5) out vec4 r_up;
 
 void main() {
     Offset found = offset_pixel(gl_FragCoord.xy);
@@ -13,7 +12,6 @@ void main() {
     }
     write_surface(found.surface);
     r_position = found.rest;
-    r_normal = found.rest_normal;
     r_right = found.rest_right;
     r_up = found.rest_up;
     gl_FragDepth = window_depth(found.surface.position.xyz);

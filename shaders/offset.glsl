@@ -1,5 +1,6 @@
 // The ray through a pixel against a BlobTree whose surface heights move; body of offset.frag and offset.comp.
 //@ include offset_foot.glsl
+//@ include octahedron.glsl
 uniform sampler2D starts;  // see offset_start.glsl
 
 const int OFFSET_STEPS = 256;
@@ -66,7 +67,6 @@ float offset_ray(vec3 origin, vec3 direction, float start, inout Foot foot, out 
 struct Offset {
     Surface surface;  // position.w = 0: none
     vec4 rest;
-    vec4 rest_normal;
     vec4 rest_right;
     vec4 rest_up;
 };
@@ -102,12 +102,12 @@ Offset offset_pixel(vec2 pixel) {
     result.surface = surface_at(position, normal, color, true);
     normal = result.surface.normal.xyz;
     result.rest = vec4(foot.place, float(object_id + 1));
-    result.rest_normal = vec4(n, 0.0);
+    vec2 rest_normal = on_octahedron(n);
     vec3 ray = ray_direction(pixel);
     for (int i = 0; i < 2; i++) {
         vec3 moved = surface_step(position, normal, ray, i == 0 ? ray_right.xyz : ray_up.xyz);
         vec2 share = vec2(dot(cross(moved, steps[1]), area), dot(cross(steps[0], moved), area));
-        vec4 rest = vec4((share.x * axis + share.y * second) / max(dot(area, area), 1e-20), 0.0);
+        vec4 rest = vec4((share.x * axis + share.y * second) / max(dot(area, area), 1e-20), rest_normal[i]);
         if (i == 0) {
             result.rest_right = rest;
         } else {

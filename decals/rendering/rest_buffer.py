@@ -23,7 +23,7 @@ class RestBuffer:
     """
 
     def __init__(self, context: Context, gbuffer: GBuffer) -> None:
-        names = "r_position", "r_normal", "r_right", "r_up"
+        names = "r_position", "r_right", "r_up"
         self.textures = {name: context.texture(gbuffer.size, "f4") for name in names}
         for texture in self.textures.values():
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)

@@ -60,8 +60,10 @@ def test_the_rest_pose_draws_the_scene_itself(renderer: Renderer) -> None:
     posed = decals.pose(scene, {"ring": item.vertices})
     one, other = buffers(renderer, scene), buffers(renderer, posed)
     assert (one.owner >= 0).sum() > 1500
-    for name in ("owner", "uv", "field", "position", "normal"):
+    for name in ("owner", "position", "normal"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    for name in ("uv", "field"):  # normals at rest are rounded once more
+        np.testing.assert_allclose(getattr(one, name), getattr(other, name), atol=1e-6)
     off = np.abs(one.color.astype(int) - other.color).max(axis=2)
     assert (off > 8).mean() < 0.01  # footprints are those of triangles, not of the smooth normal
     assert off.mean() < 0.5
