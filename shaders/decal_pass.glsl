@@ -4,8 +4,8 @@
 // LIMITED: decals have receivers or fades. MATERIALS: some images have maps; color.w is then the metalness.
 // RELIEF: some images have heights; the slot relief holds relief.glsl. With POSED, the posed objects are trees that
 // offset.glsl has moved.
-// FILTERED: average the decals over each pixel; the slot holds filtered_decals.glsl. A pixel that is not `exact` may be
-// left `pixel_divided`: it must be drawn exactly then.
+// FILTERED: average the decals over each pixel; the slot holds filtered_decals.glsl. With MARKED, pixels may be left
+// `pixel_divided`: they must be drawn again without it.
 //@ include camera.glsl
 //@ include pixel.glsl
 uniform sampler2D g_position;
@@ -27,11 +27,7 @@ int surface_receivers = -1;  // mask of the object at this pixel, see decals/rec
 //@ slot relief optional
 
 // color: linear albedo, w = 1 on objects; buffers: owner or -1, field F, uv
-#ifdef FILTERED
-Pixel pixel_at(ivec2 texel, bool exact) {
-#else
 Pixel pixel_at(ivec2 texel) {
-#endif
     Pixel pixel;
 #ifdef MATERIALS
     pixel.material = pixel.glow = vec4(0.0);
@@ -75,7 +71,7 @@ Pixel pixel_at(ivec2 texel) {
             up = rest_up;
         }
 #endif
-        vec4 color = filtered_color(position, normal, right, up, exact);
+        vec4 color = filtered_color(position, normal, right, up);
 #else
 #ifdef RELIEF
         relief_normal = normal;

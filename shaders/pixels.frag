@@ -1,7 +1,6 @@
 // A pass over all pixels as a fragment shader, for GLSL 3.30 on. The slot gives `Pixel pixel_at(ivec2 texel)`.
 // TWO_TARGETS: the pixel has a second part, `buffers`. MATERIALS: two more, `material` and `glow`.
-// FILTERED: the slot gives `Pixel pixel_at(ivec2 texel, bool exact)`. MARKED: tell which pixels are divided instead of
-// drawing them exactly; a pass with LISTED then draws a list of them, pixel after pixel.
+// MARKED: tell of which pixels the body sets `pixel_divided`. LISTED: draw a list of pixels, one beside the other.
 //@ slot body
 
 layout(location = 0) out vec4 out_color;
@@ -27,20 +26,12 @@ uniform isampler2D listed_texels;
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
-#if defined(LISTED)
+#ifdef LISTED
     texel = texelFetch(listed_texels, texel, 0).xy;
-    Pixel pixel = pixel_at(texel, true);
-#elif defined(FILTERED)
-    Pixel pixel = pixel_at(texel, false);
+#endif
+    Pixel pixel = pixel_at(texel);
 #ifdef MARKED
     out_divided = pixel_divided ? 1.0 : 0.0;
-#else
-    if (pixel_divided) {
-        pixel = pixel_at(texel, true);
-    }
-#endif
-#else
-    Pixel pixel = pixel_at(texel);
 #endif
     out_color = pixel.color;
 #ifdef TWO_TARGETS

@@ -35,7 +35,6 @@ from decals.rendering.pixel_pass import (
     PixelPass,
     Program,
     attach_camera,
-    group_of,
     read_floats,
     set_uniform,
     use_textures,
@@ -203,11 +202,10 @@ class DecalPass:
                 self.material_targets["g_glow"] = self._context.texture(self._size, "f2")
             targets = [*self._targets, *(self.material_targets.values() if variant["materials"] else ())]
             programs = decal_programs(self._context, library, len(self._targets), **variant)
-            group = group_of(filtered=variant["filtered"])
             self._passes[key] = (
                 ListedPass(self._context.gl, programs, targets)
                 if len(programs) > 1
-                else PixelPass(self._context.gl, programs[0], targets, group=group)
+                else PixelPass(self._context.gl, programs[0], targets)
             )
         return self._passes[key]
 

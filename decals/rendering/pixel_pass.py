@@ -30,9 +30,6 @@ COMPUTE_VERSION = 430
 GROUP = 8
 """Side of a compute shader's square group of pixels."""
 
-FILTER_GROUP = 16
-"""The same of filtered passes, in which invocations of a group share the pixels on rims and contact lines."""
-
 LIST_WIDTH = 256
 """Texels in a row of a list of pixels."""
 
@@ -107,14 +104,9 @@ def pass_source(
     all_defines: dict[str, str | int | float | bool] = {**(defines or {}), "TWO_TARGETS": targets > 1}
     all_slots = {"body": f"//@ include {body}", **(slots or {})}
     if backend is PassBackend.COMPUTE:
-        all_defines["GROUP"] = group_of(filtered=bool(all_defines.get("FILTERED")))
+        all_defines["GROUP"] = GROUP
         return compose("pixels.comp", slots=all_slots, defines=all_defines, version="430 core")
     return compose("pixels.frag", slots=all_slots, defines=all_defines)
-
-
-def group_of(*, filtered: bool) -> int:
-    """Return the side of a compute shader's groups."""
-    return FILTER_GROUP if filtered else GROUP
 
 
 # -- uniforms and targets -------------------------------------------------------------------------------
@@ -173,16 +165,9 @@ def read_floats(framebuffer: moderngl.Framebuffer, attachment: int, tile: Tile) 
 class PixelPass:
     """A program that fills textures of floats: a triangle over all pixels, or invocations for each pixel."""
 
-    def __init__(
-        self,
-        gl: moderngl.Context,
-        program: Program,
-        targets: Sequence[moderngl.Texture],
-        *,
-        group: int = GROUP,
-    ) -> None:
+    def __init__(self, gl: moderngl.Context, program: Program, targets: Sequence[moderngl.Texture]) -> None:
         self.programs: tuple[Program, ...] = (program,)
-        self._targets, self._gl, self._group = tuple(targets), gl, group
+        self._targets, self._gl = tuple(targets), gl
         self._owned: tuple[moderngl.VertexArray, moderngl.Framebuffer] | None = None
         if isinstance(program, moderngl.Program):
             self._owned = gl.vertex_array(program, []), gl.framebuffer(list(targets))
@@ -198,7 +183,7 @@ class PixelPass:
             assert isinstance(self.program, moderngl.ComputeShader)
             for unit, target in enumerate(self._targets):
                 target.bind_to_image(unit, read=False, write=True)
-            run_pixels(self.program, rectangle, self._group)
+            run_pixels(self.program, rectangle)
             self._gl.memory_barrier()
             return
         triangle, framebuffer = self._owned
@@ -290,11 +275,11 @@ def scissor_of(rectangle: Rectangle) -> tuple[int, int, int, int]:
     return rectangle.x, rectangle.y, rectangle.width, rectangle.height
 
 
-def run_pixels(program: moderngl.ComputeShader, rectangle: Rectangle, group: int = GROUP) -> None:
+def run_pixels(program: moderngl.ComputeShader, rectangle: Rectangle) -> None:
     """Invoke a compute shader for every pixel of a rectangle."""
     program["first_texel"] = rectangle.x, rectangle.y
     program["end_texel"] = rectangle.x + rectangle.width, rectangle.y + rectangle.height
-    program.run(-(-rectangle.width // group), -(-rectangle.height // group))
+    program.run(-(-rectangle.width // GROUP), -(-rectangle.height // GROUP))
 
 
 # -- choice of the backend ------------------------------------------------------------------------------

@@ -17,7 +17,6 @@ than 1e-6.
 
 import argparse
 import json
-import re
 import statistics
 import time
 from collections.abc import Callable
@@ -28,6 +27,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+GROUP = 8
+"""Width and height of a work group of the recorded compute shaders."""
 WARM_UP = 3
 """Runs before the timed ones."""
 COMPUTE_VERSION = 430
@@ -129,10 +130,7 @@ class PictureReplay(Recording):
         self.set_uniforms(program, {name: unit for unit, name in enumerate(textures)})
         if entry == "compute":
             program["end_texel"] = self.size
-            match = re.search(r"#define GROUP (\d+)", recorded["text"])
-            assert match, "expected the size of groups in a compute shader"
-            group = int(match[1])
-            return lambda: self._run_compute(program, textures, target, group)
+            return lambda: self._run_compute(program, textures, target)
         array = self.gl.vertex_array(program, [])
         framebuffer = self.gl.framebuffer([self.targets[target]])
         return lambda: self._run_fragment(array, framebuffer, textures)
@@ -153,11 +151,11 @@ class PictureReplay(Recording):
             self._textures[name] = texture
         return self._textures[name]
 
-    def _run_compute(self, program: Any, textures: dict[str, Any], target: str, group: int) -> None:
+    def _run_compute(self, program: Any, textures: dict[str, Any], target: str) -> None:
         for unit, texture in enumerate(textures.values()):
             texture.use(unit)
         self.targets[target].bind_to_image(0, read=False, write=True)
-        program.run(-(-self.size[0] // group), -(-self.size[1] // group))
+        program.run(-(-self.size[0] // GROUP), -(-self.size[1] // GROUP))
         self.gl.memory_barrier()
 
     def _run_fragment(
