@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from decals.apps.sandbox.controls import STEPS, Control, exchanged, number_of
 from decals.apps.sandbox.cube import cube_cells
+from decals.apps.sandbox.decal_panel import brush_values
 from decals.editing.background import Job, Worker
 from decals.editing.document import Document
 from decals.editing.gizmo import AXES
@@ -313,13 +314,20 @@ class Display:
                     handles.append({"name": handle.name, "x": x, "y": y})
                     if handle.name.startswith(LINED) and np.isfinite(places[0][0]):
                         lines.append([*places[0], x, y])
-        return {"handles": handles, "lines": lines}
+        return {"handles": handles, "lines": lines, "brush": self._brush_size()}
 
     def cube(self) -> list[dict[str, Any]]:
         """Return the orientation cube; see `cube_cells`."""
         eye, target = self._window.camera.eye_and_target()
         up = self._window.subplot.vtk_renderer.camera.up
         return cube_cells(self._window.actions.view.axes, np.subtract(eye, target), up)
+
+    def _brush_size(self) -> float:
+        """Return the radius of the brush at the target, in heights of the view; 0 without one."""
+        controls = brush_values(self._window.document, self._window.actions.state.brush)["controls"]
+        radius = next((control["value"] for control in controls if control["name"] == "radius"), 0.0)
+        _, target = self._window.camera.eye_and_target()
+        return round(radius * GIZMO_SIZE / self._gizmo_length(target), 4)
 
     def _in_view(self, pixels: ArrayLike) -> list[list[float]]:
         """Return pixels as parts of the view's width, and of its height from the top."""

@@ -42,6 +42,8 @@ STYLE = """html { overflow-y: auto }
 .toolbar .v-btn-group { flex-shrink: 0 }
 .v-field__input { padding-inline: 8px }
 .row-flag { font-size: 18px; padding: 4px }
+.brush { position: absolute; left: var(--x, -999px); top: var(--y, 0); aspect-ratio: 1; border-radius: 50%;
+  transform: translate(-50%, -50%); border: 2px solid #fff; outline: 1px solid #111; pointer-events: none }
 .cube { position: absolute; top: 8px; right: 8px; width: 104px; height: 104px; pointer-events: none }
 .cube polygon { fill: rgb(var(--v-theme-surface)); stroke: rgb(var(--v-theme-on-surface)); stroke-width: 0.02;
   fill-opacity: 0.85; pointer-events: all; cursor: pointer }
@@ -158,10 +160,16 @@ TOUCH_EVENTS = {
     "if (last) trigger('pinch', [now[0] - last[0], last[1] - now[1], now[2] / last[2], 'move']) }",
     "touchend": "$event.currentTarget.fingers && trigger('pinch', [0, 0, 1, 'end'])",
     "pointerdown": "$event.isPrimary ? $event.currentTarget.fingers = null : $event.stopPropagation()",
-    "pointermove": "$event.currentTarget.fingers && $event.stopPropagation()",
+    "pointermove": "$event.currentTarget.fingers && $event.stopPropagation(); "
+    "const view = $event.currentTarget, box = view.getBoundingClientRect(); "
+    "view.style.setProperty('--x', $event.clientX - box.left + 'px'); "
+    "view.style.setProperty('--y', $event.clientY - box.top + 'px')",
     "pointerup": "$event.isPrimary || $event.stopPropagation()",
 }
-"""Two fingers move and zoom the view. The first alone does what the mouse does, until another one comes."""
+"""Two fingers move and zoom the view; the first does what the mouse does, until another one comes.
+
+The circle of the brush follows the pointer.
+"""
 
 CUBE = """<svg viewBox="-1.8 -1.8 3.6 3.6" class="cube" aria-hidden="true">
 <polygon v-for="c in cube" :key="c.points" :points="c.points"
@@ -310,6 +318,9 @@ class Page:
                     self.sandbox.schedule = self.view.update
                     html.Div(LASSO, v_if="gizmo.line")
                     html.Div(GIZMO, v_if="gizmo.handles.length")
+                    html.Div(
+                        v_if="gizmo.brush", classes="brush", style=("{height: 200 * gizmo.brush + '%'}",)
+                    )
                     html.Div(CUBE)
                 panels.build_start(self.sandbox)
                 with vuetify3.VFooter(app=True, height=28, classes="text-caption"):

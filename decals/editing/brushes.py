@@ -309,7 +309,7 @@ class BrushStroke:
             case Brush.RELAX | Brush.ALIGN if last is not None and distance(position, last) <= radius / 4:
                 self._last = last
             case Brush.RELAX:
-                self._run(RelaxDecals(position))
+                self._run(RelaxDecals(position, radius))
             case Brush.ALIGN if last is not None:
                 command = aligned(document, decals_within(document, position, radius), position - last)
                 if command is not None:

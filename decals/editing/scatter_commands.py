@@ -19,7 +19,7 @@ from decals.scattering.polish import PUSHING_RADIUS, relax_near
 from decals.scattering.scatter import scatter
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject, check_names, relative_to
 from decals.scenes.recipe import Recipe
-from decals.validation import describe, finite_vector, instance, one_of, whole_number
+from decals.validation import describe, finite_number, finite_vector, instance, one_of, whole_number
 
 SPACING = 3.0**0.5 / 1.03
 """Distance of neighbours among decals without gaps, in radii (see `sizing.RADIUS_MARGIN`)."""
@@ -177,6 +177,8 @@ class RelaxDecals:
     ----------
     point
         Centre of the neighbourhood, shape (3,).
+    radius
+        Decals within this distance move. Default: those about the nearest decal.
 
     Examples
     --------
@@ -190,6 +192,7 @@ class RelaxDecals:
     """
 
     point: ArrayLike
+    radius: float | None = None
     label: ClassVar[str] = "relax"
 
     def compute(self, document: Document) -> Edit:
@@ -200,7 +203,10 @@ class RelaxDecals:
             return Edit()
         distances = np.linalg.norm(decals.positions - center, axis=1)
         closest = int(distances.argmin())
-        near = distances < RELAXED_DISTANCE * SPACING * decals.radii[closest]
+        reach = RELAXED_DISTANCE * SPACING * decals.radii[closest]
+        if self.radius is not None:
+            reach += finite_number("radius", self.radius, InvalidEdit)
+        near = distances < reach
         near &= ~np.isin(decals.layers, document.locked_layers)
         rows = np.flatnonzero(near & (decals.ranks == decals.ranks[closest]))
         if len(rows) < 2:
@@ -215,6 +221,7 @@ class RelaxDecals:
             np.ones(len(rows), np.bool_),
             (SPACING * decals.radii[rows]).astype(np.float32),
             center,
+            self.radius,
         )
         moved = np.flatnonzero((after.positions != before.positions).any(axis=1))
         points = SurfacePoints(after.positions[moved], after.normals[moved], after.surface_ids[moved])

@@ -178,12 +178,16 @@ def relax_near(
     movable: BoolArray,
     sizes: Float32Array,
     center: Float32Array,
+    reach: float | None = None,
 ) -> OrientedPoints:
-    """Relax the particles around a point, and leave all others where they are."""
+    """Relax the particles around a point, or those within a reach, and leave all others where they are."""
     distances = np.linalg.norm(points.positions - center, axis=1)
     spacing = float(sizes[distances.argmin()])
-    near = np.flatnonzero(distances < PUSHING_RADIUS * spacing)
-    moving = (distances[near] < MOVING_RADIUS * spacing) & movable[near]
+    pushing, moved = PUSHING_RADIUS * spacing, MOVING_RADIUS * spacing
+    if reach is not None:
+        pushing, moved = reach + pushing - moved, reach
+    near = np.flatnonzero(distances < pushing)
+    moving = (distances[near] < moved) & movable[near]
     if not moving.any():
         return points
     state = ParticleState(domain, points[near], moving, sizes[near])

@@ -325,7 +325,11 @@ def test_brush_and_drawing_are_set(sandbox: Sandbox, shared: EditWindow) -> None
     values = sandbox.values()["brush"]
     assert values["brush"] == "scatter"
     assert {control["name"]: control["value"] for control in values["controls"]}["radius"] == 0.7
-    for name, value in (("brush", "paint"), ("radius", 0), ("density", 2), ("color", 1), ("radius", None)):
+    camera = shared.subplot.vtk_renderer.camera
+    ends = pixels_of(shared.subplot, [camera.focal_point, np.array(camera.focal_point) + camera.up])
+    length = np.linalg.norm(ends[1] - ends[0]) / shared.plotter.window_size[1]
+    assert sandbox.values()["gizmo"]["brush"] == pytest.approx(0.7 * length, rel=0.1)
+    for name, value in (("brush", "smear"), ("radius", 0), ("density", 2), ("color", 1), ("radius", None)):
         sandbox.set_brush(name, value)
         assert "expected" in sandbox.status
     sandbox.set_brush("brush", "select")

@@ -10,7 +10,7 @@ from blobtree import Point
 from decals.editing import Actions, EditSession, PointerTools
 from decals.editing.brushes import CLOSEST, Brush, BrushDecals, PushDecals
 from decals.editing.commands import SetValues
-from decals.editing.scatter_commands import SPACING
+from decals.editing.scatter_commands import SPACING, RelaxDecals
 from decals.editing.visibility import LockLayers
 from decals.errors import InvalidEdit
 from tests.decals.editing.scenes import digest
@@ -143,3 +143,18 @@ def test_the_paint_brush_selects_what_it_touches() -> None:
     ]
     assert session.labels == ("set values", LockLayers.label)
     assert actions.state.message == f"{len(actions.state.selection)} decals"
+
+
+def test_the_relax_brush_moves_decals_within_its_radius_alone() -> None:
+    moved = []
+    for radius in (0.3, 1.0):
+        session = covered_ball(60)
+        session.do(PushDecals(TOP, (0.3, 0.0, 0.0), 0.6))
+        before = session.document.decals.decals.positions
+        session.do(RelaxDecals(TOP, radius))
+        changed = (session.document.decals.decals.positions != before).any(axis=1)
+        assert (np.linalg.norm(before[changed] - TOP, axis=1) < radius + 1e-6).all()
+        moved.append(changed.sum())
+    assert 0 < moved[0] < moved[1]
+    with pytest.raises(InvalidEdit, match="radius: expected"):
+        session.do(RelaxDecals(TOP, float("nan")))
