@@ -41,7 +41,7 @@ def digest(document: Document) -> str:
     """Everything that a document holds; parts by identity, as renderers tell them apart."""
     decals = document.decals
     same = document.objects, document.images, document.camera
-    parts = (decals.numbers.tolist(), *map(id, same), document.layer_names)
+    parts = (decals.numbers.tolist(), *map(id, same), document.layer_names, document.drawing)
     arrays = [
         getattr(decals.decals, name) for name in ("positions", "normals", "tangents", "radii", "images")
     ]
