@@ -53,7 +53,9 @@ def test_a_public_name_has_an_example(name: str) -> None:
 
 
 @pytest.mark.slow_cases(
+    "blobtree.Arc",
     "blobtree.ContactSurface",
+    "blobtree.Fit",
     "blobtree.SolidContact",
     "decals.Scene",
     "decals.define_contact",

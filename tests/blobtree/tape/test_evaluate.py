@@ -38,6 +38,7 @@ def test_values_match_float64(batch: Batch) -> None:
     assert inside > 2 * len(batch.trees)
 
 
+@pytest.mark.slow_cases("fields-0")
 @EVERY_BATCH
 def test_gradients_match_float64_differences(batch: Batch) -> None:
     compared = 0
@@ -118,6 +119,7 @@ def oracle_slope() -> float:
 # -- bounds on the slope --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow_cases("fields-0")
 @EVERY_BATCH
 def test_no_field_rises_faster_than_its_bound(batch: Batch) -> None:
     """|f(x) − f(q)| ≤ L · |x − q| for all x in the ball: 192,000 pairs over all runs."""
