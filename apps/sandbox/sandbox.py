@@ -196,7 +196,7 @@ class Sandbox:
             state.message,
             self.display.message,
         )
-        return "   ".join(filter(None, parts))
+        return " · ".join(filter(None, parts))
 
     @staticmethod
     def catalog() -> dict[str, Any]:
