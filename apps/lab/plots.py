@@ -94,7 +94,8 @@ def _ticks(low: float, high: float) -> list[float]:
     span = high - low
     power = 10.0 ** np.floor(np.log10(span))
     step = next(s for s in (0.2 * power, 0.5 * power, power, 2 * power) if span / s < 6)
-    return [float(value * step) for value in np.arange(np.ceil(low / step), np.floor(high / step + 1e-9) + 1)]
+    first, last = np.ceil(low / step), np.floor(high / step + 1e-9)
+    return [float(value * step) for value in np.arange(first, last + 1) + 0.0]  # 0 in place of -0
 
 
 def _mark(plot: Plot, lesson: Lesson, scope: Scope, axes: _Axes) -> None:
@@ -121,7 +122,7 @@ def _curves(plot: Plot, lesson: Lesson, scope: Scope) -> str:
         np.broadcast_to(np.asarray(lesson.formulas[c.formula].evaluate(at), np.float64), x.shape)
         for c in plot.curves
     ]
-    axes = _Axes(ends, plot.values or _range(np.concatenate(rows)), HEIGHT, rows=(len(rows) + 1) // 2)
+    axes = _Axes(ends, plot.values or _range(np.concatenate(rows), 0.05), HEIGHT, rows=(len(rows) + 1) // 2)
     for number, (curve, row) in enumerate(zip(plot.curves, rows, strict=True)):
         look = {"stroke": COLORS[number % 6], "stroke_dasharray": DASHES[number % 6]}
         path = _path(axes, x, row)
@@ -138,12 +139,12 @@ def _curves(plot: Plot, lesson: Lesson, scope: Scope) -> str:
     return axes.svg(plot.title)
 
 
-def _range(values: Float64Array) -> tuple[float, float]:
+def _range(values: Float64Array, padding: float = 0.0) -> tuple[float, float]:
     finite = values[np.isfinite(values)]
     if not len(finite):
         return 0.0, 1.0
     low, high = float(finite.min()), float(finite.max())
-    margin = 0.05 * (high - low) or 0.5
+    margin = padding * (high - low) if high > low else 0.5
     return low - margin, high + margin
 
 

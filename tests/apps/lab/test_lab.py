@@ -12,7 +12,7 @@ import pytest
 
 import decals
 from decals.apps.lab.errors import InvalidLesson
-from decals.apps.lab.lab import Lab, measured
+from decals.apps.lab.lab import Lab, Results, measured
 from decals.apps.lab.lesson import LESSONS, load_lesson, load_lessons, shown
 from decals.apps.lab.measures import MEASURES
 from decals.apps.lab.plots import LEFT, TOP
@@ -198,14 +198,16 @@ def test_a_lesson_of_the_docs_is_loaded_and_answered(tmp_path: Path) -> None:
     (lesson,) = load_lessons(tmp_path)
     state = made["scene"].decals
 
-    def verdict(x: float) -> tuple[bool, str]:
+    def results(x: float) -> Results:
         from tests.apps.lab.test_measures import experiment
 
         moved = state.replace(positions=[state.positions[0], (x, 0, 0)])
-        return measured(lesson, experiment(decals=moved, camera=lesson.scene.camera)).verdict
+        return measured(lesson, experiment(decals=moved, camera=lesson.scene.camera))
 
-    assert verdict(1.5) == (False, "The distance is 1.5, and the radii together are 1.")
-    assert verdict(1.0)[0]
+    assert results(1.5).verdict == (False, "The distance is 1.5, and the radii together are 1.")
+    assert results(1.0).verdict[0]
+    texts = [re.findall(">([^<]+)</text>", plot["svg"]) for plot in results(1.0).plots]
+    assert not any(text.startswith("-0") for text in texts[0] + texts[1])  # neither -0 nor fields below 0
     for name in MEASURES:
         assert f"`{name}" in page, f"the docs do not name the measure {name}"
 
