@@ -23,6 +23,9 @@ QUALITY, COARSE_QUALITY = 92, 75
 MAX_PIXELS = 1 << 25
 """Pixels of a picture for a browser that watches, at most."""
 
+CAMERA_SECONDS = 1.0 / 30.0
+"""Time between two looks at a camera that may move."""
+
 PENDING_SECONDS = 0.01
 """Time between two looks at browsers that are not ready for another picture."""
 
@@ -59,6 +62,7 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
         self._sizes = sizes
         self._outdated = False
         self._task: asyncio.Task[None] | None = None
+        self._animation: asyncio.Task[None] | None = None
         self._delivery: Any = None
         self._camera_time = 0
         super().__init__(window.plotter, **options)
@@ -69,7 +73,21 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
         for part in protocol.getLinkProtocols():
             if isinstance(part, vtkWebPublishImageDelivery):
                 self._delivery = part
-                part.push_render = self._push
+                part.push_render, part.animate = self._push, self._animate
+
+    def _animate(self) -> None:
+        """Look for a moved camera while a button is down; trame would start one more loop with each press."""
+        loop = running_loop()
+        if loop is not None and self._animation is None:
+            self._animation = loop.create_task(self._follow_camera(), name="camera of the sandbox")
+
+    async def _follow_camera(self) -> None:
+        try:
+            while self._delivery.views_in_animations:
+                self._push("", animated=True)
+                await asyncio.sleep(CAMERA_SECONDS)
+        finally:
+            self._animation = None
 
     def _push(self, _view: str, animated: bool = False, _stale: int = 0) -> None:
         """Draw after input of the view; while a button is down, trame asks for frames all the time."""

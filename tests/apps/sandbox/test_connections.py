@@ -231,6 +231,11 @@ def test_malformed_messages_are_refused_without_an_exception(
             ("viewport.image.push.original.size", "-1", 1e9, 1e9),
         ):
             assert "refused" in (await browser.call(name, *values))["error"]
+        view = str(page.view._delivery.get_global_id(window.plotter.render_window))
+        for action in ("start", "stop", "start", "stop", "start", "start"):
+            await browser.call(f"viewport.image.animation.{action}", view)
+        names = [task.get_name() for task in asyncio.all_tasks()]
+        assert names.count("camera of the sandbox") == 1
         await browser.close()
         announced = (3_000_000_000).to_bytes(4, "little")  # the whole message, of which the rest never comes
         for data in (b"", b"x", bytes(12), b"x" * 40, bytes(8) + announced + b"x", "text"):
