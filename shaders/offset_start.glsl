@@ -3,7 +3,7 @@
 //@ include pixel.glsl
 //@ include offset_foot.glsl
 
-const int START_STEPS = 64;
+const int START_STEPS = 32;
 const float BEYOND = 1e30;  // no ray of the square meets the surface
 
 // color.x: the distance from the origins of rays

@@ -152,7 +152,7 @@ def displace(
     Raises
     ------
     InvalidScene
-        No decal has relief, or an option is out of range.
+        No decal has relief, an option is out of range, or the scene is posed.
     InvalidMesh
         A tree has no surface at this resolution, or edges so short need too many triangles.
     Cancelled
@@ -174,6 +174,10 @@ def displace(
     >>> float(studded.to_polydata().length) > 2 * 3**0.5
     True
     """
+    if isinstance(scene, PosedScene):
+        raise InvalidScene(
+            f"scene: expected a Scene at rest, got a {type(scene).__name__}; heights move surfaces at rest"
+        )
     known = as_scene(scene)
     modes = known.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping)
     if edge_length is not None:
