@@ -452,8 +452,8 @@ async def panels(picture: str | None = None) -> None:
             await shows(browser, plotter)
             image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
             image.resize((960, 600), Image.Resampling.LANCZOS).save(picture, quality=80, optimize=True)
-        await row("Scattering").click()
         await row("Drawing").click()
+        await browser.get_by_label("background top").wait_for()
         before = await shows(browser, plotter)
         await browser.get_by_label("background top").evaluate(
             "input => { input.value = '#204060'; input.dispatchEvent(new Event('change')); }"
