@@ -282,8 +282,7 @@ def covering_radii(
         farthest = np.zeros(len(decals))
         np.maximum.at(farthest, owners[owners >= 0], distances[owners >= 0])
         outer = distances > PEAK_FRACTION * np.minimum(farthest, limits)[owners]
-        may_nest = (centers.gaps < farthest)[owners]
-        samples = samples[np.flatnonzero((owners < 0) | outer | may_nest)]
+        samples = samples[np.flatnonzero((owners < 0) | outer)]
     sample_distance = np.sqrt(np.pi * len(decals) / max(len(distances), 1))
 
     first = centers.find(samples)
