@@ -52,14 +52,14 @@ class MeshDecals:
 
     def clip(self, decals: Decals) -> ClippedMesh:
         """Clip the mesh by the boxes of all decals: cubes with sides of twice the radius."""
-        decal, face = self._candidates(decals)
+        decal, face = self.candidates(decals)
         parts = [
             self._clipped(decals, decal[i : i + BATCH], face[i : i + BATCH])
             for i in range(0, max(1, len(decal)), BATCH)
         ]
         return _joined(parts)
 
-    def _candidates(self, decals: Decals) -> tuple[IndexArray, IndexArray]:
+    def candidates(self, decals: Decals) -> tuple[IndexArray, IndexArray]:
         """Return pairs of decal and triangle that may overlap."""
         reach = np.sqrt(3.0) * decals.radii.astype(np.float64) + self._reach
         faces = self._tree.query_ball_point(decals.positions, reach)
@@ -67,10 +67,7 @@ class MeshDecals:
         return np.repeat(np.arange(len(decals)), counts), np.concatenate(faces).astype(np.intp)
 
     def _clipped(self, decals: Decals, decal: IndexArray, face: IndexArray) -> ClippedMesh:
-        frames = np.stack([decals.tangents, decals.bitangents, decals.normals], axis=2).astype(np.float64)
-        radii = decals.radii.astype(np.float64)
-        offsets = self.corners[face] - decals.positions[decal][:, None]
-        local = np.matmul(offsets, frames[decal]) / radii[decal][:, None, None]  # the box is [-1, 1]³
+        local = box_coordinates(decals, decal, self.corners[face])
         low = np.minimum(np.minimum(local[:, 0], local[:, 1]), local[:, 2])
         high = np.maximum(np.maximum(local[:, 0], local[:, 1]), local[:, 2])
         outside = ((low > 1) | (high < -1)).any(axis=1)
@@ -81,9 +78,23 @@ class MeshDecals:
         points = np.concatenate([local[whole].reshape(-1, 3), points])
         origin = np.concatenate([np.repeat(decal[whole], 3), decal[cut][owner]])
         faces = np.concatenate([np.arange(3 * len(whole)).reshape(-1, 3), triangles + 3 * len(whole)])
-        world = np.einsum("nk,nik->ni", points * radii[origin][:, None], frames[origin])
+        radii = decals.radii.astype(np.float64)[origin, None]
+        world = np.einsum("nk,nik->ni", points * radii, _frames(decals)[origin])
         of_face = np.concatenate([decal[whole], decal[cut][owner[rows]]])
         return ClippedMesh(world + decals.positions[origin], 0.5 + 0.5 * points[:, :2], faces, of_face)
+
+
+def box_coordinates(decals: Decals, decal: NDArray[np.integer], points: Float64Array) -> Float64Array:
+    """Return points [n, k, 3] in the coordinates of decals int[n], whose boxes are [-1, 1]³."""
+    offsets = points - decals.positions[decal][:, None]
+    radii = decals.radii.astype(np.float64)[decal][:, None, None]
+    coordinates: Float64Array = np.matmul(offsets, _frames(decals)[decal]) / radii
+    return coordinates
+
+
+def _frames(decals: Decals) -> Float64Array:
+    """Return the axes of the boxes in columns: float64[n, 3, 3]."""
+    return np.stack([decals.tangents, decals.bitangents, decals.normals], axis=2).astype(np.float64)
 
 
 def _clip_by_box(triangles: Float64Array) -> tuple[Float64Array, IndexArray]:

@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -36,6 +37,9 @@ from decals.scenes.objects import MeshObject
 from decals.scenes.scene import DecalImage, Scene
 from tests.bench.clipped_decals import ClippedMesh, MeshDecals
 from tests.bench.exponential_maps import ExponentialMaps
+from tests.bench.paper_octree import crowded_decals
+from tests.bench.projected_boxes import RECORD_BYTES, fragments, marks
+from tests.bench.texture_sprites import Sprites, shown_by_all
 from tests.decals.field import log_maps as analytic
 from tests.decals.shapes import torus
 
@@ -45,6 +49,9 @@ LOG_MAPS = 20
 
 RADII = {"large": 0.5, "small": 0.1}
 """Radii of the decals on the torus (tube 0.4) and the ellipsoid (1, 0.7, 0.45)."""
+
+SPRITE_POINTS = 30_000
+"""Points of the surface at which sprites are looked up."""
 
 SIZE = (800, 600)
 RUNS = 3
@@ -292,6 +299,64 @@ def measure_clipped(item: MeshObject, decals: Decals) -> Row:
     )
 
 
+def measure_boxes(item: MeshObject, decals: Decals) -> Row:
+    """Measure projected boxes: one matrix for each decal; all other work is done per pixel."""
+    seconds, _ = timed(lambda: np.linalg.inv(_matrices(decals)))
+    found = marks(MeshDecals(item.vertices, item.faces), item.faces, decals)
+    camera = frame([item], parse_view(None, axes_of(item.name)), SIZE)
+    with Renderer() as renderer:
+        buffers = renderer.buffers(
+            Scene(objects=(item,), camera=camera), RenderOptions(size=(160, 120), samples=1)
+        )
+    visible = buffers.position[buffers.object_id >= 0].reshape(-1, 3).astype(np.float64)
+    drawn, used = fragments(decals, np.asarray(camera.position, np.float64), visible)
+    return Row(
+        "projected boxes",
+        "no contact; marks surface behind the visible one",
+        decal_ms=1e3 * seconds / len(decals),
+        megabytes=1e-6 * RECORD_BYTES * len(decals),
+        errors=errors_of(planar),
+        note=f"{found.backward:.1%} of the marked area faces away, {found.other:.1%} lies on another part; "
+        f"faded, {found.other_faded:.1%} on another part and {found.own_lost:.1%} of the own part lost; "
+        f"{drawn:.1f} boxes drawn at a pixel, of which {used:.1f} contain its point",
+    )
+
+
+def _matrices(decals: Decals) -> Float64Array:
+    """Return the matrices that take the box [-1, 1]³ to each decal: float64[n, 4, 4]."""
+    result = np.tile(np.eye(4), (len(decals), 1, 1))
+    axes = np.stack([decals.tangents, decals.bitangents, decals.normals], axis=2)
+    result[:, :3, :3] = axes * decals.radii[:, None, None]
+    result[:, :3, 3] = decals.positions
+    return result
+
+
+def measure_sprites(item: MeshObject, decals: Decals) -> Row:
+    """Measure texture sprites, of even decals and of crowded ones."""
+    seconds, sprites = timed(lambda: Sprites.of(decals))
+    points, normals = (array.astype(np.float64) for array in item.surface.sample(SPRITE_POINTS, 0))
+    crowd = Sprites.of(crowded_decals(item.surface, COUNT, np.random.default_rng(0)))
+    notes = []
+    for name, some in (("even", sprites), ("crowded", crowd)):
+        owner, reads = some.shown(points, normals)
+        expected, count = shown_by_all(some.decals, points, normals)
+        index = DecalIndex.of(some.decals)
+        notes.append(
+            f"{name}: {len(some.tree.children):,} voxels, {1e-6 * some.nbytes:.2g} MB, {reads:.1f} reads, "
+            f"{some.leaves:.0f} leaves for each sprite ({len(index.ids) / len(some.decals):.0f} cells of the "
+            f"index), {(owner != expected).mean():.2%} of the points wrong, {(count > 8).mean():.2%} under "
+            "more than eight sprites"
+        )
+    return Row(
+        "texture sprites",
+        "no contact; at most eight sprites in a leaf",
+        decal_ms=1e3 * seconds / len(decals),
+        megabytes=1e-6 * sprites.nbytes,
+        errors=errors_of(planar),
+        note="; ".join(notes),
+    )
+
+
 def measure_at_vertices(item: MeshObject, decals: Decals) -> Row:
     """Measure texture coordinates at the vertices, by the formulas of implicit decals."""
     index, normals = DecalIndex.of(decals), vertex_normals(item)
@@ -398,6 +463,7 @@ def frame_time(item: MeshObject, decals: Decals, clipped: ClippedMesh | None = N
         )
 
 
+@cache
 def errors_of(offsets: Callable[[SmoothMesh, int, Any, float], Any], decals: int = 6) -> Figures:
     """Return the RMS errors against the log map over the radius, on both surfaces and for both radii."""
     results: Figures = {}
@@ -429,6 +495,8 @@ def measure(*, quick: bool) -> tuple[str, list[Row]]:
     rows = [
         measure_implicit(item, decals),
         measure_clipped(item, decals),
+        measure_boxes(item, decals),
+        measure_sprites(item, decals),
         measure_at_vertices(item, decals),
         measure_exponential_maps(item, decals, 5 if quick else LOG_MAPS),
         measure_log_maps(item, decals, 5 if quick else LOG_MAPS),

@@ -14,7 +14,7 @@ oracles of the tests. Other parts:
     --only walk                      walked image mapping against exact log maps, and its cost
     --only octree                    the paper's octree beside the index
     --only methods                   ray tracer, coordinates at vertices, and fragment shader
-    --peers                          mesh-clipped decals, log maps, and texture coordinates at vertices
+    --peers                          mesh-clipped decals, projected boxes, sprites, and maps of the surface
 """
 
 import argparse

@@ -11,7 +11,9 @@ decals. The octree is built in NumPy, level by level, so its time to build is no
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +40,8 @@ CHUNK = 20_000
 Figures = dict[str, float]
 Float64Array = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
+Touches = Callable[[IndexArray, Float64Array, float], NDArray[np.bool_]]
+"""Test of bodies int64[n] against voxels with lowest corners float64[n, 3] and a side."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +72,20 @@ class Octree:
     depth: int
 
     @classmethod
-    def build(cls, centres: Float64Array, reach: Float64Array, *, depth: int = MAX_DEPTH) -> "Octree":
-        """Divide the bounding cube of balls, until each leaf touches at most eight of them."""
+    def build(
+        cls,
+        centres: Float64Array,
+        reach: Float64Array,
+        *,
+        depth: int = MAX_DEPTH,
+        touches: Touches | None = None,
+        last: bool = False,
+    ) -> "Octree":
+        """Divide the bounding cube of balls, until each leaf touches at most eight of them.
+
+        `touches` tests bodies inside the balls, in place of the balls.
+        With `last`, full leaves keep their last bodies, not the nearest ones.
+        """
         low = (centres - reach[:, None]).min(axis=0)
         size = float(((centres + reach[:, None]).max(axis=0) - low).max())
         corners, level = np.zeros((1, 3), np.int64), 0
@@ -87,7 +103,7 @@ class Octree:
             leaf, leaf_decal = voxel[in_leaf], decal[in_leaf]
             middle = low + (corners[leaf] + 0.5) * width
             distance = np.linalg.norm(centres[leaf_decal] - middle, axis=1) / reach[leaf_decal]
-            order = np.lexsort([distance, leaf])
+            order = np.lexsort([-leaf_decal if last else distance, leaf])
             leaf, leaf_decal = leaf[order], leaf_decal[order]
             place = np.arange(len(leaf)) - np.searchsorted(leaf, leaf)
             fits = place < LEAF_DECALS
@@ -103,10 +119,13 @@ class Octree:
             level += 1
             voxel = (8 * rank[voxel[~in_leaf], None] + np.arange(8)).reshape(-1)
             decal = np.repeat(decal[~in_leaf], 8)
-            nearest = np.clip(
-                centres[decal], *(low + (corners[voxel] + i) * (size / 2**level) for i in (0, 1))
-            )
-            touched = np.linalg.norm(nearest - centres[decal], axis=1) < reach[decal]
+            width = size / 2**level
+            corner = low + corners[voxel] * width
+            if touches is not None:
+                touched = touches(decal, corner, width)
+            else:
+                nearest = np.clip(centres[decal], corner, corner + width)
+                touched = np.linalg.norm(nearest - centres[decal], axis=1) < reach[decal]
             voxel, decal = voxel[touched], decal[touched]
 
     def find(self, points: Float64Array) -> tuple[IndexArray, IndexArray]:
@@ -190,6 +209,19 @@ def compare(decals: Decals, points: Float64Array, normals: Float64Array) -> Figu
     }
 
 
+def crowded_decals(surface: Any, count: int, rng: np.random.Generator) -> Decals:
+    """Return decals with random places and sizes, whose areas add up to `CROWD` times the surface."""
+    spread = np.exp(rng.normal(0.0, 0.5, count))
+    radii = spread * np.sqrt(CROWD * surface.area / (np.pi * (spread**2).sum()))
+    places, facings = surface.sample(count, 1)
+    return Decals(
+        positions=places,
+        normals=facings,
+        tangents=tangents(places, facings, None, 0),
+        radii=radii.astype(np.float32),
+    )
+
+
 def measure(*, quick: bool) -> Figures:
     """Compare both structures on the dragon, or a knot, with even and with crowded decals."""
     try:
@@ -203,15 +235,7 @@ def measure(*, quick: bool) -> Figures:
     figures: Figures = {}
     for count in (100, 1_000) if quick else (100, 1_000, 10_000):
         even = even_decals(surface, count=count)
-        spread = np.exp(rng.normal(0.0, 0.5, count))
-        radii = spread * np.sqrt(CROWD * surface.area / (np.pi * (spread**2).sum()))
-        places, facings = surface.sample(count, 1)
-        crowded = Decals(
-            positions=places,
-            normals=facings,
-            tangents=tangents(places, facings, None, 0),
-            radii=radii.astype(np.float32),
-        )
+        crowded = crowded_decals(surface, count, rng)
         for name, decals in (("even", even), ("crowded", crowded)):
             for key, value in compare(decals, points, normals).items():
                 figures[f"{name}_{count}_{key}"] = value

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from decals.model import Decals
-from tests.bench import decal_peers
+from tests.bench import decal_peers, projected_boxes
 from tests.bench.clipped_decals import MeshDecals
 from tests.bench.exponential_maps import ExponentialMaps
+from tests.bench.texture_sprites import Sprites, shown_by_all
+from tests.decals.field import log_maps
 from tests.decals.shapes import torus
 
 TORUS = decal_peers.torus_mesh(rows=120)
@@ -145,3 +147,77 @@ def test_exponential_maps_unroll_what_can_be_unrolled(radius: float, limit: floa
     coordinates = offsets @ np.stack([along, [0.0, 1.0, 0.0]], axis=1)
     assert len(reached) > 300
     assert np.linalg.norm(coordinates - (flat[reached] - flat[center]), axis=1).max() < limit
+
+
+def sheets(*offsets: tuple[float, float, bool]) -> tuple[Any, Any]:
+    """Return level squares of side 4 with 3,200 triangles each: their x, height, and whether they face up."""
+    n = 41
+    x, y = np.meshgrid(np.linspace(-2, 2, n), np.linspace(-2, 2, n), indexing="ij")
+    corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).reshape(-1)
+    quads = np.stack([corner, corner + n, corner + n + 1, corner + 1], -1)
+    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    vertices = [np.stack([x + shift, y, 0 * x + height], -1).reshape(-1, 3) for shift, height, _ in offsets]
+    parts = [(faces if up else faces[:, ::-1]) + number * n * n for number, (_, _, up) in enumerate(offsets)]
+    return np.concatenate(vertices).astype(np.float32), np.concatenate(parts).astype(np.int32)
+
+
+def test_boxes_mark_sheets_below_and_behind() -> None:
+    """Three sheets in the box, one of which faces away; a fourth lies below the box, the fifth beside it."""
+    vertices, faces = sheets((0, 0, True), (0, -0.5, False), (0, -0.9, True), (0, -1.2, True), (9, 0, True))
+    decals = Decals([[0, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], [1.0])
+    found = projected_boxes.marks(MeshDecals(vertices, faces), faces, decals)
+    assert found.backward == pytest.approx(1 / 3)
+    assert found.other == pytest.approx(2 / 3)
+    assert found.other_faded == pytest.approx(1 / 2)
+    assert found.own_lost == pytest.approx(0)
+    np.testing.assert_allclose(
+        projected_boxes.opacity(np.cos(np.radians([0, 60, 75, 100]))), [1, 1, 0.5176, 0], atol=1e-4
+    )
+
+
+def test_boxes_are_drawn_behind_the_surface() -> None:
+    """The eye is far above: the first box contains the point, the second lies in front, others behind it."""
+    decals = Decals(
+        [[0, 0, 0], [0, 0, 3], [0, 0, -3], [5, 0, 0]], [[0, 0, 1]] * 4, [[1, 0, 0]] * 4, [1.0] * 4
+    )
+    drawn, used = projected_boxes.fragments(decals, np.array([0, 0, 100.0]), np.array([[0.1, 0.2, 0]]))
+    assert (drawn, used) == (2, 1)
+
+
+def sprites_on_a_torus(count: int, radius: float) -> tuple[Decals, Any, Any]:
+    """Return decals and points on the torus of the tests, with the normals of the points."""
+    rng = np.random.default_rng(8)
+    points = log_maps.torus_points(rng, count + 3_000)
+    normals = log_maps.unit(log_maps.torus_gradient(points))
+    radii = rng.uniform(0.5, 1, count) * radius
+    decals = Decals(points[:count], normals[:count], rng.normal(size=(count, 3)), radii)
+    return decals, points[count:], normals[count:]
+
+
+@pytest.mark.parametrize(("radius", "full"), [(0.12, False), (0.6, True)])
+def test_sprites_show_the_last_of_all(radius: float, full: bool) -> None:
+    """Where leaves are full they keep those on top, and a few points may be wrong."""
+    count = 150
+    decals, points, normals = sprites_on_a_torus(count, radius)
+    frames = np.stack([decals.tangents, decals.bitangents, decals.normals], 1).astype(float)
+    local = np.einsum("nki,mni->mnk", frames, points[:, None] - decals.positions) / decals.radii[:, None]
+    inside = (np.abs(local) <= 1).all(axis=2) & (normals @ decals.normals.T > 0)
+    expected = np.where(inside, np.arange(count), -1).max(axis=1)
+    owner, number = shown_by_all(decals, points, normals)
+    np.testing.assert_array_equal(owner, expected)
+    np.testing.assert_array_equal(number, inside.sum(axis=1))
+    sprites = Sprites.of(decals)
+    drawn, _ = sprites.shown(points, normals)
+    assert (sprites.tree.dropped > 0) == full
+    assert (drawn != expected).mean() <= (0.01 if full else 0)
+    assert inside[np.flatnonzero(drawn >= 0), drawn[drawn >= 0]].all()
+
+
+def test_a_full_leaf_loses_a_sprite_below() -> None:
+    """Eight boxes end just beside the point, in its leaf; the ninth, which contains it, is dropped."""
+    x = np.array([0.0] + [1.02] * 8)
+    decals = Decals(np.column_stack([x, 0 * x, 0 * x]), [[0, 0, 1]] * 9, [[1, 0, 0]] * 9, [1.0] * 9)
+    point, up = np.array([[0.015, 0.1, 0.0]]), np.array([[0.0, 0.0, 1.0]])
+    assert shown_by_all(decals, point, up)[0].tolist() == [0]
+    assert Sprites.of(decals).shown(point, up)[0].tolist() == [-1]
+    assert Sprites.of(decals[:8]).shown(point, up)[0].tolist() == [0]
