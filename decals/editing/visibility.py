@@ -225,7 +225,8 @@ class RenameNode:
         item, objects = document.object(self.object), list(document.objects)
         if not isinstance(item, TreeObject):
             raise InvalidEdit(f"expected a BlobTree, object {item.name!r} is a mesh; rename the object")
-        names = _renamed(item.names, self.path, self.name)
+        node_at(item.tree, self.path)  # raises for what is no path of a node
+        names = _renamed(item.names, tuple(self.path), self.name)
         objects[self.object] = flagged(item, names=names)
         return Edit() if names == item.names else document.compute_parts(objects=tuple(objects))
 
@@ -265,8 +266,8 @@ class RenameLayer:
 
 def _renamed(names: dict[Any, str], key: Any, name: str) -> dict[Any, str]:
     """Return names with another one; without it if it is empty."""
-    key = tuple(key) if isinstance(key, list) else key
-    return {other: text for other, text in {**names, key: name}.items() if other != key or name != ""}
+    others = {other: text for other, text in names.items() if other != key}
+    return others if isinstance(name, str) and name == "" else {**others, key: name}
 
 
 def check_locks(document: Document, edit: Edit) -> None:

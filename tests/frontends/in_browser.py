@@ -456,7 +456,7 @@ async def panels(picture: str | None = None) -> None:
         await browser.get_by_label("background top").wait_for()
         before = await shows(browser, plotter)
         await browser.get_by_label("background top").evaluate(
-            "input => { input.value = '#204060'; input.dispatchEvent(new Event('change')); }"
+            "input => { input.value = '#ffe0c0'; input.dispatchEvent(new Event('change')); }"
         )
         await done("set background.top")
         assert np.abs(await shows(browser, plotter) - before).mean() > 5

@@ -262,6 +262,9 @@ def test_names_stay_with_their_nodes_and_layers_and_are_saved(tmp_path: Path) ->
     goes_back_and_forth(session)
     wrong: list[Any] = [
         RenameNode(0, (7,), "x"),
+        RenameNode(0, (7,), ""),
+        RenameNode(0, np.array([]), "x"),  # type: ignore[arg-type]
+        RenameNode(0, (), np.array([])),  # type: ignore[arg-type]
         RenameNode(1, (), "x"),
         RenameNode(0, (), 3),  # type: ignore[arg-type]
         RenameNode(0, (), "\ud800"),
