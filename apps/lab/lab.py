@@ -243,7 +243,7 @@ class Lab:
         except (IndexError, TypeError):
             self._show(f"slider: expected one of the lesson, got {number!r:.40}")
         except ImplicitDecalsError as error:
-            self._show(str(error))
+            self._window.actions.state.refuse(error)
         self._window.redraw(whole=bool(last))
 
     def _set(self, slider: Slider, raw: Any, last: bool) -> None:

@@ -130,9 +130,13 @@ def build_controls(source: str, event: Any, *, who: str = "c.name", key: str = "
 
 
 def _number_field(value: str, label: str, event: Any, sent: str, style: str = "", **options: Any) -> None:
-    """Build a field for a number, or for nothing."""
+    """Build a field for a number, or for nothing.
+
+    What was refused goes away: a refusal turns the value into another type, so that the field takes it anew.
+    """
+    number = f"typeof {value} === 'number' ? Number({value}.toPrecision(5)) : null"
     vuetify3.VTextField(
-        model_value=(f"typeof {value} === 'number' ? Number({value}.toPrecision(5)) : ''",),
+        model_value=(f"(n => refusals % 2 ? n : String(n ?? ''))({number})",),
         raw_attrs=named(label),
         style=style,
         change=(event, sent),
@@ -294,7 +298,7 @@ def build_view_menu(sandbox: Sandbox) -> None:
             build_controls("display.controls", sandbox.set_display)
             with html.Div(classes="d-flex flex-wrap ga-1 my-2"):
                 for text, action in {
-                    "Frame selection": "frame",
+                    "Frame selection, or all": "frame",
                     **{s: f"view_{s}" for s in SIDE_KEYS},
                 }.items():
                     perform = sandbox.perform, f"['{action}']"

@@ -147,6 +147,7 @@ class Sandbox:
         return {
             "title": window.actions.files.title,
             "status": self.status,
+            "refusals": state.refusals,
             "busy": window.busy,
             "outline": self._outline(),
             "selected": self._selected(),
@@ -726,7 +727,7 @@ class Sandbox:
         try:
             yield
         except ImplicitDecalsError as error:
-            self._window.actions.state.show(str(error))
+            self._window.actions.state.refuse(error)
         self._window.redraw(whole=whole)
 
 

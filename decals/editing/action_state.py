@@ -105,6 +105,8 @@ class ActionState:
         The surface point of the last click, if it met one.
     message
         Result of the last action, in plain words.
+    refusals
+        Number of inputs that were refused.
     prompt
         The open prompt, if any; it receives all keys.
     brush
@@ -123,7 +125,7 @@ class ActionState:
         self.primitive: tuple[int, Path] | None = None
         self.handle_offset: Float32Array = np.zeros(3, np.float32)
         self.picked: SurfacePick | None = None
-        self.message = ""
+        self.message, self.refusals = "", 0
         self.prompt = PromptLine(self.show)
         self.brush = BrushSettings()
         self.snap = 0.0
@@ -141,6 +143,11 @@ class ActionState:
     def show(self, message: str) -> None:
         """Set the message."""
         self.message = message
+
+    def refuse(self, error: Exception) -> None:
+        """Set the message to the reason why an input was refused."""
+        self.refusals += 1
+        self.show(str(error))
 
     # -- selection --------------------------------------------------------------------------------------
 

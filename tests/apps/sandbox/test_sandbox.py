@@ -352,6 +352,7 @@ def test_wrong_events_say_why_and_change_nothing(window: EditWindow) -> None:
     sandbox, before = Sandbox(window), digest(window.document)
     sandbox.set_value("radius", 0.5)
     assert "no node is selected" in sandbox.status
+    assert sandbox.values()["refusals"] == 1  # fields show their values again
     for key in ("0/7", "9", "x", "object x", None, 3, "image 0"):
         sandbox.select(key)  # type: ignore[arg-type]
         assert "expected" in sandbox.status
