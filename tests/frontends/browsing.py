@@ -18,6 +18,8 @@ PATIENCE = 120
 """Seconds: the first frame compiles shaders."""
 PICTURE = "canvas, img.image-display-area"
 """Where trame's views show what they get."""
+ABOVE = "svg, .brush { visibility: hidden !important }"
+"""Hides the orientation cube, handles and the circle of the brush."""
 LOSS = 2.0
 """Levels of 255 in the mean that JPEG may take away."""
 
@@ -61,8 +63,8 @@ async def served(server: Any, *, size: tuple[int, int] = SIZE) -> AsyncIterator[
 
 
 async def seen(page: Page) -> np.ndarray:
-    """The picture in the page's canvas, ``int[h, w, 3]``."""
-    data = await page.locator(PICTURE).first.screenshot()
+    """The picture in the page's canvas, ``int[h, w, 3]``, without what the page draws above it."""
+    data = await page.locator(PICTURE).first.screenshot(style=ABOVE)
     return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
 
 

@@ -6,6 +6,7 @@ their page of docs.
 
 import asyncio
 import io
+import re
 import sys
 import tempfile
 from functools import partial
@@ -153,6 +154,11 @@ async def sandbox(picture: str | None = None) -> None:
     sandbox_page = SandboxPage(server, window)
     state = digest(window.document)
     requests: list[str] = []
+
+    def normal() -> Any:
+        plane = sandbox_page.sandbox.display.options.slice
+        return plane and plane.normal
+
     async with served(server, size=(1280, 800)) as browser:
         browser.on("request", lambda request: requests.append(request.url))
         first = await shows(browser, plotter)
@@ -179,6 +185,24 @@ async def sandbox(picture: str | None = None) -> None:
         await browser.get_by_role("textbox", name="ring radius").fill("-1")
         await browser.get_by_role("textbox", name="ring radius").press("Enter")
         await until(lambda: "expected a number above 0" in sandbox_page.sandbox.status)
+        async with asyncio.timeout(PATIENCE):
+            while await browser.get_by_role("textbox", name="ring radius").input_value() != "0.6":
+                await asyncio.sleep(0.1)
+        await browser.locator(".cube polygon").filter(has_text=re.compile("^right view")).click()
+        await until(lambda: np.allclose(plotter.camera.direction, (-1, 0, 0), atol=1e-6))
+        await browser.get_by_role("button", name="View", exact=True).click()
+        await choose(browser, "slice axis", "y")
+        await browser.keyboard.press("Escape")
+        await until(lambda: normal() is not None)
+        before = normal()
+        handle = browser.locator("[data-handle='tilt slice']")
+        box = await handle.bounding_box()
+        assert box is not None
+        await browser.mouse.move(box["x"] + 8, box["y"] + 8)
+        await browser.mouse.down()
+        await browser.mouse.move(box["x"] + 40, box["y"] - 20)
+        await browser.mouse.up()
+        await until(lambda: not np.allclose(normal(), before))
         await browser.get_by_text("Start", exact=True).click()
         await until(lambda: digest(window.document) == state)
         await until(lambda: window.session.undone_labels == (*slid, "add a primitive", "set ring_radius"))
