@@ -21,6 +21,7 @@ import numpy as np
 
 from blobtree.nodes.parameters import parameters_of
 from decals.apps.lab.errors import InvalidLesson
+from decals.apps.sandbox.controls import exchanged, number_of
 from decals.editing.commands import MoveDecals, SetValues
 from decals.editing.document import Document
 from decals.editing.queries import nearest_points
@@ -28,7 +29,6 @@ from decals.editing.session import Command
 from decals.editing.tree_commands import SetParameter
 from decals.model import Decals, Interaction
 from decals.scenes.objects import SceneObject, TreeObject
-from decals.validation import describe
 
 AXES = "xyz"
 COLUMNS = {"radius": "radii", "opacity": "opacities", "layer": "layers", "interaction": "interactions"}
@@ -68,11 +68,11 @@ class DecalPath:
         """Return the command that sets a value."""
         chosen = [numbers[row] for row in self.rows(len(numbers))]
         if self.name not in AXES:
-            value = value if self.name == "interaction" else number_of(value)
+            value = value if self.name == "interaction" else number_of(self.name, value)
             value = round(value) if self.name == "layer" else value
             return SetValues(chosen, {COLUMNS[self.name]: value}, f"set {self.name}")
         place = document.decals.take(np.array(chosen[:1])).positions.astype(np.float64)
-        place[0, AXES.index(self.name)] = number_of(value)
+        place[0, AXES.index(self.name)] = number_of(self.name, value)
         point = nearest_points(document.objects, place)
         return MoveDecals(chosen[:1], point.positions[0], point.normals[0])
 
@@ -109,7 +109,7 @@ class NodePath:
     def command(self, document: Document, numbers: Sequence[int], value: Any) -> Command:
         """Return the command that sets a value."""
         self.read(document.objects, document.decals.decals)
-        value = exchanged(self._parameter(document.objects), self.index, number_of(value))
+        value = exchanged(self._parameter(document.objects), list(self.index), number_of(self.name, value))
         return SetParameter(self.object, self.path, self.name, value, quick=True)
 
 
@@ -132,25 +132,6 @@ def binding(path: str) -> DecalPath | NodePath:
         f"path: expected {', '.join(OWN)}, or one such as decals.0.radius or objects.0.1.center.0, "
         f"got {path!r}"
     )
-
-
-def number_of(raw: Any) -> float:
-    """Return what a slider sent as a finite number, or raise `InvalidLesson`."""
-    try:
-        number = float(raw)
-    except (TypeError, ValueError, OverflowError):
-        number = np.nan
-    if not np.isfinite(number):
-        raise InvalidLesson(f"expected a number, got {describe(raw)}")
-    return number
-
-
-def exchanged(value: Any, index: Sequence[int], new: Any) -> Any:
-    """Return nested tuples with one number exchanged."""
-    if not index:
-        return new
-    first, *rest = index
-    return (*value[:first], exchanged(value[first], rest, new), *value[first + 1 :])
 
 
 def _whole(text: str) -> tuple[int, ...]:

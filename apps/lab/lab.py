@@ -15,13 +15,13 @@ import numpy as np
 import pyvista as pv
 from markdown_it import MarkdownIt
 
-from decals.apps.lab.bindings import AXES, MODES, binding, exchanged, number_of
+from decals.apps.lab.bindings import AXES, MODES, binding
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Scope
 from decals.apps.lab.lesson import Lesson, Slider
 from decals.apps.lab.plots import described, drawn
 from decals.apps.lab.relaxing import Recording
-from decals.apps.sandbox.controls import STEPS, Control
+from decals.apps.sandbox.controls import STEPS, Control, exchanged, number_of
 from decals.apps.sandbox.decal_panel import set_drawing
 from decals.editing.commands import ReplaceScene, SetValues
 from decals.editing.queries import move_decals
@@ -249,17 +249,17 @@ class Lab:
     def _set(self, slider: Slider, raw: Any, last: bool) -> None:
         state, path = self._window.actions.state, slider.path
         if path.startswith("probe."):
-            x, y, z = exchanged(self._probe, [AXES.index(path[-1])], number_of(raw))
+            x, y, z = exchanged(self._probe, [AXES.index(path[-1])], number_of(path, raw))
             self._probe = x, y, z
             self._mark_probe()
         elif path in MODES:
             set_drawing(state, path, raw, last=last)
         elif path in ("step", "seed") and self._recording is not None:
             if path == "seed":
-                self._recording = self._recorded(round(max(number_of(raw), 0.0)))
+                self._recording = self._recorded(round(max(number_of(path, raw), 0.0)))
                 self._step = -1
             else:
-                self._target = round(min(max(number_of(raw), 0.0), self._recording.iterations))
+                self._target = round(min(max(number_of(path, raw), 0.0), self._recording.iterations))
         else:
             command = binding(path).command(self._window.document, self.numbers, raw)
             state.begin_series(("lab", path), command.label)

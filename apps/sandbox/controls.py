@@ -13,7 +13,7 @@ from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.nodes.parameters import UNITS, Parameter, Quantity, describe, parameters_of
 from blobtree.transpile.python import plain_python
 from decals.errors import InvalidEdit
-from decals.options import Option
+from decals.options import Option, options_of
 from decals.validation import describe as described
 from decals.validation import finite_number, one_of
 
@@ -133,6 +133,12 @@ def option_control(
         return asdict(Control(name, "field", value, doc, unit, optional=option.optional))
     step = 1.0 if option.kind is int else (high - low) / STEPS
     return asdict(Control(name, "number", value, doc, unit, low, high, step, optional=option.optional))
+
+
+def parsed_option(of: Any, name: Any, raw: Any) -> Any:
+    """Return what a page sent for an option of a function or a class, or raise `InvalidEdit`."""
+    options = options_of(of)
+    return options[one_of("option", name, options, InvalidEdit)].parsed(raw, InvalidEdit)
 
 
 def _ends(parameter: Parameter, value: float | None, size: float) -> tuple[float, float]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from decals.apps.sandbox.controls import STEPS, Control, number_of, option_control
+from decals.apps.sandbox.controls import STEPS, Control, number_of, option_control, parsed_option
 from decals.apps.sandbox.outline import picture
 from decals.editing.action_state import ActionState
 from decals.editing.brushes import Brush, BrushSettings, default_decal_radius, default_radius, positive_number
@@ -138,8 +138,7 @@ def brush_values(document: Document, brush: BrushSettings) -> dict[str, Any]:
 
 def set_brush(brush: BrushSettings, name: str, raw: Any) -> None:
     """Set the brush, or one of its numbers, to what a page sent."""
-    options = options_of(BrushSettings)
-    value = options[one_of("brush", name, options, InvalidEdit)].parsed(raw, InvalidEdit)
+    value = parsed_option(BrushSettings, name, raw)
     if name != "brush":
         positive_number(name, value)
     if name == "density" and value > 1.0:
@@ -158,9 +157,8 @@ def drawing_controls(drawing: Drawing) -> list[dict[str, Any]]:
 
 def set_drawing(state: ActionState, name: str, raw: Any, *, last: bool) -> None:
     """Set an option of how the scene is drawn; moves of a slider are one undo entry."""
-    values, options = values_of(Drawing, state.session.document.drawing), options_of(Drawing)
-    value = options[one_of("option", name, options, InvalidEdit)].parsed(raw, InvalidEdit)
-    state.draw_with(f"set {name}", last=last, **arguments_of(Drawing, values | {name: value}))
+    values = values_of(Drawing, state.session.document.drawing) | {name: parsed_option(Drawing, name, raw)}
+    state.draw_with(f"set {name}", last=last, **arguments_of(Drawing, values))
 
 
 def first_scatter_values() -> dict[str, Any]:
@@ -199,9 +197,8 @@ def _level(image: DecalImage, name: str) -> float | None:
 
 def set_image_value(state: ActionState, number: int, name: str, raw: Any, *, last: bool) -> None:
     """Set a number of an image, which becomes a material."""
-    image, options = state.session.document.images[number], options_of(DecalMaterial)
-    value = options[one_of("option", name, options, InvalidEdit)].parsed(raw, InvalidEdit)
+    image = state.session.document.images[number]
+    values: dict[str, Any] = {name: parsed_option(DecalMaterial, name, raw)}
     if not isinstance(image, DecalMaterial):
         image = DecalMaterial(image.source, image.pixels)
-    values: dict[str, Any] = {name: value}
     state.run_step(ReplaceImage(number, replace(image, **values), f"set {name}"), last=last)

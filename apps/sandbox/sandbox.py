@@ -24,7 +24,7 @@ from decals import cover
 from decals.apps.models.samples import SAMPLES, axes_of, sample
 from decals.apps.models.scenes import empty_scene, new_file
 from decals.apps.sandbox import catalog
-from decals.apps.sandbox.controls import controls_of, exchanged, parsed
+from decals.apps.sandbox.controls import controls_of, exchanged, parsed, parsed_option
 from decals.apps.sandbox.decal_panel import (
     brush_values,
     decal_controls,
@@ -50,7 +50,7 @@ from decals.editing.session import UndoEntry
 from decals.editing.tree_commands import RenameObject
 from decals.editing.visibility import RenameLayer, RenameNode
 from decals.errors import ImplicitDecalsError, InvalidEdit
-from decals.options import arguments_of, options_of
+from decals.options import arguments_of
 from decals.scattering.scatter import scatter
 from decals.scenes.camera import UPRIGHT, Camera
 from decals.scenes.files import is_scene_file, load_model
@@ -445,7 +445,7 @@ class Sandbox:
     def new_model(self) -> None:
         """Begin an empty scene."""
         with self._reported():
-            self._open(_given(empty_scene(FIRST_IMAGES, UPRIGHT["y"])), self._new_file("scene"))
+            self._open(_given(empty_scene(FIRST_IMAGES, UPRIGHT["y"])), new_file(self._folder, "scene"))
 
     def open_sample(self, name: str) -> None:
         """Open a sample with scattered decals."""
@@ -456,7 +456,7 @@ class Sandbox:
                 direction = axes_of(name).preset(THREE_QUARTER)
                 return cover(sample(name), images=FIRST_IMAGES, view_direction=direction, progress=progress)
 
-            self._open(load, self._new_file(f"{name}-decals"))
+            self._open(load, new_file(self._folder, f"{name}-decals"))
 
     def open_file(self, name: str) -> None:
         """Open a file of the folder: a scene, or a model, to which decals can be added."""
@@ -477,7 +477,7 @@ class Sandbox:
                 return found if isinstance(found, Scene) else _bare_scene(found)
 
             is_scene = path.suffix == ".json" and (not path.exists() or is_scene_file(path))
-            self._open(load, path if is_scene else self._new_file(f"{path.stem}-decals"))
+            self._open(load, path if is_scene else new_file(self._folder, f"{path.stem}-decals"))
 
     def upload(self, files: object, key: str = "") -> None:
         """Take files that were dropped on the page: images and models are added, a scene is opened.
@@ -489,7 +489,7 @@ class Sandbox:
                 found, window = read_upload(file), self._window
                 name = plain_name(str(file["name"]))  # type: ignore[index]  # read_upload has checked it
                 if isinstance(found, Scene):
-                    self._open(_given(found), self._new_file(name))
+                    self._open(_given(found), new_file(self._folder, name))
                 elif isinstance(found, DecalImage):
                     self._take_image(found, key)
                 else:
@@ -553,9 +553,6 @@ class Sandbox:
         Image.fromarray(pixels[..., :3]).save(path)
         self._window.actions.state.show(f"saved the picture to {path.name}")
 
-    def _new_file(self, name: str) -> Path:
-        return new_file(self._folder, name)
-
     def _open(self, load: Callable[[Progress, Cancel], Scene], path: Path) -> None:
         self.in_lesson, self._before_lesson = False, None
         self._window.actions.files.open(load, path)
@@ -611,8 +608,8 @@ class Sandbox:
     def set_scattering(self, name: str, raw: Any, _last: bool = True) -> None:
         """Set an option of the next scattering."""
         with self._reported():
-            option = options_of(scatter)[one_of("option", name, self._scattering, InvalidEdit)]
-            self._scattering |= {name: option.parsed(raw, InvalidEdit)}
+            one_of("option", name, self._scattering, InvalidEdit)
+            self._scattering |= {name: parsed_option(scatter, name, raw)}
 
     def set_drawing(self, name: str, raw: Any, last: bool = True) -> None:
         """Set how the scene is drawn: contact mode, mapping, background and more."""
