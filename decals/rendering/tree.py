@@ -133,7 +133,7 @@ class Kinds:
         )
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=32)
 def tracing_shader(kinds: Kinds, backend: PassBackend = PassBackend.FRAGMENT) -> Source:
     """``trace.frag`` or ``trace.comp`` with the cases of `kinds`."""
     slots = tracing_slots(kinds)
