@@ -5,6 +5,7 @@ shaders much faster. Software rasterisers run them as fast or several times slow
 both.
 """
 
+import math
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,9 +30,6 @@ COMPUTE_VERSION = 430
 
 GROUP = 8
 """Side of a compute shader's square group of pixels."""
-
-LIST_WIDTH = 256
-"""Texels in a row of a list of pixels."""
 
 LIST_UNIT = 15
 """Texture unit of the list, the last that every driver has."""
@@ -236,7 +234,7 @@ class ListedPass(PixelPass):
     @contextmanager
     def _draw_listed(self, texels: Int32Array) -> Iterator[moderngl.Framebuffer]:
         """Draw pixels, ``int32[n, 2]``, one after the other into new textures."""
-        size = LIST_WIDTH, -(-len(texels) // LIST_WIDTH)
+        size = list_size(len(texels))
         padding = np.repeat(texels[:1], size[0] * size[1] - len(texels), axis=0)
         listed = self._gl.texture(size, 2, np.concatenate([texels, padding]), dtype="i4")
         drawn = [self._gl.texture(size, 4, dtype=target.dtype) for target in self._targets[:-1]]
@@ -256,6 +254,12 @@ class ListedPass(PixelPass):
         super().release()
         self._triangle.release()
         self._marks.release()
+
+
+def list_size(count: int) -> tuple[int, int]:
+    """Return width and height of the smallest square of so many texels, without its last empty rows."""
+    width = math.isqrt(count - 1) + 1
+    return width, -(-count // width)
 
 
 def _read_raw(

@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 from blobtree.transpile.python import plain_python, vector
 from decals.field import elastic, pixel_filter
 from decals.rendering.options import RenderOptions
+from decals.rendering.pixel_pass import list_size
 from decals.rendering.renderer import Renderer
 from decals.rendering.uploads import filled_corners
+from decals.rendering.viewpoint import largest_tile
 from tests.blobtree.transpile.warp_functions import python_function
 from tests.decals.rendering.flat_views import FLAT, expected_picture, flat_view, peak_ratio, waves
 from tests.oracles.pixels import share_inside
@@ -114,6 +116,14 @@ def test_steps_of_elastic_contact_are_those_of_its_distance() -> None:
             along, rel=1e-2, abs=1e-3
         )
     assert pushing > 10
+
+
+def test_lists_of_pixels_are_no_larger_than_the_picture_that_they_are_of() -> None:
+    largest = largest_tile((20_000, 20_000), 2)
+    for count in (1, 2, 3, 16, 17, 4_200_000, largest[0] * largest[1]):
+        width, height = list_size(count)
+        assert width * height >= count > width * (height - 1)
+        assert max(width, height) <= max(largest)
 
 
 def test_images_do_not_show_what_lies_outside_their_disc() -> None:
