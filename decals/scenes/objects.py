@@ -287,7 +287,8 @@ def _flags(item: SceneObject) -> dict[str, Any]:
         if not known:
             example = "names by paths of its nodes, such as {(0, 1): 'head'}"
             expected = example if flag == "names" else "paths of its nodes, such as ((0, 1),)"
-            raise InvalidScene(f"object {item.name!r}, {flag}: expected {expected}, got {describe(given)}")
+            got = describe(list(given) if isinstance(given, Mapping) else given)
+            raise InvalidScene(f"object {item.name!r}, {flag}: expected {expected}, got {got}")
     return checked
 
 

@@ -277,3 +277,5 @@ def test_names_stay_with_their_nodes_and_layers_and_are_saved(tmp_path: Path) ->
     for names in ((), "ab", {(5,): "x"}, {0: "x"}, {(): ""}):
         with pytest.raises(InvalidScene, match="expected"):
             TreeObject("t", TREE, names=names or [(0,)])  # type: ignore[arg-type]
+    with pytest.raises(InvalidScene, match=r"got \[\(5,\)\]"):
+        TreeObject("t", TREE, names={(5,): "x"})
