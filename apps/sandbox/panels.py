@@ -90,15 +90,14 @@ def build_controls(source: str, event: Any, *, who: str = "c.name", key: str = "
             _number_field("c.value", WORDS, event, f"[{who}, $event.target.value, true]", "max-width: 84px")
         with html.Div(v_if="c.kind === 'vector'", classes="d-flex ga-1"):
             sent = f"[{who}, $event.target.value, true, [i]]"
-            _number_field(
-                "number", "`${c.name} ${i + 1}`", event, sent, v_for="(number, i) in c.value", key="i"
-            )
+            label = f"`${{{WORDS}}} ${{i + 1}}`"
+            _number_field("number", label, event, sent, v_for="(number, i) in c.value", key="i")
         with (
             html.Div(v_if="c.kind === 'list'"),
             html.Div(v_for="(row, i) in c.value", key="i", classes="d-flex ga-1 mb-1"),
         ):
             sent = f"[{who}, $event.target.value, true, Array.isArray(row) ? [i, j] : [i]]"
-            label = "`${c.name} ${i + 1} ${j + 1}`"
+            label = f"`${{{WORDS}}} ${{i + 1}} ${{j + 1}}`"
             _number_field("number", label, event, sent, v_for="(number, j) in [].concat(row)", key="j")
         html.Input(
             v_if="c.kind === 'color'",

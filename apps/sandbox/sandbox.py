@@ -610,6 +610,7 @@ class Sandbox:
         with self._reported():
             one_of("option", name, self._scattering, InvalidEdit)
             self._scattering |= {name: parsed_option(scatter, name, raw)}
+            self._window.actions.state.show(f"set {name}")
 
     def set_drawing(self, name: str, raw: Any, last: bool = True) -> None:
         """Set how the scene is drawn: contact mode, mapping, background and more."""

@@ -357,6 +357,7 @@ def test_scattering_takes_the_options_of_its_panel(sandbox: Sandbox, shared: Edi
     values = {"count": "30", "regularity": 0.2, "sizing": "touching", "jitter.size": 0.3, "direction": "none"}
     for name, value in values.items():
         sandbox.set_scattering(name, value)
+        assert sandbox.status == f"set {name}"
     shown = {control["name"]: control["value"] for control in sandbox.values()["scattering"]}
     assert shown["sizing"] == "touching"
     for wrong in (("count", "x"), ("images", 3), ("sizing", "x"), (None, 1)):
