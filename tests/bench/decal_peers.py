@@ -40,6 +40,7 @@ from tests.bench.exponential_maps import ExponentialMaps
 from tests.bench.paper_octree import crowded_decals
 from tests.bench.projected_boxes import RECORD_BYTES, fragments, marks
 from tests.bench.texture_sprites import Sprites, shown_by_all
+from tests.bench.tile_trees import TileTree
 from tests.decals.field import log_maps as analytic
 from tests.decals.shapes import torus
 
@@ -52,6 +53,12 @@ RADII = {"large": 0.5, "small": 0.1}
 
 SPRITE_POINTS = 30_000
 """Points of the surface at which sprites are looked up."""
+
+TILE_POINTS = 400_000
+"""Samples of the surface of which a tile tree is made."""
+
+IMAGE_SIDE = 256
+"""Texels across a decal, in tile trees."""
 
 SIZE = (800, 600)
 RUNS = 3
@@ -357,6 +364,30 @@ def measure_sprites(item: MeshObject, decals: Decals) -> Row:
     )
 
 
+def measure_tiles(item: MeshObject, decals: Decals) -> Row:
+    """Measure a tile tree with as many texels across a decal as its image has.
+
+    Of trees of different least depths, the one with the fewest texels is taken.
+    """
+    points, normals = (array.astype(np.float64) for array in item.surface.sample(TILE_POINTS, 0))
+    density = IMAGE_SIDE / (2 * float(np.median(decals.radii)))
+    trees = (TileTree.of(points, normals, least=least) for least in range(4, 8))
+    tree = min(trees, key=lambda tree: tree.texels(density))
+    area = float(item.surface.area)
+    texels = tree.texels(density)
+    return Row(
+        "tile trees",
+        "a texture, into which decals are painted: one colour at each texel",
+        setup_s=float("nan"),
+        decal_ms=float("nan"),
+        megabytes=1e-6 * (4 * texels + 32 * tree.voxels),
+        note=f"{tree.voxels:,} voxels, {len(tree.width):,} tiles, {tree.reads:.1f} reads; "
+        f"{texels:.3g} texels, {texels / (area * density**2):.2f} times those of the area, "
+        f"of which the surface covers {area * density**2 * tree.cosine.mean() / texels:.0%}; "
+        f"stretch {(1 / tree.cosine).mean():.2f} on average, {(1 / tree.cosine).max():.2f} at most",
+    )
+
+
 def measure_at_vertices(item: MeshObject, decals: Decals) -> Row:
     """Measure texture coordinates at the vertices, by the formulas of implicit decals."""
     index, normals = DecalIndex.of(decals), vertex_normals(item)
@@ -497,6 +528,7 @@ def measure(*, quick: bool) -> tuple[str, list[Row]]:
         measure_clipped(item, decals),
         measure_boxes(item, decals),
         measure_sprites(item, decals),
+        measure_tiles(item, decals),
         measure_at_vertices(item, decals),
         measure_exponential_maps(item, decals, 5 if quick else LOG_MAPS),
         measure_log_maps(item, decals, 5 if quick else LOG_MAPS),
@@ -515,7 +547,8 @@ def table(subject: str, rows: list[Row]) -> str:
     for row in rows:
         total = row.setup_s + 1e-3 * COUNT * row.decal_ms
         frame = f"{row.frame_ms:.0f}" if np.isfinite(row.frame_ms) else ""
-        cells = [f"{row.setup_s:.3g}", f"{row.decal_ms:.3g}", f"{total:.3g}", f"{row.megabytes:.3g}", frame]
+        costs = (row.setup_s, row.decal_ms, total, row.megabytes)
+        cells = [*(f"{cost:.3g}" if np.isfinite(cost) else "" for cost in costs), frame]
         cells += [f"{value:.2%}" for value in row.errors.values()]
         lines.append(f"| {row.title} | {' | '.join(cells)} |")
     lines += ["", *(f"{row.title}: {'; '.join(filter(None, [row.note, row.limits]))}" for row in rows[1:])]

@@ -10,6 +10,7 @@ from tests.bench import decal_peers, projected_boxes
 from tests.bench.clipped_decals import MeshDecals
 from tests.bench.exponential_maps import ExponentialMaps
 from tests.bench.texture_sprites import Sprites, shown_by_all
+from tests.bench.tile_trees import TileTree
 from tests.decals.field import log_maps
 from tests.decals.shapes import torus
 
@@ -221,3 +222,30 @@ def test_a_full_leaf_loses_a_sprite_below() -> None:
     assert shown_by_all(decals, point, up)[0].tolist() == [0]
     assert Sprites.of(decals).shown(point, up)[0].tolist() == [-1]
     assert Sprites.of(decals[:8]).shown(point, up)[0].tolist() == [0]
+
+
+def test_a_ball_needs_six_tiles() -> None:
+    rng = np.random.default_rng(3)
+    normals = log_maps.unit(rng.normal(size=(20_000, 3)))
+    tree = TileTree.of(2 * normals, normals)
+    assert (tree.voxels, len(tree.width), tree.reads) == (1, 6, 1)
+    assert tree.cosine.min() == pytest.approx(3**-0.5, abs=0.02)
+    assert tree.texels(25.0) == pytest.approx(6 * 101**2, rel=0.02)
+
+
+def test_tiles_show_one_sheet_each() -> None:
+    """Samples of a torus in the same texel are neighbours, and two level sheets are told apart."""
+    points = log_maps.torus_points(np.random.default_rng(4), 30_000)
+    tree = TileTree.of(points, log_maps.unit(log_maps.torus_gradient(points)))
+    texel = (tree.place * tree.width[tree.tile, None] / 0.05).astype(int)
+    order = np.lexsort([texel[:, 1], texel[:, 0], tree.tile])
+    same = (np.diff(np.column_stack([tree.tile, texel])[order], axis=0) == 0).all(axis=1)
+    gaps = np.linalg.norm(np.diff(points[order], axis=0), axis=1)[same]
+    assert same.sum() > 12_000
+    assert gaps.max() < 0.05 * 6**0.5
+    x, y = np.random.default_rng(5).uniform(0, 1, (2, 20_000))
+    level = np.column_stack([x, y, np.where(np.arange(len(x)) % 2, 0.2, 0.8)])
+    pair = TileTree.of(level, np.tile([0, 0, 1.0], (len(x), 1)))
+    assert (pair.voxels, len(pair.width)) == (9, 8)
+    deeper = TileTree.of(level, np.tile([0, 0, 1.0], (len(x), 1)), least=2)
+    assert (deeper.voxels, len(deeper.width)) == (1 + 8 + 8 * 8, 32)
