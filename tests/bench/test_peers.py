@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from decals.model import Decals
-from tests.bench import decal_peers, projected_boxes
+from tests.bench import decal_peers, peer_pictures, projected_boxes
 from tests.bench.clipped_decals import MeshDecals
 from tests.bench.exponential_maps import ExponentialMaps
 from tests.bench.texture_sprites import Sprites, shown_by_all
@@ -249,3 +249,13 @@ def test_tiles_show_one_sheet_each() -> None:
     assert (pair.voxels, len(pair.width)) == (9, 8)
     deeper = TileTree.of(level, np.tile([0, 0, 1.0], (len(x), 1)), least=2)
     assert (deeper.voxels, len(deeper.width)) == (1 + 8 + 8 * 8, 32)
+
+
+def test_picture_shows_what_the_methods_mark() -> None:
+    """Boxes mark most, sprites what faces them, fading least; maps are next to implicit decals."""
+    row = np.asarray(peer_pictures.draw(side=60, rows=120), float)
+    panels = [row[:, 64 * number : 64 * number + 60] for number in range(5)]
+    _, box, faded, sprite, implicit = panels
+    assert 0.0 < (box != sprite).any(axis=2).mean() < (box != faded).any(axis=2).mean() < 0.2
+    away = [np.abs(panel - implicit).mean() for panel in panels]
+    assert away[0] < 0.5 * min(away[1:4])
