@@ -161,10 +161,15 @@ def set_drawing(state: ActionState, name: str, raw: Any, *, last: bool) -> None:
     state.draw_with(f"set {name}", last=last, **arguments_of(Drawing, values))
 
 
-def first_scatter_values() -> dict[str, Any]:
-    """Return the options of `decals.scatter` at the beginning."""
+FIRST_COUNT = 100
+"""Decals that are scattered over a scene without any."""
+
+
+def first_scatter_values(count: int) -> dict[str, Any]:
+    """Return the options of `decals.scatter` at the beginning, for a scene with a number of decals."""
     options = options_of(scatter).values()
-    return {o.name: o.default for o in options if o.name not in NOT_OF_SCATTER} | {"count": 100}
+    first = {o.name: o.default for o in options if o.name not in NOT_OF_SCATTER}
+    return first | {"count": count or FIRST_COUNT}
 
 
 def scatter_controls(values: dict[str, Any]) -> list[dict[str, Any]]:

@@ -132,7 +132,7 @@ class Sandbox:
         self._rows: list[dict[str, Any]] = []
         self._marked: list[str] = []
         self._image: int | None = None
-        self._scattering = first_scatter_values()
+        self._scattering: dict[str, Any] = {}
         self._background = window.document.drawing.background
         self._outlined: tuple[Any, ...] = (None,) * 5
         self._measured: tuple[object, float] = None, 1.0
@@ -165,7 +165,7 @@ class Sandbox:
             },
             "brush": brush_values(window.document, state.brush),
             "drawing": drawing_controls(window.document.drawing),
-            "scattering": scatter_controls(self._scattering),
+            "scattering": scatter_controls(self._scatter_values()),
             "image": image_values(window.document, self._shown_image),
             "pick": self._pick(),
             "decals": len(window.document.decals),
@@ -599,17 +599,21 @@ class Sandbox:
     def scatter(self) -> None:
         """Cover the object of the selected node, or every object, with decals; each time another seed."""
         with self._reported():
-            state, values = self._window.actions.state, self._scattering
+            state, values = self._window.actions.state, self._scatter_values()
             objects = range(len(self._window.document.objects))
             numbers = tuple(objects) if state.primitive is None else (state.primitive[0],)
             self._window.actions.decals.scatter_over(numbers, **arguments_of(scatter, values))
-            self._scattering = values | {"seed": values["seed"] + 1}
+            self._scattering["seed"] = values["seed"] + 1
+
+    def _scatter_values(self) -> dict[str, Any]:
+        """Return the options of the next scattering: those that were set, else the first ones."""
+        return first_scatter_values(len(self._window.document.decals)) | self._scattering
 
     def set_scattering(self, name: str, raw: Any, _last: bool = True) -> None:
         """Set an option of the next scattering."""
         with self._reported():
-            one_of("option", name, self._scattering, InvalidEdit)
-            self._scattering |= {name: parsed_option(scatter, name, raw)}
+            one_of("option", name, self._scatter_values(), InvalidEdit)
+            self._scattering[name] = parsed_option(scatter, name, raw)
             self._window.actions.state.show(f"set {name}")
 
     def set_drawing(self, name: str, raw: Any, last: bool = True) -> None:

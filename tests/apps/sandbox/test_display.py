@@ -354,6 +354,8 @@ def test_brush_and_drawing_are_set(sandbox: Sandbox, shared: EditWindow) -> None
 
 
 def test_scattering_takes_the_options_of_its_panel(sandbox: Sandbox, shared: EditWindow) -> None:
+    first = {control["name"]: control["value"] for control in sandbox.values()["scattering"]}
+    assert first["count"] == len(shared.document.decals) > 0
     values = {"count": "30", "regularity": 0.2, "sizing": "touching", "jitter.size": 0.3, "direction": "none"}
     for name, value in values.items():
         sandbox.set_scattering(name, value)

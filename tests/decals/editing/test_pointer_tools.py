@@ -379,7 +379,7 @@ def test_a_scene_without_a_file_asks_for_its_name(user: UserInput, tmp_path: Pat
 
 
 def test_what_means_nothing_here_is_left_to_others(user: UserInput) -> None:
-    for name in ("w", "F5", "r"):
+    for name in ("F5", "F6", "r"):
         assert not user.key(name)
     assert not user.tools.move(5, 5)
     assert not user.tools.release(5, 5)
