@@ -7,9 +7,8 @@ uniform vec2 relief_range;             // lowest and highest point of the relief
 uniform float relief_step;             // greatest step along the surface
 uniform vec4 relief_light;             // w = 0: the studio's key; 1: toward light at infinity; 2: where a light is
 
-const int RELIEF_STEPS = 40;      // to the relief, at most
+const int RELIEF_STEPS = 40;      // to the relief, or toward the light, at most
 const int RELIEF_HALVINGS = 8;    // of the last step
-const int SHADOW_STEPS = 16;      // toward the light, at most
 const float SHADOW_EDGE = 0.06;   // of the range: depth below the relief at which a shadow is full
 const float LEAST_SLOPE = 0.08;   // least cosine between the normal and the ray, or the light
 
@@ -112,7 +111,7 @@ float relief_light_at(vec3 q, float z, vec3 n) {
     vec3 slant = relief_slant(toward, n);
     float range = relief_range.y - relief_range.x;
     float hidden = 0.0;
-    float steps = clamp(ceil(length(slant) * (relief_range.y - z) / relief_step), 1.0, float(SHADOW_STEPS));
+    float steps = clamp(ceil(length(slant) * (relief_range.y - z) / relief_step), 1.0, float(RELIEF_STEPS));
     for (int i = 1; i < int(steps); i++) {
         float rise = (relief_range.y - z) * float(i) / steps;
         if (hidden >= min(relief_range.y - z - rise, SHADOW_EDGE * range)) {
