@@ -82,6 +82,9 @@ SEARCHES = ((0.5, 0.9, 1), (0.3, 0.93, 1), (0.15, 0.96, 2), (0.08, 0.97, 2), (0.
 points around which they lie from their owners, in the owners' radii, and number of random points around each.
 Another point lies a spread farther out. The last round is repeated."""
 
+LEAST_BEND = 0.05
+"""Least sine between the normals of two faces whose edge is searched along."""
+
 ON_PLANE = 0.01
 """Largest distance of a projected point from the plane of a face, in spreads, at which it lies there."""
 
@@ -640,7 +643,8 @@ class _Growth:
         """Grow radii until searches around points find no bare one; return the searched points.
 
         Points whose nearest decals have not grown for `CLEAN_SEARCHES` of the last rounds are not searched
-        again.
+        again. Around doubtful points, rounds search along edges, every other with the first spread: where a
+        decal faces one face of a mesh and not the next, its farthest point is a corner of that face.
         """
         finest = len(SEARCHES) - 1
         changed = np.full(len(radii), finest)  # first round after each decal's last growth
@@ -660,7 +664,12 @@ class _Growth:
                 _random_points_around(owned.points, count, reach, self.rng),
                 _power_corners(owned, radii),
             ]
-            found = owned.centers.find(_projected(trials, reach, self.project))
+            doubtful = owned[np.flatnonzero(owned.doubts < DOUBTFUL)]
+            step = SEARCHES[0][0] * self.sample_distance if turn % 2 else reach
+            edges = _along_edges(_outward(doubtful, radii, step), step, self.project)
+            found = owned.centers.find(
+                OrientedPoints.joined([_projected(trials, reach, self.project), edges])
+            )
             owned = owned.joined(found.with_shading(self.shade, radii))
             before = radii.copy()
             self._cover(radii, owned)
@@ -733,6 +742,27 @@ def _projected(trials: list[OrientedPoints], height: float, project: Project) ->
     risen = np.einsum("ni,ni->n", points.positions - joined.positions[rows], normals) + height
     on_plane = (rows < lifted) & (np.abs(risen) < ON_PLANE * height)
     return replace(points, normals=np.where(on_plane[:, None], normals, points.normals))
+
+
+def _along_edges(trials: OrientedPoints, height: float, project: Project) -> OrientedPoints:
+    """Return the points of faces' edges that are nearest to trials, with the normals of the faces.
+
+    The trials lie at a height over faces. The planes of such a face and of the one that a trial falls onto
+    meet at the edge, if the faces do.
+    """
+    points, rows = project(trials)
+    own, others = trials.normals[rows].astype(np.float64), points.normals.astype(np.float64)
+    feet = trials.positions[rows] - height * own
+    across = others - np.einsum("ni,ni->n", others, own)[:, None] * own
+    squared = np.einsum("ni,ni->n", across, across)
+    beyond = np.einsum("ni,ni->n", feet - points.positions, others)
+    bent = np.flatnonzero((squared > LEAST_BEND**2) & (beyond**2 < squared * (2.0 * height) ** 2))
+    meets = feet[bent] - (beyond[bent] / squared[bent])[:, None] * across[bent]
+    rows = rows[bent]
+    edges = OrientedPoints(meets.astype(np.float32), trials.normals[rows], trials.surface_ids[rows])
+    points, rows = project(edges)
+    moved = np.linalg.norm(points.positions - edges.positions[rows], axis=1)
+    return edges[rows[moved < ON_PLANE * height]]
 
 
 def _power_corners(owned: _OwnedPoints, radii: Float64Array) -> OrientedPoints:
