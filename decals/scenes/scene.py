@@ -128,6 +128,10 @@ def as_layer_names(names: Any) -> dict[int, str]:
     return {layer: checked_name(f"a name of layer {layer}", names[layer]) for layer in layers}
 
 
+SHOWN_NAMES = 3
+"""Objects that the text of a scene names."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scene:
     """Everything that a picture shows.
@@ -181,7 +185,7 @@ class Scene:
     decals: Decals = field(default_factory=Decals.empty)
     images: tuple[DecalImage, ...] = ()
     drawing: rendering.Drawing = field(default_factory=lambda: rendering.Drawing())
-    recipe: Recipe | None = field(default=None, repr=False)
+    recipe: Recipe | None = None
     hidden_decals: Decals = field(default_factory=Decals.empty)
     locked_layers: tuple[int, ...] = ()
     layer_names: dict[int, str] = field(default_factory=dict)
@@ -235,6 +239,14 @@ class Scene:
             )
         for shown_or_hidden in (self.decals, self.hidden_decals):
             check_receivers(shown_or_hidden.receivers, self.objects, InvalidScene)
+
+    def __repr__(self) -> str:
+        """Return the names of the first objects, the decals, and the number of images."""
+        names = [repr(item.name) for item in self.objects[:SHOWN_NAMES]]
+        if len(self.objects) > SHOWN_NAMES:
+            names.append(f"… {len(self.objects) - SHOWN_NAMES} more")
+        objects = ", ".join(names)
+        return f"Scene(objects=[{objects}], decals={self.decals!r}, images={len(self.images)})"
 
     @property
     def origin(self) -> Origin:

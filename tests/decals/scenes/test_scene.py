@@ -335,6 +335,14 @@ def test_missing_scene(tmp_path: Path) -> None:
         load_scene(tmp_path / "nowhere.json")
 
 
+@pytest.mark.parametrize(
+    ("count", "objects"), [(0, "[]"), (1, "['model 1']"), (5, "['model 1', 'model 2', 'model 3', … 2 more]")]
+)
+def test_the_text_of_a_scene_is_short(count: int, objects: str) -> None:
+    scene = Scene(objects=count * [Point((0, 0, 0), radius=1)], camera=Camera((0, 0, 5)))
+    assert repr(scene) == f"Scene(objects={objects}, decals=Decals(0), images=0)"
+
+
 def test_scene_refuses_decals_without_their_image() -> None:
     with pytest.raises(InvalidScene, match="has 1 images"):
         _scene().replace(images=[DecalImage.load("scale")])
