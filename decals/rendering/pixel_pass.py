@@ -244,10 +244,12 @@ class ListedPass(PixelPass):
         framebuffer.use()
         self._gl.enable_only(moderngl.NOTHING)
         self._triangle.render(vertices=3)
-        yield framebuffer
-        framebuffer.release()
-        for texture in (listed, *drawn):
-            texture.release()
+        try:
+            yield framebuffer
+        finally:
+            framebuffer.release()
+            for texture in (listed, *drawn):
+                texture.release()
 
     def release(self) -> None:
         """Release the memory, except targets and programs."""

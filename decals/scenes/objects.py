@@ -128,7 +128,7 @@ class MeshObject(Immutable):
             "source": _source(self.name, self.source),
             "crease_angle": as_crease_angle(self.crease_angle),
             "origin": origin,
-            **_flags(self),
+            **_by_paths(self),
             **_labels(self),
             "surface": surface,
             "vertices": surface.vertices,
@@ -220,7 +220,7 @@ class TreeObject(Immutable):
         else:
             origin = as_origin(self.origin)
         object.__setattr__(self, "origin", origin)
-        for key, value in (_flags(self) | _labels(self)).items():
+        for key, value in (_by_paths(self) | _labels(self)).items():
             object.__setattr__(self, key, value)
 
     @property
@@ -268,11 +268,11 @@ def _labels(item: SceneObject) -> dict[str, Any]:
     }
 
 
-def _flags(item: SceneObject) -> dict[str, Any]:
-    """Return the checked paths of hidden, locked and named nodes, in order; a mesh has its root alone."""
+def _by_paths(item: SceneObject) -> dict[str, Any]:
+    """Return what an object says of nodes by their paths: checked, in order; a mesh has its root alone."""
     tree = item.tree if isinstance(item, TreeObject) else None
     checked: dict[str, Any] = {}
-    for flag in ("hidden", "locked", "names")[: 2 if tree is None else 3]:
+    for flag in ("hidden", "locked") if tree is None else ("hidden", "locked", "names"):
         given = getattr(item, flag)
         try:
             by_path = {tuple(map(operator.index, path)): path for path in given}
@@ -301,7 +301,7 @@ def flagged(item: SceneObject, **changed: Any) -> SceneObject:
     vars(twin).update(vars(item))
     vars(twin).pop("_shown_part", None)
     vars(twin).update(changed)
-    vars(twin).update(name=checked_name("an object's name", twin.name), **_flags(twin))
+    vars(twin).update(name=checked_name("an object's name", twin.name), **_by_paths(twin))
     return twin
 
 
