@@ -196,8 +196,10 @@ async def sandbox(picture: str | None = None) -> None:
         await until(lambda: normal() is not None)
         before = normal()
         handle = browser.locator("[data-handle='tilt slice']")
-        box = await handle.bounding_box()
-        assert box is not None
+        box = None
+        while box is None or box != await handle.bounding_box():  # it follows the camera
+            box = await handle.bounding_box()
+            await asyncio.sleep(0.5)
         await browser.mouse.move(box["x"] + 8, box["y"] + 8)
         await browser.mouse.down()
         await browser.mouse.move(box["x"] + 40, box["y"] - 20)
