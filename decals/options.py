@@ -1,8 +1,8 @@
 """Options that functions and classes declare, as a form shows them: kind, usual range, unit and text.
 
-A parameter is an option if its annotation is a number, a truth value, a colour or an enumeration, or if it
-says so with `Values`. One of a class with options, such as a background, stands for its options. The text is
-that of the docstring.
+A parameter is an option if its annotation is a number, a truth value, a colour or an enumeration, or contains
+`Values`. A parameter whose type is a class with options, such as a background, is replaced by those options.
+The text is that of the docstring.
 """
 
 import inspect

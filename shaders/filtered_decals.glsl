@@ -407,7 +407,8 @@ vec4 exact_color(vec3 q, vec3 n, vec3 right, vec3 up) {
 // with long sides.
 bool pixel_divided = false;
 
-// Premultiplied linear colour of a pixel inside of one decal, or of none. One traversal keeps all candidates.
+// Premultiplied linear colour of a pixel that lies inside one decal or on bare surface. One traversal keeps all
+// candidates.
 vec4 inner_color(vec3 q, vec3 n, vec3 right, vec3 up) {
     const int KEPT = 8;
     int owner = -1, count = 0;

@@ -178,7 +178,7 @@ def scatter_controls(values: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def image_values(document: Document, number: int | None) -> dict[str, Any]:
-    """Return name, picture and controls of an image; without a number, of none."""
+    """Return name, picture and controls of an image; they are empty if there is no number."""
     if number is None or number >= len(document.images):
         return {"name": "", "picture": "", "controls": []}
     image = document.images[number]

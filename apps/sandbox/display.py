@@ -33,7 +33,7 @@ CHOICES = {"mode": MODES, "overlay": OVERLAYS, "slice_axis": SLICES, "up": tuple
 CHOICE_DOCS = {
     "mode": "how surfaces are drawn",
     "overlay": "what is measured on them",
-    "slice_axis": "cut the model open across this axis",
+    "slice_axis": "cut the model open across this axis, or along a tilted plane",
     "up": "axis that points upward in the model",
 }
 POSITION_DOC = "distance of the slice from the origin of the model"

@@ -225,7 +225,7 @@ class RenameNode:
         item, objects = document.object(self.object), list(document.objects)
         if not isinstance(item, TreeObject):
             raise InvalidEdit(f"expected a BlobTree, object {item.name!r} is a mesh; rename the object")
-        node_at(item.tree, self.path)  # raises for what is no path of a node
+        node_at(item.tree, self.path)  # raises InvalidNode if the path leads to no node
         names = _renamed(item.names, tuple(self.path), self.name)
         objects[self.object] = flagged(item, names=names)
         return Edit() if names == item.names else document.compute_parts(objects=tuple(objects))
