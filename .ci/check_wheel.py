@@ -27,6 +27,8 @@ for package in map(importlib.import_module, sys.argv[2:]):
         assert file.is_relative_to(sys.argv[1]), f"{module.__name__} comes from {file}, not from the wheel"
 """
 
+PATTERNS = "*.py", "*.glsl", "*.vert", "*.frag", "*.comp", "lessons/*", "thumbnails/*"
+"""Files of the packages that the wheel holds."""
 
 FIRST_MESH = """
 import blobtree, blobtree.kernels
@@ -43,21 +45,22 @@ def build(folder: Path) -> Path:
     subprocess.run([sys.executable, ROOT / ".ci" / "compile_kernels.py"], check=True)
     command = [sys.executable, "-m", "build", "--outdir", folder, ROOT]
     built = subprocess.run(command, check=False, capture_output=True, text=True)
+    output = f"{built.stdout}{built.stderr}"
     if built.returncode:
-        sys.exit(f"{built.stdout}{built.stderr}the wheel could not be built")
+        sys.exit(f"{output}the wheel could not be built")
+    if "is absent from the `packages` configuration" in output:
+        sys.exit(f"{output}setuptools warns of folders: see packages and package-data in pyproject.toml")
     (wheel,) = folder.glob("*.whl")
     return wheel
 
 
 def expected_files() -> set[str]:
-    """Name every module, shader and marker of the four packages as the wheel should hold it."""
+    """Name every file of the four packages as the wheel should hold it."""
     files = set()
     for package in PACKAGES:
         folder = ROOT / {"decals.apps": "apps", "decals.shaders": "shaders"}.get(package, package)
         inside = package.replace(".", "/")
-        found = [
-            p for pattern in ("*.py", "*.glsl", "*.vert", "*.frag", "*.comp") for p in folder.rglob(pattern)
-        ]
+        found = [path for pattern in PATTERNS for path in folder.rglob(pattern)]
         files.update(f"{inside}/{p.relative_to(folder).as_posix()}" for p in [*found, folder / "py.typed"])
     return files
 
