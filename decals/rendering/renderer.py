@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Hashable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -226,6 +227,7 @@ class Renderer:
         slot: str = WHOLE_SLOT,
     ) -> Iterator[tuple[Tile, Targets]]:
         """Draw tile after tile; the targets hold a tile until the next one is drawn."""
+        _warn_of_plain_samples(scene, options)
         with self.context.current():
             uploaded = self._uploads.scene(scene, options.mapping)
             view = PictureView.of(viewpoint_of(scene, viewpoint), options.sample_size, uploaded.bounds)
@@ -311,6 +313,7 @@ class Renderer:
                 f"{height}; take fewer a pixel, or `render` draws in parts"
             )
         check_scene(scene)
+        _warn_of_plain_samples(scene, options)
         return FrameRequest(scene, viewpoint_of(scene, viewpoint), options)
 
     def warmup(self, scene: SceneLike, options: RenderOptions = DEFAULT_OPTIONS) -> WarmupPlan:
@@ -465,6 +468,16 @@ def _decal_tasks(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
 def _is_filtered(scene: SceneLike, options: RenderOptions) -> bool:
     """Return True if decals are averaged over pixels; relief and walked images are not."""
     return options.filtered and not has_relief(scene) and options.mapping is not ImageMapping.WALKED
+
+
+def _warn_of_plain_samples(scene: SceneLike, options: RenderOptions) -> None:
+    """Warn if decals cannot be averaged over pixels although the options ask for it."""
+    if options.filtered and len(scene.decals) and not _is_filtered(scene, options):
+        reason = "decals with relief" if has_relief(scene) else "the walked mapping"
+        warnings.warn(
+            f"filtered=True has no effect on {reason}: plain samples are drawn; take more samples a pixel",
+            stacklevel=4,
+        )
 
 
 def _library(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> str:

@@ -6,6 +6,7 @@ is drawn as a mesh, whose vertices know their places on the tree at rest.
 This removes the limitation that section 3.5 of the paper states.
 """
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -121,6 +122,16 @@ class PosedScene:
     def render(self, **options: Any) -> Picture:
         """Draw the scene as its `drawing` says; options and errors are those of `decals.render`."""
         return decals.render(self, **options)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Raise `InvalidScene`: a file holds the rest pose, so save the scene that was posed.
+
+        `decals.bake` writes the pose itself, with the decals in a texture.
+        """
+        raise InvalidScene(
+            f"{str(path)!r}: expected a Scene at rest, got a posed one; save the scene that was posed, or "
+            "write this pose by decals.bake"
+        )
 
 
 def pose(

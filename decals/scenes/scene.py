@@ -291,6 +291,17 @@ class Scene:
         """
         return decals.render(self, **options)
 
+    def measure(self, **options: Any) -> "decals.Measures":
+        """Measure how the decals lie; options and errors are those of `decals.measure`.
+
+        Examples
+        --------
+        >>> import blobtree, decals
+        >>> decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20).measure().coverage > 0.99
+        True
+        """
+        return decals.measure(self, **options)
+
     def show(self, **options: Any) -> Any:
         """Show the scene in a window or a notebook; options and errors are those of `decals.show`.
 

@@ -334,6 +334,8 @@ def test_a_posed_scene_is_drawn_only(vtk_display: None) -> None:
         decals.measure(cast(Any, posed))
     with pytest.raises(InvalidScene, match="expected a Scene, got a PosedScene"):
         decals.save_scene(cast(Any, posed), "scene.json")
+    with pytest.raises(InvalidScene, match="expected a Scene at rest, got a posed one"):
+        posed.save("scene.json")
     with pytest.raises(InvalidScene, match="expected a Scene at rest, got a PosedScene"):
         decals.displace(cast(Any, posed))
 

@@ -1,5 +1,6 @@
 """Relief in pictures: parallax, normals and shadows against float64 and against moved triangles."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -120,6 +121,14 @@ def test_a_picture_is_that_of_the_displaced_mesh(renderers: dict[str, Renderer])
     assert np.abs(one - other).mean() < 2.0
     assert np.abs(plain - other).mean() > 8.0
     assert plain[:, :3].max(axis=1).min() > 20  # a light at the eye leaves no pixel black
+
+
+def test_filtered_relief_is_drawn_with_plain_samples_and_a_warning(renderers: dict[str, Renderer]) -> None:
+    plain = RenderOptions(size=(24, 16), samples=1)
+    drawer = renderers["fragment"]
+    with pytest.warns(UserWarning, match="no effect on decals with relief"):
+        filtered = drawer.render(hilly(), replace(plain, filtered=True))
+    np.testing.assert_array_equal(filtered, drawer.render(hilly(), plain))
 
 
 def test_the_inside_of_a_surface_is_flat(renderers: dict[str, Renderer]) -> None:

@@ -51,7 +51,7 @@ def test_two_decals_on_a_plane(contact: str) -> None:
 
 
 def test_layers_hide_and_do_not_touch() -> None:
-    found = measure(flat_scene([[0, 0, 0], [0, 0, 0]], [1.0, 0.5], layers=[0, 1]), contact="product")
+    found = flat_scene([[0, 0, 0], [0, 0, 0]], [1.0, 0.5], layers=[0, 1]).measure(contact="product")
     np.testing.assert_allclose(found.decals.visible_area, [0.75 * math.pi, 0.25 * math.pi], rtol=0.02)
     assert found.overlap_area == pytest.approx(0.25 * math.pi, rel=0.02)
     assert found.contact_length == 0
