@@ -35,6 +35,7 @@ from blobtree.validation import affine_matrix, truth
 from decals.editing.document import Document, Edit
 from decals.editing.followers import followers
 from decals.editing.queries import move_decals
+from decals.editing.visibility import rename_label
 from decals.errors import InvalidEdit
 from decals.scenes.objects import SceneObject, TreeObject, check_names, flagged, with_tree
 from decals.validation import describe, finite_number, finite_vector, instance, member, whole_number
@@ -713,7 +714,11 @@ class RenameObject:
 
     number: int
     name: str
-    label: ClassVar[str] = "rename"
+
+    @property
+    def label(self) -> str:
+        """The new name."""
+        return rename_label(self.name)
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""

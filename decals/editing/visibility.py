@@ -17,6 +17,7 @@ from decals.errors import InvalidEdit
 from decals.index.rows import as_numbers
 from decals.scenes.objects import Paths, SceneObject, TreeObject, flagged
 from decals.scenes.scene import as_layer_names, as_layers
+from decals.validation import describe
 
 FOLLOW_DISTANCE = 0.02
 """Decals that were hidden go back to the surface if it is farther away than this, in their radii."""
@@ -218,7 +219,11 @@ class RenameNode:
     object: int
     path: Path
     name: str
-    label: ClassVar[str] = "rename"
+
+    @property
+    def label(self) -> str:
+        """The new name."""
+        return rename_label(self.name)
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
@@ -255,13 +260,22 @@ class RenameLayer:
 
     layer: int
     name: str
-    label: ClassVar[str] = "rename"
+
+    @property
+    def label(self) -> str:
+        """The new name."""
+        return rename_label(self.name)
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
         (layer,) = as_layers("layer", (self.layer,), InvalidEdit)
         names = as_layer_names(_renamed(document.layer_names, layer, self.name))
         return Edit() if names == document.layer_names else document.compute_parts(layer_names=names)
+
+
+def rename_label(name: str) -> str:
+    """Return the label of the command that gives something a name."""
+    return f"rename to {describe(name)}" if str(name) else "remove a name"
 
 
 def _renamed(names: dict[Any, str], key: Any, name: str) -> dict[Any, str]:
