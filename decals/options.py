@@ -36,12 +36,15 @@ class Values:
         Unit of a number.
     kind
         Type of one value, where an array holds one for each decal or pixel.
+    label
+        What a form calls the option in place of its name.
     """
 
     low: float = -math.inf
     high: float = math.inf
     unit: str = ""
     kind: Any = None
+    label: str = ""
 
 
 @dataclass(frozen=True)

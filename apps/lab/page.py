@@ -8,7 +8,7 @@ from trame.widgets import client, html, vuetify3
 from decals.apps.lab.lab import Lab
 from decals.apps.lab.lesson import Lesson
 from decals.apps.sandbox.page import PANEL_WIDTH, Page, drawer
-from decals.apps.sandbox.panels import FIELD, build_controls, icon_button, named
+from decals.apps.sandbox.panels import build_controls, icon_button, named
 from decals.window import EditWindow
 
 LESSON_WIDTH, PLOTS_WIDTH = 330, 350
@@ -89,13 +89,12 @@ class LabPage(Page):
                         items=("lab_titles",),
                         raw_attrs=named("'lesson'"),
                         update_modelValue=(self.lab.start, "[$event]"),
-                        **FIELD,
                     )
                     icon_button("mdi-restart", "start the lesson again", (self.lab.start, "[lab_number]"))
                     icon_button("mdi-close", "leave the lesson", self.sandbox.close_lesson)
                 html.Div(v_html=("lab_text",), classes="lesson")
                 self._build_question()
-                build_controls("lab_sliders", self.lab.set_value, who="c.number", key="lab_number + c.name")
+                build_controls("lab_sliders", self.lab.set_value, "c.number", key="lab_number + c.name")
 
     @staticmethod
     def _build_values() -> None:
@@ -107,7 +106,7 @@ class LabPage(Page):
     def _build_question(self) -> None:
         with vuetify3.VSheet(border=True, rounded=True, classes="pa-2 my-2"):
             html.Div("{{ lab_question }}", classes="lesson font-weight-medium mb-2")
-            vuetify3.VBtn("Check the answer", size="small", color="primary", click=self.lab.check)
+            vuetify3.VBtn("Check the answer", color="primary", click=self.lab.check)
             vuetify3.VAlert(
                 "{{ lab_verdict.text }}",
                 v_if="lab_verdict.text",
@@ -128,8 +127,8 @@ class LabPage(Page):
                 variant="text",
                 classes="mx-2 mt-1",
             ):
-                vuetify3.VBtn("Plots", value="plots", size="small")
-                vuetify3.VBtn("Model", value="model", size="small")
+                vuetify3.VBtn("Plots", value="plots")
+                vuetify3.VBtn("Model", value="model")
             with html.Div(v_if="in_lesson && lab_side === 'plots'", classes="px-2 pb-2"):
                 self._build_values()
                 with html.Div(v_for="p in lab_plots", key="p.title", classes="mb-2"):

@@ -76,14 +76,10 @@ def checked_kind(name: object) -> type[Node]:
     return known[one_of("kind", name, known, InvalidEdit)]
 
 
-def operand_count(kind: type[Node]) -> int:
-    """Return the smallest number of operands of a class: 0 for primitives, 1 for warps."""
-    return sum(2 if several else 1 for several in _operand_fields(kind).values())
-
-
-def most_operands(kind: type[Node]) -> float:
-    """Return the largest number of operands of a class; infinity for any number."""
-    return sum(math.inf if several else 1 for several in _operand_fields(kind).values())
+def operand_range(kind: type[Node]) -> tuple[int, float]:
+    """Return the least and the largest number of operands: 0 for primitives, 1 for warps."""
+    several = _operand_fields(kind).values()
+    return len(several) + sum(several), math.inf if any(several) else len(several)
 
 
 def _operand_fields(kind: type[Node]) -> dict[str, bool]:
@@ -93,19 +89,16 @@ def _operand_fields(kind: type[Node]) -> dict[str, bool]:
     return {name: hints[name] is not Node for name in names}
 
 
-def primitives() -> list[str]:
-    """Return the names of the classes without operands, in the order of the catalog."""
-    return [name for name, kind in kinds().items() if issubclass(kind, Leaf) or operand_count(kind) == 0]
+def families() -> dict[str, list[str]]:
+    """Return the names of all classes in the order of the catalog, by what they are.
 
-
-def modifiers() -> list[str]:
-    """Return the names of the classes with one operand: warps, offsets, shells."""
-    return [name for name, kind in kinds().items() if operand_count(kind) == 1]
-
-
-def combinations() -> list[str]:
-    """Return the names of the classes with two or more operands."""
-    return [name for name, kind in kinds().items() if operand_count(kind) > 1]
+    "primitives" have no operands, "modifiers" (warps, offsets, shells) have one, "combinations" more.
+    """
+    found: dict[str, list[str]] = {"primitives": [], "modifiers": [], "combinations": []}
+    for name, kind in kinds().items():
+        least = 0 if issubclass(kind, Leaf) else operand_range(kind)[0]
+        found[[*found][min(least, 2)]].append(name)
+    return found
 
 
 def new_node(
@@ -132,7 +125,7 @@ def new_node(
         The class refuses the values.
     """
     kind = checked_kind(name)
-    least, most = operand_count(kind), most_operands(kind)
+    least, most = operand_range(kind)
     if not least <= len(operands) <= most:
         raise InvalidEdit(f"{name}: expected {least} or more operands, at most {most:g}, got {len(operands)}")
     declared, several = parameters_of(kind), _operand_fields(kind)

@@ -1,5 +1,6 @@
 """Controls of a panel, from the parameters that classes of nodes declare."""
 
+import re
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -55,10 +56,10 @@ class Control:
         Ends and step of the slider. The field takes any value that the node accepts.
     choices
         Texts of a choice.
-    optional
-        An empty field gives None.
     curve
         Points of the curve of a choice, in a square of the size 1, as SVG writes them; "" for none.
+    label
+        What the page calls it; by default its name in words.
     """
 
     name: str
@@ -70,8 +71,11 @@ class Control:
     high: float = 0.0
     step: float = 0.0
     choices: tuple[str, ...] = ()
-    optional: bool = False
     curve: str = ""
+    label: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "label", self.label or re.sub("[_.]", " ", self.name))
 
 
 def controls_of(node: Node, size: float) -> list[dict[str, Any]]:
@@ -101,7 +105,7 @@ def _control(parameter: Parameter, value: Any, size: float) -> Control:
     if quantity in NUMBERS and not isinstance(value, tuple):
         low, high = _ends(parameter, value, size)
         step = 1.0 if parameter.whole else (high - low) / STEPS
-        return Control(parameter.name, "number", value, doc, unit, low, high, step, optional=value is None)
+        return Control(parameter.name, "number", value, doc, unit, low, high, step)
     if quantity in VECTORS or quantity is Quantity.NUMBERS:
         return Control(parameter.name, "vector", list(value), doc, unit)
     if quantity in LISTS:
@@ -114,25 +118,24 @@ def option_control(
     option: Option, value: Any, low: float | None = None, high: float | None = None
 ) -> dict[str, Any]:
     """Return the control of an option of a function or a class, with other ends of its slider, if given."""
-    name, doc, unit = option.name, option.doc, option.values.unit
+    kind, choices, values = "field", option.choices, option.values
+    low, high = values.low if low is None else low, values.high if high is None else high
     if option.kind is bool:
-        return asdict(Control(name, "switch", bool(value), doc))
-    if option.choices:
-        shown = (
-            "none"
-            if value is None
-            else (value if hasattr(value, "name") else option.kind(value)).name.lower()
-        )
-        return asdict(Control(name, "choice", shown, doc, choices=option.choices))
-    if option.kind in (Rgb, Rgba):
-        return asdict(Control(name, "color", hex_color(tuple(value)[:3]), doc))
-    low, high = option.values.low if low is None else low, option.values.high if high is None else high
-    if value is not None:
-        low, high = min(low, value), max(high, value)
-    if not isfinite(high - low):
-        return asdict(Control(name, "field", value, doc, unit, optional=option.optional))
+        kind = "switch"
+    elif choices:
+        kind = "choice"
+        named = value if value is None or hasattr(value, "name") else option.kind(value)
+        value = "none" if named is None else named.name.lower()
+    elif option.kind in (Rgb, Rgba):
+        kind, value = "color", hex_color(tuple(value)[:3])
+    elif isfinite(high - low):
+        kind = "number"
+        low, high = (low, high) if value is None else (min(low, value), max(high, value))
+    if kind != "number":
+        low = high = 0.0
     step = 1.0 if option.kind is int else (high - low) / STEPS
-    return asdict(Control(name, "number", value, doc, unit, low, high, step, optional=option.optional))
+    slider = values.unit, low, high, step, choices
+    return asdict(Control(option.name, kind, value, option.doc, *slider, label=values.label))
 
 
 def parsed_option(of: Any, name: Any, raw: Any) -> Any:

@@ -1,6 +1,6 @@
 """How the view shows the scene: modes, overlays, a field slice, and cameras."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol
 
@@ -29,15 +29,6 @@ from decals.window.host_plotter import pixels_of, ray_through
 
 MODES = "traced", "polygonized", "wireframe", "normals", "curvature"
 OVERLAYS = "none", "contact lines", "owners", "stretch", "folds", "seeds"
-CHOICES = {"mode": MODES, "overlay": OVERLAYS, "slice_axis": SLICES, "up": tuple(UPRIGHT)}
-CHOICE_DOCS = {
-    "mode": "how surfaces are drawn",
-    "overlay": "what is measured on them",
-    "slice_axis": "cut the model open across this axis, or along a tilted plane",
-    "up": "axis that points upward in the model",
-}
-POSITION_DOC = "distance of the slice from the origin of the model"
-SNAP_DOC = "dragged primitives move by multiples of this distance; 0: freely"
 RESOLUTION = 96
 """Cells along the longest side of the meshes that modes and overlays use."""
 
@@ -127,33 +118,8 @@ class Display:
 
     def values(self) -> dict[str, Any]:
         """Return plain values for a page."""
-        plane, axes = self.options.slice, self._window.actions.view.axes
-        shown = {
-            "mode": self.options.mode,
-            "overlay": self.options.overlay,
-            "slice_axis": NONE if plane is None else plane.choice,
-            "up": next((name for name, known in UPRIGHT.items() if known == axes), "y"),
-        }
-        controls = [
-            Control(name, "choice", shown[name], doc, choices=CHOICES[name])
-            for name, doc in CHOICE_DOCS.items()
-        ]
-        if plane is not None:
-            low, high = plane.reach(*self._box())
-            step = (high - low) / STEPS
-            position = Control(
-                "slice_position", "number", plane.position, POSITION_DOC, "model units", low, high, step
-            )
-            normal = Control("slice_normal", "vector", plane.normal, "direction across the slice")
-            controls[3:3] = [position, normal]
-        parallel = self._window.camera.parallel
-        controls += [
-            Control("snap", "field", self._window.actions.state.snap, SNAP_DOC, "model units"),
-            Control("orthographic", "switch", parallel, "no perspective"),
-            Control("axes", "switch", self._axes, "show the axes"),
-        ]
         return {
-            "controls": [asdict(control) for control in controls],
+            "controls": [asdict(control) for control, _ in self._options()],
             "bookmarks": [name for name, _ in self.bookmarks],
             "busy": self._worker.busy,
             "message": self.message,
@@ -161,62 +127,82 @@ class Display:
 
     # -- modes ------------------------------------------------------------------------------------------
 
-    def set_option(self, name: str, value: Any, index: object = ()) -> None:
-        """Set a choice by its name, or "slice_position", "slice_normal", "orthographic", "axes" or "snap".
+    def _options(self) -> Iterator[tuple[Control, Callable[[Any], None]]]:
+        """Yield the controls of the view, each with the function that takes its checked value."""
+        options, plane, length = self.options, self.options.slice, "model units"
+        camera, state, view = self._window.camera, self._window.actions.state, self._window.actions.view
 
-        ``index`` holds that of the number of the normal.
+        def choice(name: str, value: str, choices: Iterable[str], doc: str) -> Control:
+            return Control(name, "choice", value, doc, choices=tuple(choices))
+
+        def change(**changed: Any) -> None:
+            self.options = replace(options, **changed)
+
+        up = next((name for name, known in UPRIGHT.items() if known == view.axes), "y")
+        cut = NONE if plane is None else plane.choice
+        cut_doc = "plane that cuts the model open: across an axis, or tilted"
+        yield choice("mode", options.mode, MODES, "how surfaces are drawn"), lambda mode: change(mode=mode)
+        yield (
+            choice("overlay", options.overlay, OVERLAYS, "what is measured on them"),
+            lambda overlay: change(overlay=overlay),
+        )
+        yield choice("slice", cut, SLICES, cut_doc), lambda chosen: change(slice=self._plane_of(chosen))
+        if plane is not None:
+            low, high = plane.reach(*self._box())
+            doc, step = "distance of the slice from the origin of the model", (high - low) / STEPS
+            position = Control("slice_position", "number", plane.position, doc, length, low, high, step)
+            yield position, lambda at: change(slice=plane.at(at))
+            normal = Control("slice_normal", "vector", plane.normal, "direction across the slice")
+            yield normal, lambda along: change(slice=SlicePlane.across(plane.point, along))
+        up_doc = "axis that points upward in the model"
+        yield choice("up", up, UPRIGHT, up_doc), lambda axis: setattr(view, "axes", UPRIGHT[axis])
+        snap_doc = "dragged primitives move by multiples of this distance; 0: freely"
+        yield Control("snap", "field", state.snap, snap_doc, length), self._set_snap
+        parallel = Control("orthographic", "switch", camera.parallel, "no perspective")
+        yield parallel, lambda on: setattr(camera, "parallel", on)
+        yield Control("axes", "switch", self._axes, "show the axes"), self._show_axes
+
+    def set_option(self, name: str, value: Any, index: object = ()) -> None:
+        """Set a control of the view; ``index`` holds that of the number of the normal.
 
         Raises
         ------
         InvalidEdit
-            There is no such option or value.
+            There is no such control or value.
         """
-        plane = self.options.slice
-        match name:
-            case "orthographic":
-                self._window.camera.parallel = bool(value)
-            case "up":
-                self._window.actions.view.axes = UPRIGHT[one_of(name, value, UPRIGHT, InvalidEdit)]
-            case "slice_axis":
-                self.options = replace(self.options, slice=self._plane_of(value))
-            case "slice_position" | "slice_normal" if plane is not None:
-                if name == "slice_position":
-                    plane = plane.at(number_of(name, value))
-                else:
-                    normal = exchanged(plane.normal, index, number_of(name, value)) if index else value
-                    plane = SlicePlane.across(plane.point, normal)
-                self.options = replace(self.options, slice=plane)
-            case "axes":
-                self._show_axes(bool(value))
-            case "snap":
-                distance = number_of("snap", value)
-                if distance < 0.0:
-                    raise InvalidEdit(f"snap: expected 0 or more, got {distance}")
-                self._window.actions.state.snap = distance
+        options = {control.name: (control, take) for control, take in self._options()}
+        control, take = options[one_of("view", name, options, InvalidEdit)]
+        match control.kind:
+            case "choice":
+                take(one_of(name, value, control.choices, InvalidEdit))
+            case "switch":
+                take(bool(value))
+            case "vector" if not index:
+                take(value)
             case _:
-                chosen: Any = {one_of("view", name, CHOICES, InvalidEdit): value}
-                one_of(name, value, CHOICES[name], InvalidEdit)
-                self.options = replace(self.options, **chosen)
+                take(exchanged(control.value, index, number_of(name, value)))
+
+    def _set_snap(self, distance: float) -> None:
+        if distance < 0.0:
+            raise InvalidEdit(f"snap: expected 0 or more, got {distance}")
+        self._window.actions.state.snap = distance
 
     def _box(self) -> tuple[ArrayLike, ArrayLike]:
         """Return the corners of the scene's box; those of a cube without objects."""
         objects = self._window.document.objects
         return bounds_of(objects) if objects else (-np.ones(3), np.ones(3))
 
-    def _plane_of(self, choice: object) -> SlicePlane | None:
+    def _plane_of(self, choice: str) -> SlicePlane | None:
         """Return the plane of a choice, through the middle of the scene; a tilted one stays."""
-        chosen, plane = one_of("slice_axis", choice, SLICES, InvalidEdit), self.options.slice
-        if chosen == NONE or (plane is not None and chosen == plane.choice):
-            return None if chosen == NONE else plane
-        normal = np.ones(3) if chosen == TILTED else np.eye(3)[AXES.index(chosen)]
+        plane = self.options.slice
+        if choice == NONE or (plane is not None and choice == plane.choice):
+            return None if choice == NONE else plane
+        normal = np.ones(3) if choice == TILTED else np.eye(3)[AXES.index(choice)]
         return SlicePlane.across(np.add(*self._box()) / 2, normal)
 
     def _show_axes(self, shown: bool) -> None:
         plotter = self._window.plotter
-        if shown:
-            plotter.add_axes()
-        else:
-            plotter.hide_axes()
+        (plotter.add_axes if shown else plotter.hide_axes)()
         self._axes = shown
 
     def update(self) -> bool:
@@ -237,7 +223,7 @@ class Display:
             return self._clear()
         content = document.objects, document.decals.version, modes.contact, modes.mapping, modes.stiffness
         key = options, *content
-        if len(key) == len(self._key) and all(a is b or a == b for a, b in zip(key, self._key, strict=True)):
+        if key == self._key:
             return False
         self._key = key
         fork, meshes = document.fork(), self._meshes

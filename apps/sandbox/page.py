@@ -11,7 +11,7 @@ from trame.widgets import client, html, vuetify3
 from decals.apps.sandbox import panels
 from decals.apps.sandbox.connections import Connections
 from decals.apps.sandbox.folder import thumbnails
-from decals.apps.sandbox.panels import DROP, FIELD, named
+from decals.apps.sandbox.panels import DEFAULTS, DROP, named
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.apps.sandbox.view import StreamedView
 from decals.window import EditWindow, browser_keys
@@ -285,7 +285,7 @@ class Page:
     # -- layout -----------------------------------------------------------------------------------------
 
     def _build(self) -> None:
-        with VAppLayout(self._server, full_height=True) as layout:
+        with VAppLayout(self._server, vuetify_config={"defaults": DEFAULTS}, full_height=True) as layout:
             layout.root.theme = ("theme",)
             client.Style(STYLE)
             client.Script(f"{ALT}.observe(document, {{childList: true, subtree: true}})")
@@ -351,15 +351,19 @@ class Page:
         ):
             html.H1("{{ title }}", classes="text-h6 mx-3")
             if self._ends:
-                vuetify3.VBtn("Done", color="primary", variant="flat", size="small", click=self._finish)
+                vuetify3.VBtn("Done", color="primary", variant="flat", click=self._finish)
             for side, icon in (("left", "mdi-file-tree-outline"), ("right", "mdi-tune")):
                 panels.icon_button(icon, f"{side} panel", f"{side}_open = !{side}_open", v_if=NARROW_WINDOW)
             panels.build_driver()
             panels.build_files(self.sandbox)
             panels.build_view_menu(self.sandbox)
-            self._build_menu("Add", "mdi-plus", "primitives", self.sandbox.add)
-            self._build_menu("Modify", "mdi-tune-variant", "modifiers", self.sandbox.wrap)
-            self._build_menu("Combine", "mdi-set-center", "combinations", self.sandbox.combine)
+            for title, icon, family, event in (
+                ("Add", "mdi-plus", "primitives", self.sandbox.add),
+                ("Modify", "mdi-tune-variant", "modifiers", self.sandbox.wrap),
+                ("Combine", "mdi-set-center", "combinations", self.sandbox.combine),
+            ):
+                with panels.menu(title, icon, max_height=480, max_width=380):
+                    panels.build_list(f"catalog.{family}", "e", "catalog.docs[e]", event, "e")
             vuetify3.VDivider(vertical=True, classes="mx-2")
             panels.build_actions(self.sandbox)
             panels.build_brushes(self.sandbox)
@@ -369,24 +373,10 @@ class Page:
             theme = "theme = theme === 'light' ? 'dark' : 'light'"
             panels.icon_button("mdi-theme-light-dark", "light or dark", theme)
 
-    @staticmethod
-    def _build_menu(label: str, icon: str, family: str, event: Any) -> None:
-        with vuetify3.VMenu(max_height=480, max_width=380):
-            with vuetify3.Template(v_slot_activator="{ props }"):
-                vuetify3.VBtn(label, v_bind="props", prepend_icon=icon, size="small")
-            with vuetify3.VList(density="compact"):
-                vuetify3.VListItem(
-                    v_for=f"kind in catalog.{family}",
-                    key="kind",
-                    title=("kind",),
-                    subtitle=("catalog.docs[kind]",),
-                    click=(event, "[kind]"),
-                )
-
     def _build_outline(self) -> None:
         vuetify3.VListSubheader("Outline", raw_attrs=['role="heading" aria-level="2"'])
         with (
-            vuetify3.VList(density="compact", nav=True),
+            vuetify3.VList(nav=True),
             html.Div(
                 v_for="row in outline",
                 key="row.key",
@@ -405,7 +395,6 @@ class Page:
                 ],
                 __events=[("escape", "keyup.esc")],
                 escape="renamed = {key: '', name: ''}",
-                **FIELD,
             )
             vuetify3.VListItem(
                 v_if="renamed.key !== row.key",
@@ -450,7 +439,7 @@ class Page:
                 update_modelValue="menu = {...menu, open: $event}",
                 target=("[menu.x, menu.y]",),
             ),
-            vuetify3.VList(density="compact"),
+            vuetify3.VList(),
         ):
             for title, kinds, event in (
                 ("Rename", "object mesh node layer", "renamed = {key: menu.key, name: menu.label}"),
@@ -478,13 +467,13 @@ class Page:
 
     def _build_panel(self) -> None:
         with html.Div(v_if="panel.kind", classes="pa-3"):
-            html.H2("{{ panel.kind }}", classes="text-subtitle-1")
+            html.H2("{{ panel.name }}{{ panel.name ? ': ' : '' }}{{ panel.kind }}", classes="text-subtitle-1")
             html.P("{{ panel.doc }}", classes="text-caption mb-3")
-            panels.build_controls("panel.controls", self.sandbox.set_value, key="selected + c.name")
+            who, key = "'node', c.name", "selected + c.name"
+            panels.build_controls("panel.controls", self.sandbox.set_control, who, key=key)
             vuetify3.VBtn(
                 "Remove this modifier",
                 v_if="panel.operands === 1",
-                size="small",
                 variant="tonal",
                 click=self.sandbox.unwrap,
             )
@@ -497,7 +486,7 @@ class Page:
     def _build_history(self) -> None:
         vuetify3.VDivider()
         vuetify3.VListSubheader("History", raw_attrs=['role="heading" aria-level="2"'])
-        with vuetify3.VList(density="compact"):
+        with vuetify3.VList():
             vuetify3.VListItem(
                 title="Start",
                 active=("done.length === 0",),

@@ -1,5 +1,7 @@
 """Parts of the sandbox's page beside outline and history: start, files, view, brushes, decals, actions."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from trame.widgets import html, vuetify3
@@ -12,8 +14,18 @@ from decals.editing.file_actions import Video
 from decals.editing.key_bindings import CAMERA, Binding, Group, format_gestures
 from decals.editing.view_actions import SIDE_KEYS
 
-FIELD = {"density": "compact", "variant": "outlined", "hide_details": True}
-COMPACT = {"density": "compact", "hide_details": True}
+COMPACT = {"density": "compact", "hideDetails": True}
+OUTLINED = {**COMPACT, "variant": "outlined"}
+DEFAULTS = {
+    "VBtn": {"size": "small"},
+    "VList": {"density": "compact"},
+    "VSlider": COMPACT,
+    "VSwitch": COMPACT,
+    "VCheckbox": COMPACT,
+    "VTextField": OUTLINED,
+    "VSelect": OUTLINED,
+}
+"""How elements look unless they say otherwise."""
 
 BRUSH_ICONS = {
     Brush.SELECT: "mdi-cursor-default-outline",
@@ -29,9 +41,6 @@ BRUSH_ICONS = {
 }
 SUMMARIES = {b.action: f"{b.summary} ({format_gestures(b)})" for b in KEYS.bindings}
 """What each action does, and its keys."""
-
-WORDS = "c.name.replaceAll(/[_.]/g, ' ')"
-"""Name of the control ``c`` in words."""
 
 CURVE = """<svg viewBox="-0.02 -0.02 1.04 1.04" preserveAspectRatio="none"
   style="width: 100%; height: 48px"><polyline :points="c.curve" fill="none" stroke="currentColor"
@@ -49,11 +58,32 @@ def named(expression: str) -> list[str]:
 
 def icon_button(icon: str, text: str, click: Any, **options: Any) -> None:
     """Build a button with an icon and a tooltip."""
-    options = {"size": "small", "density": "comfortable", **options}
+    options = {"density": "comfortable", **options}
     vuetify3.VBtn(icon=icon, title=text, raw_attrs=named(f"'{text}'"), click=click, **options)
 
 
-def build_controls(source: str, event: Any, *, who: str = "c.name", key: str = "c.name") -> None:
+@contextmanager
+def menu(text: str, icon: str, **options: Any) -> Iterator[None]:
+    """Build a button that opens a menu with what is built inside."""
+    with vuetify3.VMenu(**options):
+        with vuetify3.Template(v_slot_activator="{ props }"):
+            vuetify3.VBtn(text, v_bind="props", prepend_icon=icon)
+        yield
+
+
+def build_list(source: str, title: str, subtitle: str, click: Any, chosen: str) -> None:
+    """Build a list with each ``e`` of a list of the page; a click sends the value of an expression."""
+    with vuetify3.VList():
+        vuetify3.VListItem(
+            v_for=f"(e, i) in {source}",
+            key="i",
+            title=(title,),
+            subtitle=(subtitle,),
+            click=(click, f"[{chosen}]"),
+        )
+
+
+def build_controls(source: str, event: Any, who: str, *, key: str = "c.name") -> None:
     """Build labels and inputs of controls; see `decals.apps.sandbox.controls.Control`.
 
     Parameters
@@ -64,13 +94,13 @@ def build_controls(source: str, event: Any, *, who: str = "c.name", key: str = "
         Receives what identifies the control, its value, and False while a slider moves; then, for one number
         of a vector or a list, the indices of that number.
     who
-        Expression of what identifies the control ``c``.
+        Arguments that identify the control ``c``, as expressions of the page.
     key
         Expression that tells the control from those of another selection.
     """
     with html.Div(v_for=f"c in {source}", key=key, classes="mb-2"):
         html.Label(
-            f"{{{{ {WORDS} }}}}{{{{ c.unit ? ', ' + c.unit : '' }}}}",
+            "{{ c.label }}{{ c.unit ? ', ' + c.unit : '' }}",
             v_if="c.kind !== 'switch'",
             title=("c.doc",),
             classes="text-caption",
@@ -82,28 +112,29 @@ def build_controls(source: str, event: Any, *, who: str = "c.name", key: str = "
                 min=("c.low",),
                 max=("c.high",),
                 step=("c.step",),
-                name=(WORDS,),
+                name=("c.label",),
                 update_modelValue=(event, f"[{who}, $event, false]"),
                 end=(event, f"[{who}, $event, true]"),
-                **COMPACT,
             )
-            _number_field("c.value", WORDS, event, f"[{who}, $event.target.value, true]", "max-width: 84px")
+            _number_field(
+                "c.value", "c.label", event, f"[{who}, $event.target.value, true]", "max-width: 84px"
+            )
         with html.Div(v_if="c.kind === 'vector'", classes="d-flex ga-1"):
             sent = f"[{who}, $event.target.value, true, [i]]"
-            label = f"`${{{WORDS}}} ${{i + 1}}`"
+            label = "`${c.label} ${i + 1}`"
             _number_field("number", label, event, sent, v_for="(number, i) in c.value", key="i")
         with (
             html.Div(v_if="c.kind === 'list'"),
             html.Div(v_for="(row, i) in c.value", key="i", classes="d-flex ga-1 mb-1"),
         ):
             sent = f"[{who}, $event.target.value, true, Array.isArray(row) ? [i, j] : [i]]"
-            label = f"`${{{WORDS}}} ${{i + 1}} ${{j + 1}}`"
+            label = "`${c.label} ${i + 1} ${j + 1}`"
             _number_field("number", label, event, sent, v_for="(number, j) in [].concat(row)", key="j")
         html.Input(
             v_if="c.kind === 'color'",
             type="color",
             value=("c.value",),
-            raw_attrs=named(WORDS),
+            raw_attrs=named("c.label"),
             style="width: 100%; height: 28px",
             change=(event, f"[{who}, $event.target.value, true]"),
         )
@@ -111,19 +142,17 @@ def build_controls(source: str, event: Any, *, who: str = "c.name", key: str = "
             v_if="c.kind === 'choice'",
             model_value=("c.value",),
             items=("c.choices",),
-            raw_attrs=named(WORDS),
+            raw_attrs=named("c.label"),
             update_modelValue=(event, f"[{who}, $event, true]"),
-            **FIELD,
         )
         html.Div(CURVE, v_if="c.curve")
         vuetify3.VSwitch(
             v_if="c.kind === 'switch'",
             model_value=("c.value",),
-            label=(WORDS,),
+            label=("c.label",),
             title=("c.doc",),
             update_modelValue=(event, f"[{who}, $event, true]"),
             color="primary",
-            **COMPACT,
         )
         html.Div("{{ c.value }}", v_if="c.kind === 'text'", classes="text-caption")
 
@@ -140,7 +169,6 @@ def _number_field(value: str, label: str, event: Any, sent: str, style: str = ""
         style=style,
         change=(event, sent),
         **options,
-        **FIELD,
     )
 
 
@@ -172,30 +200,22 @@ def build_start(sandbox: Sandbox) -> None:
             ):
                 vuetify3.VImg(src=("thumbnails[name]",), height=88, cover=True, alt="")
                 html.Div("{{ name }}", classes="text-caption text-center pa-1")
-        _build_open_file()
-        for family, title, event in (
-            ("recovered", "Recovered sessions", sandbox.open_file),
-            ("recent", "Files in this folder", sandbox.open_file),
+        html.Label("Open from this computer (or drop files on the view): ", classes="text-caption")
+        html.Input(
+            type="file",
+            multiple=True,
+            accept=",".join(MODELS + IMAGES),
+            raw_attrs=named("'open from this computer'"),
+            change=DROP.format("target"),
+        )
+        for family, heading, title, subtitle, event, chosen in (
+            ("recovered", "Recovered sessions", "e.name", "e.when", sandbox.open_file, "e.name"),
+            ("recent", "Files in this folder", "e.name", "e.when", sandbox.open_file, "e.name"),
+            ("lessons", "Lessons", "e", "''", sandbox.open_lesson, "i"),
         ):
             with html.Div(v_if=f"start.{family}.length", classes="mt-4"):
-                html.H2(title, classes="text-subtitle-2")
-                with vuetify3.VList(density="compact"):
-                    vuetify3.VListItem(
-                        v_for=f"file in start.{family}",
-                        key="file.name",
-                        title=("file.name",),
-                        subtitle=("file.when",),
-                        click=(event, "[file.name]"),
-                    )
-        with html.Div(v_if="start.lessons.length", classes="mt-4"):
-            html.H2("Lessons", classes="text-subtitle-2")
-            with vuetify3.VList(density="compact"):
-                vuetify3.VListItem(
-                    v_for="(lesson, i) in start.lessons",
-                    key="i",
-                    title=("lesson",),
-                    click=(sandbox.open_lesson, "[i]"),
-                )
+                html.H2(heading, classes="text-subtitle-2")
+                build_list(f"start.{family}", title, subtitle, event, chosen)
 
 
 def _start_tile(icon: str, text: str, click: Any) -> None:
@@ -205,58 +225,42 @@ def _start_tile(icon: str, text: str, click: Any) -> None:
         html.Div(text, classes="text-caption text-center pa-1")
 
 
-def _build_open_file() -> None:
-    html.Label("Open from this computer (or drop files on the view): ", classes="text-caption")
-    html.Input(
-        type="file",
-        multiple=True,
-        accept=",".join(MODELS + IMAGES),
-        raw_attrs=named("'open from this computer'"),
-        change=DROP.format("target"),
-    )
-
-
 def build_files(sandbox: Sandbox) -> None:
     """Build the menu that writes files: scene, script, mesh and picture by the suffix of the name."""
-    with vuetify3.VMenu(close_on_content_click=False):
-        with vuetify3.Template(v_slot_activator="{ props }"):
-            vuetify3.VBtn("File", v_bind="props", prepend_icon="mdi-file-outline", size="small")
-        with vuetify3.VCard(width=340, classes="pa-3"):
-            vuetify3.VBtn(
-                "Open or new ...", size="small", variant="tonal", click=(sandbox.show_start, "[true]")
-            )
-            html.P(
-                "Save or export. The ending is the format: .json scene, .py script, "
-                ".ply .stl .obj .vtp mesh, .glb mesh with the decals, .png .jpg picture, .gif .mp4 video.",
-                classes="text-caption mt-3 mb-1",
-            )
-            with html.Div(classes="d-flex ga-2 align-center"):
-                write = sandbox.write_file, "[file_name, replace_file, file_size, file_video]"
-                vuetify3.VTextField(
-                    v_model=("file_name", ""),
-                    placeholder="model.stl",
-                    raw_attrs=named("'file name'"),
-                    enter=write,
-                    __events=[("enter", "keyup.enter")],
-                    **FIELD,
-                )
-                vuetify3.VBtn("Write", size="small", click=write)
+    with (
+        menu("File", "mdi-file-outline", close_on_content_click=False),
+        vuetify3.VCard(width=340, classes="pa-3"),
+    ):
+        vuetify3.VBtn("Open or new ...", variant="tonal", click=(sandbox.show_start, "[true]"))
+        html.P(
+            "Save or export. The ending is the format: .json scene, .py script, "
+            ".ply .stl .obj .vtp mesh, .glb mesh with the decals, .png .jpg picture, .gif .mp4 video.",
+            classes="text-caption mt-3 mb-1",
+        )
+        with html.Div(classes="d-flex ga-2 align-center"):
+            write = sandbox.write_file, "[file_name, replace_file, file_size, file_video]"
             vuetify3.VTextField(
-                v_if="/(png|jpg|gif|mp4)$/i.test(file_name)",
-                v_model=("file_size", ""),
-                label="size, such as 1920 x 1080",
-                classes="mt-2",
-                **FIELD,
+                v_model=("file_name", ""),
+                placeholder="model.stl",
+                raw_attrs=named("'file name'"),
+                enter=write,
+                __events=[("enter", "keyup.enter")],
             )
-            vuetify3.VSelect(
-                v_if="/(gif|mp4)$/i.test(file_name)",
-                v_model=("file_video", "turntable"),
-                items=("videos", list(map(str, Video))),
-                label="video",
-                classes="mt-2",
-                **FIELD,
-            )
-            vuetify3.VCheckbox(v_model=("replace_file", False), label="replace a file that exists", **COMPACT)
+            vuetify3.VBtn("Write", click=write)
+        vuetify3.VTextField(
+            v_if="/(png|jpg|gif|mp4)$/i.test(file_name)",
+            v_model=("file_size", ""),
+            label="size, such as 1920 x 1080",
+            classes="mt-2",
+        )
+        vuetify3.VSelect(
+            v_if="/(gif|mp4)$/i.test(file_name)",
+            v_model=("file_video", "turntable"),
+            items=("videos", list(map(str, Video))),
+            label="video",
+            classes="mt-2",
+        )
+        vuetify3.VCheckbox(v_model=("replace_file", False), label="replace a file that exists")
 
 
 def build_driver() -> None:
@@ -271,7 +275,6 @@ def build_driver() -> None:
         vuetify3.VBtn(
             "Pass control to browser {{ driving.next }}",
             v_if="driving.drives && driving.next",
-            size="small",
             variant="tonal",
             click="trigger('pass_control')",
         )
@@ -279,7 +282,6 @@ def build_driver() -> None:
             "{{ driving.asks ? 'Asked for control' : 'Ask for control' }}",
             v_if="!driving.drives",
             disabled=("driving.asks",),
-            size="small",
             variant="tonal",
             click="trigger('ask_to_drive')",
         )
@@ -290,27 +292,25 @@ def build_driver() -> None:
 
 def build_view_menu(sandbox: Sandbox) -> None:
     """Build the menu of modes, overlays, slices and cameras."""
-    with vuetify3.VMenu(close_on_content_click=False, max_height=640):
-        with vuetify3.Template(v_slot_activator="{ props }"):
-            vuetify3.VBtn("View", v_bind="props", prepend_icon="mdi-eye-outline", size="small")
-        with vuetify3.VCard(width=320, classes="pa-3"):
-            build_controls("display.controls", sandbox.set_display)
-            with html.Div(classes="d-flex flex-wrap ga-1 my-2"):
-                for text, action in {
-                    "Frame selection, or all": "frame",
-                    **{s: f"view_{s}" for s in SIDE_KEYS},
-                }.items():
-                    perform = sandbox.perform, f"['{action}']"
-                    vuetify3.VBtn(text, title=SUMMARIES[action], size="x-small", click=perform)
-            with html.Div(classes="d-flex flex-wrap ga-1"):
-                vuetify3.VBtn("Keep this view", size="x-small", click=(sandbox.move_camera, "['keep']"))
-                vuetify3.VBtn(
-                    "{{ name }}",
-                    v_for="(name, i) in display.bookmarks",
-                    key="name",
-                    size="x-small",
-                    click=(sandbox.move_camera, "['go', i]"),
-                )
+    moves = {"Frame selection, or all": "frame", **{side: f"view_{side}" for side in SIDE_KEYS}}
+    with (
+        menu("View", "mdi-eye-outline", close_on_content_click=False, max_height=640),
+        vuetify3.VCard(width=320, classes="pa-3"),
+    ):
+        build_controls("display.controls", sandbox.set_control, "'display', c.name")
+        with html.Div(classes="d-flex flex-wrap ga-1 my-2"):
+            for text, action in moves.items():
+                perform = sandbox.perform, f"['{action}']"
+                vuetify3.VBtn(text, title=SUMMARIES[action], size="x-small", click=perform)
+        with html.Div(classes="d-flex flex-wrap ga-1"):
+            vuetify3.VBtn("Keep this view", size="x-small", click=(sandbox.move_camera, "['keep']"))
+            vuetify3.VBtn(
+                "{{ name }}",
+                v_for="(name, i) in display.bookmarks",
+                key="name",
+                size="x-small",
+                click=(sandbox.move_camera, "['go', i]"),
+            )
 
 
 # -- decals ---------------------------------------------------------------------------------------------
@@ -322,14 +322,13 @@ def build_brushes(sandbox: Sandbox) -> None:
         model_value=("brush.brush",),
         mandatory=True,
         density="compact",
-        update_modelValue=(sandbox.set_brush, "['brush', $event]"),
+        update_modelValue=(sandbox.set_control, "['brush', 'brush', $event]"),
         raw_attrs=['aria-label="brush"'],
     ):
         for brush in Brush:
             vuetify3.VBtn(
                 value=str(brush),
                 icon=BRUSH_ICONS[brush],
-                size="small",
                 width=34,
                 title=SUMMARIES[f"brush_{brush}"],
                 raw_attrs=named(f"'{SUMMARIES[f'brush_{brush}']}'"),
@@ -338,32 +337,24 @@ def build_brushes(sandbox: Sandbox) -> None:
 
 def build_decal_panel(sandbox: Sandbox) -> None:
     """Build the panels of the brush, the selected decals, the selected image, and the drawing."""
-    for shown, title, source, event in (
-        ("brush.controls.length", "{{ brush.brush }} brush", "brush.controls", sandbox.set_brush),
-        (
-            "decal.count",
-            "{{ decal.count === 1 ? 'Decal' : decal.count + ' decals' }}",
-            "decal.controls",
-            sandbox.set_decals,
-        ),
-        ("image.name", "Image {{ image.name }}", "image.controls", sandbox.set_image),
+    for panel, values, shown, title in (
+        ("brush", "brush", "brush.controls.length", "{{ brush.brush }} brush"),
+        ("decals", "decal", "decal.count", "{{ decal.count === 1 ? 'Decal' : decal.count + ' decals' }}"),
+        ("image", "image", "image.name", "Image {{ image.name }}"),
     ):
         with html.Div(v_if=shown, classes="pa-3"):
             html.H2(title, classes="text-subtitle-1")
-            if source == "image.controls":
+            if panel == "image":
                 html.Img(src=("image.picture",), alt="", style="width: 50%; border-radius: 50%")
-            build_controls(source, event)
+            build_controls(f"{values}.controls", sandbox.set_control, f"'{panel}', c.name")
 
 
 def build_options(sandbox: Sandbox) -> None:
     """Build the panels, closed at first, of scattering and of the drawing."""
     with vuetify3.VExpansionPanels(v_if="outline.length > 1", multiple=True, flat=True, elevation=0):
-        for title, source, event in (
-            ("Scattering", "scattering", sandbox.set_scattering),
-            ("Drawing", "drawing", sandbox.set_drawing),
-        ):
-            with vuetify3.VExpansionPanel(title=title), vuetify3.VExpansionPanelText():
-                build_controls(source, event)
+        for panel in ("scattering", "drawing"):
+            with vuetify3.VExpansionPanel(title=panel.capitalize()), vuetify3.VExpansionPanelText():
+                build_controls(panel, sandbox.set_control, f"'{panel}', c.name")
 
 
 def build_scatter(sandbox: Sandbox) -> None:
@@ -371,7 +362,6 @@ def build_scatter(sandbox: Sandbox) -> None:
     with html.Div(v_if="outline.length > 1", classes="d-flex align-center ga-2 px-3 pt-3"):
         vuetify3.VBtn(
             "{{ decals ? 'Scatter again' : 'Scatter decals' }}",
-            size="small",
             variant="tonal",
             click=sandbox.scatter,
         )
@@ -386,20 +376,17 @@ def build_pick() -> None:
 
 def build_actions(sandbox: Sandbox) -> None:
     """Build the menu of all actions, with their keys, by group."""
-    with vuetify3.VMenu(max_height=560):
-        with vuetify3.Template(v_slot_activator="{ props }"):
-            vuetify3.VBtn("Actions", v_bind="props", prepend_icon="mdi-keyboard-outline", size="small")
-        with vuetify3.VList(density="compact"):
-            for group in Group:
-                bindings = [binding for binding in KEYS.bindings if _offered(binding, group)]
-                if bindings:
-                    vuetify3.VListSubheader(group.value)
-                for binding in bindings:
-                    vuetify3.VListItem(
-                        title=binding.summary,
-                        subtitle=format_gestures(binding),
-                        click=(sandbox.perform, f"['{binding.action}']"),
-                    )
+    with menu("Actions", "mdi-keyboard-outline", max_height=560), vuetify3.VList():
+        for group in Group:
+            bindings = [binding for binding in KEYS.bindings if _offered(binding, group)]
+            if bindings:
+                vuetify3.VListSubheader(group.value)
+            for binding in bindings:
+                vuetify3.VListItem(
+                    title=binding.summary,
+                    subtitle=format_gestures(binding),
+                    click=(sandbox.perform, f"['{binding.action}']"),
+                )
 
 
 def _offered(binding: Binding, group: Group) -> bool:

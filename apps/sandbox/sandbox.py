@@ -10,8 +10,9 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from functools import wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, Concatenate, ParamSpec
 
 from PIL import Image
 
@@ -54,7 +55,7 @@ from decals.options import arguments_of
 from decals.scattering.scatter import scatter
 from decals.scenes.camera import UPRIGHT, Camera
 from decals.scenes.files import is_scene_file, load_model
-from decals.scenes.objects import MeshObject, SceneObject, bounds_of, flagged
+from decals.scenes.objects import MeshObject, SceneObject, TreeObject, bounds_of, flagged
 from decals.scenes.scene import DecalImage, Scene
 from decals.validation import describe, finite_number, one_of, whole_number
 from decals.window import EditWindow
@@ -71,6 +72,22 @@ MAX_ZOOM = 4.0
 
 MAX_HISTORY = 200
 """Most entries of the history that a page lists."""
+
+
+Arguments = ParamSpec("Arguments")
+
+
+def event(
+    method: Callable[Concatenate["Sandbox", Arguments], None],
+) -> Callable[Concatenate["Sandbox", Arguments], None]:
+    """Let an event end the steps before it, turn its errors into the message, and draw the result."""
+
+    @wraps(method)
+    def reported(sandbox: "Sandbox", /, *arguments: Arguments.args, **options: Arguments.kwargs) -> None:
+        with sandbox.reported():
+            method(sandbox, *arguments, **options)
+
+    return reported
 
 
 class Sandbox:
@@ -113,14 +130,23 @@ class Sandbox:
         lessons: Sequence[str] = (),
         start_lesson: Callable[[int], None] = lambda _: None,
     ) -> None:
-        self._window = window
+        self._window, actions = window, window.actions
+        self._state, self._trees, self._files = actions.state, actions.trees, actions.files
         self._folder = (Path() if folder is None else folder).resolve()
         self.display = Display(window)
         window.overlay.hide_status()  # the page has its own, and handles
         window.handle.visible = False
         window.redraw(whole=True)
-        files = window.actions.files
-        files.folder, files.show_view = self._folder, self.display.show_from
+        self._files.folder, self._files.show_view = self._folder, self.display.show_from
+        self._setters: dict[str, Callable[[Any, Any, bool, object], None]] = {
+            "node": self._set_parameter,
+            "display": lambda name, raw, _, index: self.display.set_option(name, raw, index),
+            "decals": lambda name, raw, last, _: set_decal_value(self._state, name, raw, last=last),
+            "brush": lambda name, raw, *_: set_brush(self._state.brush, name, raw),
+            "image": self._set_image,
+            "drawing": lambda name, raw, last, _: set_drawing(self._state, name, raw, last=last),
+            "scattering": self._set_scattering,
+        }
         self._lessons, self._start_lesson = list(lessons), start_lesson
         self.in_lesson = False
         self._before_lesson: tuple[UndoEntry | None, tuple[Any, ...]] | None = None
@@ -134,7 +160,7 @@ class Sandbox:
         self._image: int | None = None
         self._scattering: dict[str, Any] = {}
         self._background = window.document.drawing.background
-        self._outlined: tuple[Any, ...] = (None,) * 5
+        self._outlined: tuple[Any, ...] = ()
         self._measured: tuple[object, float] = None, 1.0
         self._reported_pick: tuple[object, dict[str, str]] = None, {}
 
@@ -142,10 +168,10 @@ class Sandbox:
 
     def values(self) -> dict[str, Any]:
         """Return all values of the page, by their names there."""
-        window, state = self._window, self._window.actions.state
-        session = window.session
+        window, state = self._window, self._state
+        document, session = window.document, window.session
         return {
-            "title": window.actions.files.title,
+            "title": self._files.title,
             "status": self.status,
             "refusals": state.refusals,
             "busy": window.busy,
@@ -161,35 +187,35 @@ class Sandbox:
             "gizmo": {**self.display.gizmo(), "line": self.display.selection_line()},
             "decal": {
                 "count": len(state.selection),
-                "controls": decal_controls(self._window.document, state.selection),
+                "controls": decal_controls(document, state.selection),
             },
-            "brush": brush_values(window.document, state.brush),
-            "drawing": drawing_controls(window.document.drawing),
+            "brush": brush_values(document, state.brush),
+            "drawing": drawing_controls(document.drawing),
             "scattering": scatter_controls(self._scatter_values()),
-            "image": image_values(window.document, self._shown_image),
+            "image": image_values(document, self._shown_image),
             "pick": self._pick(),
-            "decals": len(window.document.decals),
+            "decals": len(document.decals),
         }
 
     def _selected(self) -> str:
         """Return the key of the selected row."""
-        if (primitive := self._window.actions.state.primitive) is not None:
+        if (primitive := self._state.primitive) is not None:
             return key_of(*primitive)
         return "" if self._shown_image is None else f"image {self._shown_image}"
 
     def _pick(self) -> dict[str, str]:
         """Return what the last click met."""
-        state = self._window.actions.state
+        state = self._state
         if state.picked is not self._reported_pick[0]:
             pick = state.picked
-            facts = {} if pick is None else self._window.actions.trees.report(pick)
+            facts = {} if pick is None else self._trees.report(pick)
             self._reported_pick = pick, facts
         return self._reported_pick[1]
 
     @property
     def status(self) -> str:
         """The last message, and the progress of background work."""
-        state = self._window.actions.state
+        state = self._state
         parts = (
             self._window.warmup.status,
             state.background.progress,
@@ -203,9 +229,7 @@ class Sandbox:
     def catalog() -> dict[str, Any]:
         """Return the names of the kinds that can be added, by family, and what each is."""
         return {
-            "primitives": catalog.primitives(),
-            "modifiers": catalog.modifiers(),
-            "combinations": catalog.combinations(),
+            **catalog.families(),
             "custom": [kind.__name__ for kind in custom_kinds()],
             "docs": {name: first_line(kind) for name, kind in catalog.kinds().items()},
         }
@@ -215,7 +239,7 @@ class Sandbox:
         document = self._window.document
         layers = document.locked_layers, document.layer_names, document.decals.version
         shown = document.objects, document.images, *layers
-        if any(a is not b and a != b for a, b in zip(shown, self._outlined, strict=True)):
+        if shown != self._outlined:
             rows = outline(document)
             if rows != self._rows:  # a key may stand for another node now
                 self._rows, self._marked = rows, []
@@ -224,11 +248,14 @@ class Sandbox:
 
     def _panel(self) -> dict[str, Any]:
         """Return title and controls of the selected node."""
-        if self._window.actions.state.primitive is None:
-            return {"kind": "", "doc": "", "controls": [], "operands": 0}
-        node = self._window.actions.trees.selected_node
+        if self._state.primitive is None:
+            return {"kind": "", "name": "", "doc": "", "controls": [], "operands": 0}
+        (number, path), node = self._state.primitive, self._trees.selected_node
+        item = self._window.document.object(number)
+        assert isinstance(item, TreeObject)  # meshes have no nodes
         return {
             "kind": type(node).__name__,
+            "name": item.names.get(path, ""),
             "doc": first_line(type(node)),
             "controls": controls_of(node, self._size()),
             "operands": len(node.children),
@@ -236,7 +263,7 @@ class Sandbox:
 
     def _size(self) -> float:
         """Return the size of the scene when the node was selected: sliders keep their ends."""
-        selected = self._window.actions.state.primitive
+        selected = self._state.primitive
         if self._measured[0] != selected:
             low, high = bounds_of(self._window.document.objects)
             self._measured = selected, float((high - low).max())
@@ -244,60 +271,85 @@ class Sandbox:
 
     # -- events -----------------------------------------------------------------------------------------
 
+    @event
     def mark(self, key: str) -> None:
         """Mark the node of a row too, or no longer; marked nodes are grouped and removed together."""
-        with self._reported():
-            number, path = self._row(key)
-            self._window.actions.trees.select_node(number, path)
-            self._outline()  # forgets the marks of a former tree
-            key = key_of(number, path)
-            self._marked = [k for k in self._marked if k != key and self._row(k)[0] == number] + (
-                [] if key in self._marked else [key]
-            )
+        number, path = self._row(key)
+        self._trees.select_node(number, path)
+        self._outline()  # forgets the marks of a former tree
+        key = key_of(number, path)
+        self._marked = [k for k in self._marked if k != key and self._row(k)[0] == number] + (
+            [] if key in self._marked else [key]
+        )
 
+    @event
     def select(self, key: str) -> None:
         """Select a node, the root of an object, the decals of a layer, or an image; "" selects nothing."""
         self._marked, self._image = [], None
-        with self._reported():
-            state, document = self._window.actions.state, self._window.document
-            if key == "":
-                state.primitive = None
-                return
-            family, number, path = _parsed(key)
-            if family == "layer":
-                state.selection = state.selectable(_decals_of(document, number))
-            elif family == "image":
-                self._image = whole_number("image", number, 0, len(document.images) - 1, InvalidEdit)
-                state.primitive, state.selection = None, ()
-            else:
-                self._window.actions.trees.select_node(number, path)
-                self._marked = [key_of(number, path)]
+        state, document = self._state, self._window.document
+        if key == "":
+            state.primitive = None
+            return
+        family, number, path = _parsed(key)
+        if family == "layer":
+            state.selection = state.selectable(_decals_of(document, number))
+        elif family == "image":
+            self._image = whole_number("image", number, 0, len(document.images) - 1, InvalidEdit)
+            state.primitive, state.selection = None, ()
+        else:
+            self._trees.select_node(number, path)
+            self._marked = [key_of(number, path)]
 
     @property
     def _shown_image(self) -> int | None:
         """The selected image, unless something else has been selected since, or it was removed."""
-        state, count = self._window.actions.state, len(self._window.document.images)
+        state, count = self._state, len(self._window.document.images)
         kept = state.primitive is None and not state.selection and (self._image or 0) < count
         return self._image if kept else None
 
-    def set_value(self, name: str, raw: Any, last: bool = True, index: object = ()) -> None:
-        """Set a parameter of the selected node to what a control sent; see `TreeActions.set_parameter`.
+    def set_control(self, panel: str, name: str, raw: Any, last: bool = True, index: object = ()) -> None:
+        """Set what a control of a panel stands for.
 
-        ``index`` leads through lists to the number of the parameter that is set.
+        Parameters
+        ----------
+        panel
+            "node", "display", "decals", "brush", "image", "drawing" or "scattering".
+        name
+            Name of the control.
+        raw
+            What it sent.
+        last
+            False while a slider moves: all its values are one undo entry.
+        index
+            Leads through lists to the number that is set.
         """
 
         def step() -> None:
-            trees = self._window.actions.trees
-            value = exchanged(getattr(trees.selected_node, str(name), ()), index, raw)
-            trees.set_parameter(name, parsed(trees.selected_node, name, value), last=bool(last))
+            setter = self._setters[one_of("panel", panel, self._setters, InvalidEdit)]
+            setter(name, raw, bool(last), index)
 
         self._slide(step, last=bool(last))
+
+    def _set_parameter(self, name: str, raw: Any, last: bool, index: object) -> None:
+        node = self._trees.selected_node
+        value = exchanged(getattr(node, str(name), ()), index, raw)
+        self._trees.set_parameter(name, parsed(node, name, value), last=last)
+
+    def _set_image(self, name: str, raw: Any, last: bool, _index: object) -> None:
+        if (number := self._shown_image) is None:
+            raise InvalidEdit("no image is selected; click on one in the outline")
+        set_image_value(self._state, number, name, raw, last=last)
+
+    def _set_scattering(self, name: str, raw: Any, _last: bool, _index: object) -> None:
+        one_of("option", name, self._scatter_values(), InvalidEdit)
+        self._scattering[name] = parsed_option(scatter, name, raw)
+        self._state.show(f"set {name}")
 
     def _slide(self, step: Callable[[], None], *, last: bool) -> None:
         """Carry out a step of a slider; while it moves, only the newest one, before the next frame."""
 
         def reported() -> None:
-            with self._reported(whole=last):
+            with self.reported(whole=last):
                 step()
                 self._last_step = math.inf if last else time.monotonic()
 
@@ -317,8 +369,8 @@ class Sandbox:
         """End the moves of a slider whose browser has left, as one entry of the history."""
         self.take_step()
         self._last_step = math.inf
-        with self._reported():
-            self._window.actions.trees.end_drag()
+        with self.reported():
+            self._trees.end_drag()
 
     def settle(self) -> None:
         """Keep the view up to date, and end the edit of a slider that has rested; call this regularly."""
@@ -337,50 +389,46 @@ class Sandbox:
             lambda: self.display.drag_handle(name, phase, x, y, snap=bool(snap)), last=phase != "move"
         )
 
+    @event
     def add(self, kind: str) -> None:
         """Add a primitive of a kind: blended to the selected node, or as an object."""
-        with self._reported():
-            name = catalog.checked_kind(kind).__name__
-            self._window.actions.trees.add_node(
-                name, lambda center, size: catalog.new_node(name, center=center, size=size)
-            )
+        name = catalog.checked_kind(kind).__name__
+        self._trees.add_node(name, lambda center, size: catalog.new_node(name, center=center, size=size))
 
+    @event
     def wrap(self, kind: str) -> None:
         """Put the selected node under a new node with one operand, such as a warp."""
-        with self._reported():
-            catalog.checked_kind(kind)
+        catalog.checked_kind(kind)
 
-            def wrapped(node: Node) -> Node:
-                low, high = node.bounds
-                return catalog.new_node(kind, (node,), size=float((high - low).max()))
+        def wrapped(node: Node) -> Node:
+            low, high = node.bounds
+            return catalog.new_node(kind, (node,), size=float((high - low).max()))
 
-            self._window.actions.trees.replace_node(wrapped)
+        self._trees.replace_node(wrapped)
 
+    @event
     def combine(self, kind: str) -> None:
         """Combine the operands of the selected node in another way."""
-        with self._reported():
-            node = self._window.actions.trees.selected_node
-            if len(node.children) < 2:
-                raise InvalidEdit(
-                    f"select a node with two or more operands; a {type(node).__name__} has fewer"
-                )
-            self._window.actions.trees.replace_node(lambda node: catalog.new_node(kind, node.children))
+        node = self._trees.selected_node
+        if len(node.children) < 2:
+            raise InvalidEdit(f"select a node with two or more operands; a {type(node).__name__} has fewer")
+        self._trees.replace_node(lambda node: catalog.new_node(kind, node.children))
 
+    @event
     def unwrap(self) -> None:
         """Replace the selected node by its only operand."""
-        with self._reported():
-            node = self._window.actions.trees.selected_node
-            if len(node.children) != 1:
-                raise InvalidEdit(
-                    f"select a node with one operand; a {type(node).__name__} has {len(node.children)}"
-                )
-            self._window.actions.trees.replace_node(lambda node: node.children[0])
+        node = self._trees.selected_node
+        if len(node.children) != 1:
+            raise InvalidEdit(
+                f"select a node with one operand; a {type(node).__name__} has {len(node.children)}"
+            )
+        self._trees.replace_node(lambda node: node.children[0])
 
+    @event
     def perform(self, action: str) -> None:
         """Carry out an action of the key table at the middle of the view."""
-        with self._reported():
-            width, height = self._window.plotter.window_size
-            self._window.actions.perform(action, lambda: self._window.tools.at(width / 2, height / 2))
+        width, height = self._window.plotter.window_size
+        self._window.actions.perform(action, lambda: self._window.tools.at(width / 2, height / 2))
 
     def go_to(self, entry: int) -> None:
         """End a drag, then undo or redo until so many entries of the history are done."""
@@ -392,7 +440,7 @@ class Sandbox:
             while len(session.labels) < number and session.redo() is not None:
                 pass
 
-        with self._reported():
+        with self.reported():
             total = len(session.labels) + len(session.undone_labels)
             number = whole_number("history", entry, 0, total, InvalidEdit)
             self._when_idle(step)
@@ -406,7 +454,7 @@ class Sandbox:
             step()
 
         if self._window.session.stroke_open:
-            self._window.actions.trees.end_drag()
+            self._trees.end_drag()
         background.when_followed(followed)
 
     # -- files ------------------------------------------------------------------------------------------
@@ -415,15 +463,15 @@ class Sandbox:
         """Show or hide the start page."""
         self._start = {"open": bool(shown), **values_of_start(self._folder, SAMPLES, self._lessons)}
 
+    @event
     def open_lesson(self, number: int) -> None:
         """Start one of the lessons."""
-        with self._reported():
-            number = whole_number("lesson", number, 0, len(self._lessons) - 1, InvalidEdit)
-            self._window.background.require_idle()
-            if not self.in_lesson and self._window.document.objects:
-                self._before_lesson = self._window.session.next_undo, self.display.kept_camera()
-            self._start_lesson(number)
-            self.in_lesson, self._start = True, {**self._start, "open": False}
+        number = whole_number("lesson", number, 0, len(self._lessons) - 1, InvalidEdit)
+        self._window.background.require_idle()
+        if not self.in_lesson and self._window.document.objects:
+            self._before_lesson = self._window.session.next_undo, self.display.kept_camera()
+        self._start_lesson(number)
+        self.in_lesson, self._start = True, {**self._start, "open": False}
 
     def close_lesson(self) -> None:
         """Leave the lesson and go back to the scene before it; without one, that of the lesson stays."""
@@ -439,45 +487,43 @@ class Sandbox:
                 session.undo()
             self.display.restore_camera(camera)
 
-        with self._reported():
+        with self.reported():
             self._when_idle(step)
 
+    @event
     def new_model(self) -> None:
         """Begin an empty scene."""
-        with self._reported():
-            self._open(_given(empty_scene(FIRST_IMAGES, UPRIGHT["y"])), new_file(self._folder, "scene"))
+        self._open(_given(empty_scene(FIRST_IMAGES, UPRIGHT["y"])), new_file(self._folder, "scene"))
 
+    @event
     def open_sample(self, name: str) -> None:
         """Open a sample with scattered decals."""
-        with self._reported():
-            one_of("sample", name, SAMPLES, InvalidEdit)
+        one_of("sample", name, SAMPLES, InvalidEdit)
 
-            def load(progress: Progress, _cancel: Cancel) -> Scene:
-                direction = axes_of(name).preset(THREE_QUARTER)
-                return cover(sample(name), images=FIRST_IMAGES, view_direction=direction, progress=progress)
+        def load(progress: Progress, _cancel: Cancel) -> Scene:
+            direction = axes_of(name).preset(THREE_QUARTER)
+            return cover(sample(name), images=FIRST_IMAGES, view_direction=direction, progress=progress)
 
-            self._open(load, new_file(self._folder, f"{name}-decals"))
+        self._open(load, new_file(self._folder, f"{name}-decals"))
 
+    @event
     def open_file(self, name: str) -> None:
         """Open a file of the folder: a scene, or a model, to which decals can be added."""
-        with self._reported():
-            if not isinstance(name, str) or Path(name).suffix.lower() not in MODELS:
-                raise InvalidEdit(
-                    f"file: expected a name that ends in {', '.join(MODELS)}, got {describe(name)}"
-                )
-            path = self._window.actions.files.inside(name)
-            unsaved = self._window.actions.files.inside(recovery_path(path))  # a link could lead elsewhere
-            if not path.exists() and not unsaved.is_file():
-                raise InvalidEdit(f"expected a file of the folder, found no {name!r}")
+        if not isinstance(name, str) or Path(name).suffix.lower() not in MODELS:
+            raise InvalidEdit(f"file: expected a name that ends in {', '.join(MODELS)}, got {describe(name)}")
+        path = self._files.inside(name)
+        unsaved = self._files.inside(recovery_path(path))  # a link could lead elsewhere
+        if not path.exists() and not unsaved.is_file():
+            raise InvalidEdit(f"expected a file of the folder, found no {name!r}")
 
-            def load(_progress: Progress, _cancel: Cancel) -> Scene:
-                if not path.exists():  # the recovery file has everything
-                    return empty_scene(FIRST_IMAGES, UPRIGHT["y"])
-                found = load_model(path)
-                return found if isinstance(found, Scene) else _bare_scene(found)
+        def load(_progress: Progress, _cancel: Cancel) -> Scene:
+            if not path.exists():  # the recovery file has everything
+                return empty_scene(FIRST_IMAGES, UPRIGHT["y"])
+            found = load_model(path)
+            return found if isinstance(found, Scene) else _bare_scene(found)
 
-            is_scene = path.suffix == ".json" and (not path.exists() or is_scene_file(path))
-            self._open(load, path if is_scene else new_file(self._folder, f"{path.stem}-decals"))
+        is_scene = path.suffix == ".json" and (not path.exists() or is_scene_file(path))
+        self._open(load, path if is_scene else new_file(self._folder, f"{path.stem}-decals"))
 
     def upload(self, files: object, key: str = "") -> None:
         """Take files that were dropped on the page: images and models are added, a scene is opened.
@@ -485,7 +531,7 @@ class Sandbox:
         An image that was dropped on the row of a layer shows on its decals, on that of an image replaces it.
         """
         for file in files if isinstance(files, list | tuple) else [files]:
-            with self._reported():
+            with self.reported():
                 found, window = read_upload(file), self._window
                 name = plain_name(str(file["name"]))  # type: ignore[index]  # read_upload has checked it
                 if isinstance(found, Scene):
@@ -502,7 +548,7 @@ class Sandbox:
     def _take_image(self, image: DecalImage, key: str) -> None:
         """Add an image that was dropped on a row, or replace that of the row."""
         family, row, _ = _parsed(key) if key else ("", 0, ())
-        session, state = self._window.session, self._window.actions.state
+        session, state = self._window.session, self._state
         count, shown = len(session.document.images), ""
         if family == "image":
             state.run(ReplaceImage(row, image))
@@ -521,9 +567,10 @@ class Sandbox:
             if first:
                 self.move_camera("frame")
 
-        self._window.actions.state.run(AddObject(item), added)
+        self._state.run(AddObject(item), added)
         self._start = {**self._start, "open": False}
 
+    @event
     def write_file(
         self, name: str, replace_existing: bool = False, size: object = "", video: str = "turntable"
     ) -> None:
@@ -531,51 +578,45 @@ class Sandbox:
 
         A picture without a size, such as "1920 x 1080", is what the view shows, with its mode and overlays.
         """
-        with self._reported():
-            if not isinstance(name, str) or not name.strip():
-                raise InvalidEdit(f"file: expected a name, such as model.json, got {describe(name)}")
-            files, replaced = self._window.actions.files, bool(replace_existing)
-            numbers = [int(digits[:6]) for digits in re.findall(r"\d+", str(size))]
-            if len(numbers) == 2:
-                files.write(name.strip(), replaced, size=(numbers[0], numbers[1]), video=video)
-            elif Path(name).suffix.lower() in PICTURE_SUFFIXES:
-                self._save_picture(name, replaced)
-            else:
-                files.write(name.strip(), replaced, video=video)
+        if not isinstance(name, str) or not name.strip():
+            raise InvalidEdit(f"file: expected a name, such as model.json, got {describe(name)}")
+        files, replaced = self._files, bool(replace_existing)
+        numbers = [int(digits[:6]) for digits in re.findall(r"\d+", str(size))]
+        if len(numbers) == 2:
+            files.write(name.strip(), replaced, size=(numbers[0], numbers[1]), video=video)
+        elif Path(name).suffix.lower() in PICTURE_SUFFIXES:
+            self._save_picture(name, replaced)
+        else:
+            files.write(name.strip(), replaced, video=video)
 
     def _save_picture(self, name: str, replace_existing: bool) -> None:
-        path = self._window.actions.files.inside(name)
+        path = self._files.inside(name)
         if path.exists() and not replace_existing:
             raise InvalidEdit(f"{path} exists; write it again to replace it")
         if not path.parent.is_dir():
             raise InvalidEdit(f"expected a file in an existing folder, got {name!r}")
         pixels = self._window.plotter.screenshot(None, return_img=True)
         Image.fromarray(pixels[..., :3]).save(path)
-        self._window.actions.state.show(f"saved the picture to {path.name}")
+        self._state.show(f"saved the picture to {path.name}")
 
     def _open(self, load: Callable[[Progress, Cancel], Scene], path: Path) -> None:
         self.in_lesson, self._before_lesson = False, None
-        self._window.actions.files.open(load, path)
+        self._files.open(load, path)
         self._start = {**self._start, "open": False}
         self.display.bookmarks.clear()
 
     # -- view, decals and outline -----------------------------------------------------------------------
 
-    def set_display(self, name: str, value: Any, _last: bool = True, index: object = ()) -> None:
-        """Set how the view shows the scene; see `Display.set_option`."""
-        with self._reported():
-            self.display.set_option(name, value, index)
-
+    @event
     def move_camera(self, name: str, value: Any = None) -> None:
         """Move the camera: "frame", "look" from a side, "keep" a bookmark, or "go" to one."""
-        with self._reported():
-            moves: dict[str, Callable[[], None]] = {
-                "frame": lambda: self._window.actions.view.frame(lambda: None),
-                "look": lambda: self._window.actions.view.look_from(value),
-                "keep": self.display.add_bookmark,
-                "go": lambda: self.display.go_to_bookmark(value),
-            }
-            moves[one_of("camera", name, moves, InvalidEdit)]()
+        moves: dict[str, Callable[[], None]] = {
+            "frame": lambda: self._window.actions.view.frame(lambda: None),
+            "look": lambda: self._window.actions.view.look_from(value),
+            "keep": self.display.add_bookmark,
+            "go": lambda: self.display.go_to_bookmark(value),
+        }
+        moves[one_of("camera", name, moves, InvalidEdit)]()
 
     def pinch(self, right: object, up: object, factor: object, phase: str) -> None:
         """Move the scene in heights of the view and enlarge it, as two fingers do.
@@ -587,7 +628,7 @@ class Sandbox:
         phase
             "begin", which cancels what the first finger did alone, "move", or "end".
         """
-        with self._reported(whole=phase == "end"):
+        with self.reported(whole=phase == "end"):
             one_of("phase", phase, PHASES, InvalidEdit)
             if phase == "begin":
                 self._window.cancel_press()
@@ -596,51 +637,20 @@ class Sandbox:
             ratio = min(max(ratio, 1.0 / MAX_ZOOM), MAX_ZOOM)
             self._window.camera.move_and_zoom(min(max(moved, -1.0), 1.0), min(max(raised, -1.0), 1.0), ratio)
 
+    @event
     def scatter(self) -> None:
         """Cover the object of the selected node, or every object, with decals; each time another seed."""
-        with self._reported():
-            state, values = self._window.actions.state, self._scatter_values()
-            objects = range(len(self._window.document.objects))
-            numbers = tuple(objects) if state.primitive is None else (state.primitive[0],)
-            self._window.actions.decals.scatter_over(numbers, **arguments_of(scatter, values))
-            self._scattering["seed"] = values["seed"] + 1
+        state, values = self._state, self._scatter_values()
+        objects = range(len(self._window.document.objects))
+        numbers = tuple(objects) if state.primitive is None else (state.primitive[0],)
+        self._window.actions.decals.scatter_over(numbers, **arguments_of(scatter, values))
+        self._scattering["seed"] = values["seed"] + 1
 
     def _scatter_values(self) -> dict[str, Any]:
         """Return the options of the next scattering: those that were set, else the first ones."""
         return first_scatter_values(len(self._window.document.decals)) | self._scattering
 
-    def set_scattering(self, name: str, raw: Any, _last: bool = True) -> None:
-        """Set an option of the next scattering."""
-        with self._reported():
-            one_of("option", name, self._scatter_values(), InvalidEdit)
-            self._scattering[name] = parsed_option(scatter, name, raw)
-            self._window.actions.state.show(f"set {name}")
-
-    def set_drawing(self, name: str, raw: Any, last: bool = True) -> None:
-        """Set how the scene is drawn: contact mode, mapping, background and more."""
-        state = self._window.actions.state
-        self._slide(lambda: set_drawing(state, name, raw, last=bool(last)), last=bool(last))
-
-    def set_image(self, name: str, raw: Any, last: bool = True) -> None:
-        """Set a number of the material of the selected image."""
-
-        def step() -> None:
-            if (number := self._shown_image) is None:
-                raise InvalidEdit("no image is selected; click on one in the outline")
-            set_image_value(self._window.actions.state, number, name, raw, last=bool(last))
-
-        self._slide(step, last=bool(last))
-
-    def set_decals(self, name: str, raw: Any, last: bool = True) -> None:
-        """Set a value of the selected decals to what a control sent."""
-        state = self._window.actions.state
-        self._slide(lambda: set_decal_value(state, name, raw, last=bool(last)), last=bool(last))
-
-    def set_brush(self, name: str, raw: Any, _last: bool = True) -> None:
-        """Set the brush, or one of its numbers."""
-        with self._reported():
-            set_brush(self._window.actions.state.brush, name, raw)
-
+    @event
     def change_row(self, key: str, change: str, value: Any = None) -> None:
         """Change what a row of the outline stands for.
 
@@ -656,63 +666,62 @@ class Sandbox:
         value
             New name; or the key of the row to which a row is moved: a node, or the layer of an image.
         """
-        with self._reported():
-            family, number, path = _parsed(key)
-            actions, document = self._window.actions, self._window.document
-            run, flag = actions.state.run, {"hide": "hidden", "lock": "locked"}.get(str(change), "")
-            marked = self._marked if key in self._marked else [key]
-            match family, change:
-                case "layer", "hide" | "lock":
-                    actions.visibility.flag_layer(flag, number)
-                case "layer", "isolate":
-                    actions.visibility.isolate_layer(number)
-                case "layer", "remove":
-                    run(DeleteDecals(_decals_of(document, number)))
-                case "layer", "rename":
-                    run(RenameLayer(number, value))
-                case "image", "remove":
-                    run(RemoveImage(number))
-                case "image", "move":
-                    self._show_image(number, value)
-                case "object" | "node", "hide" | "lock":
-                    for row in marked:
-                        actions.visibility.flag_node(flag, *self._row(row))
-                case "object" | "node", "isolate":
-                    actions.visibility.isolate_node(number, path)
-                case "node", "rename":
-                    run(RenameNode(number, path, value))
-                case "node", "group":
-                    actions.trees.group_nodes(number, [self._row(other)[1] for other in marked])
-                case "node", "remove" if len(marked) > 1:
-                    actions.trees.delete_nodes(number, [self._row(other)[1] for other in marked])
-                case "node", "remove" | "duplicate" | "move":
-                    target = self._row(value) if change == "move" else (number, ())
-                    if target[0] != number:
-                        raise InvalidEdit("a node can be moved inside its own object only")
-                    actions.trees.select_node(number, path)
-                    if change == "move":
-                        actions.trees.move_node(target[1])
-                    elif change == "remove":
-                        actions.trees.delete_selected()
-                    else:
-                        actions.trees.duplicate_selected()
-                case "object", "rename":
-                    run(RenameObject(number, value))
-                case "object", "remove":
-                    run(RemoveObject(number))
-                case "object", "duplicate":
-                    item = document.object(number)
-                    name = unused(item.name, {other.name for other in document.objects})
-                    run(AddObject(flagged(item, name=name)))
-                case _:
-                    raise InvalidEdit(f"change: {describe(change)} is none for {describe(key)}")
+        family, number, path = _parsed(key)
+        actions, document = self._window.actions, self._window.document
+        run, flag = actions.state.run, {"hide": "hidden", "lock": "locked"}.get(str(change), "")
+        marked = self._marked if key in self._marked else [key]
+        match family, change:
+            case "layer", "hide" | "lock":
+                actions.visibility.flag_layer(flag, number)
+            case "layer", "isolate":
+                actions.visibility.isolate_layer(number)
+            case "layer", "remove":
+                run(DeleteDecals(_decals_of(document, number)))
+            case "layer", "rename":
+                run(RenameLayer(number, value))
+            case "image", "remove":
+                run(RemoveImage(number))
+            case "image", "move":
+                self._show_image(number, value)
+            case "object" | "node", "hide" | "lock":
+                for row in marked:
+                    actions.visibility.flag_node(flag, *self._row(row))
+            case "object" | "node", "isolate":
+                actions.visibility.isolate_node(number, path)
+            case "node", "rename":
+                run(RenameNode(number, path, value))
+            case "node", "group":
+                actions.trees.group_nodes(number, [self._row(other)[1] for other in marked])
+            case "node", "remove" if len(marked) > 1:
+                actions.trees.delete_nodes(number, [self._row(other)[1] for other in marked])
+            case "node", "remove" | "duplicate" | "move":
+                target = self._row(value) if change == "move" else (number, ())
+                if target[0] != number:
+                    raise InvalidEdit("a node can be moved inside its own object only")
+                actions.trees.select_node(number, path)
+                if change == "move":
+                    actions.trees.move_node(target[1])
+                elif change == "remove":
+                    actions.trees.delete_selected()
+                else:
+                    actions.trees.duplicate_selected()
+            case "object", "rename":
+                run(RenameObject(number, value))
+            case "object", "remove":
+                run(RemoveObject(number))
+            case "object", "duplicate":
+                item = document.object(number)
+                name = unused(item.name, {other.name for other in document.objects})
+                run(AddObject(flagged(item, name=name)))
+            case _:
+                raise InvalidEdit(f"change: {describe(change)} is none for {describe(key)}")
 
     def _show_image(self, number: int, key: object) -> None:
         """Let the decals of a layer show an image."""
         family, layer, _ = _parsed(key)
         if family != "layer":
             raise InvalidEdit(f"an image can be moved onto a layer only, got {describe(key)}")
-        self._window.actions.state.run(_showing(self._window.document, number, layer))
+        self._state.run(_showing(self._window.document, number, layer))
 
     @staticmethod
     def _row(key: object) -> tuple[int, TreePath]:
@@ -723,13 +732,13 @@ class Sandbox:
         return number, path
 
     @contextmanager
-    def _reported(self, *, whole: bool = True) -> Iterator[None]:
+    def reported(self, *, whole: bool = True) -> Iterator[None]:
         """Turn errors of the event into the message, and draw the result; an event ends the steps before."""
         self.take_step()
         try:
             yield
         except ImplicitDecalsError as error:
-            self._window.actions.state.refuse(error)
+            self._state.refuse(error)
         self._window.redraw(whole=whole)
 
 

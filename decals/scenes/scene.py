@@ -291,7 +291,7 @@ class Scene:
         """
         return decals.render(self, **options)
 
-    def measure(self, **options: Any) -> "decals.Measures":
+    def measure(self, **options: Any) -> Any:
         """Measure how the decals lie; options and errors are those of `decals.measure`.
 
         Examples

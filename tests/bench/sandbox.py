@@ -143,7 +143,7 @@ async def _on_server(
     page.sandbox.select(point)
     for step in range(events):
         await asyncio.sleep(REST_SECONDS)
-        page.sandbox.set_value("radius", 1.0 + 0.05 * (1 + step % 2), last=False)
+        page.sandbox.set_control("node", "radius", 1.0 + 0.05 * (1 + step % 2), last=False)
     await asyncio.sleep(REST_SECONDS)
     figures |= _summary("server_slider", on_server)
     page.sandbox.select("")

@@ -191,7 +191,7 @@ async def sandbox(picture: str | None = None) -> None:
         await browser.locator(".cube polygon").filter(has_text=re.compile("^right view")).click()
         await until(lambda: np.allclose(plotter.camera.direction, (-1, 0, 0), atol=1e-6))
         await browser.get_by_role("button", name="View", exact=True).click()
-        await choose(browser, "slice axis", "y")
+        await choose(browser, "slice", "y")
         await browser.keyboard.press("Escape")
         await until(lambda: normal() is not None)
         before = normal()

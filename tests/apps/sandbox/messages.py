@@ -35,7 +35,7 @@ UNDONE = ("close", "camera", "move", "add_image", "save", "save_as", "export")
 ACTIONS = [binding.action for binding in KEYS.bindings if binding.action not in UNDONE]
 KINDS = ["Point", "Torus", "Box", "Twist", "Offset", "Union", "Difference", "Nothing"]
 NAMES = ["radius", "center", "degrees", "color", "opacity", "layer", "image", "tint", "spill", "interaction"]
-OPTIONS = ["mode", "overlay", "slice_axis", "slice_position", "slice_normal", "up", "orthographic", "axes"]
+OPTIONS = ["mode", "overlay", "slice", "slice_position", "slice_normal", "up", "orthographic", "axes"]
 SHOWN = ["traced", "polygonized", "normals", "none", "seeds", "owners", "folds", "contact lines", "x", "z"]
 CHANGES = ["rename", "remove", "duplicate", "move", "group", "hide", "lock", "isolate"]
 HANDLES = ["move", "move x", "turn y", "scale", "start 0", "slice", "tilt slice"]
@@ -43,7 +43,13 @@ EVENTS: dict[str, list[list[Any]]] = {
     "select": [KEYS_OF_ROWS],
     "mark": [KEYS_OF_ROWS],
     "open_lesson": [[0, 1]],
-    "set_value": [NAMES, [0.2, 0.9, "3", [0, 0, 1], "#ff0000"], [True, False], [[], [], [0], [1], [9]]],
+    "set_control node": [
+        ["node"],
+        NAMES,
+        [0.2, 0.9, "3", [0, 0, 1], "#ff0000"],
+        [True, False],
+        [[], [], [0], [1], [9]],
+    ],
     "scatter": [],
     "add": [KINDS],
     "wrap": [KINDS],
@@ -51,21 +57,44 @@ EVENTS: dict[str, list[list[Any]]] = {
     "unwrap": [],
     "perform": [ACTIONS],
     "go_to": [[0, 1, 2, 3, 5]],
-    "set_display": [OPTIONS, [*SHOWN, 0.3, True, False], [True, False], [[], [], [0], [1], [9]]],
+    "set_control display": [
+        ["display"],
+        OPTIONS,
+        [*SHOWN, 0.3, True, False],
+        [True, False],
+        [[], [], [0], [1], [9]],
+    ],
     "pinch": [[0.1, 0.0], [-0.2, 0.0], [0.5, 1.0, 3.0], ["begin", "move", "end"]],
     "move_camera": [["frame", "look", "keep", "go"], ["front", "top", 0, 3]],
-    "set_decals": [NAMES, [0.1, 0.5, 2, "overlap", "tint alone", "#0000ff", True], [True, False]],
-    "set_brush": [["brush", "radius", "density"], ["select", "scatter", "push", "lasso", 0.3]],
-    "set_drawing": [["contact", "mapping", "stiffness", "filtered"], ["product", "elastic", "walked", 2.0]],
-    "set_scattering": [["count", "factor", "sizing", "jitter.size"], [3, "10", 0.5, "touching"]],
-    "set_image": [["roughness", "relief"], [0.2, 0.5], [True, False]],
+    "set_control decals": [
+        ["decals"],
+        NAMES,
+        [0.1, 0.5, 2, "overlap", "tint alone", "#0000ff", True],
+        [True, False],
+    ],
+    "set_control brush": [
+        ["brush"],
+        ["brush", "radius", "density"],
+        ["select", "scatter", "push", "lasso", 0.3],
+    ],
+    "set_control drawing": [
+        ["drawing"],
+        ["contact", "mapping", "stiffness", "filtered"],
+        ["product", "elastic", "walked", 2.0],
+    ],
+    "set_control scattering": [
+        ["scattering"],
+        ["count", "factor", "sizing", "jitter.size"],
+        [3, "10", 0.5, "touching"],
+    ],
+    "set_control image": [["image"], ["roughness", "relief"], [0.2, 0.5], [True, False]],
     "change_row": [KEYS_OF_ROWS, CHANGES, ["name", "0/1", "0"]],
     "drag_handle": [HANDLES, ["begin", "move", "end"], [0.1, 0.5, 0.8], [0.3, 0.6], [True, False]],
     "open_file": [["../x.json", "none.json", "a\0.json"]],
     "write_file": [["../x.py", "x.exe", "no/x.json"]],
     "upload": [[[{}], [{"name": "a.ply", "content": b"x"}], 3], KEYS_OF_ROWS],
 }
-"""Arguments of the page's events."""
+"""Arguments of the page's events, by their names; a second word tells two kinds of one event apart."""
 
 WAIT_SECONDS = 60.0
 """Longest time until an answer comes, and until background work ends."""
@@ -218,7 +247,7 @@ class Messages:
             await self._answer(f"{name} {arguments[:1]}"[:40], self._trigger(number, name, *arguments))
 
     def _trigger(self, number: int, name: str, *arguments: Any) -> Awaitable[Any]:
-        return self._browsers[number].trigger(getattr(self._page.sandbox, name), *arguments)
+        return self._browsers[number].trigger(getattr(self._page.sandbox, name.split()[0]), *arguments)
 
     def _mouse(self, number: int, action: str = "") -> Awaitable[Any]:
         at = self._rng.uniform(0, SIZE[0]), self._rng.uniform(0, SIZE[1])

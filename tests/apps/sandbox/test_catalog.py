@@ -14,7 +14,7 @@ KINDS = [*catalog.built_in_kinds(), "Ring", "Soft"]
 
 
 def test_every_built_in_class_is_offered_once() -> None:
-    families = [catalog.primitives(), catalog.modifiers(), catalog.combinations()]
+    families = [*catalog.families().values()]
     names = [name for family in families for name in family]
     assert len(names) == len(set(names))
     left_out = {NODE_KINDS[tag].__name__ for tag in catalog.NOT_OFFERED}
@@ -24,7 +24,7 @@ def test_every_built_in_class_is_offered_once() -> None:
 @pytest.mark.slow_cases("GradientBlend")
 @pytest.mark.parametrize("name", KINDS)
 def test_a_new_node_has_a_surface(name: str) -> None:
-    count = catalog.operand_count(catalog.kinds()[name])
+    count = catalog.operand_range(catalog.kinds()[name])[0]
     low, high = catalog.new_node(name, OPERANDS[:count]).bounds
     assert (high > low).all()
 
@@ -38,8 +38,8 @@ def test_a_new_primitive_stands_where_it_is_wanted(name: str) -> None:
 
 
 def test_custom_kinds_are_offered() -> None:
-    assert Ring.__name__ in catalog.primitives()
-    assert Soft.__name__ in catalog.combinations()
+    assert Ring.__name__ in catalog.families()["primitives"]
+    assert Soft.__name__ in catalog.families()["combinations"]
     ring: Node = catalog.new_node("Ring")
     assert isinstance(ring, Ring)
 

@@ -194,7 +194,7 @@ def test_a_browser_that_leaves_in_a_drag_ends_it_as_one_entry(
             await other.close()
         browser = await connect()
         await browser.trigger(page.sandbox.select, "0/1")
-        await browser.trigger(page.sandbox.set_value, "radius", 0.7, False)
+        await browser.trigger(page.sandbox.set_control, "node", "radius", 0.7, False)
         await browser.close()
         await until(lambda: window.session.labels[2:] == ("set radius",) and not window.session.stroke_open)
         page.sandbox.go_to(0)
@@ -219,8 +219,8 @@ def test_malformed_messages_are_refused_without_an_exception(
                 for value in odd:
                     await browser.call(name, *[value] * count)
         for value in odd:
-            await browser.trigger(page.sandbox.set_value, value)
-            await browser.trigger(page.sandbox.set_value, value, value, value)
+            await browser.trigger(page.sandbox.set_control, "node", value)
+            await browser.trigger(page.sandbox.set_control, "node", value, value, value)
         changes = [{"key": key, "value": "<b>x</b>"} for key in [*templates, "driving"]]
         await browser.call("trame.state.update", changes)
         assert {key: page._server.state[key] for key in templates} == templates

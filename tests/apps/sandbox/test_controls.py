@@ -21,7 +21,7 @@ KINDS = list(catalog.built_in_kinds())
 
 
 def made(name: str) -> Node:
-    return catalog.new_node(name, OPERANDS[: catalog.operand_count(catalog.kinds()[name])])
+    return catalog.new_node(name, OPERANDS[: catalog.operand_range(catalog.kinds()[name])[0]])
 
 
 @pytest.mark.parametrize("name", KINDS)

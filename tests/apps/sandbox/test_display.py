@@ -40,8 +40,8 @@ def shared(vtk_display: None) -> Iterator[EditWindow]:
 def sandbox(shared: EditWindow) -> Iterator[Sandbox]:
     sandbox = Sandbox(shared)
     yield sandbox
-    for name, value in (("mode", "traced"), ("overlay", "none"), ("slice_axis", "none")):
-        sandbox.set_display(name, value)
+    for name, value in (("mode", "traced"), ("overlay", "none"), ("slice", "none")):
+        sandbox.set_control("display", name, value)
     settle(sandbox, shared)
     sandbox.go_to(0)
     shared.actions.state.selection, shared.actions.state.primitive = (), None
@@ -67,10 +67,10 @@ def test_every_mode_and_overlay_changes_the_picture_and_all_go_back(
     pictures = [picture(shared)]
     choices: list[tuple[str, Any]] = [("mode", mode) for mode in MODES[1:]] + [("mode", MODES[0])]
     choices += [("overlay", overlay) for overlay in OVERLAYS[1:] if overlay != "folds"]
-    choices += [("overlay", "none"), ("slice_axis", "z"), ("slice_position", -0.3)]
-    choices += [("slice_normal", (1.0, 0.0, 2.0)), ("slice_axis", "none")]
+    choices += [("overlay", "none"), ("slice", "z"), ("slice_position", -0.3)]
+    choices += [("slice_normal", (1.0, 0.0, 2.0)), ("slice", "none")]
     for name, value in choices:
-        sandbox.set_display(name, value)
+        sandbox.set_control("display", name, value)
         settle(sandbox, shared)
         drawn = picture(shared)
         if value in ("traced", "none", ""):
@@ -78,14 +78,14 @@ def test_every_mode_and_overlay_changes_the_picture_and_all_go_back(
         else:
             assert all(np.abs(drawn - other).mean() > 0.3 for other in pictures), (name, value)
             pictures.append(drawn)
-    sandbox.set_display("overlay", "folds")
+    sandbox.set_control("display", "overlay", "folds")
     settle(sandbox, shared)
     assert "triangles folded" in sandbox.status
 
 
 def test_dragged_primitives_snap(sandbox: Sandbox, shared: EditWindow) -> None:
     sandbox.select("0/1")
-    sandbox.set_display("snap", 0.25)
+    sandbox.set_control("display", "snap", 0.25)
     trees = shared.actions.trees
     before = np.array(trees.selected_node.center)  # type: ignore[attr-defined]
     trees.begin_drag()
@@ -96,18 +96,18 @@ def test_dragged_primitives_snap(sandbox: Sandbox, shared: EditWindow) -> None:
     np.testing.assert_allclose(after - before, (0.25, 0.0, 0.5), atol=1e-6)
     wrong: list[Any] = [-1.0, float("nan"), "far", None]
     for value in wrong:
-        sandbox.set_display("snap", value)
+        sandbox.set_control("display", "snap", value)
         assert "snap: expected" in sandbox.status
-    sandbox.set_display("snap", 0.0)
+    sandbox.set_control("display", "snap", 0.0)
     controls = {control["name"]: control["value"] for control in sandbox.values()["display"]["controls"]}
     assert controls["snap"] == 0.0
 
 
 def test_a_former_mode_keeps_no_mesh(sandbox: Sandbox, shared: EditWindow) -> None:
-    sandbox.set_display("mode", "polygonized")
+    sandbox.set_control("display", "mode", "polygonized")
     settle(sandbox, shared)
     actor = shared.plotter.actors["sandbox mesh"]
-    sandbox.set_display("mode", "traced")
+    sandbox.set_control("display", "mode", "traced")
     settle(sandbox, shared)
     with pytest.raises(InvalidScene, match="expected an actor with decals"):
         shared.subplot.remove(actor)
@@ -117,7 +117,7 @@ def test_near_and_far_planes_follow_a_growing_model(sandbox: Sandbox, shared: Ed
     camera = shared.subplot.vtk_renderer.camera
     near, far = camera.clipping_range
     sandbox.select("0/1")
-    sandbox.set_value("center", -60.0, index=[2])
+    sandbox.set_control("node", "center", -60.0, index=[2])
     finish(shared)
     shared.plotter.render()
     assert camera.clipping_range[1] > far
@@ -125,7 +125,7 @@ def test_near_and_far_planes_follow_a_growing_model(sandbox: Sandbox, shared: Ed
 
 
 def test_overlays_follow_edits(sandbox: Sandbox, shared: EditWindow) -> None:
-    sandbox.set_display("overlay", "seeds")
+    sandbox.set_control("display", "overlay", "seeds")
     settle(sandbox, shared)
     assert "40 seeds" in sandbox.status
     shared.actions.state.selection = (3,)
@@ -143,7 +143,7 @@ def test_cameras(sandbox: Sandbox, shared: EditWindow) -> None:
         toward = np.array(camera.position) - camera.focal_point
         preset = np.array(PRESETS[name])
         np.testing.assert_allclose(toward / np.linalg.norm(toward), preset / np.linalg.norm(preset))
-    sandbox.set_display("orthographic", True)
+    sandbox.set_control("display", "orthographic", True)
     assert camera.parallel_projection
     sandbox.move_camera("go", 0)
     assert camera.position == kept
@@ -166,16 +166,16 @@ def test_cameras(sandbox: Sandbox, shared: EditWindow) -> None:
     for name, value in wrong:
         sandbox.move_camera(name, value)
         assert "expected" in sandbox.status
-    sandbox.set_display("slice_axis", "tilted")
+    sandbox.set_control("display", "slice", "tilted")
     wrong = [("mode", "x"), ("overlay", None), ("slice_position", "x"), ("slice_position", float("inf"))]
-    wrong += [("slice_axis", "w"), ("slice_normal", (0, 0, 0)), ("slice_normal", 3), ("up", "w"), (3, 3)]
+    wrong += [("slice", "w"), ("slice_normal", (0, 0, 0)), ("slice_normal", 3), ("up", "w"), (3, 3)]
     for name, value in wrong:
-        sandbox.set_display(name, value)
+        sandbox.set_control("display", name, value)
         assert "expected" in sandbox.status
     for index in (["x"], [3], 0):
-        sandbox.set_display("slice_normal", 1.0, True, index)
+        sandbox.set_control("display", "slice_normal", 1.0, True, index)
         assert "expected" in sandbox.status
-    sandbox.set_display("slice_axis", "none")
+    sandbox.set_control("display", "slice", "none")
     for pinch in ((0.0, 0.0, 0.0, "spin"), (None, 0.0, 1.0, "move"), (0.0, float("nan"), 1.0, "move")):
         sandbox.pinch(*pinch)
         assert "expected" in sandbox.status
@@ -196,7 +196,7 @@ def test_two_fingers_move_and_zoom_what_lies_at_the_target(sandbox: Sandbox, sha
     camera, (_, height) = shared.subplot.vtk_renderer.camera, shared.plotter.window_size
     for parallel in (False, True):
         sandbox.perform("frame")
-        sandbox.set_display("orthographic", parallel)
+        sandbox.set_control("display", "orthographic", parallel)
         point = np.array(camera.focal_point)
         sides = np.stack([point, point + 0.2 * np.array(camera.up)])
         before = pixels_of(shared.subplot, sides)
@@ -218,14 +218,14 @@ def test_two_fingers_move_and_zoom_what_lies_at_the_target(sandbox: Sandbox, sha
 def test_two_fingers_take_back_what_the_first_did(sandbox: Sandbox, shared: EditWindow) -> None:
     before, camera = digest(shared.document), shared.subplot.vtk_renderer.camera
     sandbox.perform("frame")
-    sandbox.set_brush("brush", "erase")
+    sandbox.set_control("brush", "brush", "erase")
     middle = [side // 2 for side in shared.plotter.window_size]
     shared.tools.press(*middle)
     assert digest(shared.document) != before
     sandbox.pinch(0.0, 0.0, 1.0, "begin")
     assert digest(shared.document) == before
     assert sandbox.values()["done"] == []
-    sandbox.set_brush("brush", "select")
+    sandbox.set_control("brush", "brush", "select")
     position = camera.position
     shared.tools.press(*middle)
     sandbox.pinch(0.0, 0.0, 1.0, "begin")
@@ -237,7 +237,7 @@ def test_two_fingers_take_back_what_the_first_did(sandbox: Sandbox, shared: Edit
 def test_the_slice_is_moved_and_tilted_in_the_view(sandbox: Sandbox, shared: EditWindow) -> None:
     sandbox.perform("frame")
     sandbox.perform("view_three-quarter")
-    sandbox.set_display("slice_axis", "x")
+    sandbox.set_control("display", "slice", "x")
     controls = {control["name"]: control for control in sandbox.values()["display"]["controls"]}
     low, high = (controls["slice_position"][end] for end in ("low", "high"))
     assert abs(controls["slice_position"]["value"] - (low + high) / 2) < 1e-6
@@ -256,12 +256,12 @@ def test_the_slice_is_moved_and_tilted_in_the_view(sandbox: Sandbox, shared: Edi
         assert (before.point == after.point) == (name == "tilt slice")
     assert sandbox.values()["done"] == []
     controls = {control["name"]: control for control in sandbox.values()["display"]["controls"]}
-    assert controls["slice_axis"]["value"] == "tilted"
-    sandbox.set_display("slice_normal", "0", True, [1])
-    sandbox.set_display("slice_normal", 0.0, True, [2])
+    assert controls["slice"]["value"] == "tilted"
+    sandbox.set_control("display", "slice_normal", "0", True, [1])
+    sandbox.set_control("display", "slice_normal", 0.0, True, [2])
     controls = {control["name"]: control for control in sandbox.values()["display"]["controls"]}
-    assert controls["slice_axis"]["value"] == "x"
-    sandbox.set_display("slice_axis", "none")
+    assert controls["slice"]["value"] == "x"
+    sandbox.set_control("display", "slice", "none")
     assert sandbox.values()["gizmo"]["handles"] == []
     sandbox.drag_handle("slice", "begin", 0.5, 0.5)
     assert "expected" in sandbox.status
@@ -285,8 +285,8 @@ def test_values_of_decals_are_set_as_one_entry_each(sandbox: Sandbox, shared: Ed
     controls = {control["name"]: control for control in sandbox.values()["decal"]["controls"]}
     assert set(controls) == set(values)
     for name, value in values.items():
-        sandbox.set_decals(name, value, False)
-        sandbox.set_decals(name, value, True)
+        sandbox.set_control("decals", name, value, False)
+        sandbox.set_control("decals", name, value, True)
         finish(shared)
     rows = shared.document.decals.take(np.array([3, 5]))
     assert rows.radii.tolist() == [np.float32(0.3)] * 2
@@ -312,16 +312,16 @@ def test_values_of_decals_are_set_as_one_entry_each(sandbox: Sandbox, shared: Ed
         (None, 1),
     ]
     for name, value in wrong:
-        sandbox.set_decals(name, value)
+        sandbox.set_control("decals", name, value)
         assert "expected" in sandbox.status or "radii" in sandbox.status
     sandbox.go_to(0)
     assert digest(shared.document) == before
 
 
 def test_brush_and_drawing_are_set(sandbox: Sandbox, shared: EditWindow) -> None:
-    sandbox.set_brush("brush", "scatter")
-    sandbox.set_brush("radius", "0.7")
-    sandbox.set_brush("density", 0.5)
+    sandbox.set_control("brush", "brush", "scatter")
+    sandbox.set_control("brush", "radius", "0.7")
+    sandbox.set_control("brush", "density", 0.5)
     values = sandbox.values()["brush"]
     assert values["brush"] == "scatter"
     assert {control["name"]: control["value"] for control in values["controls"]}["radius"] == 0.7
@@ -330,15 +330,15 @@ def test_brush_and_drawing_are_set(sandbox: Sandbox, shared: EditWindow) -> None
     length = np.linalg.norm(ends[1] - ends[0]) / shared.plotter.window_size[1]
     assert sandbox.values()["gizmo"]["brush"] == pytest.approx(0.7 * length, rel=0.1)
     for name, value in (("brush", "smear"), ("radius", 0), ("density", 2), ("color", 1), ("radius", None)):
-        sandbox.set_brush(name, value)
+        sandbox.set_control("brush", name, value)
         assert "expected" in sandbox.status
-    sandbox.set_brush("brush", "select")
+    sandbox.set_control("brush", "brush", "select")
     before = shared.document.drawing
-    sandbox.set_drawing("contact", "radial")
+    sandbox.set_control("drawing", "contact", "radial")
     for stiffness in (4, "3.5", 3):
-        sandbox.set_drawing("stiffness", stiffness, False)
-    sandbox.set_drawing("stiffness", 3)
-    sandbox.set_drawing("background.top", "#ff0000")
+        sandbox.set_control("drawing", "stiffness", stiffness, False)
+    sandbox.set_control("drawing", "stiffness", 3)
+    sandbox.set_control("drawing", "background.top", "#ff0000")
     sandbox.settle()
     drawing = shared.document.scene.drawing
     assert (shared.subplot.contact, shared.subplot.stiffness) == (Contact.RADIAL, 3.0)
@@ -347,7 +347,7 @@ def test_brush_and_drawing_are_set(sandbox: Sandbox, shared: EditWindow) -> None
     assert sandbox.values()["done"] == ["set contact", "set stiffness", "set background.top"]
     wrong: list[Any] = [("contact", "x"), ("stiffness", 0), ("stiffness", "x"), ("color", 1), (None, 1)]
     for name, value in [*wrong, ("filtered", 3), ("samples", ""), ("background.top", None)]:
-        sandbox.set_drawing(name, value)
+        sandbox.set_control("drawing", name, value)
         assert "expected" in sandbox.status
     sandbox.go_to(0)
     assert shared.document.drawing == before
@@ -358,12 +358,12 @@ def test_scattering_takes_the_options_of_its_panel(sandbox: Sandbox, shared: Edi
     assert first["count"] == len(shared.document.decals) > 0
     values = {"count": "30", "regularity": 0.2, "sizing": "touching", "jitter.size": 0.3, "direction": "none"}
     for name, value in values.items():
-        sandbox.set_scattering(name, value)
+        sandbox.set_control("scattering", name, value)
         assert sandbox.status == f"set {name}"
     shown = {control["name"]: control["value"] for control in sandbox.values()["scattering"]}
     assert shown["sizing"] == "touching"
     for wrong in (("count", "x"), ("images", 3), ("sizing", "x"), (None, 1)):
-        sandbox.set_scattering(*wrong)
+        sandbox.set_control("scattering", *wrong)
         assert "expected" in sandbox.status
     sandbox.scatter()
     finish(shared)
@@ -385,12 +385,12 @@ def test_scattering_takes_the_options_of_its_panel(sandbox: Sandbox, shared: Edi
 
 def test_images_become_materials_and_are_dropped_on_rows(sandbox: Sandbox, shared: EditWindow) -> None:
     before = digest(shared.document)
-    sandbox.set_image("roughness", 0.5)
+    sandbox.set_control("image", "roughness", 0.5)
     assert "no image is selected" in sandbox.status
     sandbox.select("image 0")
     for roughness in (0.7, 0.5, 0.2):
-        sandbox.set_image("roughness", roughness, False)
-    sandbox.set_image("roughness", 0.2)
+        sandbox.set_control("image", "roughness", roughness, False)
+    sandbox.set_control("image", "roughness", 0.2)
     material = shared.document.images[0]
     assert isinstance(material, decals.DecalMaterial)
     assert material.roughness.max() == 51
@@ -400,7 +400,7 @@ def test_images_become_materials_and_are_dropped_on_rows(sandbox: Sandbox, share
     assert [control["value"] for control in shown["controls"]] == pytest.approx([0.2, 0, 1, 0])
     assert sandbox.values()["done"] == ["set roughness"]
     for name, value in (("roughness", 2), ("relief", 0.2), ("height", 1), ("metallic", "")):
-        sandbox.set_image(name, value)
+        sandbox.set_control("image", name, value)
         assert "expected" in sandbox.status
     shared.session.do(ReplaceImage(0, decals.DecalMaterial("m", material.pixels, roughness=material.pixels)))
     assert sandbox.values()["image"]["controls"][0]["value"] is None  # a map

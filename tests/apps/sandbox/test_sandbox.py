@@ -59,16 +59,16 @@ def test_of_waiting_slider_steps_only_the_newest_is_carried_out(window: EditWind
 
     window.session.subscribe(changed)
     for radius in (0.65, 0.7, 0.75):
-        sandbox.set_value("radius", radius, False)
+        sandbox.set_control("node", "radius", radius, False)
     assert (len(asked), radii) == (3, [])
     sandbox.take_step()
     sandbox.take_step()
     assert radii == [0.75]
-    sandbox.set_value("radius", 0.8, False)
+    sandbox.set_control("node", "radius", 0.8, False)
     sandbox.select("0/0")  # any other event comes after the step
     assert radii[-1] == 0.8
-    sandbox.set_value("radius", 0.85, False)
-    sandbox.set_value("radius", 0.9, True)
+    sandbox.set_control("node", "radius", 0.85, False)
+    sandbox.set_control("node", "radius", 0.9, True)
     tree: Any = tree_of(window.document)
     assert (tree.children[0].radius, tree.children[1].radius) == (0.9, 0.8)
 
@@ -234,8 +234,8 @@ def test_a_slider_is_one_undo_entry_and_undo_restores_every_bit(window: EditWind
     sandbox, before = Sandbox(window), digest(window.document)
     sandbox.select("0/1")
     for radius in (0.65, 0.7, 0.75):
-        sandbox.set_value("radius", radius, False)
-    sandbox.set_value("radius", 0.8, True)
+        sandbox.set_control("node", "radius", radius, False)
+    sandbox.set_control("node", "radius", 0.8, True)
     finish(window)
     tree: Any = tree_of(window.document)
     assert tree.children[1].radius == 0.8
@@ -245,7 +245,7 @@ def test_a_slider_is_one_undo_entry_and_undo_restores_every_bit(window: EditWind
     sandbox.perform("undo")
     assert digest(window.document) == before
     for last in (False, True):  # the history ends a drag, and waits for the check of the surface
-        sandbox.set_value("radius", 0.8, last)
+        sandbox.set_control("node", "radius", 0.8, last)
         sandbox.go_to(0)
         finish(window)
         assert digest(window.document) == before
@@ -256,7 +256,7 @@ def test_the_ends_of_a_slider_stay_while_it_moves(window: EditWindow) -> None:
     sandbox = Sandbox(window)
     sandbox.select("0/1")
     before = sandbox.values()["panel"]["controls"][1]
-    sandbox.set_value("radius", 1.4, False)
+    sandbox.set_control("node", "radius", 1.4, False)
     after = sandbox.values()["panel"]["controls"][1]
     assert (after["value"], after["low"], after["high"]) == (1.4, before["low"], before["high"])
 
@@ -276,8 +276,8 @@ def test_after_two_slow_steps_a_slider_blocks_the_page_no_longer(
     monkeypatch.setattr(SetParameter, "compute", slow)
     sandbox.select("0/1")
     for radius in (0.65, 0.7, 0.75, 0.8):
-        sandbox.set_value("radius", radius, False)
-    sandbox.set_value("radius", 0.85, True)
+        sandbox.set_control("node", "radius", radius, False)
+    sandbox.set_control("node", "radius", 0.85, True)
     finish(window)
     assert threads[:2] == [True, True]
     assert not any(threads[2:])
@@ -288,7 +288,7 @@ def test_after_two_slow_steps_a_slider_blocks_the_page_no_longer(
 def test_a_slider_that_rests_ends_its_edit(window: EditWindow, monkeypatch: pytest.MonkeyPatch) -> None:
     sandbox, now = Sandbox(window), time.monotonic()
     sandbox.select("0/1")
-    sandbox.set_value("radius", 0.7, False)
+    sandbox.set_control("node", "radius", 0.7, False)
     sandbox.settle()
     assert window.session.stroke_open
     monkeypatch.setattr(time, "monotonic", lambda: now + 2.0 * REST_SECONDS + 60.0)
@@ -302,8 +302,8 @@ def test_a_slider_that_rests_ends_its_edit(window: EditWindow, monkeypatch: pyte
 def test_parameters_of_all_sorts_are_set(window: EditWindow) -> None:
     sandbox = Sandbox(window)
     sandbox.select("0/1")
-    sandbox.set_value("color", "#ff0000")
-    sandbox.set_value("center", "0.5", index=[1])
+    sandbox.set_control("node", "color", "#ff0000")
+    sandbox.set_control("node", "center", "0.5", index=[1])
     finish(window)
     ball: Any = tree_of(window.document).children[1]
     assert ball.color == (1.0, 0.0, 0.0)
@@ -350,7 +350,7 @@ def test_a_new_node_without_a_selection_is_an_object(vtk_display: None) -> None:
 
 def test_wrong_events_say_why_and_change_nothing(window: EditWindow) -> None:
     sandbox, before = Sandbox(window), digest(window.document)
-    sandbox.set_value("radius", 0.5)
+    sandbox.set_control("node", "radius", 0.5)
     assert "no node is selected" in sandbox.status
     assert sandbox.values()["refusals"] == 1  # fields show their values again
     for key in ("0/7", "9", "x", "object x", None, 3, "image 0"):
@@ -358,10 +358,10 @@ def test_wrong_events_say_why_and_change_nothing(window: EditWindow) -> None:
         assert "expected" in sandbox.status
     sandbox.select("0/1")
     for name, raw in (("radius", -1), ("radius", "x"), ("nothing", 1), ("center", 3)):
-        sandbox.set_value(name, raw)
+        sandbox.set_control("node", name, raw)
         finish(window)
         assert sandbox.status
-        sandbox.set_value(name, raw, index=[5])
+        sandbox.set_control("node", name, raw, index=[5])
         assert "expected" in sandbox.status
     for event, value in ((sandbox.add, "No"), (sandbox.wrap, "Sum"), (sandbox.combine, "Union")):
         event(value)
@@ -382,9 +382,10 @@ def test_random_events_leave_a_scene_that_undo_restores(window: EditWindow) -> N
     kinds = ["Point", "Torus", "Box", "Twist", "Offset", "Union", "Ricci", "Nothing"]
     actions = [b.action for b in KEYS.bindings if b.action not in ("close", "camera", "move", "add_image")]
     values: Any = st.one_of(st.floats(-3, 3), st.sampled_from(["", "x", None, [1, 2, 3], "#00ff00"]))
+    names = ["radius", "center", "degrees", "color"]
     events: Any = st.one_of(
         st.tuples(st.just("select"), st.sampled_from(["", "0", "0/0", "0/1", "0/1/0", "object 0", "q"])),
-        st.tuples(st.just("set_value"), st.sampled_from(["radius", "center", "degrees", "color"]), values),
+        st.tuples(st.just("set_control"), st.just("node"), st.sampled_from(names), values),
         st.tuples(st.sampled_from(["add", "wrap", "combine"]), st.sampled_from(kinds)),
         st.tuples(st.just("perform"), st.sampled_from(actions)),
         st.tuples(st.just("go_to"), st.integers(-1, 4)),

@@ -237,8 +237,8 @@ def test_names_stay_with_their_nodes_and_layers_and_are_saved(tmp_path: Path) ->
     session.do(RenameObject(0, "snail"))
     assert session.document.objects[0].surface is surface
     session.do(RenameNode(0, (1,), "right"))  # it has that name
-    names = "left", "right", "body", "rust", "scales", "snail"
-    assert session.labels == tuple(f"rename to '{name}'" for name in names)
+    given = "left", "right", "body", "rust", "scales", "snail"
+    assert session.labels == tuple(f"rename to '{name}'" for name in given)
     session.do(FlagNodes(hidden={0: ((1,),)}))
     tree = tree_of(session.document)
     session.do(ReplaceNode(0, (), Union(tree.children)))  # of the same operands
