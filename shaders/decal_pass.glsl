@@ -5,7 +5,7 @@
 // RELIEF: some images have heights; the slot relief holds relief.glsl. With POSED, the posed objects are trees that
 // offset.glsl has moved.
 // FILTERED: average the decals over each pixel; the slot holds filtered_decals.glsl. With MARKED, pixels may be left
-// `pixel_divided`: they must be drawn again without it.
+// `pixel_divided`: they must be drawn again without it. With SHARED, invocations of a group draw their pixels together.
 //@ include camera.glsl
 //@ include pixel.glsl
 uniform sampler2D g_position;
@@ -23,8 +23,63 @@ uniform isampler2D object_masks;
 #endif
 int surface_receivers = -1;  // mask of the object at this pixel, see decals/receivers.py
 
+// Surface at a pixel: where it is seen, and its place and normal where decals lie, in the rest pose if it has one.
+struct Surface {
+    vec3 visible;
+    vec3 position;
+    vec3 normal;
+#ifdef FILTERED
+    vec3 right;  // sides of the pixel, at `position`
+    vec3 up;
+#endif
+};
+
 //@ slot decals optional
 //@ slot relief optional
+
+#ifdef DECALS
+// The surface at a pixel of an object; sets the variables of decals.glsl that depend on it.
+Surface surface_at(ivec2 texel) {
+    Surface surface;
+    vec4 visible = texelFetch(g_position, texel, 0);
+    surface.visible = surface.position = visible.xyz;
+#ifdef LIMITED
+    int object = int(visible.w) - 1;
+    surface_receivers = texelFetch(object_masks, ivec2(object & 4095, object >> 12), 0).x;
+#endif
+    surface.normal = texelFetch(g_normal, texel, 0).xyz;
+#ifdef FILTERED
+    vec3 ray = ray_direction(vec2(texel) + 0.5);
+    surface.right = surface_step(visible.xyz, surface.normal, ray, ray_right.xyz);
+    surface.up = surface_step(visible.xyz, surface.normal, ray, ray_up.xyz);
+#endif
+#ifdef POSED
+    vec4 rest = texelFetch(r_position, texel, 0);
+    is_posed = rest.w == visible.w;
+    if (is_posed) {
+        surface.position = rest.xyz;
+        vec4 right = texelFetch(r_right, texel, 0);
+        vec4 up = texelFetch(r_up, texel, 0);
+        rest_right = right.xyz;
+        rest_up = up.xyz;
+#ifdef FILTERED
+        surface.right = rest_right;
+        surface.up = rest_up;
+#endif
+#ifdef MATERIALS
+        vec3 toward = ray_direction(vec2(texel) + 0.5);
+        posed_normal = surface.normal;
+        posed_right = surface_step(visible.xyz, posed_normal, toward, ray_right.xyz);
+        posed_up = surface_step(visible.xyz, posed_normal, toward, ray_up.xyz);
+#endif
+        surface.normal = off_octahedron(vec2(right.w, up.w));
+    }
+#endif
+    return surface;
+}
+#endif
+
+//@ slot shared optional
 
 // color: linear albedo, w = 1 on objects; buffers: owner or -1, field F, uv
 Pixel pixel_at(ivec2 texel) {
@@ -36,49 +91,21 @@ Pixel pixel_at(ivec2 texel) {
     vec4 buffers = vec4(-1.0, 0.0, 0.0, 0.0);
 #ifdef DECALS
     if (pixel.color.w > 0.0) {
-        vec4 visible = texelFetch(g_position, texel, 0);
-        vec3 position = visible.xyz;
-#ifdef LIMITED
-        int object = int(visible.w) - 1;
-        surface_receivers = texelFetch(object_masks, ivec2(object & 4095, object >> 12), 0).x;
-#endif
-        vec3 normal = texelFetch(g_normal, texel, 0).xyz;
-#ifdef POSED
-        vec4 rest = texelFetch(r_position, texel, 0);
-        is_posed = rest.w == visible.w;
-        if (is_posed) {
-            position = rest.xyz;
-            vec4 right = texelFetch(r_right, texel, 0);
-            vec4 up = texelFetch(r_up, texel, 0);
-            rest_right = right.xyz;
-            rest_up = up.xyz;
-            normal = off_octahedron(vec2(right.w, up.w));
-#ifdef MATERIALS
-            vec3 toward = ray_direction(vec2(texel) + 0.5);
-            posed_normal = texelFetch(g_normal, texel, 0).xyz;
-            posed_right = surface_step(visible.xyz, posed_normal, toward, ray_right.xyz);
-            posed_up = surface_step(visible.xyz, posed_normal, toward, ray_up.xyz);
-#endif
-        }
-#endif
-#ifdef FILTERED
-        vec3 ray = ray_direction(vec2(texel) + 0.5);
-        vec3 right = surface_step(visible.xyz, texelFetch(g_normal, texel, 0).xyz, ray, ray_right.xyz);
-        vec3 up = surface_step(visible.xyz, texelFetch(g_normal, texel, 0).xyz, ray, ray_up.xyz);
-#ifdef POSED
-        if (is_posed) {
-            right = rest_right;
-            up = rest_up;
-        }
-#endif
-        vec4 color = filtered_color(position, normal, right, up);
+#ifdef SHARED
+        vec4 color = shared_color(texel);
 #else
+        Surface surface = surface_at(texel);
+#ifdef FILTERED
+        vec4 color = filtered_color(surface);
+#else
+        vec3 position = surface.position;
+        vec3 normal = surface.normal;
 #ifdef RELIEF
         relief_normal = normal;
         float lit = 1.0;
 #ifdef POSED
         if (is_posed) {  // offset.glsl moved the surface
-            lit = relief_light_at(position, dot(visible.xyz - position, normal), normal);
+            lit = relief_light_at(position, dot(surface.visible - position, normal), normal);
         } else
 #endif
         if (dot(ray_direction(vec2(texel) + 0.5), normal) < 0.0) {  // none on the inside of a surface
@@ -91,6 +118,7 @@ Pixel pixel_at(ivec2 texel) {
         DecalHit hit = decal_at(position, normal);  // before the ray, which would take registers meanwhile
         vec4 color = decal_color(hit, position, normal, ray_direction(vec2(texel) + 0.5));
         buffers = vec4(float(hit.owner), hit.field, hit.uv);
+#endif
 #endif
 #ifdef MATERIALS
         float part = material_normals.w;

@@ -348,49 +348,58 @@ int nearest_rim(vec3 q, vec3 n, vec3 right, vec3 up) {
     return nearest;
 }
 
-// Premultiplied linear colour of all decals over each other, averaged over a pixel. Pixels with many boundaries, or with sides that are long beside
-// their owner, are the mean of several parts.
-vec4 exact_color(vec3 q, vec3 n, vec3 right, vec3 up) {
+// Premultiplied linear colour of all decals over each other, of part number `i` of a pixel in `parts`, weighted by its
+// share. A whole pixel with many boundaries, or with sides that are long beside its owner, sets `parts` instead: then
+// the sum of all these is its colour.
+vec4 part_color(Surface surface, int i, inout ivec2 parts) {
+    bool whole = parts == ivec2(1);
+    vec3 n = surface.normal;
+    vec2 at = (vec2(float(i % parts.x), float(i / parts.x)) + 0.5) / vec2(parts) - 0.5;
+    vec3 point = surface.position + at.x * surface.right + at.y * surface.up;
+    vec3 right = surface.right / float(parts.x), up = surface.up / float(parts.y);
+    float share = 1.0 / float(parts.x * parts.y);
+    int owner = decal_single_layer ? int(single_layer_at(point, n, decal_contact).x)
+                                   : owner_at(point, n, decal_contact);
+    WHERE (owner < 0) {
+        owner = nearest_rim(point, n, right, up);
+    }
+    if (whole && owner >= 0) {
+        float longest = MAX_SIDE * RIM * decal_texel(4 * owner).w;
+        parts = ivec2(clamp(ceil(vec2(length(right), length(up)) / longest), 1.0, float(SIDE_PARTS)));
+        if (parts != ivec2(1)) {
+            return vec4(0.0);
+        }
+    }
+    vec4 color = vec4(0.0);
+    int most = 0;
+    while (owner >= 0 && color.a < OPAQUE) {
+        int boundaries;
+#ifdef MATERIALS
+        material_left = (1.0 - color.a) * share;
+#endif
+        color += (1.0 - color.a) * layer_average(owner, point, n, right, up, boundaries);
+        most = most > 0 && boundaries > 0 ? MANY : most + boundaries;  // of layers over each other
+        if (!decal_layered) {
+            break;
+        }
+        owner = owner_below(point, n, rank_of(owner, decal_records), next_number_below(owner, decal_records),
+            decal_contact);
+    }
+    parts = whole && most > MAX_BOUNDARIES ? ivec2(SIDE_PARTS) : parts;
+    return share * color;
+}
+
+// The colour of a pixel.
+vec4 exact_color(Surface surface) {
     vec4 sum = vec4(0.0);
     ivec2 parts = ivec2(1);
 #ifdef MATERIALS
     clear_materials();
 #endif
     for (int i = 0; i < parts.x * parts.y; i++) {
-        vec2 at = (vec2(float(i % parts.x), float(i / parts.x)) + 0.5) / vec2(parts) - 0.5;
-        vec3 point = q + at.x * right + at.y * up;
-        vec3 part_right = right / float(parts.x), part_up = up / float(parts.y);
-        bool whole = parts == ivec2(1);
-        int owner = decal_single_layer ? int(single_layer_at(point, n, decal_contact).x)
-                                       : owner_at(point, n, decal_contact);
-        WHERE (owner < 0) {
-            owner = nearest_rim(point, n, part_right, part_up);
-        }
-        if (whole && owner >= 0) {
-            float longest = MAX_SIDE * RIM * decal_texel(4 * owner).w;
-            parts = ivec2(clamp(ceil(vec2(length(right), length(up)) / longest), 1.0, float(SIDE_PARTS)));
-            if (parts != ivec2(1)) {
-                i = -1;
-                continue;
-            }
-        }
-        vec4 color = vec4(0.0);
-        int most = 0;
-        while (owner >= 0 && color.a < OPAQUE) {
-            int boundaries;
-#ifdef MATERIALS
-            material_left = (1.0 - color.a) / float(parts.x * parts.y);
-#endif
-            color += (1.0 - color.a) * layer_average(owner, point, n, part_right, part_up, boundaries);
-            most = most > 0 && boundaries > 0 ? MANY : most + boundaries;  // of layers over each other
-            if (!decal_layered) {
-                break;
-            }
-            owner = owner_below(point, n, rank_of(owner, decal_records), next_number_below(owner, decal_records),
-                decal_contact);
-        }
-        if (whole && most > MAX_BOUNDARIES) {
-            parts = ivec2(SIDE_PARTS);
+        ivec2 before = parts;
+        vec4 color = part_color(surface, i, parts);
+        if (parts != before) {
             i = -1;
 #ifdef MATERIALS
             clear_materials();
@@ -399,7 +408,7 @@ vec4 exact_color(vec3 q, vec3 n, vec3 right, vec3 up) {
         }
         sum += color;
     }
-    return sum / float(parts.x * parts.y);
+    return sum;
 }
 
 #ifdef MARKED
@@ -463,15 +472,16 @@ vec4 inner_color(vec3 q, vec3 n, vec3 right, vec3 up) {
 #endif
 
 // The colour of a pixel. MARKED: by the quicker way, where it is enough.
-vec4 filtered_color(vec3 q, vec3 n, vec3 right, vec3 up) {
+vec4 filtered_color(Surface surface) {
 #ifdef MARKED
 #ifdef MATERIALS
     material_left = 1.0;
     clear_materials();
 #endif
     pixel_divided = decal_layered;
-    return decal_layered ? vec4(0.0) : inner_color(q, n, right, up);
+    return decal_layered ? vec4(0.0)
+                         : inner_color(surface.position, surface.normal, surface.right, surface.up);
 #else
-    return exact_color(q, n, right, up);
+    return exact_color(surface);
 #endif
 }

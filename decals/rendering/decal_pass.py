@@ -30,6 +30,7 @@ from decals.rendering.gbuffer import GBuffer
 from decals.rendering.lights import Lighting
 from decals.rendering.materials import MaterialArray, Relief
 from decals.rendering.pixel_pass import (
+    IndirectPass,
     ListedPass,
     PassBackend,
     PixelPass,
@@ -202,11 +203,11 @@ class DecalPass:
                 self.material_targets["g_glow"] = self._context.texture(self._size, "f2")
             targets = [*self._targets, *(self.material_targets.values() if variant["materials"] else ())]
             programs = decal_programs(self._context, library, len(self._targets), **variant)
-            self._passes[key] = (
-                ListedPass(self._context.gl, programs, targets)
-                if len(programs) > 1
-                else PixelPass(self._context.gl, programs[0], targets)
-            )
+            if len(programs) == 1:
+                self._passes[key] = PixelPass(self._context.gl, programs[0], targets)
+            else:
+                kind = IndirectPass if self._context.backend is PassBackend.COMPUTE else ListedPass
+                self._passes[key] = kind(self._context.gl, programs, targets)
         return self._passes[key]
 
     def release(self) -> None:
@@ -231,7 +232,7 @@ def decal_programs(
 ) -> tuple[Program, ...]:
     """Return the program with a library of decal formulas; an empty one is for scenes without decals.
 
-    Software rasterisers take two for filtered pictures, see `ListedPass`.
+    Filtered pictures take two, by `IndirectPass` or `ListedPass`, except in fragment shaders on a card.
     """
     file = "filtered_decals.glsl" if filtered else "decals.glsl"
     slots = {"decals": f"//@ include {file}", "functions": library} if library else {}
@@ -239,12 +240,21 @@ def decal_programs(
     variants |= {"MATERIALS": materials, "RELIEF": relief}
     slots |= {"relief": "//@ include relief.glsl"} if relief and library else {}
     defines = {name: value and bool(library) for name, value in variants.items()}
-    parts: list[dict[str, bool | int]] = [{}]
-    if defines["FILTERED"] and context.software and context.backend is PassBackend.FRAGMENT:
-        parts = [{"MARKED": targets + 2 * defines["MATERIALS"]}, {"LISTED": True}]
+    compute = context.backend is PassBackend.COMPUTE
+    stages: list[dict[str, bool | int]] = [{}]
+    if defines["FILTERED"] and (compute or context.software):
+        stages = [{"MARKED": targets + 2 * defines["MATERIALS"]}, {"LISTED": True, "SHARED": compute}]
+    shared = {"shared": "//@ include shared_parts.glsl"}
     return tuple(
-        attach_camera(context.pixel_program(BODY, targets, slots=slots, defines={**defines, **part}))
-        for part in parts
+        attach_camera(
+            context.pixel_program(
+                BODY,
+                targets,
+                slots=slots | (shared if stage.get("SHARED") else {}),
+                defines={**defines, **stage},
+            )
+        )
+        for stage in stages
     )
 
 

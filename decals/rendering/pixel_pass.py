@@ -31,6 +31,12 @@ COMPUTE_VERSION = 430
 GROUP = 8
 """Side of a compute shader's square group of pixels."""
 
+LIST_BINDING = 0
+"""Binding point of the storage buffer ``PixelList`` in ``shaders/pixels.comp``."""
+
+LIST_HEAD = np.array([0, 1, 1, 0], np.uint32)
+"""Numbers before the pixels of an empty list: groups that draw it, along three axes, and its length."""
+
 LIST_UNIT = 15
 """Texture unit of the list, the last that every driver has."""
 
@@ -198,11 +204,40 @@ class PixelPass:
             resource.release()
 
 
-class ListedPass(PixelPass):
-    """A pass that marks pixels which need more work, and draws these side by side with a second program.
+class IndirectPass(PixelPass):
+    """A pass of two compute shaders: the first lists pixels that need more work, the second draws these.
 
-    A software rasteriser draws neighbours at once, each of them with the work of all. Marks and pixels are
-    read back, for which a graphics card would have to finish first.
+    Neighbours are drawn at once, each of them with the work of all. The card itself starts as many groups as
+    the list needs.
+    """
+
+    def __init__(
+        self, gl: moderngl.Context, programs: Sequence[Program], targets: Sequence[moderngl.Texture]
+    ) -> None:
+        super().__init__(gl, programs[0], targets)
+        self.programs = tuple(programs)
+        self._list = gl.buffer(reserve=LIST_HEAD.nbytes + 4 * math.prod(targets[0].size))
+
+    def run(self, rectangle: Rectangle) -> None:
+        """Fill a rectangle of all targets."""
+        assert isinstance(self.programs[1], moderngl.ComputeShader)
+        self._list.write(LIST_HEAD.tobytes())
+        self._list.bind_to_storage_buffer(LIST_BINDING)
+        super().run(rectangle)
+        self.programs[1].run_indirect(self._list)
+        self._gl.memory_barrier()
+
+    def release(self) -> None:
+        """Release the memory, except targets and programs."""
+        super().release()
+        self._list.release()
+
+
+class ListedPass(PixelPass):
+    """The same in fragment shaders: the first marks pixels, and the processor lists them for the second.
+
+    Marks and pixels are read back, for which a graphics card would have to finish first, so it serves
+    software rasterisers.
     """
 
     def __init__(

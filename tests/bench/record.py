@@ -112,11 +112,11 @@ def _recording_use(original: Any, units: dict[int, Any]) -> Any:
 def _recording_run(
     original: Any, units: dict[int, Any], sources: Sources, arrays: Arrays, passes: dict[str, Any]
 ) -> Any:
-    def run(self: Any, target: Any) -> None:
-        body, text = sources[id(self.program)]
+    def recorded(program: Any) -> dict[str, Any]:
+        text = sources[id(program)][1]
         uniforms, textures = {}, {}
-        for name in self.program:
-            member = self.program[name]
+        for name in program:
+            member = program[name]
             if not isinstance(member, moderngl.Uniform):
                 continue
             uniform_type = _type(text, name)
@@ -124,7 +124,13 @@ def _recording_run(
                 textures[name] = _texture(units[member.value], name, arrays)
             elif "image" not in uniform_type:
                 uniforms[name] = member.value
-        passes[body] = {"text": text, "uniforms": uniforms, "textures": textures}
+        return {"text": text, "uniforms": uniforms, "textures": textures}
+
+    def run(self: Any, target: Any) -> None:
+        first, *listed = self.programs
+        body = passes[sources[id(first)][0]] = recorded(first)
+        if listed:
+            body["listed"] = recorded(*listed)
         original(self, target)
 
     return run

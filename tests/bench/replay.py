@@ -19,7 +19,7 @@ import argparse
 import json
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,8 @@ GROUP = 8
 WARM_UP = 3
 """Runs before the timed ones."""
 COMPUTE_VERSION = 430
+LIST_HEAD = np.array([0, 1, 1, 0], np.uint32)
+"""Numbers before the pixels of an empty list, as in decals/rendering/pixel_pass.py."""
 DATA_WIDTH = 4096
 """Width of a data texture, in texels."""
 BOX_VERTICES = 36
@@ -93,6 +95,7 @@ class PictureReplay(Recording):
         for texture in self.targets.values():
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._textures: dict[str, Any] = {}
+        self.listed: moderngl.Buffer | None = None
         software = "llvmpipe" in gl.info["GL_RENDERER"]  # as in decals/rendering/context.py
         self.anisotropy = 1.0 if software else min(8.0, gl.max_anisotropy)
         surface = [self.targets[name] for name in ("g_position", "g_normal", "g_color")]
@@ -119,21 +122,36 @@ class PictureReplay(Recording):
         """Compile a pass that writes a target; return a function that runs it."""
         passes = self.settings["passes"][entry]
         recorded = {EARLIER_NAMES.get(name, name): value for name, value in passes.items()}[body]
-        textures = {name: self._texture(name, layout) for name, layout in recorded["textures"].items()}
-        program: Any
         if entry == "compute":
-            program = self.gl.compute_shader(recorded["text"])
-        else:
-            vertex = self.settings["texts"]["screen.vert"]
-            program = self.gl.program(vertex_shader=vertex, fragment_shader=recorded["text"])
-        self.set_uniforms(program, recorded["uniforms"])
-        self.set_uniforms(program, {name: unit for unit, name in enumerate(textures)})
-        if entry == "compute":
-            program["end_texel"] = self.size
-            return lambda: self._run_compute(program, textures, target)
+            return self._compile_compute(recorded, target)
+        program = self.gl.program(
+            vertex_shader=self.settings["texts"]["screen.vert"], fragment_shader=recorded["text"]
+        )
+        textures = self._set_inputs(program, recorded)
         array = self.gl.vertex_array(program, [])
         framebuffer = self.gl.framebuffer([self.targets[target]])
         return lambda: self._run_fragment(array, framebuffer, textures)
+
+    def _compile_compute(self, recorded: dict[str, Any], target: str) -> Callable[[], None]:
+        programs: list[Any] = []
+        textures: dict[str, Any] = {}
+        for stage in (recorded, recorded.get("listed")):
+            if stage is not None:
+                programs.append(self.gl.compute_shader(stage["text"]))
+                textures |= self._set_inputs(programs[-1], stage, textures)
+        programs[0]["end_texel"] = self.size
+        if len(programs) > 1:
+            self.listed = self.gl.buffer(reserve=LIST_HEAD.nbytes + 4 * self.size[0] * self.size[1])
+        return lambda: self._run_compute(programs, textures, target)
+
+    def _set_inputs(
+        self, program: Any, recorded: dict[str, Any], before: Iterable[str] = ()
+    ) -> dict[str, Any]:
+        """Set uniforms and samplers; return the textures by name, those of other programs first."""
+        names = dict.fromkeys([*before, *recorded["textures"]])
+        self.set_uniforms(program, recorded["uniforms"])
+        self.set_uniforms(program, {name: unit for unit, name in enumerate(names)})
+        return {name: self._texture(name, layout) for name, layout in recorded["textures"].items()}
 
     def _texture(self, name: str, layout: dict[str, Any]) -> Any:
         if name in self.targets:
@@ -151,12 +169,24 @@ class PictureReplay(Recording):
             self._textures[name] = texture
         return self._textures[name]
 
-    def _run_compute(self, program: Any, textures: dict[str, Any], target: str) -> None:
+    def _run_compute(self, programs: list[Any], textures: dict[str, Any], target: str) -> None:
         for unit, texture in enumerate(textures.values()):
             texture.use(unit)
         self.targets[target].bind_to_image(0, read=False, write=True)
-        program.run(-(-self.size[0] // GROUP), -(-self.size[1] // GROUP))
+        listed = self.listed if len(programs) > 1 else None
+        if listed is not None:
+            listed.write(LIST_HEAD.tobytes())
+            listed.bind_to_storage_buffer(0)
+        programs[0].run(-(-self.size[0] // GROUP), -(-self.size[1] // GROUP))
         self.gl.memory_barrier()
+        if listed is not None:
+            programs[1].run_indirect(listed)
+            self.gl.memory_barrier()
+
+    def listed_count(self) -> int:
+        """Return the number of pixels in the list of the last pass that made one."""
+        assert self.listed is not None
+        return int(np.frombuffer(self.listed.read(LIST_HEAD.nbytes), np.uint32)[3])
 
     def _run_fragment(
         self, array: moderngl.VertexArray, framebuffer: moderngl.Framebuffer, textures: dict[str, Any]
@@ -187,6 +217,8 @@ class PictureReplay(Recording):
 
             figures[f"frame_{entry}"] = self.milliseconds(frame, runs)
             painted[entry] = np.frombuffer(self.targets["g_paint"].read(), np.float16).astype(np.float32)
+        if self.listed is not None:
+            figures["listed"] = self.listed_count() / (self.size[0] * self.size[1])
         if len(painted) == 2:
             difference = np.abs(painted["fragment"] - painted["compute"])
             figures["entries_differ"] = float((difference > 2e-3).mean())
@@ -230,7 +262,8 @@ class CountedReplay(PictureReplay):
         return {"index_ms": 1e3 * seconds, "mb": 1e-6 * sum(array.nbytes for array in arrays.values())}
 
     def _recorded_passes(self) -> list[dict[str, Any]]:
-        return [recorded for passes in self.settings["passes"].values() for recorded in passes.values()]
+        passes = [recorded for passes in self.settings["passes"].values() for recorded in passes.values()]
+        return passes + [recorded["listed"] for recorded in passes if "listed" in recorded]
 
     def _replace_texture(self, name: str, array: NDArray[Any]) -> None:
         rows = max(1, -(-len(array) // DATA_WIDTH))

@@ -40,16 +40,19 @@ def ring_scene(*, layered: bool) -> Scene:
     return Scene(objects=(item,), camera=view_of(decals, ring).camera, decals=decals, images=(white,))
 
 
-def test_a_recorded_picture_is_drawn_again(tmp_path: Path, gl: moderngl.Context) -> None:
+@pytest.mark.slow_cases("False")
+@pytest.mark.parametrize("filtered", [False, True])
+def test_a_recorded_picture_is_drawn_again(tmp_path: Path, gl: moderngl.Context, filtered: bool) -> None:
     path = tmp_path / "ring.npz"
-    record.record(
-        ring_scene(layered=False), path, RenderOptions(size=(64, 48), samples=1, contact=Contact.PRODUCT)
-    )
+    options = RenderOptions(size=(64, 48), samples=1, contact=Contact.PRODUCT, filtered=filtered)
+    record.record(ring_scene(layered=False), path, options)
     figures = replay.measure(gl, path, 1)
     assert 0.1 < figures["covered"] < 0.9
     assert figures["decals_fragment"] >= 0.0
     if gl.version_code >= 430:
         assert figures["entries_differ"] == 0.0
+        assert ("listed" in figures) == filtered
+        assert 0.02 < figures.get("listed", 0.1) < figures["covered"]
 
 
 def test_replaced_decals_cover_the_same_part_of_the_picture(tmp_path: Path, gl: moderngl.Context) -> None:
