@@ -1,8 +1,8 @@
 """Benchmark of decals beside other methods: ``python -m tests.bench.decals --peers``.
 
-Measures set-up, time per decal and memory on the dragon, or on a knot if the dragon is not available. Errors
-are RMS errors of the image coordinates against log maps from integrated geodesics, on a torus and an
-ellipsoid, divided by the decal's radius. Methods that are not installed are left out with a message.
+Measures set-up, time per decal and memory on the dragon, or on a knot if the dragon is not available. The
+errors are those of `peer_errors`, over the decal's radius. Methods that are not installed are left out with a
+message.
 """
 
 import os
@@ -11,14 +11,11 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cache
-from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyvista as pv
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -29,27 +26,47 @@ from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
 from decals.field.evaluate import evaluate
 from decals.field.mapping import ImageMapping
+from decals.field.walks import Walks
 from decals.index.index import DecalIndex
 from decals.model import Decals
 from decals.rendering import Renderer
 from decals.rendering.options import RenderOptions
+from decals.scattering.neighbors import FacingTree, ideal_spacing, spacing_of_distances
+from decals.scattering.relaxation import Relaxation
 from decals.scenes.objects import MeshObject
 from decals.scenes.scene import DecalImage, Scene
+from decals.surfaces.mesh import MeshSurface
+from tests.bench import cellular_textures, implicit_uvs
+from tests.bench.cellular_textures import Cells
 from tests.bench.clipped_decals import ClippedMesh, MeshDecals
 from tests.bench.exponential_maps import ExponentialMaps
 from tests.bench.paper_octree import crowded_decals
+from tests.bench.peer_errors import (
+    RADII,
+    Figures,
+    at_vertices,
+    bumpy_error,
+    by_walk_to_seed,
+    edge_field,
+    errors_of,
+    exponential_map,
+    frame_at,
+    implicit,
+    implicit_walked,
+    planar,
+    potpourri,
+    torus_field,
+    torus_mesh,
+)
 from tests.bench.projected_boxes import RECORD_BYTES, fragments, marks
 from tests.bench.texture_sprites import Sprites, shown_by_all
 from tests.bench.tile_trees import TileTree
 from tests.decals.field import log_maps as analytic
-from tests.decals.shapes import torus
+from tests.decals.field import unfolding
 
 COUNT = 1_000
 LOG_MAPS = 20
 """Decals whose log maps are timed; the time of all decals is extrapolated from these."""
-
-RADII = {"large": 0.5, "small": 0.1}
-"""Radii of the decals on the torus (tube 0.4) and the ellipsoid (1, 0.7, 0.45)."""
 
 SPRITE_POINTS = 30_000
 """Points of the surface at which sprites are looked up."""
@@ -60,186 +77,26 @@ TILE_POINTS = 400_000
 IMAGE_SIDE = 256
 """Texels across a decal, in tile trees."""
 
+CELL_AREA = 0.9
+"""Sum of the areas of the cells over the surface, if they are as many as the decals."""
+
+FIRST_CELLS = 10
+RING_CELLS = 200
+"""Cells with which a simulation starts, and about as many as grow on the torus."""
+
+SEEDS, SEED_POINTS = 200, 4_000
+"""Seeds on the torus, and points whose nearest seed is searched for."""
+
+MANY_STEPS = 128
+"""Steps of a walk, to show what is left of the error."""
+
 SIZE = (800, 600)
 RUNS = 3
 COLUMNS = [
     *("set-up, s", "a decal, ms", "all, s", "memory, MB", "frame, ms"),
     *("torus 0.5", "torus 0.1", "ellipsoid 0.5", "ellipsoid 0.1"),
 ]
-Figures = dict[str, float]
-
-
 Float64Array = NDArray[np.float64]
-IndexArray = NDArray[np.intp]
-NEAREST = 12
-"""Triangles among which the one of a point is searched."""
-
-
-@dataclass(frozen=True)
-class SmoothMesh:
-    """A mesh with its vertices on a smooth surface, and the gradient of that surface."""
-
-    vertices: Float64Array
-    faces: IndexArray
-    gradient: Callable[[Float64Array], Float64Array]
-
-    def normals(self, points: Float64Array) -> Float64Array:
-        """Return unit normals of the smooth surface."""
-        normals: Float64Array = analytic.unit(self.gradient(points))
-        return normals
-
-    def discs(
-        self, rng: np.random.Generator, centres: IndexArray, radius: float, count: int
-    ) -> tuple[Float64Array, Float64Array]:
-        """Sample points around vertices, and their log maps, out to a radius: float64[c, count, 3] each.
-
-        The points are ends of integrated geodesics of uniform lengths and directions.
-        """
-        start = np.repeat(self.vertices[centres], count, axis=0)
-        directions = analytic.tangents(rng, self.normals(start))
-        length = rng.uniform(0, radius, (len(start), 1))
-        ends = analytic.walk(self.gradient, start, directions, length)
-        shape = len(centres), count, 3
-        return ends.reshape(shape), (directions * length).reshape(shape)
-
-
-def torus_mesh(*, rows: int = 316) -> SmoothMesh:
-    """Return a torus of radii 1 and 0.4 with 100,000 faces."""
-    shape = torus(rows=rows, columns=rows // 2)
-    return SmoothMesh(shape.vertices.astype(np.float64), shape.faces.astype(np.intp), analytic.torus_gradient)
-
-
-def ellipsoid_mesh(*, level: int = 6) -> SmoothMesh:
-    """Return an ellipsoid of axes 1, 0.7 and 0.45 with 82,000 faces."""
-    ball = pv.Icosphere(nsub=level)
-    vertices = analytic.unit(np.asarray(ball.points, np.float64)) * analytic.AXES
-    return SmoothMesh(vertices, ball.regular_faces.astype(np.intp), analytic.ellipsoid_gradient)
-
-
-class Locator:
-    """Search for the triangle next to a point, and the point's barycentric weights."""
-
-    def __init__(self, vertices: Float64Array, faces: IndexArray) -> None:
-        self._corners, self._faces = vertices[faces], faces
-        self._tree = cKDTree(self._corners.mean(axis=1))
-
-    def find(self, points: Float64Array) -> tuple[IndexArray, Float64Array]:
-        """Return the vertices int[n, 3] of the triangles, and the weights float64[n, 3]."""
-        near = self._tree.query(points, k=NEAREST)[1]
-        a, b, c = np.moveaxis(self._corners[near], 2, 0)
-        e1, e2, w = b - a, c - a, points[:, None] - a
-        d11, d12, d22 = _dots(e1, e1), _dots(e1, e2), _dots(e2, e2)
-        d1, d2, area = _dots(w, e1), _dots(w, e2), d11 * d22 - d12 * d12
-        v, u = (d22 * d1 - d12 * d2) / area, (d11 * d2 - d12 * d1) / area
-        weights = np.stack([1 - v - u, v, u], axis=2)
-        best = weights.min(axis=2).argmax(axis=1)
-        rows = np.arange(len(points))
-        return self._faces[near[rows, best]], weights[rows, best]
-
-    def interpolate(self, values: Any, points: Float64Array) -> Float64Array:
-        """Return values per vertex [v, k], interpolated linearly at points."""
-        vertices, weights = self.find(points)
-        result: Float64Array = np.einsum("nc,nck->nk", weights, np.asarray(values)[vertices])
-        return result
-
-
-def _dots(a: Float64Array, b: Float64Array) -> Float64Array:
-    result: Float64Array = (a * b).sum(axis=-1)
-    return result
-
-
-def frame_at(mesh: SmoothMesh, vertex: int) -> Float64Array:
-    """Return two tangents and the normal at a vertex: rows of float64[3, 3]."""
-    normal = mesh.normals(mesh.vertices[vertex : vertex + 1])[0]
-    u = np.cross(normal, [0.36, 0.48, 0.8])
-    u /= np.linalg.norm(u)
-    return np.stack([u, np.cross(normal, u), normal])
-
-
-def planar(mesh: SmoothMesh, vertex: int, points: Float64Array, radius: float) -> Float64Array:
-    """Return the coordinates of points in the box of a mesh-clipped decal.
-
-    They are linear in each triangle, so those of the clipped mesh are equal.
-    """
-    coordinates: Float64Array = (points - mesh.vertices[vertex]) @ frame_at(mesh, vertex)[:2].T
-    return coordinates
-
-
-def implicit(
-    mesh: SmoothMesh, vertex: int, points: Float64Array, radius: float, **options: Any
-) -> Float64Array:
-    """Return the coordinates that the decal pass draws."""
-    u, _, normal = frame_at(mesh, vertex)
-    decal = Decals(mesh.vertices[vertex : vertex + 1], [normal], [u], [radius])
-    uv = evaluate(decal, points, mesh.normals(points), device="cpu", **options).uv
-    return 2 * radius * (uv.astype(np.float64) - 0.5)
-
-
-def implicit_by_chord(mesh: SmoothMesh, vertex: int, points: Float64Array, radius: float) -> Float64Array:
-    """Return the coordinates of the paper's mapping."""
-    return implicit(mesh, vertex, points, radius, mapping=ImageMapping.CHORD)
-
-
-def at_vertices(mesh: SmoothMesh, vertex: int, points: Float64Array, radius: float) -> Float64Array:
-    """Return the decal pass's coordinates at the vertices, interpolated linearly."""
-    near = np.linalg.norm(mesh.vertices - mesh.vertices[vertex], axis=1) < 1.5 * radius
-    values = np.zeros((len(mesh.vertices), 2))
-    values[near] = implicit(mesh, vertex, mesh.vertices[near], 2 * radius)
-    return Locator(mesh.vertices, mesh.faces).interpolate(values, points)
-
-
-@dataclass
-class LogMaps:
-    """Log maps of potpourri3d by the affine heat method.
-
-    The strategy is the default, `AffineLocal`. `AffineAdaptive` was not more exact and factors a matrix per
-    decal. `VectorHeat` is about as fast, with errors of 7 to 11 % for decals of a tenth of the model's size.
-    """
-
-    module: Any
-    version: str
-
-    def solver(self, vertices: Any, faces: Any) -> Any:
-        """Return the solver of a mesh; its first log map completes the set-up."""
-        return self.module.MeshVectorHeatSolver(
-            np.ascontiguousarray(vertices, np.float64), np.ascontiguousarray(faces)
-        )
-
-    def log_map(self, solver: Any, vertex: int) -> Float64Array:
-        """Return the log map at all vertices, in the solver's frame."""
-        result: Float64Array = solver.compute_log_map(int(vertex), strategy="AffineLocal")
-        return result
-
-    def offsets(self, mesh: SmoothMesh, vertex: int, points: Float64Array, radius: float) -> Float64Array:
-        """Return the interpolated log map, rotated into the frame of `frame_at`."""
-        solver = self._solver_of(mesh)
-        x, y, _ = (np.asarray(axis)[vertex] for axis in solver.get_tangent_frames())
-        flat = self.log_map(solver, vertex)
-        world = flat[:, :1] * x + flat[:, 1:] * y
-        return Locator(mesh.vertices, mesh.faces).interpolate(world @ frame_at(mesh, vertex)[:2].T, points)
-
-    def _solver_of(self, mesh: SmoothMesh) -> Any:
-        cached = getattr(self, "_cached", None)
-        if cached is None or cached[0] is not mesh:
-            cached = self._cached = mesh, self.solver(mesh.vertices, mesh.faces)
-        return cached[1]
-
-
-def exponential_map(mesh: SmoothMesh, vertex: int, points: Float64Array, radius: float) -> Float64Array:
-    """Return the discrete exponential map of the vertices around a vertex, interpolated linearly."""
-    maps = ExponentialMaps.of(mesh.vertices, mesh.faces, mesh.normals(mesh.vertices))
-    reached, offsets = maps.map(vertex, 1.5 * radius)
-    values = np.zeros((len(mesh.vertices), 2))
-    values[reached] = offsets @ frame_at(mesh, vertex)[:2].T
-    return Locator(mesh.vertices, mesh.faces).interpolate(values, points)
-
-
-def potpourri() -> LogMaps | None:
-    """Return the log maps of potpourri3d, or None if it is not installed."""
-    try:
-        return LogMaps(import_module("potpourri3d"), version("potpourri3d"))
-    except (ImportError, PackageNotFoundError, OSError):
-        return None
 
 
 @dataclass
@@ -287,6 +144,19 @@ def measure_implicit(item: MeshObject, decals: Decals) -> Row:
         megabytes=1e-6 * (index[0].nbytes + index[1].nbytes),
         frame_ms=frame_time(item, decals),
         errors=errors_of(implicit),
+    )
+
+
+def measure_walked(item: MeshObject, decals: Decals) -> Row:
+    """Measure implicit decals with the walked mapping."""
+    seconds, walks = timed(lambda: Walks.over(decals, [item.surface]))
+    return Row(
+        "implicit decals walked",
+        "",
+        decal_ms=1e3 * seconds / len(decals),
+        megabytes=1e-6 * (DecalIndex.of(decals).nbytes + decals.packed().nbytes + walks.texels.nbytes),
+        frame_ms=frame_time(item, decals, mapping=ImageMapping.WALKED),
+        errors=errors_of(implicit_walked),
     )
 
 
@@ -388,6 +258,122 @@ def measure_tiles(item: MeshObject, decals: Decals) -> Row:
     )
 
 
+def measure_cells(item: MeshObject, decals: Decals) -> Row:
+    """Measure cellular textures: a simulation, and a dome for each cell."""
+    surface, count = item.surface, len(decals)
+    size = float(np.sqrt(CELL_AREA * surface.area / (np.pi * count)))
+
+    def on_mesh(points: Float64Array) -> tuple[Float64Array, Float64Array]:
+        normals = surface.smooth_normals(points).astype(np.float64)
+        return ((points - surface.project(points)[0]) * normals).sum(axis=1), normals
+
+    start = surface.sample(FIRST_CELLS, 0)[0].astype(np.float64)
+    begin = time.process_time()
+    rest = cellular_textures.simulate(Cells.at(start, on_mesh, size), on_mesh, size, unrest=0.5)
+    seconds = time.process_time() - begin
+    cells = rest.cells
+    oriented = cells.positions.astype(np.float32), cells.normals.astype(np.float32)
+    distances, _ = FacingTree(*oriented).nearest(*oriented, count=6, skip_self=True)
+    spacing = spacing_of_distances(distances, ideal_spacing(surface.area, len(cells)))
+    relaxation = Relaxation(surface, count=count)
+    relaxation.run()
+    even = relaxation.statistics()
+    shapes = decals.positions, decals.normals, decals.tangents, decals.radii
+    discs = Cells(*(values.astype(np.float64) for values in shapes))
+    cells.sizes *= np.sqrt((discs.sizes**2).sum() / (cells.sizes**2).sum())
+    points, normals = (array.astype(np.float64) for array in surface.sample(SPRITE_POINTS, 0))
+    over, beside = (cellular_textures.cover(some, points, normals) for some in (cells, discs))
+    mesh = cellular_textures.domes(cells)
+    gaps = ", ".join(f"{rim_gap(radius):.0%} at {radius}" for radius in RADII.values())
+    notes = [
+        f"{len(cells):,} cells after {rest.steps} steps, {rest.divisions} divisions and {rest.deaths} deaths",
+        f"rho {spacing.rho:.2f}, CV {spacing.cv:.1%}, of scattered decals {even.rho:.2f}, {even.cv:.1%}",
+        f"{(over > 1).mean():.0%} of the surface under several, {(over == 0).mean():.1%} under none",
+        f"under discs of decals {(beside > 1).mean():.0%}, {(beside == 0).mean():.1%}",
+        f"{len(mesh.faces):,} triangles",
+        f"a step takes {1e3 * seconds / rest.steps:.1f} ms; a cell moved on a torus: {edited_ring()}",
+        f"rims leave the torus by {gaps} of the radius",
+    ]
+    return Row(
+        "cellular textures",
+        "no contact: polygons pass through each other; places result from the simulation",
+        decal_ms=1e3 * seconds / len(cells),
+        megabytes=1e-6 * (cellular_textures.RECORD_BYTES * len(cells) + mesh.nbytes),
+        frame_ms=frame_time(item, Decals.empty(), mesh),
+        errors=errors_of(planar),
+        note="; ".join(notes),
+    )
+
+
+def edited_ring() -> str:
+    """Move a cell of a texture on the torus, and return what that changes."""
+
+    def on_torus(points: Float64Array) -> tuple[Float64Array, Float64Array]:
+        return torus_field(points), analytic.unit(analytic.torus_gradient(points))
+
+    size = float(np.sqrt(CELL_AREA * 4 * np.pi**2 * 0.4 / (np.pi * RING_CELLS)))
+    start = Cells.at(analytic.torus_points(np.random.default_rng(0), FIRST_CELLS), on_torus, size)
+    cells = cellular_textures.simulate(start, on_torus, size).cells
+    moved = cells.rows(np.arange(len(cells)))
+    moved.positions[0] += 2 * size * moved.tangents[0]
+    rest = cellular_textures.simulate(moved, on_torus, size)
+    away, _ = cKDTree(rest.cells.positions).query(cells.positions)
+    return (
+        f"{rest.steps} steps, {rest.divisions} divisions, {rest.deaths} deaths, "
+        f"{(away > 0.01 * size).sum()} of {len(cells)} cells move by more than 1 % of their size"
+    )
+
+
+def rim_gap(radius: float) -> float:
+    """Return the mean distance of the rims of flat discs from the torus over their radius."""
+    mesh, angle = torus_mesh(), np.linspace(0, 2 * np.pi, 90, endpoint=False)
+    circle = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    vertices = np.random.default_rng(0).integers(0, len(mesh.vertices), 60).tolist()
+    rims = np.concatenate(
+        [mesh.vertices[vertex] + circle @ frame_at(mesh, vertex)[:2] for vertex in vertices]
+    )
+    return float(np.abs(torus_field(rims)).mean() / radius)
+
+
+def measure_implicit_uvs(item: MeshObject, decals: Decals) -> Row:
+    """Measure Implicit UVs; as they need a field, all but the memory is measured on other surfaces."""
+    torus, evaluated = torus_mesh(), 0
+
+    def counting(points: Float64Array) -> Float64Array:
+        nonlocal evaluated
+        evaluated += len(points)
+        return torus_field(points)
+
+    seeds = even_decals(MeshSurface(torus.vertices, torus.faces), count=SEEDS)
+    points = analytic.torus_points(np.random.default_rng(0), SEED_POINTS)
+    found = implicit_uvs.nearest(counting, points, seeds.positions.astype(np.float64))
+    owner = evaluate(seeds, points, torus.normals(points), device="cpu").owner
+    bumpy = max(bumpy_error(seed) for seed in range(8))
+    edge = unfolding.edge(90, 0.3)
+    beyond = edge.log[:, 0] > 0.3
+    lost = np.isnan(implicit_uvs.log_maps(edge_field, edge.points, edge.centre)[:, 0])
+    many = errors_of(partial(by_walk_to_seed, steps=MANY_STEPS))
+    same = (found.seed == owner)[owner >= 0].mean()
+    notes = [
+        f"{found.walks:.1f} walks and {evaluated / len(points):.0f} evaluations of the field at a point of a "
+        f"torus with {SEEDS} seeds",
+        f"the nearest seed is the owner of implicit decals at {same:.2%} of the points",
+        f"bumpy sphere {bumpy:.2%}",
+        f"with {MANY_STEPS} steps large decals {many['torus_large']:.2%} and {many['ellipsoid_large']:.2%}",
+        f"no coordinates at {lost[beyond].mean():.0%} of the points beyond an edge of 90°, and at "
+        f"{lost[~beyond].mean():.0%} before it",
+    ]
+    return Row(
+        "Implicit UVs",
+        "fields of trees only, smooth ones; seeds part the surface, and images are cut there",
+        setup_s=float("nan"),
+        decal_ms=float("nan"),
+        megabytes=1e-6 * implicit_uvs.SEED_BYTES * len(decals),
+        errors=errors_of(by_walk_to_seed),
+        note="; ".join(notes),
+    )
+
+
 def measure_at_vertices(item: MeshObject, decals: Decals) -> Row:
     """Measure texture coordinates at the vertices, by the formulas of implicit decals."""
     index, normals = DecalIndex.of(decals), vertex_normals(item)
@@ -478,7 +464,13 @@ def vertex_normals(item: MeshObject) -> NDArray[np.float64]:
     return normals
 
 
-def frame_time(item: MeshObject, decals: Decals, clipped: ClippedMesh | None = None) -> float:
+def frame_time(
+    item: MeshObject,
+    decals: Decals,
+    clipped: ClippedMesh | None = None,
+    *,
+    mapping: ImageMapping = ImageMapping.CORRECTED,
+) -> float:
     """Return the time in ms of a frame of the model with decals, or with clipped triangles."""
     camera = frame([item], parse_view(None, axes_of(item.name)), SIZE)
     objects = [item]
@@ -487,28 +479,10 @@ def frame_time(item: MeshObject, decals: Decals, clipped: ClippedMesh | None = N
             MeshObject("decals", clipped.vertices.astype(np.float32), clipped.faces.astype(np.int32))
         )
     scene = Scene(objects=tuple(objects), camera=camera, decals=decals, images=(DecalImage.load("scale"),))
+    options = RenderOptions(size=SIZE, mapping=mapping)
     with Renderer() as renderer:
-        renderer.time_frame(scene, RenderOptions(size=SIZE))
-        return 1e3 * statistics.median(
-            renderer.time_frame(scene, RenderOptions(size=SIZE)) for _ in range(RUNS)
-        )
-
-
-@cache
-def errors_of(offsets: Callable[[SmoothMesh, int, Any, float], Any], decals: int = 6) -> Figures:
-    """Return the RMS errors against the log map over the radius, on both surfaces and for both radii."""
-    results: Figures = {}
-    for name, mesh in (("torus", torus_mesh()), ("ellipsoid", ellipsoid_mesh())):
-        for size, radius in RADII.items():
-            rng = np.random.default_rng(0)
-            centres = rng.integers(0, len(mesh.vertices), decals)
-            points, logs = mesh.discs(rng, centres, radius, 300)
-            squares = [
-                ((offsets(mesh, vertex, q, radius) - log @ frame_at(mesh, vertex)[:2].T) ** 2).sum(1)
-                for vertex, q, log in zip(centres.tolist(), points, logs, strict=True)
-            ]
-            results[f"{name}_{size}"] = float(np.sqrt(np.mean(squares)) / radius)
-    return results
+        renderer.time_frame(scene, options)
+        return 1e3 * statistics.median(renderer.time_frame(scene, options) for _ in range(RUNS))
 
 
 def resident() -> float:
@@ -525,6 +499,7 @@ def measure(*, quick: bool) -> tuple[str, list[Row]]:
     decals = even_decals(item.surface, count=COUNT)
     rows = [
         measure_implicit(item, decals),
+        measure_walked(item, decals),
         measure_clipped(item, decals),
         measure_boxes(item, decals),
         measure_sprites(item, decals),
@@ -532,6 +507,8 @@ def measure(*, quick: bool) -> tuple[str, list[Row]]:
         measure_at_vertices(item, decals),
         measure_exponential_maps(item, decals, 5 if quick else LOG_MAPS),
         measure_log_maps(item, decals, 5 if quick else LOG_MAPS),
+        measure_cells(item, decals),
+        measure_implicit_uvs(item, decals),
     ]
     return f"{item.name}, {len(item.faces):,} faces", [row for row in rows if row is not None]
 

@@ -6,15 +6,18 @@ import numpy as np
 import pytest
 
 from decals.model import Decals
-from tests.bench import decal_peers, peer_pictures, projected_boxes
+from tests.bench import decal_peers, peer_errors, peer_pictures, projected_boxes
+from tests.bench.cellular_textures import RINGS, SECTORS, Cells, cover, domes, simulate
 from tests.bench.clipped_decals import MeshDecals
 from tests.bench.exponential_maps import ExponentialMaps
+from tests.bench.implicit_uvs import STEPS, nearest
+from tests.bench.implicit_uvs import log_maps as walk_maps
 from tests.bench.texture_sprites import Sprites, shown_by_all
 from tests.bench.tile_trees import TileTree
 from tests.decals.field import log_maps
 from tests.decals.shapes import torus
 
-TORUS = decal_peers.torus_mesh(rows=120)
+TORUS = peer_errors.torus_mesh(rows=120)
 """A torus mesh of 14,400 faces."""
 
 
@@ -81,13 +84,13 @@ def test_values_are_interpolated_linearly() -> None:
     rng = np.random.default_rng(4)
     face = rng.integers(0, len(TORUS.faces), 500)
     points = np.einsum("nk,nki->ni", rng.dirichlet([1, 1, 1], 500), TORUS.vertices[TORUS.faces[face]])
-    locator = decal_peers.Locator(TORUS.vertices, TORUS.faces)
+    locator = peer_errors.Locator(TORUS.vertices, TORUS.faces)
     np.testing.assert_allclose(locator.interpolate(TORUS.vertices, points), points, atol=1e-12)
 
 
 def test_discs_are_geodesic() -> None:
     """On a torus the outer equator is one: along it the log map is the angle times the radius 1.4."""
-    mesh = decal_peers.torus_mesh(rows=40)
+    mesh = peer_errors.torus_mesh(rows=40)
     points, logs = mesh.discs(np.random.default_rng(5), np.array([0]), 0.3, 50)
     assert np.linalg.norm(logs[0], axis=1).max() <= 0.3
     assert np.abs(np.hypot(np.hypot(*points[0, :, :2].T) - 1, points[0, :, 2]) - 0.4).max() < 1e-6
@@ -99,15 +102,15 @@ def test_errors_of_the_methods() -> None:
     mesh, rng = TORUS, np.random.default_rng(6)
     vertex = 1234
     points, logs = mesh.discs(rng, np.array([vertex]), 0.1, 400)
-    expected = logs[0] @ decal_peers.frame_at(mesh, vertex)[:2].T
+    expected = logs[0] @ peer_errors.frame_at(mesh, vertex)[:2].T
 
     def error(offsets: Any) -> float:
         computed = offsets(mesh, vertex, points[0], 0.1)
         return float(np.sqrt(((computed - expected) ** 2).sum(axis=1).mean()) / 0.1)
 
-    assert error(decal_peers.implicit) < 0.002 < error(decal_peers.planar) < 0.01
-    assert error(decal_peers.at_vertices) == pytest.approx(error(decal_peers.implicit), abs=1e-3)
-    maps = decal_peers.potpourri()
+    assert error(peer_errors.implicit) < 0.002 < error(peer_errors.planar) < 0.01
+    assert error(peer_errors.at_vertices) == pytest.approx(error(peer_errors.implicit), abs=1e-3)
+    maps = peer_errors.potpourri()
     if maps is not None:
         assert error(maps.offsets) < 0.003
 
@@ -251,11 +254,145 @@ def test_tiles_show_one_sheet_each() -> None:
     assert (deeper.voxels, len(deeper.width)) == (1 + 8 + 8 * 8, 32)
 
 
+def ball(points: Any) -> Any:
+    """Return signed distances of points from the unit sphere, and normals."""
+    distance = np.linalg.norm(points, axis=1)
+    return distance - 1, points / distance[:, None]
+
+
+CELL = 0.5
+"""Size of cells on the unit sphere."""
+
+
+def grown() -> Any:
+    """Return cells on the unit sphere, grown from three near it; a fourth is far away and dies."""
+    start = np.array([[0, 0, 1.2], [0.1, 0, 1.2], [0, 0.9, 0], [0, 0, 4.0]])
+    return simulate(Cells.at(start, ball, CELL), ball, CELL)
+
+
+def test_cells_divide_until_they_cover_a_ball() -> None:
+    """They are upright and of full size, leave no room for another, and touch six others at most."""
+    rest = grown()
+    cells = rest.cells
+    assert rest.deaths > 0
+    assert len(cells) == 4 + rest.divisions - rest.deaths
+    np.testing.assert_allclose(np.linalg.norm(cells.positions, axis=1), 1, atol=0.01 * CELL)
+    np.testing.assert_allclose(cells.sizes, CELL, rtol=1e-3)
+    np.testing.assert_allclose((cells.normals * cells.positions).sum(axis=1), 1, atol=1e-3)
+    np.testing.assert_allclose((cells.normals * cells.tangents).sum(axis=1), 0, atol=1e-9)
+    gaps = np.linalg.norm(cells.positions[:, None] - cells.positions, axis=2) + 9 * np.eye(len(cells))
+    assert gaps.min() > 1.2 * CELL
+    away = log_maps.unit(np.random.default_rng(0).normal(size=(5_000, 3)))
+    holes = np.linalg.norm(away[:, None] - cells.positions, axis=2).min(axis=1)
+    assert holes.max() < 2 * CELL
+    assert 0.7 < len(cells) * CELL**2 / 4 < 1.1
+
+
+def test_cells_repel_align_and_rest() -> None:
+    """Two cells on a plane part until they touch, along their line, and turn to each other's tangent."""
+
+    def plane(points: Any) -> Any:
+        return points[:, 2], np.tile([0.0, 0.0, 1.0], (len(points), 1))
+
+    turn = np.array([0.0, 1.0])
+    cells = Cells(
+        np.array([[-0.5, 0, 0], [0.5, 0, 0.1]]),
+        np.tile([0.0, 0.0, 1.0], (2, 1)),
+        np.column_stack([np.cos(turn), np.sin(turn), [0, 0]]),
+        np.ones(2),
+    )
+    # With much unrest allowed, the cells do not live to divide.
+    rest = simulate(cells, plane, 1.0, unrest=1.0)
+    assert (rest.steps, rest.divisions) == (1, 0)
+    for _ in range(60):
+        rest = simulate(rest.cells, plane, 1.0, unrest=1.0)
+    assert rest.cells.positions[:, 0] == pytest.approx([-1, 1], abs=1e-3)
+    np.testing.assert_allclose(rest.cells.positions[:, 1:], 0, atol=1e-3)
+    angle = np.arctan2(rest.cells.tangents[:, 1], rest.cells.tangents[:, 0])
+    np.testing.assert_allclose(angle, 0.5, atol=0.05)
+
+
+def test_domes_and_the_area_under_discs() -> None:
+    """Areas seen from above are those of polygons; three discs in a row overlap in two lenses."""
+    places = np.array([[-1.0, 0, 0], [0, 0, 0], [1, 0, 0]])
+    up, along = np.tile([0.0, 0.0, 1.0], (3, 1)), np.tile([1.0, 0.0, 0.0], (3, 1))
+    cells = Cells(places, up, along, np.full(3, 0.6))
+    mesh = domes(cells)
+    assert len(mesh.faces) == 3 * SECTORS * (2 * RINGS - 1)
+    flat = mesh.vertices * [1, 1, 0]
+    corners = flat[mesh.faces]
+    signed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] / 2
+    assert signed.min() > 0
+    polygon = 0.5 * SECTORS * np.sin(2 * np.pi / SECTORS) * 0.6**2
+    np.testing.assert_allclose(np.bincount(mesh.decals, signed), polygon)
+    assert mesh.vertices[:, 2].max() == pytest.approx(0.3 * 0.6)
+    offsets = (flat - np.repeat(places, len(flat) // 3, axis=0))[:, :2]
+    np.testing.assert_allclose(mesh.uv, 0.5 + offsets / 1.2, atol=1e-12)
+    points = np.column_stack([np.random.default_rng(1).uniform(-2, 2, (40_000, 2)), np.zeros(40_000)])
+    count = cover(cells, points, np.tile([0.0, 0.0, 1.0], (40_000, 1)))
+    half = np.arccos(0.5 / 0.6)
+    lens = 2 * 0.6**2 * (half - np.sin(half) * np.cos(half))
+    assert 16 * (count > 1).mean() == pytest.approx(2 * lens, rel=0.1)
+    assert 16 * (count > 0).mean() == pytest.approx(3 * np.pi * 0.6**2 - 2 * lens, rel=0.03)
+
+
+def test_rims_of_flat_discs_leave_a_torus() -> None:
+    """By half the radius times the curvature along it, for small ones."""
+    tube, way = np.meshgrid(*2 * [np.linspace(0, 2 * np.pi, 400, endpoint=False)])
+    curvature = np.cos(way) ** 2 / 0.4 + np.sin(way) ** 2 * np.cos(tube) / (1 + 0.4 * np.cos(tube))
+    assert decal_peers.rim_gap(0.02) == pytest.approx(0.01 * np.abs(curvature).mean(), rel=0.05)
+
+
+def test_walks_to_a_seed_unroll_planes_and_spheres() -> None:
+    rng = np.random.default_rng(2)
+    flat = np.column_stack([rng.uniform(-1, 1, (200, 2)), np.zeros(200)])
+    np.testing.assert_allclose(walk_maps(lambda x: x[:, 2], flat, np.zeros(3)), flat, atol=1e-9)
+    log = log_maps.offsets(rng, 200, 1.5)
+    chord, _ = log_maps.sphere(log)
+    seed = np.array([0.0, 0.0, 1.0])
+    found = walk_maps(lambda x: np.linalg.norm(x, axis=1) - 1, chord + seed, seed)
+    np.testing.assert_allclose(found[:, :2], log, atol=2e-3)
+    np.testing.assert_allclose(found[:, 2], 0, atol=1e-6)
+
+
+def test_walks_end_at_sharp_edges_and_at_the_far_side() -> None:
+    """Points on the seed's face have exact coordinates, those beyond the edge none."""
+    points = np.array([[0.2, 0.1, 0], [-1, 2, 0], [0.3, 0, -0.4], [0.3, 1, -0.01]])
+    found = walk_maps(peer_errors.edge_field, points, np.zeros(3))
+    np.testing.assert_allclose(found[:2], points[:2], atol=1e-9)
+    assert np.isnan(found[2:]).all()
+
+
+def test_a_point_belongs_to_the_seed_with_the_shortest_walk() -> None:
+    """On a plane these are Voronoi cells; behind an edge, where no walk arrives, a point has no seed."""
+    rng = np.random.default_rng(3)
+    seeds = np.column_stack([rng.uniform(-1, 1, (6, 2)), np.zeros(6)])
+    points = np.column_stack([rng.uniform(-1, 1, (300, 2)), np.zeros(300)])
+    calls = []
+
+    def plane(x: Any) -> Any:
+        calls.append(len(x))
+        return x[:, 2]
+
+    found = nearest(plane, points, seeds)
+    np.testing.assert_array_equal(found.seed, np.linalg.norm(points[:, None] - seeds, axis=2).argmin(axis=1))
+    np.testing.assert_allclose(found.offsets, points - seeds[found.seed], atol=1e-9)
+    assert found.walks == 1
+    assert sum(calls) >= 300 * 10 * STEPS
+    beyond = nearest(peer_errors.edge_field, np.array([[0.3, 0.0, -0.2]]), np.zeros((1, 3)))
+    assert beyond.seed.tolist() == [-1]
+
+
 def test_picture_shows_what_the_methods_mark() -> None:
-    """Boxes mark most, sprites what faces them, fading least; maps are next to implicit decals."""
-    row = np.asarray(peer_pictures.draw(side=60, rows=120), float)
-    panels = [row[:, 64 * number : 64 * number + 60] for number in range(5)]
-    _, box, faded, sprite, implicit = panels
+    """Boxes mark most, sprites what faces them, fading least; maps and seeds are next to implicit decals."""
+    picture = np.asarray(peer_pictures.draw(side=60, rows=120), float)
+    corners = [(64 * (number // 4), 64 * (number % 4)) for number in range(7)]
+    panels = [picture[y : y + 60, x : x + 60] for y, x in corners]
+    _, box, faded, sprite, cells, seeds, implicit = panels
     assert 0.0 < (box != sprite).any(axis=2).mean() < (box != faded).any(axis=2).mean() < 0.2
     away = [np.abs(panel - implicit).mean() for panel in panels]
-    assert away[0] < 0.5 * min(away[1:4])
+    assert max(away[0], away[5]) < 0.5 * min(away[1:4])
+    # Domes stand out over the silhouette, where all others show the white behind the torus.
+    white = (implicit == 255).all(axis=2)
+    assert (seeds[white] == 255).all()
+    assert (cells[white] < 255).any(axis=1).sum() > 20
