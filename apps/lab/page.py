@@ -1,6 +1,7 @@
 """The page of the contact lab: the sandbox with a lesson on the left and its plots on the right."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from trame.widgets import client, html, vuetify3
@@ -13,14 +14,7 @@ from decals.window import EditWindow
 
 LESSON_WIDTH, PLOTS_WIDTH = 330, 350
 
-STYLE = """
-.lesson { font-size: 0.85rem; line-height: 1.35 }
-.lesson p, .lesson ul, .lesson ol, .lesson table { margin-bottom: 6px }
-.lesson ul, .lesson ol { padding-left: 20px }
-.answer .v-alert__content { color: rgb(var(--v-theme-on-surface)) }
-.lesson td, .lesson th { padding-right: 10px; text-align: left }
-"""
-"""How the text of a lesson looks."""
+STYLE = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
 
 LAB_VALUES = (
     "lab_titles",

@@ -2,7 +2,7 @@
 
 import asyncio
 from contextlib import suppress
-from functools import partial
+from pathlib import Path
 from typing import Any
 
 from trame.ui.vuetify3 import VAppLayout
@@ -30,27 +30,7 @@ ONE_ROW = 1260
 TOOLBAR_HEIGHT = f"$vuetify.display.width < {ONE_ROW} + (driving.shared ? 320 : 0) ? 96 : 64"
 """Height of the toolbar, of which its density takes 16."""
 
-STYLE = """html { overflow-y: auto }
-.v-list-subheader { padding-inline-start: 12px !important }
-.v-slider *, .v-field * { transition: none !important }
-.toolbar .v-toolbar__content { overflow-x: auto; flex-wrap: wrap; justify-content: flex-start }
-.toolbar h1 { min-width: 60px; max-width: 120px; flex: 0 1 auto; overflow: hidden; text-overflow: ellipsis;
-  white-space: nowrap }
-@media (max-width: 900px) {
-.toolbar .v-btn__prepend { display: none } .toolbar .v-btn--size-small:not(.v-btn--icon) { padding: 0 8px }
-.toolbar h1 { max-width: 100px } }
-.toolbar .v-btn-group { flex-shrink: 0 }
-.v-field__input { padding-inline: 8px }
-.row-flag { font-size: 18px; padding: 4px }
-.brush { position: absolute; left: var(--x, -999px); top: var(--y, 0); aspect-ratio: 1; border-radius: 50%;
-  transform: translate(-50%, -50%); border: 2px solid #fff; outline: 1px solid #111; pointer-events: none }
-.cube { position: absolute; top: 8px; right: 8px; width: 104px; height: 104px; pointer-events: none }
-.cube polygon { fill: rgb(var(--v-theme-surface)); stroke: rgb(var(--v-theme-on-surface)); stroke-width: 0.02;
-  fill-opacity: 0.85; pointer-events: all; cursor: pointer }
-.cube polygon:hover { fill: #56b4e9 }
-.cube text { font-size: 0.42px; text-anchor: middle; dominant-baseline: central;
-  fill: rgb(var(--v-theme-on-surface)) }"""
-"""A moved slider would otherwise repaint the panel for 0.3 s, which slows the pictures."""
+STYLE = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
 
 TOOLBAR = {
     "undo": "mdi-undo",
@@ -82,13 +62,6 @@ ROW_FLAGS = (
     ("lock", "locked", ("mdi-lock-outline", "mdi-lock-open-variant-outline")),
 )
 """Buttons of a row: its change, the row's value, and icons for true and false."""
-
-HANDLE_FILL = (
-    "h.name.startsWith('move ') ? ({x: '#d55e00', y: '#009e73', z: '#0072b2'})[h.name[5]] : "
-    "h.name.startsWith('turn') ? ({x: '#f0b070', y: '#8fd8c0', z: '#90c4f0'})[h.name[5]] : "
-    "h.name === 'scale' ? '#f0e442' : h.name.endsWith('slice') ? '#cc79a7' : '#ffffff'"
-)
-"""Colours of the handles: strong for axes, light for turns, yellow for the scale, white for points."""
 
 OPEN_MENU = (
     "menu = {open: row.kind !== 'more', x: $event.clientX, y: $event.clientY, key: row.key, "
@@ -137,7 +110,7 @@ GIZMO = f"""<svg style="position: absolute; inset: 0; width: 100%; height: 100%;
 <line v-for="(l, i) in gizmo.lines" :key="i" stroke="#111" stroke-width="3"
   :x1="100 * l[0] + '%'" :y1="100 * l[1] + '%'" :x2="100 * l[2] + '%'" :y2="100 * l[3] + '%'"/>
 <circle v-for="h in gizmo.handles" :key="h.name" :cx="100 * h.x + '%'" :cy="100 * h.y + '%'" r="8"
-  :fill="{HANDLE_FILL}" :data-handle="h.name" stroke="#111" stroke-width="2"
+  class="handle" :data-handle="h.name" stroke="#111" stroke-width="2"
   style="pointer-events: all; cursor: grab; touch-action: none"
   @pointerdown.stop.prevent="$event.target.setPointerCapture($event.pointerId); {_place("begin")}"
   @pointermove="$event.buttons && {_place("move")}"
@@ -214,34 +187,27 @@ class Page:
         self._shown: dict[str, Any] = {}
         self._task: asyncio.Task[None] | None = None
         self._end: asyncio.Task[None] | None = None
-        constants = {"catalog": self.sandbox.catalog(), "thumbnails": thumbnails(), "theme": "light"}
-        renamed, dropped = {"key": "", "name": ""}, None
         server.state.client_only("left_open", "right_open")  # another browser has its own panels
+        server.state.update({**self.values(), "catalog": self.sandbox.catalog(), "thumbnails": thumbnails()})
+        server.state.update({"theme": "light", "dropped": None, "dropped_on": ""})
+        server.state.renamed = {"key": "", "name": ""}
         server.state.menu = {"open": False, "x": 0, "y": 0, "key": "", "label": "", "kind": ""}
-        server.state.update(
-            {**constants, **self.values(), "renamed": renamed, "dropped": dropped, "dropped_on": ""}
-        )
         server.state.change("dropped")(self._take_dropped)
-        server.controller.trigger("handle")(self.sandbox.drag_handle)
-        for change in ("rename", "move"):
-            server.controller.trigger(change)(partial(self._change_row, change))
-        server.controller.trigger("pinch")(self.sandbox.pinch)
-        server.controller.trigger("look")(lambda name: self.sandbox.move_camera("look", name))
+        trigger, change_row = server.controller.trigger, self.sandbox.change_row
+        trigger("handle")(self.sandbox.drag_handle)
+        trigger("pinch")(self.sandbox.pinch)
+        trigger("look")(lambda side: self.sandbox.move_camera("look", side))
+        trigger("rename")(lambda key, name: change_row(key, "rename", name))
+        trigger("move")(lambda key, target: change_row(key, "move", target))
         self._build()
         server.controller.on_server_ready.add(self._start)
         server.controller.on_server_exited.add(self._stop)
 
-    def _change_row(self, change: str, key: str, value: str) -> None:
-        self.sandbox.change_row(key, change, value)
-
     def _take_dropped(self, dropped: Any, **_: Any) -> None:
         """Take files that the browser sent."""
         if dropped:
-            key, self._server.state.dropped, self._server.state.dropped_on = (
-                self._server.state.dropped_on,
-                None,
-                "",
-            )
+            state = self._server.state
+            key, state.dropped, state.dropped_on = state.dropped_on, None, ""
             self.sandbox.upload(dropped, key)
 
     # -- values -----------------------------------------------------------------------------------------

@@ -14,8 +14,6 @@ from functools import wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
-from PIL import Image
-
 from blobtree import Node
 from blobtree._typing import Int64Array
 from blobtree.custom.definition import custom_kinds
@@ -44,7 +42,6 @@ from decals.apps.sandbox.outline import key_of, outline, parse_key
 from decals.apps.views import THREE_QUARTER
 from decals.editing.commands import AddImage, DeleteDecals, RemoveImage, ReplaceImage, SetValues
 from decals.editing.document import Document
-from decals.editing.file_actions import PICTURE_SUFFIXES
 from decals.editing.recovery import recovery_path
 from decals.editing.scatter_commands import AddObject, RemoveObject
 from decals.editing.session import UndoEntry
@@ -137,6 +134,7 @@ class Sandbox:
         window.overlay.hide_status()  # the page has its own, and handles
         window.handle.visible = False
         window.redraw(whole=True)
+        self._files.screenshot = lambda: window.plotter.screenshot(None, return_img=True)
         self._files.folder, self._files.show_view = self._folder, self.display.show_from
         self._setters: dict[str, Callable[[Any, Any, bool, object], None]] = {
             "node": self._set_parameter,
@@ -580,24 +578,9 @@ class Sandbox:
         """
         if not isinstance(name, str) or not name.strip():
             raise InvalidEdit(f"file: expected a name, such as model.json, got {describe(name)}")
-        files, replaced = self._files, bool(replace_existing)
         numbers = [int(digits[:6]) for digits in re.findall(r"\d+", str(size))]
-        if len(numbers) == 2:
-            files.write(name.strip(), replaced, size=(numbers[0], numbers[1]), video=video)
-        elif Path(name).suffix.lower() in PICTURE_SUFFIXES:
-            self._save_picture(name, replaced)
-        else:
-            files.write(name.strip(), replaced, video=video)
-
-    def _save_picture(self, name: str, replace_existing: bool) -> None:
-        path = self._files.inside(name)
-        if path.exists() and not replace_existing:
-            raise InvalidEdit(f"{path} exists; write it again to replace it")
-        if not path.parent.is_dir():
-            raise InvalidEdit(f"expected a file in an existing folder, got {name!r}")
-        pixels = self._window.plotter.screenshot(None, return_img=True)
-        Image.fromarray(pixels[..., :3]).save(path)
-        self._state.show(f"saved the picture to {path.name}")
+        shown = (numbers[0], numbers[1]) if len(numbers) == 2 else None
+        self._files.write(name.strip(), bool(replace_existing), size=shown, video=video)
 
     def _open(self, load: Callable[[Progress, Cancel], Scene], path: Path) -> None:
         self.in_lesson, self._before_lesson = False, None

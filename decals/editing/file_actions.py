@@ -5,6 +5,7 @@ from enum import StrEnum
 from os import PathLike
 from pathlib import Path
 
+from blobtree._typing import UInt8Array
 from blobtree.progress import Cancel, Progress
 from blobtree.pyvista_views import MESH_SUFFIXES
 from decals.baking.bake import SUFFIX as BAKED_SUFFIX
@@ -18,6 +19,7 @@ from decals.editing.session import Command
 from decals.errors import InvalidEdit
 from decals.images.builtin import BUILTIN_IMAGES, is_builtin
 from decals.rendering.options import Size
+from decals.rendering.picture import Picture
 from decals.scenes.animation import VIDEO_SUFFIXES, animate, turntable
 from decals.scenes.camera import Camera
 from decals.scenes.files import load_scene
@@ -74,6 +76,8 @@ class FileActions:
         Closes the window.
     show_view
         Shows the scene from its own camera, after another file was opened.
+    screenshot
+        Returns the pixels of the view, which a picture without a size shows; None to draw the scene.
     folder
         Files outside this folder are neither read nor written; None for no limit.
     recovery : RecoveryFile
@@ -86,6 +90,7 @@ class FileActions:
         self.camera: Callable[[], Camera | None] = lambda: None
         self.leave: Callable[[], None] = lambda: None
         self.show_view: Callable[[Camera], None] = lambda camera: None
+        self.screenshot: Callable[[], UInt8Array] | None = None
         self.folder: Path | None = None
         self.recovery = self._recovery_beside(path)
         self._closing = False
@@ -154,7 +159,7 @@ class FileActions:
         replace: bool,
         *,
         suffixes: tuple[str, ...] = WRITTEN_SUFFIXES,
-        size: Size = PICTURE_SIZE,
+        size: Size | None = None,
         video: str = "turntable",
     ) -> None:
         """Write a file whose suffix is the format: a scene, a script, a mesh, a picture or a video.
@@ -170,7 +175,7 @@ class FileActions:
         suffixes
             Suffixes that are accepted.
         size
-            Width and height of pictures and videos, in pixels.
+            Width and height of pictures and videos, in pixels. A picture without one is a `screenshot`.
         video
             What a video shows; see `Video`.
         """
@@ -182,6 +187,11 @@ class FileActions:
         if suffix == ".json":
             self._save_to(path)
             return
+        if suffix in PICTURE_SUFFIXES and size is None and self.screenshot is not None:
+            Picture(self.screenshot()).save(path)
+            self._state.show(f"exported to {text}")
+            return
+        size = PICTURE_SIZE if size is None else size
         session = self._state.session
         scene = session.document.scene
         camera, fork = self.camera() or scene.camera, session.fork()

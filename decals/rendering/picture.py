@@ -107,7 +107,7 @@ class Picture:
 def on_white(image: Image.Image) -> Image.Image:
     """Return a picture with alpha on white, as RGB."""
     white = Image.new("RGBA", image.size, (255, 255, 255, 255))
-    return Image.alpha_composite(white, image).convert("RGB")
+    return Image.alpha_composite(white, image.convert("RGBA")).convert("RGB")
 
 
 @dataclass(frozen=True, eq=False)

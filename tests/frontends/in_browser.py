@@ -464,7 +464,7 @@ async def panels(picture: str | None = None) -> None:
         await browser.get_by_role("slider", name="metallic").press("End")
         await done("set metallic")
         await row("Scattering").click()
-        for name, value in (("count", "90"), ("factor", "0.8"), ("jitter size", "0.2")):
+        for name, value in (("count", "90"), ("radius factor", "0.8"), ("jitter size", "0.2")):
             field = browser.get_by_role("textbox", name=name, exact=True)
             await field.fill(value)
             await field.press("Enter")
