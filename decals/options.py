@@ -154,8 +154,14 @@ def described(source: Source) -> dict[str, str]:
 
 
 def values_of(source: Source, given: Any) -> dict[str, Any]:
-    """Return the values that an object of a class has for its options."""
-    return {name: reduce(getattr, name.split("."), given) for name in options_of(source)}
+    """Return the values that an object of a class has for its options, except of parts that are None."""
+    values: dict[str, Any] = {}
+    for name in options_of(source):
+        *parts, last = name.split(".")
+        part = reduce(getattr, parts, given)
+        if part is not None:
+            values[name] = getattr(part, last)
+    return values
 
 
 def arguments_of(source: Source, values: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,6 +1,7 @@
-// The light pass, body of pixels.frag and pixels.comp: painted surface under light. The slot holds studio_light.glsl
-// or lights.glsl; both define `vec3 lit_color(ivec2 texel, vec3 position, vec3 normal, vec3 albedo)`, and, of a Material
-// in place of the albedo, `material_color`. MATERIAL_LIGHT: some decals have materials; the slot material is material.glsl. RELIEF: some have relief.
+// The light pass, body of pixels.frag and pixels.comp: painted surface under light. The slot holds studio_light.glsl,
+// lights.glsl or image_light.glsl; all define `vec3 lit_color(ivec2 texel, vec3 position, vec3 normal, vec3 albedo)`, and,
+// of a Material in place of the albedo, `material_color`. PHYSICAL: the slot material is material.glsl. MATERIAL_LIGHT:
+// some decals have materials. RELIEF: some have relief. ENVIRONMENT_SHOWN: the environment is seen behind the objects.
 //@ include pixel.glsl
 uniform sampler2D g_position;
 uniform sampler2D g_normal;
@@ -10,7 +11,7 @@ uniform sampler2D g_material;  // as `material` and `glow` of the decal pass
 uniform sampler2D g_glow;
 #endif
 #ifdef RELIEF
-float relief_lit;  // part of the first light, or of the studio's key, that reaches the relief
+float relief_lit = 1.0;  // part of the first light, or of the studio's key, that reaches the relief
 #endif
 
 // A smooth normal may point away from the eye at a silhouette: turn it until it is just visible.
@@ -26,6 +27,9 @@ vec3 visible_normal(vec3 normal, vec3 toward_eye) {
 Pixel pixel_at(ivec2 texel) {
     vec4 position = texelFetch(g_position, texel, 0);
     if (position.w <= 0.0) {
+#ifdef ENVIRONMENT_SHOWN
+        return Pixel(vec4(environment_behind(texel), 1.0));
+#endif
         return Pixel(vec4(0.0));
     }
     vec4 normal = texelFetch(g_normal, texel, 0);

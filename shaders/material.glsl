@@ -10,9 +10,6 @@ struct Material {
 };
 
 //@ include camera.glsl
-// Rows of decals/rendering/environment.py: axis in the camera's frame, sharpness; and radiance.
-//@ slot environment
-
 const float DIELECTRIC = 0.04;     // reflectance of surface that is no metal, head on
 const float MIN_ROUGHNESS = 0.045;
 const float MIN_FACING = 1e-3;     // least cosine between the normal and the direction to the eye
@@ -46,32 +43,10 @@ vec3 direct_light(Material m, vec3 toward_eye, vec3 toward_light, vec3 light) {
     return lit * light * (diffuse + mirrored * squared / (spread * spread) * visible);
 }
 
-// Radiance of the environment around a direction in the camera's frame, seen through a lobe of this sharpness.
-vec3 environment_radiance(vec3 direction, float sharpness) {
-    float kept = sharpness / (sharpness + 1.0);  // of the mean direction, by the width of the lobe
-    vec3 light = mix(ENVIRONMENT_GROUND, ENVIRONMENT_SKY, 0.5 + 0.5 * kept * direction.y);
-    for (int i = 0; i < ENVIRONMENT_LOBES; i++) {
-        float own = environment_axes[i].w;
-        float both = own * sharpness / (own + sharpness);
-        light += both / own * exp(both * (dot(direction, environment_axes[i].xyz) - 1.0)) * environment_colors[i];
-    }
-    return light;
-}
-
-// What the environment reflects: diffuse light `ambient`, and mirrored light by Karis' fit of the integral over the
-// lobe (Physically Based Shading on Mobile, 2014). `to_camera` turns directions into the camera's frame.
-vec3 environment_light(Material m, vec3 toward_eye, vec3 ambient, float open_, mat3 to_camera) {
-    float seen = facing(m, toward_eye);
-    float alpha = m.roughness * m.roughness;
-    vec3 bounced = 2.0 * dot(m.normal, toward_eye) * m.normal - toward_eye;
-    vec3 radiance = environment_radiance(to_camera * bounced, 0.5 / (alpha * alpha * seen));
-    vec4 r = m.roughness * vec4(-1.0, -0.0275, -0.572, 0.022) + vec4(1.0, 0.0425, 1.04, -0.04);
-    float scale = min(r.x * r.x, exp2(-9.28 * seen)) * r.x + r.y;
-    vec2 fit = vec2(-1.04, 1.04) * scale + r.zw;
-    vec3 mirrored = reflectance(m) * fit.x + fit.y;
-    vec3 diffuse = (1.0 - mirrored) * (1.0 - m.metallic) * m.albedo * ambient;
-    return m.occlusion * open_ * (diffuse + mirrored * radiance);
-}
+// What the environment reflects: the slot defines, of a Material with diffuse light `ambient` in a part `open_` of the
+// directions, `vec3 environment_light(Material m, vec3 toward_eye, vec3 ambient, float open_, mat3 frame)`. The frame
+// turns directions into those of the environment.
+//@ slot environment
 
 // Khronos PBR Neutral tone mapper: colours up to 0.76 stay but for a small offset, brighter ones fade to white.
 vec3 tone_mapped(vec3 color) {

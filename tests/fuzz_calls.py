@@ -351,6 +351,10 @@ def call_table() -> Calls:
             },
         ),
         "Lighting": (rendering.Lighting, {"lights": ()}),
+        "Environment": (
+            rendering.Environment,
+            {"picture": np.ones((2, 4, 3)), "rotation": 5.0, "strength": 1.0, "visible": True, "up": axis},
+        ),
         "Background": (rendering.Background, {"top": (1, 1, 1), "bottom": (0, 0, 0, 1)}),
         "pick": (
             editing.pick,

@@ -1,8 +1,9 @@
 """``implicit-decals render``: a picture of models with scattered decals, or of a saved scene."""
 
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -20,6 +21,7 @@ from decals.apps.commands.options import (
     Trust,
     UpAxis,
     check_count,
+    given,
     parse_size,
 )
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
@@ -29,7 +31,7 @@ from decals.apps.models.samples import axes_of
 from decals.apps.output import PICTURE_SUFFIXES, check_output, print_path
 from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
-from decals.rendering import Drawing, Picture, Renderer
+from decals.rendering import Drawing, Environment, Picture, Renderer
 from decals.scenes.camera import UPRIGHT
 
 
@@ -48,6 +50,10 @@ def render(
     stiffness: Stiffness = None,
     filtered: Annotated[bool | None, Parameter(negative=(), show_default=False)] = None,
     mapping: MappingName = None,
+    environment: str | None = None,
+    environment_rotation: float | None = None,
+    environment_strength: float | None = None,
+    environment_visible: Annotated[bool | None, Parameter(negative=(), show_default=False)] = None,
     seed: Seed = None,
     save: Path | None = None,
     crease_angle: CreaseAngle = None,
@@ -91,6 +97,15 @@ def render(
     mapping
         Image mapping: corrected for the curvature of the surface, chord (the paper's projection), or walked
         along the shortest path, for edges and corners. Default: that of a saved scene, or corrected.
+    environment
+        Equirectangular picture of all directions as light, in place of the studio light: a Radiance file
+        (hdr), or any picture. Its upward axis is the camera's.
+    environment_rotation
+        Degrees by which the environment turns about the upward axis, counterclockwise from above.
+    environment_strength
+        Factor of the light of the environment.
+    environment_visible
+        Show the environment behind the models.
     save
         Also write the scene to this JSON file, which render and edit can open.
     """
@@ -98,8 +113,15 @@ def render(
     view = parse_view(camera, axes_of(model[0]) if up is None else UPRIGHT[up])
     if samples is not None:
         check_count("--samples", samples, 1, MAX_SAMPLES)
-    options = {"samples": samples, "contact": contact, "stiffness": stiffness, "mapping": mapping}
-    options["filtered"] = filtered
+    options: dict[str, Any] = {
+        "samples": samples,
+        "contact": contact,
+        "stiffness": stiffness,
+        "mapping": mapping,
+        "filtered": filtered,
+    }
+    changes = given(rotation=environment_rotation, strength=environment_strength, visible=environment_visible)
+    options["environment"] = None if environment is None else Environment(environment, **changes)
     Drawing().overridden(**options)  # checked before anything slow
     check_output(output, PICTURE_SUFFIXES)
     if save is not None:
@@ -117,9 +139,21 @@ def render(
         scene = loaded if isinstance(loaded, Scene) else scattering.scene(loaded, view, pixels, progress)
         if isinstance(loaded, Scene) and (camera is not None or up is not None):
             scene = scene.replace(camera=frame(scene.objects, view, pixels))
-        scene = scene.replace(drawing=scene.drawing.overridden(**options))
+        drawing = scene.drawing.overridden(**options)
+        if environment is not None:
+            changes["up"] = scene.camera.up
+        if changes:
+            drawing = drawing.overridden(environment=_changed(drawing.environment, changes))
+        scene = scene.replace(drawing=drawing)
         if save is not None:
             save_scene(scene, save)
         progress("drawing", 0.0)
         Picture(renderer.render(scene, scene.drawing.at(pixels))).save(output)
     print_path(output)
+
+
+def _changed(environment: Environment | None, changes: dict[str, Any]) -> Environment:
+    """Return an environment with other values, or raise `InvalidInput` if there is none."""
+    if environment is None:
+        raise InvalidInput("expected an environment that the options change, got none; give --environment")
+    return replace(environment, **changes)

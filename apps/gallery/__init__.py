@@ -26,6 +26,7 @@ Example = Literal[
     "interactions",
     "layers",
     "materials",
+    "environments",
     "relief",
     "contact_modes",
     "size_ratio",

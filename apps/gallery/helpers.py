@@ -14,7 +14,7 @@ from decals.apps.models.samples import axes_of, sample
 from decals.apps.models.shapes import rounded_box
 from decals.apps.views import frame, parse_view
 from decals.field.law import AnyContact
-from decals.rendering import Picture, Renderer
+from decals.rendering import Environment, Picture, Renderer
 from decals.rendering.options import RenderOptions
 from decals.scenes.pose import PosedScene
 
@@ -50,11 +50,12 @@ GAP = 4
 
 @dataclass(frozen=True)
 class Panel:
-    """A scene and the modes in which its decals are drawn."""
+    """A scene, the modes in which its decals are drawn, and its environment."""
 
     scene: Scene | PosedScene
     contact: AnyContact = RenderOptions.contact
     mapping: ImageMapping = ImageMapping.CORRECTED
+    environment: Environment | None = None
 
 
 def draw(
@@ -81,7 +82,13 @@ def draw(
         left = number * (side + GAP)
         row[:, left : left + side] = renderer.render(
             panel.scene,
-            RenderOptions(size=(side, side), samples=samples, contact=panel.contact, mapping=panel.mapping),
+            RenderOptions(
+                size=(side, side),
+                samples=samples,
+                contact=panel.contact,
+                mapping=panel.mapping,
+                environment=panel.environment,
+            ),
         )
     return row
 

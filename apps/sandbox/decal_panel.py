@@ -14,7 +14,7 @@ from decals.editing.commands import ReplaceImage, SetValues
 from decals.editing.document import Document
 from decals.errors import InvalidEdit
 from decals.model import FADE_ANGLES, FADE_DEPTHS, NO_IMAGE, Decals
-from decals.options import arguments_of, described, options_of, values_of
+from decals.options import described, options_of, values_of
 from decals.receivers import labels_of
 from decals.rendering.options import Drawing
 from decals.scattering.scatter import scatter
@@ -151,14 +151,18 @@ def set_brush(brush: BrushSettings, name: str, raw: Any) -> None:
 
 def drawing_controls(drawing: Drawing) -> list[dict[str, Any]]:
     """Return the controls of how the scene is drawn."""
-    values = values_of(Drawing, drawing)
-    return [option_control(option, values[name]) for name, option in options_of(Drawing).items()]
+    options = options_of(Drawing)
+    return [option_control(options[name], value) for name, value in values_of(Drawing, drawing).items()]
 
 
 def set_drawing(state: ActionState, name: str, raw: Any, *, last: bool) -> None:
     """Set an option of how the scene is drawn; moves of a slider are one undo entry."""
-    values = values_of(Drawing, state.session.document.drawing) | {name: parsed_option(Drawing, name, raw)}
-    state.draw_with(f"set {name}", last=last, **arguments_of(Drawing, values))
+    drawing = state.session.document.drawing
+    one_of("option", name, values_of(Drawing, drawing), InvalidEdit)
+    whole, _, part = name.partition(".")
+    value = parsed_option(Drawing, name, raw)
+    value = replace(getattr(drawing, whole), **{part: value}) if part else value
+    state.draw_with(f"set {name}", last=last, **{whole: value})
 
 
 FIRST_COUNT = 100

@@ -1,4 +1,5 @@
 from .context import Context
+from .environment import Environment
 from .lights import Light, Lighting
 from .options import STUDIO, TRANSPARENT, Background, Drawing, RenderOptions, SceneLike, Size
 from .picture import Buffers, Picture
@@ -14,6 +15,7 @@ __all__ = [
     "Context",
     "Drawable",
     "Drawing",
+    "Environment",
     "Light",
     "Lighting",
     "Picture",

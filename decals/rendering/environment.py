@@ -1,54 +1,346 @@
-"""The studio's environment: smooth lobes of light, which reflections on materials of any roughness show.
+"""Environments: pictures of all directions as light, prefiltered for surface of any roughness.
 
-The radiance from a direction d in the camera's frame (right, up, back) is a gradient from the ground to the
-sky, and a sum of spherical Gaussians exp(λ (d·μ − 1)) of which each is a large lamp. A rough surface sees it
-through a lobe. The convolution of two such Gaussians is nearly one again, so the environment is prefiltered
-for every roughness in closed form, without a texture.
+A rough surface mirrors light through a lobe. The mean light in the lobe is that of the split sum (Karis,
+"Real Shading in Unreal Engine 4", 2013): the mean of the picture, weighted by GGX seen head on, times a
+table of what surface of this roughness reflects of light 1. The lobe of roughness 1 is the cosine, so its
+means light diffuse surface too. Lobes are round: along circles of latitude, a mean is a convolution, which a
+Fourier transform computes without noise.
 """
 
+import os
 from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct, irfft, rfft
+from scipy.sparse import csr_array
 
-Color = tuple[float, float, float]
+from blobtree._typing import Float32Array, Float64Array
+from decals.errors import InvalidImage, InvalidScene
+from decals.images.load import MAX_IMAGE_EDGE, AnyImage, image_pixels, is_embedded
+from decals.images.texels import linear_premultiplied
+from decals.options import Values
+from decals.validation import MAX_LIGHT, finite_number, finite_vector, instance
+
+Vector = tuple[float, float, float]
+
+ASPECTS = (1.9, 2.1)
+"""Least and greatest width over height of a picture of all directions."""
+
+MAX_PICTURE_COLUMNS = 8192
+"""Greatest width of a panorama in the background: more takes more than 200 MB of graphics memory."""
+
+GRID_ROWS = (512, 256, 128, 64, 64, 64, 64)
+"""Steps from pole to pole of the grids of directions, from mirrors to surface of roughness 1."""
+
+TABLE_SHAPE = (32, 64)
+"""Rows of the table, by roughness, and its columns, by the cosine between normal and eye."""
+
+TABLE_LOBE_STEPS = (128, 12)
+"""Directions over a lobe, from its axis and around it, with which the table is computed."""
+
+MIN_FACING = 1e-3
+"""Least cosine between normal and eye, as in ``shaders/material.glsl``."""
 
 
-@dataclass(frozen=True, slots=True)
-class Lamp:
-    """A lamp: its direction in the camera's frame, sharpness λ of its edge, and radiance at its middle."""
+class Panorama:
+    """A picture of all directions in linear light.
 
-    direction: Color
-    sharpness: float
-    color: Color
+    Parameters
+    ----------
+    picture : image
+        See `Environment`.
+
+    Attributes
+    ----------
+    source : str
+        Path of the picture; empty for an array.
+    light : float32[h, w, 3]
+        Linear light, row 0 at the top.
+    """
+
+    def __init__(self, picture: AnyImage) -> None:
+        source = os.fspath(picture) if isinstance(picture, str | os.PathLike) else ""
+        self.source = "" if is_embedded(source) else source
+        self.light = _light(picture)
+        height, width = self.light.shape[:2]
+        if not ASPECTS[0] <= width / height <= ASPECTS[1]:
+            raise InvalidImage(
+                f"environment: expected a picture of all directions, twice as wide as high, got {width} x "
+                f"{height}; convert it to an equirectangular picture"
+            )
+
+    def __eq__(self, other: object) -> bool:
+        same = self is other
+        return same or (isinstance(other, Panorama) and np.array_equal(self.light, other.light))
+
+    def __hash__(self) -> int:
+        return hash((self.source, self.light.shape))
+
+    def __repr__(self) -> str:
+        return repr(self.source)
+
+    @cached_property
+    def texels(self) -> NDArray[np.float16]:
+        """What ``shaders/image_environment.glsl`` reads: all grids one below the other, and the table."""
+        blocks = [_mirror_grid(panorama_cells(self.light, GRID_ROWS[0]))]
+        for level, rows in enumerate(GRID_ROWS[1:], 1):
+            blocks.append(lobe_means(panorama_cells(self.light, rows), level_alpha(level)))
+        blocks.append(np.dstack(reflection_table()))
+        blocks = [np.pad(block, ((1, 1), (0, 0), (0, 0)), "edge") for block in blocks]
+        texels = np.zeros((sum(map(len, blocks)), 2 * GRID_ROWS[0] + 1, 3), np.float16)
+        first = 0
+        for block in blocks:
+            texels[first : first + len(block), : block.shape[1]] = block
+            first += len(block)
+        return texels
 
 
-SKY: Color = (0.33, 0.35, 0.39)
-GROUND: Color = (0.13, 0.11, 0.10)
-"""Radiance from above and below: the ambient light of ``shaders/studio_light.glsl``."""
+@dataclass(frozen=True)
+class Environment:
+    """A picture of all directions as light, such as a sky or a room; it replaces the studio light.
 
-LAMPS = (
-    Lamp((-0.75, 0.55, 0.35), 14.0, (2.6, 2.5, 2.3)),
-    Lamp((0.85, 0.10, 0.45), 22.0, (1.1, 1.2, 1.4)),
-    Lamp((0.10, 0.75, -0.65), 9.0, (1.3, 1.3, 1.4)),
-)
+    Parameters
+    ----------
+    picture : image
+        Path of an equirectangular picture, twice as wide as high: Radiance (``.hdr``), or any other as less
+        bright light; or an array ``[h, w, 3]``, of which floats are linear light and integers sRGB. Row 0 is
+        straight up, the middle column opposite to the front: at −z, or at +y for an ``up`` along z.
+    rotation : float
+        Angle in degrees by which the picture turns about ``up``, counterclockwise as seen from above.
+    strength : float
+        Factor of its light, at least 0.
+    visible : bool
+        True shows the picture behind the objects, in place of the background.
+    up : (x, y, z)
+        Upward direction of the picture in the scene.
+
+    Raises
+    ------
+    InvalidImage
+        If the picture cannot be read, has another shape, or holds negative or infinite light. Light above
+        65,504 counts as that much.
+    InvalidScene
+        If another parameter is not finite, or out of range.
+
+    Examples
+    --------
+    >>> import numpy
+    >>> from decals.rendering import Environment
+    >>> sky = numpy.linspace([0.6, 0.8, 2.0], [0.2, 0.1, 0.1], 64)[:, None] * numpy.ones((128, 1))
+    >>> Environment(sky, rotation=90).strength
+    1.0
+    """
+
+    picture: Panorama
+    rotation: Annotated[float, Values(-180.0, 180.0, "°")] = 0.0
+    strength: Annotated[float, Values(0.0, 4.0)] = 1.0
+    visible: bool = False
+    up: Annotated[Vector, Values(kind=tuple)] = (0.0, 1.0, 0.0)  # three numbers are else a colour
+
+    if TYPE_CHECKING:  # images of any kind are converted
+
+        def __init__(
+            self,
+            picture: "AnyImage | Panorama",
+            rotation: float = 0.0,
+            strength: float = 1.0,
+            visible: bool = False,
+            up: Vector = (0.0, 1.0, 0.0),
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        numbers = finite_vector("an environment's up", self.up, InvalidScene)
+        checked: dict[str, Any] = {
+            "rotation": finite_number("an environment's rotation", self.rotation, InvalidScene),
+            "strength": finite_number("an environment's strength", self.strength, InvalidScene),
+            "visible": instance("visible", self.visible, bool, InvalidScene, "such as True"),
+            "up": tuple(numbers.tolist()),
+        }
+        if checked["strength"] < 0.0:
+            raise InvalidScene(
+                f"an environment's strength: expected at least 0, got {self.strength:g}; 0 is darkness"
+            )
+        if not 0.0 < np.linalg.norm(numbers) < np.inf:
+            raise InvalidScene(f"an environment's up: expected a direction, got {self.up}; such as (0, 0, 1)")
+        if not isinstance(self.picture, Panorama):
+            checked["picture"] = Panorama(self.picture)
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def frame(self) -> Float64Array:
+        """Directions of the picture in the scene, right, up and toward the front, as rows, float64[3, 3]."""
+        up = np.array(self.up) / np.linalg.norm(self.up)
+        front = np.array([0.0, 0.0, 1.0] if abs(up[2]) < 0.99 else [0.0, -1.0, 0.0])
+        front -= (front @ up) * up
+        front /= np.linalg.norm(front)
+        right = np.cross(up, front)
+        cosine, sine = np.cos(np.radians(self.rotation)), np.sin(np.radians(self.rotation))
+        return np.array([cosine * right - sine * front, up, cosine * front + sine * right])
 
 
-def environment_glsl() -> str:
-    """Return the environment as constants of GLSL."""
-    axes, colors = [], []
-    for lamp in LAMPS:
-        axis = np.asarray(lamp.direction) / np.linalg.norm(lamp.direction)
-        axes.append(f"vec4({', '.join(map(repr, axis.tolist()))}, {lamp.sharpness!r})")
-        colors.append(_vector(lamp.color))
-    count = len(LAMPS)
+def as_environment(environment: Any) -> Environment:
+    """Return an environment, or that of a picture."""
+    return environment if isinstance(environment, Environment) else Environment(environment)
+
+
+def environment_constants() -> str:
+    """Return the places of the grids and of the table as GLSL, for ``shaders/image_environment.glsl``."""
+    first, grids = 1, []
+    for rows in GRID_ROWS:
+        grids.append(f"ivec2({first}, {rows})")
+        first += rows + 3  # both poles, and a row above and below
+    count, (rows, columns) = len(GRID_ROWS), TABLE_SHAPE
     return (
-        f"const int ENVIRONMENT_LOBES = {count};\n"
-        f"const vec3 ENVIRONMENT_SKY = {_vector(SKY)};\n"
-        f"const vec3 ENVIRONMENT_GROUND = {_vector(GROUND)};\n"
-        f"const vec4 environment_axes[{count}] = vec4[]({', '.join(axes)});\n"
-        f"const vec3 environment_colors[{count}] = vec3[]({', '.join(colors)});\n"
+        f"const int ENVIRONMENT_LEVELS = {count};\n"
+        f"const ivec2 ENVIRONMENT_GRIDS[{count}] = ivec2[]({', '.join(grids)});\n"
+        f"const ivec3 ENVIRONMENT_TABLE = ivec3({first}, {columns}, {rows});\n"
     )
 
 
-def _vector(color: Color) -> str:
-    return f"vec3({', '.join(map(repr, color))})"
+def _light(picture: Any) -> Float32Array:
+    """Return linear light ``[h, w, 3]`` of an image of any kind, or raise `InvalidImage`."""
+    if not (isinstance(picture, np.ndarray) and picture.dtype.kind == "f"):
+        return linear_premultiplied(image_pixels(picture, name="environment"))[..., :3]
+    if (
+        picture.ndim != 3
+        or picture.shape[2] not in (3, 4)
+        or not 0 < min(picture.shape) <= max(picture.shape) <= MAX_IMAGE_EDGE
+    ):
+        raise InvalidImage(
+            f"environment: expected light [h, w, 3] of 1 to {MAX_IMAGE_EDGE} pixels a side, "
+            f"got {list(picture.shape)}"
+        )
+    wrong = np.argwhere(~((picture >= 0.0) & np.isfinite(picture)))
+    if len(wrong):
+        row, column, channel = wrong[0].tolist()
+        raise InvalidImage(
+            f"environment: expected finite light of at least 0, got {picture[row, column, channel]:g} in row "
+            f"{row}, column {column}; replace such pixels"
+        )
+    return np.minimum(picture[..., :3], MAX_LIGHT).astype(np.float32)
+
+
+def picture_texels(light: Float32Array, max_edge: int) -> NDArray[np.float16]:
+    """Return a panorama for the background: as it is, or, if it is too large, with fewer pixels."""
+    rows = min(max_edge, MAX_PICTURE_COLUMNS) // 2
+    small = max(light.shape) <= 2 * rows
+    return (light if small else panorama_cells(light, rows)).astype(np.float16)
+
+
+# -- prefiltering ---------------------------------------------------------------------------------------
+
+
+def level_alpha(level: int) -> float:
+    """Return the width α of GGX, the squared roughness, of a grid: 0 of the first, 1 of the last."""
+    return float((2.0**level - 1.0) / (2.0 ** (len(GRID_ROWS) - 1) - 1.0))
+
+
+def panorama_cells(light: Float32Array, rows: int) -> Float32Array:
+    """Return a panorama in another size, float32[rows, 2 rows, 3]: means over the parts of the sphere."""
+    height, width = light.shape[:2]
+    lines = _overlaps(_heights(rows), _heights(height)) @ light.reshape(height, -1)
+    columns = lines.reshape(rows, width, 3).transpose(1, 0, 2).reshape(width, -1)
+    turned = _overlaps(np.linspace(0, 1, 2 * rows + 1), np.linspace(0, 1, width + 1)) @ columns
+    cells: Float32Array = turned.reshape(2 * rows, rows, 3).transpose(1, 0, 2)
+    return np.ascontiguousarray(cells)
+
+
+def _heights(rows: int) -> Float64Array:
+    """Return the heights of the edges of rows below the upper pole, on a sphere of radius 1."""
+    return 1.0 - np.cos(np.linspace(0.0, np.pi, rows + 1))
+
+
+def _overlaps(edges: Float64Array, others: Float64Array) -> csr_array:
+    """Return the part of each interval between edges that each interval between others covers."""
+    ends, starts = np.minimum.outer(edges[1:], others[1:]), np.maximum.outer(edges[:-1], others[:-1])
+    parts = np.maximum(ends - starts, 0.0) / np.diff(edges)[:, None]
+    return csr_array(parts.astype(np.float32))
+
+
+def lobe(cosine: Float32Array, alpha: float) -> Float32Array:
+    """Return the weight of light at an angle from the axis of a lobe that is seen head on.
+
+    That is the distribution of GGX at half the angle, times the cosine; the factor is arbitrary.
+    """
+    weight: Float32Array = np.maximum(cosine, 0.0) / (1.0 - 0.5 * (1.0 + cosine) * (1.0 - alpha * alpha)) ** 2
+    return weight
+
+
+def lobe_means(cells: Float32Array, alpha: float) -> Float32Array:
+    """Return the mean light in the lobe around each direction of a grid.
+
+    Parameters
+    ----------
+    cells
+        Panorama, float32[rows, 2 rows, 3].
+    alpha
+        Squared roughness.
+
+    Returns
+    -------
+    float32[rows + 1, 2 rows + 1, 3]
+        Means around the corners of the cells: the first and the last row are the poles, the first and the
+        last column are the same.
+    """
+    rows = len(cells)
+    edges = np.linspace(0.0, np.pi, rows + 1)
+    middles, half = 0.5 * (edges[1:] + edges[:-1]), rows // 2 + 1
+    turns = np.cos((np.arange(rows) + 0.5) * np.pi / rows).astype(np.float32)
+    along = np.outer(np.cos(edges[:half]), np.cos(middles)).astype(np.float32)
+    across = np.outer(np.sin(edges[:half]), np.sin(middles)).astype(np.float32)
+    weights = lobe(along[..., None] + across[..., None] * turns, alpha)  # of the half that begins at a corner
+    waves = dct(weights, axis=-1, overwrite_x=True) * np.diff(_heights(rows)).astype(np.float32)[:, None]
+    shift = np.exp(-0.5j * np.pi * np.arange(rows) / rows)[:, None]  # from middles to corners
+    spectrum = (rfft(cells, axis=1)[:, :-1] * shift).astype(np.complex64)
+    both = np.concatenate([spectrum, spectrum[::-1]], axis=-1)  # the southern half is the northern, reflected
+    means = np.matmul(waves.transpose(2, 0, 1), both.transpose(1, 0, 2)).transpose(1, 0, 2)
+    means = irfft(means / waves[:, :, 0].sum(axis=1)[:, None, None], 2 * rows, axis=1)
+    grid = np.concatenate([means[..., :3], means[-2::-1, :, 3:]])
+    closed: Float32Array = np.concatenate([grid, grid[:, :1]], axis=1).astype(np.float32)
+    return np.maximum(closed, 0.0)
+
+
+def _mirror_grid(cells: Float32Array) -> Float32Array:
+    """Return the mean of the cells around each corner, as `lobe_means` of an infinitely narrow lobe."""
+    rows = np.pad(cells, ((1, 1), (0, 0), (0, 0)), "edge")
+    rows = 0.5 * (rows[1:] + rows[:-1])
+    corners = 0.5 * (rows + np.roll(rows, 1, axis=1))
+    corners[[0, -1]] = corners[[0, -1]].mean(axis=1, keepdims=True)
+    return np.concatenate([corners, corners[:, :1]], axis=1)
+
+
+@cache
+def reflection_table() -> tuple[Float64Array, Float64Array, Float64Array]:
+    """Return what surface reflects of light 1 from everywhere, by roughness and by the cosine to the eye.
+
+    The first array is the factor of the reflectance seen head on, the second is added to the product: an
+    integral of GGX with Smith's height-correlated shadowing, over the normals that the eye sees (Dupuy and
+    Benyoub, "Sampling Visible GGX Normals with Spherical Caps", 2023). The third is the mean of
+    (1 - cosine to the half vector)⁵ over diffuse light.
+    """
+    steps = [np.linspace(0.0, 1.0, count) for count in TABLE_SHAPE]
+    roughness, seen = (grid[..., None, None] for grid in np.meshgrid(*steps, indexing="ij"))
+    alpha, seen = roughness**2, np.maximum(seen, MIN_FACING)
+    parts, turns = ((np.arange(count) + 0.5) / count for count in TABLE_LOBE_STEPS)
+    aside = np.sqrt(1.0 - seen**2)
+    stretched = np.hypot(alpha * aside, seen)
+    x, z = alpha * aside / stretched, seen / stretched
+    height = (1.0 - parts[:, None]) * (1.0 + z) - z
+    ring = np.sqrt(np.maximum(1.0 - height**2, 0.0))
+    half = [alpha * (ring * np.cos(np.pi * turns) + x), alpha * ring * np.sin(np.pi * turns), height + z]
+    length = np.sqrt(sum(part**2 for part in half))
+    toward_half = np.clip((half[0] * aside + half[2] * seen) / length, 0.0, 1.0)
+    lit = 2.0 * toward_half * half[2] / length - seen
+    smith = [
+        np.sqrt(cosine**2 * (1.0 - alpha**2) + alpha**2) / cosine for cosine in (np.maximum(lit, 1e-9), seen)
+    ]
+    weight = np.where(lit > 0.0, (1.0 + smith[1]) / (smith[0] + smith[1]), 0.0)
+    fresnel = (1.0 - toward_half) ** 5
+    diffuse = aside * np.sqrt(parts[:, None]) * np.cos(np.pi * turns) + seen * np.sqrt(1.0 - parts[:, None])
+    grazing = np.broadcast_to((1.0 - np.sqrt(0.5 + 0.5 * diffuse)) ** 5, weight.shape)
+    means = [values.mean(axis=(2, 3)) for values in ((1.0 - fresnel) * weight, fresnel * weight, grazing)]
+    return means[0], means[1], means[2]

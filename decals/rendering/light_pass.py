@@ -1,23 +1,49 @@
 """The light pass, which lights the painted surface, and the resolve of its samples to pixels."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import moderngl
 import numpy as np
 
 from blobtree._typing import UInt8Array
 from decals.rendering.context import Context
-from decals.rendering.environment import environment_glsl
+from decals.rendering.environment import Environment, Panorama, environment_constants, picture_texels
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Background
 from decals.rendering.pixel_pass import PixelPass, Program, attach_camera, set_uniform, use_textures
+from decals.rendering.studio import studio_constants
 from decals.rendering.viewpoint import TILE_MARGIN, WHOLE, Part, Rectangle, Tile
 from decals.shaders import compose
 
 BODY = "light_pass.glsl"
-STUDIO_LIGHT, SCENE_LIGHTS = "studio_light.glsl", "lights.glsl"
-"""Shader files of the two kinds of light."""
+STUDIO_LIGHT, SCENE_LIGHTS, IMAGE_LIGHT = "studio_light.glsl", "lights.glsl", "image_light.glsl"
+"""Shader files of the kinds of light."""
+
+
+class EnvironmentTextures:
+    """A panorama on the GPU: prefiltered, and, if it is visible, as it is."""
+
+    def __init__(self, context: Context, panorama: Panorama, visible: bool) -> None:
+        arrays = {"environment_levels": panorama.texels}
+        if visible:
+            arrays["environment_picture"] = picture_texels(panorama.light, context.max_texture_size)
+        self.textures: dict[str, moderngl.Texture] = {}
+        for name, texels in arrays.items():
+            size = texels.shape[1], texels.shape[0]
+            texture = context.gl.texture(size, 3, np.ascontiguousarray(texels), alignment=1, dtype="f2")
+            texture.repeat_x, texture.repeat_y = name == "environment_picture", False
+            texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            self.textures[name] = texture
+
+    def release(self) -> None:
+        """Release the memory."""
+        for texture in self.textures.values():
+            texture.release()
+
+
+NO_LIGHTS = Lighting(())
 
 
 class LightPass:
@@ -36,7 +62,7 @@ class LightPass:
         self.light.repeat_x = self.light.repeat_y = False  # it may be magnified
         self._context = context
         self._passes: dict[tuple[object, ...], PixelPass] = {}
-        self._pass(STUDIO_LIGHT)
+        self._pass(**light_variant(None, None))
 
     def draw(
         self,
@@ -46,6 +72,8 @@ class LightPass:
         tile: Tile,
         ambient_radius: float,
         lights: Lighting | None = None,
+        environment: Environment | None = None,
+        maps: Mapping[str, moderngl.Texture] | None = None,
         materials: Mapping[str, moderngl.Texture] | None = None,
         relief: bool = False,
         part: Part = WHOLE,
@@ -53,27 +81,31 @@ class LightPass:
         """Light some rows of a rectangle of a tile; all of the tile must be in the G-buffer.
 
         ``ambient_radius`` is the greatest distance, in the scene's units, at which surface keeps out the
-        studio light. Without ``lights`` the studio light is used. ``materials`` are the decal pass's targets;
-        with ``relief`` they have shadows.
+        studio light, and that of an environment, whose textures are ``maps``. Without ``lights`` and
+        environment the studio light is used. ``materials`` are the decal pass's targets; with ``relief`` they
+        have shadows.
         """
-        shining = bool(materials)
-        light_pass = self._pass(light_file(lights), materials=shining, relief=shining and relief)
+        variant = light_variant(lights, environment, materials=bool(materials), relief=relief)
+        light_pass = self._pass(**variant)
         program = light_pass.program
         textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_paint": paint}
-        use_textures(program, textures | dict(materials or {}))
-        if lights is None:
+        use_textures(program, textures | dict(materials or {}) | dict(maps or {}))
+        if environment is not None:
+            set_uniform(program, "environment_strength", environment.strength)
+            set_uniform(program, "environment_frame", tuple(environment.frame.T.ravel().tolist()))
+        if lights is None or environment is not None:
             set_uniform(program, "tile_corner", (tile.x, tile.y))
             set_uniform(program, "tile_size", (tile.width, tile.height))
             set_uniform(program, "ambient_radius", ambient_radius)
             set_uniform(program, "ambient_limit", TILE_MARGIN)
-        else:
-            _use_lights(program, lights)
+        if lights is not None or environment is not None:
+            _use_lights(program, lights or NO_LIGHTS)
         light_pass.run(rectangle.rows(part))
 
-    def _pass(self, file: str, **variant: bool) -> PixelPass:
-        key = file, *variant.values()
+    def _pass(self, **variant: Any) -> PixelPass:
+        key = tuple(variant.values())
         if key not in self._passes:
-            program = light_program(self._context, file, **variant)
+            program = light_program(self._context, **variant)
             self._passes[key] = PixelPass(self._context.gl, program, [self.light])
         return self._passes[key]
 
@@ -84,17 +116,32 @@ class LightPass:
         self.light.release()
 
 
-def light_file(lights: Lighting | None) -> str:
-    """Return the shader file of the studio light or of lights of a scene."""
-    return STUDIO_LIGHT if lights is None else SCENE_LIGHTS
+def light_variant(
+    lights: Lighting | None,
+    environment: Environment | None,
+    *,
+    materials: bool = False,
+    relief: bool = False,
+) -> dict[str, Any]:
+    """Return the arguments of `light_program` for lights and an environment."""
+    file = IMAGE_LIGHT if environment is not None else STUDIO_LIGHT if lights is None else SCENE_LIGHTS
+    shown = environment is not None and environment.visible
+    return {"file": file, "materials": materials, "relief": materials and relief, "shown": shown}
 
 
-def light_program(context: Context, file: str, *, materials: bool = False, relief: bool = False) -> Program:
-    """Return the program of a kind of light, by its shader file."""
-    slots = {"lighting": f"//@ include {file}"}
-    if materials:
-        slots |= {"material": "//@ include material.glsl", "environment": environment_glsl()}
-    defines = {"MATERIAL_LIGHT": materials, "RELIEF": relief}
+def light_program(context: Context, file: str, *, materials: bool, relief: bool, shown: bool) -> Program:
+    """Return the program of a kind of light, by its shader file; ``shown``: the environment is visible."""
+    slots, image = {"lighting": f"//@ include {file}"}, file == IMAGE_LIGHT
+    if materials or image:
+        kind, constants = ("image", environment_constants()) if image else ("studio", studio_constants())
+        environment = f"{constants}//@ include {kind}_environment.glsl"
+        slots |= {"material": "//@ include material.glsl", "environment": environment}
+    defines = {
+        "PHYSICAL": materials or image,
+        "MATERIAL_LIGHT": materials,
+        "RELIEF": relief,
+        "ENVIRONMENT_SHOWN": shown,
+    }
     return attach_camera(context.pixel_program(BODY, 1, slots=slots, defines=defines))
 
 

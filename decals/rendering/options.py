@@ -11,12 +11,14 @@ from blobtree.colors import ColorLike, Rgba, color_rgba
 from decals.errors import InvalidScene
 from decals.field.law import AnyContact, contact_mode
 from decals.field.mapping import ImageMapping
+from decals.images.load import AnyImage
 from decals.images.texels import Pixels
 from decals.index.editor import DecalEditor
 from decals.model import Decals
 from decals.options import Values
 from decals.receivers import takes_named_only
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS
+from decals.rendering.environment import Environment, as_environment
 from decals.rendering.lights import Lighting
 from decals.rendering.viewpoint import Viewpoint
 from decals.validation import describe, instance, member, stiffness_number, whole_number
@@ -95,11 +97,15 @@ class Drawing:
     filtered : bool
         Average images, rims and contact lines over each sample, so that they are smooth with one sample a
         pixel. Silhouettes and light still need several.
+    environment : Environment or image, optional
+        Picture of all directions as light, in place of the studio light; ``lights`` are added to it.
 
     Raises
     ------
     InvalidScene
         If an option is of another type, or out of range.
+    InvalidImage
+        If the picture of the environment cannot be used.
 
     Examples
     --------
@@ -116,6 +122,7 @@ class Drawing:
     lights: Lighting | None = None
     stiffness: Annotated[float, Values(1.0, 8.0)] = DEFAULT_STIFFNESS
     filtered: bool = False
+    environment: Environment | None = None
 
     if TYPE_CHECKING:  # names of modes are converted
 
@@ -129,10 +136,11 @@ class Drawing:
             lights: Lighting | None = None,
             stiffness: float = DEFAULT_STIFFNESS,
             filtered: bool = False,
+            environment: Environment | AnyImage | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        checked = {
+        checked: dict[str, object] = {
             "samples": whole_number("samples", self.samples, 1, MAX_SAMPLES, InvalidScene),
             "contact": contact_mode(self.contact, InvalidScene),
             "mapping": member("mapping", self.mapping, ImageMapping, InvalidScene),
@@ -142,6 +150,8 @@ class Drawing:
         instance("background", self.background, Background, InvalidScene, "such as decals.rendering.STUDIO")
         if self.lights is not None:
             instance("lights", self.lights, Lighting, InvalidScene, "leave them out for the studio light")
+        if self.environment is not None:
+            checked["environment"] = as_environment(self.environment)
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
@@ -192,6 +202,7 @@ class RenderOptions(Drawing):
             lights: Lighting | None = None,
             stiffness: float = DEFAULT_STIFFNESS,
             filtered: bool = False,
+            environment: Environment | AnyImage | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:

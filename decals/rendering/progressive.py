@@ -159,7 +159,7 @@ class TargetState:
     version
         Version of the editor.
     options
-        Mapping, contact mode, stiffness and lights.
+        Mapping, contact mode, stiffness, lights and environment.
     relief
         True if rays are followed over the surface, so that an edit may change pixels far from it.
     moved
@@ -214,7 +214,10 @@ class TargetState:
             return DirtyRegions((Rectangle(0, 0, tile.width, tile.height),), whole, whole)
         if self._same_decals(previous):
             paint = self._edited(previous.version, tile)
-        same_light = self.options.lights == previous.options.lights
+        same_light = all(
+            getattr(self.options, name) == getattr(previous.options, name)
+            for name in ("lights", "environment")
+        )
         return DirtyRegions((), paint, paint if same_light else whole)
 
     def _same_decals(self, previous: TargetState) -> bool:
@@ -419,7 +422,9 @@ def plan_frame(
     radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
     materials = None if uploaded.materials is None else targets.decal_pass.material_targets
     relief = uploaded.relief is not None
-    light_arguments = gbuffer, paint, tile, radius, options.lights, materials, relief
+    maps = None if uploaded.environment is None else uploaded.environment.textures
+    shining = options.lights, options.environment, maps, materials, relief
+    light_arguments = gbuffer, paint, tile, radius, *shining
     steps += [partial(targets.light_pass.draw, rectangle, *light_arguments) for rectangle in dirty.light]
     return FramePlan(state, steps, dirty.work(tile))
 

@@ -22,7 +22,7 @@ from decals.index.editor import DecalEditor
 from decals.rendering.context import Context
 from decals.rendering.decal_pass import decal_library, decal_programs
 from decals.rendering.gbuffer import depth_program
-from decals.rendering.light_pass import light_file, light_program, resolve_program
+from decals.rendering.light_pass import light_program, light_variant, resolve_program
 from decals.rendering.materials import has_materials, has_relief
 from decals.rendering.mesh import ColoredMesh, MeshDrawable, PosedColoredMesh, PosedMeshDrawable
 from decals.rendering.offset_tree import OffsetTreeDrawable
@@ -194,7 +194,7 @@ class Renderer:
         for name, coordinate, side in (("x", x, options.size[0]), ("y", y, options.size[1])):
             whole_number(name, coordinate, 0, side - 1, InvalidPoints)
         with self.context.current():
-            uploaded = self._uploads.scene(scene, options.mapping)
+            uploaded = self._uploads.scene(scene, options)
             view = PictureView.of(viewpoint_of(scene, viewpoint), options.size, uploaded.bounds)
             targets = self._targets.of(BUFFERS_SLOT, (1, 1))
             self._draw_tile(scene, uploaded, view.part(Rectangle(x, y, 1, 1)), targets, options)
@@ -229,7 +229,7 @@ class Renderer:
         """Draw tile after tile; the targets hold a tile until the next one is drawn."""
         _warn_of_plain_samples(scene, options)
         with self.context.current():
-            uploaded = self._uploads.scene(scene, options.mapping)
+            uploaded = self._uploads.scene(scene, options)
             view = PictureView.of(viewpoint_of(scene, viewpoint), options.sample_size, uploaded.bounds)
             size = largest_tile(options.size, options.samples, limit=self._max_tile)
             targets = self._targets.of(slot, size)
@@ -282,7 +282,7 @@ class Renderer:
 
         def plan(targets: Targets, previous: TargetState | None) -> FramePlan:
             # each time: other frames may be drawn between slices
-            uploaded = self._uploads.scene(scene, options.mapping)
+            uploaded = self._uploads.scene(scene, options)
             tile = request.tile(uploaded.bounds)
             self._camera.use(tile)
             return plan_frame(scene, uploaded, tile, options, targets, previous, depth=True)
@@ -406,8 +406,9 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
     """
     context = uploads.context
     objects = [warmup_of(context, item) for item in drawn_objects(scene)]
-    has_decals, light = len(scene.decals) > 0, light_file(options.lights)
+    has_decals, environment = len(scene.decals) > 0, options.environment
     formulas, materials, relief = None, has_materials(scene), has_relief(scene)
+    light = light_variant(options.lights, environment, materials=materials, relief=relief)
     if has_decals:
         formulas = (
             options.contact,
@@ -434,18 +435,23 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
                 relief=relief,
             ),
         ),
-        WarmupTask(SHADERS, lambda: light_program(context, light, materials=materials, relief=relief)),
+        WarmupTask(SHADERS, partial(light_program, context, **light)),
         WarmupTask(SHADERS, partial(depth_program, context)),
         WarmupTask(SHADERS, partial(resolve_program, context)),
     ]
     if relief:
         tasks.append(WarmupTask(SHADERS, partial(_compile_offsets, uploads, scene, options)))
-    return WarmupPlan((frozenset(plan.key for plan in objects), formulas, light, materials, relief), tasks)
+    if environment is not None:
+        tasks.append(WarmupTask(IMAGES, lambda: environment.picture.texels, threaded=True))
+        tasks.append(WarmupTask(IMAGES, partial(uploads.environment, environment)))
+    shown = None if environment is None else environment.picture
+    kinds = frozenset(plan.key for plan in objects)
+    return WarmupPlan((kinds, formulas, tuple(light.values()), shown), tasks)
 
 
 def _compile_offsets(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> None:
     """Compile the programs that trace the trees that heights of a scene move."""
-    uploaded = uploads.scene(scene, options.mapping)
+    uploaded = uploads.scene(scene, options)
     source = decal_source(uploaded, options)
     for drawable in uploaded.drawables:
         if source is not None and isinstance(drawable, OffsetTreeDrawable):

@@ -22,7 +22,9 @@ from decals.index.index import DecalIndex, has_nested
 from decals.model import Decals
 from decals.receivers import object_mask
 from decals.rendering.context import Context
+from decals.rendering.environment import Environment
 from decals.rendering.gbuffer import GBuffer
+from decals.rendering.light_pass import EnvironmentTextures
 from decals.rendering.materials import (
     RELIEF_LOOKUPS,
     MaterialArray,
@@ -31,7 +33,7 @@ from decals.rendering.materials import (
     has_materials,
     has_relief,
 )
-from decals.rendering.options import SceneLike, check_scene, drawn_objects, is_limited
+from decals.rendering.options import Drawing, SceneLike, check_scene, drawn_objects, is_limited
 from decals.rendering.pixel_pass import Program, set_uniform
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
 from decals.rendering.walk_cache import WalkCache
@@ -536,6 +538,7 @@ class UploadedScene:
     materials: MaterialArray | None = None
     relief: Relief | None = None
     walks: DataTexture | None = None
+    environment: EnvironmentTextures | None = None
 
     @cached_property
     def bounds(self) -> Bounds:
@@ -573,20 +576,40 @@ class Uploads:
         self._images: GpuCache[ImageArray] = GpuCache()
         self._materials: GpuCache[MaterialArray] = GpuCache()
         self._reliefs: GpuCache[ReliefArray] = GpuCache()
+        self._environments: GpuCache[EnvironmentTextures] = GpuCache()
+        self._caches: tuple[GpuCache[Any], ...] = (
+            self._drawables,
+            self._decals,
+            self._images,
+            self._materials,
+            self._reliefs,
+            self._environments,
+        )
         self._masks: tuple[tuple[int, ...], DataTexture] | None = None
         self.walk_cache = WalkCache()
         self._walks: tuple[Walks, DataTexture] | None = None
 
-    def scene(self, scene: SceneLike, mapping: ImageMapping = ImageMapping.CORRECTED) -> UploadedScene:
-        """Return a whole scene, with walks for the mapping WALKED; errors are those of `check_scene`."""
+    def scene(self, scene: SceneLike, drawing: Drawing) -> UploadedScene:
+        """Return a whole scene, with what a way of drawing needs; errors are those of `check_scene`."""
         check_scene(scene)
         objects = drawn_objects(scene)
         drawables = [self.drawable(item) for item in objects]
         masks = self._masks_of(scene, objects)
         images = self.images(scene)
         materials = self._materials_of(scene, images)
-        relief, walks = self._relief_of(scene, images), self.walks(scene, mapping)
-        return UploadedScene(drawables, self.decals(scene), images, masks, materials, relief, walks)
+        relief, walks = self._relief_of(scene, images), self.walks(scene, drawing.mapping)
+        environment = self.environment(drawing.environment)
+        decals = self.decals(scene)
+        return UploadedScene(drawables, decals, images, masks, materials, relief, walks, environment)
+
+    def environment(self, environment: Environment | None) -> EnvironmentTextures | None:
+        """Return the textures of an environment."""
+        if environment is None:
+            return None
+        panorama, visible = environment.picture, environment.visible
+        return self._environments.get(
+            lambda: EnvironmentTextures(self.context, panorama, visible), panorama, visible
+        )
 
     def walks(self, scene: SceneLike, mapping: ImageMapping) -> DataTexture | None:
         """Return the walks of a scene's decals; None in other mappings, or without decals."""
@@ -677,12 +700,12 @@ class Uploads:
 
     def sweep(self) -> None:
         """Release everything that was not used since the last sweep."""
-        for cache in (self._drawables, self._decals, self._images, self._materials, self._reliefs):
+        for cache in self._caches:
             cache.sweep()
 
     def release(self) -> None:
         """Release everything."""
-        for cache in (self._drawables, self._decals, self._images, self._materials, self._reliefs):
+        for cache in self._caches:
             cache.release()
         self._release_masks()
         self._release_walks()

@@ -1,16 +1,23 @@
 """How a scene is drawn, as its file has it."""
 
+from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from msgspec import Struct
+from msgspec.structs import asdict
 
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.field.law import LAWS, ContactLaw
 from decals.field.mapping import ImageMapping
+from decals.images.load import embedded_image, is_embedded
 from decals.record import DEFAULT_STIFFNESS, Contact
+from decals.rendering.environment import Environment
 from decals.rendering.lights import Light, Lighting
 from decals.rendering.options import STUDIO, Background, Drawing
 from decals.scenes.camera import Vector
+from decals.scenes.records import absolute, relative
+from decals.validation import is_file
 
 FORMER_CONTACT = Contact.PRODUCT
 """Contact mode of files that name none: their pictures were drawn with it."""
@@ -37,6 +44,14 @@ class _LightingRecord(Struct, forbid_unknown_fields=True):
     frame: tuple[float, ...]
 
 
+class _EnvironmentRecord(Struct, forbid_unknown_fields=True, omit_defaults=True):
+    picture: str
+    rotation: float = 0.0
+    strength: float = 1.0
+    visible: bool = False
+    up: Vector = (0.0, 1.0, 0.0)
+
+
 class DrawingRecord(Struct, forbid_unknown_fields=True):
     """Modes are always written, so that other defaults of later versions change no picture."""
 
@@ -48,10 +63,16 @@ class DrawingRecord(Struct, forbid_unknown_fields=True):
     lights: _LightingRecord | None = None
     law: str | None = None
     filtered: bool = False
+    environment: _EnvironmentRecord | None = None
+
+    def sources(self) -> list[str]:
+        """Return the files that the record names."""
+        named = self.environment is not None and not is_embedded(self.environment.picture)
+        return [self.environment.picture] if self.environment is not None and named else []
 
 
-def drawing_record(drawing: Drawing) -> DrawingRecord:
-    """Describe how a scene is drawn."""
+def drawing_record(drawing: Drawing, folder: Path) -> DrawingRecord:
+    """Describe how a scene is drawn; paths are relative to the folder."""
     lights = drawing.lights
     described = None
     if lights is not None:
@@ -69,10 +90,23 @@ def drawing_record(drawing: Drawing) -> DrawingRecord:
         lights=described,
         law=drawing.contact.name if isinstance(drawing.contact, ContactLaw) else None,
         filtered=drawing.filtered,
+        environment=None if drawing.environment is None else _environment_record(drawing.environment, folder),
     )
 
 
-def drawing_of_record(record: DrawingRecord | None) -> Drawing:
+def _environment_record(environment: Environment, folder: Path) -> _EnvironmentRecord:
+    """Describe an environment: a file by its path, another picture in full."""
+    panorama = environment.picture
+    if is_file(Path(panorama.source)):
+        picture = relative(panorama.source, folder)
+    else:
+        opaque = np.ones((*panorama.light.shape[:2], 1), np.float32)
+        picture = embedded_image(np.concatenate([panorama.light, opaque], axis=-1))
+    others = _EnvironmentRecord.__struct_fields__[1:]
+    return _EnvironmentRecord(picture, *(getattr(environment, name) for name in others))
+
+
+def drawing_of_record(record: DrawingRecord | None, folder: Path) -> Drawing:
     """Return how a scene is drawn. Pictures of files without this record were drawn with equation 5.
 
     Raises
@@ -92,6 +126,10 @@ def drawing_of_record(record: DrawingRecord | None) -> Drawing:
             names = _LightRecord.__struct_fields__
             each = (Light(*(getattr(light, name) for name in names)) for light in record.lights.lights)
             lights = Lighting(tuple(each), record.lights.frame)
+        environment = None
+        if record.environment is not None:
+            parts = asdict(record.environment)
+            environment = Environment(absolute(parts.pop("picture"), folder), **parts)
         return Drawing(
             samples=record.samples,
             contact=Contact[record.contact.upper()] if record.law is None else _law(record.law),
@@ -102,6 +140,7 @@ def drawing_of_record(record: DrawingRecord | None) -> Drawing:
             lights=lights,
             stiffness=record.stiffness,
             filtered=record.filtered,
+            environment=environment,
         )
     except ImplicitDecalsError as error:
         raise InvalidScene(f"drawing: {error}") from error

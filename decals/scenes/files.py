@@ -209,7 +209,7 @@ def to_json(scene: Scene, *, folder: Path, progress: Progress | None = None) -> 
         "objects": _lines(record_of(item, folder) for item in scene.objects),
         "images": [_image_record(image, folder) for image in scene.images],
         "camera": _CameraRecord(camera.position, camera.target, camera.up, camera.fov),
-        "drawing": drawing_record(scene.drawing),
+        "drawing": drawing_record(scene.drawing, folder),
         "decals": decals,
     }
     if scene.recipe is not None:
@@ -233,14 +233,15 @@ def from_json(
     if not trust:
         meshes = [item.source for item in record.objects if isinstance(item, MeshRecord)]
         images = [source for image in record.images for source in sources_of(image)]
-        check_inside([*(source for source in meshes if source is not None), *images], folder)
+        drawing = [] if record.drawing is None else record.drawing.sources()
+        check_inside([*(source for source in meshes if source is not None), *images, *drawing], folder)
     objects = [object_of(item, folder, samples) for item in record.objects]
     return Scene(
         objects=tuple(objects),
         camera=_camera(record.camera),
         decals=decals_of(record.decals),
         images=_images(record.images, folder, trust),
-        drawing=drawing_of_record(record.drawing),
+        drawing=drawing_of_record(record.drawing, folder),
         recipe=None if record.recipe is None else Recipe(**msgspec.structs.asdict(record.recipe)),
         hidden_decals=decals_of(record.hidden_decals),
         locked_layers=tuple(record.locked_layers),

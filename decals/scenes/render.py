@@ -6,6 +6,8 @@ from typing import cast
 from blobtree.progress import reporting
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.images.load import AnyImage
+from decals.rendering.environment import Environment, as_environment
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Background, Drawing, SceneLike, Size, drawing_of, is_scene_like
 from decals.rendering.picture import Picture
@@ -27,6 +29,7 @@ def render(
     background: Background | None = None,
     lights: Lighting | None = None,
     filtered: bool | None = None,
+    environment: Environment | AnyImage | None = None,
     viewpoint: Viewpoint | None = None,
 ) -> Picture:
     """Draw a scene, or a model without decals.
@@ -56,6 +59,8 @@ def render(
         Lights in place of the studio light.
     filtered : bool, optional
         Average images, rims and contact lines over each sample; they are then smooth with one sample a pixel.
+    environment : Environment or image, optional
+        Picture of all directions as light, in place of the studio light; ``lights`` are added to it.
     viewpoint : Camera or Projection, optional
         Viewpoint in place of the scene's camera.
 
@@ -66,7 +71,7 @@ def render(
 
     Raises
     ------
-    InvalidScene, InvalidMesh, InvalidFile
+    InvalidScene, InvalidMesh, InvalidFile, InvalidImage
         If the scene or an option cannot be used.
     NoGraphics
         If there is no OpenGL; the message says what to install.
@@ -92,6 +97,7 @@ def render(
         "lights": lights,
         "stiffness": stiffness,
         "filtered": filtered,
+        "environment": None if environment is None else as_environment(environment),
     }
     width, height = Drawing().overridden(**given).at(size).size  # checked before a model is read
     with reporting() as report:

@@ -19,6 +19,7 @@ from blobtree.nodes.values import fields_of, left_out
 from decals.errors import InvalidScene
 from decals.images.builtin import is_builtin
 from decals.model import Decals
+from decals.rendering.environment import Environment
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Background, Drawing
 from decals.scenes.material import MAP_NAMES, DecalMaterial
@@ -110,7 +111,7 @@ class _Script:
         objects = [self._object(item) for item in scene.objects]
         images = [self._image(image) for image in scene.images]
         decals = self._decals("decals", scene.decals)
-        camera = scene.camera
+        camera, drawing = scene.camera, self._drawing(scene.drawing)
         view = ", ".join(repr(getattr(camera, name)) for name in ("position", "target", "up", "fov"))
         head = ['"""A scene of Implicit Decals; run this file to see it, or import ``scene``."""', ""]
         if self.arrays:
@@ -129,7 +130,7 @@ class _Script:
             f"    images=[{', '.join(images)}],",
             "    camera=camera,",
             f"    decals={decals},",
-            *([] if scene.drawing == Drawing() else [f"    drawing={_drawing_text(scene.drawing)},"]),
+            *([] if scene.drawing == Drawing() else [f"    drawing={drawing},"]),
             *(
                 [f"    hidden_decals={self._decals('hidden', scene.hidden_decals)},"]
                 if len(scene.hidden_decals)
@@ -219,6 +220,30 @@ class _Script:
         pixels = self._array(f"image_{len(self.arrays)}", image.pixels)
         return f"decals.DecalImage({image.source!r}, {pixels})"
 
+    def _drawing(self, drawing: Drawing) -> str:
+        """Return the expression of how a scene is drawn; options with their default are left out."""
+        given = {field.name: getattr(drawing, field.name) for field in fields(Drawing)}
+        standard = Drawing()
+        texts = [
+            f"{name}=decals.{type(value).__name__}.{value.name}"
+            if isinstance(value, Enum)
+            else f"{name}={self._value(value)}"
+            for name, value in given.items()
+            if value != getattr(standard, name)
+        ]
+        return f"decals.rendering.Drawing({', '.join(texts)})"
+
+    def _value(self, value: Any) -> str:
+        """Return the text of a number, of a background, of lights or of an environment."""
+        if isinstance(value, Lighting):
+            lights = "".join(f"decals.rendering.{light!r}, " for light in value.lights)
+            return f"decals.rendering.Lighting(({lights}), {value.frame!r})"
+        if isinstance(value, Environment):
+            light = self._array("environment", value.picture.light)
+            others = (f", {field.name}={getattr(value, field.name)!r}" for field in fields(value)[1:])
+            return f"decals.rendering.Environment({light}{''.join(others)})"
+        return f"decals.rendering.{value!r}" if isinstance(value, Background) else repr(value)
+
     def _decals(self, part: str, decals: Decals) -> str:
         if not len(decals):
             return "decals.Decals.empty()"
@@ -263,28 +288,6 @@ def _number_text(values: Any) -> str:
     if array.ndim:
         return f"[{', '.join(map(_number_text, array))}]"
     return repr(float(str(array[()]))) if array.dtype == np.float32 else repr(array.item())
-
-
-def _drawing_text(drawing: Drawing) -> str:
-    """Return the expression of how a scene is drawn; options with their default are left out."""
-    given = {field.name: getattr(drawing, field.name) for field in fields(Drawing)}
-    standard = Drawing()
-    texts = [
-        f"{name}=decals.{type(value).__name__}.{value.name}"
-        if isinstance(value, Enum)
-        else f"{name}={_value_text(value)}"
-        for name, value in given.items()
-        if value != getattr(standard, name)
-    ]
-    return f"decals.rendering.Drawing({', '.join(texts)})"
-
-
-def _value_text(value: Any) -> str:
-    """Return the text of a number, of a background, or of lights."""
-    if isinstance(value, Lighting):
-        lights = "".join(f"decals.rendering.{light!r}, " for light in value.lights)
-        return f"decals.rendering.Lighting(({lights}), {value.frame!r})"
-    return f"decals.rendering.{value!r}" if isinstance(value, Background) else repr(value)
 
 
 def _more(item: SceneObject) -> str:

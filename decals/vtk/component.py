@@ -19,7 +19,7 @@ from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.images.load import DEFAULT_IMAGE, AnyImage
 from decals.model import NO_IMAGE, Decals
-from decals.rendering import SceneLike
+from decals.rendering import Environment, SceneLike
 from decals.scenes.camera import Camera
 from decals.scenes.cover import as_scene
 from decals.scenes.objects import CLAY, MeshObject, SceneObject, TreeObject
@@ -342,6 +342,15 @@ class DecalsComponent(KnownAttributes):
     @lights.setter
     def lights(self, lights: Lights | str) -> None:
         self.subplot.lights = lights
+
+    @property
+    def environment(self) -> Environment | None:
+        """Environment of the active subplot; see `decals.rendering.Environment`."""
+        return self.subplot.environment
+
+    @environment.setter
+    def environment(self, environment: Environment | AnyImage | None) -> None:
+        self.subplot.environment = environment
 
     @property
     def contact(self) -> AnyContact:

@@ -21,8 +21,9 @@ from blobtree.progress import displayed, reporting
 from decals.errors import InvalidPoints, InvalidScene
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.images.load import AnyImage
 from decals.receivers import label_names
-from decals.rendering import Renderer, RenderOptions, SceneLike, Size
+from decals.rendering import Environment, Renderer, RenderOptions, SceneLike, Size
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Drawing, check_scene, drawing_of
 from decals.rendering.pixel_pass import CameraBuffer
@@ -352,6 +353,15 @@ class SubplotRenderer(KnownAttributes):
     @stiffness.setter
     def stiffness(self, stiffness: float) -> None:
         self._draw_with("stiffness", stiffness)
+
+    @property
+    def environment(self) -> Environment | None:
+        """Environment in place of the studio light; see `decals.rendering.Environment`."""
+        return self.drawing.environment
+
+    @environment.setter
+    def environment(self, environment: Environment | AnyImage | None) -> None:
+        self._draw_with("environment", environment)
 
     @property
     def lights(self) -> Lights:

@@ -38,6 +38,7 @@ def golden_renderer(renderer: Renderer) -> Renderer:
     "by_hand",
     "custom_nodes",
     "deforming",
+    "environments",
     "materials",
     "painted",
     "particles",

@@ -70,7 +70,7 @@ class User:
         subplot.status = FrameStatus.DRAWN if warm else FrameStatus.WARMING_UP
         if not subplot.warming_up:  # otherwise the window compiles programs, slice by slice
             with subplot.current():
-                subplot.renderer._uploads.scene(self.window.document)
+                subplot.renderer._uploads.scene(self.window.document, subplot.drawing)
                 subplot.renderer.context.gl.finish()
 
     def _place(self) -> tuple[int, int]:

@@ -23,8 +23,8 @@ OF_PACKAGES = {
     "field": ["MaterialSamples", "Neighbors", "Samples", "Walks"],
     "index": ["DecalEditor", "DecalIndex"],
     "rendering": [
-        "Background", "Buffers", "Context", "Drawable", "Drawing", "Light", "Lighting", "Picture",
-        "Projection", "RenderOptions", "Renderer", "STUDIO", "SceneLike", "Size", "TRANSPARENT",
+        "Background", "Buffers", "Context", "Drawable", "Drawing", "Environment", "Light", "Lighting",
+        "Picture", "Projection", "RenderOptions", "Renderer", "STUDIO", "SceneLike", "Size", "TRANSPARENT",
         "Viewpoint", "register",
     ],
     "scattering": [

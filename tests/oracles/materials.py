@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.rendering.environment import GROUND, LAMPS, SKY
 from decals.rendering.lights import Light
+from decals.rendering.studio import GROUND, LAMPS, SKY
 
 Array = NDArray[np.float64]
 

@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,13 @@ import decals
 from blobtree import Point, Transform
 from blobtree.nodes.paths import node_at
 from blobtree.nodes.surgery import move_branch
+from decals.apps.sandbox.decal_panel import drawing_controls
 from decals.apps.sandbox.display import MODES, OVERLAYS
 from decals.apps.sandbox.sandbox import Sandbox
-from decals.editing.commands import AddImage, ReplaceImage
+from decals.editing.commands import AddImage, ReplaceImage, SetDrawing
 from decals.errors import InvalidScene
 from decals.record import Contact
+from decals.rendering import Environment
 from decals.rendering.options import Background
 from decals.scenes.camera import PRESETS
 from decals.scenes.objects import MeshObject
@@ -351,6 +354,15 @@ def test_brush_and_drawing_are_set(sandbox: Sandbox, shared: EditWindow) -> None
         assert "expected" in sandbox.status
     sandbox.go_to(0)
     assert shared.document.drawing == before
+    sandbox.set_control("drawing", "environment.strength", 2)
+    assert "expected one of" in sandbox.status
+    dark = Environment(np.zeros((2, 4, 3)), rotation=5)
+    shown = drawing_controls(replace(before, environment=dark))
+    new = {control["name"]: control["value"] for control in shown[len(drawing_controls(before)) :]}
+    assert new == {"environment.rotation": 5, "environment.strength": 1, "environment.visible": False}
+    shared.session.do(SetDrawing(replace(before, environment=dark)))
+    sandbox.set_control("drawing", "environment.strength", "0.5")
+    assert shared.document.drawing.environment == replace(dark, strength=0.5)
 
 
 def test_scattering_takes_the_options_of_its_panel(sandbox: Sandbox, shared: EditWindow) -> None:

@@ -1,18 +1,21 @@
 """How a scene is drawn and made: files, pictures, editors and measures follow the scene."""
 
 import json
+import runpy
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import decals
 from blobtree import Point
 from decals.editing import EditSession, ReplaceScene, ScatterDecals
 from decals.errors import InvalidScene
-from decals.rendering import Background, Drawing, Light, Lighting
+from decals.rendering import Background, Drawing, Environment, Light, Lighting
 from decals.scenes.recipe import Recipe
+from decals.scenes.script import write_script
 
 LOOK = Drawing(
     samples=1,
@@ -76,6 +79,31 @@ def test_wrong_files_are_refused(tmp_path: Path, part: str, value: Any, says: st
     path.write_text(json.dumps(json.loads(path.read_text()) | {part: value}))
     with pytest.raises(InvalidScene, match=says):
         decals.load_scene(path)
+
+
+def test_files_and_scripts_keep_environments(tmp_path: Path) -> None:
+    light = np.random.default_rng(0).random((4, 8, 3)).astype(np.float32) * 9
+    Image.fromarray((20 * light).astype(np.uint8)).save(tmp_path / "sky.png")
+    shown = {"rotation": 30.0, "strength": 2.0, "visible": True, "up": (0.0, 0.0, 1.0)}
+    path, text = tmp_path / "scene.json", ""
+    for picture in (light, str(tmp_path / "sky.png")):
+        kept = scene(drawing=Drawing(environment=Environment(picture, **shown)))  # type: ignore[arg-type]
+        kept.save(path)
+        write_script(kept, tmp_path / "script.py")
+        assert decals.load_scene(path).drawing == kept.drawing
+        assert runpy.run_path(str(tmp_path / "script.py"))["scene"].drawing == kept.drawing
+        text = path.read_text()
+    assert json.loads(text)["drawing"]["environment"] == {**shown, "picture": "sky.png", "up": [0, 0, 1]}
+    for old, new, says in (
+        ('"sky.png"', '"../sky.png"', "in the folder of the scene"),
+        ('"sky.png"', '"no.png"', "drawing: expected an image, found no file"),
+        ('"strength":2.0', '"strength":-2.0', "strength: expected at least 0"),
+        ('"visible":true', '"visible":3', "environment.visible"),
+    ):
+        assert old in text
+        path.write_text(text.replace(old, new))
+        with pytest.raises(InvalidScene, match=says):
+            decals.load_scene(path)
 
 
 def test_pictures_follow_the_scene_and_options_override_it(tmp_path: Path) -> None:

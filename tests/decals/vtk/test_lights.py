@@ -7,8 +7,8 @@ import pytest
 import pyvista as pv
 from scipy.ndimage import binary_erosion
 
-from decals.errors import InvalidScene
-from decals.rendering import TRANSPARENT
+from decals.errors import InvalidImage, InvalidScene
+from decals.rendering import TRANSPARENT, Environment
 from decals.rendering.options import RenderOptions
 from decals.vtk import Lights
 from tests.decals.vtk.conftest import Factory, Plotter
@@ -92,6 +92,33 @@ def test_a_ball_looks_as_vtks_own(plotter: Factory, lighting: str) -> None:
         assert (np.ptp(seen[inside], axis=0) <= 1).all()
     else:
         assert np.ptp(seen[inside], axis=0).max() > 40
+
+
+def test_an_environment_lights_the_objects_and_may_stand_behind_all(plotter: Factory) -> None:
+    pl = plotter(window_size=(60, 60))
+    pl.disable_anti_aliasing()
+    pl.set_background("black")
+    pl.decals.add_mesh(BALL, color=COLOR)
+    pl.add_mesh(pv.Sphere(radius=0.3, center=(0.7, 0, 0)), color="white", lighting=False)
+    pl.camera_position = [(0.6, -4.2, 1.0), (0.3, 0, 0), (0, 0, 1)]
+    before = shot(pl)
+    pl.decals.environment = np.full((2, 4, 3), 0.2)
+    lit = shot(pl)
+    owned = binary_erosion(lying_behind(pl.decals.subplot).object_id >= 0, iterations=2)
+    assert (lit[owned] != before[owned]).any(axis=-1).mean() > 0.9
+    assert (lit[0, 0] == 0).all()
+    pl.decals.environment = Environment(pl.decals.environment.picture, visible=True)
+    shown = shot(pl)
+    assert np.ptp(shown[[0, 0, -1], [0, -1, 0]], axis=0).max() == 0
+    assert 90 < shown[0, 0].max() < 140
+    white = (lit == 255).all(axis=-1)
+    assert white.sum() > 50
+    assert (shown[white] == 255).all()
+    assert np.abs(shown[owned].astype(int) - lit[owned]).max() <= 1
+    pl.decals.environment = None
+    assert np.abs(shot(pl).astype(int) - before).max() <= 1
+    with pytest.raises(InvalidImage, match="twice as wide"):
+        pl.decals.environment = np.ones((4, 4, 3))
 
 
 def test_the_batch_renderer_gives_the_same_pixels_under_the_same_lights(plotter: Factory) -> None:
