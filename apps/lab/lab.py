@@ -262,11 +262,8 @@ class Lab:
                 self._target = round(min(max(number_of(path, raw), 0.0), self._recording.iterations))
         else:
             command = binding(path).command(self._window.document, self.numbers, raw)
-            state.begin_series(("lab", path), command.label)
-            state.run_latest(command)
-            self._last_step = time.monotonic()
-            if last:
-                self._end_edit()
+            state.run_step(command, last=last)
+            self._last_step = math.inf if last else time.monotonic()
 
     def _relax(self, recording: Recording) -> None:
         """Show the step that was asked for, or the last one that is known in time."""
