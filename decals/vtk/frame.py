@@ -303,8 +303,10 @@ class FrameRenderer:
         """Draw a scene into the renderer's targets; with ``wait``, until the graphics card has finished."""
         frame = self._begin(scene, options, viewpoint, options.slot)
         with self.context.current():
-            frame.complete(max_samples=self.context.part_samples)
-            self.renderer.sweep()
+            try:
+                frame.complete(max_samples=self.context.part_samples)
+            finally:
+                self.renderer.sweep()
             if wait and frame.work:
                 self.context.gl.finish()
         self.drawn_fraction = frame.work

@@ -92,6 +92,12 @@ class ProxyActor:
         """True while the actor is among the renderer's actors; pyvista's ``clear`` removes it."""
         return bool(self._renderer.HasViewProp(self.actor))
 
+    @property
+    def visible(self) -> bool:
+        """True if the renderer draws the actor, and so the scene; False if it is hidden or has no objects."""
+        cells = self._mapper.GetInput().GetNumberOfCells()
+        return cells > 0 and bool(self.actor.GetVisibility()) and self.present
+
     def remove(self) -> None:
         """Remove the actor from the renderer."""
         if self.present:

@@ -557,6 +557,9 @@ class SubplotRenderer(KnownAttributes):
 
     def _end_frame(self) -> None:
         self.applied.end_frame()
+        if self._frames is not None and not self._proxy_actor.visible:  # frames that are drawn do it
+            with self._frames.context.current():
+                self._frames.renderer.sweep()
 
     def _warn_of_unsupported(self) -> None:
         """Warn once of each mode of VTK and pyvista that the subplot does not support."""
@@ -627,7 +630,7 @@ class SubplotRenderer(KnownAttributes):
         """Draw a slice of a later frame of the window's size, without showing it.
 
         Once it is complete, frames with a `draw_scale` of 1 and these samples show it. Any change starts it
-        again.
+        again. Nothing is drawn while the proxy actor is hidden.
 
         Parameters
         ----------
@@ -642,7 +645,7 @@ class SubplotRenderer(KnownAttributes):
             Duration of the whole frame in seconds, 0 if parts were kept; None while it is incomplete.
         """
         scene = self.scene
-        if scene is None or self._drawn_size is None:
+        if scene is None or self._drawn_size is None or not self._proxy_actor.visible:
             return 0.0
         with self._attempt(scene, 1.0, samples) as possible:
             if possible:
@@ -666,7 +669,7 @@ class SubplotRenderer(KnownAttributes):
         """
         scene = self.scene
         self.status = FrameStatus.DRAWN
-        if scene is None or self._drawn_size is None:
+        if scene is None or self._drawn_size is None or not self._proxy_actor.visible:
             return None
         with self._attempt(scene, self.draw_scale, self.samples) as possible:
             if not possible:

@@ -1,17 +1,21 @@
 """What a stage shows is what the batch renderer draws, and what it says lies there."""
 
+import gc
+import weakref
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 import pyvista as pv
 
+from blobtree import Point
 from decals.errors import InvalidPoints, InvalidScene, NoGraphics
 from decals.field.mapping import ImageMapping
 from decals.index.editor import DecalEditor
 from decals.record import Contact
 from decals.rendering import TRANSPARENT, Drawing
 from decals.rendering.options import RenderOptions
+from decals.scenes.objects import TreeObject
 from decals.vtk.subplot import SubplotRenderer
 from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import both, mesh_object, shot
@@ -109,6 +113,31 @@ def test_whatever_changes_is_drawn(plotter: Factory, change: Callable[[Plotter],
     change(pl)
     seen = shot(pl)
     assert seen.shape != first.shape or (seen != first).any()
+
+
+def test_a_hidden_scene_takes_no_work_and_keeps_no_former_state(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(both(), camera=True)
+    subplot = pl.decals.subplot
+    first = shot(pl)
+    subplot.actor.visibility = False
+    stand_in = pl.add_mesh(pv.Sphere(), reset_camera=False)
+    pl.decals.apply(stand_in)
+    former: list[weakref.ref[object]] = []
+    for count in (20, 30, 40):
+        item = TreeObject("ball", Point((0, 0, 0), radius=0.5))
+        state = both().replace(objects=(item,), decals=both().decals[:count])
+        former += [weakref.ref(item), weakref.ref(state.decals)]
+        subplot.scene = state
+        shot(pl)
+        assert (subplot.prepare(1, 1.0), subplot.warm(1.0)) == (0.0, None)
+    shot(pl)
+    gc.collect()
+    assert [ref() is not None for ref in former] == [False] * 4 + [True] * 2
+    pl.remove_actor(stand_in)
+    subplot.scene = both()
+    subplot.actor.visibility = True
+    np.testing.assert_array_equal(shot(pl), first)
 
 
 def test_the_stages_renderer_may_draw_other_things_in_between(plotter: Factory) -> None:
