@@ -4,7 +4,8 @@
 
 Browsers vanish while they drag and while they wait for answers; a third one takes 2 s for each picture. The
 figures are printed as JSON: errors of the server, whether undoing all restores the first scene bit for bit,
-the growth of the memory once the first third has been sent, and for how long the server's loop was busy.
+the growth of the memory once the first third has been sent and once the first half has, and for how long the
+server's loop was busy.
 """
 
 import argparse
@@ -16,7 +17,8 @@ import random
 import sys
 import tempfile
 import time
-from collections.abc import Awaitable, Callable
+from collections import Counter
+from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -105,8 +107,8 @@ PICTURE_SECONDS = 2.0
 SAMPLES = 20
 """Looks at the memory during a run."""
 
-FIRST_PART = 0.3
-"""Part of a run after which the memory should not grow."""
+FIRST_PARTS = {"growth_mb_per_1000": 0.3, "steady_growth_mb_per_1000": 0.5}
+"""Parts of a run after which the memory should not grow, by the name of the figure."""
 
 LATE_MS = 100.0
 """Milliseconds within which any input should be answered."""
@@ -129,7 +131,7 @@ class Messages:
         self._modes = {name: getattr(window.subplot, name) for name in ("contact", "mapping", "stiffness")}
         self._browsers: list[Browser] = []
         self._tasks: list[asyncio.Task[None]] = []
-        self._busy_ms = [0.0]
+        self._busy_ms: Counter[float] = Counter({0.0: 1})
         self._memory: list[tuple[int, float]] = []
         self.changed = self.unanswered = 0
         self.restored = True
@@ -162,19 +164,17 @@ class Messages:
 
     def figures(self) -> dict[str, Any]:
         """Return the figures so far."""
-        busy = np.array(self._busy_ms)
-        numbers, megabytes = np.transpose(self._memory or [(0, 0.0)])
-        steady = numbers >= FIRST_PART * numbers[-1]
-        slope = np.polyfit(numbers[steady], megabytes[steady], 1)[0] if steady.sum() > 1 else 0.0
+        busy, times = np.transpose(sorted(self._busy_ms.items()))
+        common = busy[np.searchsorted(np.cumsum(times), 0.99 * times.sum())]
         return {
             "changed": self.changed,
             "restored": self.restored,
             "unanswered": self.unanswered,
-            "memory_mb": round(float(megabytes[-1])),
-            "growth_mb_per_1000": round(1000.0 * float(slope), 2),
-            "loop_busy_p99_ms": round(float(np.percentile(busy, 99)), 1),
-            "loop_busy_max_ms": round(float(busy.max()), 1),
-            "loop_late": int((busy > LATE_MS).sum()),
+            "memory_mb": round(self._memory[-1][1]) if self._memory else 0,
+            **{name: round(growth(self._memory, part), 2) for name, part in FIRST_PARTS.items()},
+            "loop_busy_p99_ms": float(common),
+            "loop_busy_max_ms": float(busy[-1]),
+            "loop_late": int(times[busy > LATE_MS].sum()),
             "slowest": dict(sorted(self.slowest.items(), key=lambda item: -item[1])[:5]),
         }
 
@@ -190,7 +190,7 @@ class Messages:
         while True:
             before = time.thread_time()
             await asyncio.sleep(0.001)
-            self._busy_ms.append(1000.0 * (time.thread_time() - before))
+            self._busy_ms[round(1000.0 * (time.thread_time() - before), 1)] += 1
 
     async def _read_slowly(self) -> None:
         browser = await self._connect()
@@ -296,6 +296,23 @@ class Messages:
         await asyncio.sleep(0)
         await self._browsers[number].close()
         task.cancel()
+
+
+def growth(memory: Sequence[tuple[int, float]], first_part: float) -> float:
+    """Return the growth per 1,000 messages after the first part of a run: the slope of the best line.
+
+    Parameters
+    ----------
+    memory
+        Numbers of sent messages and megabytes then.
+    first_part
+        Part of the run that is left out.
+    """
+    steady = [look for look in memory if look[0] >= first_part * memory[-1][0]]
+    if len(steady) < 2:
+        return 0.0
+    numbers, megabytes = np.transpose(steady)
+    return 1000.0 * float(np.polyfit(numbers, megabytes, 1)[0])
 
 
 def resident_megabytes() -> float:
