@@ -2,7 +2,6 @@
 
 import math
 import zlib
-from functools import lru_cache
 from typing import Any, Self
 
 import msgspec
@@ -10,12 +9,16 @@ import numpy as np
 
 from blobtree._typing import Float32Array
 from blobtree.errors import InvalidNode
+from blobtree.sized_cache import sized_cache
 from blobtree.validation import real
 
 FAST_COMPRESSION = 1
 
 MAX_NUMBERS = 1 << 24
 """Largest number of samples: a float32 cannot count more texels on a tape."""
+
+MAX_KEPT_BYTES = 1 << 26
+"""Bytes of decoded samples that are kept for the next access, at most."""
 
 
 class Samples(msgspec.Struct, frozen=True):
@@ -75,7 +78,7 @@ class Samples(msgspec.Struct, frozen=True):
         return f"<{nx} × {ny} × {nz} numbers; save() or to_json() keep them>"
 
 
-@lru_cache(maxsize=32)
+@sized_cache(MAX_KEPT_BYTES)
 def _decoded(samples: Samples) -> Float32Array:
     _check_shape(samples.shape)
     size = 4 * math.prod(samples.shape)

@@ -15,8 +15,9 @@ from blobtree.formulas.volumes import VOLUME
 from blobtree.nodes.fields import FieldPrimitive
 from blobtree.nodes.parameters import Color, Parameter, Quantity
 from blobtree.nodes.primitives import DEFAULT_COLOR, Falling
-from blobtree.nodes.samples import MAX_NUMBERS, Samples
+from blobtree.nodes.samples import MAX_KEPT_BYTES, MAX_NUMBERS, Samples
 from blobtree.sampling.mesh_distances import grid_points, mesh_distances, triangles_of
+from blobtree.sized_cache import sized_cache
 from blobtree.validation import Vector, finite_vector, positive_number
 
 STEEPEST = 2.0
@@ -255,7 +256,7 @@ def _sampled(
     return values.reshape(counts)
 
 
-@lru_cache(maxsize=32)
+@sized_cache(4 * MAX_KEPT_BYTES)
 def _texels_of(samples: Samples) -> Float32Array:
     """Return samples as the texels that `formulas.volumes` reads."""
     v = samples.array

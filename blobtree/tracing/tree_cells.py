@@ -1,7 +1,6 @@
 """Tracing cells: the table of blocks that rays read, and the pruned tapes of blocks with surface."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -12,6 +11,7 @@ from blobtree.cells.grid import BRANCHING, grid_from
 from blobtree.cells.refine_kernels import SURELY_OUTSIDE
 from blobtree.cells.sparse_cells import SparseCells, build_cells
 from blobtree.device import known_device
+from blobtree.sized_cache import sized_cache
 from blobtree.tape.instruction_set import InstructionSet
 from blobtree.tape.model import ImplicitModel
 from blobtree.tape.tape import Tape
@@ -25,6 +25,9 @@ BLOCKS_ALONG = 64
 
 MAX_LAYERS = 16
 """Most layers of empty blocks that a ray skips at once."""
+
+MAX_KEPT_BYTES = 1 << 25
+"""Bytes of cells that are kept for the next rays, at most; those of a model take 1 MB or more."""
 
 Corner: TypeAlias = tuple[float, ...]
 
@@ -60,6 +63,11 @@ class TracingCells:
     tolerance: float
     instruction_set: InstructionSet
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the arrays."""
+        return self.tape.nbytes + self.blocks.nbytes
+
 
 @dataclass(frozen=True, eq=False)
 class DeviceCells:
@@ -69,6 +77,7 @@ class DeviceCells:
     arrays: Any
     """`ray_kernels.RayCells`, the argument of kernels."""
     instruction_set: InstructionSet
+    nbytes: int
 
 
 def tracing_cells(tree: ImplicitModel, *, device: str | None = None) -> TracingCells:
@@ -94,7 +103,7 @@ def _corners(tree: ImplicitModel) -> tuple[Corner, Corner]:
     return tuple(lower.tolist()), tuple(upper.tolist())
 
 
-@lru_cache(maxsize=16)
+@sized_cache(MAX_KEPT_BYTES)
 def _tracing_cells(tape: Tape, lower: Corner, upper: Corner, device: str) -> TracingCells:
     bounds = np.array(lower, np.float32), np.array(upper, np.float32)
     cell_size = float((bounds[1] - bounds[0]).max()) / (BLOCKS_ALONG * BRANCHING) * (1.0 + 1e-6)
@@ -166,13 +175,14 @@ def _layers(empty: BoolArray) -> Int32Array:
     return layers.astype(np.int32)
 
 
-@lru_cache(maxsize=16)
+@sized_cache(MAX_KEPT_BYTES)
 def _device_cells(tape: Tape, lower: Corner, upper: Corner, device: str) -> DeviceCells:
     cells = _tracing_cells(tape, lower, upper, device)
     arrays: Any = RayCells()
     arrays.lower, arrays.counts = wp.vec3(*cells.lower.tolist()), wp.vec3i(*cells.counts)
     arrays.block_size, arrays.tolerance = cells.block_size, cells.tolerance
-    arrays.tape = wp.array(cells.tape, dtype=wp.vec4, device=device)
+    copy = device != "cpu"  # the processor's kernels read the arrays themselves
+    arrays.tape = wp.array(cells.tape, dtype=wp.vec4, device=device, copy=copy)
     arrays.start = cells.start
-    arrays.blocks = wp.array(cells.blocks, dtype=wp.int32, device=device)
-    return DeviceCells(arrays.tape, arrays, cells.instruction_set)
+    arrays.blocks = wp.array(cells.blocks, dtype=wp.int32, device=device, copy=copy)
+    return DeviceCells(arrays.tape, arrays, cells.instruction_set, cells.nbytes)
