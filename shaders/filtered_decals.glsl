@@ -9,6 +9,7 @@ const int MANY = 100;
 const int MAX_BOUNDARIES = 2;  // through a pixel whose shares are computed
 const int SIDE_PARTS = 4;      // parts of each side of pixels with more
 const float MAX_SIDE = 0.15;   // of a pixel or a part of one, in visible radii
+ivec2 pixel_parts = ivec2(1);  // along the sides of a listed pixel, as far as its first drawing has found them
 const vec3 EVERYWHERE = vec3(1.0, 0.0, 0.0);  // line with the whole pixel on its inner side
 const float MAX_TAPS = 8.0;    // look-ups of an image along one side of a pixel
 const float SPACING = 0.67;   // of look-ups, relative to the shorter side
@@ -348,58 +349,73 @@ int nearest_rim(vec3 q, vec3 n, vec3 right, vec3 up) {
     return nearest;
 }
 
-// Premultiplied linear colour of all decals over each other, of part number `i` of a pixel in `parts`, weighted by its
-// share. A whole pixel with many boundaries, or with sides that are long beside its owner, sets `parts` instead: then
-// the sum of all these is its colour.
-vec4 part_color(Surface surface, int i, inout ivec2 parts) {
-    bool whole = parts == ivec2(1);
-    vec3 n = surface.normal;
-    vec2 at = (vec2(float(i % parts.x), float(i / parts.x)) + 0.5) / vec2(parts) - 0.5;
-    vec3 point = surface.position + at.x * surface.right + at.y * surface.up;
-    vec3 right = surface.right / float(parts.x), up = surface.up / float(parts.y);
-    float share = 1.0 / float(parts.x * parts.y);
-    int owner = decal_single_layer ? int(single_layer_at(point, n, decal_contact).x)
-                                   : owner_at(point, n, decal_contact);
+// Middle of part number `i` of a pixel in `parts`, in sides of the pixel from its own middle.
+vec2 part_middle(int i, ivec2 parts) {
+    return (vec2(float(i % parts.x), float(i / parts.x)) + 0.5) / vec2(parts) - 0.5;
+}
+
+// The owner of a pixel or a part of one; the decal with the largest share where none covers the middle.
+int part_owner(vec3 q, vec3 n, vec3 right, vec3 up) {
+    int owner = decal_single_layer ? int(single_layer_at(q, n, decal_contact).x) : owner_at(q, n, decal_contact);
     WHERE (owner < 0) {
-        owner = nearest_rim(point, n, right, up);
+        owner = nearest_rim(q, n, right, up);
     }
-    if (whole && owner >= 0) {
-        float longest = MAX_SIDE * RIM * decal_texel(4 * owner).w;
-        parts = ivec2(clamp(ceil(vec2(length(right), length(up)) / longest), 1.0, float(SIDE_PARTS)));
-        if (parts != ivec2(1)) {
-            return vec4(0.0);
-        }
-    }
+    return owner;
+}
+
+// Parts along both sides of a pixel, so that none of them is long beside the owner.
+ivec2 parts_beside(int owner, vec3 right, vec3 up) {
+    float longest = MAX_SIDE * RIM * decal_texel(4 * owner).w;
+    return ivec2(clamp(ceil(vec2(length(right), length(up)) / longest), 1.0, float(SIDE_PARTS)));
+}
+
+// Premultiplied linear colour of the owner and the decals below it, averaged over a pixel or a part of one. `share` is
+// that of the part, `boundaries` those through it.
+vec4 layers_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, float share, out int boundaries) {
     vec4 color = vec4(0.0);
-    int most = 0;
+    boundaries = 0;
     while (owner >= 0 && color.a < OPAQUE) {
-        int boundaries;
+        int more;
 #ifdef MATERIALS
         material_left = (1.0 - color.a) * share;
 #endif
-        color += (1.0 - color.a) * layer_average(owner, point, n, right, up, boundaries);
-        most = most > 0 && boundaries > 0 ? MANY : most + boundaries;  // of layers over each other
+        color += (1.0 - color.a) * layer_average(owner, q, n, right, up, more);
+        boundaries = boundaries > 0 && more > 0 ? MANY : boundaries + more;
         if (!decal_layered) {
             break;
         }
-        owner = owner_below(point, n, rank_of(owner, decal_records), next_number_below(owner, decal_records),
+        owner = owner_below(q, n, rank_of(owner, decal_records), next_number_below(owner, decal_records),
             decal_contact);
     }
-    parts = whole && most > MAX_BOUNDARIES ? ivec2(SIDE_PARTS) : parts;
-    return share * color;
+    return color;
 }
 
-// The colour of a pixel.
-vec4 exact_color(Surface surface) {
+#ifndef SHARED
+// Premultiplied linear colour of all decals over each other, averaged over a pixel. Pixels with many boundaries, or
+// with sides that are long beside their owner, are the mean of several parts.
+vec4 exact_color(vec3 q, vec3 n, vec3 right, vec3 up) {
     vec4 sum = vec4(0.0);
     ivec2 parts = ivec2(1);
 #ifdef MATERIALS
     clear_materials();
 #endif
     for (int i = 0; i < parts.x * parts.y; i++) {
-        ivec2 before = parts;
-        vec4 color = part_color(surface, i, parts);
-        if (parts != before) {
+        vec2 at = part_middle(i, parts);
+        vec3 point = q + at.x * right + at.y * up;
+        vec3 part_right = right / float(parts.x), part_up = up / float(parts.y);
+        bool whole = parts == ivec2(1);
+        int owner = part_owner(point, n, part_right, part_up);
+        if (whole && owner >= 0) {
+            parts = parts_beside(owner, right, up);
+            if (parts != ivec2(1)) {
+                i = -1;
+                continue;
+            }
+        }
+        int boundaries;
+        vec4 color = layers_average(owner, point, n, part_right, part_up, 1.0 / float(parts.x * parts.y), boundaries);
+        if (whole && boundaries > MAX_BOUNDARIES) {
+            parts = ivec2(SIDE_PARTS);
             i = -1;
 #ifdef MATERIALS
             clear_materials();
@@ -408,8 +424,9 @@ vec4 exact_color(Surface surface) {
         }
         sum += color;
     }
-    return sum;
+    return sum / float(parts.x * parts.y);
 }
+#endif
 
 #ifdef MARKED
 // True after `inner_color` of pixels that need `exact_color`: those through which a rim or contact line may go, and those
@@ -450,14 +467,15 @@ vec4 inner_color(vec3 q, vec3 n, vec3 right, vec3 up) {
     float radius = RIM * ball.w;
     vec3 w = (q - ball.xyz) / radius;
     vec4 pushes = vec4(0.0);
+    bool nested = count > KEPT;  // or not known: another decal may be the owner
     for (int i = min(count, KEPT); i > 0; i--) {
         int other = a.x;
         a = ivec4(a.yzw, b.x);
         b = ivec4(b.yzw, -1);
         if (other != owner) {
             vec4 other_ball = decal_texel(4 * other);
-            pixel_divided = pixel_divided || contact_line(q, right, up, ball, other_ball).x < 0.5
-                || (decal_nested && balls_nested(other_ball.xyz - ball.xyz, radius, RIM * other_ball.w));
+            pixel_divided = pixel_divided || contact_line(q, right, up, ball, other_ball).x < 0.5;
+            nested = nested || (decal_nested && balls_nested(other_ball.xyz - ball.xyz, radius, RIM * other_ball.w));
             pushes += push_of(w, ball, other_ball);
         }
     }
@@ -465,23 +483,25 @@ vec4 inner_color(vec3 q, vec3 n, vec3 right, vec3 up) {
         pushes.w = contact_distance(contact_at(q, n, owner, decal_contact).x);
     }
     Place place = place_of(owner, ball, q, n, right, up, pushes);
-    pixel_divided = pixel_divided || max(length(right), length(up)) > MAX_SIDE * radius
+    pixel_parts = nested ? ivec2(1) : parts_beside(owner, right, up);
+    pixel_divided = pixel_divided || nested || pixel_parts != ivec2(1)
         || rim_line(place.arc, right / radius, up / radius).x < 0.5;
     return image_average(owner, place, q, n, 1.0);
 }
 #endif
 
+#ifndef SHARED
 // The colour of a pixel. MARKED: by the quicker way, where it is enough.
-vec4 filtered_color(Surface surface) {
+vec4 filtered_color(vec3 q, vec3 n, vec3 right, vec3 up) {
 #ifdef MARKED
 #ifdef MATERIALS
     material_left = 1.0;
     clear_materials();
 #endif
     pixel_divided = decal_layered;
-    return decal_layered ? vec4(0.0)
-                         : inner_color(surface.position, surface.normal, surface.right, surface.up);
+    return decal_layered ? vec4(0.0) : inner_color(q, n, right, up);
 #else
-    return exact_color(surface);
+    return exact_color(q, n, right, up);
 #endif
 }
+#endif

@@ -1,5 +1,6 @@
 // The same pass as pixels.frag as a compute shader, for GLSL 4.30 on: an invocation a pixel.
-// MARKED: list the pixels of which the body sets `pixel_divided`. LISTED: draw the listed pixels.
+// MARKED: list the pixels of which the body sets `pixel_divided`, with its `pixel_parts`, 1 to 4 along each side.
+// LISTED: draw the listed pixels.
 layout(local_size_x = GROUP, local_size_y = GROUP) in;
 uniform ivec2 first_texel;  // the lower left one of a rectangle
 uniform ivec2 end_texel;    // past its upper right one
@@ -37,7 +38,7 @@ const uint MAX_LIST_GROUPS = 65535u;  // that every driver runs
 layout(std430, binding = 0) buffer PixelList {
     uint list_groups[3];  // that draw the list
     uint list_count;
-    uint list_texels[];   // x, and 65536 times y
+    uint list_pixels[];   // number of a pixel by rows (28 bits), parts up and to the right (2 bits each)
 };
 #endif
 
@@ -57,7 +58,9 @@ void list_pixel(ivec2 texel, bool listed) {
     }
     barrier();
     if (listed) {
-        list_texels[group_begin + number] = uint(texel.x) | uint(texel.y) << 16;
+        uint pixel = uint(texel.y * imageSize(out_color).x + texel.x);
+        uvec2 parts = uvec2(pixel_parts - 1);
+        list_pixels[group_begin + number] = pixel << 4 | parts.y << 2 | parts.x;
     }
 }
 #endif
@@ -67,8 +70,10 @@ void main() {
     uint members = uint(GROUP * GROUP);
     for (uint first = gl_WorkGroupID.x * members; first < list_count; first += gl_NumWorkGroups.x * members) {
         // the last group draws its last pixel several times
-        uint texel = list_texels[min(first + gl_LocalInvocationIndex, list_count - 1u)];
-        draw_pixel(ivec2(texel & 65535u, texel >> 16));
+        uint listed = list_pixels[min(first + gl_LocalInvocationIndex, list_count - 1u)];
+        uint pixel = listed >> 4, width = uint(imageSize(out_color).x);
+        pixel_parts = ivec2(listed & 3u, listed >> 2 & 3u) + 1;
+        draw_pixel(ivec2(pixel % width, pixel / width));
     }
 #else
     ivec2 texel = ivec2(gl_GlobalInvocationID.xy) + first_texel;

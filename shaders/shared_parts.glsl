@@ -1,78 +1,104 @@
-// Colours of pixels that the invocations of a compute shader's group draw together: first each its own pixel, then in
-// turn the parts of those that must be divided. So no invocation waits while others draw many parts.
+// Colours of pixels that the invocations of a compute shader's group draw together. Whole pixels and parts of pixels
+// stand in one queue, from which each invocation in turn takes one. So none waits while others draw many parts.
 const int MEMBERS = GROUP * GROUP;
 
-shared ivec2 pixel_texels[MEMBERS];
-shared ivec2 pixel_parts[MEMBERS];
-shared int pixel_begins[MEMBERS];                         // number of a pixel's first part
-shared int part_pixels[MEMBERS * SIDE_PARTS * SIDE_PARTS];
-shared int part_count;
+shared ivec2 member_texels[MEMBERS];
+shared ivec2 member_parts[MEMBERS];                              // into which each member's pixel is divided
+shared int member_begins[MEMBERS];                               // place of the first of them in the queue
+shared int queue[MEMBERS * (1 + SIDE_PARTS * SIDE_PARTS)];       // the members whose parts these are
+shared int queue_end;
 shared vec4 part_colors[MEMBERS];  // of the parts that are drawn at once
 #ifdef MATERIALS
 shared Maps part_maps[MEMBERS];
 #endif
 
-// Premultiplied linear colour of the decals at an invocation's pixel. All invocations of the group must call it at once.
+void add_parts(int member, ivec2 parts) {
+    int count = parts.x * parts.y;
+    int begin = atomicAdd(queue_end, count);
+    member_parts[member] = parts;
+    member_begins[member] = begin;
+    for (int i = begin; i < begin + count; i++) {
+        queue[i] = member;
+    }
+}
+
+// Premultiplied linear colour of part number `i` of a pixel in `parts`. A whole pixel that must be divided, as in
+// `exact_color`, sets `parts` instead.
+vec4 part_color(Surface surface, int i, inout ivec2 parts) {
+    vec3 right = surface.right / float(parts.x), up = surface.up / float(parts.y);
+    vec2 at = part_middle(i, parts);
+    vec3 q = surface.position + at.x * surface.right + at.y * surface.up;
+    float share = 1.0 / float(parts.x * parts.y);
+    bool whole = parts == ivec2(1);
+    int owner = part_owner(q, surface.normal, right, up);
+    if (whole && owner >= 0) {
+        parts = parts_beside(owner, right, up);
+        owner = parts == ivec2(1) ? owner : -1;
+    }
+    int boundaries;
+    vec4 color = layers_average(owner, q, surface.normal, right, up, share, boundaries);
+    if (whole && boundaries > MAX_BOUNDARIES) {
+        parts = ivec2(SIDE_PARTS);
+    }
+    return color;
+}
+
+// Premultiplied linear colour of the decals at an invocation's pixel, in `pixel_parts` or more. All invocations of the
+// group must call it at once.
 vec4 shared_color(ivec2 texel) {
     int member = int(gl_LocalInvocationIndex);
-    int begin = 0, end = 0;  // parts of this pixel
     vec4 sum = vec4(0.0);
 #ifdef MATERIALS
     clear_materials();
     Maps maps = material_sums();
 #endif
     barrier();  // the group may have drawn other pixels before
-    pixel_texels[member] = texel;
-    part_count = 0;
+    member_texels[member] = texel;
+    queue_end = 0;
     barrier();
-    for (int first = -MEMBERS; first < part_count; first += MEMBERS) {
-        bool whole = first < 0;
-        bool drawn = whole || first + member < part_count;
-        ivec2 parts = ivec2(1);
+    if (pixel_parts == ivec2(1)) {  // first, because they may have to be divided
+        add_parts(member, pixel_parts);
+    }
+    barrier();
+    if (pixel_parts != ivec2(1)) {
+        add_parts(member, pixel_parts);
+    }
+    barrier();
+    for (int first = 0, last = 0; first < queue_end; first = last) {
+        last = min(first + MEMBERS, queue_end);
+        barrier();  // no invocation adds parts before all have read their number
         vec4 color = vec4(0.0);
 #ifdef MATERIALS
         clear_materials();
 #endif
-        if (drawn) {
-            int pixel = whole ? member : part_pixels[first + member];
-            int number = 0;
-            if (!whole) {
-                parts = pixel_parts[pixel];
-                number = first + member - pixel_begins[pixel];
+        if (first + member < last) {
+            int pixel = queue[first + member];
+            ivec2 parts = member_parts[pixel];
+            color = part_color(surface_at(member_texels[pixel]), first + member - member_begins[pixel], parts);
+            if (parts != member_parts[pixel]) {
+                add_parts(pixel, parts);
             }
-            color = part_color(surface_at(pixel_texels[pixel]), number, parts);
         }
         part_colors[member] = color;
 #ifdef MATERIALS
         part_maps[member] = material_sums();
 #endif
-        barrier();  // no invocation adds parts before all have compared their number
-        int count = parts.x * parts.y;
-        int from = whole ? member : max(begin - first, 0), to = whole ? member + 1 : min(end - first, MEMBERS);
-        if (whole && count > 1) {
-            begin = atomicAdd(part_count, count);
-            end = begin + count;
-            pixel_parts[member] = parts;
-            pixel_begins[member] = begin;
-            for (int i = begin; i < end; i++) {
-                part_pixels[i] = member;
-            }
-            to = from;
-        }
-        for (int i = from; i < to; i++) {
-            sum += part_colors[i];
+        barrier();
+        int begin = member_begins[member];
+        int end = begin + member_parts[member].x * member_parts[member].y;
+        for (int i = max(begin, first); i < min(end, last); i++) {
+            sum += part_colors[i - first];
 #ifdef MATERIALS
-            maps.normals += part_maps[i].normals;
-            maps.values += part_maps[i].values;
-            maps.glow += part_maps[i].glow;
+            maps.normals += part_maps[i - first].normals;
+            maps.values += part_maps[i - first].values;
+            maps.glow += part_maps[i - first].glow;
 #endif
         }
-        barrier();
     }
 #ifdef MATERIALS
     material_normals = maps.normals;
     material_values = maps.values;
     material_glow = maps.glow;
 #endif
-    return sum;
+    return sum / float(member_parts[member].x * member_parts[member].y);
 }
