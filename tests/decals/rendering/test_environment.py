@@ -67,7 +67,7 @@ def test_the_table_is_the_integral_of_the_model() -> None:
     table = np.stack(reflection_table(), axis=-1)
     for row, column in ((16, 63), (22, 2), (31, 20)):
         roughness, seen = row / (TABLE_SHAPE[0] - 1), column / (TABLE_SHAPE[1] - 1)
-        wanted = reference.reflected_parts(seen, roughness, 200)
+        wanted = reference.reflected_parts(seen, roughness, 120)
         np.testing.assert_allclose(table[row, column], wanted, atol=0.004)
     np.testing.assert_allclose(table[0, 1:, :2].sum(axis=-1), 1.0, atol=1e-6)  # mirrors keep all light
 
@@ -113,6 +113,7 @@ def split_sum(
 CASES = [(0.35, 1.0, 0.0), (0.6, 0.0, 60.0), (1.0, 0.5, 0.0)]
 
 
+@pytest.mark.ordinary_cases("fragment-0.6-0.0-60.0")
 @pytest.mark.parametrize(("roughness", "metallic", "rotation"), CASES)
 def test_pixels_are_the_split_sum_and_near_the_integral(
     drawer: Renderer, environment: Environment, roughness: float, metallic: float, rotation: float
@@ -127,25 +128,26 @@ def test_pixels_are_the_split_sum_and_near_the_integral(
     frame = np.array([[cosine, sine, 0], [0, 0, 1], [sine, -cosine, 0]])  # right, up, front
     surface: dict[str, Any] = {"albedo": decode_srgb(np.array(color) / 255)}
     surface |= {"roughness": round(255 * roughness) / 255, "metallic": round(255 * metallic) / 255}
-    off: list[float] = []
-    far: list[float] = []
-    for row, column in np.argwhere(shown)[::59]:
+    cells, off = 0.8 * sky(), list[float]()
+    far = list[float]()
+    for row, column in np.argwhere(shown)[::89]:
         normal = frame @ buffers.normal[row, column].astype(float)
         eye = frame @ (np.array(scene.camera.position) - buffers.position[row, column])
         normal, eye = normal / np.linalg.norm(normal), eye / np.linalg.norm(eye)
         pixel = picture[row, column, :3].astype(float)
         for errors, model in ((off, split_sum), (far, reference.reflected)):
-            errors.append(np.abs(pixel - bytes_of(model(0.8 * sky(), normal, eye, **surface))).max())
+            errors.append(np.abs(pixel - bytes_of(model(cells, normal, eye, **surface))).max())
     print(f"{len(off)} pixels: {max(off):.2f}; {max(far):.2f}, mean {np.mean(far):.2f}")
-    assert len(off) >= 12
-    assert max(off) <= 3.0
-    assert max(far) <= 14.0
-    assert np.mean(far) <= 4.0
+    assert len(off) >= 10
+    assert max(off) <= 1.5
+    assert max(far) <= 9.0
+    assert np.mean(far) <= 3.0
 
 
 EVEN = Environment(np.full((2, 4, 3), 0.6))
 
 
+@pytest.mark.ordinary_cases("255-0.6-1.0")
 @pytest.mark.parametrize(
     ("color", "roughness", "metallic"), [(255, 0.5, 0.0), (255, 0.6, 1.0), (200, 1.0, 0.5)]
 )
@@ -172,14 +174,25 @@ def bare(camera: Camera) -> Scene:
     return Scene(objects=[ball()], camera=camera)
 
 
+@pytest.mark.slow
+def test_a_turned_picture_has_its_columns_moved(renderer: Renderer, environment: Environment) -> None:
+    turned = Environment(environment.picture, rotation=90)
+    rolled = Environment(np.roll(sky(), -32, axis=1))  # a quarter to the left, seen from within
+    pictures = [
+        renderer.render(bare(Camera((0, 1, 5))), RenderOptions(size=SIZE, samples=1, environment=one)).astype(
+            int
+        )
+        for one in (turned, rolled)
+    ]
+    assert np.abs(pictures[1] - pictures[0]).max() <= 1
+
+
 def test_a_turned_picture_is_a_turned_scene(renderer: Renderer, environment: Environment) -> None:
     def drawn(camera: Camera, environment: Environment) -> np.ndarray:
         options = RenderOptions(size=SIZE, samples=1, environment=environment)
         return renderer.render(bare(camera), options).astype(int)
 
     turned = drawn(Camera((0, 1, 5)), Environment(environment.picture, rotation=90))
-    rolled = Environment(np.roll(sky(), -32, axis=1))  # a quarter to the left, seen from within
-    assert np.abs(turned - drawn(Camera((0, 1, 5)), rolled)).max() <= 1
     assert np.abs(turned - drawn(Camera((-5, 1, 0)), environment)).max() <= 3  # the ball has facets
     assert np.abs(turned - drawn(Camera((0, 1, 5)), environment)).max() > 40
     upright = Environment(environment.picture, up=(0, 0, 1))
