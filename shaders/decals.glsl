@@ -55,7 +55,7 @@ DecalHit decal_hit(int owner, vec3 q, vec3 n) {
         return DecalHit(-1, 0.0, vec2(0.0));
     }
     vec3 pushed = contact_at(q, n, owner, decal_contact);
-    return DecalHit(owner, 1.0 - pushed.x, uv_at(q, n, owner, pushed, decal_mapping));
+    return DecalHit(owner, 1.0 - pushed.x, uv_at(q, n, owner, pushed));
 }
 
 // The topmost decal.
@@ -66,7 +66,7 @@ DecalHit decal_at(vec3 q, vec3 n) {
         if (owner < 0) {
             return DecalHit(-1, 0.0, vec2(0.0));
         }
-        return DecalHit(owner, 1.0 - found.y, uv_at(q, n, owner, found.yzw, decal_mapping));
+        return DecalHit(owner, 1.0 - found.y, uv_at(q, n, owner, found.yzw));
     }
     return decal_hit(owner_at(q, n, decal_contact), q, n);
 }

@@ -228,6 +228,11 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
                 }
                 vec3 line = ball_line(q, right, up, other_ball);
                 lower_rims += !higher && abs(line.x) < 0.5 ? 1 : 0;
+                WHERE (higher && line.x > -0.5) {  // its image may end before its ball
+                    Place place = place_of(other, other_ball, q, n, right, up, vec4(0.0));
+                    line = rim_line(place.arc, right / (RIM * other_ball.w), up / (RIM * other_ball.w));
+                    outside = outside || (nested && place.arc.x > 1.0);
+                }
                 if (higher && outside) {
                     boundaries += line.x > -0.5 ? 1 : 0;
                     above = line.x > above_line.x ? other : above;
@@ -271,6 +276,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
         ivec2 neighbours = ivec2(-1);
         WHERE (!first) {
             vec3 line = EVERYWHERE, other_line = EVERYWHERE;
+            vec3 rim = decal == above ? above_line : ball_line(q, right, up, own_ball);
             if (across) {
                 int third = decal == beside.x ? beside.y : beside.x;
                 neighbours = ivec2(owner, third);
@@ -279,7 +285,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
                     other_line = contact_line(q, right, up, own_ball, decal_texel(4 * third));
                 }
             }
-            part = inner_part(ball_line(q, right, up, own_ball), line, other_line);
+            part = inner_part(rim, line, other_line);
         }
         vec3 at = first ? q : q + part.y * right + part.z * up;
         vec4 contact = first ? pushes : contact_with(own_ball, neighbours, at);

@@ -34,6 +34,7 @@ With pushes of planes, its smallness prevents folds: tests and benchmark find no
 
 import warp as wp
 
+from decals.field.image_place import image_reaches
 from decals.field.mapping import tangent_coordinates, unroll_step
 from decals.field.radial import (
     NO_OWNER,
@@ -262,18 +263,24 @@ def elastic_contact(q: wp.vec3, n_q: wp.vec3, owner: wp.int32, index: IndexedDec
 
 @wp.func
 def kept_owner(
-    q: wp.vec3, n_q: wp.vec3, first: wp.vec4i, last: wp.vec4i, closest: wp.int32, index: IndexedDecals
+    q: wp.vec3,
+    n_q: wp.vec3,
+    first: wp.vec4i,
+    last: wp.vec4i,
+    closest: wp.int32,
+    after: wp.int32,
+    index: IndexedDecals,
 ) -> wp.int32:
     """Return the decal of `decals.field.radial.nested_owner`, given all candidates at q."""
     a = first
     b = last
     closest_ball = index.records[RECORD * closest]
-    tried = wp.int32(closest)
+    tried = wp.int32(after)
     while True:
         tried_ball = index.records[RECORD * tried]
         radius = RIM_RADIUS * tried_ball[3]
         own = power(q - xyz(tried_ball), radius)
-        inside = bool(tried != closest)
+        inside = bool(tried != after)
         if inside:
             inside = lies_on_top(n_q, tried, index.records)
         lower = wp.int32(NO_OWNER)
@@ -307,8 +314,8 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
 
     They are those of `cell_owner` and `elastic_contact`. One traversal of the index finds the candidates,
     and of the holders of q, whose rims contain it, the number, the topmost, and the one of least power. This
-    one is the owner, unless it is nested with another holder above it that faces the surface well. Only sets
-    with nested decals (`IndexedDecals.nested`) are searched for such a holder.
+    one is the owner, unless it is nested with another holder above it that faces the surface well, and whose
+    image reaches q. Only sets with nested decals (`IndexedDecals.nested`) are searched for such a holder.
     """
     closest = wp.int32(NO_OWNER)
     least = wp.float32(0.0)
@@ -348,16 +355,21 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
         return wp.vec4(float(NO_OWNER), 0.0, 0.0, 0.0)
     owner = wp.int32(closest)
     own_ball = index.records[RECORD * closest]
-    if index.nested and topmost != closest:
+    searching = bool(index.nested and topmost != closest)
+    while searching:
         if holders == 2:
             offset = xyz(topmost_ball) - xyz(own_ball)
-            if balls_nested(offset, RIM_RADIUS * own_ball[3], RIM_RADIUS * topmost_ball[3]):
+            first = bool(owner == closest)
+            owner = closest
+            if first and balls_nested(offset, RIM_RADIUS * own_ball[3], RIM_RADIUS * topmost_ball[3]):
                 if lies_on_top(n_q, topmost, index.records):
                     owner = topmost
         elif count > MAX_KEPT:
-            owner = nested_owner(q, n_q, closest, index)
+            owner = nested_owner(q, n_q, closest, owner, index)
         else:
-            owner = kept_owner(q, n_q, a, b, closest, index)
+            owner = kept_owner(q, n_q, a, b, closest, owner, index)
+        searching = bool(owner != closest and not image_reaches(q, n_q, owner, index))
+    if index.nested:
         own_ball = index.records[RECORD * owner]
     radius = RIM_RADIUS * own_ball[3]
     w = (q - xyz(own_ball)) / radius

@@ -226,7 +226,7 @@ def evaluate(
                 f"normal_derivatives: expected one for each of {count} points, got {len(turns)}"
             )
     indexed = _indexed(decals, index, device)
-    indexed.stiffness = stiffness
+    indexed.stiffness, indexed.mapping = stiffness, int(mapping)
     _limit(indexed, decals, on, device)
     if mapping is ImageMapping.WALKED:
         indexed.walked, indexed.walks = True, _walk_texels(walks, len(indexed.records) // RECORD, device)
@@ -236,7 +236,6 @@ def evaluate(
     inputs = [
         wp.array(positions, dtype=wp.vec3, device=device),
         wp.array(facings, dtype=wp.vec3, device=device),
-        int(mapping),
         int(contact),
         indexed,
     ]
@@ -271,7 +270,7 @@ def _jacobians(
     contact: AnyContact,
     device: Any,
 ) -> Float64Array:
-    """Return derivatives of image coordinates; `modes` are mapping, contact mode and indexed decals."""
+    """Return derivatives of image coordinates; `modes` are contact mode and indexed decals."""
     spheres: Float32Array = modes[-1].records.numpy()[::RECORD, 3]
     radii = np.ones(len(points))
     owned = center[0] >= 0
@@ -301,7 +300,7 @@ def _neighbors(
     """Return all decals with a field at points; the index lists whole influences, not only reaches."""
     from decals.field.neighbor_kernels import list_neighbors  # compiled at the first use
 
-    points, normals, _, mode, indexed = inputs
+    points, normals, mode, indexed = inputs
     if isinstance(decals, DecalEditor):
         rows, known = decals.decals, decals.numbers
     else:

@@ -26,11 +26,11 @@ from decals.field.contact import (
     rim_distance,
 )
 from decals.field.elastic import MAX_KEPT, elastic_contact, single_layer_elastic
-from decals.field.mapping import ImageMapping, image_distance, tangent_coordinates, unroll
+from decals.field.image_place import image_place
+from decals.field.mapping import ImageMapping, image_distance, tangent_coordinates
 from decals.field.radial import NO_OWNER as CELL_NO_OWNER
 from decals.field.radial import cell_owner, radial_complement
 from decals.field.receivers import complement_of
-from decals.field.walk import walked_place
 from decals.index.lookup import ABOVE_ALL, IndexedDecals, cell_range, end_of_lower, rank_range
 from decals.record import (
     NO_FIELD,
@@ -44,9 +44,6 @@ from decals.record import (
 )
 
 wp.set_module_options({"enable_backward": False})
-
-MIN_PLACE = 1.0e-12
-"""Smallest distance in the image by which is divided."""
 
 NO_OWNER = CELL_NO_OWNER
 """Owner of a point outside all rims."""
@@ -171,30 +168,23 @@ def uv_at(
     n_q: wp.vec3,
     owner: wp.int32,
     pushed: wp.vec3,
-    mapping: wp.int32,
     index: IndexedDecals,
 ) -> wp.vec2:
     """Return image coordinates in the owner's image, a disc of radius ½ around (½, ½) (`in_image`).
 
     `pushed` is that of `contact_at`. The displacement fades toward the rim, where no image moves.
     """
-    centre = xyz(index.records[RECORD * owner])
-    normal = xyz(index.records[RECORD * owner + 1])
-    tangent = xyz(index.records[RECORD * owner + 2])
-    w = q - centre
+    w = q - xyz(index.records[RECORD * owner])
     drawn = rim_distance(pushed[0])
-    place = tangent_coordinates(w, normal, tangent)
-    if mapping != ImageMapping.CHORD:
+    place = wp.vec2(0.0, 0.0)
+    if index.mapping == ImageMapping.CHORD:
+        normal = xyz(index.records[RECORD * owner + 1])
+        place = tangent_coordinates(w, normal, xyz(index.records[RECORD * owner + 2]))
+    else:
         small = w / visible_radius(owner, index.records)
-        arc = unroll(small, normal, n_q)
-        place = tangent_coordinates(xyz(arc), normal, tangent)
-        length = arc[3]
-        if index.walked:
-            place = wp.max(length / wp.max(wp.length(place), MIN_PLACE), 1.0) * place
-            walked = walked_place(owner, small, n_q, place, index)
-            place += walked[2] * (wp.vec2(walked[0], walked[1]) - place)
-            length += walked[2] * (wp.max(wp.length(place), wp.length(small)) - length)
-        drawn = image_distance(drawn, wp.length(small), length)
+        unrolled = image_place(small, n_q, owner, index)
+        place = wp.vec2(unrolled[0], unrolled[1])
+        drawn = image_distance(drawn, wp.length(small), unrolled[2])
     uv = contact_uv(place, drawn)
     if index.nested:
         uv += 0.5 * wp.max(1.0 - drawn * drawn, 0.0) * wp.vec2(pushed[1], pushed[2])

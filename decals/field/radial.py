@@ -9,9 +9,10 @@ ray so that its rim lies at R.
 Two decals are nested if one of them would keep less than MIN_KEPT_RADIUS of its radius before their plane
 (`decals.record.balls_nested`).
 Nested decals do not push each other. The smaller one lies above the other, and of equal ones that of the
-lower number, on surface that it faces well (`lies_on_top`). So a small decal deep inside a large one is seen
-whole, and R ≥ MIN_KEPT_RADIUS·ρ: no image is compressed more than 1/MIN_KEPT_RADIUS times. There are no
-gaps: every point inside a rim lies at least in the cell of the decal of least |q − p|² − ρ².
+lower number, on surface that it faces well (`lies_on_top`), as far as its image reaches (`image_reaches`).
+So a small decal deep inside a large one is seen whole, and R ≥ MIN_KEPT_RADIUS·ρ: no image is compressed more
+than 1/MIN_KEPT_RADIUS times. There are no gaps: every point inside a rim lies at least in the cell of the
+decal of least |q − p|² − ρ².
 """
 
 # ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
@@ -20,6 +21,7 @@ gaps: every point inside a rim lies at least in the cell of the decal of least |
 
 import warp as wp
 
+from decals.field.image_place import image_reaches
 from decals.field.receivers import acts, complement_of
 from decals.index.lookup import IndexedDecals, rank_range
 from decals.record import (
@@ -131,22 +133,25 @@ def comes_next(
 
 
 @wp.func
-def nested_owner(q: wp.vec3, n_q: wp.vec3, closest: wp.int32, index: IndexedDecals) -> wp.int32:
-    """Return the topmost contact decal whose cell contains q, given the one of least power at q.
+def nested_owner(
+    q: wp.vec3, n_q: wp.vec3, closest: wp.int32, after: wp.int32, index: IndexedDecals
+) -> wp.int32:
+    """Return the topmost contact decal below `after` whose cell contains q, given the one of least power at q.
 
     Only decals nested with that one can share q with it. Those above it that face the surface well are tried
-    from the topmost down: each traversal finds whether q lies in the cell of one, and the next one.
+    from the topmost down: each traversal finds whether q lies in the cell of one, and the next one. `after`
+    is `closest` to begin at the top.
     """
     rank = wp.int32(0)
     if index.layered:
         rank = rank_of(closest, index.records)
     closest_ball = index.records[RECORD * closest]
-    tried = wp.int32(closest)
+    tried = wp.int32(after)
     while True:
         tried_ball = index.records[RECORD * tried]
         radius = RIM_RADIUS * tried_ball[3]
         own = power(q - xyz(tried_ball), radius)
-        inside = bool(tried != closest)
+        inside = bool(tried != after)
         lower = wp.int32(NO_OWNER)
         lower_size = wp.float32(0.0)
         for level in range(index.level_count):
@@ -173,7 +178,10 @@ def nested_owner(q: wp.vec3, n_q: wp.vec3, closest: wp.int32, index: IndexedDeca
 
 @wp.func
 def cell_owner(q: wp.vec3, n_q: wp.vec3, rank: wp.int32, index: IndexedDecals) -> wp.int32:
-    """Return the topmost contact decal of a rank whose cell contains q; NO_OWNER outside all rims."""
+    """Return the topmost contact decal of a rank whose cell contains q; NO_OWNER outside all rims.
+
+    The image of an upper one must reach q.
+    """
     owner = wp.int32(NO_OWNER)
     least = wp.float32(0.0)
     holders = wp.int32(0)
@@ -192,7 +200,12 @@ def cell_owner(q: wp.vec3, n_q: wp.vec3, rank: wp.int32, index: IndexedDecals) -
                     owner = index.ids[j]
     if holders < 2 or not index.nested:
         return owner
-    return nested_owner(q, n_q, owner, index)
+    closest = owner
+    while True:
+        owner = nested_owner(q, n_q, closest, owner, index)
+        if owner == closest or image_reaches(q, n_q, owner, index):
+            return owner
+    return owner
 
 
 # -- deformation ----------------------------------------------------------------------------------------

@@ -65,13 +65,12 @@ def image_point(
     q: wp.vec3,
     n_q: wp.vec3,
     owner: wp.int32,
-    mapping: wp.int32,
     contact: wp.int32,
     index: IndexedDecals,
 ) -> wp.vec3:
     """Return (u, v, E): image coordinates of q in its owner, and the complement of the owner's field."""
     pushed = contact_at(q, n_q, owner, contact, index)
-    uv = uv_at(q, n_q, owner, pushed, mapping, index)
+    uv = uv_at(q, n_q, owner, pushed, index)
     return wp.vec3(uv[0], uv[1], pushed[0])
 
 
@@ -79,7 +78,6 @@ def image_point(
 def sample_points(
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
-    mapping: wp.int32,
     contact: wp.int32,
     index: IndexedDecals,
     owners: wp.array(dtype=wp.int32),
@@ -92,7 +90,7 @@ def sample_points(
     owner = owner_at(points[i], n_q, contact, index)
     owners[i] = owner
     if owner != NO_OWNER:
-        image = image_point(points[i], n_q, owner, mapping, contact, index)
+        image = image_point(points[i], n_q, owner, contact, index)
         uv[i] = wp.vec2(image[0], image[1])
         fields[i] = 1.0 - image[2]
 
@@ -101,7 +99,6 @@ def sample_points(
 def color_points(
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
-    mapping: wp.int32,
     contact: wp.int32,
     index: IndexedDecals,
     owners: wp.array(dtype=wp.int32),
@@ -116,7 +113,7 @@ def color_points(
     owner = owners[i]
     color = wp.vec4(0.0, 0.0, 0.0, 0.0)
     while owner != NO_OWNER and color[3] < OPAQUE_ALPHA:
-        image = image_point(q, n_q, owner, mapping, contact, index)
+        image = image_point(q, n_q, owner, contact, index)
         uv = wp.vec2(image[0], image[1])
         color += (1.0 - color[3]) * decal_color(q, n_q, owner, uv, index, extents, texels)
         if not index.layered:

@@ -46,6 +46,7 @@ MIX_ALL = wp.constant(wp.uint32(0x2C1B3C6D))
     limited="decal_limited",
     limits="decal_limits",
     surface="surface_receivers",
+    mapping="decal_mapping",
     walked="decal_walked",
     walks="decal_walks",
 )
@@ -68,6 +69,8 @@ class IndexedDecals:
         `decals.model.Decals.limited` and `decals.model.Decals.limits`, which are read where it is True.
     surface
         Mask of the surface, see `decals.receivers.surface_mask`.
+    mapping
+        Image mapping, a `decals.field.mapping.ImageMapping`; 0, CHORD, by default.
     walked, walks
         True in the image mapping WALKED, and `decals.field.walks.Walks.texels`, which are read in it alone.
     """
@@ -84,6 +87,7 @@ class IndexedDecals:
     limited: wp.bool
     limits: wp.array(dtype=wp.vec4)
     surface: wp.int32
+    mapping: wp.int32
     walked: wp.bool
     walks: wp.array(dtype=wp.vec4)
 

@@ -432,6 +432,8 @@ class _OwnedPoints:
     def owners(self, radii: Float64Array) -> Int64Array:
         """Return the columns of the owners, ``[n]``: of least power, or the smallest that is nested above it.
 
+        The image of the smallest must reach the point.
+
         `decals.field.radial.nested_owner` is the rule.
         """
         powers = self.powers(radii)
@@ -448,9 +450,8 @@ class _OwnedPoints:
         rows = rows[(smaller[rows] & self._nested(self.decals[rows], lowest[rows], radii)).any(axis=1)]
         decals, own = self.decals[rows], powers[rows]
         facing = np.einsum("nki,ni->nk", self.centers.points.normals[decals], self.points.normals[rows])
-        above = (
-            smaller[rows] & self._nested(decals, lowest[rows], radii) & (facing > FACING_LIMIT + TOP_MARGIN)
-        )
+        above = smaller[rows] & self._nested(decals, lowest[rows], radii)
+        above &= (facing > FACING_LIMIT + TOP_MARGIN) & (self.lengths[rows] <= radii[decals])
         for column in range(decals.shape[1]):
             lower = own < own[:, column : column + 1]
             parted = lower & ~self._nested(decals, decals[:, column : column + 1], radii)

@@ -168,8 +168,9 @@ class Chunk:
         decals = self.world.decals
         outputs = [self._new(dtype) for dtype in (wp.int32, wp.float32, wp.vec2)]
         index = index_on(decals, self.device)
-        modes = int(mapping), int(contact), once
-        self._launch(kernels.look_at_points, [self.points, self.normals, *modes, index], outputs)
+        index.mapping = int(mapping)
+        inputs = [self.points, self.normals, int(contact), once, index]
+        self._launch(kernels.look_at_points, inputs, outputs)
         return outputs
 
     def expected(self, contact: Contact, mapping: ImageMapping, *, reach: float) -> list[Any]:

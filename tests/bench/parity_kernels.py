@@ -152,7 +152,6 @@ def choose_points(
 def look_at_points(
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
-    mapping: wp.int32,
     contact: wp.int32,
     once: wp.bool,
     index: IndexedDecals,
@@ -179,7 +178,7 @@ def look_at_points(
     uv[i] = wp.vec2(0.0, 0.0)
     if owner != NO_OWNER:
         rims[i] = rim_distance(pushed[0])
-        uv[i] = uv_at(q, n, owner, pushed, mapping, index)
+        uv[i] = uv_at(q, n, owner, pushed, index)
 
 
 @wp.func

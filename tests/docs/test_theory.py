@@ -36,7 +36,7 @@ def complement(z: Array) -> Array:
 class World:
     """All decals at all points, in float64."""
 
-    def __init__(self, decals: Decals, points: Array, normals: Array) -> None:
+    def __init__(self, decals: Decals, points: Array, normals: Array, mapping: ImageMapping) -> None:
         self.decals, self.points, self.normals = decals, points, normals
         self.centres = decals.positions.astype(np.float64)
         self.radii = decals.radii.astype(np.float64)
@@ -44,6 +44,12 @@ class World:
         cosines = normals @ decals.normals.astype(np.float64).T
         self.faces = decals.spill[None] | (cosines > FACING_LIMIT)
         self.tops = decals.spill[None] | (cosines > TOP_LIMIT)
+        self.reaches = np.ones_like(self.tops)
+        if mapping == ImageMapping.CORRECTED:
+            each = np.indices(self.tops.shape).reshape(2, -1)
+            w = (points[each[0]] - self.centres[each[1]]) / self.radii[each[1], None]
+            lengths = unrolled(w, decals.normals[each[1]].astype(np.float64), normals[each[0]])[1]
+            self.reaches = (lengths**2 / 4 <= 0.25001).reshape(self.tops.shape)
         influence = self.radii / RIM
         acts = self.faces & (self.distances < NEIGHBOUR_REACH * influence)
         self.e = np.where(acts, complement((self.distances / influence) ** 2), ABSENT)
@@ -88,7 +94,8 @@ def shown_in_cells(world: World, group: Ints, contact: Contact) -> tuple[Ints, A
     owner = np.full(len(power), -1)
     for i in upper_first[::-1]:
         less = inside & (power < power[:, i : i + 1])
-        on_top = world.tops[:, group[i]] | ~less.any(axis=1)
+        shows = world.tops[:, group[i]] & world.reaches[:, group[i]]
+        on_top = shows | ~less.any(axis=1)
         owner[inside[:, i] & ~(less & ~stacked[i]).any(axis=1) & on_top] = i
     ray = world.points - centres[owner]
     x = np.linalg.norm(ray, axis=1)
@@ -147,6 +154,24 @@ def displacements(world: World, owner: Ints) -> Array:
     return turned
 
 
+def unrolled(w: Array, n: Array, n_q: Array) -> tuple[Array, Array]:
+    """Section 7, CORRECTED: m and L."""
+    a, b = -(w * n).sum(axis=1), (w * n_q).sum(axis=1)
+    bend = a * b
+    x = np.maximum(0.25 * ((n_q - n) ** 2).sum(axis=1), 1e-20)
+    cosine = np.maximum(0.5 * np.linalg.norm(n_q + n, axis=1), 1e-4)
+    half = np.arctan2(np.sqrt(x), cosine)
+    stretch = half / np.sin(half)
+    arc = bend > 1e-37
+    total = np.where(arc, a + b, 1.0)
+    factor = np.where(arc, bend / total * (stretch - cosine) / (x * cosine), 0.0)
+    m = w + factor[:, None] * (n_q - n + 2 * x[:, None] * n)
+    y = (b - a) / total
+    longer = np.where(arc, bend * (1 + 2 * y * y) * (stretch**2 - 1) / x, 0.0)
+    length: Array = np.sqrt((w**2).sum(axis=1) + longer)
+    return m, length
+
+
 def image_coordinates(world: World, owner: Ints, e: Array, mapping: ImageMapping, contact: Contact) -> Array:
     """Section 7, for points that have an owner."""
     c = np.cbrt(1 - e)
@@ -157,19 +182,7 @@ def image_coordinates(world: World, owner: Ints, e: Array, mapping: ImageMapping
     chord = np.linalg.norm(w, axis=1)
     m, drawn = w, rim
     if mapping == ImageMapping.CORRECTED:
-        a, b = -(w * n).sum(axis=1), (w * n_q).sum(axis=1)
-        bend = a * b
-        x = np.maximum(0.25 * ((n_q - n) ** 2).sum(axis=1), 1e-20)
-        cosine = np.maximum(0.5 * np.linalg.norm(n_q + n, axis=1), 1e-4)
-        half = np.arctan2(np.sqrt(x), cosine)
-        stretch = half / np.sin(half)
-        arc = bend > 1e-37
-        total = np.where(arc, a + b, 1.0)
-        factor = np.where(arc, bend / total * (stretch - cosine) / (x * cosine), 0.0)
-        m = w + factor[:, None] * (n_q - n + 2 * x[:, None] * n)
-        y = (b - a) / total
-        longer = np.where(arc, bend * (1 + 2 * y * y) * (stretch**2 - 1) / x, 0.0)
-        length = np.sqrt(chord**2 + longer)
+        m, length = unrolled(w, n, n_q)
         t = np.clip((length - chord) / np.maximum(1 - chord, 1e-7), 0, 1)
         drawn = np.maximum(rim + (1 - rim) * t, length)
     xy = np.column_stack([(m * u).sum(axis=1), (m * np.cross(n, u)).sum(axis=1)])
@@ -184,7 +197,7 @@ def reference(
     decals: Decals, points: Array, normals: Array, contact: Contact, mapping: ImageMapping
 ) -> tuple[Ints, Array, Array]:
     """Owner, field and image coordinates from the formulas of the page."""
-    world = World(decals, points, normals)
+    world = World(decals, points, normals, mapping)
     owner, e = np.full(len(points), -1), np.ones(len(points))
     for group in world.groups():
         if decals.interactions[group[0]] != Interaction.PUSH:
@@ -198,7 +211,7 @@ def reference(
         owner[free], e[free] = shown[free], complements[free]
     uv = np.zeros((len(points), 2))
     owned = owner >= 0
-    inside = World(decals, points[owned], normals[owned])
+    inside = World(decals, points[owned], normals[owned], mapping)
     uv[owned] = image_coordinates(inside, owner[owned], e[owned], mapping, contact)
     return owner, np.where(owned, 1 - e, 0.0), uv
 

@@ -15,6 +15,7 @@ from tests.oracles.contact import RIM, complements, log_factor, rim_distance
 FACING_LIMIT = -0.25
 LEAST = 0.21
 ON_TOP = 0.5
+IMAGE_END = 2 * np.sqrt(0.25001)
 STIFFNESS = 2.0
 CHUNK = 2_000_000
 
@@ -70,7 +71,7 @@ def colors_at(
     """
 
     def composed(decals: Any, points: NDArray[Any], normals: NDArray[Any]) -> Any:
-        scene = _Scene(decals, points, normals, 1.0, on)
+        scene = _Scene(decals, points, normals, 1.0, on, corrected)
         color = np.zeros((len(points), 4))
         for members in reversed(_drawings(decals)):
             owner, complement, _ = scene.shown(members, contact)
@@ -116,7 +117,7 @@ def _topmost(
     contact: Any,
     on: frozenset[str] | None,
 ) -> Any:
-    scene = _Scene(decals, points, normals, reach, on)
+    scene = _Scene(decals, points, normals, reach, on, corrected)
     count = len(points)
     owner, complement, doubt = np.full(count, -1), np.ones(count), np.full(count, 4.0)
     for members in _drawings(decals):
@@ -141,12 +142,14 @@ class _Scene:
         points: NDArray[Any],
         normals: NDArray[Any],
         reach: Any,
-        on: frozenset[str] | None = None,
+        on: frozenset[str] | None,
+        corrected: bool,
     ) -> None:
+        self.normals, self.facings, self.corrected = normals, decals.normals.astype(np.float64), corrected
         self.points, self.centres = points, decals.positions.astype(np.float64)
         self.radii, self.spill = decals.radii.astype(np.float64), decals.spill
         self.alone = np.asarray(decals.interactions) != 1
-        self.cosine = normals @ decals.normals.astype(np.float64).T
+        self.cosine = normals @ self.facings.T
         offsets = [points[:, None, a] - self.centres[None, :, a] for a in range(3)]
         self.squared = sum(w**2 for w in offsets) / (self.radii / RIM) ** 2
         count = len(self.radii)
@@ -186,8 +189,22 @@ class _Scene:
         who = np.append(members, -1)
         return np.where(owned, who[owner], -1), complement, _tie_doubt(squared, acts)
 
+    def spare(self, inside: Any, members: Any) -> Any:
+        """How far images reach beyond points inside their rims, in their radii."""
+        result = np.full(inside.shape, 4.0)
+        if self.corrected:
+            rows, columns = np.nonzero(inside)
+            decals = members[rows, columns]
+            w = (self.points[rows] - self.centres[decals]) / self.radii[decals][:, None]
+            lengths = _unrolled(w, self.facings[decals], self.normals[rows])[1]
+            result[rows, columns] = IMAGE_END - lengths
+        return result
+
     def cells(self, members: Any, *, elastic: bool) -> Any:
-        """Convex cells between radical planes. Of stacked decals the smallest shows that faces q well."""
+        """Convex cells between radical planes. Of stacked decals the smallest shows that faces q well.
+
+        Its image must reach q.
+        """
         centres, radii = self.centres[members], self.radii[members]
         squared, facing = self.squared[:, members], self.facing[:, members]
         power = (squared / RIM**2 - 1) * radii**2
@@ -204,7 +221,8 @@ class _Scene:
         less = power_few[:, None, :] < power_few[:, :, None]
         beyond = less & (inside_few[:, None, :] & ~stacked_few)
         lowest = ~(less & inside_few[:, None, :]).any(axis=2)
-        shows = inside_few & ~beyond.any(axis=2) & ((away_few > 0) | lowest)
+        spare_few = self.spare(inside_few, members[few])
+        shows = inside_few & ~beyond.any(axis=2) & ((away_few > 0) & (spare_few >= 0) | lowest)
         upper = np.argsort(np.argsort(radii, kind="stable"), kind="stable")
         uppermost = np.where(shows, upper[few], len(members)).argmin(axis=1)
         owner, owned = few[np.arange(len(few)), uppermost], shows.any(axis=1)
@@ -230,7 +248,8 @@ class _Scene:
         gap[:, np.arange(few.shape[1]), np.arange(few.shape[1])] = 4.0
         doubt = np.minimum((np.abs(power) / radii**2).min(axis=1), gap.min(axis=(1, 2)))
         over = (inside_few[:, None, :] & stacked_few & less).any(axis=2)
-        doubt = np.minimum(doubt, np.where(inside_few & over, np.abs(away_few), 4.0).min(axis=1))
+        unsure = np.minimum(np.abs(away_few), np.abs(spare_few))
+        doubt = np.minimum(doubt, np.where(inside_few & over, unsure, 4.0).min(axis=1))
         if elastic:
             aside = facing & stacked & (squared < 1.6 * RIM**2) & (radii < radii[owner][:, None])
             doubt = np.minimum(doubt, np.where(aside, np.abs(away), 4.0).min(axis=1))

@@ -26,6 +26,7 @@ FOUR = wp.constant(wp.float64(4.0))
 THIRD = wp.constant(wp.float64(1.0 / 3.0))
 FACING_LIMIT = wp.constant(wp.float64(-0.25))
 ON_TOP = wp.constant(wp.float64(0.5))
+IMAGE_END = wp.constant(wp.float64(2.0 * math.sqrt(0.25001)))
 KEPT_LEAST = wp.constant(wp.float64(0.21))
 TINY = wp.constant(wp.float64(1e-300))
 NEARLY = wp.constant(wp.float64(1e-3))
@@ -224,10 +225,47 @@ def moved_by(
 
 
 @wp.func
+def unrolled(w: wp.vec3d, n_p: wp.vec3d, n_q: wp.vec3d) -> wp.vec4d:
+    """Offset by an arc of the ends' harmonic mean height, and length by one of their geometric mean."""
+    fall = -wp.dot(w, n_p)
+    rise = wp.dot(w, n_q)
+    turn = n_q - n_p
+    angle = TWO * wp.atan2(wp.length(turn), wp.length(n_q + n_p))
+    if fall * rise <= ZERO or angle == ZERO:
+        return wp.vec4d(w[0], w[1], w[2], wp.length(w))
+    versine = HALF * wp.dot(turn, turn)
+    radius = TWO * fall * rise / ((fall + rise) * versine)
+    toward = turn + versine * n_p
+    m = w + radius * (angle - wp.sin(angle)) / wp.max(wp.sin(angle), TINY) * toward
+    skew = (rise - fall) / (rise + fall)
+    gain = fall * rise * (ONE + TWO * skew * skew) / (versine * versine)
+    length = wp.sqrt(wp.dot(w, w) + gain * (angle * angle - TWO * versine))
+    return wp.vec4d(m[0], m[1], m[2], length)
+
+
+@wp.func
+def spare(q: wp.vec3d, n: wp.vec3d, i: wp.int32, corrected: wp.bool, these: Members) -> wp.float64:
+    """How far the image of i reaches beyond q, in its radii."""
+    if not corrected:
+        return FOUR
+    w = (q - wide(these.positions[i])) / wp.float64(these.radii[i])
+    return IMAGE_END - unrolled(w, wide(these.normals[i]), n)[3]
+
+
+@wp.func
 def convex(
-    q: wp.vec3d, n: wp.vec3d, first: wp.int32, rank: wp.int32, contact: wp.int32, these: Members
+    q: wp.vec3d,
+    n: wp.vec3d,
+    first: wp.int32,
+    rank: wp.int32,
+    contact: wp.int32,
+    corrected: wp.bool,
+    these: Members,
 ) -> Answer:
-    """Radial and elastic contact: the uppermost cell that holds q, and where q lies on the ray to its end."""
+    """Radial and elastic contact: the uppermost cell that holds q, and where q lies on the ray to its end.
+
+    The image of an upper decal reaches q.
+    """
     owner = wp.int32(-1)
     doubt = wp.float64(4.0)
     smallest = wp.float64(1e300)
@@ -237,7 +275,10 @@ def convex(
             r = wp.float64(these.radii[i])
             inside = bool(own <= ZERO)
             away = wp.dot(n, wide(these.normals[i])) - ON_TOP
-            shows = bool(these.spill[i] != 0 or away > ZERO)
+            left = wp.float64(4.0)
+            if inside:
+                left = spare(q, n, i, corrected, these)
+            shows = bool((these.spill[i] != 0 or away > ZERO) and left >= ZERO)
             lowest = bool(True)
             for j in range(first, first + these.size):
                 if j != i and these.ranks[j] == rank and facing(n, j, these):
@@ -246,8 +287,10 @@ def convex(
                         lowest = False
                         if not lie_over(i, j, these):
                             inside = False
-                        elif these.spill[i] == 0 and own <= ZERO:
-                            doubt = wp.min(doubt, wp.abs(away))
+                        elif own <= ZERO:
+                            doubt = wp.min(doubt, wp.abs(left))
+                            if these.spill[i] == 0:
+                                doubt = wp.min(doubt, wp.abs(away))
             if inside and (shows or lowest) and r < smallest:  # of equal ones the first stays
                 smallest = r
                 owner = i
@@ -285,25 +328,6 @@ def convex(
                     away = wp.dot(n, wide(these.normals[j])) - ON_TOP
                     edge = wp.min(edge, wp.float64(0.1) * wp.abs(away))
     return Answer(owner, complement(share * share), doubt, edge)
-
-
-@wp.func
-def unrolled(w: wp.vec3d, n_p: wp.vec3d, n_q: wp.vec3d) -> wp.vec4d:
-    """Offset by an arc of the ends' harmonic mean height, and length by one of their geometric mean."""
-    fall = -wp.dot(w, n_p)
-    rise = wp.dot(w, n_q)
-    turn = n_q - n_p
-    angle = TWO * wp.atan2(wp.length(turn), wp.length(n_q + n_p))
-    if fall * rise <= ZERO or angle == ZERO:
-        return wp.vec4d(w[0], w[1], w[2], wp.length(w))
-    versine = HALF * wp.dot(turn, turn)
-    radius = TWO * fall * rise / ((fall + rise) * versine)
-    toward = turn + versine * n_p
-    m = w + radius * (angle - wp.sin(angle)) / wp.max(wp.sin(angle), TINY) * toward
-    skew = (rise - fall) / (rise + fall)
-    gain = fall * rise * (ONE + TWO * skew * skew) / (versine * versine)
-    length = wp.sqrt(wp.dot(w, w) + gain * (angle * angle - TWO * versine))
-    return wp.vec4d(m[0], m[1], m[2], length)
 
 
 @wp.func
@@ -395,7 +419,13 @@ def doubted(answer: Answer, doubt: wp.float64) -> Answer:
 
 @wp.func
 def topmost(
-    q: wp.vec3d, n: wp.vec3d, group: wp.int32, contact: wp.int32, reach: wp.float64, these: Members
+    q: wp.vec3d,
+    n: wp.vec3d,
+    group: wp.int32,
+    contact: wp.int32,
+    corrected: wp.bool,
+    reach: wp.float64,
+    these: Members,
 ) -> Answer:
     """What the topmost decal of a set shows at q, with unit normal n."""
     first = group * these.size
@@ -404,7 +434,9 @@ def topmost(
         return Answer(-1, ONE, doubt_of_rims(q, n, first, these), FOUR)
     if (rank & 3) == PUSH:
         if contact >= RADIAL:
-            return doubted(convex(q, n, first, rank, contact, these), doubt_of_rims(q, n, first, these))
+            return doubted(
+                convex(q, n, first, rank, contact, corrected, these), doubt_of_rims(q, n, first, these)
+            )
         return doubted(sheet(q, n, first, rank, contact, reach, these), doubt_of_rims(q, n, first, these))
     owner = wp.int32(-1)
     e = wp.float64(1.0)
@@ -435,7 +467,7 @@ def answer_points(
     i = wp.tid()
     q = wide(points[i])
     n = wp.normalize(wide(normals[i]))
-    found = topmost(q, n, sets[i], contact, reach, these)
+    found = topmost(q, n, sets[i], contact, corrected, reach, these)
     owners[i] = found.owner
     complements[i] = found.complement
     doubts[i] = found.doubt

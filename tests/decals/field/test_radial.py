@@ -8,6 +8,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from decals.field.evaluate import evaluate
+from decals.field.mapping import ImageMapping
 from decals.index.index import index_on
 from decals.model import Decals
 from decals.record import Contact
@@ -135,6 +136,31 @@ def test_a_hundred_thousand_points_against_float64(rounds: int) -> None:
     assert owned > 80_000 * rounds
     assert sure > 90_000 * rounds
     assert worst <= ERROR_LIMIT
+
+
+@pytest.mark.parametrize("mapping", [ImageMapping.CHORD, ImageMapping.CORRECTED])
+@pytest.mark.parametrize("contact", CELLS)
+@pytest.mark.parametrize("above", [1, 2, 9])
+def test_a_larger_decal_shows_between_end_and_rim_of_one_above(
+    above: int, contact: Contact, mapping: ImageMapping
+) -> None:
+    """On the unit ball, an image of radius r ends at the angle r, and its rim lies at 2 asin(r/2)."""
+    radius, turn = 0.5, 0.3 + 2e-7 * np.arange(above)  # more than 8 on one point are traversed again
+    pole = np.array([np.sin(turn), 0 * turn, np.cos(turn)]).T
+    centres = np.vstack([[[0, 0, 1.0]], pole])
+    decals = Decals(centres, centres, [[0, 1, 0]] * (1 + above), [1.2, *[radius] * above])
+    ends = {ImageMapping.CHORD: 2 * np.arcsin(radius / 2), ImageMapping.CORRECTED: radius}
+    angle, around = np.meshgrid(np.linspace(0.485, 0.52, 351), np.linspace(0, 6, 13))
+    around_pole = np.stack([np.cos(around), np.sin(around), 0 * around]) * np.sin(angle)
+    x, y, z = around_pole[0], around_pole[1], np.cos(angle)
+    points = np.stack([np.cos(0.3) * x + np.sin(0.3) * z, y, np.cos(0.3) * z - np.sin(0.3) * x], -1)
+    seen = evaluate(decals, *[points.reshape(-1, 3)] * 2, mapping=mapping, contact=contact, device="cpu")
+    owner = seen.owner.reshape(angle.shape)
+    clear = np.abs(angle - ends[mapping]) > 5e-5
+    assert np.array_equal((owner > 0)[clear], (angle < ends[mapping])[clear])
+    assert (np.hypot(*(seen.uv - 0.5).T) <= 0.5 + 1e-5).all()
+    assert (owner == 0).any()
+    assert (owner > 0).any()
 
 
 def pair(distance: float, radius: float, other: Any) -> Any:

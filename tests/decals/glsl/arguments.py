@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.warps import WARPS
 from decals.field.contact import MIN_COMPLEMENT, MIN_SPAN
+from decals.field.mapping import ImageMapping
 from decals.field.ownership import owner_at
 from decals.index.index import DecalIndex
 from decals.model import RECORD
@@ -151,8 +152,10 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
         "ball": ball, "closest_ball": ball, "lower_size": uniform(0.3, 2.5), "lower": whole(-1, DECALS),
         "tried_size": uniform(0.3, 2.5), "tried": whole(0, DECALS), "closest": whole(0, DECALS),
     },
-    "nested_owner": {"closest": whole(0, DECALS)},
-    "kept_owner": {"first": kept, "last": kept, "closest": whole(0, DECALS)},
+    "nested_owner": {"closest": whole(0, DECALS), "after": whole(0, DECALS)},
+    "kept_owner": {
+        "first": kept, "last": kept, "closest": whole(0, DECALS), "after": whole(0, DECALS),
+    },
     "sum_of_pushes": {"distance": uniform(0.0, 0.2)},  # before all planes, where z is infinite
     "cell_owner": {"rank": among(1)},
     "log_one_minus": {"w": uniform(0.0, 0.999)},
@@ -190,10 +193,9 @@ class World:
 
     @property
     def arguments(self) -> dict[str, Any]:
-        return {
-            "decals": self.decals,
-            "index": self.index.on("cpu", records=self.decals, layered=True),
-        }
+        index = self.index.on("cpu", records=self.decals, layered=True)
+        index.mapping = int(ImageMapping.CORRECTED)
+        return {"decals": self.decals, "index": index}
 
 
 @lru_cache

@@ -1,5 +1,6 @@
 """Filtered pictures, with one sample a pixel, against the mean of many points of each pixel."""
 
+from dataclasses import replace
 from functools import cache
 from itertools import combinations
 from typing import Any
@@ -9,7 +10,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from blobtree import Point
 from blobtree.transpile.python import plain_python, vector
+from decals import Camera, DecalImage, Decals, Scene, TreeObject
 from decals.field import elastic, pixel_filter
 from decals.rendering.options import RenderOptions
 from decals.rendering.pixel_pass import list_size
@@ -17,7 +20,7 @@ from decals.rendering.renderer import Renderer
 from decals.rendering.uploads import filled_corners
 from decals.rendering.viewpoint import largest_tile
 from tests.blobtree.transpile.warp_functions import python_function
-from tests.decals.rendering.flat_views import FLAT, expected_picture, flat_view, peak_ratio, waves
+from tests.decals.rendering.flat_views import FLAT, expected_picture, flat_view, grey, peak_ratio, waves
 from tests.oracles.pixels import share_inside
 
 SIZE = (64, 48)
@@ -27,6 +30,24 @@ SIZE = (64, 48)
 def expected(angle: float, kind: str, contact: str) -> np.ndarray:
     """Means over 64 points of each pixel, from 0 to 255."""
     return expected_picture(flat_view(angle, kind), SIZE, contact)
+
+
+@pytest.mark.ordinary_cases("fragment-0")
+@pytest.mark.parametrize("layer", [0, 1])
+def test_upper_images_end_at_their_length_along_the_surface(drawer: Renderer, layer: int) -> None:
+    """On a ball, at 0.7 and not at the rim, 0.02 farther out, whether in a layer or nested."""
+    centres = np.array([[0, 0, 1.0], [np.sin(0.3), 0, np.cos(0.3)]])
+    decals = Decals(centres, centres, [[0, 1, 0]] * 2, [1.3, 0.7], images=[0, 1], layers=[0, layer])
+    ball = TreeObject("ball", Point((0, 0, 0), radius=1.0))
+    camera = Camera((0.0, 0.0, 8.0), up=(0, 1, 0), fov=10)
+    images = [DecalImage(name, grey(level)) for name, level in (("light", 240), ("dark", 80))]
+    scene = Scene(objects=[ball], camera=camera, decals=decals, images=images)
+    options = RenderOptions((64, 64), samples=1, filtered=True, lights=FLAT)
+    means = drawer.render(scene, replace(options, filtered=False, samples=5))
+    error = np.abs(drawer.render(scene, options).astype(int) - means)
+    y, x = np.mgrid[:64, :64] - 31.5
+    assert (means[np.hypot(x, y) < 30, 0] < 100).any()
+    assert error[np.hypot(x, y) < 30].max() <= 8
 
 
 def difference(drawer: Renderer, angle: float, kind: str, contact: str = "elastic") -> np.ndarray:
