@@ -104,7 +104,7 @@ void part_image(inout Place place, Bumps bumps, vec3 n, int decal) {
 }
 
 #ifdef MATERIALS
-// Sums of decals.glsl, and how to lay another decal over what was added to them.
+// Sums of decals.glsl.
 struct Maps {
     vec4 normals;
     vec2 values;
@@ -113,12 +113,6 @@ struct Maps {
 
 Maps material_sums() {
     return Maps(material_normals, material_values, material_glow);
-}
-
-void cover_materials(Maps before, Maps under, float alpha) {
-    material_normals -= alpha * (under.normals - before.normals);
-    material_values -= alpha * (under.values - before.values);
-    material_glow -= alpha * (under.glow - before.glow);
 }
 #endif
 
@@ -188,9 +182,15 @@ vec4 contact_with(vec4 ball, ivec2 others, vec3 q) {
     return pushes;
 }
 
+// Centre of what is left of a pixel under a part of it, in sides.
+vec2 centre_under(vec2 centre, float alpha, vec2 part) {
+    return clamp((centre - alpha * part) / max(1.0 - alpha, 1e-4), -0.5, 0.5);
+}
+
 // Premultiplied colour of the decals of one layer that share the pixel, with their owner at q. `boundaries` counts the
-// rims and contact lines through the pixel, and is MANY where nested decals make others than these.
-vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int boundaries) {
+// rims and contact lines through the pixel, and is MANY where nested decals or several layers make others than these.
+// `centre` is that of what upper layers leave of the pixel, then of what these decals leave.
+vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 centre, out int boundaries) {
     vec4 ball = decal_texel(4 * owner);
     float per_radius = 1.0 / (RIM * ball.w);
     vec3 w = per_radius * (q - ball.xyz);
@@ -261,15 +261,13 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
     if (decal_contact != ELASTIC) {
         pushes.w = contact_distance(contact_at(q, n, owner, decal_contact).x);
     }
-    // The owner, those beside it or the one below, and the one above in turn; in one loop, because some drivers run
+    // The one above, the owner, and those beside it or the one below in turn; in one loop, because some drivers run
     // code once even where no pixel needs it.
     vec3 owner_part = vec3(1.0, 0.0, 0.0);
-#ifdef MATERIALS
-    Maps before = material_sums();
-#endif
-    vec4 color = vec4(0.0);
+    vec4 over = vec4(0.0), color = vec4(0.0);
+    vec2 covered = vec2(0.0);  // sum of the centres of parts, times alpha
     ivec2 others = beside;
-    for (int decal = owner; decal >= 0;) {
+    for (int decal = above < 0 ? owner : above; decal >= 0;) {
         bool first = decal == owner, across = decal == beside.x || decal == beside.y;
         vec4 own_ball = decal_texel(4 * decal);
         vec3 part = vec3(1.0, 0.0, 0.0);
@@ -291,20 +289,23 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
         vec4 contact = first ? pushes : contact_with(own_ball, neighbours, at);
         Place place = place_of(decal, own_ball, at, n, right, up, contact);
         if (PARTED) {
+            Bumps own_bumps = bumps;
             if (!first) {
-                bumps = Bumps(vec4(0.0), vec4(0.0), vec4(0.0));
+                own_bumps = Bumps(vec4(0.0), vec4(0.0), vec4(0.0));
                 if (decal == below) {
-                    add_bump(bumps, at, n, right, up, own_ball, ball, owner);
+                    add_bump(own_bumps, at, n, right, up, own_ball, ball, owner);
                 }
             }
-            if (bumps.here.w > 0.0) {
-                part_image(place, bumps, n, decal);
+            if (own_bumps.here.w > 0.0) {
+                part_image(place, own_bumps, n, decal);
             }
         }
         WHERE (first) {
             vec3 rim = rim_line(place.arc, per_radius * right, per_radius * up);
             boundaries += rim.x < 0.5 ? (lower_rims > 0 ? MANY : 1) : 0;
-            if (boundaries > 0) {
+            boundaries += above >= 0 && boundaries > 1 ? MANY : 0;
+            part.yz = centre;
+            if (boundaries > (above < 0 ? 0 : 1)) {
                 part = inner_part(rim, first_line, second_line);
             }
             place.uv += part.y * place.uv_right + part.z * place.uv_up;
@@ -316,24 +317,24 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, out int bound
         if (!first && decal != above && !across) {
             part.x = min(part.x, 1.0 - owner_part.x);
         }
-#ifdef MATERIALS
-        Maps under = material_sums();
-#endif
         vec4 own_color = part.x * image_average(decal, place, at, n, part.x);
         if (decal == above) {
 #ifdef MATERIALS
-            cover_materials(before, under, own_color.a);
+            material_left *= 1.0 - own_color.a;
 #endif
-            color = own_color + (1.0 - own_color.a) * color;
-            break;
+            over = own_color;
+            centre = centre_under(centre, over.a, part.yz);
+            decal = owner;
+            continue;
         }
         color += own_color;
+        covered += own_color.a * part.yz;
         decal = others.x;
         others = ivec2(others.y, -1);
-        decal = decal < 0 ? above : decal;
     }
+    centre = centre_under(centre, color.a, covered / max(color.a, 1e-4));
     boundaries += boundaries > 0 && nested_count > 0 && nested_count + boundaries > 2 ? MANY : 0;
-    return color;
+    return over + (1.0 - over.a) * color;
 }
 
 // The decal with the largest part of a pixel whose centre no decal covers, or -1.
@@ -379,13 +380,14 @@ ivec2 parts_beside(int owner, vec3 right, vec3 up) {
 // that of the part, `boundaries` those through it.
 vec4 layers_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, float share, out int boundaries) {
     vec4 color = vec4(0.0);
+    vec2 centre = vec2(0.0);
     boundaries = 0;
     while (owner >= 0 && color.a < OPAQUE) {
         int more;
 #ifdef MATERIALS
         material_left = (1.0 - color.a) * share;
 #endif
-        color += (1.0 - color.a) * layer_average(owner, q, n, right, up, more);
+        color += (1.0 - color.a) * layer_average(owner, q, n, right, up, centre, more);
         boundaries = boundaries > 0 && more > 0 ? MANY : boundaries + more;
         if (!decal_layered) {
             break;
@@ -413,15 +415,15 @@ vec4 exact_color(vec3 q, vec3 n, vec3 right, vec3 up) {
         int owner = part_owner(point, n, part_right, part_up);
         if (whole && owner >= 0) {
             parts = parts_beside(owner, right, up);
-            if (parts != ivec2(1)) {
+            if (parts != ivec2(1) && !decal_layered) {  // parts of layers may need more
                 i = -1;
                 continue;
             }
         }
         int boundaries;
         vec4 color = layers_average(owner, point, n, part_right, part_up, 1.0 / float(parts.x * parts.y), boundaries);
-        if (whole && boundaries > MAX_BOUNDARIES) {
-            parts = ivec2(SIDE_PARTS);
+        parts = whole && boundaries > MAX_BOUNDARIES ? ivec2(SIDE_PARTS) : parts;
+        if (whole && parts != ivec2(1)) {
             i = -1;
 #ifdef MATERIALS
             clear_materials();

@@ -33,7 +33,7 @@ vec4 part_color(Surface surface, int i, inout ivec2 parts) {
     int owner = part_owner(q, surface.normal, right, up);
     if (whole && owner >= 0) {
         parts = parts_beside(owner, right, up);
-        owner = parts == ivec2(1) ? owner : -1;
+        owner = parts == ivec2(1) || decal_layered ? owner : -1;  // parts of layers may need more
     }
     int boundaries;
     vec4 color = layers_average(owner, q, surface.normal, right, up, share, boundaries);

@@ -136,7 +136,7 @@ def comes_next(
 def nested_owner(
     q: wp.vec3, n_q: wp.vec3, closest: wp.int32, after: wp.int32, index: IndexedDecals
 ) -> wp.int32:
-    """Return the topmost contact decal below `after` whose cell contains q, given the one of least power at q.
+    """Return the topmost contact decal below `after` whose cell contains q, given that of least power at q.
 
     Only decals nested with that one can share q with it. Those above it that face the surface well are tried
     from the topmost down: each traversal finds whether q lies in the cell of one, and the next one. `after`

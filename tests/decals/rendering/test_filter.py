@@ -60,7 +60,7 @@ def difference(drawer: Renderer, angle: float, kind: str, contact: str = "elasti
 
 @pytest.mark.slow_cases(
     "fragment-80-waves-elastic-46",
-    "fragment-45-layers-elastic-44",
+    "fragment-45-layers-elastic-46",
     "compute-0-waves-elastic-44",
     "compute-45-waves-product-42",
     "compute-45-waves-radial-43",
@@ -72,7 +72,7 @@ def difference(drawer: Renderer, angle: float, kind: str, contact: str = "elasti
         (80, "waves", "elastic", 46),  # decals of three pixels' height
         (45, "waves", "product", 42),  # footprints without contact
         (45, "waves", "radial", 43),
-        (45, "layers", "elastic", 44),
+        (45, "layers", "elastic", 46),
         (45, "plain", "product", 50),
         (85, "plain", "elastic", 50),
     ],
