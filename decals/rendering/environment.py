@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import dct, irfft, rfft
-from scipy.sparse import csr_array
 
 from blobtree._typing import Float32Array, Float64Array
 from decals.errors import InvalidImage, InvalidScene
@@ -254,8 +252,10 @@ def _heights(rows: int) -> Float64Array:
     return 1.0 - np.cos(np.linspace(0.0, np.pi, rows + 1))
 
 
-def _overlaps(edges: Float64Array, others: Float64Array) -> csr_array:
+def _overlaps(edges: Float64Array, others: Float64Array) -> Any:
     """Return the part of each interval between edges that each interval between others covers."""
+    from scipy.sparse import csr_array
+
     ends, starts = np.minimum.outer(edges[1:], others[1:]), np.maximum.outer(edges[:-1], others[:-1])
     parts = np.maximum(ends - starts, 0.0) / np.diff(edges)[:, None]
     return csr_array(parts.astype(np.float32))
@@ -286,6 +286,8 @@ def lobe_means(cells: Float32Array, alpha: float) -> Float32Array:
         Means around the corners of the cells: the first and the last row are the poles, the first and the
         last column are the same.
     """
+    from scipy.fft import dct, irfft, rfft
+
     rows = len(cells)
     edges = np.linspace(0.0, np.pi, rows + 1)
     middles, half = 0.5 * (edges[1:] + edges[:-1]), rows // 2 + 1
