@@ -5,7 +5,7 @@ uniform sampler2D starts;  // see offset_start.glsl
 
 const int OFFSET_STEPS = 256;
 const float STEPS_PER_GROWTH = 16.0;  // after which the shortest step is longer by itself
-const float RELAXATION = 0.6;         // part of the slope of its cone that the surface is first assumed to rise by
+const float RELAXATION = 0.65;        // part of the slope of its cone that the surface is first assumed to rise by
 
 // First point of a ray on the moved surface: distance along it, or -1; its foot, and the height
 // there. The ray is outside up to `start`.
@@ -38,7 +38,7 @@ float offset_ray(vec3 origin, vec3 direction, float start, inout Foot foot, out 
         follow(foot, p, tracked, met ? exactness : 0.1 * shortest);
         tracked = true;
         Nearness near = nearness(foot, direction, exactness);
-        if (!met && t - max(near.gap, 0.0) / (near.leaving + near.rise) > known) {
+        if (!met && t - way_outside(near, near.leaving, 1.0) > known) {
             t = known;  // the step before was too long
             continue;
         }
@@ -48,8 +48,8 @@ float offset_ray(vec3 origin, vec3 direction, float start, inout Foot foot, out 
         if (near.gap > 0.0) {
             outside = vec2(t, near.gap);
             float least = shortest * max(1.0, float(i) / STEPS_PER_GROWTH);
-            known = t + clamp(near.gap / (near.nearing + near.rise), least, longest);
-            t += clamp(near.gap / (near.nearing + RELAXATION * near.rise), least, longest);
+            known = t + clamp(way_outside(near, near.nearing, 1.0), least, longest);
+            t += clamp(way_outside(near, near.nearing, RELAXATION), least, longest);
         } else {
             inside = vec2(t, near.gap);
         }

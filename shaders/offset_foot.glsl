@@ -85,8 +85,9 @@ struct Nearness {
     float gap;
     float nearing;  // rate at which the distance to the surface shrinks at most, on the ray ahead
     float leaving;  // the same on the way back
-    float slope;    // by which the heights rise at most, in all directions
-    float rise;     // and along the ray
+    float across;   // the part of the ray's direction along the surface
+    float pace;     // way of the foot over that of a point along the surface; 0 above all heights
+    vec4 slopes;    // by which the heights rise at most on the point's way, up to each of the cone lengths of the foot's
 };
 
 // Heights are looked up if all of them together are nearer than `near`.
@@ -94,13 +95,21 @@ Nearness nearness(Foot foot, vec3 direction, float near) {
     float fall = -dot(direction, foot.normal);
     float across = sqrt(max(1.0 - fall * fall, 0.0));
     float bend = 0.125 * across * across;
-    float gap = foot.height - relief_range.y;
-    float slope = 0.0;
-    if (gap <= near) {
-        gap = foot.height - relief_height(foot.place, foot.normal);
-        slope = relief_slope / max(1.0 + foot.bend * foot.height, LEAST_SPREAD);
+    Nearness found = Nearness(
+        foot.height - relief_range.y, max(bend + fall, 1e-6), max(bend - fall, 1e-6), across, 0.0, vec4(0.0));
+    if (found.gap <= near) {
+        found.gap = foot.height - relief_height(foot.place, foot.normal);
+        found.pace = 1.0 / max(1.0 + foot.bend * foot.height, LEAST_SPREAD);
+        found.slopes = found.pace * relief_slopes;
     }
-    return Nearness(gap, max(bend + fall, 1e-6), max(bend - fall, 1e-6), slope, across * slope);
+    return found;
+}
+
+// Way along a ray outside: the gap shrinks at this rate, and by a part of the slopes.
+float way_outside(Nearness near, float rate, float part) {
+    vec4 ways = max(near.gap, 0.0) / (rate + part * near.across * near.slopes);
+    ways = min(ways, cone_lengths / max(near.across * near.pace, 1e-6));
+    return max(max(ways.x, ways.y), max(ways.z, ways.w));
 }
 
 // Way from a point through space above all heights.

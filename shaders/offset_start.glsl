@@ -39,10 +39,13 @@ Pixel pixel_at(ivec2 square) {
         follow(foot, p, tracked, 0.1 * shortest);
         tracked = true;
         Nearness near = nearness(foot, direction, 2.0 * radius + shortest);
-        float steepest = length(vec2(1.0, near.slope));
-        float turned = radius / (STEPS_PER_RADIUS * relief_step);  // of normals in the cone
-        float gap = near.gap - steepest * radius;
-        float way = gap / (near.nearing + turned + near.rise + steepest * width.y);
+        // normals turn in the cone, and feet are as far apart as its width
+        near.nearing += radius / (STEPS_PER_RADIUS * relief_step);
+        vec4 steepest = sqrt(1.0 + near.slopes * near.slopes);
+        vec4 rates = near.nearing + near.across * near.slopes + steepest * width.y;
+        vec4 ways = (near.gap - steepest * radius) / rates;
+        ways = min(ways, (cone_lengths / max(near.pace, 1e-6) - radius) / (near.across + width.y + 1e-6));
+        float way = max(max(ways.x, ways.y), max(ways.z, ways.w));
         if (way < max(shortest, 0.3 * radius)) {
             t += max(way, 0.0);
             break;

@@ -2,7 +2,11 @@
 // plane of the surface at a pixel, and heights are looked up through contact and image mapping. Lookups are bounded
 // in number and, as long as they last, in length.
 //@ include key_light.glsl
-uniform sampler2DArray decal_reliefs;  // heights in radii, times alpha; alpha
+uniform sampler2DArray decal_reliefs;  // heights in radii, times alpha; alpha. Behind all images: slopes
+uniform int relief_images;
+uniform int relief_cells;              // along each side of an image, of which slopes are known
+uniform float relief_stretch;          // of images by contact and mapping, at most
+uniform vec4 cone_lengths;             // on the surface, up to which slopes hold
 uniform vec2 relief_range;             // lowest and highest point of the relief, in model units, the surface included
 uniform float relief_step;             // greatest step along the surface
 uniform vec4 relief_light;             // w = 0: the studio's key; 1: toward light at infinity; 2: where a light is
@@ -12,36 +16,55 @@ const int RELIEF_HALVINGS = 8;    // of the last step
 const float SHADOW_EDGE = 0.06;   // of the range: depth below the relief at which a shadow is full
 const float LEAST_SLOPE = 0.08;   // least cosine between the normal and the ray, or the light
 
-#ifdef OFFSET
-uniform sampler2DArray relief_slopes;  // by which heights rise at most from a place of image i, see offset_tree.py
-uniform float relief_steepest;         // of them
-uniform float relief_stretch;          // of images by contact and mapping, at most
-float relief_slope;                    // from the place where a height was looked up last
-#endif
+const int RIM_KNOTS = 32;
+const bool RELIEF_STEPPED = decal_layered || decal_nested || decal_limited;  // decals begin within images of others
+uniform vec4 rim_slopes[RIM_KNOTS + 1];  // to neighbours, by the distance from the rim
+
+// By which heights rise at most over the surface, up to each of the lengths, from where one was looked up last.
+vec4 relief_slopes;
+
+// Slopes to neighbours of a decal at a distance from its rim; knots lie closer near the rim.
+vec4 slopes_beyond(float rim) {
+    float share = min(rim / (relief_stretch * cone_lengths.w), 1.0);
+    return relief_stretch * rim_slopes[int(float(RIM_KNOTS) * sqrt(share))];
+}
+
+// Slopes of cones that contain the heights of an image around a place (see decals/rendering/materials.py).
+vec4 slopes_within(vec2 uv, float image) {
+    ivec2 cell = clamp(ivec2(uv * float(relief_cells)), ivec2(0), ivec2(relief_cells - 1));
+    vec2 size = vec2(textureSize(decal_reliefs, 0).xy);
+    float number = float((int(image) * relief_cells + cell.y) * relief_cells + cell.x);
+    float columns = floor(0.5 * size.x);
+    float row = floor((number + 0.5) / columns);
+    float layer = floor((row + 0.5) / size.y);
+    ivec3 place = ivec3(vec3(2.0 * (number - row * columns), row - layer * size.y, layer)) + ivec3(0, 0, relief_images);
+    vec2 near = texelFetch(decal_reliefs, place, 0).xy;
+    return relief_stretch * vec4(near, texelFetch(decal_reliefs, place + ivec3(1, 0, 0), 0).xy);
+}
 
 // Height over the surface at q: of all decals over each other, from the topmost down.
 float relief_height(vec3 q, vec3 n) {
     float height = 0.0;
     float left = 1.0;
     DecalHit hit = decal_at(q, n);
-#ifdef OFFSET
-    relief_slope = hit.owner < 0 ? relief_stretch * relief_steepest : 0.0;
-#endif
+    relief_slopes = slopes_beyond(0.0);
+    if (hit.owner >= 0) {
+        relief_slopes = vec4(0.0);
+    }
     while (hit.owner >= 0 && left > 1.0 - OPAQUE) {
         float image = decal_texel(4 * hit.owner + 2).w;
         float shown = decal_texel(4 * hit.owner + 3).w * (decal_limited ? fade_at(q, n, hit.owner) : 1.0);
+        float radius = RIM * decal_texel(4 * hit.owner).w;
+        vec4 slopes = slopes_beyond(RELIEF_STEPPED ? 0.0 : radius * max(1.0 - 2.0 * length(hit.uv - 0.5), 0.0));
         vec2 texel = vec2(0.0, 1.0);
         if (image >= 0.0) {
             texel = textureLod(decal_reliefs, vec3(hit.uv, image), 0.0).xy;
-#ifdef OFFSET
-            float rim = RIM * decal_texel(4 * hit.owner).w * max(1.0 - 2.0 * length(hit.uv - 0.5), 0.0);
-            float beyond = relief_range.y / (rim + relief_range.y / relief_steepest + 1e-30);  // to neighbours
-            float within = textureLod(relief_slopes, vec3(hit.uv, image), 0.0).x;
-            relief_slope = max(relief_slope, relief_stretch * max(within, beyond));
-#endif
+            vec4 within = slopes_within(hit.uv, image);
+            slopes = texel.x < 0.0 ? slopes + within : max(slopes, within);
         }
+        relief_slopes = max(relief_slopes, slopes);
         if (in_image(hit.uv)) {
-            height += left * shown * RIM * decal_texel(4 * hit.owner).w * texel.x;
+            height += left * shown * radius * texel.x;
             left *= 1.0 - shown * texel.y;
         }
         if (!decal_layered) {
@@ -60,6 +83,17 @@ vec3 relief_slant(vec3 direction, vec3 n) {
     return (direction - slope * n) / max(slope, LEAST_SLOPE);
 }
 
+// Strides over the surface, each but the last ending outside. A ray moves over it by `slant` while it rises by 1, climbing
+// or falling. The gap is that over the height that was looked up last.
+float steps_outside(float gap, float slant, float climb, float stride) {
+    if (RELIEF_STEPPED) {
+        return 1.0;  // heights of decals over others may begin anywhere
+    }
+    vec4 rates = max(slant * relief_slopes - climb, 1e-20);
+    vec4 ways = min(slant * gap / rates, cone_lengths);
+    return max(ceil(max(max(ways.x, ways.y), max(ways.z, ways.w)) / max(stride, 1e-20)), 1.0);
+}
+
 // The surface point below the relief that the ray through a pixel meets; w: the height there.
 vec4 relief_point(vec3 q, vec3 n, vec3 ray) {
     vec3 slant = relief_slant(-normalize(ray), n);
@@ -69,18 +103,23 @@ vec4 relief_point(vec3 q, vec3 n, vec3 ray) {
     float low = relief_range.x;
     float z = high;
     int halvings = 0;
+    float stride = range / steps;
+    float strides = 1.0;
     bool below = false;
     for (int i = 0; i <= RELIEF_STEPS + RELIEF_HALVINGS; i++) {
         if (below) {
             z = 0.5 * (low + high);
         } else {
-            z = max(high - range / steps, relief_range.x);
+            z = max(high - strides * stride, relief_range.x);
         }
-        if (relief_height(q + z * slant, n) >= z || z <= relief_range.x) {
+        float gap = z - relief_height(q + z * slant, n);
+        if (gap <= 0.0 || z <= relief_range.x) {
+            high = min(high, z + stride);  // all strides before the last one end outside
             below = true;
             low = z;
         } else {
             high = z;
+            strides = steps_outside(gap, length(slant), -1.0, length(slant) * stride);
         }
         halvings += below ? 1 : 0;
         if (halvings > RELIEF_HALVINGS) {
@@ -112,12 +151,15 @@ float relief_light_at(vec3 q, float z, vec3 n) {
     float range = relief_range.y - relief_range.x;
     float hidden = 0.0;
     float steps = clamp(ceil(length(slant) * (relief_range.y - z) / relief_step), 1.0, float(RELIEF_STEPS));
-    for (int i = 1; i < int(steps); i++) {
-        float rise = (relief_range.y - z) * float(i) / steps;
+    float i = 1.0;
+    while (i < steps) {
+        float rise = (relief_range.y - z) * i / steps;
         if (hidden >= min(relief_range.y - z - rise, SHADOW_EDGE * range)) {
             break;  // nothing hides more, or the shadow is full
         }
-        hidden = max(hidden, relief_height(q + rise * slant, n) - z - rise);
+        float gap = z + rise - relief_height(q + rise * slant, n);
+        hidden = max(hidden, -gap);
+        i += steps_outside(gap + hidden, length(slant), 1.0, length(slant) * (relief_range.y - z) / steps);
     }
     return 1.0 - clamp(hidden / (SHADOW_EDGE * range), 0.0, 1.0);
 }

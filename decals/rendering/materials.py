@@ -46,29 +46,40 @@ RELIEF_LOOKUPS = 64
 
 
 SLOPE_CELLS = 24
-"""Cells along each side of an image for which a slope is known."""
+"""Most cells along each side of an image for which slopes are known."""
+
+CONE_LENGTHS = (1 / 12, 1 / 6, 1 / 2, 2.0)
+"""Distances over an image, in radii, up to which cones contain its heights."""
+
+RIM_DEPTHS = 48
+"""Rings of equal width from the rim of an image to its centre, of which the highest points are known."""
+
+RIM_KNOTS = 32
+"""Distances from the rim for which slopes to neighbours are known, see ``shaders/relief.glsl``."""
 
 STRETCH = 2.0
 """Assumed greatest movement of images by contact and mapping, over that of the surface."""
 
 
-def slope_bounds(texels: Float32Array) -> Float64Array:
-    """Return the slopes of cones that contain all heights of an image.
+def slope_bounds(texels: Float32Array, count: int) -> Float64Array:
+    """Return the slopes of cones that contain heights of an image.
 
-    A cone stands on any point of a cell, at its height: no height of the image lies above it (cone step
-    mapping, Dummer 2006). Heights and distances are in radii, so the image is two wide.
+    A cone stands on any point of a cell, at its height: no height of the image up to a distance of
+    `CONE_LENGTHS` lies above it (cone step mapping, Dummer 2006). Heights and distances are in radii, so the
+    image is two wide.
 
     Parameters
     ----------
     texels
         Heights, float32[h, w], which are interpolated.
+    count
+        Number of cells along each side.
 
     Returns
     -------
-    float64[SLOPE_CELLS, SLOPE_CELLS]
-        The first row belongs to the first of the texels.
+    float64[count, count, 4]
+        For each cell the slopes up to each distance. The first row belongs to the first of the texels.
     """
-    count = SLOPE_CELLS
     padded = np.pad(texels.astype(np.float64), 1, mode="edge")
     down, right = (np.abs(np.diff(padded, axis=axis)) * texels.shape[axis] / 2.0 for axis in (0, 1))
     steep = np.hypot(
@@ -91,54 +102,112 @@ def slope_bounds(texels: Float32Array) -> Float64Array:
             )
         return values
 
-    highest = cells(texels.astype(np.float64), np.maximum).reshape(-1)
-    lowest = cells(texels.astype(np.float64), np.minimum).reshape(-1)
-    places = np.indices((count, count)).reshape(2, -1)
-    apart = np.abs(places[:, :, None] - places[:, None, :])
-    gaps = np.hypot(*np.maximum(apart - 1, 0) * (2.0 / count))
-    slopes = np.where(gaps > 0.0, (highest - lowest[:, None]) / np.where(gaps > 0.0, gaps, 1.0), np.inf)
+    cell = 2.0 / count
+    reach = min(int(CONE_LENGTHS[-1] / cell) + 1, count - 1)  # cells farther apart are out of all cones
+    highest = np.pad(cells(texels.astype(np.float64), np.maximum), reach, constant_values=-np.inf)
+    lowest = cells(texels.astype(np.float64), np.minimum)
     between = [cells(steep, np.maximum)]  # steepest place up to so many cells away, so on the way there
-    for _ in range(count - 1):
+    for _ in range(reach):
         wider = np.lib.stride_tricks.sliding_window_view(np.pad(between[-1], 1, mode="edge"), (3, 3))
         between.append(wider.max(axis=(2, 3)))
-    limits = np.stack(between).reshape(count, -1)[apart.max(axis=0), np.arange(count**2)[:, None]]
-    bounds: Float64Array = np.minimum(slopes, limits).max(axis=1).reshape(count, count)
+    bounds = np.zeros((count, count, len(CONE_LENGTHS)))
+    for shift in np.ndindex(2 * reach + 1, 2 * reach + 1):
+        apart = np.abs(np.array(shift) - reach)
+        gap = float(np.hypot(*np.maximum(apart - 1, 0))) * cell
+        limit = between[int(apart.max())]
+        other = highest[shift[0] : shift[0] + count, shift[1] : shift[1] + count]
+        slope = np.minimum((other - lowest) / gap, limit) if gap else np.where(np.isinf(other), 0.0, limit)
+        within = np.array(CONE_LENGTHS) > gap
+        bounds[..., within] = np.maximum(bounds[..., within], slope[..., None])
     return bounds
 
 
+def rim_heights(texels: Float32Array) -> Float64Array:
+    """Return the greatest height in each of `RIM_DEPTHS` rings of an image, from the rim to the centre."""
+    y, x = (np.arange(count) + 0.5 for count in texels.shape)
+    rows, columns = texels.shape
+    inner = 1.0 - np.hypot(2.0 * x / columns - 1.0, (2.0 * y / rows - 1.0)[:, None])
+    margin = float(np.hypot(2.0 / rows, 2.0 / columns))  # a texel reaches so far by interpolation
+    first = np.clip(np.floor((inner - margin) * RIM_DEPTHS), 0, RIM_DEPTHS - 1).astype(int)
+    heights = np.zeros(RIM_DEPTHS)
+    np.maximum.at(heights, first, texels)
+    return heights
+
+
 class ReliefArray:
-    """Heights of images on the GPU: layer i holds those of image i, and slopes that bound them."""
+    """Heights of images on the GPU: layer i holds those of image i. Further layers hold slopes of cones.
+
+    The four slopes of a cell are two texels, the cells of an image follow each other row by row, and so do
+    images. One array for both keeps the decal pass within the 16 texture units that every driver has.
+    """
 
     def __init__(self, context: Context, images: Sequence[ImageLike], shape: tuple[int, int]) -> None:
-        self.texture = context.gl.texture_array((shape[1], shape[0], len(images)), 2, dtype="f4")
-        side = SLOPE_CELLS
-        self.slopes = context.gl.texture_array((side, side, len(images)), 1, dtype="f4")
+        self.count = len(images)
+        self.cells = min(max(min(shape) // 2, 1), SLOPE_CELLS)
         self.steepest, self.ranges = 0.0, relief_ranges(images)
+        self.rim_heights = np.zeros(RIM_DEPTHS)
+        slopes = np.zeros((self.count, self.cells, self.cells, len(CONE_LENGTHS)), np.float32)
+        shape = shape[0], max(shape[1], 2)
+        columns = shape[1] // 2  # pairs of texels
+        slope_layers = -(-self.count * self.cells**2 // (columns * shape[0]))
+        layers = self.count + slope_layers
+        self.texture = context.gl.texture_array((shape[1], shape[0], layers), 2, dtype="f4")
         known: dict[int, Float64Array] = {}
         for layer, image in enumerate(images):
             texels = np.zeros((*image.pixels.shape[:2], 2), np.float32)
             texels[..., 1] = unit_levels(image.pixels[..., 3])
             heights = relief_texels(image)
-            bounds: Float64Array = np.zeros((side, side))
             if heights is not None:
                 texels[..., 0] = heights
                 if id(image) not in known:
-                    known[id(image)] = slope_bounds(heights)
-                bounds = known[id(image)]
-            self.steepest = max(self.steepest, float(bounds.max()))
-            self.slopes.write(
-                bounds[::-1].astype(np.float32).tobytes(), viewport=(0, 0, layer, side, side, 1)
-            )
-            region = (0, 0, layer, shape[1], shape[0], 1)
-            self.texture.write(resized_texels(texels, shape)[::-1].tobytes(), viewport=region)
-        for texture, kind in ((self.texture, moderngl.LINEAR), (self.slopes, moderngl.NEAREST)):
-            texture.repeat_x = texture.repeat_y = False
-            texture.filter = (kind, kind)
+                    known[id(image)] = slope_bounds(heights, self.cells)
+                    self.rim_heights = np.maximum(self.rim_heights, rim_heights(heights))
+                slopes[layer] = known[id(image)][::-1]
+            self._write(layer, resized_texels(texels, shape)[::-1])
+        self.steepest = float(slopes.max(initial=0.0))
+        packed = np.zeros((slope_layers * shape[0] * columns, len(CONE_LENGTHS)), np.float32)
+        packed[: self.count * self.cells**2] = slopes.reshape(-1, len(CONE_LENGTHS))
+        for layer, texels in enumerate(packed.reshape(slope_layers, shape[0], 2 * columns, 2), self.count):
+            self._write(layer, texels)
+        self.texture.repeat_x = self.texture.repeat_y = False
+        self.texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
+
+    def _write(self, layer: int, texels: Float32Array) -> None:
+        height, width = texels.shape[:2]
+        self.texture.write(texels.tobytes(), viewport=(0, 0, layer, width, height, 1))
 
     def release(self) -> None:
         """Release the memory."""
         self.texture.release()
-        self.slopes.release()
+
+
+def rim_slopes(heights: Float64Array, steepest: float, sizes: float) -> Float64Array:
+    """Return the slopes of cones that contain the heights of neighbours of a decal.
+
+    They stand on its own image at height 0, at `RIM_KNOTS` distances from the rim and one after them. Beyond
+    the rim lies the rim of a neighbour.
+
+    Parameters
+    ----------
+    heights
+        Greatest heights of all images, see `rim_heights`.
+    steepest
+        Greatest slope of all images.
+    sizes
+        Greatest radius of a decal over the least one.
+
+    Returns
+    -------
+    float64[RIM_KNOTS + 1, 4]
+        Slopes up to each of `CONE_LENGTHS`; the unit of lengths is the least radius.
+    """
+    rims = CONE_LENGTHS[-1] * np.linspace(0.0, 1.0, RIM_KNOTS + 1)[:, None, None] ** 2
+    depths = np.maximum(np.arange(RIM_DEPTHS) / RIM_DEPTHS, heights / max(steepest, 1e-30))
+    ways = np.array(CONE_LENGTHS)[:, None] - rims
+    largest = np.minimum(ways / np.maximum(depths, 1e-30), sizes)  # decal of which a ring is in the cone
+    rises = np.where(largest >= 1.0, largest * heights, 0.0)
+    slopes: Float64Array = (rises / np.maximum(rims + largest * depths, 1e-30)).max(axis=2)
+    return slopes
 
 
 class Relief:
@@ -150,17 +219,23 @@ class Relief:
         Heights of the scene's images.
     scene
         A scene with relief.
+    stepped
+        True if decals may begin within the images of others, and not at their rims.
     """
 
-    def __init__(self, array: ReliefArray, scene: SceneLike) -> None:
-        self.texture, self.slopes, self._steepest = array.texture, array.slopes, array.steepest
+    def __init__(self, array: ReliefArray, scene: SceneLike, *, stepped: bool) -> None:
+        self.texture, self._array = array.texture, array
         rows = scene.decals.decals if isinstance(scene.decals, DecalEditor) else scene.decals
         heights_of = array.ranges[rows.images] * rows.radii[:, None]
         raised = heights_of.any(axis=1)
-        self._range = (
-            (float(heights_of[:, 0].min()), float(heights_of[:, 1].max())) if raised.any() else (0, 0)
-        )
-        self._step = float(rows.radii[raised].min()) / STEPS_PER_RADIUS if raised.any() else 1.0
+        self._range, self._radius, sizes = (0.0, 0.0), 1.0, 1.0
+        if raised.any():
+            self._range = float(heights_of[:, 0].min()), float(heights_of[:, 1].max())
+            self._radius = float(rows.radii[raised].min())
+            sizes = float(rows.radii[raised].max()) / self._radius
+        rising = array.steepest * np.arange(1, RIM_DEPTHS + 1) / RIM_DEPTHS
+        heights = np.minimum(rising, array.ranges[:, 1].max()) if stepped else array.rim_heights
+        self._rim_slopes = rim_slopes(heights, array.steepest, sizes)
 
     @property
     def reach(self) -> float:
@@ -169,10 +244,14 @@ class Relief:
 
     def use(self, program: Program, lights: Lighting | None) -> None:
         """Set the uniforms of a program but for the samplers."""
-        set_uniform(program, "relief_steepest", self._steepest)
+        lengths = self._radius / STRETCH * np.array(CONE_LENGTHS)
+        set_uniform(program, "relief_images", self._array.count)
+        set_uniform(program, "relief_cells", self._array.cells)
         set_uniform(program, "relief_stretch", STRETCH)
+        set_uniform(program, "cone_lengths", tuple(lengths.tolist()))
+        set_uniform(program, "rim_slopes", [tuple(row) for row in self._rim_slopes.tolist()])
         set_uniform(program, "relief_range", self._range)
-        set_uniform(program, "relief_step", self._step)
+        set_uniform(program, "relief_step", self._radius / STEPS_PER_RADIUS)
         set_uniform(program, "relief_light", _first_light(lights))
 
 

@@ -4,9 +4,10 @@ A point p has a foot, the closest point q of the surface, at the signed distance
 the height at q. Rays skip space by a shell of cells around the surface, and inside it follow the foot from
 step to step by Newton's method (``shaders/offset.glsl``). A safe step is at most the gap d − height over
 the greatest rate at which the gap can shrink: the distance shrinks at most by the fall of the ray, the height
-rises at most by the slope of a cone over the image that contains all its heights (cone step mapping, Dummer
-2006). As most cones are far steeper than the heights, a longer step is tried first; where the cones at both
-of its ends do not cover it, the ray goes back to the end of the shorter one (Keinert et al. 2014).
+rises at most by the slope of a cone that contains the heights up to some distance (cone step mapping, Dummer
+2006). The longest of the steps for four distances is taken. As most cones are far steeper than the heights,
+a longer step is tried first; where the cones at both of its ends do not cover it, the ray goes back to the
+end of the shorter one (Keinert et al. 2014).
 Cones around the rays of squares of pixels first find where these begin (``shaders/offset_start.glsl``).
 """
 
@@ -180,10 +181,7 @@ class OffsetTreeDrawable(TreeDrawable):
         }
         for name, value in uniforms.items():
             set_uniform(program, name, value)
-        unit = source.use(program, 3)
-        source.relief.slopes.use(unit)
-        set_uniform(program, "relief_slopes", unit)
-        return unit + 1
+        return source.use(program, 3)
 
     def _programs_for(self, source: DecalSource) -> tuple[Program, Program]:
         """Return the programs that find where rays begin and trace them; composing takes long."""
@@ -254,4 +252,4 @@ def offset_slots(kinds: Kinds, constants: str, law: ContactLaw | None) -> dict[s
 
 
 def _defines(limited: bool) -> dict[str, str | int | float | bool]:
-    return {"OFFSET": True, "RELIEF": True, "LIMITED": limited, "BLOCK": BLOCK}
+    return {"RELIEF": True, "LIMITED": limited, "BLOCK": BLOCK}

@@ -644,7 +644,9 @@ class Uploads:
         array = self._reliefs.get(
             lambda: ReliefArray(self.context, scene.images, shape), images, *scene.images
         )
-        return Relief(array, scene)
+        decals = self.decals(scene)
+        assert decals is not None
+        return Relief(array, scene, stepped=decals.layered or decals.nested or decals.limited)
 
     def _masks_of(self, scene: SceneLike, objects: Sequence[object]) -> DataTexture | None:
         """Return the masks of objects of a scene; None if its decals are not limited."""

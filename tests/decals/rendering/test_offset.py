@@ -17,7 +17,7 @@ from blobtree import Node, Point
 from decals import Camera, Decals, Scene
 from decals.index import DecalEditor
 from decals.rendering import Buffers, Renderer, RenderOptions
-from decals.rendering.materials import SLOPE_CELLS, slope_bounds
+from decals.rendering.materials import CONE_LENGTHS, RIM_KNOTS, rim_heights, rim_slopes, slope_bounds
 from decals.rendering.offset_tree import Shell
 from decals.rendering.pixel_pass import BACKEND_VARIABLE
 from tests.decals.relief import expected_heights
@@ -172,9 +172,11 @@ def test_no_view_shows_a_hole(renderers: dict[str, Renderer], turn: int) -> None
     arrays(np.float32, st.tuples(st.integers(2, 40), st.integers(2, 40)), elements=st.floats(-1, 1, width=32))
 )
 def test_cones_contain_all_heights(heights: Array) -> None:
-    bounds = slope_bounds(heights)
+    count = max(min(heights.shape) // 2, 1)
+    bounds = slope_bounds(heights, count)
     rng = np.random.default_rng(heights.size)
     places = rng.random((2, 200, 2))
+    places[1, :100] = np.clip(places[0, :100] + rng.uniform(-0.1, 0.1, (100, 2)), 0, 0.999)
 
     def at(points: Array) -> Array:
         texel = np.clip(points * heights.shape - 0.5, 0, np.array(heights.shape) - 1)
@@ -190,10 +192,44 @@ def test_cones_contain_all_heights(heights: Array) -> None:
         total: Array = np.sum(rows, axis=0)
         return total
 
-    cells = (places[0] * SLOPE_CELLS).astype(int)
+    cells = (places[0] * count).astype(int)
     slopes = bounds[cells[:, 0], cells[:, 1]]
     apart = 2 * np.linalg.norm(places[1] - places[0], axis=1)
-    assert (at(places[1]) - at(places[0]) <= slopes * apart + 1e-6).all()
+    rises = at(places[1]) - at(places[0])
+    assert (np.diff(slopes, axis=1) >= 0).all()
+    for k, length in enumerate(CONE_LENGTHS):
+        near = apart < length
+        assert (rises[near] <= slopes[near, k] * apart[near] + 1e-6).all()
+
+
+def test_short_cones_are_flatter_than_long_ones() -> None:
+    x, y = np.meshgrid(np.linspace(-1, 1, 64), np.linspace(-1, 1, 64))
+    tower = np.clip((0.3 - np.hypot(x, y)) / 0.1, 0, 1)
+    at_rim = slope_bounds(tower.astype(np.float32), 24)[12, 1]
+    assert (at_rim[:2] == 0).all()
+    assert 0.9 / 0.7 < at_rim[3] < 1.3 / 0.7
+
+
+@pytest.mark.parametrize("sizes", [1.0, 3.0])
+def test_cones_contain_the_heights_of_neighbours(sizes: float) -> None:
+    rng = np.random.default_rng(5)
+    side = 80
+    steps = (np.arange(side) + 0.5) / side * 2 - 1
+    inner = 1 - np.hypot(steps, steps[:, None])
+    hill = (np.clip(inner - 0.05, 0, 1) * (1 + np.sin(9 * inner))).astype(np.float32)
+    heights = rim_heights(hill)
+    steepest = float(slope_bounds(hill, 24).max())
+    slopes = rim_slopes(heights, steepest, sizes)
+    rows, columns = rng.integers(0, side, (2, 3000))
+    depths = inner[rows, columns]
+    rims, radii = rng.uniform(0, 2, 3000) ** 2 / 2, rng.uniform(1, sizes, 3000)
+    knots = (RIM_KNOTS * np.sqrt(np.minimum(rims / CONE_LENGTHS[-1], 1))).astype(int)
+    apart = rims + radii * np.maximum(depths, 0)
+    for k, length in enumerate(CONE_LENGTHS):
+        near = (apart < length) & (depths > 0)
+        assert near.sum() > 2
+        assert (radii * hill[rows, columns] <= slopes[knots, k] * apart + 1e-6)[near].all()
+    assert slopes[-1].max() < slopes[0].max()
 
 
 def interpolated(values: Array, places: Array) -> Array:
