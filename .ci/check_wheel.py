@@ -27,7 +27,10 @@ for package in map(importlib.import_module, sys.argv[2:]):
         assert file.is_relative_to(sys.argv[1]), f"{module.__name__} comes from {file}, not from the wheel"
 """
 
-PATTERNS = "*.py", "*.glsl", "*.vert", "*.frag", "*.comp", "*.css", "lessons/*", "thumbnails/*"
+PATTERNS = (
+    *("*.py", "*.glsl", "*.vert", "*.frag", "*.comp", "*.css", "*.html", "*.js"),
+    *("lessons/*", "thumbnails/*"),
+)
 """Files of the packages that the wheel holds."""
 
 FIRST_MESH = """

@@ -11,7 +11,7 @@ from trame.widgets import client, html, vuetify3
 from decals.apps.sandbox import panels
 from decals.apps.sandbox.connections import Connections
 from decals.apps.sandbox.folder import thumbnails
-from decals.apps.sandbox.panels import DEFAULTS, DROP, named
+from decals.apps.sandbox.panels import DEFAULTS, named
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.apps.sandbox.view import StreamedView
 from decals.window import EditWindow, browser_keys
@@ -30,7 +30,12 @@ ONE_ROW = 1260
 TOOLBAR_HEIGHT = f"$vuetify.display.width < {ONE_ROW} + (driving.shared ? 320 : 0) ? 96 : 64"
 """Height of the toolbar, of which its density takes 16."""
 
-STYLE = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
+STYLE, SCRIPT, ABOVE_VIEW = (
+    Path(__file__).with_name(name).read_text(encoding="utf-8")
+    for name in ("page.css", "page.js", "view.html")
+)
+TOUCH_EVENTS = "touchstart", "touchmove", "touchend", "pointerdown", "pointermove", "pointerup"
+"""Events of the view that the script takes first."""
 
 TOOLBAR = {
     "undo": "mdi-undo",
@@ -49,7 +54,6 @@ ROW_ICONS = (
     "image: 'mdi-image-outline'})[row.kind]"
 )
 
-
 ROW_CHANGES = {
     "duplicate": "mdi-content-duplicate",
     "group": "mdi-group",
@@ -63,29 +67,9 @@ ROW_FLAGS = (
 )
 """Buttons of a row: its change, the row's value, and icons for true and false."""
 
-OPEN_MENU = (
-    "menu = {open: row.kind !== 'more', x: $event.clientX, y: $event.clientY, key: row.key, "
-    "label: row.label, kind: ['combination', 'modifier', 'primitive'].includes(row.kind) "
-    "? 'node' : row.kind}"
-)
-"""Open the menu of a row at the pointer."""
-
-DROP_ON_ROW = (
-    "$event.preventDefault(); $event.dataTransfer.files.length ? (dropped_on = row.key, "
-    f"{DROP.format('dataTransfer')}) : trigger('move', [$event.dataTransfer.getData('text/plain'), row.key])"
-)
-"""Send the files, or the key of the other row, that are dropped on a row."""
-
 RENAME_ROW = "!['image', 'more'].includes(row.kind) && (renamed = {key: row.key, name: row.label})"
-SEND_NAME = (
-    "renamed.key && (renamed.name !== row.label && trigger('rename', [renamed.key, renamed.name]), "
-    "renamed = {key: '', name: ''})"
-)
-"""Show the field of a row's name; send what stands there, unless it is as before, and hide the field."""
-
-
-ALT = "new MutationObserver(() => document.querySelectorAll('img:not([alt])').forEach(i => i.alt = ''))"
-"""The view shows an image without the text that screen readers ask for."""
+SEND_NAME = "renamed = utils.sandbox.rename(renamed, row)"
+"""Show the field of a row's name; send what stands there, and hide the field."""
 
 
 def drawer(side: str, width: Any) -> Any:
@@ -97,68 +81,6 @@ def drawer(side: str, width: Any) -> Any:
         location=side,
         raw_attrs=named(f"'{side} panel'"),
     )
-
-
-def _place(phase: str) -> str:
-    """Return the expression that sends a phase of a drag of the handle ``h``, and the pointer's place."""
-    box = "$event.target.ownerSVGElement.getBoundingClientRect()"
-    place = f"($event.clientX - {box}.left) / {box}.width, ($event.clientY - {box}.top) / {box}.height"
-    return f"trigger('handle', [h.name, '{phase}', {place}, $event.ctrlKey || $event.metaKey])"
-
-
-GIZMO = f"""<svg style="position: absolute; inset: 0; width: 100%; height: 100%; pointer-events: none">
-<line v-for="(l, i) in gizmo.lines" :key="i" stroke="#111" stroke-width="3"
-  :x1="100 * l[0] + '%'" :y1="100 * l[1] + '%'" :x2="100 * l[2] + '%'" :y2="100 * l[3] + '%'"/>
-<circle v-for="h in gizmo.handles" :key="h.name" :cx="100 * h.x + '%'" :cy="100 * h.y + '%'" r="8"
-  class="handle" :data-handle="h.name" stroke="#111" stroke-width="2"
-  style="pointer-events: all; cursor: grab; touch-action: none"
-  @pointerdown.stop.prevent="$event.target.setPointerCapture($event.pointerId); {_place("begin")}"
-  @pointermove="$event.buttons && {_place("move")}"
-  @pointerup.stop="{_place("end")}"
-  @mousedown.stop><title>{{{{ h.name }}}}</title></circle>
-</svg>"""
-"""Handles of the selected node and the slice above the view: they cost no frame."""
-
-
-FINGERS = (
-    "const [a, b] = $event.touches, view = $event.currentTarget, h = view.clientHeight, last = view.fingers; "
-    "const now = [(a.clientX + b.clientX) / 2 / h, (a.clientY + b.clientY) / 2 / h, "
-    "Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY) / h]; view.fingers = now; "
-)
-"""Keep where the middle of two fingers is and how far apart they are, in heights of the view."""
-
-TOUCH_EVENTS = {
-    "touchstart": f"if ($event.touches.length === 2) {{ {FINGERS} trigger('pinch', [0, 0, 1, 'begin']) }}",
-    "touchmove": f"if ($event.touches.length === 2) {{ {FINGERS} "
-    "if (last) trigger('pinch', [now[0] - last[0], last[1] - now[1], now[2] / last[2], 'move']) }",
-    "touchend": "$event.currentTarget.fingers && trigger('pinch', [0, 0, 1, 'end'])",
-    "pointerdown": "$event.isPrimary ? $event.currentTarget.fingers = null : $event.stopPropagation()",
-    "pointermove": "$event.currentTarget.fingers && $event.stopPropagation(); "
-    "const view = $event.currentTarget, box = view.getBoundingClientRect(); "
-    "view.style.setProperty('--x', $event.clientX - box.left + 'px'); "
-    "view.style.setProperty('--y', $event.clientY - box.top + 'px')",
-    "pointerup": "$event.isPrimary || $event.stopPropagation()",
-}
-"""Two fingers move and zoom the view; the first does what the mouse does, until another one comes.
-
-The circle of the brush follows the pointer.
-"""
-
-CUBE = """<svg viewBox="-1.8 -1.8 3.6 3.6" class="cube" aria-hidden="true">
-<polygon v-for="c in cube" :key="c.points" :points="c.points"
-  @pointerdown.stop @mousedown.stop @click.stop="trigger('look', [c.name])">
-<title>{{ c.title }}</title></polygon>
-<text v-for="c in cube.filter(c => c.label)" :key="c.name" :transform="c.label">{{ c.name }}</text>
-</svg>"""
-"""The orientation cube; the menu of the view has its sides as buttons."""
-
-
-LASSO = """<svg viewBox="0 0 1 1" preserveAspectRatio="none"
-  style="position: absolute; inset: 0; width: 100%; height: 100%; pointer-events: none">
-<polygon :points="gizmo.line" fill="#0072b233" stroke="#0072b2" stroke-width="2"
-  vector-effect="non-scaling-stroke"/>
-</svg>"""
-"""The box or lasso that is being drawn."""
 
 
 class Page:
@@ -254,7 +176,7 @@ class Page:
         with VAppLayout(self._server, vuetify_config={"defaults": DEFAULTS}, full_height=True) as layout:
             layout.root.theme = ("theme",)
             client.Style(STYLE)
-            client.Script(f"{ALT}.observe(document, {{childList: true, subtree: true}})")
+            client.Script(SCRIPT)
             with vuetify3.VLayout(full_height=True):
                 self._build_toolbar()
                 self._build_left_side()
@@ -264,12 +186,12 @@ class Page:
                     html.Div(
                         style="height: 100%; position: relative; touch-action: none",
                         dragover="$event.preventDefault()",
-                        drop=f"$event.preventDefault(); {DROP.format('dataTransfer')}",
+                        drop="utils.sandbox.take($event)",
                         __events=["dragover", "drop"],
                         raw_attrs=[
                             'role="application"',
                             *named("'view of the scene'"),
-                            *(f'@{name}.capture="{code}"' for name, code in TOUCH_EVENTS.items()),
+                            *(f'@{name}.capture="utils.sandbox.{name}($event)"' for name in TOUCH_EVENTS),
                         ],
                         **browser_keys(self._window),
                     ),
@@ -282,12 +204,7 @@ class Page:
                         style="height: 100%",
                     )
                     self.sandbox.schedule = self.view.update
-                    html.Div(LASSO, v_if="gizmo.line")
-                    html.Div(GIZMO, v_if="gizmo.handles.length")
-                    html.Div(
-                        v_if="gizmo.brush", classes="brush", style=("{height: 200 * gizmo.brush + '%'}",)
-                    )
-                    html.Div(CUBE)
+                    html.Div(ABOVE_VIEW)
                 panels.build_start(self.sandbox)
                 with vuetify3.VFooter(app=True, height=28, classes="text-caption"):
                     html.Span("{{ status }}", raw_attrs=['role="status"'])
@@ -354,13 +271,11 @@ class Page:
                 v_if="renamed.key === row.key",
                 v_model="renamed.name",
                 autofocus=True,
-                raw_attrs=[
-                    *named("'new name of ' + row.label"),
-                    f'@keyup.enter="{SEND_NAME}"',
-                    f'@blur="{SEND_NAME}"',
-                ],
-                __events=[("escape", "keyup.esc")],
+                raw_attrs=named("'new name of ' + row.label"),
+                enter=SEND_NAME,
+                blur=SEND_NAME,
                 escape="renamed = {key: '', name: ''}",
+                __events=[("enter", "keyup.enter"), ("escape", "keyup.esc"), "blur"],
             )
             vuetify3.VListItem(
                 v_if="renamed.key !== row.key",
@@ -372,10 +287,10 @@ class Page:
                 style=("`padding-left: ${8 + 14 * row.depth}px; opacity: ${row.hidden ? 0.6 : 1}`",),
                 classes="flex-grow-1",
                 click=(self._click, "[row.key, $event.ctrlKey || $event.metaKey, selected]"),
-                contextmenu=f"$event.preventDefault(); {OPEN_MENU}",
+                contextmenu="$event.preventDefault(); menu = utils.sandbox.menu($event, row)",
                 dragstart="$event.dataTransfer.setData('text/plain', row.key)",
                 dragover="$event.preventDefault()",
-                drop=DROP_ON_ROW,
+                drop="utils.sandbox.take($event, row.key)",
                 dblclick=RENAME_ROW,
                 __events=["dragstart", "dragover", "drop", "dblclick", "contextmenu"],
             )

@@ -47,9 +47,6 @@ CURVE = """<svg viewBox="-0.02 -0.02 1.04 1.04" preserveAspectRatio="none"
   stroke-width="2" vector-effect="non-scaling-stroke"/></svg>"""
 """The curve of the control ``c``."""
 
-DROP = "dropped = Array.from($event.{}.files)"
-"""Send files to the state of the page, which turns them into names and bytes."""
-
 
 def named(expression: str) -> list[str]:
     """Return the attribute that tells screen readers what an element is, from an expression of the page."""
@@ -206,7 +203,7 @@ def build_start(sandbox: Sandbox) -> None:
             multiple=True,
             accept=",".join(MODELS + IMAGES),
             raw_attrs=named("'open from this computer'"),
-            change=DROP.format("target"),
+            change="utils.sandbox.take($event)",
         )
         for family, heading, title, subtitle, event, chosen in (
             ("recovered", "Recovered sessions", "e.name", "e.when", sandbox.open_file, "e.name"),

@@ -1,0 +1,84 @@
+// What the sandbox's page does in the browser. Its templates call these functions as `utils.sandbox`.
+(() => {
+  const { trame } = window;
+
+  // Return where the middle of two fingers is, and how far apart they are, in heights of the view.
+  const fingersOf = (event) => {
+    const [a, b] = event.touches;
+    const height = event.currentTarget.clientHeight;
+    const distance = Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY);
+    return [(a.clientX + b.clientX) / 2 / height, (a.clientY + b.clientY) / 2 / height, distance / height];
+  };
+
+  trame.utils.sandbox = {
+    // Two fingers move and zoom the view; the first does what the mouse does, until another one comes.
+    touchstart(event) {
+      if (event.touches.length === 2) {
+        event.currentTarget.fingers = fingersOf(event);
+        trame.trigger("pinch", [0, 0, 1, "begin"]);
+      }
+    },
+    touchmove(event) {
+      if (event.touches.length === 2) {
+        const last = event.currentTarget.fingers;
+        const now = (event.currentTarget.fingers = fingersOf(event));
+        if (last) trame.trigger("pinch", [now[0] - last[0], last[1] - now[1], now[2] / last[2], "move"]);
+      }
+    },
+    touchend(event) {
+      if (event.currentTarget.fingers) trame.trigger("pinch", [0, 0, 1, "end"]);
+    },
+    pointerdown(event) {
+      if (event.isPrimary) event.currentTarget.fingers = null;
+      else event.stopPropagation();
+    },
+    // The circle of the brush follows the pointer.
+    pointermove(event) {
+      const view = event.currentTarget;
+      const box = view.getBoundingClientRect();
+      if (view.fingers) event.stopPropagation();
+      view.style.setProperty("--x", event.clientX - box.left + "px");
+      view.style.setProperty("--y", event.clientY - box.top + "px");
+    },
+    pointerup(event) {
+      if (!event.isPrimary) event.stopPropagation();
+    },
+
+    // Send a phase of a drag of a handle, and the pointer's place.
+    drag(event, name, phase) {
+      const box = event.target.ownerSVGElement.getBoundingClientRect();
+      const x = (event.clientX - box.left) / box.width;
+      const y = (event.clientY - box.top) / box.height;
+      trame.trigger("handle", [name, phase, x, y, event.ctrlKey || event.metaKey]);
+    },
+
+    // Send files that were chosen or dropped, or the key of another row that was dropped on a row.
+    take(event, key = "") {
+      event.preventDefault();
+      const source = event.dataTransfer ?? event.target;
+      if (source.files.length) {
+        trame.state.set("dropped_on", key);
+        trame.state.set("dropped", Array.from(source.files));
+      } else if (key) {
+        trame.trigger("move", [source.getData("text/plain"), key]);
+      }
+    },
+
+    // Return the menu of a row at the pointer.
+    menu(event, row) {
+      const node = ["combination", "modifier", "primitive"].includes(row.kind);
+      const place = { x: event.clientX, y: event.clientY };
+      return { open: row.kind !== "more", ...place, key: row.key, label: row.label, kind: node ? "node" : row.kind };
+    },
+
+    // Send the name in the field of a row, unless it is as before, and return the hidden field.
+    rename(field, row) {
+      if (field.key && field.name !== row.label) trame.trigger("rename", [field.key, field.name]);
+      return { key: "", name: "" };
+    },
+  };
+
+  // The view shows an image without the text that screen readers ask for.
+  const describe = () => document.querySelectorAll("img:not([alt])").forEach((image) => (image.alt = ""));
+  new MutationObserver(describe).observe(document, { childList: true, subtree: true });
+})();
