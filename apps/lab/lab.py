@@ -4,8 +4,6 @@ The lab runs on an edit window like the sandbox. Values and plots are computed i
 values, so that the page never waits for them.
 """
 
-import math
-import time
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
@@ -28,9 +26,6 @@ from decals.editing.queries import move_decals
 from decals.errors import ImplicitDecalsError
 from decals.vtk.component import show_camera
 from decals.window import EditWindow
-
-REST_SECONDS = 1.0
-"""A slider that rests so long has ended its edit."""
 
 STEPPING_SECONDS = 0.05
 """Time that a relaxation takes between two looks at the session."""
@@ -76,7 +71,6 @@ class Lab:
         self._asked: object = None
         self._asking = False
         self._submitted: object = None
-        self._last_step = math.inf
         self._number = self._first = self._step = self._target = 0
         self._probe = self.lesson.settings.probe
         self._recording: Recording | None = None
@@ -170,8 +164,6 @@ class Lab:
 
     def refresh(self) -> None:
         """Go on with what is under way; call this regularly."""
-        if time.monotonic() - self._last_step > REST_SECONDS:
-            self._end_edit()
         if self._recording is not None and self._step != self._target:
             self._relax(self._recording)
         if self._pending is not None and self._pending.done():
@@ -244,7 +236,6 @@ class Lab:
             self._show(f"slider: expected one of the lesson, got {number!r:.40}")
         except ImplicitDecalsError as error:
             self._window.actions.state.refuse(error)
-        self._window.redraw(whole=bool(last))
 
     def _set(self, slider: Slider, raw: Any, last: bool) -> None:
         state, path = self._window.actions.state, slider.path
@@ -263,7 +254,6 @@ class Lab:
         else:
             command = binding(path).command(self._window.document, self.numbers, raw)
             state.run_step(command, last=last)
-            self._last_step = math.inf if last else time.monotonic()
 
     def _relax(self, recording: Recording) -> None:
         """Show the step that was asked for, or the last one that is known in time."""
@@ -280,7 +270,6 @@ class Lab:
         self._window.redraw(whole=self._step == self._target)
 
     def _end_edit(self) -> None:
-        self._last_step = math.inf
         self._window.actions.state.end_stroke()
 
     def leave(self) -> None:

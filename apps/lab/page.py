@@ -16,18 +16,6 @@ LESSON_WIDTH, PLOTS_WIDTH = 330, 350
 
 STYLE = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
 
-LAB_VALUES = (
-    "lab_titles",
-    "lab_number",
-    "lab_text",
-    "lab_question",
-    "lab_sliders",
-    "lab_values",
-    "lab_plots",
-    "lab_verdict",
-)
-"""Names of the values of a lesson, which a page knows from the beginning."""
-
 
 class LabPage(Page):
     """A page of the sandbox with lessons.
@@ -54,7 +42,7 @@ class LabPage(Page):
         **options: Any,
     ) -> None:
         self.lab = Lab(window, lessons)
-        server.state.update({"lab_side": "plots", **dict.fromkeys(LAB_VALUES)})
+        server.state.update({"lab_side": "plots", **self.lab.values()})
         titles = [lesson.settings.title for lesson in lessons]
         super().__init__(server, window, lessons=titles, start_lesson=self.lab.start, **options)
         if in_lesson:
@@ -82,13 +70,22 @@ class LabPage(Page):
                         model_value=("lab_number",),
                         items=("lab_titles",),
                         raw_attrs=named("'lesson'"),
-                        update_modelValue=(self.lab.start, "[$event]"),
+                        update_modelValue=(self._restart, "[$event]"),
                     )
-                    icon_button("mdi-restart", "start the lesson again", (self.lab.start, "[lab_number]"))
+                    icon_button("mdi-restart", "start the lesson again", (self._restart, "[lab_number]"))
                     icon_button("mdi-close", "leave the lesson", self.sandbox.close_lesson)
                 html.Div(v_html=("lab_text",), classes="lesson")
                 self._build_question()
-                build_controls("lab_sliders", self.lab.set_value, "c.number", key="lab_number + c.name")
+                build_controls("lab_sliders", self._set_value, "c.number", key="lab_number + c.name")
+
+    def _restart(self, number: int) -> None:
+        """Start a lesson from its beginning."""
+        with self.sandbox.reported():
+            self.lab.start(number)
+
+    def _set_value(self, number: int, raw: Any, last: bool = True) -> None:
+        """Set what a slider of the lesson moves."""
+        self.sandbox.slide(lambda: self.lab.set_value(number, raw, last), last=bool(last))
 
     @staticmethod
     def _build_values() -> None:

@@ -122,7 +122,6 @@ class Display:
             "controls": [asdict(control) for control, _ in self._options()],
             "bookmarks": [name for name, _ in self.bookmarks],
             "busy": self._worker.busy,
-            "message": self.message,
         }
 
     # -- modes ------------------------------------------------------------------------------------------

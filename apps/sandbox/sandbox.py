@@ -326,7 +326,7 @@ class Sandbox:
             setter = self._setters[one_of("panel", panel, self._setters, InvalidEdit)]
             setter(name, raw, bool(last), index)
 
-        self._slide(step, last=bool(last))
+        self.slide(step, last=bool(last))
 
     def _set_parameter(self, name: str, raw: Any, last: bool, index: object) -> None:
         node = self._trees.selected_node
@@ -343,7 +343,7 @@ class Sandbox:
         self._scattering[name] = parsed_option(scatter, name, raw)
         self._state.show(f"set {name}")
 
-    def _slide(self, step: Callable[[], None], *, last: bool) -> None:
+    def slide(self, step: Callable[[], None], *, last: bool) -> None:
         """Carry out a step of a slider; while it moves, only the newest one, before the next frame."""
 
         def reported() -> None:
@@ -383,9 +383,7 @@ class Sandbox:
 
     def drag_handle(self, name: str, phase: str, x: float, y: float, snap: bool = False) -> None:
         """Drag a handle of the selected node; see `Display.drag_handle`."""
-        self._slide(
-            lambda: self.display.drag_handle(name, phase, x, y, snap=bool(snap)), last=phase != "move"
-        )
+        self.slide(lambda: self.display.drag_handle(name, phase, x, y, snap=bool(snap)), last=phase != "move")
 
     @event
     def add(self, kind: str) -> None:
