@@ -1,7 +1,5 @@
 """Plots of lessons as SVG: curves over a line or a range, and maps of colours with contact lines."""
 
-import base64
-import io
 from collections.abc import Sequence
 from html import escape
 from typing import Any
@@ -13,6 +11,7 @@ from blobtree._typing import BoolArray, Float64Array
 from decals.apps.lab.experiment import MAP_PIXELS, Points, Scope
 from decals.apps.lab.lesson import Lesson, Plot, shown
 from decals.apps.lab.measures import owner
+from decals.apps.sandbox.outline import png_url
 
 WIDTH, HEIGHT, MAP_HEIGHT = 330, 150, 205
 LEFT, RIGHT, TOP, BOTTOM = 38, 8, 8, 22
@@ -185,11 +184,11 @@ def _map(plot: Plot, lesson: Lesson, scope: Scope) -> str:
     on_surface = plot.x is None and not experiment.in_space
     lines = _borders(owner(at).reshape(values.shape)) if on_surface else _borders(values >= 0.5)
     axes = _Axes(*ends, MAP_HEIGHT)
-    source = _encoded(_colored(values, low, high, red, lines))
+    source = png_url(_colored(values, low, high, red, lines), compress_level=1)
     width, height = axes.size
     axes.add("image", x=LEFT, y=TOP, width=width, height=height, href=source, preserveAspectRatio="none")
     bar = LEFT + width + 14
-    scale = _encoded(_colored(np.linspace(1, 0, 64)[:, None], 0, 1, np.zeros((64, 1), np.bool_), None))
+    scale = png_url(_colored(np.linspace(1, 0, 64)[:, None], 0, 1, np.zeros((64, 1), np.bool_), None))
     axes.add("image", x=bar, y=TOP, width=12, height=height, href=scale, preserveAspectRatio="none")
     axes.add("text", f"{high:.3g}", x=bar + 16, y=TOP + 10)
     axes.add("text", f"{low:.3g}", x=bar + 16, y=TOP + height)
@@ -223,13 +222,6 @@ def _colored(
         image[lines & np.isfinite(values)] = (*LINE, 255)
     image[red] = (*RED, 255)
     return Image.fromarray(image, "RGBA")
-
-
-def _encoded(image: Image.Image) -> str:
-    """Return a picture as an address that holds it."""
-    data = io.BytesIO()
-    image.save(data, "PNG", compress_level=1)
-    return "data:image/png;base64," + base64.b64encode(data.getvalue()).decode()
 
 
 def described(lesson: Lesson, scope: Scope) -> list[dict[str, str]]:

@@ -89,10 +89,15 @@ def picture(image: DecalImage, size: int = PICTURE_SIZE) -> str:
     """Return a picture of an image, of a width and height in pixels, as a URL with its data."""
     known = _pictures.setdefault(image, {})
     if size not in known:
-        file = BytesIO()
-        Image.fromarray(as_bytes(image.pixels)).resize((size, size)).save(file, "PNG")
-        known[size] = f"data:image/png;base64,{b64encode(file.getvalue()).decode('ascii')}"
+        known[size] = png_url(Image.fromarray(as_bytes(image.pixels)).resize((size, size)))
     return known[size]
+
+
+def png_url(picture: Image.Image, **options: Any) -> str:
+    """Return a URL that holds a picture, written with options of Pillow."""
+    file = BytesIO()
+    picture.save(file, "PNG", **options)
+    return f"data:image/png;base64,{b64encode(file.getvalue()).decode('ascii')}"
 
 
 def _nodes(number: int, item: TreeObject) -> list[Row]:
