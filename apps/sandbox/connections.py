@@ -201,7 +201,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
                 self._check(name, *bound.args[1:])
                 if name == SIZE:
                     _, width, height = bound.args[1:4]
-                    self._resizes[client] = (int(width), int(height)), lambda: call(*bound.args)
+                    self._resizes[client] = (int(width + 0.5), int(height + 0.5)), lambda: call(*bound.args)
                 if not allowed:
                     return None
             except (TypeError, KeyError, ValueError, AttributeError) as error:

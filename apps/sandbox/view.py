@@ -65,6 +65,7 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
         self._animation: asyncio.Task[None] | None = None
         self._delivery: Any = None
         self._camera_time = 0
+        self._drawn_size: tuple[int, ...] = ()
         super().__init__(window.plotter, **options)
         self.server.add_protocol_to_configure(self._take_over)
 
@@ -131,26 +132,28 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
         """Draw a frame at the size of the page's view, and return its pixels."""
         target: Any = self._window.plotter.render_window
         target.GetInteractor().EnableRenderOff()
-        if (size := self._new_size()) is not None:
-            target.SetSize(size)
+        target.SetSize(self._size())
         target.Render()
-        width, height = target.GetSize()
+        width, height = self._drawn_size = target.GetSize()
         picture = vtkWindowToImageFilter(input=target, read_front_buffer=False, should_rerender=False)
         picture.Update()
         pixels: UInt8Array = pv.convert_array(picture.GetOutput().GetPointData().GetScalars())
         return np.ascontiguousarray(pixels.reshape(height, width, 3)[::-1])
 
-    def _new_size(self) -> list[int] | None:
-        """Return the size of the page's view in pixels; None if it is that of the last picture."""
+    def _size(self) -> tuple[int, ...]:
+        """Return the size of the page's view in pixels; that of the window if the view is hidden."""
         views = {} if self._delivery is None else self._delivery.tracking_views
         tracked: dict[str, Any] = next(iter(views.values()), {})
-        size = [int(side * tracked.get("ratio", 1) + 0.5) for side in tracked.get("originalSize", ())]
+        size = tuple(int(side * tracked.get("ratio", 1) + 0.5) for side in tracked.get("originalSize", ()))
         target: Any = self._window.plotter.render_window
-        return size if size and min(size) > 0 and target and size != list(target.GetSize()) else None
+        return size if size and min(size) > 0 else target.GetSize()
 
     def follow_size(self) -> None:
-        """Send a new picture if the page's view has another size: trame asks for none."""
-        if self._new_size() is not None:
+        """Send a new picture if the last one had another size than the page's view: trame asks for none.
+
+        The window may have the new size already: trame sets it with the quality.
+        """
+        if self._drawn_size and self._window.plotter.render_window and self._size() != self._drawn_size:
             self.update()
 
     def _publish(self, image: bytes, size: tuple[int, int], **to: str) -> None:

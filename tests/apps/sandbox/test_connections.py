@@ -152,7 +152,7 @@ def test_one_browser_drives_and_passes_control(vtk_display: None) -> None:
         pictures: list[dict[str, Any]] = []
         await first.call("viewport.image.push.observer.add", view)
         third._session.register_subscription("viewport.image.push.subscription", pictures.append)
-        for browser, size in ((first, SIZE), (third, (60, 90))):
+        for browser, size in ((first, SIZE), (third, (59.5, 89.6))):
             await browser.call("viewport.image.push.original.size", view, *size)
         page.view.update()
         # Browsers show no picture of another size than theirs.

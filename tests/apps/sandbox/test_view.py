@@ -90,10 +90,19 @@ def test_many_changes_are_one_picture_of_the_newest_state(vtk_display: None) -> 
                 await asyncio.sleep(0.01)
             delivery.push_render("7", True)
             await asyncio.sleep(0.05)
+            assert len(sent) == 2
+            # With the quality, trame sets the size of the window too, and draws nothing.
+            delivery.tracking_views["7"]["originalSize"] = [90.6, 70]
+            window.plotter.render_window.SetSize(91, 70)
+            for _ in range(2):
+                view.follow_size()
+                while len(sent) < 3:
+                    await asyncio.sleep(0.01)
+            await asyncio.sleep(0.05)
 
         asyncio.run(changes())
-    assert steps == [0, 1]
+    assert steps == [0, 1, 2]
     pictures = [Image.open(BytesIO(message["image"])) for message in sent]
-    assert [picture.size for picture in pictures] == [(100, 70)] * 2
-    assert [message["id"] for message in sent] == ["7", "7"]
+    assert [picture.size for picture in pictures] == [(100, 70), (100, 70), (91, 70)]
+    assert [message["id"] for message in sent] == ["7"] * 3
     assert pictures[0].tobytes() != pictures[1].tobytes()
