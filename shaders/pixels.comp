@@ -1,7 +1,11 @@
 // The same pass as pixels.frag as a compute shader, for GLSL 4.30 on: an invocation a pixel.
 // MARKED: list the pixels of which the body sets `pixel_divided`, with its `pixel_parts`, 1 to 4 along each side.
 // LISTED: draw the listed pixels.
+#ifdef LISTED
+layout(local_size_x = LIST_GROUP) in;
+#else
 layout(local_size_x = GROUP, local_size_y = GROUP) in;
+#endif
 uniform ivec2 first_texel;  // the lower left one of a rectangle
 uniform ivec2 end_texel;    // past its upper right one
 
@@ -53,7 +57,7 @@ void list_pixel(ivec2 texel, bool listed) {
     barrier();
     if (gl_LocalInvocationIndex == 0u && group_count > 0u) {
         group_begin = atomicAdd(list_count, group_count);
-        uint groups = (group_begin + group_count - 1u) / uint(GROUP * GROUP) + 1u;
+        uint groups = (group_begin + group_count - 1u) / uint(LIST_GROUP) + 1u;
         atomicMax(list_groups[0], min(groups, MAX_LIST_GROUPS));
     }
     barrier();
@@ -67,7 +71,7 @@ void list_pixel(ivec2 texel, bool listed) {
 
 void main() {
 #ifdef LISTED
-    uint members = uint(GROUP * GROUP);
+    uint members = uint(LIST_GROUP);
     for (uint first = gl_WorkGroupID.x * members; first < list_count; first += gl_NumWorkGroups.x * members) {
         // the last group draws its last pixel several times
         uint listed = list_pixels[min(first + gl_LocalInvocationIndex, list_count - 1u)];

@@ -1,6 +1,6 @@
 // Colours of pixels that the invocations of a compute shader's group draw together. Whole pixels and parts of pixels
 // stand in one queue, from which each invocation in turn takes one. So none waits while others draw many parts.
-const int MEMBERS = GROUP * GROUP;
+const int MEMBERS = LIST_GROUP;
 
 shared ivec2 member_texels[MEMBERS];
 shared ivec2 member_parts[MEMBERS];                              // into which each member's pixel is divided

@@ -31,6 +31,9 @@ COMPUTE_VERSION = 430
 GROUP = 8
 """Side of a compute shader's square group of pixels."""
 
+LIST_GROUP = 128
+"""Number of listed pixels that a group draws together."""
+
 LIST_BINDING = 0
 """Binding point of the storage buffer ``PixelList`` in ``shaders/pixels.comp``."""
 
@@ -108,7 +111,7 @@ def pass_source(
     all_defines: dict[str, str | int | float | bool] = {**(defines or {}), "TWO_TARGETS": targets > 1}
     all_slots = {"body": f"//@ include {body}", **(slots or {})}
     if backend is PassBackend.COMPUTE:
-        all_defines["GROUP"] = GROUP
+        all_defines |= {"GROUP": GROUP, "LIST_GROUP": LIST_GROUP}
         return compose("pixels.comp", slots=all_slots, defines=all_defines, version="430 core")
     return compose("pixels.frag", slots=all_slots, defines=all_defines)
 
