@@ -147,6 +147,10 @@ def camera_of(subplot: SubplotRenderer) -> Camera | None:
     return Camera(tuple(camera.position), tuple(camera.focal_point), tuple(camera.up), camera.view_angle)
 
 
+VIEW_HEIGHTS = 1e-5, 1e4
+"""Smallest and largest height of the view that zooming reaches, in diagonals of the scene."""
+
+
 class SubplotCamera:
     """The camera of a subplot; a `decals.editing.action_state.ViewCamera`.
 
@@ -197,7 +201,10 @@ class SubplotCamera:
         self._renderer.ResetCamera(np.stack([low, high], axis=1).ravel().astype(float).tolist())
 
     def move_and_zoom(self, right: float, up: float, factor: float) -> None:
-        """Move what lies at the target, in heights of the view, then enlarge it by a factor."""
+        """Move what lies at the target, in heights of the view, then enlarge it by a factor.
+
+        The height of the view stays within `VIEW_HEIGHTS`.
+        """
         camera = self._renderer.camera
         eye, target = map(np.array, self.eye_and_target())
         tangent = math.tan(math.radians(camera.view_angle / 2.0))
@@ -206,6 +213,10 @@ class SubplotCamera:
         side /= np.linalg.norm(side)
         upward = np.cross(side, target - eye) / camera.distance
         shift = -height * (right * side + up * upward)
+        low, high = np.reshape(self._renderer.ComputeVisiblePropBounds(), (3, 2)).T
+        if (low <= high).all():
+            smallest, largest = np.linalg.norm(high - low) * np.array(VIEW_HEIGHTS)
+            factor = height / min(max(height / factor, smallest), largest)
         zoom = 1.0 if self.parallel else 1.0 / factor
         camera.focal_point = tuple((target + shift).tolist())
         camera.position = tuple((target + shift + zoom * (eye - target)).tolist())

@@ -218,6 +218,22 @@ def test_two_fingers_move_and_zoom_what_lies_at_the_target(sandbox: Sandbox, sha
         np.testing.assert_allclose(zoomed[1] - zoomed[0], 2.0 * (before[1] - before[0]), rtol=0.15)
 
 
+@pytest.mark.parametrize("parallel", [False, True])
+@pytest.mark.parametrize("factor", [0.25, 4.0])
+def test_any_number_of_pinches_leaves_a_view(
+    sandbox: Sandbox, shared: EditWindow, parallel: bool, factor: float
+) -> None:
+    sandbox.perform("frame")
+    sandbox.set_control("display", "orthographic", parallel)
+    for _ in range(60):
+        sandbox.pinch(0.3, -0.2, factor, "move")
+        assert "expected" not in sandbox.status
+        shared.subplot.viewpoint()
+    sandbox.go_to(0)
+    sandbox.perform("frame")
+    sandbox.pinch(0.0, 0.0, 1.0, "end")
+
+
 def test_two_fingers_take_back_what_the_first_did(sandbox: Sandbox, shared: EditWindow) -> None:
     before, camera = digest(shared.document), shared.subplot.vtk_renderer.camera
     sandbox.perform("frame")
