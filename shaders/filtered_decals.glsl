@@ -228,18 +228,12 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 ce
                 }
                 vec3 line = ball_line(q, right, up, other_ball);
                 lower_rims += !higher && abs(line.x) < 0.5 ? 1 : 0;
-                WHERE (higher && line.x > -0.5) {  // its image may end before its ball
-                    Place place = place_of(other, other_ball, q, n, right, up, vec4(0.0));
-                    line = rim_line(place.arc, right / (RIM * other_ball.w), up / (RIM * other_ball.w));
-                    outside = outside || (nested && place.arc.x > 1.0);
-                }
-                if (higher && outside) {
+                if (higher && (nested || outside)) {
                     boundaries += line.x > -0.5 ? 1 : 0;
                     above = line.x > above_line.x ? other : above;
-                    above_line = line.x > above_line.x ? line : above_line;
+                    above_line.x = max(line.x, above_line.x);
                 } else if (nested && !outside) {
-                    boundaries += higher ? 1 : 0;  // other decals cut it
-                    below = higher ? below : other;
+                    below = other;
                 }
                 continue;
             }
@@ -257,6 +251,16 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 ce
                 beside.y = other;
             }
         }
+    }
+    WHERE (above >= 0) {  // its image may end before its ball
+        vec4 above_ball = decal_texel(4 * above);
+        float per_above = 1.0 / (RIM * above_ball.w);
+        Place place = place_of(above, above_ball, q, n, right, up, vec4(0.0));
+        above_line = rim_line(place.arc, per_above * right, per_above * up);
+        bool ends = above_line.x <= -0.5;
+        bool cut = place.arc.x <= 1.0 && power(q - above_ball.xyz, RIM * above_ball.w) <= 0.0;  // by other decals
+        boundaries -= ends ? 1 : 0;
+        above = ends || cut ? -1 : above;
     }
     if (decal_contact != ELASTIC) {
         pushes.w = contact_distance(contact_at(q, n, owner, decal_contact).x);

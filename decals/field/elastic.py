@@ -268,19 +268,18 @@ def kept_owner(
     first: wp.vec4i,
     last: wp.vec4i,
     closest: wp.int32,
-    after: wp.int32,
     index: IndexedDecals,
 ) -> wp.int32:
-    """Return the decal of `decals.field.radial.nested_owner`, given all candidates at q."""
+    """Return the topmost decal of `decals.field.radial.nested_owner`, given all candidates at q."""
     a = first
     b = last
     closest_ball = index.records[RECORD * closest]
-    tried = wp.int32(after)
+    tried = wp.int32(closest)
     while True:
         tried_ball = index.records[RECORD * tried]
         radius = RIM_RADIUS * tried_ball[3]
         own = power(q - xyz(tried_ball), radius)
-        inside = bool(tried != after)
+        inside = bool(tried != closest)
         if inside:
             inside = lies_on_top(n_q, tried, index.records)
         lower = wp.int32(NO_OWNER)
@@ -355,21 +354,21 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
         return wp.vec4(float(NO_OWNER), 0.0, 0.0, 0.0)
     owner = wp.int32(closest)
     own_ball = index.records[RECORD * closest]
-    searching = bool(index.nested and topmost != closest)
-    while searching:
+    if index.nested and topmost != closest:
         if holders == 2:
             offset = xyz(topmost_ball) - xyz(own_ball)
-            first = bool(owner == closest)
-            owner = closest
-            if first and balls_nested(offset, RIM_RADIUS * own_ball[3], RIM_RADIUS * topmost_ball[3]):
+            if balls_nested(offset, RIM_RADIUS * own_ball[3], RIM_RADIUS * topmost_ball[3]):
                 if lies_on_top(n_q, topmost, index.records):
                     owner = topmost
-        elif count > MAX_KEPT:
-            owner = nested_owner(q, n_q, closest, owner, index)
-        else:
-            owner = kept_owner(q, n_q, a, b, closest, owner, index)
-        searching = bool(owner != closest and not image_reaches(q, n_q, owner, index))
-    if index.nested:
+        elif count <= MAX_KEPT:
+            owner = kept_owner(q, n_q, a, b, closest, index)
+        traversing = bool(holders > 2 and count > MAX_KEPT)
+        searching = bool(traversing or owner != closest)
+        while searching:
+            if traversing:  # rarely
+                owner = nested_owner(q, n_q, closest, owner, index)
+            searching = bool(owner != closest and not image_reaches(q, n_q, owner, index))
+            traversing = True
         own_ball = index.records[RECORD * owner]
     radius = RIM_RADIUS * own_ball[3]
     w = (q - xyz(own_ball)) / radius

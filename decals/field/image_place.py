@@ -19,6 +19,9 @@ wp.set_module_options({"enable_backward": False})
 MIN_PLACE = 1.0e-12
 """Smallest distance in the image by which is divided."""
 
+MAX_ARC = 0.4126
+"""Bound on (length²/chord² − 1)/|n_q − n_p|² of the corrected mapping."""
+
 
 @wp.func
 def image_place(w: wp.vec3, n_q: wp.vec3, decal: wp.int32, index: IndexedDecals) -> wp.vec3:
@@ -44,5 +47,8 @@ def image_reaches(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, index: IndexedDecal
     if index.mapping == ImageMapping.CHORD:
         return True
     w = (q - xyz(index.records[RECORD * decal])) / visible_radius(decal, index.records)
+    turn = n_q - xyz(index.records[RECORD * decal + 1])
+    if not index.walked and wp.dot(w, w) * (1.0 + MAX_ARC * wp.dot(turn, turn)) < 1.0:
+        return True  # as most points, without the length
     length = image_place(w, n_q, decal, index)[2]
     return 0.25 * length * length <= IMAGE_RADIUS_SQUARED
