@@ -75,7 +75,7 @@ class Panorama:
         return same or (isinstance(other, Panorama) and np.array_equal(self.light, other.light))
 
     def __hash__(self) -> int:
-        return hash((self.source, self.light.shape))
+        return hash(self.light.shape)  # equal panoramas may come from several files
 
     def __repr__(self) -> str:
         return repr(self.source)
@@ -109,7 +109,7 @@ class Environment:
     rotation : float
         Angle in degrees by which the picture turns about ``up``, counterclockwise as seen from above.
     strength : float
-        Factor of its light, at least 0.
+        Factor of its light, from 0 to 65,504.
     visible : bool
         True shows the picture behind the objects, in place of the background.
     up : (x, y, z)
@@ -157,9 +157,10 @@ class Environment:
             "visible": instance("visible", self.visible, bool, InvalidScene, "such as True"),
             "up": tuple(numbers.tolist()),
         }
-        if checked["strength"] < 0.0:
+        if not 0.0 <= checked["strength"] <= MAX_LIGHT:
             raise InvalidScene(
-                f"an environment's strength: expected at least 0, got {self.strength:g}; 0 is darkness"
+                f"an environment's strength: expected 0, which is darkness, to {MAX_LIGHT:g}, got "
+                f"{self.strength:g}"
             )
         if not 0.0 < np.linalg.norm(numbers) < np.inf:
             raise InvalidScene(f"an environment's up: expected a direction, got {self.up}; such as (0, 0, 1)")

@@ -67,8 +67,8 @@ class DrawingRecord(Struct, forbid_unknown_fields=True):
 
     def sources(self) -> list[str]:
         """Return the files that the record names."""
-        named = self.environment is not None and not is_embedded(self.environment.picture)
-        return [self.environment.picture] if self.environment is not None and named else []
+        pictures = [] if self.environment is None else [self.environment.picture]
+        return [picture for picture in pictures if not is_embedded(picture)]
 
 
 def drawing_record(drawing: Drawing, folder: Path) -> DrawingRecord:
