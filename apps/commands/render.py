@@ -153,7 +153,7 @@ def render(
 
 
 def _changed(environment: Environment | None, changes: dict[str, Any]) -> Environment:
-    """Return an environment with other values, or raise `InvalidInput` if there is none."""
+    """Return an environment with other values, or raise `InvalidInput` without an environment."""
     if environment is None:
         raise InvalidInput("expected an environment that the options change, got none; give --environment")
     return replace(environment, **changes)
