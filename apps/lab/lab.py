@@ -207,7 +207,7 @@ class Lab:
             return
         window, lesson = self._window, self._lessons[number]
         settings = lesson.settings
-        self._end_edit()
+        self._window.actions.state.end_stroke()
 
         def started() -> None:
             self._number, self._asked, self._asking, self._probe = number, None, False, settings.probe
@@ -266,15 +266,12 @@ class Lab:
         self._window.actions.state.begin_series(("lab", "step"), "relax")
         self._window.session.do(SetValues(numbers, arrays, "relax"))
         if self._step == self._target:
-            self._end_edit()
+            self._window.actions.state.end_stroke()
         self._window.redraw(whole=self._step == self._target)
-
-    def _end_edit(self) -> None:
-        self._window.actions.state.end_stroke()
 
     def leave(self) -> None:
         """Leave the lesson: its scene stays, its probe goes."""
-        self._end_edit()
+        self._window.actions.state.end_stroke()
         self._window.plotter.remove_actor("probe", render=False)
 
     def check(self) -> None:

@@ -229,7 +229,8 @@ class Display:
 
         def work(_progress: object, _cancel: object) -> Callable[[], None]:
             objects = fork.objects
-            parts = meshes[1] if meshes[0] is objects else [_polygonized(item) for item in objects]
+            known = meshes[1] if meshes[0] is objects else None
+            parts = known or [as_polydata([item], resolution=RESOLUTION) for item in objects]
             shown, message = show(fork, parts, options, modes)
 
             def install() -> None:
@@ -397,10 +398,6 @@ class Display:
         self._window.subplot.vtk_renderer.reset_camera_clipping_range()
 
 
-def _polygonized(item: SceneObject) -> pv.PolyData:
-    return as_polydata([item], resolution=RESOLUTION)
-
-
 def show(
     document: Document, parts: list[pv.PolyData], options: DisplayOptions, modes: Sampling
 ) -> tuple[Shown, str]:
@@ -410,7 +407,7 @@ def show(
     first, *others = parts
     mesh = first.append_polydata(*others) if others else first
     shown: Shown = []
-    messages = []
+    message = ""
     if options.slice is not None:
         shown += _sliced(document, mesh, options.slice, LIFT * size)
     elif options.mode != MODES[0]:
@@ -418,8 +415,7 @@ def show(
     if options.overlay != OVERLAYS[0]:
         overlay, message = _overlay(document, mesh, options.overlay, modes, LIFT * size)
         shown += overlay
-        messages.append(message)
-    return shown, "".join(messages)
+    return shown, message
 
 
 def _moded(document: Document, mesh: pv.PolyData, parts: list[pv.PolyData], mode: str) -> Any:
@@ -508,9 +504,8 @@ def _overlay(
         message = f"{folded} of {len(faces)} triangles folded"
         if not folded:
             return [], message
-        return [
-            (name, lifted.extract_cells(samples.folds), {"color": FOLD_COLOR, "lighting": False})
-        ], message
+        shown = name, lifted.extract_cells(samples.folds), {"color": FOLD_COLOR, "lighting": False}
+        return [shown], message
     known = np.isfinite(samples.stretch)
     if not known.any():
         return [], "no decals to measure"

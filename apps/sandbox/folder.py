@@ -5,28 +5,24 @@ import os
 import tempfile
 from collections.abc import Iterator
 from datetime import datetime
-from io import BytesIO
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from PIL import Image, UnidentifiedImageError
 
 from decals import DecalImage, Scene, load_model
 from decals.editing.recovery import SUFFIX
-from decals.errors import InvalidEdit
+from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.images import read_image
 from decals.scenes.objects import SceneObject
 from decals.validation import describe
 
 MODELS = (".json", ".ply", ".obj", ".stl", ".vtp", ".vtk", ".glb", ".gltf", ".off")
-IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".gif", ".tif", ".tiff")
+HDR = ".hdr"
+IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".gif", ".tif", ".tiff", HDR)
 
 MAX_RECENT = 12
 MAX_LOOKED_AT = 5000
 """Most files of a folder that the start page looks at."""
 
 MAX_UPLOAD_BYTES = 100_000_000
-MAX_PIXELS = 8192 * 8192
 
 
 def _files(folder: Path) -> Iterator[os.DirEntry[str]]:
@@ -87,9 +83,42 @@ def read_upload(file: object) -> Scene | SceneObject | DecalImage:
     Raises
     ------
     InvalidEdit
-        It is no such file, it is too large, or its suffix is unknown. Errors of its content are those of
-        `decals.load_model`.
+        It is no such file, it is too large, its suffix is unknown, or it cannot be read.
     """
+    name, content = _checked(file)
+    suffix = Path(name).suffix.lower()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"{plain_name(name)}{suffix}"
+        path.write_bytes(content)
+        try:
+            return DecalImage(path.stem, read_image(path)) if suffix in IMAGES else load_model(path)
+        except ImplicitDecalsError as error:
+            raise InvalidEdit(str(error).replace(f"{folder}{os.sep}", "")) from error
+
+
+def keep_upload(file: object, folder: Path) -> Path:
+    """Write a file that a page sent into a folder, unless it is there already, and return its path.
+
+    Raises
+    ------
+    InvalidEdit
+        It is no file of a kind that is read, or the folder cannot be written.
+    """
+    name, content = _checked(file)
+    stem, suffix = plain_name(name), Path(name).suffix.lower()
+    path = folder / f"{stem}{suffix}"
+    try:
+        if not (path.is_file() and path.read_bytes() == content):
+            path = folder / f"{unused(stem, {other.stem for other in folder.iterdir()})}{suffix}"
+            with path.open("xb") as kept:
+                kept.write(content)
+    except OSError as error:
+        raise InvalidEdit(f"could not write {path.name} into the folder ({error.strerror})") from error
+    return path
+
+
+def _checked(file: object) -> tuple[str, bytes]:
+    """Return name and content of a file that a page sent."""
     name = file.get("name") if isinstance(file, dict) else None
     content = file.get("content") if isinstance(file, dict) else None
     if isinstance(content, list) and all(isinstance(part, bytes) for part in content):
@@ -100,32 +129,15 @@ def read_upload(file: object) -> Scene | SceneObject | DecalImage:
         raise InvalidEdit(
             f"{name}: expected at most {MAX_UPLOAD_BYTES // 1_000_000} MB, got {len(content) // 1_000_000} MB"
         )
-    suffix = Path(name).suffix.lower()
-    if suffix in IMAGES:
-        return _image(name, bytes(content))
-    if suffix not in MODELS:
+    if Path(name).suffix.lower() not in MODELS + IMAGES:
         raise InvalidEdit(f"{name}: expected a name that ends in {', '.join(MODELS + IMAGES)}")
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{plain_name(name)}{suffix}"
-        path.write_bytes(content)
-        return load_model(path)
+    return name, bytes(content)
 
 
 def plain_name(name: str) -> str:
     """Return the stem of a file's name without characters that mean something in paths."""
     stem = Path(name.replace("\\", "/")).stem
     return "".join(c if c.isalnum() or c in "-_ " else "-" for c in stem)[:60].strip() or "model"
-
-
-def _image(name: str, content: bytes) -> DecalImage:
-    try:
-        with Image.open(BytesIO(content)) as picture:
-            if picture.width * picture.height > MAX_PIXELS:
-                raise InvalidEdit(f"{name}: expected at most {MAX_PIXELS} pixels, got {picture.size}")
-            pixels = np.asarray(picture.convert("RGBA"))
-    except (UnidentifiedImageError, OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise InvalidEdit(f"{name}: expected a picture, got none ({error})") from error
-    return DecalImage(plain_name(name), pixels)
 
 
 def unused(name: str, taken: set[str]) -> str:
@@ -144,8 +156,3 @@ def thumbnails() -> dict[str, str]:
         path.stem: "data:image/jpeg;base64," + base64.b64encode(path.read_bytes()).decode()
         for path in pictures
     }
-
-
-def values_of_start(folder: Path, samples: tuple[str, ...], lessons: list[str]) -> dict[str, Any]:
-    """Return all that the start page lists."""
-    return {"samples": list(samples), "lessons": lessons, **listed(folder)}

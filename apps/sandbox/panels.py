@@ -7,7 +7,7 @@ from typing import Any
 from trame.widgets import html, vuetify3
 
 from decals.apps.sandbox.folder import IMAGES, MODELS
-from decals.apps.sandbox.sandbox import Sandbox
+from decals.apps.sandbox.sandbox import LIGHT, Sandbox
 from decals.editing.actions import KEYS
 from decals.editing.brushes import Brush
 from decals.editing.file_actions import Video
@@ -352,6 +352,18 @@ def build_options(sandbox: Sandbox) -> None:
         for panel in ("scattering", "drawing"):
             with vuetify3.VExpansionPanel(title=panel.capitalize()), vuetify3.VExpansionPanelText():
                 build_controls(panel, sandbox.set_control, f"'{panel}', c.name")
+                if panel == "drawing":
+                    _build_light(sandbox)
+
+
+def _build_light(sandbox: Sandbox) -> None:
+    """Build what loads and removes the picture of all directions that lights the scene."""
+    take = f"utils.sandbox.take($event, '{LIGHT}')"
+    with html.Div(dragover="$event.preventDefault()", drop=take, __events=["dragover", "drop"]):
+        html.Label("light from a picture of all directions; choose or drop one", classes="text-caption")
+        html.Input(type="file", accept=",".join(IMAGES), raw_attrs=named("'picture of light'"), change=take)
+        present = "drawing.some(c => c.name.startsWith('environment.'))"
+        vuetify3.VBtn("Remove this light", v_if=present, variant="tonal", click=sandbox.remove_light)
 
 
 def build_scatter(sandbox: Sandbox) -> None:

@@ -22,22 +22,10 @@ from blobtree.progress import Cancel, Progress
 from decals import cover
 from decals.apps.models.samples import SAMPLES, axes_of, sample
 from decals.apps.models.scenes import empty_scene, new_file
-from decals.apps.sandbox import catalog
+from decals.apps.sandbox import catalog, decal_panel
 from decals.apps.sandbox.controls import controls_of, exchanged, parsed, parsed_option
-from decals.apps.sandbox.decal_panel import (
-    brush_values,
-    decal_controls,
-    drawing_controls,
-    first_scatter_values,
-    image_values,
-    scatter_controls,
-    set_brush,
-    set_decal_value,
-    set_drawing,
-    set_image_value,
-)
 from decals.apps.sandbox.display import PHASES, Display
-from decals.apps.sandbox.folder import MODELS, plain_name, read_upload, unused, values_of_start
+from decals.apps.sandbox.folder import HDR, MODELS, keep_upload, listed, plain_name, read_upload, unused
 from decals.apps.sandbox.outline import key_of, outline, parse_key
 from decals.apps.views import THREE_QUARTER
 from decals.editing.commands import AddImage, DeleteDecals, RemoveImage, ReplaceImage, SetValues
@@ -49,6 +37,7 @@ from decals.editing.tree_commands import RenameObject
 from decals.editing.visibility import RenameLayer, RenameNode
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.options import arguments_of
+from decals.rendering.environment import Environment
 from decals.scattering.scatter import scatter
 from decals.scenes.camera import UPRIGHT, Camera
 from decals.scenes.files import is_scene_file, load_model
@@ -63,6 +52,9 @@ REST_SECONDS = 1.0
 
 FIRST_IMAGES = ("scale",)
 """Images of a scene at the beginning."""
+
+LIGHT = "light"
+"""Key under which a page sends a picture of all directions."""
 
 MAX_ZOOM = 4.0
 """Largest factor of one step of two fingers."""
@@ -139,10 +131,12 @@ class Sandbox:
         self._setters: dict[str, Callable[[Any, Any, bool, object], None]] = {
             "node": self._set_parameter,
             "display": lambda name, raw, _, index: self.display.set_option(name, raw, index),
-            "decals": lambda name, raw, last, _: set_decal_value(self._state, name, raw, last=last),
-            "brush": lambda name, raw, *_: set_brush(self._state.brush, name, raw),
+            "decals": lambda name, raw, last, _: decal_panel.set_decal_value(
+                self._state, name, raw, last=last
+            ),
+            "brush": lambda name, raw, *_: decal_panel.set_brush(self._state.brush, name, raw),
             "image": self._set_image,
-            "drawing": lambda name, raw, last, _: set_drawing(self._state, name, raw, last=last),
+            "drawing": lambda name, raw, last, _: decal_panel.set_drawing(self._state, name, raw, last=last),
             "scattering": self._set_scattering,
         }
         self._lessons, self._start_lesson = list(lessons), start_lesson
@@ -185,12 +179,12 @@ class Sandbox:
             "gizmo": {**self.display.gizmo(), "line": self.display.selection_line()},
             "decal": {
                 "count": len(state.selection),
-                "controls": decal_controls(document, state.selection),
+                "controls": decal_panel.decal_controls(document, state.selection),
             },
-            "brush": brush_values(document, state.brush),
-            "drawing": drawing_controls(document.drawing),
-            "scattering": scatter_controls(self._scatter_values()),
-            "image": image_values(document, self._shown_image),
+            "brush": decal_panel.brush_values(document, state.brush),
+            "drawing": decal_panel.drawing_controls(document.drawing),
+            "scattering": decal_panel.scatter_controls(self._scatter_values()),
+            "image": decal_panel.image_values(document, self._shown_image),
             "pick": self._pick(),
             "decals": len(document.decals),
         }
@@ -336,7 +330,7 @@ class Sandbox:
     def _set_image(self, name: str, raw: Any, last: bool, _index: object) -> None:
         if (number := self._shown_image) is None:
             raise InvalidEdit("no image is selected; click on one in the outline")
-        set_image_value(self._state, number, name, raw, last=last)
+        decal_panel.set_image_value(self._state, number, name, raw, last=last)
 
     def _set_scattering(self, name: str, raw: Any, _last: bool, _index: object) -> None:
         one_of("option", name, self._scatter_values(), InvalidEdit)
@@ -457,7 +451,8 @@ class Sandbox:
 
     def show_start(self, shown: bool) -> None:
         """Show or hide the start page."""
-        self._start = {"open": bool(shown), **values_of_start(self._folder, SAMPLES, self._lessons)}
+        fixed = {"open": bool(shown), "samples": list(SAMPLES), "lessons": self._lessons}
+        self._start = fixed | listed(self._folder)
 
     @event
     def open_lesson(self, number: int) -> None:
@@ -489,7 +484,8 @@ class Sandbox:
     @event
     def new_model(self) -> None:
         """Begin an empty scene."""
-        self._open(_given(empty_scene(FIRST_IMAGES, UPRIGHT["y"])), new_file(self._folder, "scene"))
+        scene = empty_scene(FIRST_IMAGES, UPRIGHT["y"])
+        self._open(lambda *_: scene, new_file(self._folder, "scene"))
 
     @event
     def open_sample(self, name: str) -> None:
@@ -525,13 +521,16 @@ class Sandbox:
         """Take files that were dropped on the page: images and models are added, a scene is opened.
 
         An image that was dropped on the row of a layer shows on its decals, on that of an image replaces it.
+        One that was dropped on the key "light", and a Radiance file without a key, is the light.
         """
         for file in files if isinstance(files, list | tuple) else [files]:
             with self.reported():
                 found, window = read_upload(file), self._window
                 name = plain_name(str(file["name"]))  # type: ignore[index]  # read_upload has checked it
-                if isinstance(found, Scene):
-                    self._open(_given(found), new_file(self._folder, name))
+                if key == LIGHT or (not key and str(file["name"]).lower().endswith(HDR)):  # type: ignore[index]
+                    self._take_light(found, file)
+                elif isinstance(found, Scene):
+                    self._open(lambda *_, scene=found: scene, new_file(self._folder, name))
                 elif isinstance(found, DecalImage):
                     self._take_image(found, key)
                 else:
@@ -555,6 +554,19 @@ class Sandbox:
                 session.do(_showing(session.document, count, row))
                 shown = f" and shown on {session.document.layer_names.get(row, f'layer {row}')}"
         state.show(f"added image {count}{shown or '; choose it for the selected decals'}")
+
+    def _take_light(self, picture: Any, file: object) -> None:
+        """Light the scene with a picture of all directions, which is kept in the folder."""
+        present, up = self._window.document.drawing.environment, self._window.actions.view.axes.up
+        light = Environment(picture, up=up)
+        light.picture.source = str(keep_upload(file, self._folder))
+        changed = light if present is None else replace(present, picture=light.picture)
+        self._state.draw_with("set environment", environment=changed)
+
+    @event
+    def remove_light(self) -> None:
+        """Light the scene as without a picture of all directions."""
+        self._state.draw_with("remove environment", environment=None)
 
     def _add_object(self, item: SceneObject) -> None:
         first = not self._window.document.objects
@@ -629,7 +641,7 @@ class Sandbox:
 
     def _scatter_values(self) -> dict[str, Any]:
         """Return the options of the next scattering: those that were set, else the first ones."""
-        return first_scatter_values(len(self._window.document.decals)) | self._scattering
+        return decal_panel.first_scatter_values(len(self._window.document.decals)) | self._scattering
 
     @event
     def change_row(self, key: str, change: str, value: Any = None) -> None:
@@ -754,7 +766,3 @@ def _bare_scene(item: SceneObject) -> Scene:
     """Return a scene of one object, without decals."""
     images = tuple(DecalImage.load(source) for source in FIRST_IMAGES)
     return Scene(objects=[item], camera=Camera.framing(item.bounds), images=images)
-
-
-def _given(scene: Scene) -> Callable[[Progress, Cancel], Scene]:
-    return lambda *_: scene

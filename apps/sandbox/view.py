@@ -175,10 +175,8 @@ def _encoded(pixels: UInt8Array, quality: int, sizes: set[tuple[int, int]]) -> d
 
     Browsers show no picture of another size than that of their view.
     """
-    picture, files = (
-        Image.fromarray(pixels),
-        {size: BytesIO() for size in sizes if 0 < size[0] * size[1] <= MAX_PIXELS},
-    )
+    picture = Image.fromarray(pixels)
+    files = {size: BytesIO() for size in sizes if 0 < size[0] * size[1] <= MAX_PIXELS}
     for size, file in files.items():
         fitted = picture if size == picture.size else ImageOps.pad(picture, size, color="white")
         fitted.save(file, "JPEG", quality=quality)

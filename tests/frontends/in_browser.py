@@ -195,14 +195,10 @@ async def sandbox(picture: str | None = None) -> None:
         await browser.keyboard.press("Escape")
         await until(lambda: normal() is not None)
         before = normal()
-        handle = browser.locator("[data-handle='tilt slice']")
-        box = None
-        while box is None or box != await handle.bounding_box():  # it follows the camera
-            box = await handle.bounding_box()
-            await asyncio.sleep(0.5)
-        await browser.mouse.move(box["x"] + 8, box["y"] + 8)
+        box = await at_rest(browser, sandbox_page, "tilt slice")
+        await browser.mouse.move(*box)
         await browser.mouse.down()
-        await browser.mouse.move(box["x"] + 40, box["y"] - 20)
+        await browser.mouse.move(box[0] + 32, box[1] - 28)
         await browser.mouse.up()
         await until(lambda: not np.allclose(normal(), before))
         await browser.get_by_text("Start", exact=True).click()
@@ -536,6 +532,22 @@ async def lab(picture: str | None = None) -> None:
 def shows_lesson(lab_page: LabPage, number: int) -> bool:
     """Return True if the lab is at a lesson."""
     return bool(lab_page.lab.values()["lab_number"] == number)
+
+
+async def at_rest(browser: Page, sandbox_page: SandboxPage, name: str) -> tuple[float, float]:
+    """Wait until the page shows a handle where the server has it; its middle."""
+    async with asyncio.timeout(PATIENCE):
+        while True:
+            view = await browser.locator("svg.above").last.bounding_box()
+            box = await browser.locator(f"[data-handle='{name}']").bounding_box()
+            handles = sandbox_page.sandbox.values()["gizmo"]["handles"]
+            place = next(((h["x"], h["y"]) for h in handles if h["name"] == name), None)
+            if view is not None and box is not None and place is not None:
+                middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+                there = view["x"] + place[0] * view["width"], view["y"] + place[1] * view["height"]
+                if np.allclose(middle, there, atol=1.0):
+                    return middle
+            await asyncio.sleep(0.1)
 
 
 async def choose(browser: Page, label: str, option: str) -> None:

@@ -94,7 +94,7 @@ EVENTS: dict[str, list[list[Any]]] = {
     "drag_handle": [HANDLES, ["begin", "move", "end"], [0.1, 0.5, 0.8], [0.3, 0.6], [True, False]],
     "open_file": [["../x.json", "none.json", "a\0.json"]],
     "write_file": [["../x.py", "x.exe", "no/x.json"]],
-    "upload": [[[{}], [{"name": "a.ply", "content": b"x"}], 3], KEYS_OF_ROWS],
+    "upload": [[[{}], [{"name": "a.ply", "content": b"x"}], 3], [*KEYS_OF_ROWS, "light"]],
 }
 """Arguments of the page's events, by their names; a second word tells two kinds of one event apart."""
 
