@@ -9,7 +9,10 @@ from typing import Any
 
 import pytest
 
+import decals
+from blobtree import Node
 from blobtree.errors import ImplicitDecalsError
+from decals import Scene
 from tests.decals.baking.glb import need
 
 PACKAGES = (
@@ -52,6 +55,27 @@ def test_a_public_name_has_an_example(name: str) -> None:
     assert ">>>" in text
 
 
+@pytest.fixture
+def shared_covers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let equal calls of `decals.cover` in several examples scatter decals once."""
+
+    def cover(*models: Any, **options: Any) -> Scene:
+        if not all(isinstance(model, Node) for model in models):
+            return scattered(*models, **options)
+        call = repr((models, options))
+        if call not in COVERED:
+            COVERED[call] = scattered(*models, **options)
+        return COVERED[call]
+
+    scattered = decals.cover
+    monkeypatch.setattr(decals, "cover", cover)
+
+
+COVERED: dict[str, Scene] = {}
+"""Scenes of examples by the arguments of `decals.cover`."""
+
+
+@pytest.mark.usefixtures("shared_covers")
 @pytest.mark.slow_cases(
     "blobtree.Arc",
     "blobtree.ContactSurface",

@@ -82,12 +82,27 @@ def test_a_module_defines_kinds(dots: Path) -> None:
     assert_on_the_dot(np.loadtxt(dots / "decals.csv", delimiter=",", skiprows=1)[:, :3])
 
 
-def test_a_file_defines_kinds_and_imports_its_neighbours(dots: Path) -> None:
+@pytest.fixture
+def parts(dots: Path) -> str:
+    """Return the path of a definition that imports its neighbour."""
     (dots / "parts").mkdir()
     (dots / "parts" / "near.py").write_text("REACH = 1\n", encoding="utf-8")
     (dots / "parts" / "more.py").write_text(DOTS.format(imports="import near"), encoding="utf-8")
-    module = str(dots / "parts" / "more.py")
-    with_definitions(dots, module, "polygonize", "--resolution", "12", "-o", "dot.ply")
+    return str(dots / "parts" / "more.py")
+
+
+def test_a_file_defines_kinds_for_the_models_of_a_command(
+    parts: str, capfd: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "path", sys.path[:])
+    monkeypatch.setattr(sys, "modules", sys.modules.copy())
+    assert run(["measure", "dot.json", "--define", parts]) == 2
+    assert "expected a saved scene in JSON, got the model 'dot.json'" in capfd.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_file_defines_kinds_and_imports_its_neighbours(dots: Path, parts: str) -> None:
+    with_definitions(dots, parts, "polygonize", "--resolution", "12", "-o", "dot.ply")
     assert_on_the_dot(np.asarray(pv.read(dots / "dot.ply").points, np.float64))
 
 

@@ -11,9 +11,8 @@ from typing import Any
 
 import pytest
 
-import decals
 from decals.window import EditWindow
-from tests.apps.sandbox.test_sandbox import TREE
+from tests.apps.sandbox.test_sandbox import covered
 from tests.decals.editing.scenes import digest
 from tests.decals.window.driver import Driver
 
@@ -115,8 +114,7 @@ def serve(check: Check, **options: Any) -> None:
     from decals.apps.sandbox.page import Page
 
     async def run() -> None:
-        scene = decals.cover(TREE, count=20, images=["tile"])
-        with EditWindow(scene, off_screen=True, size=SIZE) as window:
+        with EditWindow(covered(), off_screen=True, size=SIZE) as window:
             window.show()
             server = get_server(f"connections {id(window)}", client_type="vue3")
             page = Page(server, window, **options)

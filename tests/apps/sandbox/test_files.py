@@ -22,15 +22,14 @@ from decals.errors import ImplicitDecalsError
 from decals.scenes.files import load_scene, save_scene
 from decals.scenes.meshes import write_mesh
 from decals.window import EditWindow
-from tests.apps.sandbox.test_sandbox import TREE, finish
+from tests.apps.sandbox.test_sandbox import covered, finish
 
 BALL = Point((0, 0, 0), radius=1.0)
 
 
 @pytest.fixture
 def window(vtk_display: None, tmp_path: Path) -> Iterator[EditWindow]:
-    scene = decals.cover(TREE, count=20, images=["tile"])
-    with EditWindow(scene, off_screen=True, size=(80, 60), path=tmp_path / "scene.json") as window:
+    with EditWindow(covered(), off_screen=True, size=(80, 60), path=tmp_path / "scene.json") as window:
         window.show()
         yield window
 

@@ -4,6 +4,7 @@ import json
 import threading
 import time
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -31,10 +32,14 @@ CAMERA = Camera((0, 0, 8))
 POINTS = np.random.default_rng(1).uniform(-2, 2, (500, 3))
 
 
+@cache
+def covered() -> Scene:
+    return decals.cover(TREE, count=20, images=["tile"])
+
+
 @pytest.fixture
 def window(vtk_display: None) -> Iterator[EditWindow]:
-    scene = decals.cover(TREE, count=20, images=["tile"])
-    with EditWindow(scene, off_screen=True, size=(80, 60)) as window:
+    with EditWindow(covered(), off_screen=True, size=(80, 60)) as window:
         window.show()
         yield window
 
@@ -63,6 +68,7 @@ def test_of_waiting_slider_steps_only_the_newest_is_carried_out(window: EditWind
     assert (len(asked), radii) == (3, [])
     sandbox.take_step()
     sandbox.take_step()
+    finish(window)
     assert radii == [0.75]
     sandbox.set_control("node", "radius", 0.8, False)
     sandbox.select("0/0")  # any other event comes after the step

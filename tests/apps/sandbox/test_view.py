@@ -15,7 +15,7 @@ from decals.editing.brushes import Brush
 from decals.editing.key_bindings import format_gestures
 from decals.editing.view_actions import SIDE_KEYS
 from decals.window import EditWindow
-from tests.apps.sandbox.test_sandbox import TREE
+from tests.apps.sandbox.test_sandbox import TREE, covered
 
 
 class Protocol:
@@ -66,7 +66,7 @@ def test_many_changes_are_one_picture_of_the_newest_state(vtk_display: None) -> 
 
     sent: list[dict[str, Any]] = []
     steps: list[int] = []
-    with EditWindow(decals.cover(TREE, count=20, images=["tile"]), off_screen=True, size=(80, 60)) as window:
+    with EditWindow(covered(), off_screen=True, size=(80, 60)) as window:
         window.show()
         with VAppLayout(get_server("view", client_type="vue3")):
             view = StreamedView(window, lambda: steps.append(len(sent)))

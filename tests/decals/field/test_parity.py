@@ -24,9 +24,9 @@ DOUBT = 1e-9
 @pytest.mark.parametrize("layered", [False, True])
 @pytest.mark.parametrize("contact", Contact)
 def test_the_two_oracles_agree(contact: Contact, layered: bool) -> None:
-    """On 17,000 points in each mode; with neighbours within reach, and with all."""
+    """On 8,000 points in each mode; with neighbours within reach, and with all."""
     world = make_world(7, layered=layered)
-    chunk = Chunk(world, 17_000, 7 + contact, "cpu")
+    chunk = Chunk(world, 8_000, 7 + contact, "cpu")
     points, normals = chunk.points.numpy(), chunk.normals.numpy().astype(float)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     mapping = ImageMapping.CHORD if layered else ImageMapping.CORRECTED
@@ -51,7 +51,7 @@ def test_the_two_oracles_agree(contact: Contact, layered: bool) -> None:
         assert np.abs(rim - rim_distance(1 - want.field[both])).max(initial=0) < 1e-7  # 1 − F cancels
         assert np.abs(place[rows, :2] - want.uv)[both & (want.stretch < 100)].max(initial=0) < 1e-7
         owned += both.sum()
-    assert owned > 10_000
+    assert owned > 5_000
 
 
 def by_set(sets: NDArray[np.integer]) -> Iterable[tuple[int, NDArray[np.intp]]]:
