@@ -121,7 +121,8 @@ def render(
         "filtered": filtered,
     }
     changes = given(rotation=environment_rotation, strength=environment_strength, visible=environment_visible)
-    options["environment"] = None if environment is None else Environment(environment, **changes)
+    if environment is not None:
+        options["environment"] = Environment(environment, **changes)
     Drawing().overridden(**options)  # checked before anything slow
     check_output(output, PICTURE_SUFFIXES)
     if save is not None:
@@ -133,17 +134,17 @@ def render(
         loaded = load_models(model, trust=trust, crease_angle=crease_angle)
         if isinstance(loaded, Scene) and (decals is not None or image or seed is not None):
             raise InvalidInput("a saved scene has its own decals; leave out --decals, --image and --seed")
+        drawing = (loaded.drawing if isinstance(loaded, Scene) else Drawing()).overridden(**options)
+        if changes:
+            drawing = drawing.overridden(environment=_changed(drawing.environment, changes))
         scattering = ScatterOptions.from_arguments(decals, image, seed)
         # The renderer comes first: without graphics the command fails before the long work.
         renderer = stack.enter_context(Renderer(max_tile=TILE))
         scene = loaded if isinstance(loaded, Scene) else scattering.scene(loaded, view, pixels, progress)
         if isinstance(loaded, Scene) and (camera is not None or up is not None):
             scene = scene.replace(camera=frame(scene.objects, view, pixels))
-        drawing = scene.drawing.overridden(**options)
         if environment is not None:
-            changes["up"] = scene.camera.up
-        if changes:
-            drawing = drawing.overridden(environment=_changed(drawing.environment, changes))
+            drawing = drawing.overridden(environment=_changed(drawing.environment, {"up": scene.camera.up}))
         scene = scene.replace(drawing=drawing)
         if save is not None:
             save_scene(scene, save)

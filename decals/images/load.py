@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 
+from blobtree._typing import Float32Array
 from decals.errors import InvalidImage
 from decals.images.builtin import BUILTIN_IMAGES, generate_image, is_builtin
 from decals.images.radiance import decode_radiance, is_radiance
 from decals.images.texels import Pixels
-from decals.validation import describe, is_file, require_rgba
+from decals.validation import MAX_LIGHT, describe, is_file, require_rgba
 
 MAX_IMAGE_EDGE = 16384
 """Longest edge of a decal image that is read, in pixels: the limit of usual graphics cards."""
@@ -102,7 +103,9 @@ def load_image(reference: str, *, folder: Path | None = None) -> Pixels:
     return read_image((folder or Path()) / reference)
 
 
-def image_pixels(image: AnyImage, *, name: str = "image", folder: Path | None = None) -> Pixels:
+def image_pixels(
+    image: AnyImage, *, name: str = "image", folder: Path | None = None, linear: bool = False
+) -> Pixels:
     """Return the pixels of an image of any kind.
 
     Parameters
@@ -115,6 +118,8 @@ def image_pixels(image: AnyImage, *, name: str = "image", folder: Path | None = 
         Name of the image in messages.
     folder : Path, optional
         Folder of relative paths. Default: the working directory.
+    linear : bool
+        True takes floats of arrays as linear light of any brightness.
 
     Returns
     -------
@@ -141,7 +146,8 @@ def image_pixels(image: AnyImage, *, name: str = "image", folder: Path | None = 
         return require_rgba(name, cast(HasPixels, image).pixels)
     if isinstance(image, type):
         raise InvalidImage(f"{name}: expected an image, got the class {image.__name__}; {_ADVICE}")
-    return _array_pixels(cast(HasArray, image).to_array() if hasattr(image, "to_array") else image, name)
+    array = cast(HasArray, image).to_array() if hasattr(image, "to_array") else image
+    return _array_pixels(array, name, linear)
 
 
 EMBEDDED = {
@@ -200,7 +206,7 @@ def each_image(images: Any) -> list[Any]:
     return list(images)
 
 
-def _array_pixels(image: Any, name: str) -> Pixels:
+def _array_pixels(image: Any, name: str, linear: bool) -> Pixels:
     try:
         array = np.asarray(image)
     except (TypeError, ValueError):  # rows of different lengths
@@ -215,15 +221,16 @@ def _array_pixels(image: Any, name: str) -> Pixels:
         raise InvalidImage(
             f"{name}: expected an image of at most {MAX_IMAGE_EDGE} pixels a side, got {list(array.shape)}"
         )
-    levels = _levels(planes, name)
+    levels = _light(planes, name) if linear and planes.dtype.kind == "f" else _levels(planes, name)
     if levels.shape[2] == 4:
         return levels
-    return _opaque(np.broadcast_to(levels, (*levels.shape[:2], 3)))
+    return opaque(np.broadcast_to(levels, (*levels.shape[:2], 3)))
 
 
-def _opaque(colors: NDArray[Any]) -> Pixels:
+def opaque(colors: NDArray[Any]) -> Pixels:
     """Return the colours ``[h, w, 3]`` of an image without alpha as RGBA."""
-    alpha = np.full(colors.shape[:2], np.iinfo(colors.dtype).max, colors.dtype)
+    most = 1.0 if colors.dtype.kind == "f" else np.iinfo(colors.dtype).max
+    alpha = np.full(colors.shape[:2], most, colors.dtype)
     return np.dstack([colors, alpha])
 
 
@@ -237,6 +244,20 @@ def _levels(values: NDArray[Any], name: str) -> NDArray[Any]:
             f"{values.max()}; scale it, or give decals.DecalImage linear light, float32[h, w, 4]"
         )
     return np.rint(values * 255.0).astype(np.uint8)
+
+
+def _light(values: NDArray[Any], name: str) -> Float32Array:
+    """Return channels of linear light; light above `MAX_LIGHT` counts as that much."""
+    wrong = np.argwhere(~((values >= 0.0) & np.isfinite(values)))
+    if len(wrong):
+        row, column, channel = wrong[0].tolist()
+        raise InvalidImage(
+            f"{name}: expected finite light of at least 0, got {values[row, column, channel]:g} "
+            f"in row {row}, column {column}; replace such pixels"
+        )
+    light: Float32Array = np.minimum(values, MAX_LIGHT).astype(np.float32)
+    light[..., 3:] = np.minimum(light[..., 3:], 1.0)
+    return light
 
 
 def _picture_pixels(picture: Image.Image, name: str, max_edge: int = MAX_IMAGE_EDGE) -> Pixels:
@@ -255,13 +276,15 @@ def _has_invalid_color(reference: str, folder: Path | None) -> bool:
     return bool(mark) and name in BUILTIN_IMAGES and not is_file((folder or Path()) / reference)
 
 
-def read_image(path: Path) -> Pixels:
+def read_image(path: Path, *, advice: str = _ADVICE) -> Pixels:
     """Return the pixels of a picture file of any mode: grey, palette, 16 bit, with or without alpha.
 
     Parameters
     ----------
     path : Path
         A PNG, JPEG, WebP, TIFF, BMP, GIF, PPM, TGA, JPEG 2000, AVIF or Radiance (``.hdr``) file.
+    advice : str
+        End of the message for a missing file or another kind of file.
 
     Returns
     -------
@@ -287,7 +310,7 @@ def read_image(path: Path) -> Pixels:
     [128, 128, 128, 255]
     """
     if not is_file(path):
-        raise InvalidImage(f"expected an image, found no file {str(path)!r}; {_ADVICE}")
+        raise InvalidImage(f"expected an image, found no file {str(path)!r}; {advice}")
     try:
         with path.open("rb") as file:
             start = file.read(PNG_DEPTH + 1)
@@ -295,7 +318,7 @@ def read_image(path: Path) -> Pixels:
                 return decode_radiance(start + file.read(MAX_FILE_BYTES), str(path), MAX_IMAGE_EDGE)
     except OSError as error:
         raise InvalidImage(f"could not read the image {str(path)!r} ({error.strerror})") from error
-    pixels = _read_picture(path, str(path))
+    pixels = _read_picture(path, str(path), advice=advice)
     wide = start.startswith(b"\x89PNG") and start[PNG_DEPTH:] == b"\x10" and pixels.dtype == np.uint8
     return _wide_colors(path, pixels) if wide else pixels
 
@@ -315,10 +338,12 @@ def _wide_colors(path: Path, narrow: Pixels) -> Pixels:
     scalars: Any = pv.convert_array(image.GetPointData().GetScalars())
     values = scalars.reshape(height, width, -1)[::-1]
     colors = np.broadcast_to(values[..., :-1], (height, width, 3)) if values.shape[2] in (2, 4) else values
-    return np.dstack([colors, values[..., -1]]) if values.shape[2] in (2, 4) else _opaque(colors)
+    return np.dstack([colors, values[..., -1]]) if values.shape[2] in (2, 4) else opaque(colors)
 
 
-def _read_picture(file: Path | io.BytesIO, name: str, max_edge: int = MAX_IMAGE_EDGE) -> Pixels:
+def _read_picture(
+    file: Path | io.BytesIO, name: str, max_edge: int = MAX_IMAGE_EDGE, advice: str = _ADVICE
+) -> Pixels:
     """Return the pixels of a picture file; messages call it by a name."""
     try:
         # Pillow warns of odd tags, and of sizes, for which MAX_IMAGE_EDGE is the limit.
@@ -329,7 +354,7 @@ def _read_picture(file: Path | io.BytesIO, name: str, max_edge: int = MAX_IMAGE_
         ):
             return _picture_pixels(picture, name, max_edge)
     except UnidentifiedImageError as error:
-        raise InvalidImage(f"expected an image, {name!r} is not a picture; {_ADVICE}") from error
+        raise InvalidImage(f"expected an image, {name!r} is not a picture; {advice}") from error
     except Image.DecompressionBombError as error:
         raise InvalidImage(
             f"expected an image of 1 to {MAX_IMAGE_EDGE} pixels a side, "
@@ -365,7 +390,7 @@ def _check_size(picture: Image.Image, name: str, max_edge: int) -> None:
 def _to_rgba(picture: Image.Image) -> Pixels:
     if picture.mode.startswith("I;16"):
         grey = np.asarray(picture).astype(np.uint16)
-        return _opaque(np.dstack([grey, grey, grey]))
+        return opaque(np.dstack([grey, grey, grey]))
     if picture.mode.startswith(("I", "F")):
         return _wide_grey(np.asarray(picture, dtype=np.float64), picture.mode)
     return np.asarray(picture.convert("RGBA"), dtype=np.uint8)

@@ -10,6 +10,7 @@ Fourier transform computes without noise.
 import os
 from dataclasses import dataclass
 from functools import cache, cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -17,12 +18,17 @@ from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, Float64Array
 from decals.errors import InvalidImage, InvalidScene
-from decals.images.load import MAX_IMAGE_EDGE, AnyImage, image_pixels, is_embedded
-from decals.images.texels import linear_premultiplied
+from decals.images.load import AnyImage, image_pixels, is_embedded, read_image
+from decals.images.texels import Pixels, linear_premultiplied
 from decals.options import Values
 from decals.validation import MAX_LIGHT, finite_number, finite_vector, instance
 
 Vector = tuple[float, float, float]
+
+_ADVICE = (
+    "give an equirectangular picture, Radiance (.hdr) or a usual format such as PNG or JPEG; convert others, "
+    "such as OpenEXR, to .hdr"
+)
 
 ASPECTS = (1.9, 2.1)
 """Least and greatest width over height of a picture of all directions."""
@@ -62,7 +68,10 @@ class Panorama:
     def __init__(self, picture: AnyImage) -> None:
         source = os.fspath(picture) if isinstance(picture, str | os.PathLike) else ""
         self.source = "" if is_embedded(source) else source
-        self.light = _light(picture)
+        pixels = (
+            _file_pixels(source) if self.source else image_pixels(picture, name="environment", linear=True)
+        )
+        self.light = linear_premultiplied(pixels)[..., :3]
         height, width = self.light.shape[:2]
         if not ASPECTS[0] <= width / height <= ASPECTS[1]:
             raise InvalidImage(
@@ -78,7 +87,8 @@ class Panorama:
         return hash(self.light.shape)  # equal panoramas may come from several files
 
     def __repr__(self) -> str:
-        return repr(self.source)
+        height, width = self.light.shape[:2]
+        return repr(self.source) if self.source else f"<{width} x {height} pixels>"
 
     @cached_property
     def texels(self) -> NDArray[np.float16]:
@@ -103,9 +113,10 @@ class Environment:
     Parameters
     ----------
     picture : image
-        Path of an equirectangular picture, twice as wide as high: Radiance (``.hdr``), or any other as less
-        bright light; or an array ``[h, w, 3]``, of which floats are linear light and integers sRGB. Row 0 is
-        straight up, the middle column opposite to the front: at −z, or at +y for an ``up`` along z.
+        Equirectangular picture, twice as wide as high: the path of a Radiance file (``.hdr``), or, as less
+        bright light, of a usual picture; or an image without a path, see `decals.images.image_pixels`. In
+        arrays and lists, floats are linear light and integers sRGB. Row 0 is straight up, the middle column
+        opposite to the front: at −z, or at +y for an ``up`` along z.
     rotation : float
         Angle in degrees by which the picture turns about ``up``, counterclockwise as seen from above.
     strength : float
@@ -200,27 +211,12 @@ def environment_constants() -> str:
     )
 
 
-def _light(picture: Any) -> Float32Array:
-    """Return linear light ``[h, w, 3]`` of an image of any kind, or raise `InvalidImage`."""
-    if not (isinstance(picture, np.ndarray) and picture.dtype.kind == "f"):
-        return linear_premultiplied(image_pixels(picture, name="environment"))[..., :3]
-    if (
-        picture.ndim != 3
-        or picture.shape[2] not in (3, 4)
-        or not 0 < min(picture.shape) <= max(picture.shape) <= MAX_IMAGE_EDGE
-    ):
-        raise InvalidImage(
-            f"environment: expected light [h, w, 3] of 1 to {MAX_IMAGE_EDGE} pixels a side, "
-            f"got {list(picture.shape)}"
-        )
-    wrong = np.argwhere(~((picture >= 0.0) & np.isfinite(picture)))
-    if len(wrong):
-        row, column, channel = wrong[0].tolist()
-        raise InvalidImage(
-            f"environment: expected finite light of at least 0, got {picture[row, column, channel]:g} in row "
-            f"{row}, column {column}; replace such pixels"
-        )
-    return np.minimum(picture[..., :3], MAX_LIGHT).astype(np.float32)
+def _file_pixels(path: str) -> Pixels:
+    """Return the pixels of a file, or raise an `InvalidImage` that says which files are environments."""
+    try:
+        return read_image(Path(path), advice=_ADVICE)
+    except InvalidImage as error:
+        raise InvalidImage(f"environment: {error}") from error
 
 
 def picture_texels(light: Float32Array, max_edge: int) -> NDArray[np.float16]:

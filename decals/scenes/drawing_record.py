@@ -3,21 +3,19 @@
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict
 
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.field.law import LAWS, ContactLaw
 from decals.field.mapping import ImageMapping
-from decals.images.load import embedded_image, is_embedded
+from decals.images.load import embedded_image, is_embedded, opaque
 from decals.record import DEFAULT_STIFFNESS, Contact
 from decals.rendering.environment import Environment
 from decals.rendering.lights import Light, Lighting
 from decals.rendering.options import STUDIO, Background, Drawing
 from decals.scenes.camera import Vector
-from decals.scenes.records import absolute, relative
-from decals.validation import is_file
+from decals.scenes.records import absolute, picture_source
 
 FORMER_CONTACT = Contact.PRODUCT
 """Contact mode of files that name none: their pictures were drawn with it."""
@@ -95,13 +93,8 @@ def drawing_record(drawing: Drawing, folder: Path) -> DrawingRecord:
 
 
 def _environment_record(environment: Environment, folder: Path) -> _EnvironmentRecord:
-    """Describe an environment: a file by its path, another picture in full."""
     panorama = environment.picture
-    if is_file(Path(panorama.source)):
-        picture = relative(panorama.source, folder)
-    else:
-        opaque = np.ones((*panorama.light.shape[:2], 1), np.float32)
-        picture = embedded_image(np.concatenate([panorama.light, opaque], axis=-1))
+    picture = picture_source(panorama.source, folder) or embedded_image(opaque(panorama.light))
     others = _EnvironmentRecord.__struct_fields__[1:]
     return _EnvironmentRecord(picture, *(getattr(environment, name) for name in others))
 

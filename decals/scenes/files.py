@@ -38,7 +38,6 @@ from blobtree.files import write_atomically
 from blobtree.json_errors import json_reason
 from blobtree.progress import Progress, reporting
 from decals.errors import ImplicitDecalsError, InvalidScene
-from decals.images.builtin import is_builtin
 from decals.images.load import embedded_image, is_embedded, load_image
 from decals.model import Decals
 from decals.scenes.camera import Camera, Vector
@@ -57,9 +56,9 @@ from decals.scenes.records import (
     check_inside,
     decals_of,
     object_of,
+    picture_source,
     record_of,
     records_of,
-    relative,
 )
 from decals.scenes.scene import DecalImage, Scene
 from decals.validation import as_path, instance, is_file
@@ -251,14 +250,9 @@ def from_json(
 
 def _image_record(image: DecalImage, folder: Path) -> str | MaterialRecord:
     """Return an image as a file has it."""
-    return material_record(image) if isinstance(image, DecalMaterial) else _image_source(image, folder)
-
-
-def _image_source(image: DecalImage, folder: Path) -> str:
-    """Return the name or the path of an image; the picture itself if it has neither."""
-    if is_builtin(image.source) or is_file(Path(image.source)):
-        return relative(image.source, folder)
-    return embedded_image(image.pixels)
+    if isinstance(image, DecalMaterial):
+        return material_record(image)
+    return picture_source(image.source, folder) or embedded_image(image.pixels)
 
 
 def _images(sources: list[str | MaterialRecord], folder: Path, trust: bool) -> tuple[DecalImage, ...]:

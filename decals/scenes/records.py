@@ -19,6 +19,7 @@ from decals.scenes.objects import MeshObject, Paths, SceneObject, TreeObject
 from decals.scenes.origin import WORLD
 from decals.surfaces.mesh_file import MeshArrays, read_mesh
 from decals.surfaces.normals import CREASE_ANGLE
+from decals.validation import is_file
 
 SAMPLE = "sample:"
 """How the source of a mesh begins that is a sample and no file."""
@@ -152,6 +153,11 @@ def relative(source: str, folder: Path) -> str:
         return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
     except ValueError:  # another drive
         return path.resolve().as_posix()
+
+
+def picture_source(source: str, folder: Path) -> str:
+    """Return the name or the path of a picture as a file has it; empty if it has neither."""
+    return relative(source, folder) if is_builtin(source) or is_file(Path(source)) else ""
 
 
 def absolute(source: str, folder: Path) -> str:

@@ -14,7 +14,8 @@ import blobtree
 from blobtree import Point
 from decals import Camera, Contact, ImageMapping, MeshObject, Scene, TreeObject, load_scene, save_scene
 from decals.apps.cli import run
-from decals.rendering import Environment, Renderer, RenderOptions
+from decals.apps.commands.scatter_options import ScatterOptions
+from decals.rendering import Drawing, Environment, Renderer, RenderOptions
 from tests.apps.commands.pictures import picture, small
 
 Capture = pytest.CaptureFixture[str]
@@ -72,7 +73,9 @@ def test_contact_and_mapping_are_passed_to_the_renderer(folder: Path) -> None:
                 assert default == np.array_equal(drawn, picture(folder / "default.png"))
 
 
-def test_an_environment_is_kept_and_changed(folder: Path, capsys: Capture) -> None:
+def test_an_environment_is_kept_and_changed(
+    folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pv.Sphere().save(folder / "ball.ply")
     Image.new("RGB", (16, 8), (200, 30, 30)).save(folder / "sky.png")
     lit = ["--environment", "sky.png", "--environment-rotation", "-30", "--environment-visible"]
@@ -80,12 +83,16 @@ def test_an_environment_is_kept_and_changed(folder: Path, capsys: Capture) -> No
     wanted = Environment("sky.png", rotation=-30, visible=True, up=(0, 0, 1))
     assert load_scene(folder / "s.json").drawing.environment == wanted
     assert (picture(folder / "lit.png")[0, 0, :3] == picture(folder / "lit.png")[-1, -1, :3]).all()
+    load_scene(folder / "s.json").replace(drawing=Drawing()).save(folder / "plain.json")
     dim = ["--environment-strength", "0.5", "--save", "d.json"]
     assert run(["render", "s.json", "--size", "32x24", *dim, "-o", "dim.png"]) == 0
     assert load_scene(folder / "d.json").drawing.environment == replace(wanted, strength=0.5)
     assert picture(folder / "dim.png").mean() < picture(folder / "lit.png").mean() - 5
-    assert run([*small("ball.ply"), "--environment-strength", "2", "-o", "no.png"]) == 2
-    assert "give --environment" in capsys.readouterr().err
+    monkeypatch.setattr(ScatterOptions, "scene", None)  # refused before decals are scattered
+    for change in (["--environment-strength", "2"], ["--environment-visible"]):
+        for model in (small("ball.ply"), ["render", "plain.json"]):
+            assert run([*model, *change, "-o", "no.png"]) == 2
+            assert "give --environment" in capsys.readouterr().err
 
 
 def test_the_crease_angle_of_meshes(folder: Path, capsys: Capture) -> None:

@@ -10,7 +10,14 @@ from PIL import Image
 import decals
 from blobtree._typing import Float64Array
 from decals.errors import InvalidImage, InvalidScene
-from decals.images import BUILTIN_IMAGES, MAX_IMAGE_EDGE, generate_image, load_image, read_image
+from decals.images import (
+    BUILTIN_IMAGES,
+    MAX_IMAGE_EDGE,
+    generate_image,
+    image_pixels,
+    load_image,
+    read_image,
+)
 from decals.images.load import embedded_image, is_embedded
 from decals.images.texels import as_bytes, linear_premultiplied
 
@@ -255,6 +262,25 @@ def test_impossible_light_is_refused(value: float) -> None:
     pixels[0, 1, 2] = value
     with pytest.raises(InvalidScene, match=r"expected linear light from 0 to 65504"):
         decals.DecalImage("lamp", pixels)
+
+
+def test_floats_of_arrays_are_srgb_or_linear_light() -> None:
+    rows = [[[0.5, 0.25, 1.0, 0.5], [0.0, 0.0, 0.0, 1.0]]]
+    assert image_pixels(rows)[0, 0].tolist() == [128, 64, 255, 128]  # type: ignore[arg-type]
+    light = image_pixels(np.array(rows) * 70000, linear=True)
+    assert light.dtype == np.float32
+    assert light[0].tolist() == [[35000.0, 17500.0, 65504.0, 1.0], [0.0, 0.0, 0.0, 1.0]]
+    assert image_pixels(np.array([[3.0]]), linear=True).tolist() == [[[3.0, 3.0, 3.0, 1.0]]]
+    assert image_pixels(np.array([[51]], np.uint8), linear=True).tolist() == [[[51, 51, 51, 255]]]
+    with pytest.raises(InvalidImage, match="got -1 in row 0, column 1; replace"):
+        image_pixels(np.array([[0.0, -1.0]]), linear=True)
+
+
+def test_the_end_of_messages_about_files_is_an_argument(tmp_path: Path) -> None:
+    (tmp_path / "text.png").write_text("no picture")
+    for name, says in (("none.png", "found no file"), ("text.png", "is not a picture")):
+        with pytest.raises(InvalidImage, match=f"{says}.*; draw one$"):
+            read_image(tmp_path / name, advice="draw one")
 
 
 def test_float_picture(tmp_path: Path) -> None:

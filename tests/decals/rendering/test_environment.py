@@ -255,9 +255,11 @@ BROKEN = np.ones((4, 8, 3))
         ((BROKEN * np.inf,), "got inf in row 0"),
         ((np.ones((1, 1, 3)),), "twice as wide as high, got 1 x 1"),
         ((np.ones((64, 64, 3), np.uint8),), "twice as wide as high, got 64 x 64"),
-        ((np.ones((4, 8, 2)),), r"expected light \[h, w, 3\]"),
-        ((np.ones((0, 8, 3)),), "expected light"),
-        (("no such sky.hdr",), "found no file"),
+        ((np.ones((4, 8, 2)),), r"environment: expected an image of shape .*\[4, 8, 2\]"),
+        ((np.ones((0, 8, 3)),), r"environment: expected an image .*\[0, 8, 3\]"),
+        (("no such sky.hdr",), r"environment: .*found no file 'no such sky.hdr'; .* Radiance \(.hdr\)"),
+        (("scale",), "environment: .*found no file 'scale'; give an equirectangular picture"),
+        ((__file__,), r"environment: .*is not a picture; .*, such as OpenEXR, to \.hdr"),
         ((5,), "environment: expected"),
         ((BROKEN, np.nan), "rotation"),
         ((BROKEN, 0.0, -1.0), "strength: expected 0, which is darkness, to 65504, got -1"),
@@ -276,6 +278,10 @@ def test_invalid_environments_are_refused(arguments: Any, message: str) -> None:
 
 def test_pictures_of_all_kinds_are_linear_light(tmp_path: Path) -> None:
     assert Environment(np.full((2, 4, 3), 1e9)).picture.light.max() == 65504
+    for kind in (np.array, np.ndarray.tolist):
+        half, grey = kind(np.full((2, 4, 3), 0.5)), kind(np.full((2, 4), 3.0))
+        np.testing.assert_array_equal(Environment(half).picture.light, 0.5)
+        np.testing.assert_array_equal(Environment(grey).picture.light, np.full((2, 4, 3), 3.0))
     np.testing.assert_allclose(
         Environment(np.full((2, 4, 3), 128, np.uint8)).picture.light,
         decode_srgb(np.array(128 / 255)),
@@ -289,3 +295,5 @@ def test_pictures_of_all_kinds_are_linear_light(tmp_path: Path) -> None:
     assert hash(loaded) == hash(same)
     assert loaded != Environment(loaded.picture, rotation=1)
     assert loaded != EVEN
+    assert repr(loaded).startswith(f"Environment(picture={str(tmp_path / 'sky.hdr')!r}, rotation=0.0")
+    assert repr(same).startswith("Environment(picture=<4 x 2 pixels>, rotation=0.0")

@@ -96,7 +96,7 @@ def test_files_and_scripts_keep_environments(tmp_path: Path) -> None:
     assert json.loads(text)["drawing"]["environment"] == {**shown, "picture": "sky.png", "up": [0, 0, 1]}
     for old, new, says in (
         ('"sky.png"', '"../sky.png"', "in the folder of the scene"),
-        ('"sky.png"', '"no.png"', "drawing: expected an image, found no file"),
+        ('"sky.png"', '"no.png"', "drawing: environment: expected an image, found no file"),
         ('"strength":2.0', '"strength":-2.0', "strength: expected 0, which is darkness"),
         ('"visible":true', '"visible":3', "environment.visible"),
     ):

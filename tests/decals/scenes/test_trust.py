@@ -82,7 +82,9 @@ def test_the_command_line_has_an_option_for_trust(folder: Path, capfd: pytest.Ca
 
 def test_a_trusted_scene_is_the_one_that_was_saved(folder: Path) -> None:
     """Also one in another folder than its files."""
-    scene = decals.load_scene(write_scene(folder))
+    Image.new("RGB", (4, 2), (90, 90, 200)).save(folder / "sky.png")
+    sky = decals.rendering.Drawing(environment=str(folder / "sky.png"))
+    scene = decals.load_scene(write_scene(folder)).replace(drawing=sky)
     other = folder.parent / "other"
     other.mkdir()
     decals.save_scene(scene, other / "again.json")
@@ -90,6 +92,7 @@ def test_a_trusted_scene_is_the_one_that_was_saved(folder: Path) -> None:
         decals.load_scene(other / "again.json")
     again = decals.load_scene(other / "again.json", trust=True)
     assert np.array_equal(again.images[0].pixels, scene.images[0].pixels)
+    assert again.drawing == sky
 
 
 def test_number_and_size_of_images_are_limited(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
