@@ -272,3 +272,16 @@ class ActionState:
                 self._slow_steps = self._slow_steps + 1 if time.thread_time() - began > SLOW_STEP else 0
         except ImplicitDecalsError as error:
             self.message = str(error)
+
+
+class WindowActions:
+    """Base of classes of actions on the state of a window.
+
+    Parameters
+    ----------
+    state
+        State of the window.
+    """
+
+    def __init__(self, state: ActionState) -> None:
+        self._state = state

@@ -1,7 +1,7 @@
 """Actions of the editing window by name: selection, history, and those on files, decals and trees.
 
-To add an action, write a method with the `action` decorator in `Actions` or one of the classes that it names.
-The key table and the help follow from it.
+To add an action, write a method with the decorator `Group.action` in `Actions` or one of the classes that it
+names. The key table and the help follow from it.
 """
 
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from decals.editing.brush_actions import BrushActions
 from decals.editing.commands import DeleteDecals, DuplicateDecals
 from decals.editing.decal_actions import DecalActions
 from decals.editing.file_actions import FileActions
-from decals.editing.key_bindings import UNREGISTERED, Group, KeyTable, action, registered_actions
+from decals.editing.key_bindings import UNREGISTERED, Group, KeyTable, registered_actions
 from decals.editing.session import EditSession, UndoEntry
 from decals.editing.tree_actions import TreeActions
 from decals.editing.view_actions import ViewActions
@@ -119,16 +119,14 @@ class Actions:
 
     # -- selection --------------------------------------------------------------------------------------
 
-    @action("select", "Click", summary="select the decal under the cursor", group=Group.SELECTION)
+    @Group.SELECTION.action("select", "Click", summary="select the decal under the cursor")
     def select(self, cursor: Cursor) -> None:
         """Select the decal under the cursor, or none."""
         pick = self.state.picked = cursor()
         self.state.selection = () if pick is None else self.state.selectable([pick.owner])
         self.state.message = f"decal {pick.owner}" if pick is not None and self.state.selection else ""
 
-    @action(
-        "select_also", "Shift+Click", summary="add it to the selection, or remove it", group=Group.SELECTION
-    )
+    @Group.SELECTION.action("select_also", "Shift+Click", summary="add it to the selection, or remove it")
     def select_also(self, cursor: Cursor) -> None:
         """Add the decal under the cursor to the selection, or remove it."""
         pick = cursor()
@@ -139,17 +137,14 @@ class Actions:
         self.state.selection = others if pick.owner in selection else (*others, pick.owner)
         self.state.message = f"{len(self.state.selection)} decals"
 
-    @action("select_all", "Ctrl+a", summary="select all decals", group=Group.SELECTION)
+    @Group.SELECTION.action("select_all", "Ctrl+a", summary="select all decals")
     def select_all(self, _cursor: Cursor) -> None:
         """Select all decals."""
         self.state.selection = self.state.selectable(self.state.session.document.decals.numbers)
         self.state.message = f"{len(self.state.selection)} decals"
 
-    @action(
-        "deselect",
-        "Escape",
-        summary="deselect all; revert a drag; cancel a background edit",
-        group=Group.SELECTION,
+    @Group.SELECTION.action(
+        "deselect", "Escape", summary="deselect all; revert a drag; cancel a background edit"
     )
     def deselect(self, _cursor: Cursor) -> None:
         """Deselect all decals, revert the drag, and cancel the background edit."""
@@ -157,11 +152,8 @@ class Actions:
         self.state.background.cancel()
         self.state.session.cancel_stroke()
 
-    @action(
-        "duplicate",
-        "d",
-        summary="duplicate the selected decals, else the selected primitive",
-        group=Group.SELECTION,
+    @Group.SELECTION.action(
+        "duplicate", "d", summary="duplicate the selected decals, else the selected primitive"
     )
     def duplicate(self, _cursor: Cursor) -> None:
         """Duplicate the selected decals and select the copies, or duplicate the selected primitive."""
@@ -177,12 +169,8 @@ class Actions:
 
         state.run(DuplicateDecals(state.selected_numbers), select)
 
-    @action(
-        "delete",
-        "Delete",
-        "BackSpace",
-        summary="delete the selected decals, else the selected primitive",
-        group=Group.SELECTION,
+    @Group.SELECTION.action(
+        "delete", "Delete", "BackSpace", summary="delete the selected decals, else the selected primitive"
     )
     def delete(self, _cursor: Cursor) -> None:
         """Delete the selected decals, or the selected primitive."""
@@ -193,12 +181,12 @@ class Actions:
 
     # -- scene ------------------------------------------------------------------------------------------
 
-    @action("undo", "Ctrl+z", summary="undo", group=Group.SCENE)
+    @Group.SCENE.action("undo", "Ctrl+z", summary="undo")
     def undo(self, _cursor: Cursor) -> None:
         """Undo the last entry."""
         self._step_through_history(lambda: self.state.session.next_undo, "undo", _undo)
 
-    @action("redo", "Ctrl+y", "Ctrl+Shift+z", summary="redo", group=Group.SCENE)
+    @Group.SCENE.action("redo", "Ctrl+y", "Ctrl+Shift+z", summary="redo")
     def redo(self, _cursor: Cursor) -> None:
         """Redo the entry that was undone last."""
         self._step_through_history(lambda: self.state.session.next_redo, "redo", _redo)
@@ -224,41 +212,26 @@ class Actions:
 
         state.background.when_followed(followed)
 
-    @action(
-        "next_contact",
-        "p",
-        summary="contact mode: product, min, radial, elastic",
-        group=Group.SCENE,
-    )
+    @Group.SCENE.action("next_contact", "p", summary="contact mode: product, min, radial, elastic")
     def next_contact(self, _cursor: Cursor) -> None:
         """Draw with the next contact mode."""
         contact = Contact((int(self.state.session.document.drawing.contact) + 1) % len(Contact))
         self.state.draw_with(f"contact mode: {contact.name.lower()}", contact=contact)
 
-    @action(
-        "next_stiffness",
-        "Shift+p",
-        summary="stiffness of elastic contact: 1, 1.5, 2, 3, 6",
-        group=Group.SCENE,
-    )
+    @Group.SCENE.action("next_stiffness", "Shift+p", summary="stiffness of elastic contact: 1, 1.5, 2, 3, 6")
     def next_stiffness(self, _cursor: Cursor) -> None:
         """Draw with the next stiffness."""
         present = self.state.session.document.drawing.stiffness
         stiffness = next((one for one in STIFFNESSES if one > present), STIFFNESSES[0])
         self.state.draw_with(f"stiffness of elastic contact: {stiffness:g}", stiffness=stiffness)
 
-    @action(
-        "next_mapping",
-        "u",
-        summary="image mapping of the window: corrected, chord, walked",
-        group=Group.SCENE,
-    )
+    @Group.SCENE.action("next_mapping", "u", summary="image mapping of the window: corrected, chord, walked")
     def next_mapping(self, _cursor: Cursor) -> None:
         """Draw with the next image mapping."""
         mapping = ImageMapping((self.state.session.document.drawing.mapping - 1) % len(ImageMapping))
         self.state.draw_with(f"image mapping: {mapping.name.lower()}", mapping=mapping)
 
-    @action("help", "h", "F1", summary="show this help, its next page, or hide it", group=Group.SCENE)
+    @Group.SCENE.action("help", "h", "F1", summary="show this help, its next page, or hide it")
     def turn_help(self, _cursor: Cursor) -> None:
         """Show the help or its next page; after the last page hide it."""
         self.help_page = (self.help_page + 1) % (self.help_pages + 1)

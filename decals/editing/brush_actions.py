@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from decals.editing.action_state import ActionState, Cursor
+from decals.editing.action_state import Cursor, WindowActions
 from decals.editing.brushes import Brush
-from decals.editing.key_bindings import Group, action
+from decals.editing.key_bindings import Group
 
 BRUSHES = {
     Brush.SELECT: ("w", "select and move decals"),
@@ -21,17 +21,8 @@ BRUSHES = {
 """Key of each brush, and what it does."""
 
 
-class BrushActions:
-    """Actions that choose the brush: one per entry of `BRUSHES`, "brush_select" and so on.
-
-    Parameters
-    ----------
-    state
-        State of the window.
-    """
-
-    def __init__(self, state: ActionState) -> None:
-        self._state = state
+class BrushActions(WindowActions):
+    """Actions that choose the brush: one per entry of `BRUSHES`, "brush_select" and so on."""
 
     def choose(self, brush: Brush) -> None:
         """Drag with a brush from now on."""
@@ -46,5 +37,5 @@ def _choosing(brush: Brush) -> Callable[[BrushActions, Cursor], None]:
 
 
 for _brush, (_key, _summary) in BRUSHES.items():
-    _register = action(f"brush_{_brush}", _key, summary=_summary, group=Group.BRUSHES)
+    _register = Group.BRUSHES.action(f"brush_{_brush}", _key, summary=_summary)
     setattr(BrushActions, f"choose_{_brush}", _register(_choosing(_brush)))

@@ -8,10 +8,10 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Int32Array
 from blobtree.progress import Progress
-from decals.editing.action_state import ActionState, Cursor, require_pick
+from decals.editing.action_state import Cursor, WindowActions, require_pick
 from decals.editing.commands import AddDecals, MapValues, OrderDecals, ScaleDecals, TurnDecals
 from decals.editing.document import Document
-from decals.editing.key_bindings import Group, action
+from decals.editing.key_bindings import Group
 from decals.editing.queries import mean_normal, nearest_points
 from decals.editing.scatter_commands import RelaxDecals, ScatterDecals
 from decals.editing.session import Command
@@ -63,18 +63,10 @@ def new_decal(document: Document, position: Float32Array, normal: Float32Array, 
     )
 
 
-class DecalActions:
-    """Actions on the selected decals, and on decals under the cursor.
+class DecalActions(WindowActions):
+    """Actions on the selected decals, and on decals under the cursor."""
 
-    Parameters
-    ----------
-    state
-        State of the window.
-    """
-
-    def __init__(self, state: ActionState) -> None:
-        self._state = state
-        self._scatter_count = 0
+    _scatter_count = 0
 
     def _map(self, label: str, name: str, function: Callable[[Decals], ArrayLike]) -> None:
         """Set a value of the selected decals to a function of them."""
@@ -84,7 +76,7 @@ class DecalActions:
     def _last_selected(self) -> Decals:
         return self._state.session.document.decals[int(self._state.selected_numbers[-1])]
 
-    @action("add_decal", "Ctrl+Click", "a", summary="add a decal under the cursor", group=Group.DECALS)
+    @Group.DECALS.action("add_decal", "Ctrl+Click", "a", summary="add a decal under the cursor")
     def add_decal(self, cursor: Cursor) -> None:
         """Add a decal like the last selected one, and select it."""
         state, pick = self._state, require_pick(cursor)
@@ -92,58 +84,34 @@ class DecalActions:
         state.run(AddDecals(new_decal(state.session.document, pick.position, pick.normal, model)))
         state.selection = (state.session.document.decals.next_number - 1,)
 
-    @action(
-        "larger",
-        "Ctrl+WheelUp",
-        "plus",
-        "equal",
-        "KP_Add",
-        summary="larger",
-        group=Group.DECALS,
-        repeats=True,
-    )
+    @Group.DECALS.action("larger", "Ctrl+WheelUp", "plus", "equal", "KP_Add", summary="larger", repeats=True)
     def larger(self, _cursor: Cursor) -> None:
         """Enlarge the selected decals."""
         self._state.run(ScaleDecals(self._state.selected_numbers, SCALE_STEP))
 
-    @action(
-        "smaller",
-        "Ctrl+WheelDown",
-        "minus",
-        "KP_Subtract",
-        summary="smaller",
-        group=Group.DECALS,
-        repeats=True,
-    )
+    @Group.DECALS.action("smaller", "Ctrl+WheelDown", "minus", "KP_Subtract", summary="smaller", repeats=True)
     def smaller(self, _cursor: Cursor) -> None:
         """Shrink the selected decals."""
         self._state.run(ScaleDecals(self._state.selected_numbers, 1.0 / SCALE_STEP))
 
-    @action(
-        "turn_left",
-        "Shift+WheelUp",
-        "comma",
-        summary="turn counter-clockwise",
-        group=Group.DECALS,
-        repeats=True,
+    @Group.DECALS.action(
+        "turn_left", "Shift+WheelUp", "comma", summary="turn counter-clockwise", repeats=True
     )
     def turn_left(self, _cursor: Cursor) -> None:
         """Turn the selected decals counter-clockwise."""
         self._state.run(TurnDecals(self._state.selected_numbers, TURN_STEP))
 
-    @action(
-        "turn_right", "Shift+WheelDown", "period", summary="turn clockwise", group=Group.DECALS, repeats=True
-    )
+    @Group.DECALS.action("turn_right", "Shift+WheelDown", "period", summary="turn clockwise", repeats=True)
     def turn_right(self, _cursor: Cursor) -> None:
         """Turn the selected decals clockwise."""
         self._state.run(TurnDecals(self._state.selected_numbers, -TURN_STEP))
 
-    @action("next_image", "i", summary="next image", group=Group.DECALS)
+    @Group.DECALS.action("next_image", "i", summary="next image")
     def next_image(self, _cursor: Cursor) -> None:
         """Give each selected decal the next image; after the last one comes the plain tint."""
         self._shift_image(1)
 
-    @action("previous_image", "Shift+i", summary="previous image", group=Group.DECALS)
+    @Group.DECALS.action("previous_image", "Shift+i", summary="previous image")
     def previous_image(self, _cursor: Cursor) -> None:
         """Give each selected decal the previous image."""
         self._shift_image(-1)
@@ -152,7 +120,7 @@ class DecalActions:
         count = len(self._state.session.document.images) - NO_IMAGE
         self._map("change the image", "images", lambda d: (d.images - NO_IMAGE + step) % count + NO_IMAGE)
 
-    @action("next_tint", "t", summary="next tint", group=Group.DECALS)
+    @Group.DECALS.action("next_tint", "t", summary="next tint")
     def next_tint(self, _cursor: Cursor) -> None:
         """Give the selected decals the tint after the first one's."""
 
@@ -162,22 +130,22 @@ class DecalActions:
 
         self._map("tint", "tints", tint)
 
-    @action("fainter", "o", summary="more transparent", group=Group.DECALS, repeats=True)
+    @Group.DECALS.action("fainter", "o", summary="more transparent", repeats=True)
     def fainter(self, _cursor: Cursor) -> None:
         """Lower the opacity of the selected decals."""
         self._map("fade", "opacities", lambda d: d.opacities * FADE_STEP)
 
-    @action("stronger", "Shift+o", summary="less transparent", group=Group.DECALS, repeats=True)
+    @Group.DECALS.action("stronger", "Shift+o", summary="less transparent", repeats=True)
     def stronger(self, _cursor: Cursor) -> None:
         """Raise the opacity of the selected decals."""
         self._map("fade", "opacities", lambda d: np.minimum(d.opacities / FADE_STEP, 1.0))
 
-    @action("layer_up", "Prior", summary="one layer up", group=Group.DECALS)
+    @Group.DECALS.action("layer_up", "Prior", summary="one layer up")
     def layer_up(self, _cursor: Cursor) -> None:
         """Raise the layer of the selected decals."""
         self._shift_layer(1)
 
-    @action("layer_down", "Next", summary="one layer down", group=Group.DECALS)
+    @Group.DECALS.action("layer_down", "Next", summary="one layer down")
     def layer_down(self, _cursor: Cursor) -> None:
         """Lower the layer of the selected decals."""
         self._shift_layer(-1)
@@ -189,12 +157,12 @@ class DecalActions:
 
         self._map(f"layer {shifted(self._last_selected)[0]}", "layers", shifted)
 
-    @action("bring_to_front", "Shift+Prior", summary="in front of its layer", group=Group.DECALS)
+    @Group.DECALS.action("bring_to_front", "Shift+Prior", summary="in front of its layer")
     def bring_to_front(self, _cursor: Cursor) -> None:
         """Draw the selected decals over all others of their layers and interactions."""
         self._order(front=True)
 
-    @action("send_to_back", "Shift+Next", summary="behind its layer", group=Group.DECALS)
+    @Group.DECALS.action("send_to_back", "Shift+Next", summary="behind its layer")
     def send_to_back(self, _cursor: Cursor) -> None:
         """Draw the selected decals under all others of their layers and interactions."""
         self._order(front=False)
@@ -208,7 +176,7 @@ class DecalActions:
 
         self._state.run(command, select)
 
-    @action("next_interaction", "k", summary="push, overlap or independent", group=Group.DECALS)
+    @Group.DECALS.action("next_interaction", "k", summary="push, overlap or independent")
     def next_interaction(self, _cursor: Cursor) -> None:
         """Give each selected decal the next interaction."""
 
@@ -219,12 +187,12 @@ class DecalActions:
         name = Interaction(int(shifted(self._last_selected)[0])).name.lower()
         self._map(f"interaction: {name}", "interactions", shifted)
 
-    @action("relax", "x", summary="even out the decals around the cursor", group=Group.MANY)
+    @Group.MANY.action("relax", "x", summary="even out the decals around the cursor")
     def relax(self, cursor: Cursor) -> None:
         """Even out the decals around the cursor."""
         self._state.run(RelaxDecals(require_pick(cursor).position))
 
-    @action("scatter", "g", summary="scatter new decals over the object under the cursor", group=Group.MANY)
+    @Group.MANY.action("scatter", "g", summary="scatter new decals over the object under the cursor")
     def scatter(self, cursor: Cursor) -> None:
         """Replace the decals on an object by as many scattered ones, with another seed each time."""
         self.scatter_over((require_pick(cursor).object,))

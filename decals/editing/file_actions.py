@@ -10,9 +10,9 @@ from blobtree.progress import Cancel, Progress
 from blobtree.pyvista_views import MESH_SUFFIXES
 from decals.baking.bake import SUFFIX as BAKED_SUFFIX
 from decals.baking.bake import bake
-from decals.editing.action_state import ActionState, Cursor
+from decals.editing.action_state import ActionState, Cursor, WindowActions
 from decals.editing.commands import AddImage, ReplaceScene
-from decals.editing.key_bindings import Group, action
+from decals.editing.key_bindings import Group
 from decals.editing.prompts import Question, TextPrompt
 from decals.editing.recovery import RecoveryFile
 from decals.editing.session import Command
@@ -56,7 +56,7 @@ NOTHING = object()
 """Mark that no changes were discarded."""
 
 
-class FileActions:
+class FileActions(WindowActions):
     """Actions on the scene's file.
 
     Parameters
@@ -85,7 +85,7 @@ class FileActions:
     """
 
     def __init__(self, state: ActionState, path: str | PathLike[str] | None) -> None:
-        self._state = state
+        super().__init__(state)
         self.path = path
         self.camera: Callable[[], Camera | None] = lambda: None
         self.leave: Callable[[], None] = lambda: None
@@ -110,7 +110,7 @@ class FileActions:
 
     # -- saving -----------------------------------------------------------------------------------------
 
-    @action("save", "Ctrl+s", summary="save", group=Group.SCENE)
+    @Group.SCENE.action("save", "Ctrl+s", summary="save")
     def save(self, cursor: Cursor) -> None:
         """Save the scene; a scene without a file asks for its name."""
         if self.path is None:
@@ -118,7 +118,7 @@ class FileActions:
         else:
             self._save_to(self.path)
 
-    @action("save_as", "Ctrl+Shift+s", summary="save to another file", group=Group.SCENE)
+    @Group.SCENE.action("save_as", "Ctrl+Shift+s", summary="save to another file")
     def save_as(self, _cursor: Cursor) -> None:
         """Ask for another file, and save the scene to it."""
         self._ask_for_name(self._save_to)
@@ -141,7 +141,7 @@ class FileActions:
 
     # -- other files ------------------------------------------------------------------------------------
 
-    @action("export", "Ctrl+e", summary="export the surface as a mesh file", group=Group.SCENE)
+    @Group.SCENE.action("export", "Ctrl+e", summary="export the surface as a mesh file")
     def export(self, _cursor: Cursor) -> None:
         """Ask for a file, and write all objects to it as one mesh; its suffix is the format."""
         if not self._state.session.document.objects:
@@ -252,7 +252,7 @@ class FileActions:
         self.recovery.release()
         state.background.compute(f"open {path.name}", compute, done)
 
-    @action("add_image", "Ctrl+i", summary="add an image for decals", group=Group.SCENE)
+    @Group.SCENE.action("add_image", "Ctrl+i", summary="add an image for decals")
     def add_image(self, _cursor: Cursor) -> None:
         """Ask for the name of an image, and add it to the scene."""
 
@@ -295,7 +295,7 @@ class FileActions:
         if message:
             self._state.show(message)
 
-    @action("close", "q", summary="close the window; it asks if there are unsaved changes", group=Group.SCENE)
+    @Group.SCENE.action("close", "q", summary="close the window; it asks if there are unsaved changes")
     def close(self, _cursor: Cursor) -> None:
         """Close the window, or ask if that would lose changes."""
         if self.may_close():

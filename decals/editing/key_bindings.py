@@ -9,7 +9,7 @@ Method = TypeVar("Method", bound=Callable[..., None])
 
 
 class Group(Enum):
-    """Section of the help in which an action stands."""
+    """Section of the help in which an action stands; its decorator `action` registers one."""
 
     SELECTION = "Selection"
     DECALS = "Decals"
@@ -18,6 +18,17 @@ class Group(Enum):
     SHAPE = "Shape"
     SCENE = "Scene"
     CAMERA = "Camera"
+
+    def action(
+        self, name: str, *gestures: str, summary: str, repeats: bool = False
+    ) -> Callable[[Method], Method]:
+        """Register a method as the action of some gestures; see `Binding` for the parameters."""
+
+        def register(method: Method) -> Method:
+            _REGISTERED[method] = Binding(name, gestures, summary, self, repeats)
+            return method
+
+        return register
 
 
 @dataclass(frozen=True)
@@ -48,18 +59,6 @@ class Binding:
 
 
 _REGISTERED: dict[Any, Binding] = {}
-
-
-def action(
-    name: str, *gestures: str, summary: str, group: Group, repeats: bool = False
-) -> Callable[[Method], Method]:
-    """Register a method as the action of some gestures; see `Binding` for the parameters."""
-
-    def register(method: Method) -> Method:
-        _REGISTERED[method] = Binding(name, gestures, summary, group, repeats)
-        return method
-
-    return register
 
 
 def registered_actions(owner: type) -> dict[str, tuple[Binding, Callable[..., None]]]:

@@ -13,11 +13,11 @@ from blobtree.formulas.falloff import RIM
 from blobtree.nodes.paths import Path, node_at, node_in_world, primitive_at
 from blobtree.nodes.places import Place
 from blobtree.nodes.surgery import Join, dominant_primitive, join_of, path_of, world_space_path
-from decals.editing.action_state import ActionState, Cursor, require_pick
+from decals.editing.action_state import Cursor, WindowActions, require_pick
 from decals.editing.background import Step
 from decals.editing.decal_actions import TINTS
 from decals.editing.gizmo import Handle, HandleDrag, Ray, handles_of, moved_point, snap_distance
-from decals.editing.key_bindings import Group, action
+from decals.editing.key_bindings import Group
 from decals.editing.queries import SurfacePick
 from decals.editing.scatter_commands import AddObject, RemoveObject
 from decals.editing.session import EditSession
@@ -72,27 +72,16 @@ MAX_DECALS_IN_DRAG = 5_000
 """With more decals than this, dragging a primitive runs in the background."""
 
 
-class TreeActions:
-    """Actions on the selected primitive, or on the primitive or object under the cursor.
+class TreeActions(WindowActions):
+    """Actions on the selected primitive, or on the primitive or object under the cursor."""
 
-    Parameters
-    ----------
-    state
-        State of the window.
-    """
-
-    def __init__(self, state: ActionState) -> None:
-        self._state = state
-        self._color_index = 0
-        self._handle_drag: tuple[HandleDrag, tuple[int, Path]] | None = None
+    _color_index = 0
+    _handle_drag: tuple[HandleDrag, tuple[int, Path]] | None = None
 
     # -- the selected primitive -------------------------------------------------------------------------
 
-    @action(
-        "select_primitive",
-        "m",
-        summary="select the primitive under the cursor, or deselect it",
-        group=Group.SHAPE,
+    @Group.SHAPE.action(
+        "select_primitive", "m", summary="select the primitive under the cursor, or deselect it"
     )
     def toggle_primitive(self, cursor: Cursor) -> None:
         """Select the primitive under the cursor; deselect a selected one, or all where no primitive is."""
@@ -372,35 +361,29 @@ class TreeActions:
 
     # -- primitives -------------------------------------------------------------------------------------
 
-    @action(
+    @Group.SHAPE.action(
         "thicker",
         "bracketright",
         summary="thicken the selected primitive, else that under the cursor",
-        group=Group.SHAPE,
         repeats=True,
     )
     def thicker(self, cursor: Cursor) -> None:
         """Enlarge the radius of a primitive."""
         self._state.run(ResizePrimitive(*self._primitive(cursor), RESIZE_STEP))
 
-    @action("thinner", "bracketleft", summary="thin the same primitive", group=Group.SHAPE, repeats=True)
+    @Group.SHAPE.action("thinner", "bracketleft", summary="thin the same primitive", repeats=True)
     def thinner(self, cursor: Cursor) -> None:
         """Reduce the radius of a primitive."""
         self._state.run(ResizePrimitive(*self._primitive(cursor), 1.0 / RESIZE_STEP))
 
-    @action("next_color", "c", summary="next colour for the same primitive", group=Group.SHAPE)
+    @Group.SHAPE.action("next_color", "c", summary="next colour for the same primitive")
     def next_color(self, cursor: Cursor) -> None:
         """Give a primitive the next colour."""
         number, path = self._primitive(cursor)
         self._color_index += 1
         self._state.run(PaintPrimitive(number, path, TINTS[self._color_index % len(TINTS)]))
 
-    @action(
-        "next_join",
-        "j",
-        summary="next join: blend, soft, union, intersection, difference",
-        group=Group.SHAPE,
-    )
+    @Group.SHAPE.action("next_join", "j", summary="next join: blend, soft, union, intersection, difference")
     def next_join(self, cursor: Cursor) -> None:
         """Join a primitive in the next way that leaves a visible surface."""
         number, path = self._select(cursor)
@@ -408,9 +391,7 @@ class TreeActions:
         first = 0 if present is None else joins.index(present) + 1
         self._restructure(*(JoinPrimitive(number, path, join) for join in joins[first:] + joins[:first]))
 
-    @action(
-        "add_ball", "n", summary="blend a ball into the tree under the cursor, selected", group=Group.SHAPE
-    )
+    @Group.SHAPE.action("add_ball", "n", summary="blend a ball into the tree under the cursor, selected")
     def add_ball(self, cursor: Cursor) -> None:
         """Blend a ball into the tree under the cursor, and select it; in an empty scene it is an object."""
         if not self._state.session.document.objects:
@@ -421,7 +402,7 @@ class TreeActions:
         ball = Point(_coordinates(pick.position), radius=BALL_RADIUS * thickness, color=color)
         self._grow(pick, path, ball, BALL_RADIUS * thickness)
 
-    @action("add_limb", "l", summary="blend a limb into it that stands out", group=Group.SHAPE)
+    @Group.SHAPE.action("add_limb", "l", summary="blend a limb into it that stands out")
     def add_limb(self, cursor: Cursor) -> None:
         """Blend a segment along the normal into the tree under the cursor, and select it.
 
@@ -457,9 +438,7 @@ class TreeActions:
         distance = _thickness(node_in_world(self._tree(number), path))
         self._restructure(DuplicatePrimitive(number, path, distance * unit_rows(aside[None])[0]))
 
-    @action(
-        "mirror", "Shift+d", summary="add the mirror image of the same primitive, across x", group=Group.SHAPE
-    )
+    @Group.SHAPE.action("mirror", "Shift+d", summary="add the mirror image of the same primitive, across x")
     def mirror(self, cursor: Cursor) -> None:
         """Add the mirror image of the selected node, or the primitive under the cursor, across x = 0."""
         self._restructure(MirrorPrimitive(*self._primitive(cursor)), handle_offset=np.zeros(3, np.float32))
@@ -507,12 +486,7 @@ class TreeActions:
 
     # -- objects ----------------------------------------------------------------------------------------
 
-    @action(
-        "add_object",
-        "Shift+n",
-        summary="add a ball as a new object, under the cursor",
-        group=Group.SHAPE,
-    )
+    @Group.SHAPE.action("add_object", "Shift+n", summary="add a ball as a new object, under the cursor")
     def add_object(self, cursor: Cursor) -> None:
         """Add a ball as a new object, on the surface under the cursor or at the target of the camera."""
         objects, pick = self._state.session.document.objects, cursor()
@@ -549,11 +523,8 @@ class TreeActions:
             AddObject.label, lambda *_: AddObject(TreeObject(name, make(), origin)), select
         )
 
-    @action(
-        "remove_object",
-        "Shift+Delete",
-        summary="remove the object under the cursor, with its decals",
-        group=Group.SHAPE,
+    @Group.SHAPE.action(
+        "remove_object", "Shift+Delete", summary="remove the object under the cursor, with its decals"
     )
     def remove_object(self, cursor: Cursor) -> None:
         """Remove the object under the cursor, with its decals."""

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree.nodes.paths import node_in_world
-from decals.editing.action_state import ActionState, Cursor
-from decals.editing.key_bindings import Group, action
+from decals.editing.action_state import ActionState, Cursor, WindowActions
+from decals.editing.key_bindings import Group
 from decals.errors import InvalidEdit
 from decals.scenes.camera import PRESETS, UPRIGHT, Axes
 from decals.scenes.objects import TreeObject, bounds_of
@@ -28,7 +28,7 @@ UPRIGHT_COSINE = 0.999
 """Cosine of the angle between a camera's up and an axis from which on the model stands along that axis."""
 
 
-class ViewActions:
+class ViewActions(WindowActions):
     """Actions on the camera of the window.
 
     Parameters
@@ -43,7 +43,7 @@ class ViewActions:
     """
 
     def __init__(self, state: ActionState) -> None:
-        self._state = state
+        super().__init__(state)
         self.stand(state.session.document.camera.up)
 
     def stand(self, up: ArrayLike) -> None:
@@ -69,9 +69,7 @@ class ViewActions:
         up = self.axes.up if upright else -np.sign(parts[1]) * np.array(self.axes.front)
         self._state.camera.look(parts @ self.axes.matrix, up)
 
-    @action(
-        "frame", "Home", summary="show what is selected, or everything, as large as fits", group=Group.CAMERA
-    )
+    @Group.CAMERA.action("frame", "Home", summary="show what is selected, or everything, as large as fits")
     def frame(self, _cursor: Cursor) -> None:
         """Show the selected decals or node, or the whole scene, as large as it fits."""
         state, document = self._state, self._state.session.document
@@ -90,7 +88,7 @@ class ViewActions:
             return
         state.camera.frame(low, high)
 
-    @action("orthographic", "5", summary="with perspective, or without", group=Group.CAMERA)
+    @Group.CAMERA.action("orthographic", "5", summary="with perspective, or without")
     def toggle_projection(self, _cursor: Cursor) -> None:
         """Look in perspective, or in parallel."""
         camera = self._state.camera
@@ -106,5 +104,5 @@ def _looking(side: str) -> Callable[[ViewActions, Cursor], None]:
 
 
 for _side, _key in SIDE_KEYS.items():
-    _register = action(f"view_{_side}", _key, summary=f"{_side} view", group=Group.CAMERA)
+    _register = Group.CAMERA.action(f"view_{_side}", _key, summary=f"{_side} view")
     setattr(ViewActions, f"look_from_{_side}", _register(_looking(_side)))

@@ -3,8 +3,8 @@
 import numpy as np
 
 from blobtree.nodes.paths import Path
-from decals.editing.action_state import ActionState, Cursor, require_pick
-from decals.editing.key_bindings import Group, action
+from decals.editing.action_state import Cursor, WindowActions, require_pick
+from decals.editing.key_bindings import Group
 from decals.editing.visibility import (
     FlagNodes,
     HideDecals,
@@ -17,23 +17,14 @@ from decals.errors import InvalidEdit
 from decals.validation import describe
 
 
-class VisibilityActions:
-    """Actions on the selected decals or node, else on the object under the cursor.
-
-    Parameters
-    ----------
-    state
-        State of the window.
-    """
-
-    def __init__(self, state: ActionState) -> None:
-        self._state = state
+class VisibilityActions(WindowActions):
+    """Actions on the selected decals or node, else on the object under the cursor."""
 
     def _subject(self, cursor: Cursor) -> tuple[int, Path]:
         """Return object and path of the selected node, else those of the object under the cursor."""
         return self._state.primitive or (require_pick(cursor).object, ())
 
-    @action("hide", "v", summary="hide what is selected, else the object", group=Group.SCENE)
+    @Group.SCENE.action("hide", "v", summary="hide what is selected, else the object")
     def hide(self, cursor: Cursor) -> None:
         """Hide the selected decals or node, or the object under the cursor."""
         if self._state.selection:
@@ -41,7 +32,7 @@ class VisibilityActions:
         else:
             self.flag_node("hidden", *self._subject(cursor))
 
-    @action("show_all", "Shift+v", summary="show everything that is hidden", group=Group.SCENE)
+    @Group.SCENE.action("show_all", "Shift+v", summary="show everything that is hidden")
     def show_all(self, _cursor: Cursor) -> None:
         """Show all objects, nodes and decals."""
         session = self._state.session
@@ -51,7 +42,7 @@ class VisibilityActions:
             session.do(ShowDecals())
         self._state.message = "everything is shown"
 
-    @action("isolate", "f", summary="hide everything else", group=Group.SCENE)
+    @Group.SCENE.action("isolate", "f", summary="hide everything else")
     def isolate(self, cursor: Cursor) -> None:
         """Hide all decals but the selected ones; else all but the node, or the object under the cursor."""
         if self._state.selection:
@@ -60,9 +51,7 @@ class VisibilityActions:
         else:
             self.isolate_node(*self._subject(cursor))
 
-    @action(
-        "lock", "Shift+l", summary="lock what is selected, else the object; or unlock it", group=Group.SCENE
-    )
+    @Group.SCENE.action("lock", "Shift+l", summary="lock what is selected, else the object; or unlock it")
     def lock(self, cursor: Cursor) -> None:
         """Lock the layers of the selected decals, the selected node, or the object under the cursor."""
         if self._state.selection:
