@@ -153,6 +153,18 @@ def described(source: Source) -> dict[str, str]:
     return found
 
 
+def inherit_descriptions(kind: type) -> None:
+    """Add to the docstring of a class the parameters that only its base describes."""
+    title, own, known = "Parameters\n----------", inspect.cleandoc(kind.__doc__ or ""), described(kind)
+    section = inspect.cleandoc(kind.__bases__[0].__doc__ or "").partition(title)[2].partition("\n\n")[0]
+    entries = re.findall(r"^(\w+)(\n(?:    .*(?:\n|$))+)", section, re.MULTILINE)
+    inherited = "".join(f"\n{name}{text.rstrip()}" for name, text in entries if name not in known)
+    if title not in own:
+        summary, examples, rest = own.partition("\n\nExamples\n")
+        own = f"{summary}\n\n{title}{examples}{rest}"
+    kind.__doc__ = own.replace(title, title + inherited, 1)
+
+
 def values_of(source: Source, given: Any) -> dict[str, Any]:
     """Return the values that an object of a class has for its options, except of parts that are None."""
     values: dict[str, Any] = {}

@@ -15,6 +15,7 @@ from decals.errors import InvalidEdit
 from decals.images.load import AnyImage
 from decals.index.rows import as_numbers
 from decals.model import LAYER_LIMIT, NO_IMAGE, Decals, Interaction
+from decals.options import inherit_descriptions
 from decals.rendering.options import Drawing
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage, Scene
@@ -73,6 +74,9 @@ class DecalCommand:
 
     numbers: Int64Array
 
+    def __init_subclass__(cls) -> None:
+        inherit_descriptions(cls)
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "numbers", as_numbers(self.numbers))
 
@@ -80,11 +84,6 @@ class DecalCommand:
 @dataclass(frozen=True, eq=False)
 class DeleteDecals(DecalCommand):
     """Delete decals; their numbers are not given to other decals.
-
-    Parameters
-    ----------
-    numbers
-        Numbers of the decals.
 
     Examples
     --------
@@ -114,8 +113,6 @@ class SetValues(DecalCommand):
 
     Parameters
     ----------
-    numbers
-        Numbers of the decals.
     values
         Arrays by their names in `decals.Decals`. Each is one value for all decals, or a row per decal.
     label
@@ -161,8 +158,6 @@ class MapValues(DecalCommand):
 
     Parameters
     ----------
-    numbers
-        Numbers of the decals.
     name
         Name of the array in `decals.Decals`.
     function
@@ -209,8 +204,6 @@ class ScaleDecals(DecalCommand):
 
     Parameters
     ----------
-    numbers
-        Numbers of the decals.
     factor
         Above 1 for larger decals, below 1 for smaller ones.
 
@@ -248,8 +241,6 @@ class TurnDecals(DecalCommand):
 
     Parameters
     ----------
-    numbers
-        Numbers of the decals.
     degrees
         Angle in degrees, counter-clockwise seen from outside.
 
@@ -289,8 +280,6 @@ class MoveDecals(DecalCommand):
 
     Parameters
     ----------
-    numbers
-        Numbers of the decals.
     position, normal
         Surface point for the first decal and its normal, shape (3,) each.
 
@@ -410,11 +399,6 @@ class OrderDecals(DecalCommand):
 class DuplicateDecals(DecalCommand):
     """Add copies of decals, beside them along the u axes of their images.
 
-    Parameters
-    ----------
-    numbers
-        Numbers of the decals.
-
     Examples
     --------
     >>> import decals
@@ -517,6 +501,8 @@ class ReplaceImage:
         Index of the image.
     image
         The new image.
+    label
+        Name of the undo entry.
 
     Examples
     --------

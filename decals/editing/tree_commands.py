@@ -37,6 +37,7 @@ from decals.editing.followers import followers
 from decals.editing.queries import move_decals
 from decals.editing.visibility import rename_label
 from decals.errors import InvalidEdit
+from decals.options import inherit_descriptions
 from decals.scenes.objects import SceneObject, TreeObject, check_names, flagged, with_tree
 from decals.validation import describe, finite_number, finite_vector, instance, member, whole_number
 
@@ -72,6 +73,9 @@ class PrimitiveCommand:
 
     object: int
     path: Path
+
+    def __init_subclass__(cls) -> None:
+        inherit_descriptions(cls)
 
     def tree(self, document: Document) -> Node:
         """Return the object's tree, or raise `InvalidEdit`."""
@@ -130,10 +134,6 @@ class MovePrimitive(PrimitiveCommand):
 
     Parameters
     ----------
-    object
-        Index of the object.
-    path
-        Path of the node in the object's tree.
     offset
         Displacement in the world, shape (3,).
     quick
@@ -169,10 +169,6 @@ class TransformPrimitive(PrimitiveCommand):
 
     Parameters
     ----------
-    object
-        Index of the object.
-    path
-        Path of the node in the object's tree.
     matrix
         The map, shape (3, 4) or (4, 4); it multiplies points as columns.
     quick
@@ -213,10 +209,6 @@ class DragSurface(PrimitiveCommand):
 
     Parameters
     ----------
-    object
-        Index of the object.
-    path
-        Path of the node in the object's tree.
     start, end
         A point of the surface, and where it is dragged, shape (3,) each.
     quick
@@ -281,10 +273,6 @@ class ResizePrimitive(PrimitiveCommand):
 
     Parameters
     ----------
-    object
-        Index of the object.
-    path
-        Path of the primitive in the object's tree.
     factor
         Above 1 for a thicker primitive, below 1 for a thinner one.
 
@@ -319,10 +307,6 @@ class SetParameter(PrimitiveCommand):
 
     Parameters
     ----------
-    object
-        Index of the object.
-    path
-        Path of the node in the object's tree.
     name
         Name of the parameter, such as "radius".
     value
@@ -377,10 +361,6 @@ class PaintPrimitive(PrimitiveCommand):
 
     Parameters
     ----------
-    object
-        Index of the object.
-    path
-        Path of the primitive in the object's tree.
     color
         sRGB, each channel in [0, 1], shape (3,).
 
@@ -457,10 +437,6 @@ class AddPrimitive(StructureCommand):
 
     Parameters
     ----------
-    object
-        Index of the object.
-    path
-        Path of the node in the object's tree.
     node
         The new node, in the space of the node at the path.
     join
@@ -495,10 +471,6 @@ class ReplaceNode(StructureCommand):
 
     Parameters
     ----------
-    object
-        Index of the object.
-    path
-        Path of the node in the object's tree.
     node
         The new node, in the space of the old one.
 
@@ -526,13 +498,6 @@ class ReplaceNode(StructureCommand):
 @dataclass(frozen=True, eq=False)
 class RemovePrimitive(StructureCommand):
     """Remove a primitive, or branch, but not the last one; decals without a surface below them go too.
-
-    Parameters
-    ----------
-    object
-        Index of the object.
-    path
-        Path of the node in the object's tree.
 
     Examples
     --------
@@ -562,10 +527,6 @@ class DuplicatePrimitive(StructureCommand):
 
     Parameters
     ----------
-    object
-        Index of the object.
-    path
-        Path of the node in the object's tree.
     offset
         Displacement of the copy in the world, shape (3,).
 
@@ -596,10 +557,6 @@ class MirrorPrimitive(StructureCommand):
 
     Parameters
     ----------
-    object
-        Index of the object.
-    path
-        Path of the node in the object's tree.
     axis
         The plane lies across this axis, through 0: 0, 1 or 2 for x, y or z.
 
@@ -629,10 +586,6 @@ class MoveBranch(StructureCommand):
 
     Parameters
     ----------
-    object
-        Index of the object.
-    path
-        Path of the node in the object's tree.
     target
         Path of a combination, which takes the node as its last operand; or of another node, behind which the
         node comes to stand.
@@ -734,10 +687,6 @@ class JoinPrimitive(StructureCommand):
 
     Parameters
     ----------
-    object
-        Index of the object.
-    path
-        Path of the node in the object's tree.
     join
         How to join them: "blend", "soft union", "union", "intersection" or "difference", or a `Join`.
         A difference subtracts the node from its siblings.

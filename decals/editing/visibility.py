@@ -32,6 +32,8 @@ class FlagNodes:
     hidden, locked
         For the index of each object that changes, the paths of all its nodes that are hidden, or locked, from
         now on. The path ``()`` is the whole object.
+    label
+        Name of the undo entry.
 
     Examples
     --------

@@ -2,11 +2,14 @@
 
 import subprocess
 import sys
+from dataclasses import fields, is_dataclass
 from importlib import import_module
 
 import pytest
 
 import decals
+from decals.editing import GroupOperands, RemovePrimitive
+from decals.options import described
 
 PACKAGES = [
     "editing", "errors", "field", "images", "index", "rendering", "scattering", "scenes", "surfaces", "vtk",
@@ -67,3 +70,18 @@ def test_importing_the_errors_loads_nothing_heavy() -> None:
     code = f"import sys, decals.errors; print(sorted({heavy} & sys.modules.keys()))"
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"
+
+
+def test_docstrings_of_commands_describe_all_parameters() -> None:
+    """Those of a base class too; a class may describe them in other words."""
+    editing = import_module("decals.editing")
+    commands = [
+        value for value in (getattr(editing, name) for name in editing.__all__) if hasattr(value, "compute")
+    ]
+    kinds = [kind for kind in commands if isinstance(kind, type) and is_dataclass(kind)]
+    assert len(kinds) > 30
+    for kind in kinds:
+        undescribed = {item.name for item in fields(kind) if item.init} - set(described(kind))
+        assert not undescribed, kind
+    assert (RemovePrimitive.__doc__ or "").count("Parameters\n----------\nobject\n    Index") == 1
+    assert described(GroupOperands)["path"].startswith("Path of a sum")
