@@ -11,8 +11,12 @@ import numpy as np
 import pyvista as pv
 
 from blobtree._typing import Float64Array
+from decals.errors import InvalidScene
 from decals.rendering.lights import MAX_LIGHTS, Light, Lighting
 from decals.rendering.viewpoint import Projection
+
+EMPTY_DEPTHS = 0.01, 100.0
+"""Depths of the clipping planes of a view that shows nothing, in distances from the camera to its target."""
 
 
 def weak_callback(method: Callable[[], None]) -> Callable[..., None]:
@@ -36,6 +40,8 @@ def matrix_of(actor: Any) -> Float64Array:
 def vtk_projection(renderer: Any, model: Float64Array | None = None) -> Projection:
     """Return the projection of a vtkRenderer's camera, perspective or parallel, with its clipping planes.
 
+    Planes that coincide are moved apart first: VTK's do while the whole scene is behind the camera.
+
     Parameters
     ----------
     renderer
@@ -43,10 +49,20 @@ def vtk_projection(renderer: Any, model: Float64Array | None = None) -> Projecti
     model
         Matrix from model to world, shape (4, 4). Default: identity.
     """
+    world = np.eye(4) if model is None else model
+    try:
+        return _projection((_clip_matrix(renderer) @ world).tobytes())
+    except InvalidScene:
+        camera = renderer.GetActiveCamera()
+        camera.SetClippingRange([camera.GetDistance() * depth for depth in EMPTY_DEPTHS])
+        return _projection((_clip_matrix(renderer) @ world).tobytes())
+
+
+def _clip_matrix(renderer: Any) -> Float64Array:
+    """Return the matrix from world to clip space of a vtkRenderer's camera, float64, shape (4, 4)."""
     camera = renderer.GetActiveCamera()
     matrix = camera.GetCompositeProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1.0, 1.0)
-    world = np.asarray(pv.array_from_vtkmatrix(matrix), np.float64)
-    return _projection((world if model is None else world @ model).tobytes())
+    return np.asarray(pv.array_from_vtkmatrix(matrix), np.float64)
 
 
 @lru_cache(maxsize=8)

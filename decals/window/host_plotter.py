@@ -18,6 +18,7 @@ from decals.editing.document import Document
 from decals.editing.gizmo import Ray
 from decals.errors import InvalidScene
 from decals.rendering.options import STUDIO, Background
+from decals.rendering.viewpoint import Projection
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
 from decals.validation import describe, whole_number
@@ -161,7 +162,21 @@ class SubplotCamera:
     """
 
     def __init__(self, subplot: SubplotRenderer) -> None:
+        self._subplot = subplot
         self._renderer: Any = subplot.vtk_renderer
+        self._usable: tuple[Projection, pv.Camera] | None = None
+
+    def keep_usable(self) -> None:
+        """Go back to the last usable camera if the present one is too near, too far or not finite."""
+        try:
+            projection = self._subplot.viewpoint()
+        except InvalidScene:
+            if self._usable is None:
+                raise
+            self._renderer.camera.DeepCopy(self._usable[1])
+        else:
+            if self._usable is None or projection is not self._usable[0]:
+                self._usable = projection, self._renderer.camera.copy()
 
     @property
     def parallel(self) -> bool:

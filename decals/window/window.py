@@ -228,6 +228,7 @@ class EditWindow:
         """
         if self._closed:
             return
+        self.camera.keep_usable()
         self.update_overlay()
         if self.busy:
             self._ticker.wake()
@@ -241,6 +242,7 @@ class EditWindow:
 
     def begin_motion(self) -> None:
         """Draw the next frames at a quality that is in time for a moving camera."""
+        self.camera.keep_usable()
         self.frames.choose_for_motion()
         self._wake_if_coarse()
 

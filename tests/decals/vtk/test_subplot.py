@@ -3,6 +3,7 @@
 import gc
 import weakref
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -40,6 +41,23 @@ def test_the_window_shows_the_batch_renderers_pixels(plotter: Factory, samples: 
     assert inside.mean() > 0.2
     assert np.abs(seen - batch[..., :3])[inside].max() <= 1
     assert (seen[sure & (object_id < 0)] == 0).all()
+
+
+def test_a_camera_in_front_of_the_whole_scene_shows_nothing(plotter: Factory) -> None:
+    pl = plotter()
+    pl.set_background("black")
+    pl.decals.add_scene(both(), camera=True)
+    shown: Any = pl.camera
+    before, camera = shot(pl), shown.copy()
+    eye, target = np.array(pl.camera.position), np.array(pl.camera.focal_point)
+    pl.camera.position, pl.camera.focal_point = tuple(2.0 * target - eye), tuple(3.0 * target - 2.0 * eye)
+    pl.renderer.ResetCameraClippingRange()
+    _, far = pl.camera.clipping_range
+    assert far < 1e-9  # VTK has no depths to choose from
+    assert not shot(pl).any()
+    assert pl.decals.subplot.viewpoint().rays(160, 120).directions(80, 60).shape == (3,)
+    pl.camera.DeepCopy(camera)
+    np.testing.assert_array_equal(shot(pl), before)
 
 
 def test_one_place_in_the_window(plotter: Factory) -> None:

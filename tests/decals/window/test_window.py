@@ -1,5 +1,6 @@
 """Driven windows: what is done with mouse and keys is done to the scene, is seen, and can be undone."""
 
+import random
 from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
@@ -328,3 +329,30 @@ def test_an_object_that_is_removed_is_not_held_any_more(driver: Driver) -> None:
     driver.key("z", ctrl=True)
     driver.key("m", driver.pixel(point))
     assert driver.window.handle.widget is not None
+
+
+@pytest.mark.parametrize("nearer", [1e200, 1e-200])
+def test_a_camera_out_of_reach_goes_back(driver: Driver, nearer: float) -> None:
+    before, camera = driver.shot(), driver.renderer.camera
+    position = camera.position
+    driver.window.begin_motion()
+    camera.Dolly(nearer)
+    assert camera.position != position
+    driver.window.redraw(whole=True)
+    assert camera.position == position
+    np.testing.assert_array_equal(driver.shot(), before)
+
+
+def test_every_move_of_the_camera_leaves_a_view(driver: Driver) -> None:
+    rng, camera = random.Random(3), driver.window.camera
+    for _ in range(1000):
+        match rng.randrange(10):
+            case 0:
+                camera.parallel = not camera.parallel
+            case 1:
+                camera.look(rng.choice(((1, 0, 0), (0, 1, 0), (0, 0, 1))), (0.3, 0.5, 0.7))
+            case _:
+                move = rng.choice((0.0, 0.1, 1.0)), rng.choice((0.0, -0.2)), rng.choice((0.25, 0.5, 1.0, 3.0))
+                camera.move_and_zoom(*move)
+        camera.keep_usable()
+        driver.window.subplot.viewpoint()
