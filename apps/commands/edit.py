@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from decals.apps.commands.opening import check_options, keep_memory_low, opened, report_unsaved
+from decals.apps.commands.opening import check_options, opened, report_unsaved
 from decals.apps.commands.options import (
     ContactName,
     Definitions,
@@ -18,6 +18,7 @@ from decals.apps.commands.options import (
     UpAxis,
     parse_size,
 )
+from decals.apps.memory import keep_memory_low
 from decals.apps.models.loading import import_definitions
 from decals.errors import InvalidInput
 from decals.validation import stiffness_number

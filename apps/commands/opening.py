@@ -1,10 +1,6 @@
 """Opening of what `edit` and `sandbox` edit: models with decals, a saved scene, or an empty one."""
 
-import ctypes
-import gc
-import sys
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,31 +19,6 @@ from decals.editing import AddImage, recovery_path
 from decals.errors import InvalidInput
 from decals.scenes.camera import UPRIGHT
 from decals.window import EditWindow
-
-CYCLE_THRESHOLDS = 700, 10, 10
-"""Python's own thresholds for its search of cycles; the command line begins with higher ones."""
-
-ALLOCATION = {-1: 4_000_000, -3: 1_000_000, -8: 2}
-"""Options of glibc's ``mallopt``: free bytes at the end of the heap that are kept (M_TRIM_THRESHOLD), bytes
-from which on memory is returned as soon as it is free (M_MMAP_THRESHOLD), and heaps (M_ARENA_MAX)."""
-
-
-def keep_memory_low() -> None:
-    """Free the memory of ended edits soon, now that a session begins.
-
-    Large arrays are in cycles here and there. Python searches for cycles only among what is made from now on.
-    All modules together have half a million objects, so that it would search seldom, and for 0.2 s. glibc
-    returns large arrays to the system; it would keep a heap for each thread, with gaps.
-    """
-    gc.collect()
-    gc.freeze()
-    gc.set_threshold(*CYCLE_THRESHOLDS)
-    gc.collect()  # the thresholds of the next search follow from what this one has found
-    if sys.platform.startswith("linux"):
-        with suppress(AttributeError):  # another C library
-            mallopt = ctypes.CDLL(None).mallopt
-            for option, value in ALLOCATION.items():
-                mallopt(option, value)
 
 
 @dataclass(frozen=True)

@@ -119,12 +119,8 @@ def sandbox(
         if desktop:
             return _show_window(command(1))
         return _serve_sessions(command, sessions, host, port, browser=browser)
-    from decals.apps.commands.opening import (
-        check_options,
-        keep_memory_low,
-        opened,
-        report_unsaved,
-    )
+    from decals.apps.commands.opening import check_options, opened, report_unsaved
+    from decals.apps.memory import keep_memory_low
     from decals.apps.models.loading import import_definitions
     from decals.window import EditWindow
     from decals.window.host_plotter import new_plotter

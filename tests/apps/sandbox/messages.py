@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from decals.apps.commands.opening import keep_memory_low
+from decals.apps.memory import keep_memory_low
 from decals.editing.actions import KEYS
 from decals.window import EditWindow
 from tests.apps.sandbox.test_connections import CALLS, SIZE, Browser, Connect, serve

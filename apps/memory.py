@@ -1,0 +1,58 @@
+"""Memory of long sessions: what ended edits used goes back to the system."""
+
+import ctypes
+import gc
+import sys
+import threading
+import time
+from typing import Any
+
+CYCLE_THRESHOLDS = 700, 10, 10
+"""Python's own thresholds for its search of cycles; the command line begins with higher ones."""
+
+ALLOCATION = {-1: 4_000_000, -3: 1_000_000, -8: 2}
+"""Options of glibc's ``mallopt``: free bytes at the end of the heap that are kept (M_TRIM_THRESHOLD), bytes
+from which on memory is returned as soon as it is free (M_MMAP_THRESHOLD), and heaps (M_ARENA_MAX)."""
+
+TRIM_SECONDS = 10.0
+"""Time between two returns of free memory to the system."""
+
+ACTIVE_SHARE = 0.1
+"""Share of one core from which on a process has been active, so that memory may have become free."""
+
+
+def keep_memory_low(trim_seconds: float = TRIM_SECONDS) -> None:
+    """Free the memory of ended edits soon, now that a session begins.
+
+    Large arrays are in cycles here and there. Python searches for cycles only among what is made from now on.
+    All modules together have half a million objects, so that it would search seldom, and for 0.2 s. glibc
+    returns large arrays to the system. A thread returns smaller ones, whose heap has gaps.
+
+    Parameters
+    ----------
+    trim_seconds
+        Time between two returns of small pieces.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(*CYCLE_THRESHOLDS)
+    gc.collect()  # the thresholds of the next search follow from what this one has found
+    if not sys.platform.startswith("linux"):
+        return
+    library = ctypes.CDLL(None)
+    if not hasattr(library, "malloc_trim"):  # another C library
+        return
+    for option, value in ALLOCATION.items():
+        library.mallopt(option, value)
+    threading.Thread(
+        target=_trim_for_ever, args=(library, trim_seconds), name="return of free memory", daemon=True
+    ).start()
+
+
+def _trim_for_ever(library: Any, seconds: float) -> None:
+    """Return free memory to the system now and then, unless the process rests; takes 1 to 30 ms each time."""
+    while True:
+        before = time.process_time()
+        time.sleep(seconds)
+        if time.process_time() - before > ACTIVE_SHARE * seconds:
+            library.malloc_trim(0)

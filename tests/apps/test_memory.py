@@ -1,0 +1,35 @@
+"""Memory of long sessions."""
+
+import subprocess
+import sys
+
+import pytest
+
+PIECES = """
+import sys, time
+from pathlib import Path
+from decals.apps.memory import keep_memory_low
+
+def resident():
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096 / 1e6
+
+keep_memory_low(trim_seconds=float(sys.argv[1]))
+pieces = [bytes(2000) for _ in range(30_000)]
+kept = pieces[::100]  # the heap has gaps
+before = resident()
+del pieces
+after = resident()
+end = time.monotonic() + 20.0
+while resident() > before - 40.0 and time.monotonic() < end and float(sys.argv[1]) < 1.0:
+    sum(range(100_000))
+print(before - after, before - resident())
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems have another allocator")
+@pytest.mark.parametrize(("seconds", "returned"), [(0.05, True), (100.0, False)])
+def test_a_session_returns_the_gaps_of_its_heap(seconds: float, returned: bool) -> None:
+    command = [sys.executable, "-c", PIECES, str(seconds)]
+    at_once, later = map(float, subprocess.check_output(command, text=True).split())
+    assert (later > 40.0) == returned
+    assert at_once < 40.0 or returned
