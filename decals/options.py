@@ -16,6 +16,7 @@ from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from blobtree.colors import Rgb, Rgba, color_rgb
+from blobtree.nodes.parameters import with_parameters
 from blobtree.validation import truth
 from decals.errors import InvalidInput
 from decals.validation import finite_number, member, one_of
@@ -159,9 +160,7 @@ def inherit_descriptions(kind: type) -> None:
     section = inspect.cleandoc(kind.__bases__[0].__doc__ or "").partition(title)[2].partition("\n\n")[0]
     entries = re.findall(r"^(\w+)(\n(?:    .*(?:\n|$))+)", section, re.MULTILINE)
     inherited = "".join(f"\n{name}{text.rstrip()}" for name, text in entries if name not in known)
-    if title not in own:
-        summary, examples, rest = own.partition("\n\nExamples\n")
-        own = f"{summary}\n\n{title}{examples}{rest}"
+    own = own if title in own else with_parameters(own, ())
     kind.__doc__ = own.replace(title, title + inherited, 1)
 
 

@@ -330,11 +330,13 @@ def documented(doc: str, kind: type) -> str:
         parameter = _declared(hint)
         if parameter is not None and parameter.doc:
             lines += [f"{name} : {_type_name(hint)}", f"    {describe(parameter)}"]
-    if not lines or "Parameters\n" in doc:
-        return doc
-    head, mark, tail = doc.partition("\n    Examples\n")
-    section = "\n".join(f"    {line}" for line in ["Parameters", "----------", *lines])
-    return f"{head.rstrip()}\n\n{section}\n{mark}{tail}" if mark else f"{head.rstrip()}\n\n{section}\n    "
+    return doc if not lines or "Parameters\n" in doc else with_parameters(doc, lines)
+
+
+def with_parameters(doc: str, lines: Sequence[str]) -> str:
+    """Return a docstring with a Parameters section of some lines in front of its examples."""
+    head, examples, tail = inspect.cleandoc(doc).partition("\n\nExamples\n")
+    return "\n".join([f"{head}\n", "Parameters", "----------", *lines]) + examples + tail
 
 
 def describe(parameter: Parameter) -> str:

@@ -41,8 +41,8 @@ class Press(Enum):
 class PointerTools:
     """Translates pointer, wheel and key events to actions, by the key table.
 
-    Coordinates are in pixels. Every event method returns True if the event was used; otherwise it belongs to
-    the camera.
+    Coordinates ``x, y`` are in pixels from the lower left corner. ``ctrl`` and ``shift`` are True while these
+    keys are down. Every event method returns True if the event was used; otherwise it belongs to the camera.
 
     Parameters
     ----------

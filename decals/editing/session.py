@@ -339,7 +339,22 @@ class EditSession:
         self.begin_save(path, camera=camera).write()()
 
     def begin_save(self, path: str | os.PathLike[str], *, camera: Camera | None = None) -> "SaveJob":
-        """Return a job that writes the scene as it is now; later edits do not change the file."""
+        """Return a job that writes the scene as it is now; later edits do not change the file.
+
+        An open stroke ends.
+
+        Parameters
+        ----------
+        path
+            The JSON file.
+        camera
+            Camera to store. Default: the document's.
+
+        Raises
+        ------
+        InvalidEdit
+            ``path`` is not a path.
+        """
         named = isinstance(path, str | os.PathLike) and os.fspath(path)
         if not named or "\0" in str(path):
             raise InvalidEdit(f"expected a path to save to, got {describe(path)}")

@@ -271,7 +271,15 @@ class Context:
         return self.program(compose("screen.vert"), source)
 
     def texture(self, size: tuple[int, int], kind: str) -> moderngl.Texture:
-        """Return a new texture: of four components of a moderngl type, or of ``"depth"``."""
+        """Return a new texture.
+
+        Parameters
+        ----------
+        size
+            Width and height in texels.
+        kind
+            A type of moderngl for its four components, such as "f1", "f2" or "f4"; or "depth".
+        """
         spare = self._spare_textures.get((size, kind))
         return spare.pop() if spare else self._new_texture(size, kind)
 

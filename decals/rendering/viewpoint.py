@@ -108,7 +108,16 @@ class Viewpoint(Protocol):
     """
 
     def clip_matrix(self, size: tuple[int, int], bounds: Bounds) -> Float64Array:
-        """Return the matrix from world to clip space, ``float64[4, 4]``, for a picture of a box."""
+        """Return the matrix from world to clip space, ``float64[4, 4]``.
+
+        Parameters
+        ----------
+        size
+            Width and height of the picture in pixels.
+        bounds
+            Lower and upper corner of a box in model units, shape (3,) each. The near and the far plane
+            enclose it.
+        """
         ...
 
     def rays(self, width: int, height: int) -> Rays:

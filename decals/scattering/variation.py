@@ -64,7 +64,21 @@ class Jitter:
     def move(
         self, domain: Domain, points: OrientedPoints, spacings: Float32Array, movable: BoolArray, seed: int
     ) -> OrientedPoints:
-        """Return points moved on their surfaces; points that would be hidden or masked stay."""
+        """Return points moved on their surfaces; points that would be hidden or masked stay.
+
+        Parameters
+        ----------
+        domain
+            The surfaces.
+        points
+            The points, n of them.
+        spacings : float32[n]
+            Distances to neighbours in model units, of which `position` is a share.
+        movable : bool[n]
+            False for points that stay.
+        seed
+            Seed of the random steps.
+        """
         if self.position == 0.0 or len(points) == 0:
             return points
         steps = np.random.default_rng(seed).normal(0.0, self.position, (len(points), 3)) * spacings[:, None]
@@ -81,13 +95,13 @@ class Jitter:
         )
 
     def scale(self, radii: Float64Array, seed: int) -> Float64Array:
-        """Return radii times random factors."""
+        """Return radii, ``float64[n]`` in model units, times random factors."""
         deviations = np.random.default_rng(seed).normal(0.0, 1.0, len(radii))
         scaled: Float64Array = radii * np.exp(self.size * np.clip(deviations, -3.0, 3.0))
         return scaled
 
     def turn(self, tangents: Float32Array, normals: Float32Array, seed: int) -> Float32Array:
-        """Return tangents turned about the normals by random angles."""
+        """Return unit tangents turned about the unit normals, ``float32[n, 3]`` each, by random angles."""
         shares = np.random.default_rng(seed).uniform(-1.0, 1.0, (len(tangents), 1))
         angles = np.radians(self.angle) * shares
         return unit_rows(np.cos(angles) * tangents + np.sin(angles) * np.cross(normals, tangents))

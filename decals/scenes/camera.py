@@ -137,7 +137,11 @@ class Camera:
         return matrix
 
     def projection(self, aspect: float, near: float, far: float) -> Float64Array:
-        """Return the matrix from eye to clip space, ``float64[4, 4]``; ``aspect`` is width over height."""
+        """Return the matrix from eye to clip space, ``float64[4, 4]``.
+
+        ``aspect`` is width over height of the picture. ``near`` and ``far`` are distances of planes from the
+        eye along the view, in model units.
+        """
         focal = 1.0 / math.tan(math.radians(self.fov) / 2)
         matrix = np.zeros((4, 4))
         matrix[0, 0] = focal / aspect
@@ -156,7 +160,7 @@ class Camera:
         return max(float(depth.min()) * 0.99, far * MIN_NEAR_OVER_FAR), far
 
     def clip_matrix(self, size: tuple[int, int], bounds: Bounds) -> Float64Array:
-        """Return the matrix from world to clip space, ``float64[4, 4]``, for a picture of a box."""
+        """Return the matrix from world to clip space, ``float64[4, 4]``; see `Viewpoint.clip_matrix`."""
         return self.projection(size[0] / size[1], *self.clip_range(bounds)) @ self.view()
 
     def rays(self, width: int, height: int) -> Rays:

@@ -345,7 +345,10 @@ class Scene:
         locked_layers: Iterable[int] | None = None,
         layer_names: Mapping[int, str] | None = None,
     ) -> "Scene":
-        """Return the same scene with some parts replaced."""
+        """Return the same scene with some parts replaced; None leaves a part as it is.
+
+        Arguments and errors are those of the class.
+        """
         given: dict[str, Any] = {
             "objects": objects,
             "camera": camera,

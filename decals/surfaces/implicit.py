@@ -133,7 +133,10 @@ class ImplicitSurface(Immutable):
         return self._coarse.bounds
 
     def sample(self, count: int, seed: int) -> tuple[Float32Array, Float32Array]:
-        """Return points uniform by area on the coarse mesh, projected onto the surface, and their normals."""
+        """Return points and normals, see `Surface.sample`.
+
+        Points are uniform by area on the coarse mesh, and then projected onto the surface.
+        """
         return self.project(self._coarse.sample(count, seed)[0])
 
     def on(self, device: str) -> "DeviceImplicitSurface":
@@ -154,7 +157,7 @@ class ImplicitSurface(Immutable):
     def project(
         self, points: ArrayLike, *, within: Float32Array | None = None
     ) -> tuple[Float32Array, Float32Array]:
-        """Return surface points near the points, and the normals there."""
+        """Return surface points near the points, by Newton's method, and normals; see `Surface.project`."""
         return project_host(self.on(self.device), points, within, self.device)
 
     def normal(self, points: ArrayLike) -> Float32Array:
@@ -162,7 +165,7 @@ class ImplicitSurface(Immutable):
         return self.project(points)[1]
 
     def raycast(self, origins: ArrayLike, directions: ArrayLike) -> Float32Array:
-        """Return the distance to the first point inside; 0 for a ray that starts inside."""
+        """Return distances to the first points inside, 0 for rays that start there; see `Surface.raycast`."""
         starts, headings = as_rays(origins, directions)
         distances = np.full(len(starts), np.inf, np.float32)
         valid = headings.any(axis=1)

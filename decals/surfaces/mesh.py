@@ -232,7 +232,7 @@ class MeshSurface(Immutable):
     def project(
         self, points: ArrayLike, *, within: Float32Array | None = None
     ) -> tuple[Float32Array, Float32Array]:
-        """Return the closest points of the mesh, and the normals of their faces."""
+        """Return the closest points of the mesh, and the normals of their faces; see `Surface.project`."""
         return project_host(self.on(self.device), points, within, self.device)
 
     def one_sided(self, points: ArrayLike) -> BoolArray:
@@ -270,7 +270,7 @@ class MeshSurface(Immutable):
         return split_at_creases(self.vertices, self.faces)
 
     def raycast(self, origins: ArrayLike, directions: ArrayLike) -> Float32Array:
-        """Return the distance to the first face that each ray hits, from either side."""
+        """Return distances to the first faces that rays hit, from either side; see `Surface.raycast`."""
         starts, headings = as_rays(origins, directions)
         hits: Any = wp.zeros(len(starts), dtype=wp.float32, device=self.device)
         self.on(self.device).raycast(vectors(starts, self.device), vectors(headings, self.device), hits)
