@@ -30,3 +30,8 @@ float window_depth(vec3 position) {
     vec4 clip = view_projection * vec4(position, 1.0);
     return 0.5 * clip.z / clip.w + 0.5;
 }
+
+// A smooth normal may point away from the eye at a silhouette: turn it until it is just visible.
+vec3 visible_normal(vec3 normal, vec3 toward_eye) {
+    return normalize(normal - min(dot(normal, toward_eye) - 1e-3, 0.0) * toward_eye);
+}

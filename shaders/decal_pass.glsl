@@ -102,17 +102,19 @@ Pixel pixel_at(ivec2 texel) {
         vec3 normal = surface.normal;
 #ifdef RELIEF
         relief_normal = normal;
-        float lit = 1.0;
+        float height = dot(surface.visible - position, normal);
+        bool raised = true;
 #ifdef POSED
-        if (is_posed) {  // offset.glsl moved the surface
-            lit = relief_light_at(position, dot(surface.visible - position, normal), normal);
-        } else
+        if (!is_posed)  // offset.glsl moved the others
 #endif
-        if (dot(ray_direction(vec2(texel) + 0.5), normal) < 0.0) {  // none on the inside of a surface
-            vec4 raised = relief_point(position, normal, ray_direction(vec2(texel) + 0.5));
-            position = raised.xyz;
-            relief_normal = relief_normal_at(position, normal);
-            lit = relief_light_at(position, raised.w, normal);
+        {
+            raised = dot(ray_direction(vec2(texel) + 0.5), normal) < 0.0;  // none on the inside of a surface
+            if (raised) {
+                vec4 found = relief_point(position, normal, ray_direction(vec2(texel) + 0.5));
+                position = found.xyz;
+                height = found.w;
+                relief_normal = relief_normal_at(position, normal);
+            }
         }
 #endif
         DecalHit hit = decal_at(position, normal);  // before the ray, which would take registers meanwhile
@@ -127,6 +129,9 @@ Pixel pixel_at(ivec2 texel) {
             pixel.glow = vec4(material_glow.rgb, material_glow.a / part);
             pixel.color.w = material_values.y / part;
 #ifdef RELIEF
+            vec3 bent = texelFetch(g_normal, texel, 0).w * normalize(material_normals.xyz);
+            bool shown = raised && relief_faces_light(bent, surface.visible, -normalize(ray_direction(vec2(texel) + 0.5)));
+            float lit = shown ? relief_light_at(position, height, normal) : 1.0;
             pixel.material.w += 2.0 * round(RELIEF_LEVELS * lit);
 #endif
         }

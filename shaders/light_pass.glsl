@@ -2,6 +2,7 @@
 // lights.glsl or image_light.glsl; all define `vec3 lit_color(ivec2 texel, vec3 position, vec3 normal, vec3 albedo)`, and,
 // of a Material in place of the albedo, `material_color`. PHYSICAL: the slot material is material.glsl. MATERIAL_LIGHT:
 // some decals have materials. RELIEF: some have relief. ENVIRONMENT_SHOWN: the environment is seen behind the objects.
+//@ include camera.glsl
 //@ include pixel.glsl
 uniform sampler2D g_position;
 uniform sampler2D g_normal;
@@ -13,11 +14,6 @@ uniform sampler2D g_glow;
 #ifdef RELIEF
 float relief_lit = 1.0;  // part of the first light, or of the studio's key, that reaches the relief
 #endif
-
-// A smooth normal may point away from the eye at a silhouette: turn it until it is just visible.
-vec3 visible_normal(vec3 normal, vec3 toward_eye) {
-    return normalize(normal - min(dot(normal, toward_eye) - 1e-3, 0.0) * toward_eye);
-}
 
 //@ slot material optional
 

@@ -16,6 +16,8 @@ const int RELIEF_HALVINGS = 8;    // of the last step
 const float SHADOW_EDGE = 0.06;   // of the range: depth below the relief at which a shadow is full
 const float LEAST_SLOPE = 0.08;   // least cosine between the normal and the ray, or the light
 
+const float NORMAL_ROUNDING = 1e-3;  // of the normal that the light pass reads, at most
+
 const int RIM_KNOTS = 32;
 const bool RELIEF_STEPPED = decal_layered || decal_nested || decal_limited;  // decals begin within images of others
 uniform vec4 rim_slopes[RIM_KNOTS + 1];  // to neighbours, by the distance from the rim
@@ -143,11 +145,20 @@ vec3 relief_normal_at(vec3 q, vec3 n) {
     return normalize(2.0 * reach * n - (heights.x - heights.y) * right - (heights.z - heights.w) * up);
 }
 
+// Unit direction toward the light.
+vec3 relief_light_way(vec3 q) {
+    vec3 toward = relief_light.w == 0.0 ? camera_frame() * KEY_DIRECTION : relief_light.xyz;
+    return normalize(relief_light.w > 1.5 ? toward - q : toward);
+}
+
+// False if a material with this normal reflects nothing of the light, so that shadows change nothing.
+bool relief_faces_light(vec3 normal, vec3 q, vec3 toward_eye) {
+    return dot(visible_normal(normal, toward_eye), relief_light_way(q)) > -NORMAL_ROUNDING;
+}
+
 // The part of the light that reaches the relief at height z over q, from 0 to 1.
 float relief_light_at(vec3 q, float z, vec3 n) {
-    vec3 toward = relief_light.w == 0.0 ? camera_frame() * KEY_DIRECTION : relief_light.xyz;
-    toward = normalize(relief_light.w > 1.5 ? toward - q : toward);
-    vec3 slant = relief_slant(toward, n);
+    vec3 slant = relief_slant(relief_light_way(q), n);
     float range = relief_range.y - relief_range.x;
     float hidden = 0.0;
     float steps = clamp(ceil(length(slant) * (relief_range.y - z) / relief_step), 1.0, float(RELIEF_STEPS));

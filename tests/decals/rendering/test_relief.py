@@ -55,8 +55,8 @@ def hilly(*, layers: int = 1) -> Scene:
 
 
 def slant_of(directions: Array) -> Array:
-    """Movement over the square per height."""
-    slants: Array = (directions - directions[:, 2:] * UP) / directions[:, 2:]
+    """Movement over the square per height; grazing directions are steepened, as in the shader."""
+    slants: Array = (directions - directions[:, 2:] * UP) / np.maximum(directions[:, 2:], 0.08)
     return slants
 
 
@@ -153,16 +153,20 @@ def test_an_edit_draws_all_that_it_changes(renderers: dict[str, Renderer]) -> No
     assert (np.abs(drawn.astype(int) - whole).max(axis=2) > 3).mean() < 0.005
 
 
-def test_relief_shadows_itself(renderers: dict[str, Renderer]) -> None:
-    """Without the light a shadow is as dark as with it; elsewhere the light shows."""
+@pytest.mark.parametrize(("height", "tilt"), [(0.8, 0.0), (-0.05, 0.6)])
+def test_relief_shadows_itself(renderers: dict[str, Renderer], height: float, tilt: float) -> None:
+    """Without the light a shadow is as dark as with it; elsewhere the light shows, if normals of maps face it."""
     renderer = renderers["fragment"]
     x = np.linspace(-1, 1, 48)
     tower = np.clip((0.4 - np.hypot(x, x[:, None])) / 0.08, 0, 1)
-    white = DecalMaterial("tower", np.ones((48, 48, 3)), height=tower, relief=0.5, occlusion=0.5)
+    normals = np.tile(0.5 + 0.5 * np.array([tilt, 0, np.sqrt(1 - tilt**2)]), (48, 48, 1))
+    white = DecalMaterial(
+        "tower", np.ones((48, 48, 3)), height=tower, relief=0.5, occlusion=0.5, normal=normals
+    )
     one = Decals([[0.0, 0, 0]], [UP], [[1.0, 0, 0]], [0.8])
     camera = Camera(position=(0.0, -0.01, 4.0), target=(0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), fov=28.0)
     scene = Scene(objects=[sheet(side=3)], decals=one, images=white, camera=camera)
-    toward = np.array([1.0, 0.3, 0.8]) / np.linalg.norm([1.0, 0.3, 0.8])
+    toward = np.array([1.0, 0.3, height]) / np.linalg.norm([1.0, 0.3, height])
     lit, dark = (
         renderer.render(
             scene,
