@@ -17,7 +17,7 @@ FAST_COMPRESSION = 1
 MAX_NUMBERS = 1 << 24
 """Largest number of samples: a float32 cannot count more texels on a tape."""
 
-MAX_KEPT_BYTES = 1 << 26
+MAX_DECODED_BYTES = 1 << 26
 """Bytes of decoded samples that are kept for the next access, at most."""
 
 
@@ -78,7 +78,7 @@ class Samples(msgspec.Struct, frozen=True):
         return f"<{nx} × {ny} × {nz} numbers; save() or to_json() keep them>"
 
 
-@sized_cache(MAX_KEPT_BYTES)
+@sized_cache(MAX_DECODED_BYTES)
 def _decoded(samples: Samples) -> Float32Array:
     _check_shape(samples.shape)
     size = 4 * math.prod(samples.shape)

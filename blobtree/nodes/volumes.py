@@ -15,7 +15,7 @@ from blobtree.formulas.volumes import VOLUME
 from blobtree.nodes.fields import FieldPrimitive
 from blobtree.nodes.parameters import Color, Parameter, Quantity
 from blobtree.nodes.primitives import DEFAULT_COLOR, Falling
-from blobtree.nodes.samples import MAX_KEPT_BYTES, MAX_NUMBERS, Samples
+from blobtree.nodes.samples import MAX_NUMBERS, Samples
 from blobtree.sampling.mesh_distances import grid_points, mesh_distances, triangles_of
 from blobtree.sized_cache import sized_cache
 from blobtree.validation import Vector, finite_vector, positive_number
@@ -28,6 +28,9 @@ DEFAULT_RESOLUTION = 64
 
 WIDTH_CELLS = 4.0
 """Blend width of a mesh in cells, where none is given."""
+
+MAX_TEXELS_BYTES = 1 << 28
+"""Bytes of texels that are kept for the next tapes, at most; they take four times the samples."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -256,7 +259,7 @@ def _sampled(
     return values.reshape(counts)
 
 
-@sized_cache(4 * MAX_KEPT_BYTES)
+@sized_cache(MAX_TEXELS_BYTES)
 def _texels_of(samples: Samples) -> Float32Array:
     """Return samples as the texels that `formulas.volumes` reads."""
     v = samples.array

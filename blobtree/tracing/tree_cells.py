@@ -26,7 +26,7 @@ BLOCKS_ALONG = 64
 MAX_LAYERS = 16
 """Most layers of empty blocks that a ray skips at once."""
 
-MAX_KEPT_BYTES = 1 << 25
+MAX_CELLS_BYTES = 1 << 25
 """Bytes of cells that are kept for the next rays, at most; those of a model take 1 MB or more."""
 
 Corner: TypeAlias = tuple[float, ...]
@@ -103,7 +103,7 @@ def _corners(tree: ImplicitModel) -> tuple[Corner, Corner]:
     return tuple(lower.tolist()), tuple(upper.tolist())
 
 
-@sized_cache(MAX_KEPT_BYTES)
+@sized_cache(MAX_CELLS_BYTES)
 def _tracing_cells(tape: Tape, lower: Corner, upper: Corner, device: str) -> TracingCells:
     bounds = np.array(lower, np.float32), np.array(upper, np.float32)
     cell_size = float((bounds[1] - bounds[0]).max()) / (BLOCKS_ALONG * BRANCHING) * (1.0 + 1e-6)
@@ -175,7 +175,7 @@ def _layers(empty: BoolArray) -> Int32Array:
     return layers.astype(np.int32)
 
 
-@sized_cache(MAX_KEPT_BYTES)
+@sized_cache(MAX_CELLS_BYTES)
 def _device_cells(tape: Tape, lower: Corner, upper: Corner, device: str) -> DeviceCells:
     cells = _tracing_cells(tape, lower, upper, device)
     arrays: Any = RayCells()
