@@ -19,6 +19,7 @@ from decals.model import Decals, Interaction
 from decals.scattering.domain import Domain, apportion
 from decals.scattering.neighbors import FacingTree, ideal_spacing, spacing_of_distances
 from decals.scenes.objects import MeshObject, SceneObject
+from decals.scenes.pose import PosedScene
 from decals.scenes.scene import Scene
 from decals.surfaces.normals import split_at_creases
 from decals.surfaces.surface import unit_rows
@@ -183,7 +184,7 @@ def measure(
     Raises
     ------
     InvalidScene
-        No scene, a scene without objects, or an option out of range.
+        No scene, a posed scene, a scene without objects, or an option out of range.
 
     See Also
     --------
@@ -197,6 +198,11 @@ def measure(
     >>> measures.coverage > 0.999, measures.folded < 0.01, len(measures.decals.visible_area)
     (True, True, 30)
     """
+    if isinstance(scene, PosedScene):
+        raise InvalidScene(
+            "scene: expected a Scene at rest, got a posed one; measure the scene that was posed, where its "
+            "decals lie"
+        )
     instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
     count = len(scene.decals)
     if samples is None:

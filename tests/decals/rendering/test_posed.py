@@ -330,7 +330,7 @@ def test_a_posed_scene_is_drawn_only(vtk_display: None) -> None:
     np.testing.assert_array_equal(
         posed.render(size=SIZE, samples=1), decals.render(posed, size=SIZE, samples=1)
     )
-    with pytest.raises(InvalidScene, match="expected a Scene, got a PosedScene"):
+    with pytest.raises(InvalidScene, match="at rest, got a posed one; measure the scene that was posed"):
         decals.measure(cast(Any, posed))
     with pytest.raises(InvalidScene, match="expected a Scene, got a PosedScene"):
         decals.save_scene(cast(Any, posed), "scene.json")
