@@ -4,7 +4,7 @@
 // Radiance around a direction, seen through a lobe of this sharpness.
 vec3 lobes_around(vec3 direction, float sharpness) {
     float kept = sharpness / (sharpness + 1.0);  // of the mean direction, by the width of the lobe
-    vec3 light = mix(ENVIRONMENT_GROUND, ENVIRONMENT_SKY, 0.5 + 0.5 * kept * direction.y);
+    vec3 light = mix(GROUND_COLOR, SKY_COLOR, 0.5 + 0.5 * kept * direction.y);
     for (int i = 0; i < ENVIRONMENT_LOBES; i++) {
         float own = environment_axes[i].w;
         float both = own * sharpness / (own + sharpness);

@@ -1,13 +1,11 @@
 // Soft studio light that stays with the camera: a key from its upper left, a weak fill from the right, and a
-// sky over a darker ground. All in linear light.
+// sky over a darker ground, SKY_COLOR and GROUND_COLOR of decals/rendering/studio.py. All in linear light.
 //@ include camera.glsl
 //@ include ambient.glsl
 //@ include key_light.glsl
 const vec3 FILL_DIRECTION = vec3(0.85, 0.10, 0.45);
 const vec3 KEY_COLOR = vec3(1.00, 0.97, 0.92);
 const vec3 FILL_COLOR = vec3(0.13, 0.14, 0.17);
-const vec3 SKY_COLOR = vec3(0.33, 0.35, 0.39);
-const vec3 GROUND_COLOR = vec3(0.13, 0.11, 0.10);
 const float KEY_STRENGTH = 0.86;
 const float WRAP = 0.12;       // how far the key reaches beyond its own terminator
 const float KEY_SOFTNESS = 0.6;  // how far the key's light, too, is kept out of corners

@@ -13,7 +13,7 @@ from decals.rendering.gbuffer import GBuffer
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Background
 from decals.rendering.pixel_pass import PixelPass, Program, attach_camera, set_uniform, use_textures
-from decals.rendering.studio import studio_constants
+from decals.rendering.studio import studio_ambient, studio_constants
 from decals.rendering.viewpoint import TILE_MARGIN, WHOLE, Part, Rectangle, Tile
 from decals.shaders import compose
 
@@ -136,7 +136,8 @@ def light_program(context: Context, file: str, *, materials: bool, relief: bool,
         kind, constants = ("image", environment_constants()) if image else ("studio", studio_constants())
         environment = f"{constants}//@ include {kind}_environment.glsl"
         slots |= {"material": "//@ include material.glsl", "environment": environment}
-    defines = {
+    defines: dict[str, str | bool] = {
+        **studio_ambient(),
         "PHYSICAL": materials or image,
         "MATERIAL_LIGHT": materials,
         "RELIEF": relief,

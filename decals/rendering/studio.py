@@ -24,7 +24,7 @@ class Lamp:
 
 SKY: Color = (0.33, 0.35, 0.39)
 GROUND: Color = (0.13, 0.11, 0.10)
-"""Radiance from above and below: the ambient light of ``shaders/studio_light.glsl``."""
+"""Radiance from above and below, which is the ambient light of ``shaders/studio_light.glsl`` too."""
 
 LAMPS = (
     Lamp((-0.75, 0.55, 0.35), 14.0, (2.6, 2.5, 2.3)),
@@ -43,11 +43,14 @@ def studio_constants() -> str:
     count = len(LAMPS)
     return (
         f"const int ENVIRONMENT_LOBES = {count};\n"
-        f"const vec3 ENVIRONMENT_SKY = {_vector(SKY)};\n"
-        f"const vec3 ENVIRONMENT_GROUND = {_vector(GROUND)};\n"
         f"const vec4 environment_axes[{count}] = vec4[]({', '.join(axes)});\n"
         f"const vec3 environment_colors[{count}] = vec3[]({', '.join(colors)});\n"
     )
+
+
+def studio_ambient() -> dict[str, str]:
+    """Return the light from above and below as definitions for both shaders of the studio."""
+    return {"SKY_COLOR": _vector(SKY), "GROUND_COLOR": _vector(GROUND)}
 
 
 def _vector(color: Color) -> str:
