@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 import time
 import warnings
 from collections.abc import Hashable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import chain
-from types import TracebackType
+from types import FrameType, TracebackType
 from typing import Self
 
 import numpy as np
@@ -64,6 +65,9 @@ from decals.rendering.warmup import DECALS, IMAGES, SHADERS, SHAPES, WarmupPlan,
 from decals.validation import instance, whole_number
 
 DEFAULT_OPTIONS = RenderOptions()
+
+PACKAGES = ("blobtree", "decals")
+"""Packages whose lines no warning names."""
 
 register(PosedColoredMesh, PosedMeshDrawable, PosedMeshDrawable.warmup)
 register(ColoredMesh, MeshDrawable, MeshDrawable.warmup)
@@ -482,8 +486,17 @@ def _warn_of_plain_samples(scene: SceneLike, options: RenderOptions) -> None:
         reason = "decals with relief" if has_relief(scene) else "the walked mapping"
         warnings.warn(
             f"filtered=True has no effect on {reason}: plain samples are drawn; take more samples a pixel",
-            stacklevel=4,
+            stacklevel=_caller_level(),
         )
+
+
+def _caller_level() -> int:
+    """Return the stack level, for the function that calls this one, of the line outside our packages."""
+    level = 1
+    frame: FrameType | None = sys._getframe(1)
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] in PACKAGES:
+        level, frame = level + 1, frame.f_back
+    return level
 
 
 def _library(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> str:

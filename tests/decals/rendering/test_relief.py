@@ -126,8 +126,9 @@ def test_a_picture_is_that_of_the_displaced_mesh(renderers: dict[str, Renderer])
 def test_filtered_relief_is_drawn_with_plain_samples_and_a_warning(renderers: dict[str, Renderer]) -> None:
     plain = RenderOptions(size=(24, 16), samples=1)
     drawer = renderers["fragment"]
-    with pytest.warns(UserWarning, match="no effect on decals with relief"):
+    with pytest.warns(UserWarning, match="no effect on decals with relief") as warned:
         filtered = drawer.render(hilly(), replace(plain, filtered=True))
+    assert [each.filename for each in warned] == [__file__]
     np.testing.assert_array_equal(filtered, drawer.render(hilly(), plain))
 
 
