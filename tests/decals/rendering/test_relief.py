@@ -156,7 +156,7 @@ def test_an_edit_draws_all_that_it_changes(renderers: dict[str, Renderer]) -> No
 
 @pytest.mark.parametrize(("height", "tilt"), [(0.8, 0.0), (-0.05, 0.6)])
 def test_relief_shadows_itself(renderers: dict[str, Renderer], height: float, tilt: float) -> None:
-    """Without the light a shadow is as dark as with it; elsewhere light shows where normals of maps face it."""
+    """Without the light a shadow is as dark as with it; elsewhere it shows where mapped normals face it."""
     renderer = renderers["fragment"]
     x = np.linspace(-1, 1, 48)
     tower = np.clip((0.4 - np.hypot(x, x[:, None])) / 0.08, 0, 1)
