@@ -39,7 +39,7 @@ class Recording:
         points, solver = self._relaxation.points, self._relaxation
         sizes = solver.sizes_at(points.positions)
         spacing = spacing_of_points(points.positions, points.normals, sizes, solver.spacing)
-        energy = solver.energy if solver.steps else float("nan")
+        energy = solver.energy or float("nan")  # 0: it is not known at the start and at the end
         self._points.append(SurfacePoints(points.positions, points.normals, points.surface_ids))
         self._measures.append((energy, spacing.rho, spacing.cv))
 

@@ -76,6 +76,7 @@ def test_the_first_even_step_is_the_answer(lab: Lab) -> None:
     relaxed = lab.experiment().relaxed
     assert relaxed is not None
     assert relaxed.energies[1] > relaxed.energies[5] > 0
+    assert np.isnan([relaxed.energies[0], relaxed.energies[-1]]).all()
     first = int(np.argmax(np.array(relaxed.rhos) >= 0.75))
     lab.set_value(number_of(lab, STEP), first)
     lab.check()
