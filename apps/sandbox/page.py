@@ -369,7 +369,7 @@ class Page:
         vuetify3.VListSubheader("History", raw_attrs=['role="heading" aria-level="2"'])
         with vuetify3.VList():
             vuetify3.VListItem(
-                title="Start",
+                title=("forgotten ? `Oldest step (${forgotten} before it are forgotten)` : 'Start'",),
                 active=("done.length === 0",),
                 click=(self.sandbox.go_to, "[0]"),
             )
@@ -379,5 +379,5 @@ class Page:
                 title=("entry",),
                 active=("i === done.length - 1",),
                 classes=("i < done.length ? '' : 'text-disabled'",),
-                click=(self.sandbox.go_to, "[i + 1]"),
+                click=(self.sandbox.go_to, "[earlier + i + 1]"),
             )

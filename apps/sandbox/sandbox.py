@@ -172,6 +172,8 @@ class Sandbox:
             "marked": self._marked,
             "panel": self._panel(),
             "done": list(session.labels[-MAX_HISTORY:]),
+            "earlier": max(len(session.labels) - MAX_HISTORY, 0),
+            "forgotten": session.forgotten,
             "undone": list(session.undone_labels[:MAX_HISTORY]),
             "start": self._start,
             "display": self.display.values(),

@@ -3,6 +3,7 @@
 An edit holds the state of a document before and after, so that undo is exact.
 """
 
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Self
@@ -10,13 +11,15 @@ from typing import Any, Self
 import numpy as np
 
 from blobtree._typing import BoolArray, Int64Array
+from blobtree.lazy import Lazy
+from blobtree.nodes.numeric_parameters import nodes_with_paths
 from decals.errors import InvalidEdit, InvalidMesh, InvalidScene
 from decals.index.editor import DecalEditor
 from decals.model import Decals
 from decals.receivers import check_receivers
 from decals.rendering.options import Drawing
 from decals.scenes.camera import Camera
-from decals.scenes.objects import SceneObject, shown_objects
+from decals.scenes.objects import MeshObject, SceneObject, shown_objects
 from decals.scenes.origin import WORLD, Origin
 from decals.scenes.recipe import Recipe
 from decals.scenes.scene import DecalImage, Scene
@@ -153,6 +156,14 @@ class Edit:
         """Objects before the edit, then those after it; none if they stay."""
         return *(self.parts_before.objects or ()), *(self.parts_after.objects or ())
 
+    @Lazy
+    def held_bytes(self) -> int:
+        """Approximate memory that undo alone needs: decals, and objects and images that were replaced."""
+        states = [*vars(self.before.decals).values(), *vars(self.after.decals).values()]
+        kept = _parts_bytes(self.parts_after)
+        parts = {key: size for key, size in _parts_bytes(self.parts_before).items() if key not in kept}
+        return sum(_arrays(states).values()) + sum(parts.values())
+
     def then(self, later: "Edit") -> "Edit":
         """Return one edit that does this one and then a later one."""
         return Edit(
@@ -161,6 +172,29 @@ class Edit:
             self.parts_before.overlaid_on(later.parts_before),
             later.parts_after.overlaid_on(self.parts_after),
         )
+
+
+NODE_BYTES = 200
+"""Memory of a node, and of its part of the tape, approximately."""
+
+
+def _arrays(values: Iterable[object]) -> dict[int, int]:
+    """Return the bytes of arrays by their identity."""
+    return {id(array): array.nbytes for array in values if isinstance(array, np.ndarray)}
+
+
+def _parts_bytes(parts: SceneParts) -> dict[int, int]:
+    """Return the bytes of objects and images by the identities of their arrays and nodes."""
+    held = _arrays(array for image in parts.images or () for array in vars(image).values())
+    for item in parts.objects or ():
+        if isinstance(item, MeshObject):
+            held |= _arrays([item.vertices, item.faces])
+            continue
+        nodes = [node for _, node in nodes_with_paths(item.tree)]
+        for node in nodes:
+            held |= {id(node): NODE_BYTES} | _arrays(vars(node).values())
+        held[id(item.tree)] += NODE_BYTES * len(nodes)  # the tape has a part for each
+    return held
 
 
 ANY_POINT, ANY_DIRECTION = np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32)

@@ -304,7 +304,7 @@ class FileActions(WindowActions):
     def may_close(self) -> bool:
         """Return True if the window may close; otherwise ask. While the question is open, return True."""
         state = self._state
-        if self._discarded is state.session.next_undo:
+        if self._discarded is state.session.position:
             return True
         if state.background.saving:
             self._closing = True
@@ -335,7 +335,7 @@ class FileActions(WindowActions):
     def finish(self) -> None:
         """Keep unsaved changes in the recovery file, unless they were discarded; call this at the end."""
         session = self._state.session
-        if self._discarded is session.next_undo or not session.modified:
+        if self._discarded is session.position or not session.modified:
             self.recovery.remove()
         else:
             self.recovery.keep()
@@ -344,7 +344,7 @@ class FileActions(WindowActions):
     def _discard_changes(self) -> None:
         """Note that the present changes may be lost; later ones count again."""
         self._state.session.end_stroke()
-        self._discarded = self._state.session.next_undo
+        self._discarded = self._state.session.position
 
     def _discard(self) -> None:
         self._discard_changes()

@@ -164,7 +164,7 @@ class RecoveryFile:
                 f"could not read the unsaved changes in {str(path)!r} ({error}); move or delete this file"
             ) from error
         self._session.do(ReplaceScene(scene, "recover unsaved changes"))
-        self._exists, self._written = True, self._session.next_undo
+        self._exists, self._written = True, self._session.position
         return (
             f"recovered unsaved changes of {when:%Y-%m-%d %H:%M} from {path.name}; "
             "Ctrl + S keeps them, Ctrl + Z goes back to the saved scene"
@@ -179,7 +179,7 @@ class RecoveryFile:
         return (
             self._exists
             if not session.modified
-            else session.stroke_open or session.next_undo is not self._written
+            else session.stroke_open or session.position is not self._written
         )
 
     def update(self) -> None:
@@ -205,7 +205,7 @@ class RecoveryFile:
             self._wait = max(AUTOSAVE_SECONDS, (time.monotonic() - now) / MAX_WRITING_SHARE)
 
         self._acquire_new()
-        self._written, self._exists, self._changed_at = self._session.next_undo, True, None
+        self._written, self._exists, self._changed_at = self._session.position, True, None
         self._written_at = now
         self._background.write_copy(self.path, self._camera(), written)
 

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from blobtree.progress import Progress
@@ -14,13 +14,19 @@ from decals.scenes.camera import Camera
 from decals.scenes.files import save_scene
 from decals.scenes.objects import forget_surface
 from decals.scenes.scene import Scene
-from decals.validation import describe, instance
+from decals.validation import describe, instance, whole_number
 
 MAX_REPLAYED_DECALS = 500
 """A session repeats a fork's edits of at most so many decals; otherwise it adopts the fork's index."""
 
 MAX_SURFACES = 8
 """Entries before the present state, and after it, whose objects keep surfaces; others compute them again."""
+
+MAX_HISTORY_BYTES = 1 << 28
+"""Memory of the entries of a session, about; beyond it the oldest ones are forgotten, but never the last."""
+
+ENTRY_BYTES = 4096
+"""Memory of an entry beside what its edit holds, at most."""
 
 
 class Command(Protocol):
@@ -46,6 +52,8 @@ class UndoEntry:
         What was done, in a few words.
     edit
         The edit that undo takes back.
+    mark
+        Identity of the state after the entry.
 
     Examples
     --------
@@ -60,19 +68,36 @@ class UndoEntry:
 
     label: str
     edit: Edit
+    mark: object = field(default_factory=object, repr=False)
 
 
 @dataclass
 class History:
-    """Entries that can be undone and redone, the open stroke, and the entry that was saved last."""
+    """Entries that can be undone and redone, the open stroke, and the forgotten entries.
+
+    ``start`` is the mark of the oldest state that undo reaches; so many entries before it are ``forgotten``.
+    """
 
     done: list[UndoEntry] = field(default_factory=list)
     undone: list[UndoEntry] = field(default_factory=list)
     stroke: UndoEntry | None = None
+    start: object = field(default_factory=object)
+    forgotten: int = 0
 
     def copy(self) -> "History":
         """Return an independent copy; entries are immutable and shared."""
-        return History([*self.done], [*self.undone], self.stroke)
+        return replace(self, done=[*self.done], undone=[*self.undone])
+
+    def forget_oldest(self, max_bytes: int) -> None:
+        """Forget the oldest entries if all take more memory; the last one stays."""
+        held = sum(ENTRY_BYTES + entry.edit.held_bytes for entry in self.done)
+        count = 0
+        while held > max_bytes and count < len(self.done) - 1:
+            held -= ENTRY_BYTES + self.done[count].edit.held_bytes
+            count += 1
+        if count:
+            self.start, self.forgotten = self.done[count - 1].mark, self.forgotten + count
+            del self.done[:count]
 
 
 class EditSession:
@@ -84,6 +109,8 @@ class EditSession:
     ----------
     scene
         The scene, or document, to edit. Undoing everything restores it bit for bit, decal numbers included.
+    max_history_bytes
+        Memory of the entries that can be undone, about. Beyond it the oldest ones are forgotten.
 
     Attributes
     ----------
@@ -112,10 +139,11 @@ class EditSession:
     >>> edited = session.document.scene
     """
 
-    def __init__(self, scene: Scene | Document) -> None:
+    def __init__(self, scene: Scene | Document, *, max_history_bytes: int = MAX_HISTORY_BYTES) -> None:
         self.document = scene if isinstance(scene, Document) else Document.from_scene(scene)
+        self._max_history_bytes = whole_number("max_history_bytes", max_history_bytes, 0, None, InvalidEdit)
         self._history = History()
-        self._saved: UndoEntry | None = None
+        self._saved = self._history.start
         self._listeners: list[Callable[[Edit], None]] = []
         self._revision = 0
 
@@ -181,6 +209,8 @@ class EditSession:
             far = entries[-MAX_SURFACES - 1].edit.objects
             for item in set(far) - near - {*self.document.objects}:
                 forget_surface(item)
+        if entries is self._history.done:
+            self._history.forget_oldest(self._max_history_bytes)
 
     def _revert(self, edit: Edit) -> None:
         self._apply(edit.before, edit.parts_before)
@@ -199,6 +229,16 @@ class EditSession:
     def next_redo(self) -> UndoEntry | None:
         """Entry that `redo` would redo."""
         return self._history.undone[-1] if self._history.undone else None
+
+    @property
+    def position(self) -> object:
+        """Mark of the present state in the history; undo and redo return to the same ones."""
+        return self._history.done[-1].mark if self._history.done else self._history.start
+
+    @property
+    def forgotten(self) -> int:
+        """Number of the oldest entries that can no longer be undone, see ``max_history_bytes``."""
+        return self._history.forgotten
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -288,7 +328,8 @@ class EditSession:
     def forget_history(self) -> None:
         """Drop all entries, as after another file was opened; the present state counts as saved."""
         self.end_stroke()
-        self._history, self._saved = History(), None
+        self._history = History()
+        self._saved = self._history.start
         self._revision += 1
 
     # -- listeners and files ----------------------------------------------------------------------------
@@ -324,7 +365,7 @@ class EditSession:
     def modified(self) -> bool:
         """True if there are edits since the last save."""
         stroke = self._history.stroke
-        return (stroke is not None and not stroke.edit.empty) or self.next_undo is not self._saved
+        return (stroke is not None and not stroke.edit.empty) or self.position is not self._saved
 
     def save(self, path: str | os.PathLike[str], *, camera: Camera | None = None) -> None:
         """Write the scene to a file, completely or not at all; see `decals.save_scene`.
@@ -379,7 +420,7 @@ class Fork(EditSession):
     """
 
     def __init__(self, origin: EditSession) -> None:
-        super().__init__(origin.document.fork())
+        super().__init__(origin.document.fork(), max_history_bytes=origin._max_history_bytes)
         self._history = origin._history.copy()
         self.origin, self._origin_revision = origin, origin._revision
         self._saved = origin._saved
@@ -441,13 +482,13 @@ class SaveJob:
 
     def __init__(self, session: EditSession, path: str | os.PathLike[str], camera: Camera | None) -> None:
         self._session, self._path, self._camera = session, path, camera
-        self._document, self._entry = session.document.fork(), session.next_undo
+        self._document, self._position = session.document.fork(), session.position
 
     def write(self, progress: Progress | None = None) -> Callable[[], None]:
         """Write the file, and return a function that marks the session as saved, for the session's thread."""
         save_scene(self._document.scene.replace(camera=self._camera), self._path, progress=progress)
 
         def mark_saved() -> None:
-            self._session._saved = self._entry
+            self._session._saved = self._position
 
         return mark_saved

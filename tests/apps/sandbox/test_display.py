@@ -234,6 +234,19 @@ def test_any_number_of_pinches_leaves_a_view(
     sandbox.pinch(0.0, 0.0, 1.0, "end")
 
 
+def test_a_page_lists_the_newest_entries_and_jumps_to_each(
+    sandbox: Sandbox, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("decals.apps.sandbox.sandbox.MAX_HISTORY", 2)
+    for name in ("first", "second", "third"):
+        sandbox.change_row("object 0", "rename", name)
+    values = sandbox.values()
+    assert (values["earlier"], len(values["done"]), values["forgotten"]) == (1, 2, 0)
+    sandbox.go_to(values["earlier"] + 1)  # the page's first entry
+    assert sandbox.values()["outline"][0]["label"] == "second"
+    sandbox.go_to(0)
+
+
 def test_two_fingers_take_back_what_the_first_did(sandbox: Sandbox, shared: EditWindow) -> None:
     before, camera = digest(shared.document), shared.subplot.vtk_renderer.camera
     sandbox.perform("frame")

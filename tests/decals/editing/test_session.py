@@ -13,11 +13,19 @@ from decals.editing import (
     EditSession,
     MoveDecals,
     PaintPrimitive,
+    RemoveObject,
+    RenameObject,
+    ReplaceImage,
     ScaleDecals,
+    SetParameter,
     SetValues,
 )
+from decals.editing.document import NODE_BYTES
+from decals.editing.session import ENTRY_BYTES
 from decals.errors import InvalidDecals, InvalidEdit, InvalidScene
 from decals.scenes.files import load_scene
+from decals.scenes.objects import MeshObject
+from decals.scenes.scene import DecalImage
 from tests.decals.editing.scenes import digest, one, scene, tree_of
 
 
@@ -188,3 +196,58 @@ def test_a_save_that_fails_leaves_the_file_and_the_mark(session: EditSession, tm
     with pytest.raises(InvalidScene, match="existing folder"):
         session.save(tmp_path / "nowhere" / "scene.json")
     assert session.modified
+
+
+def test_the_oldest_entries_are_forgotten_beyond_a_limit_of_memory(tmp_path: Path) -> None:
+    drags = EditSession(scene())
+    drag(drags, 2)
+    each = ENTRY_BYTES + (drags.next_undo.edit.held_bytes if drags.next_undo else 0)
+    session = EditSession(scene(), max_history_bytes=5 * each)
+    states = [digest(session.document)]
+    for x in np.linspace(0, 0.5, 12):
+        session.do(MoveDecals([3], np.array([x, 0, 1], np.float32), np.array([0, 0, 1], np.float32)))
+        states.append(digest(session.document))
+        if len(states) == 8:
+            session.save(tmp_path / "scene.json")
+    assert (len(session.labels), session.forgotten) == (5, 7)
+    fork = session.fork()
+    assert (fork.forgotten, fork.position) == (7, session.position)
+    for state in states[-2:-7:-1]:
+        assert session.modified
+        session.undo()
+        assert digest(session.document) == state
+    assert session.undo() is None
+    assert not session.modified  # the saved state is the oldest one now
+    while session.redo():
+        pass
+    assert (digest(session.document), session.forgotten) == (states[-1], 7)
+    session.forget_history()
+    assert (session.forgotten, session.modified) == (0, False)
+
+
+def test_the_first_state_is_not_saved_once_its_entries_are_forgotten() -> None:
+    session = EditSession(scene(), max_history_bytes=0)
+    drag(session, 3)
+    assert (len(session.labels), session.forgotten) == (1, 2)  # the last one can always be undone
+    session.undo()
+    assert session.modified
+
+
+def test_entries_count_what_they_alone_hold(session: EditSession) -> None:
+    def held() -> int:
+        entry = session.next_undo
+        assert entry is not None
+        return entry.edit.held_bytes
+
+    item = session.document.objects[1]
+    assert isinstance(item, MeshObject)
+    session.do(RenameObject(1, "chest"))
+    assert held() == 0
+    path = dominant_primitive(tree_of(session.document), np.zeros(3, np.float32))
+    session.do(SetParameter(0, path, "radius", 0.9))
+    assert 3 * NODE_BYTES < held() < 60 * NODE_BYTES  # decals on it have moved too
+    session.do(RemoveObject(1))
+    assert held() >= item.vertices.nbytes + item.faces.nbytes
+    image = session.document.images[0]
+    session.do(ReplaceImage(0, DecalImage.load("tile")))
+    assert held() == image.pixels.nbytes
