@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 SCRIPTS = {
     "values": "from blobtree import Point; Point((0, 0, 0), radius=1.0).gradient([[0.0, 0.0, 0.0]])",
     "mesh": "from blobtree import Point, polygonize; polygonize(Point((0, 0, 0), radius=1.0), resolution=8)",
@@ -32,9 +34,15 @@ for script in sys.argv[1:]:
 """Runs each script in a fork of its own, in which Warp has not been started."""
 
 
-def test_warp_starts_without_a_warning() -> None:
+@pytest.mark.parametrize(
+    "names",
+    [("mesh", "mesh surface"), pytest.param(("values", "index", "editor"), marks=pytest.mark.slow)],
+    ids=" ".join,
+)
+def test_warp_starts_without_a_warning(names: tuple[str, ...]) -> None:
+    scripts = [SCRIPTS[name] for name in names]
     run = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *SCRIPTS.values()], capture_output=True, text=True, check=False
+        [sys.executable, "-c", PROGRAM, *scripts], capture_output=True, text=True, check=False
     )
     assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
 
