@@ -5,6 +5,7 @@ This module imports nothing heavy, so ``--help`` and ``--version`` are fast.
 
 import gc
 import sys
+import warnings
 from collections.abc import Sequence
 from importlib.metadata import version
 
@@ -207,14 +208,24 @@ def _missing_text(error: MissingArgumentError) -> str:
 
 def _print_error(message: str) -> int:
     """Print a message as one line on stderr; return the exit code."""
-    line = " ".join(message.split())
-    Console(stderr=True, soft_wrap=True).print(f"[bold red]error:[/] {escape(line)}", highlight=False)
+    _print_line("red", "error", message)
     return BAD_INPUT
+
+
+def _print_warning(message: Warning | str, *_: object, **__: object) -> None:
+    """Print a warning as one line on stderr, without the line of code that it comes from."""
+    _print_line("yellow", "warning", str(message))
+
+
+def _print_line(color: str, kind: str, message: str) -> None:
+    line = " ".join(message.split())
+    Console(stderr=True, soft_wrap=True).print(f"[bold {color}]{kind}:[/] {escape(line)}", highlight=False)
 
 
 def main() -> None:
     """Run the command line and exit with its code."""
     gc.set_threshold(COLLECTED_OBJECTS)
+    warnings.showwarning = _print_warning
     try:
         sys.exit(run())
     finally:

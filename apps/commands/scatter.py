@@ -1,6 +1,7 @@
 """``implicit-decals scatter``: scattered decals as a scene, or as a table."""
 
 import colorsys
+from math import sqrt
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -52,8 +53,8 @@ def scatter(
     images: OptionalWhole = None,
     choice: ImageChoice = ImageChoice.RANDOM,
     painted: Annotated[Path | None, Parameter(show_default=False)] = None,
-    painted_along: Literal["x", "y", "z"] = "z",
-    black: float = 0.1,
+    painted_along: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
+    black: Annotated[float | None, Parameter(show_default=False)] = None,
     regularity: float = 1.0,
     seed: Whole = 0,
     crease_angle: CreaseAngle = None,
@@ -88,9 +89,9 @@ def scatter(
     painted
         An image file, projected onto the models, that sets the density of decals: highest where it is white.
     painted_along
-        Axis of that projection.
+        Axis of that projection. Default: z.
     black
-        Density where the image is black, as a fraction of that where it is white.
+        Density where the image is black, as a fraction of that where it is white. Default: 0.1.
     regularity
         From 0 (random positions) to 1 (as even as possible).
     seed
@@ -98,6 +99,11 @@ def scatter(
     """
     if count is not None and spacing is not None:
         raise InvalidInput("expected --count or --spacing, got both; leave one of them out")
+    if painted is None and (painted_along is not None or black is not None):
+        raise InvalidInput(
+            "--painted-along and --black change a painted image; give --painted, or leave them out"
+        )
+    painted_along, black = painted_along or "z", 0.1 if black is None else black
     if count is None and spacing is None:
         count = 500
     if count is not None:
@@ -116,6 +122,8 @@ def scatter(
         own = loaded.images if images is None and isinstance(loaded, Scene) else ()
         pictures = own or scale_images(images or 1)
         surfaces = [item.surface for item in objects]
+        if spacing is not None:
+            _check_spacing(spacing, sum(surface.area for surface in surfaces))
         density = None
         if painted is not None:
             density = PaintedImage(painted, Planar.over(surfaces, painted_along)).density(black=black)
@@ -143,6 +151,15 @@ def scatter(
             kept: dict[str, Any] = {"drawing": drawing, "recipe": recipe}
             save_scene(Scene(objects=objects, camera=camera, images=pictures, decals=decals, **kept), output)
     print_path(output)
+
+
+def _check_spacing(spacing: float, area: float) -> None:
+    """Raise `InvalidInput` for a distance of neighbours at which an area would need too many decals."""
+    least = sqrt(2.0 * area / (sqrt(3.0) * MAX_DECALS))
+    if 0.0 < spacing < least:
+        raise InvalidInput(
+            f"--spacing: expected at least {least:.3g}, which makes {MAX_DECALS:,} decals, got {spacing:g}"
+        )
 
 
 def write_table(decals: Decals, path: Path, origin: Origin = WORLD) -> None:

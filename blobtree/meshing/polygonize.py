@@ -466,11 +466,12 @@ def _cell_size(tree: ImplicitModel, resolution: int | None, cell_size: float | N
         raise InvalidResolution("expected either resolution or cell_size, got both; drop one")
     if cell_size is None:
         cells = DEFAULT_RESOLUTION if resolution is None else resolution
-        if not is_whole(cells) or cells < 1:
+        if not is_whole(cells) or not 1 <= cells <= MAX_RESOLUTION:
             raise InvalidResolution(
-                f"resolution: expected a whole number of cells from 1, got {shown(resolution)}"
+                f"resolution: expected a whole number of cells from 1 to {MAX_RESOLUTION:,}, "
+                f"got {shown(resolution)}"
             )
-        cell_size = longest / int(min(cells, 2 * MAX_RESOLUTION))  # beyond it is refused below
+        cell_size = longest / int(cells)
     cell_size = _above_zero("cell_size", "size", cell_size)
     if not MIN_MODEL_SIZE < longest < MAX_MODEL_SIZE:
         raise InvalidResolution(

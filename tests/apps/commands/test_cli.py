@@ -1,14 +1,17 @@
 """The command as a whole: version, help, interrupts."""
 
+import gc
 import shutil
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
+from decals.apps import cli
 from decals.apps.cli import run
 from decals.apps.commands import scatter_options
 from tests.apps.commands.pictures import small
@@ -36,6 +39,8 @@ def test_the_package_runs_as_the_command() -> None:
 def test_help_version_and_gallery_import_nothing_heavy() -> None:
     script = """
 import sys
+import warnings
+from decals.apps import cli
 from decals.apps.cli import run
 run(sys.argv[1:])
 print({"numpy", "warp", "vtkmodules", "pyvista", "moderngl"} & set(sys.modules), file=sys.stderr)
@@ -108,3 +113,12 @@ def test_interrupt(folder: Path, monkeypatch: pytest.MonkeyPatch, capfd: Capture
 
 def test_square_brackets_in_names_survive(bad: Callable[..., str]) -> None:
     assert "[bold]x[/].ply" in bad("render", "[bold]x[/].ply", "-o", "a.png")
+
+
+def test_warnings_are_one_line(monkeypatch: pytest.MonkeyPatch, capsys: Capture) -> None:
+    monkeypatch.setattr(cli, "run", lambda: warnings.warn("plain samples\nare [drawn]", stacklevel=2))
+    for name in ("freeze", "set_threshold"):
+        monkeypatch.setattr(gc, name, lambda *_: None)
+    with warnings.catch_warnings(action="always"), pytest.raises(SystemExit):
+        cli.main()
+    assert capsys.readouterr().err == "warning: plain samples are [drawn]\n"

@@ -73,6 +73,9 @@ def test_a_painted_image_sets_the_density(folder: Path) -> None:
         (["--count", "-1", "-o", "a.json"], "--count: expected"),
         (["--images", "257", "-o", "a.json"], "--images: expected"),
         (["--spacing", "0", "-o", "a.json"], "spacing: expected a length above 0"),
+        (["--spacing", "1e-5", "-o", "a.json"], "which makes 1,000,000 decals, got 1e-05"),
+        (["--black", "0.5", "-o", "a.json"], "give --painted"),
+        (["--painted-along", "x", "-o", "a.json"], "give --painted"),
         (["-o", "a.png"], "expected an output file"),
     ],
 )
