@@ -239,9 +239,10 @@ def _levels(values: NDArray[Any], name: str) -> NDArray[Any]:
     if values.dtype in (np.uint8, np.uint16):
         return values.astype(values.dtype.newbyteorder("="), copy=False)
     if values.dtype.kind != "f" or not ((values >= 0.0) & (values <= 1.0)).all():
+        limits = f" from {values.min()} to {values.max()}" if values.dtype.kind in "biuf" else ""
         raise InvalidImage(
-            f"{name}: expected bytes, or floats from 0 to 1, got {values.dtype} from {values.min()} to "
-            f"{values.max()}; scale it, or give decals.DecalImage linear light, float32[h, w, 4]"
+            f"{name}: expected bytes, or floats from 0 to 1, got {values.dtype}{limits}; "
+            "scale it, or give decals.DecalImage linear light, float32[h, w, 4]"
         )
     return np.rint(values * 255.0).astype(np.uint8)
 

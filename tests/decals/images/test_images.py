@@ -276,6 +276,16 @@ def test_floats_of_arrays_are_srgb_or_linear_light() -> None:
         image_pixels(np.array([[0.0, -1.0]]), linear=True)
 
 
+@pytest.mark.parametrize("linear", [False, True])
+@pytest.mark.parametrize(
+    ("rows", "got"),
+    [([["a", "b"]], "got <U1; scale it"), ([[1, None]], "got object; "), ([[3, -1]], "int64 from -1 to 3; ")],
+)
+def test_values_of_other_types_are_refused(rows: Any, got: str, linear: bool) -> None:
+    with pytest.raises(InvalidImage, match=f"expected bytes, or floats from 0 to 1, .*{got}"):
+        image_pixels(np.array(rows), linear=linear)
+
+
 def test_the_end_of_messages_about_files_is_an_argument(tmp_path: Path) -> None:
     (tmp_path / "text.png").write_text("no picture")
     for name, says in (("none.png", "found no file"), ("text.png", "is not a picture")):
