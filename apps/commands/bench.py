@@ -25,6 +25,7 @@ from decals.errors import InvalidInput
 from decals.index import DecalIndex
 from decals.rendering import Renderer
 from decals.rendering.options import RenderOptions
+from decals.scattering.neighbors import ideal_spacing
 from decals.scattering.orientation import tangents
 from decals.surfaces import Surface
 
@@ -237,7 +238,7 @@ def even_decals(surface: Surface, *, count: int, seed: int = 0) -> Decals:
     `decals.scatter` distributes them more evenly and without gaps, but takes minutes for 100,000.
     """
     positions, normals = surface.sample(count, seed)
-    spacing = np.sqrt(2.0 * surface.area / (np.sqrt(3.0) * max(count, 1)))
+    spacing = ideal_spacing(surface.area, count)
     for _ in range(REPULSION_STEPS if count > NEIGHBORS else 0):
         positions, normals = surface.project(positions + _displacements(positions, spacing))
     radius = np.sqrt(COVERAGE * surface.area / (np.pi * max(count, 1)))

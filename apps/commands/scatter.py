@@ -1,7 +1,6 @@
 """``implicit-decals scatter``: scattered decals as a scene, or as a table."""
 
 import colorsys
-from math import sqrt
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -29,6 +28,7 @@ from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
 from decals.rendering import Drawing
 from decals.scattering import ImageChoice, Orientation, PaintedImage, Planar
+from decals.scattering.neighbors import ideal_spacing
 from decals.scenes.origin import WORLD, Origin
 from decals.scenes.recipe import Recipe
 
@@ -155,7 +155,7 @@ def scatter(
 
 def _check_spacing(spacing: float, area: float) -> None:
     """Raise `InvalidInput` for a distance of neighbours at which an area would need too many decals."""
-    least = sqrt(2.0 * area / (sqrt(3.0) * MAX_DECALS))
+    least = ideal_spacing(area, MAX_DECALS)
     if 0.0 < spacing < least:
         raise InvalidInput(
             f"--spacing: expected at least {least:.3g}, which makes {MAX_DECALS:,} decals, got {spacing:g}"
