@@ -113,8 +113,8 @@ class Environment:
     Parameters
     ----------
     picture : image
-        Equirectangular picture, twice as wide as high: the path of a Radiance file (``.hdr``), or, as less
-        bright light, of a usual picture; or an image without a path, see `decals.images.image_pixels`. In
+        Equirectangular picture, twice as wide as high: a path, or an image of another kind, see
+        `decals.images.image_pixels`. Only Radiance files (``.hdr``) and floats are brighter than white. In
         arrays and lists, floats are linear light and integers sRGB. Row 0 is straight up, the middle column
         opposite to the front: at −z, or at +y for an ``up`` along z.
     rotation : float
