@@ -1,4 +1,4 @@
-"""Warp kernels that insert one decal into the lists of the index, or remove it, in a single thread."""
+"""Warp kernels that insert a decal, remove it, and find decals nested with it."""
 
 # mypy: ignore-errors
 # (kernel code is Python only in form: its names have Warp types)
@@ -17,13 +17,16 @@ from decals.index.decal_cells import (
     power_of_two,
     touches,
 )
-from decals.index.lookup import IndexedDecals, end_of_lower
+from decals.index.lookup import IndexedDecals, are_nested_contact, end_of_lower
 from decals.record import RECORD, rank_of, xyz
 
 wp.set_module_options(KERNEL_OPTIONS)
 
 INITIAL_ROOM = 4
 """Room of a new list, in decals. A full list moves to the end, with twice the room."""
+
+MOST_CELLS_ACROSS = 16
+"""Most cells along an axis that are searched for decals nested with one."""
 
 IDS_END = wp.constant(0)
 CELLS = wp.constant(1)
@@ -150,3 +153,34 @@ def insert_decal(
             slots[touched] = wp.where(taken > 0, slot, -1)
             touched += 1
     state[TOUCHED] = touched
+
+
+@wp.kernel
+def find_nested_with(
+    changed: wp.array(dtype=wp.int32),
+    level_count: wp.int32,
+    index: IndexedDecals,
+    found: wp.array(dtype=wp.int32),
+):
+    """Write 1 first if a contact decal is nested with a changed one, second if one reaches too many cells.
+
+    By `find_nested`, the larger of two nested decals reaches the centre of the smaller one. A cell that the
+    changed decal reaches therefore lists the other: it holds the centre of one of them.
+    """
+    decal = changed[wp.tid()]
+    ball = index.records[RECORD * decal]
+    position = xyz(ball)
+    for level in range(level_count):
+        width = wp.float64(index.levels[level][1])
+        corner = lowest_cell(position, ball[3], width)
+        across = cells_across(position, ball[3], width)
+        if wp.max(wp.max(across[0], across[1]), across[2]) > MOST_CELLS_ACROSS:
+            found[1] = 1
+        else:
+            for number in range(cells_in(across)):
+                slot = slot_of(cell_key(cell_of_block(corner, across, number), level), index)
+                if index.table[slot][0] != EMPTY:
+                    head = index.table[slot][3]
+                    for j in range(index.ids[head]):
+                        if are_nested_contact(decal, index.ids[head + 1 + j], index.records):
+                            found[0] = 1

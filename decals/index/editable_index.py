@@ -13,7 +13,6 @@ from decals.index import edit_kernels as kernels
 from decals.index.change_log import ChangeLog
 from decals.index.decal_cells import FINEST, MAX_CELLS_OF_DECAL, NO_FLOOR, NO_PARITY, REACH_WITH_SLACK
 from decals.index.index import DecalIndex, has_nested, indexed_decals
-from decals.index.lookup import find_nested_with
 from decals.index.rows import with_spare
 from decals.model import RECORD
 
@@ -21,9 +20,6 @@ MAX_LEVELS = 128
 
 MAX_SMALL_EDITS = 64
 """Number of decals smaller than the cells they share, from which the index is rebuilt."""
-
-MAX_CHECKED_PAIRS = 10_000_000
-"""Number of pairs of decals that are compared after an edit; for more, the index finds those that matter."""
 
 LEVELS, TABLE, IDS = "index_levels", "index_table", "index_ids"
 _TYPES = {LEVELS: wp.vec4, TABLE: wp.vec4i, IDS: wp.int32}
@@ -120,16 +116,15 @@ class EditableIndex:
         """Update `nested` after a change of some of the first `count` decals."""
         if self.nested:
             return
-        if len(changed) > MAX_CHECKED_PAIRS // max(count, 1):
-            arrays = self.arrays[LEVELS][: self.level_count], self.arrays[TABLE], self.arrays[IDS]
-            indexed = indexed_decals(records, *arrays, layered=True, device="cpu")
-            self.nested = has_nested(indexed, count)
-            return
-        found, found_on_cpu = _shared(np.zeros(1, np.int32), wp.int32)
+        found, found_on_cpu = _shared(np.zeros(2, np.int32), wp.int32)
         numbers = _shared(changed.astype(np.int32), wp.int32)[1]
-        inputs = [numbers, self._indexed(records).records, found_on_cpu]
-        wp.launch(loaded(find_nested_with, "cpu"), count, inputs, device="cpu")
-        self.nested = bool(found[0])
+        inputs = [numbers, self.level_count, self._indexed(records), found_on_cpu]
+        wp.launch(loaded(kernels.find_nested_with, "cpu"), len(changed), inputs, device="cpu")
+        nested, unknown = found
+        if unknown and not nested:
+            arrays = self.arrays[LEVELS][: self.level_count], self.arrays[TABLE], self.arrays[IDS]
+            nested = has_nested(indexed_decals(records, *arrays, layered=True, device="cpu"), count)
+        self.nested = bool(nested)
 
     def remove(self, records: Float32Array, number: int, log: ChangeLog) -> None:
         """Remove a decal, whose record is still unchanged, from the lists of its cells."""

@@ -246,14 +246,3 @@ def find_nested(index: IndexedDecals, found: wp.array(dtype=wp.int32)):
         for j in range(span[0], span[1]):
             if are_nested_contact(i, index.ids[j], index.records):
                 found[0] = 1
-
-
-@wp.kernel
-def find_nested_with(
-    changed: wp.array(dtype=wp.int32), records: wp.array(dtype=wp.vec4), found: wp.array(dtype=wp.int32)
-):
-    """Write 1 if a contact decal is nested with one of the changed ones."""
-    i = wp.tid()
-    for k in range(changed.shape[0]):
-        if are_nested_contact(i, changed[k], records):
-            found[0] = 1
