@@ -346,8 +346,8 @@ def around(at: tuple[int, int], reach: int) -> list[tuple[int, int]]:
 async def accessible(browser: Page) -> None:
     """Make sure that axe-core finds nothing serious in the page; axe-playwright-python brings its script."""
     found = find_spec("axe_playwright_python")
-    if found is None or found.origin is None:
-        return
+    assert found is not None, "pip install axe-playwright-python"
+    assert found.origin is not None
     script = (Path(found.origin).parent / "axe.min.js").read_text(encoding="utf-8")
     await browser.evaluate(script)
     violations = await browser.evaluate("axe.run().then(result => result.violations)")

@@ -12,7 +12,7 @@ from tests.display import run_module
 
 pytestmark = pytest.mark.browser
 
-NEEDED = ("playwright", "trame_pyvista")
+NEEDED = ("playwright", "axe_playwright_python", "trame_pyvista")
 FOR_NOTEBOOKS = ("nbclient", "ipykernel", "ipywidgets", "nest_asyncio2")
 
 
