@@ -135,7 +135,7 @@ def render(
         if isinstance(loaded, Scene) and (decals is not None or image or seed is not None):
             raise InvalidInput("a saved scene has its own decals; leave out --decals, --image and --seed")
         drawing = (loaded.drawing if isinstance(loaded, Scene) else Drawing()).overridden(**options)
-        if changes:
+        if changes and environment is None:
             drawing = drawing.overridden(environment=_changed(drawing.environment, changes))
         scattering = ScatterOptions.from_arguments(decals, image, seed)
         # The renderer comes first: without graphics the command fails before the long work.

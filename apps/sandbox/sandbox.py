@@ -453,8 +453,8 @@ class Sandbox:
 
     def show_start(self, shown: bool) -> None:
         """Show or hide the start page."""
-        fixed = {"open": bool(shown), "samples": list(SAMPLES), "lessons": self._lessons}
-        self._start = fixed | listed(self._folder)
+        offered = {"open": bool(shown), "samples": list(SAMPLES), "lessons": self._lessons}
+        self._start = offered | listed(self._folder)
 
     @event
     def open_lesson(self, number: int) -> None:
@@ -528,8 +528,9 @@ class Sandbox:
         for file in files if isinstance(files, list | tuple) else [files]:
             with self.reported():
                 found, window = read_upload(file), self._window
-                name = plain_name(str(file["name"]))  # type: ignore[index]  # read_upload has checked it
-                if key == LIGHT or (not key and str(file["name"]).lower().endswith(HDR)):  # type: ignore[index]
+                file_name = str(file["name"])  # type: ignore[index]  # read_upload has checked it
+                name = plain_name(file_name)
+                if key == LIGHT or (not key and file_name.lower().endswith(HDR)):
                     self._take_light(found, file)
                 elif isinstance(found, Scene):
                     self._open(lambda *_, scene=found: scene, new_file(self._folder, name))
