@@ -23,7 +23,7 @@ d = |w|/ρ_i and b = ρ_i in radii of the owner, the point of the image moves to
 
 a bump that ends where i stops to reach; inside its rim, a paraboloid continues it. On that rim the image
 moves by A ρ_i, so only what lies within (1 − A) ρ_i of the centre stays hidden. Several bumps join to
-S = (Σ s_i⁸)^⅛. As S curves by at most PARTING·k^⅛ < 1 for k < 4,000 of them, the map is the gradient of a
+S = (Σ s_i⁶)^⅙. As S curves by at most PARTING·k^⅙ < 1 for k < 540 of them, the map is the gradient of a
 convex function and does not fold. The displacement is multiplied by 1 − r²: rims and contact lines stay.
 With pushes of planes, its smallness prevents folds: tests and benchmark find none.
 """
@@ -171,7 +171,7 @@ def bump_of(w: wp.vec3, radius: wp.float32, other: wp.float32) -> wp.vec4:
 
 @wp.func
 def join_bumps(first: wp.vec4, second: wp.vec4) -> wp.vec4:
-    """Return gradient and height of (s⁸ + t⁸)^⅛ for two bumps; the second may be 0."""
+    """Return gradient and height of (s⁶ + t⁶)^⅙ for two bumps; the second may be 0."""
     if second[3] <= 0.0:
         return first
     largest = wp.max(first[3], second[3])
@@ -179,12 +179,11 @@ def join_bumps(first: wp.vec4, second: wp.vec4) -> wp.vec4:
     b = second[3] / largest
     a2 = a * a
     b2 = b * b
-    a6 = a2 * a2 * a2
-    b6 = b2 * b2 * b2
-    joined = wp.pow(a6 * a2 + b6 * b2, 0.125)
-    per = 1.0 / joined
-    per7 = wp.pow(per, 7.0)
-    result = (a6 * a * per7) * first + (b6 * b * per7) * second
+    a5 = a2 * a2 * a
+    b5 = b2 * b2 * b
+    joined = wp.pow(a5 * a + b5 * b, 1.0 / 6.0)
+    per5 = wp.pow(joined, -5.0)
+    result = (a5 * per5) * first + (b5 * per5) * second
     return wp.vec4(result[0], result[1], result[2], largest * joined)
 
 

@@ -339,7 +339,7 @@ def _parted(decals: Any, points: NDArray[Any], normals: NDArray[Any], owner: NDA
     """How far stacked decals above the owner draw its image towards them, in the owner's radii.
 
     Each has a potential: ½ A (1.2 − d²) b² inside its rim, that joins to one of (1.6 − d²)³ there and ends at
-    √1.6 of its radius. The eighth powers of several add up. The step is turned with the normal at q to that
+    √1.6 of its radius. The sixth powers of several add up. The step is turned with the normal at q to that
     at p, around the axis perpendicular to both.
     """
     centres, radii = decals.positions.astype(np.float64), decals.radii.astype(np.float64)
@@ -356,8 +356,8 @@ def _parted(decals: Any, points: NDArray[Any], normals: NDArray[Any], owner: NDA
     height = size**2 * strength * np.where(squared < 1, 0.6 - squared / 2, rest**3 / 10)
     slope = strength * np.where(squared < 1, 1, rest**2)
     most = np.maximum(height.max(axis=1, initial=0), 1e-300)[:, None]
-    total = ((height / most) ** 8).sum(axis=1)[:, None]
-    weight = (height / most) ** 7 / np.maximum(total, 1e-300) ** (7 / 8)
+    total = ((height / most) ** 6).sum(axis=1)[:, None]
+    weight = (height / most) ** 5 / np.maximum(total, 1e-300) ** (5 / 6)
     step = -((weight * slope)[..., None] * away).sum(axis=1)
     n_p = decals.normals[owner].astype(np.float64)
     axis, cosine = np.cross(normals, n_p), (normals * n_p).sum(axis=1)[:, None]

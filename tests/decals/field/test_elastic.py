@@ -141,6 +141,19 @@ def test_no_image_folds_among_nested_decals() -> None:
     assert owned > 5000
 
 
+def test_no_image_folds_around_500_decals_in_one_place() -> None:
+    """Their potentials join to one that curves 500^⅙ = 2.8 times as much; the proof ends at 540."""
+    radii = np.full(501, 0.1)
+    radii[0] = 1.0
+    decals = Decals(np.zeros((501, 3)), np.tile(UP, (501, 1)), np.tile([1.0, 0, 0], (501, 1)), radii)
+    distances = np.linspace(0.101, 0.13, 30)
+    shown = evaluate(decals, distances[:, None] * [1, 0, 0], np.tile(UP, (30, 1)))
+    assert (shown.owner == 0).all()
+    place = 2 * shown.uv[:, 0].astype(np.float64) - 1
+    assert place[0] < 0.01
+    assert (np.diff(place) > 0).all()
+
+
 def test_a_decal_without_overlap_is_not_deformed() -> None:
     points = np.linspace(0, 0.99, 50)[:, None] * [1, 0, 0]
     _, r = rims(pair(2.001, 1.0, 1.0), points)
