@@ -12,7 +12,6 @@ import numpy as np
 
 from blobtree._typing import BoolArray, Int64Array
 from blobtree.lazy import Lazy
-from blobtree.nodes.numeric_parameters import nodes_with_paths
 from decals.errors import InvalidEdit, InvalidMesh, InvalidScene
 from decals.index.editor import DecalEditor
 from decals.model import Decals
@@ -160,9 +159,10 @@ class Edit:
     def held_bytes(self) -> int:
         """Approximate memory that undo alone needs: decals, and objects and images that were replaced."""
         states = [*vars(self.before.decals).values(), *vars(self.after.decals).values()]
-        kept = _parts_bytes(self.parts_after)
-        parts = {key: size for key, size in _parts_bytes(self.parts_before).items() if key not in kept}
-        return sum(_arrays(states).values()) + sum(parts.values())
+        before, after = ({*map(id, parts.objects or ())} for parts in (self.parts_before, self.parts_after))
+        kept = _parts_bytes(self.parts_after, before & after)
+        held = _parts_bytes(self.parts_before, before & after)
+        return sum(_arrays(states).values()) + sum(held[key] for key in held.keys() - kept)
 
     def then(self, later: "Edit") -> "Edit":
         """Return one edit that does this one and then a later one."""
@@ -183,16 +183,24 @@ def _arrays(values: Iterable[object]) -> dict[int, int]:
     return {id(array): array.nbytes for array in values if isinstance(array, np.ndarray)}
 
 
-def _parts_bytes(parts: SceneParts) -> dict[int, int]:
-    """Return the bytes of objects and images by the identities of their arrays and nodes."""
+def _parts_bytes(parts: SceneParts, known: set[int]) -> dict[int, int]:
+    """Return the bytes of images, meshes and trees without known identities, by those of arrays and nodes."""
     held = _arrays(array for image in parts.images or () for array in vars(image).values())
     for item in parts.objects or ():
         if isinstance(item, MeshObject):
             held |= _arrays([item.vertices, item.faces])
             continue
-        nodes = [node for _, node in nodes_with_paths(item.tree)]
-        for node in nodes:
-            held |= {id(node): NODE_BYTES} | _arrays(vars(node).values())
+        if id(item) in known:
+            continue
+        nodes: set[int] = set()
+        pending = [item.tree]
+        while pending:
+            node = pending.pop()
+            if id(node) not in nodes:
+                nodes.add(id(node))
+                held[id(node)] = NODE_BYTES
+                held |= _arrays(vars(node).values())
+                pending.extend(node.children)
         held[id(item.tree)] += NODE_BYTES * len(nodes)  # the tape has a part for each
     return held
 

@@ -70,12 +70,18 @@ class UndoEntry:
     edit: Edit
     mark: object = field(default_factory=object, repr=False)
 
+    @property
+    def held_bytes(self) -> int:
+        """Memory of the entry, about."""
+        return ENTRY_BYTES + self.edit.held_bytes
+
 
 @dataclass
 class History:
     """Entries that can be undone and redone, the open stroke, and the forgotten entries.
 
     ``start`` is the mark of the oldest state that undo reaches; so many entries before it are ``forgotten``.
+    ``held_bytes`` is the memory of the entries that can be undone, about.
     """
 
     done: list[UndoEntry] = field(default_factory=list)
@@ -83,21 +89,30 @@ class History:
     stroke: UndoEntry | None = None
     start: object = field(default_factory=object)
     forgotten: int = 0
+    held_bytes: int = 0
 
     def copy(self) -> "History":
         """Return an independent copy; entries are immutable and shared."""
         return replace(self, done=[*self.done], undone=[*self.undone])
 
-    def forget_oldest(self, max_bytes: int) -> None:
-        """Forget the oldest entries if all take more memory; the last one stays."""
-        held = sum(ENTRY_BYTES + entry.edit.held_bytes for entry in self.done)
+    def add(self, entry: UndoEntry, max_bytes: int) -> None:
+        """Add the last entry, and forget the oldest ones if all take more memory; the last one stays."""
+        self.done.append(entry)
+        self.held_bytes += entry.held_bytes
         count = 0
-        while held > max_bytes and count < len(self.done) - 1:
-            held -= ENTRY_BYTES + self.done[count].edit.held_bytes
+        while self.held_bytes > max_bytes and count < len(self.done) - 1:
+            self.held_bytes -= self.done[count].held_bytes
             count += 1
         if count:
             self.start, self.forgotten = self.done[count - 1].mark, self.forgotten + count
             del self.done[:count]
+
+    def take_back(self) -> UndoEntry:
+        """Move the last entry to those that can be redone, and return it."""
+        entry = self.done.pop()
+        self.held_bytes -= entry.held_bytes
+        self.undone.append(entry)
+        return entry
 
 
 class EditSession:
@@ -174,7 +189,7 @@ class EditSession:
         history = self._history
         history.undone.clear()
         if history.stroke is None:
-            self._append(history.done, UndoEntry(command.label, edit))
+            self._add(UndoEntry(command.label, edit))
         else:
             history.stroke = UndoEntry(history.stroke.label, history.stroke.edit.then(edit))
         self._notify(edit)
@@ -185,8 +200,8 @@ class EditSession:
         self.end_stroke()
         if not self._history.done:
             return None
-        entry = self._history.done.pop()
-        self._append(self._history.undone, entry)
+        entry = self._history.take_back()
+        self._forget_surfaces(self._history.undone)
         self._revert(entry.edit)
         return entry.label
 
@@ -196,21 +211,22 @@ class EditSession:
         if not self._history.undone:
             return None
         entry = self._history.undone.pop()
-        self._append(self._history.done, entry)
+        self._add(entry)
         self._apply(entry.edit.after, entry.edit.parts_after)
         self._notify(entry.edit)
         return entry.label
 
-    def _append(self, entries: list[UndoEntry], entry: UndoEntry) -> None:
-        """Append an entry; objects that only farther ones have forget their surfaces."""
-        entries.append(entry)
+    def _add(self, entry: UndoEntry) -> None:
+        self._history.add(entry, self._max_history_bytes)
+        self._forget_surfaces(self._history.done)
+
+    def _forget_surfaces(self, entries: list[UndoEntry]) -> None:
+        """Forget the surfaces of objects that only entries far from the present state have."""
         if len(entries) > MAX_SURFACES:
             near = {item for kept in entries[-MAX_SURFACES:] for item in kept.edit.objects}
             far = entries[-MAX_SURFACES - 1].edit.objects
             for item in set(far) - near - {*self.document.objects}:
                 forget_surface(item)
-        if entries is self._history.done:
-            self._history.forget_oldest(self._max_history_bytes)
 
     def _revert(self, edit: Edit) -> None:
         self._apply(edit.before, edit.parts_before)
@@ -269,7 +285,7 @@ class EditSession:
         stroke, self._history.stroke = self._history.stroke, None
         self._revision += stroke is not None
         if stroke is not None and not stroke.edit.empty:
-            self._append(self._history.done, stroke)
+            self._add(stroke)
 
     def revert_stroke(self) -> None:
         """Restore the state at the beginning of the open stroke, and keep the stroke open."""

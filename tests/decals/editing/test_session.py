@@ -221,6 +221,7 @@ def test_the_oldest_entries_are_forgotten_beyond_a_limit_of_memory(tmp_path: Pat
     while session.redo():
         pass
     assert (digest(session.document), session.forgotten) == (states[-1], 7)
+    assert session._history.held_bytes == sum(entry.held_bytes for entry in session._history.done) == 5 * each
     session.forget_history()
     assert (session.forgotten, session.modified) == (0, False)
 
