@@ -40,7 +40,8 @@ def matrix_of(actor: Any) -> Float64Array:
 def vtk_projection(renderer: Any, model: Float64Array | None = None) -> Projection:
     """Return the projection of a vtkRenderer's camera, perspective or parallel, with its clipping planes.
 
-    Planes that coincide are moved apart first: VTK's do while the whole scene is behind the camera.
+    Planes that coincide, as VTK's do while the whole scene is behind the camera, are replaced; the camera
+    itself stays as it is.
 
     Parameters
     ----------
@@ -50,18 +51,19 @@ def vtk_projection(renderer: Any, model: Float64Array | None = None) -> Projecti
         Matrix from model to world, shape (4, 4). Default: identity.
     """
     world = np.eye(4) if model is None else model
+    camera, aspect = renderer.GetActiveCamera(), renderer.GetTiledAspectRatio()
     try:
-        return _projection((_clip_matrix(renderer) @ world).tobytes())
+        return _projection((_clip_matrix(camera, aspect) @ world).tobytes())
     except InvalidScene:
-        camera = renderer.GetActiveCamera()
-        camera.SetClippingRange([camera.GetDistance() * depth for depth in EMPTY_DEPTHS])
-        return _projection((_clip_matrix(renderer) @ world).tobytes())
+        apart = camera.NewInstance()
+        apart.DeepCopy(camera)
+        apart.SetClippingRange([camera.GetDistance() * depth for depth in EMPTY_DEPTHS])
+        return _projection((_clip_matrix(apart, aspect) @ world).tobytes())
 
 
-def _clip_matrix(renderer: Any) -> Float64Array:
-    """Return the matrix from world to clip space of a vtkRenderer's camera, float64, shape (4, 4)."""
-    camera = renderer.GetActiveCamera()
-    matrix = camera.GetCompositeProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1.0, 1.0)
+def _clip_matrix(camera: Any, aspect: float) -> Float64Array:
+    """Return the matrix from world to clip space of a vtkCamera, float64, shape (4, 4)."""
+    matrix = camera.GetCompositeProjectionTransformMatrix(aspect, -1.0, 1.0)
     return np.asarray(pv.array_from_vtkmatrix(matrix), np.float64)
 
 
