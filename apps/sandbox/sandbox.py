@@ -561,9 +561,8 @@ class Sandbox:
     def _take_light(self, picture: Any, file: object) -> None:
         """Light the scene with a picture of all directions, which is kept in the folder."""
         present, up = self._window.document.drawing.environment, self._window.actions.view.axes.up
-        light = Environment(picture, up=up)
-        light.picture.source = str(keep_upload(file, self._folder))
-        changed = light if present is None else replace(present, picture=light.picture)
+        checked = Environment(picture, up=up) if present is None else replace(present, picture=picture)
+        changed = replace(checked, picture=checked.picture.kept_at(keep_upload(file, self._folder)))
         self._state.draw_with("set environment", environment=changed)
 
     @event

@@ -8,6 +8,7 @@ Fourier transform computes without noise.
 """
 
 import os
+from copy import copy
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -78,6 +79,12 @@ class Panorama:
                 f"environment: expected a picture of all directions, twice as wide as high, got {width} x "
                 f"{height}; convert it to an equirectangular picture"
             )
+
+    def kept_at(self, path: str | os.PathLike[str]) -> "Panorama":
+        """Return the same picture as one of a file, which has to hold it."""
+        kept = copy(self)
+        kept.source = os.fspath(path)
+        return kept
 
     def __eq__(self, other: object) -> bool:
         same = self is other

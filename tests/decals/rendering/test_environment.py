@@ -291,9 +291,12 @@ def test_pictures_of_all_kinds_are_linear_light(tmp_path: Path) -> None:
     (tmp_path / "sky.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n" + pixels)
     loaded = Environment(str(tmp_path / "sky.hdr"))
     np.testing.assert_allclose(loaded.picture.light[1, 3], [2, 1, 0])
-    assert loaded == (same := Environment(loaded.picture.light))
+    same = Environment(loaded.picture.light)
+    assert loaded == same
     assert hash(loaded) == hash(same)
     assert loaded != Environment(loaded.picture, rotation=1)
     assert loaded != EVEN
     assert repr(loaded).startswith(f"Environment(picture={str(tmp_path / 'sky.hdr')!r}, rotation=0.0")
     assert repr(same).startswith("Environment(picture=<4 x 2 pixels>, rotation=0.0")
+    kept = same.picture.kept_at("light.hdr")
+    assert (kept.source, same.picture.source, kept) == ("light.hdr", "", same.picture)
