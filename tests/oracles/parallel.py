@@ -331,14 +331,14 @@ def convex(
 
 
 @wp.func
-def eighth(x: wp.float64) -> wp.float64:
+def sixth_power(x: wp.float64) -> wp.float64:
     squared = x * x
-    return squared * squared * squared * squared
+    return squared * squared * squared
 
 
 @wp.func
 def parted(q: wp.vec3d, n: wp.vec3d, i: wp.int32, these: Members) -> wp.vec3d:
-    """Step towards smaller decals that lie over i: the slope of the 8-norm of their potentials."""
+    """Step towards smaller decals that lie over i: the slope of the 6-norm of their potentials."""
     first = i - i % these.size
     own = wp.float64(these.radii[i])
     highest = wp.float64(0.0)
@@ -363,10 +363,10 @@ def parted(q: wp.vec3d, n: wp.vec3d, i: wp.int32, these: Members) -> wp.vec3d:
                     if turn == 0:
                         highest = wp.max(highest, height)
                     elif height > ZERO:
-                        total += eighth(height / highest)
-                        step -= eighth(height / highest) * highest / height * slope * amount * away
+                        total += sixth_power(height / highest)
+                        step -= sixth_power(height / highest) * highest / height * slope * amount * away
         if turn == 1 and total > ZERO:
-            return step / wp.pow(total, wp.float64(0.875))
+            return step / wp.pow(total, wp.float64(5.0) / wp.float64(6.0))
     return wp.vec3d(ZERO, ZERO, ZERO)
 
 
