@@ -184,7 +184,7 @@ def _arrays(values: Iterable[object]) -> dict[int, int]:
 
 
 def _parts_bytes(parts: SceneParts, known: set[int]) -> dict[int, int]:
-    """Return the bytes of images, meshes and trees without known identities, by those of arrays and nodes."""
+    """Return the bytes of each array and node of a scene's parts, by its identity; skip the known trees."""
     held = _arrays(array for image in parts.images or () for array in vars(image).values())
     for item in parts.objects or ():
         if isinstance(item, MeshObject):

@@ -72,7 +72,7 @@ class UndoEntry:
 
     @property
     def held_bytes(self) -> int:
-        """Memory of the entry, about."""
+        """Approximate memory of the entry, in bytes."""
         return ENTRY_BYTES + self.edit.held_bytes
 
 
@@ -81,7 +81,7 @@ class History:
     """Entries that can be undone and redone, the open stroke, and the forgotten entries.
 
     ``start`` is the mark of the oldest state that undo reaches; so many entries before it are ``forgotten``.
-    ``held_bytes`` is the memory of the entries that can be undone, about.
+    ``held_bytes`` is the approximate memory of the entries that can be undone.
     """
 
     done: list[UndoEntry] = field(default_factory=list)
@@ -96,7 +96,7 @@ class History:
         return replace(self, done=[*self.done], undone=[*self.undone])
 
     def add(self, entry: UndoEntry, max_bytes: int) -> None:
-        """Add the last entry, and forget the oldest ones if all take more memory; the last one stays."""
+        """Add a last entry; forget the oldest ones while all take more than ``max_bytes``. The last stays."""
         self.done.append(entry)
         self.held_bytes += entry.held_bytes
         count = 0

@@ -81,7 +81,7 @@ class Panorama:
             )
 
     def kept_at(self, path: str | os.PathLike[str]) -> "Panorama":
-        """Return the same picture as one of a file, which has to hold it."""
+        """Return this picture with the path of a file that holds it."""
         kept = copy(self)
         kept.source = os.fspath(path)
         return kept
