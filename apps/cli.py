@@ -230,3 +230,7 @@ def main() -> None:
         sys.exit(run())
     finally:
         gc.freeze()  # else Python looks for cycles among all objects before it ends, which takes a second
+
+
+if __name__ == "__main__":
+    main()

@@ -35,7 +35,12 @@ def describe(value: object) -> str:
             return " ".join(f"{value!r:.60}".split())
         except ValueError:  # a whole number of thousands of digits
             return f"a {type(value).__name__} of very many digits"
-    return f"a {type(value).__name__}"
+    return with_article(type(value).__name__)
+
+
+def with_article(noun: str) -> str:
+    """Return a noun after "a" or "an"."""
+    return f"{'an' if noun[0] in 'AEIOUaeiou' else 'a'} {noun}"
 
 
 # -- single values: the error is the caller's -----------------------------------------------------------
@@ -44,7 +49,7 @@ def describe(value: object) -> str:
 def instance(name: str, value: object, kind: type[T], error: type[ImplicitDecalsError], advice: str) -> T:
     """Return a value of a type; raise an error with advice for any other."""
     if not isinstance(value, kind):
-        raise error(f"{name}: expected a {kind.__name__}, got {describe(value)}; {advice}")
+        raise error(f"{name}: expected {with_article(kind.__name__)}, got {describe(value)}; {advice}")
     return value
 
 

@@ -20,6 +20,7 @@ from decals.rendering.options import Drawing
 from decals.scenes.camera import Camera
 from decals.scenes.objects import MeshObject, SceneObject, shown_objects
 from decals.scenes.origin import WORLD, Origin
+from decals.scenes.pose import require_scene
 from decals.scenes.recipe import Recipe
 from decals.scenes.scene import DecalImage, Scene
 from decals.validation import instance, whole_number
@@ -253,7 +254,7 @@ class Document:
         InvalidScene
             The argument is not a `Scene`.
         """
-        instance("scene to edit", scene, Scene, InvalidScene, "decals.cover makes one")
+        require_scene("scene to edit", scene, "edit the scene that was posed")
         return cls(DecalEditor(scene.decals), SceneParts.of(scene))
 
     @property

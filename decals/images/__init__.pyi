@@ -1,5 +1,6 @@
 from .builtin import BUILTIN_IMAGES, generate_image, is_builtin
-from .load import MAX_IMAGE_EDGE, image_pixels, load_image, read_image
+from .load import image_pixels, load_image, read_image
+from .texels import MAX_IMAGE_EDGE
 
 __all__ = [
     "BUILTIN_IMAGES",

@@ -18,14 +18,8 @@ from blobtree._typing import Float32Array
 from decals.errors import InvalidImage
 from decals.images.builtin import BUILTIN_IMAGES, generate_image, is_builtin
 from decals.images.radiance import decode_radiance, is_radiance
-from decals.images.texels import Pixels
+from decals.images.texels import MAX_IMAGE_EDGE, Pixels, check_size
 from decals.validation import MAX_LIGHT, describe, is_file, require_rgba
-
-MAX_IMAGE_EDGE = 16384
-"""Longest edge of a decal image that is read, in pixels: the limit of usual graphics cards."""
-
-MAX_IMAGE_AREA = 1 << 26
-"""Most pixels of a decal image that is read."""
 
 PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM", "TGA", "JPEG2000", "AVIF")
 """Formats that are read, by their names in Pillow. Others, such as EPS, would start programs or are rare."""
@@ -221,7 +215,7 @@ def _array_pixels(image: Any, name: str, linear: bool) -> Pixels:
         raise InvalidImage(
             f"{name}: expected an image of at most {MAX_IMAGE_EDGE} pixels a side, got {list(array.shape)}"
         )
-    levels = _light(planes, name) if linear and planes.dtype.kind == "f" else _levels(planes, name)
+    levels = _light(planes, name) if linear and planes.dtype.kind == "f" else _levels(planes, name, linear)
     if levels.shape[2] == 4:
         return levels
     return opaque(np.broadcast_to(levels, (*levels.shape[:2], 3)))
@@ -234,16 +228,15 @@ def opaque(colors: NDArray[Any]) -> Pixels:
     return np.dstack([colors, alpha])
 
 
-def _levels(values: NDArray[Any], name: str) -> NDArray[Any]:
+def _levels(values: NDArray[Any], name: str, linear: bool) -> NDArray[Any]:
     """Return channels as integers."""
     if values.dtype in (np.uint8, np.uint16):
         return values.astype(values.dtype.newbyteorder("="), copy=False)
     if values.dtype.kind != "f" or not ((values >= 0.0) & (values <= 1.0)).all():
         limits = f" from {values.min()} to {values.max()}" if values.dtype.kind in "biuf" else ""
-        raise InvalidImage(
-            f"{name}: expected bytes, or floats from 0 to 1, got {values.dtype}{limits}; "
-            "scale it, or give decals.DecalImage linear light, float32[h, w, 4]"
-        )
+        kinds = "16-bit levels or floats of linear light" if linear else "or floats from 0 to 1"
+        light = "" if linear else ", or give decals.DecalImage linear light, float32[h, w, 4]"
+        raise InvalidImage(f"{name}: expected bytes, {kinds}, got {values.dtype}{limits}; scale it{light}")
     return np.rint(values * 255.0).astype(np.uint8)
 
 
@@ -263,7 +256,7 @@ def _light(values: NDArray[Any], name: str) -> Float32Array:
 
 def _picture_pixels(picture: Image.Image, name: str, max_edge: int = MAX_IMAGE_EDGE) -> Pixels:
     """Return the pixels of an open picture, upright."""
-    _check_size(picture, name, max_edge)
+    check_size(*picture.size, name, max_edge)
     try:
         picture.load()
         return _to_rgba(ImageOps.exif_transpose(picture))
@@ -316,7 +309,7 @@ def read_image(path: Path, *, advice: str = _ADVICE) -> Pixels:
         with path.open("rb") as file:
             start = file.read(PNG_DEPTH + 1)
             if is_radiance(start):
-                return decode_radiance(start + file.read(MAX_FILE_BYTES), str(path), MAX_IMAGE_EDGE)
+                return decode_radiance(start + file.read(MAX_FILE_BYTES), str(path))
     except OSError as error:
         raise InvalidImage(f"could not read the image {str(path)!r} ({error.strerror})") from error
     pixels = _read_picture(path, str(path), advice=advice)
@@ -377,15 +370,6 @@ def _without_log() -> Iterator[None]:
         yield
     finally:
         logger.setLevel(level)
-
-
-def _check_size(picture: Image.Image, name: str, max_edge: int) -> None:
-    width, height = picture.size
-    if not (0 < width <= max_edge and 0 < height <= max_edge and width * height <= MAX_IMAGE_AREA):
-        raise InvalidImage(
-            f"expected an image of 1 to {max_edge} pixels a side and {MAX_IMAGE_AREA:,} together, "
-            f"{name!r} has {width} x {height}: scale it first"
-        )
 
 
 def _to_rgba(picture: Image.Image) -> Pixels:

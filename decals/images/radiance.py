@@ -6,6 +6,7 @@ import numpy as np
 
 from blobtree._typing import Float32Array, UInt8Array
 from decals.errors import InvalidImage
+from decals.images.texels import check_size
 from decals.validation import MAX_LIGHT
 
 SIGNATURES = (b"#?RADIANCE", b"#?RGBE")
@@ -26,7 +27,7 @@ def is_radiance(content: bytes) -> bool:
     return content.startswith(SIGNATURES)
 
 
-def decode_radiance(content: bytes, name: str, max_edge: int) -> Float32Array:
+def decode_radiance(content: bytes, name: str) -> Float32Array:
     """Return linear light ``float32[h, w, 4]`` with alpha 1, row 0 at the top.
 
     Parameters
@@ -35,8 +36,6 @@ def decode_radiance(content: bytes, name: str, max_edge: int) -> Float32Array:
         A file, with rows stored as runs or as plain pixels (Ward, "Real Pixels", Graphics Gems II, 1991).
     name : str
         Name of the file in messages.
-    max_edge : int
-        Longest side that is accepted, in pixels.
 
     Raises
     ------
@@ -49,11 +48,7 @@ def decode_radiance(content: bytes, name: str, max_edge: int) -> Float32Array:
             f"could not read {name!r}: expected RGB rows from the top ('-Y height +X width'); export it again"
         )
     height, width = int(size[1]), int(size[2])
-    if not (0 < height <= max_edge and 0 < width <= max_edge):
-        raise InvalidImage(
-            f"expected an image of 1 to {max_edge} pixels a side, "
-            f"{name!r} has {width} x {height}: scale it first"
-        )
+    check_size(width, height, name)
     data = np.frombuffer(content, np.uint8, offset=size.end())
     try:
         texels = _texels(data, height, width)
@@ -61,9 +56,12 @@ def decode_radiance(content: bytes, name: str, max_edge: int) -> Float32Array:
         raise InvalidImage(
             f"could not read {name!r}: its rows are damaged or cut off; export it again"
         ) from error
-    scale = np.where(texels[..., 3:] > 0, np.exp2(texels[..., 3:].astype(np.float64) - EXPONENT_BIAS), 0.0)
-    light = np.minimum(texels[..., :3] * scale, MAX_LIGHT)
-    return np.concatenate([light, np.ones((height, width, 1))], axis=-1).astype(np.float32)
+    pixels = np.ones((height, width, 4), np.float32)
+    light = pixels[..., :3]
+    np.ldexp(texels[..., :3], texels[..., 3:].astype(np.int32) - EXPONENT_BIAS, out=light, dtype=np.float32)
+    light[texels[..., 3] == 0] = 0.0
+    np.minimum(light, MAX_LIGHT, out=light)
+    return pixels
 
 
 def _texels(data: UInt8Array, height: int, width: int) -> UInt8Array:

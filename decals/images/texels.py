@@ -1,4 +1,4 @@
-"""Pixels of any depth as linear light: bytes and 16 bits hold sRGB, floats hold linear light itself."""
+"""Pixels of any depth, and as linear light: bytes and 16 bits hold sRGB, floats hold linear light itself."""
 
 from typing import Any, TypeAlias
 
@@ -7,9 +7,25 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from blobtree._typing import Float32Array, FloatArray, UInt8Array
+from decals.errors import InvalidImage
 
 Pixels: TypeAlias = NDArray[Any]
 """Straight RGBA ``[h, w, 4]`` of uint8, uint16 or float32, row 0 at the top."""
+
+MAX_IMAGE_EDGE = 16384
+"""Longest edge of an image that is read, in pixels: the limit of usual graphics cards."""
+
+MAX_IMAGE_AREA = 1 << 26
+"""Most pixels of an image that is read."""
+
+
+def check_size(width: int, height: int, name: str, max_edge: int = MAX_IMAGE_EDGE) -> None:
+    """Raise InvalidImage for a picture without pixels, or with more than are read."""
+    if not (0 < width <= max_edge and 0 < height <= max_edge and width * height <= MAX_IMAGE_AREA):
+        raise InvalidImage(
+            f"expected an image of 1 to {max_edge} pixels a side and {MAX_IMAGE_AREA:,} together, "
+            f"{name!r} has {width} x {height}: scale it first"
+        )
 
 
 def decode_srgb(colors: FloatArray) -> FloatArray:

@@ -45,6 +45,7 @@ from decals.scenes.drawing_record import DrawingRecord, drawing_of_record, drawi
 from decals.scenes.material import DecalMaterial
 from decals.scenes.material_record import MaterialRecord, material_of, material_record, sources_of
 from decals.scenes.objects import SceneObject, as_object
+from decals.scenes.pose import require_scene
 from decals.scenes.recipe import Recipe
 from decals.scenes.records import (
     TRUST_ADVICE,
@@ -61,7 +62,7 @@ from decals.scenes.records import (
     records_of,
 )
 from decals.scenes.scene import DecalImage, Scene
-from decals.validation import as_path, instance, is_file
+from decals.validation import as_path, is_file
 
 PART = 500
 """Decals that are described at a time."""
@@ -134,7 +135,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress
     >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20)
     >>> decals.save_scene(scene, "ball.json")
     """
-    instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
+    require_scene("scene", scene, "save the scene that was posed, or write this pose by decals.bake")
     path = as_path(path)
     if path.suffix.lower() != ".json":
         raise InvalidScene(f"expected a file name that ends in .json, got {path.name!r}; rename the file")

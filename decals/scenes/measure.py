@@ -19,11 +19,11 @@ from decals.model import Decals, Interaction
 from decals.scattering.domain import Domain, apportion
 from decals.scattering.neighbors import FacingTree, ideal_spacing, spacing_of_distances
 from decals.scenes.objects import MeshObject, SceneObject
-from decals.scenes.pose import PosedScene
+from decals.scenes.pose import require_scene
 from decals.scenes.scene import Scene
 from decals.surfaces.normals import split_at_creases
 from decals.surfaces.surface import unit_rows
-from decals.validation import instance, whole_number
+from decals.validation import whole_number
 
 SAMPLES_PER_DECAL = 200
 MIN_SAMPLES = 20_000
@@ -198,12 +198,7 @@ def measure(
     >>> measures.coverage > 0.999, measures.folded < 0.01, len(measures.decals.visible_area)
     (True, True, 30)
     """
-    if isinstance(scene, PosedScene):
-        raise InvalidScene(
-            "scene: expected a Scene at rest, got a posed one; measure the scene that was posed, where its "
-            "decals lie"
-        )
-    instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
+    require_scene("scene", scene, "measure the scene that was posed, where its decals lie")
     count = len(scene.decals)
     if samples is None:
         samples = min(max(SAMPLES_PER_DECAL * count, MIN_SAMPLES), MAX_DEFAULT_SAMPLES)

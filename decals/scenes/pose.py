@@ -9,7 +9,7 @@ This removes the limitation that section 3.5 of the paper states.
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -128,10 +128,14 @@ class PosedScene:
 
         `decals.bake` writes the pose itself, with the decals in a texture.
         """
-        raise InvalidScene(
-            f"{str(path)!r}: expected a Scene at rest, got a posed one; save the scene that was posed, or "
-            "write this pose by decals.bake"
-        )
+        decals.save_scene(cast(Any, self), path)
+
+
+def require_scene(name: str, scene: object, advice: str) -> Scene:
+    """Return a scene at rest; raise InvalidScene for any other value, with the advice for a posed one."""
+    if isinstance(scene, PosedScene):
+        raise InvalidScene(f"{name}: expected a Scene at rest, got a posed one; {advice}")
+    return instance(name, scene, Scene, InvalidScene, "decals.cover makes one")
 
 
 def pose(
@@ -188,7 +192,7 @@ def pose(
     >>> decals.render(decals.pose(scene, {"tube": bent}), size=(64, 48))
     Picture(64 × 48 pixels)
     """
-    instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
+    require_scene("scene", scene, "pose the scene that was posed")
     if not isinstance(poses, Mapping):
         raise InvalidScene(f"poses: expected positions by the names of objects, got {describe(poses)}")
     whole_number("resolution", resolution, 4, 2048, InvalidScene)

@@ -25,8 +25,8 @@ from decals.rendering.options import Background, Drawing
 from decals.scenes.material import MAP_NAMES, DecalMaterial
 from decals.scenes.objects import MeshObject, SceneObject
 from decals.scenes.origin import WORLD
+from decals.scenes.pose import require_scene
 from decals.scenes.scene import DecalImage, Scene
-from decals.validation import instance
 
 MAX_ROWS = 2000
 """Decals that a script lists as text; more stand in the file of arrays."""
@@ -82,7 +82,7 @@ def write_script(scene: Scene, path: str | os.PathLike[str]) -> None:
     >>> bool((rebuilt.decals.positions == scene.decals.positions).all())
     True
     """
-    instance("scene", scene, Scene, InvalidScene, "decals.cover makes one")
+    require_scene("scene", scene, "write the scene that was posed, and a call of decals.pose")
     path = Path(path)
     script = _Script(path.with_suffix(".npz").name)
     text = script.text_of(scene)

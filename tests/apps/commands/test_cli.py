@@ -29,11 +29,12 @@ def test_the_package_runs_as_the_command() -> None:
         subprocess.run([*command, "--help"], capture_output=True, text=True, check=True).stdout
         for command in (
             [sys.executable, "-m", "decals"],
+            [sys.executable, "-m", "decals.apps.cli"],
             [sys.executable, "-c", "from decals.apps.cli import main; main()"],
         )
     ]
     assert "Usage: implicit-decals" in ran[0]
-    assert ran[0] == ran[1]
+    assert ran[0] == ran[1] == ran[2]
 
 
 def test_help_version_and_gallery_import_nothing_heavy() -> None:

@@ -18,7 +18,7 @@ from decals.images import (
     load_image,
     read_image,
 )
-from decals.images.load import embedded_image, is_embedded
+from decals.images.load import each_image, embedded_image, is_embedded
 from decals.images.texels import as_bytes, linear_premultiplied
 
 FULL = ("rock", "scale", "tile")
@@ -282,7 +282,8 @@ def test_floats_of_arrays_are_srgb_or_linear_light() -> None:
     [([["a", "b"]], "got <U1; scale it"), ([[1, None]], "got object; "), ([[3, -1]], "int64 from -1 to 3; ")],
 )
 def test_values_of_other_types_are_refused(rows: Any, got: str, linear: bool) -> None:
-    with pytest.raises(InvalidImage, match=f"expected bytes, or floats from 0 to 1, .*{got}"):
+    kinds = "16-bit levels or floats of linear light" if linear else "or floats from 0 to 1"
+    with pytest.raises(InvalidImage, match=f"expected bytes, {kinds}, .*{got}"):
         image_pixels(np.array(rows), linear=linear)
 
 
@@ -341,6 +342,31 @@ def test_too_large(tmp_path: Path, size: tuple[int, int]) -> None:
     Image.new("1", size).save(path)
     with pytest.raises(InvalidImage, match="scale it"):
         read_image(path)
+
+
+@pytest.mark.parametrize("size", [(MAX_IMAGE_EDGE + 1, 1), (8200, 8200)])
+def test_too_large_radiance_files_are_refused_by_their_header(tmp_path: Path, size: tuple[int, int]) -> None:
+    path = tmp_path / "sky.hdr"
+    path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n" % size)
+    with pytest.raises(InvalidImage, match=r"a side and 67,108,864 together, .*sky\.hdr' has .*: scale it"):
+        read_image(path)
+
+
+def test_radiance_exponents_are_exact(tmp_path: Path) -> None:
+    """Of any size, in files of plain pixels; light beyond the limit counts as that much."""
+    exponents = np.arange(256)
+    texels = np.column_stack([np.full(256, 1), np.full(256, 3), np.full(256, 255), exponents])
+    path = tmp_path / "sky.hdr"
+    header = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 64 +X 4\n"
+    path.write_bytes(header + texels.astype(np.uint8).tobytes())
+    light = np.where(exponents[:, None] > 0, texels[:, :3] * 2.0 ** (exponents[:, None] - 136), 0.0)
+    want = np.column_stack([np.minimum(light, 65504.0), np.ones(256)])
+    np.testing.assert_array_equal(read_image(path).reshape(-1, 4), want)
+
+
+def test_messages_say_an_before_a_vowel() -> None:
+    with pytest.raises(InvalidImage, match="got an ellipsis"):
+        each_image(...)
 
 
 def test_a_folder_is_no_image(tmp_path: Path) -> None:

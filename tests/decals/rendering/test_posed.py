@@ -1,5 +1,6 @@
 """Posed meshes: decals lie on the rest pose, and stretch with the surface."""
 
+from collections.abc import Callable
 from typing import Any, cast
 
 import numpy as np
@@ -9,9 +10,11 @@ from numpy.typing import NDArray
 import decals
 from blobtree import Node, Point, Segment
 from decals import Camera, Decals, MeshObject, Scene, TreeObject
+from decals.editing import Document
 from decals.errors import InvalidScene
 from decals.rendering import Buffers, Renderer, RenderOptions
 from decals.scenes.pose import PosedScene
+from decals.scenes.script import write_script
 from decals.surfaces import MeshSurface
 from decals.surfaces.normals import vertex_normals
 from tests.decals.shapes import torus
@@ -330,10 +333,16 @@ def test_a_posed_scene_is_drawn_only(vtk_display: None) -> None:
     np.testing.assert_array_equal(
         posed.render(size=SIZE, samples=1), decals.render(posed, size=SIZE, samples=1)
     )
-    with pytest.raises(InvalidScene, match="at rest, got a posed one; measure the scene that was posed"):
-        decals.measure(cast(Any, posed))
-    with pytest.raises(InvalidScene, match="expected a Scene, got a PosedScene"):
-        decals.save_scene(cast(Any, posed), "scene.json")
+    uses: dict[str, Callable[[Any], object]] = {
+        "measure": decals.measure,
+        "save": lambda scene: decals.save_scene(scene, "scene.json"),
+        "write": lambda scene: write_script(scene, "scene.py"),
+        "pose": lambda scene: decals.pose(scene, {}),
+        "edit": Document.from_scene,
+    }
+    for verb, use in uses.items():
+        with pytest.raises(InvalidScene, match=f"at rest, got a posed one; {verb} the scene that was posed"):
+            use(posed)
     with pytest.raises(InvalidScene, match="expected a Scene at rest, got a posed one"):
         posed.save("scene.json")
     with pytest.raises(InvalidScene, match="expected a Scene at rest, got a PosedScene"):
