@@ -2,9 +2,11 @@
 
 ``python -m tests.bench.scattering [--quick] [--json PATH] [--counts 1000,10000] [--models sphere,dragon]``
 
-Packages that are not installed are listed as absent. All are measured alike, by distances between points that
-face the same way and lie within two ideal spacings of the number that the package returned. Other packages
-sample the mesh, or a fine mesh of the tree; this package samples the tree itself.
+Packages that are not installed are listed as absent. All are measured by distances between points that face
+the same way and lie within two ideal spacings of the number that the package returned. Other packages
+sample the mesh, or a fine mesh of the tree; this package samples the tree itself. Our particles have normals.
+Points of other packages have none, and take those of the closest faces; where sheets of a mesh cross, this
+may be the other sheet, and rho is then too low.
 """
 
 import argparse
@@ -67,7 +69,7 @@ def joined(meshes: list[MeshSurface]) -> Any:
 
 
 def measure(surface: MeshSurface, points: Any) -> Spacing:
-    """Measure any points on a mesh."""
+    """Measure points without normals on a mesh whose sheets do not cross."""
     positions, normals = surface.project(points)
     distances, _ = FacingTree(positions, normals).nearest(positions, normals, count=6, skip_self=True)
     return spacing_of_distances(distances, ideal_spacing(surface.area, len(positions)))
