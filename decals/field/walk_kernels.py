@@ -33,6 +33,12 @@ OUTER = 1.3
 """Distance in the image, in visible radii, to which relays are made; corners of the grid lie farther out."""
 LARGEST_TURN = 0.3
 """Angle between a walk and its neighbours, at most, from which its stretch is measured."""
+NARROW = 0.2
+"""Angle to closer neighbours, over the first one, by which walks past a focus are found."""
+EVEN = 2.0
+"""Stretch, or its inverse, up to which a walk between two neighbours is not tested for a focus."""
+FOCUS = 0.1
+"""Stretch below which the end of a walk counts as past a focus."""
 SAME_FACE = 0.9
 """Cosine between the normals of two walks' ends from which they count as ends on one smooth surface."""
 SAME_WAY = 0.95
@@ -125,6 +131,33 @@ def walk(start: WalkStart, angle: wp.float32, length: wp.float32, mesh: WalkedMe
     return p, ahead, -1
 
 
+@wp.func
+def side_stretch(
+    start: WalkStart,
+    angle: wp.float32,
+    turn: wp.float32,
+    length: wp.float32,
+    end: wp.vec3,
+    ahead: wp.vec3,
+    normal: wp.vec3,
+    mesh: WalkedMesh,
+):
+    """Return the stretch between the ends of a walk and of a turned one; MOST_STRETCH without such an end.
+
+    The end must lie on the same face, and the turned walk must arrive there in the direction expected. Past a
+    focus, where walks have crossed, the stretch is negative. A walk past a focus is not the shortest one.
+    """
+    beside, turned, other = walk(start, angle + turn, length, mesh)
+    if other < 0:
+        return MOST_STRETCH
+    across = wp.cross(normal, ahead)
+    if wp.dot(mesh.normals[other], normal) <= SAME_FACE:
+        return MOST_STRETCH
+    if wp.dot(turned, wp.cos(turn) * ahead + wp.sin(turn) * across) <= SAME_WAY:
+        return MOST_STRETCH
+    return wp.dot(beside - end, across) / (length * wp.sin(turn))
+
+
 @wp.kernel
 def place_relays(starts: wp.array(dtype=WalkStart), mesh: WalkedMesh, texels: wp.array(dtype=wp.vec4)):
     """Write the grids of relays: places, gradients of the image coordinates there, and states."""
@@ -147,20 +180,25 @@ def place_relays(starts: wp.array(dtype=WalkStart), mesh: WalkedMesh, texels: wp
     stretch = wp.float32(1.0)
     total = wp.float32(0.0)
     count = wp.float32(0.0)
+    least = wp.float32(MOST_STRETCH)
     if length > 0.0:
         turn = wp.min(0.5 * SPACING / length, LARGEST_TURN)
         for side in range(2):
-            sign = float(1 - 2 * side)
-            beside, turned, other = walk(start, angle + sign * turn, length * start.radius, mesh)
-            if other >= 0:
-                expected = wp.cos(turn) * ahead + sign * wp.sin(turn) * across
-                if wp.dot(mesh.normals[other], normal) > SAME_FACE and wp.dot(turned, expected) > SAME_WAY:
-                    seen = sign * wp.dot(beside - end, across) / (length * start.radius * wp.sin(turn))
-                    if seen > LEAST_STRETCH and seen < MOST_STRETCH:
-                        total += seen
-                        count += 1.0
-    if count > 0.0:
-        stretch = total / count
+            seen = side_stretch(
+                start, angle, float(1 - 2 * side) * turn, length * start.radius, end, ahead, normal, mesh
+            )
+            least = wp.min(least, seen)
+            if seen > LEAST_STRETCH and seen < MOST_STRETCH:
+                total += seen
+                count += 1.0
+        if count > 0.0:
+            stretch = total / count
+        if count == 0.0 or stretch > EVEN or least * EVEN < 1.0:
+            for side in range(2):
+                close = float(1 - 2 * side) * NARROW * turn
+                seen = side_stretch(start, angle, close, length * start.radius, end, ahead, normal, mesh)
+                if seen <= FOCUS:
+                    return
     cosine = wp.cos(angle)
     sine = wp.sin(angle)
     along_x = cosine * ahead - sine / stretch * across

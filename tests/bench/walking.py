@@ -17,6 +17,7 @@ from tests.decals.field.unfolding import Patch, rms
 Figures = dict[str, float]
 
 TARGETS = {"walk_edge": "≤ 0.005", "walk_corner": "≤ 0.005", "walk_rim": "≤ 0.005", "walk_bumpy": "≤ 0.005"}
+TARGETS["walk_on_rim"] = "≤ 0.005"
 TARGETS["walk_pass_over_corrected"] = "≤ 4"
 """Largest RMS errors of the drawn coordinates over the radius."""
 
@@ -31,6 +32,7 @@ def patches(*, quick: bool) -> dict[str, list[tuple[Patch, float]]]:
         "edge": [(unfolding.edge(turn, at), 1.0) for turn in (60, 90, 120) for at in (0.1, 0.3, 0.6)],
         "corner": [(unfolding.corner(*place), 1.0) for place in places],
         "rim": [(unfolding.cylinder_rim(depth), radius) for depth, radius in ((0.5, 0.8), (0.2, 0.5))],
+        "on_rim": [(unfolding.cylinder_end(inside), 0.8) for inside in (0.0, 0.02, 0.04, 0.1)],
         "bumpy": [(unfolding.bumpy(seed, 0.5, level=5 if quick else 6), 0.5) for seed in seeds],
     }
 

@@ -64,6 +64,14 @@ def test_images_run_on_over_the_rim_of_a_cylinder(depth: float, radius: float) -
     assert rms(unfolding.cylinder_rim(depth).errors(radius)) <= 0.005
 
 
+@pytest.mark.parametrize(("inside", "most"), [(0.0, 0.02), (0.01, 0.01), (0.1, 0.0025)])
+def test_images_centred_near_the_rim_of_a_cylinder(inside: float, most: float) -> None:
+    """Walks past a focus, which are not the shortest, leave no relays."""
+    errors = unfolding.cylinder_end(inside).errors(0.8)
+    print(f"{rms(errors):.5f}, largest {errors.max():.4f} of the radius")
+    assert rms(errors) <= most
+
+
 @pytest.mark.parametrize("seed", [0, 3])
 def test_large_images_on_bumps(seed: int) -> None:
     patch = unfolding.bumpy(seed, 0.5)

@@ -1,5 +1,6 @@
 """Meshes with known log maps: unfolded faces, a rim by minimisation, bumps by integration."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -157,12 +158,8 @@ def tip(sides: int, slope: float, distance: float, count: int = 4000) -> Patch:
     )
 
 
-def cylinder_rim(depth: float, count: int = 3000, sides: int = 128) -> Patch:
-    """The side of a cylinder of radius 1, and its flat end at z = 0, seen from a depth below it.
-
-    A path to the end crosses the rim where the sum of both straight parts is least.
-    """
-    rng = np.random.default_rng(2)
+def cylinder(sides: int) -> tuple[Array, NDArray[Any]]:
+    """Vertices and faces of a cylinder of radius 1, with its flat end at z = 0."""
     turns = np.linspace(0, 2 * np.pi, sides, endpoint=False)
     ring = np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1)
     vertices = np.vstack([ring, ring - [0, 0, 2.0], [[0, 0, 0]]])
@@ -175,6 +172,57 @@ def cylinder_rim(depth: float, count: int = 3000, sides: int = 128) -> Patch:
             np.stack([i, j, np.full(sides, 2 * sides)], axis=1),
         ]
     )
+    return vertices, faces
+
+
+def least(length: Callable[[Array], Array], low: Array, high: Array) -> Array:
+    """Where a length is least, given that it first falls and then rises."""
+    for _ in range(80):
+        one, other = low + (high - low) / 3, high - (high - low) / 3
+        less = length(one) < length(other)
+        low, high = np.where(less, low, one), np.where(less, other, high)
+    return low
+
+
+def cylinder_end(inside: float, count: int = 3000, sides: int = 1024) -> Patch:
+    """The side of a cylinder just below its end, seen from the end, at a distance inside the rim.
+
+    A path crosses the rim where the sum of both straight parts is least; there are two such places. From a
+    centre on the rim, another path runs along the side alone.
+    """
+    rng = np.random.default_rng(5)
+    s, z = rng.uniform(-0.1, 0.75, count), rng.uniform(-0.25, 0, count)
+
+    def length(at: Array) -> Array:
+        result: Array = np.hypot(np.cos(at) - 1 + inside, np.sin(at)) + np.hypot(s - at, z)
+        return result
+
+    tried = np.linspace(-1.7, 1.7, 401)
+    nearest = np.array([length(np.full(count, at)) for at in tried]).argmin(axis=0)
+    at = least(length, tried[nearest - 1], tried[nearest + 1])
+    across = np.stack([np.sin(at), 1 - inside - np.cos(at)], axis=1)
+    log = length(at)[:, None] * across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
+    if inside == 0:
+        straight = np.hypot(s, z) <= length(at) + 1e-9
+        log = np.where(straight[:, None], np.stack([s, z], axis=1), log)
+    return Patch(
+        *cylinder(sides),
+        np.array([1.0 - inside, 0, 0]),
+        np.array([0, 0, 1.0]),
+        np.array([0, 1.0, 0]),
+        np.stack([np.cos(s), np.sin(s), z], axis=1),
+        np.stack([np.cos(s), np.sin(s), 0 * s], axis=1),
+        log,
+    )
+
+
+def cylinder_rim(depth: float, count: int = 3000, sides: int = 128) -> Patch:
+    """The side of a cylinder of radius 1, and its flat end at z = 0, seen from a depth below it.
+
+    A path to the end crosses the rim where the sum of both straight parts is least.
+    """
+    rng = np.random.default_rng(2)
+    vertices, faces = cylinder(sides)
     s, z = rng.uniform(-1, 1, count), rng.uniform(-2 * depth, 0, count)
     side = np.stack([np.cos(s), np.sin(s), z], axis=1)
     disc = rng.uniform([0.2, -0.8], [1.0, 0.8], (count, 2))
@@ -184,11 +232,7 @@ def cylinder_rim(depth: float, count: int = 3000, sides: int = 128) -> Patch:
         result: Array = np.hypot(at, depth) + np.hypot(np.cos(at) - disc[:, 0], np.sin(at) - disc[:, 1])
         return result
 
-    low, high = np.full(len(disc), -1.5), np.full(len(disc), 1.5)
-    for _ in range(80):
-        one, other = low + (high - low) / 3, high - (high - low) / 3
-        less = length(one) < length(other)
-        low, high = np.where(less, low, one), np.where(less, other, high)
+    low = least(length, np.full(len(disc), -1.5), np.full(len(disc), 1.5))
     over = length(low)[:, None] * log_maps.unit(np.stack([low, np.full(len(disc), depth)], axis=1))
     ends = np.column_stack([disc, np.zeros(len(disc))])
     return Patch(
