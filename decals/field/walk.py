@@ -4,9 +4,10 @@ It is for edges, corners and large decals. `decals.field.walks` walks from the c
 straightest geodesics and leaves a grid of *relays*: surface points whose image coordinates are known, with
 the gradients of these coordinates and the normal. A table of cells of space lists relays for each cell, one
 for each face and each way around a corner. A pixel looks up its cell, finds with these relays about where it
-lies in the image, and takes the mean of the places that the four relays there see (`between_relays`). A relay
-is exact on its own face, and of third order on curved surface. Relays across an edge, with another normal, do
-not count where others do.
+lies in the image, and takes the mean of the places that the four relays there see (`between_relays`). If the
+closest of them sees the pixel elsewhere, the mean is taken once more, around that place. A relay is exact on
+its own face, and of third order on curved surface. Relays across an edge, with another normal, do not count
+where others do.
 
 Behind a corner two walks lead to one point, and the shorter one is drawn. Relays at the ends of longer walks
 are dropped, but for those close to the cut, where both are equally long. All lengths are in visible radii.
@@ -55,6 +56,8 @@ LISTED_SHARE = 0.002
 """Share of the listed relay beside the four around a point."""
 AGREEMENT = 1.0
 """Squared distance that counts as much as a right angle between normals."""
+STEPS = 2
+"""Times, at most, that the place of a point is taken from the relays around it."""
 FAR = 3.0
 """Mean distance of a point from its relays, in spacings, from which only the corrected mapping is drawn."""
 OTHER_WAY = 0.15
@@ -96,13 +99,25 @@ def from_relay(
 
 
 @wp.func
+def remoteness(seen: wp.vec4) -> wp.float32:
+    """Return the squared distance of a relay from a point, and what its normal adds."""
+    return seen[2] * seen[2] + AGREEMENT * seen[3]
+
+
+@wp.func
+def between_places(a: wp.vec4, b: wp.vec4) -> wp.float32:
+    """Return the distance between the places at which two relays see a point."""
+    return wp.length(wp.vec2(a[0] - b[0], a[1] - b[1]))
+
+
+@wp.func
 def between_relays(
     listed: wp.vec4, first: wp.int32, w: wp.vec3, n_q: wp.vec3, index: IndexedDecals
-) -> wp.vec4:
+) -> tuple[wp.vec4, wp.vec4]:
     """Return the place of a point as the four relays around it see it, their mean distance and turn.
 
     `listed` is what a relay of the cell sees, from which this begins. It counts where the others lie on other
-    faces.
+    faces. The second result is what the closest of these five relays sees.
     """
     at = wp.vec2(listed[0], listed[1])
     limit = float(RELAYS_PER_RADIUS) - 1.0
@@ -119,6 +134,8 @@ def between_relays(
     doubt = DOUBT * (TURN + listed[3])
     total = LISTED_SHARE / (doubt * doubt)
     weighted = total * listed
+    closest = listed
+    least = remoteness(listed)
     for corner in range(4):
         right = corner & 1
         up = corner >> 1
@@ -129,7 +146,10 @@ def between_relays(
         if seen[2] < 0.5 * NOWHERE:
             weighted += weight * seen
             total += weight
-    return weighted / total
+        if remoteness(seen) < least:
+            closest = seen
+            least = remoteness(seen)
+    return weighted / total, closest
 
 
 @wp.func
@@ -166,8 +186,8 @@ def walked_place(owner: wp.int32, w: wp.vec3, n_q: wp.vec3, guess: wp.vec2, inde
             break
         row = int((float(number) + 0.5) / float(SIDE))
         seen = from_relay(number - SIDE * row, row, first, w, n_q, index)
-        cost = seen[2] * seen[2] + AGREEMENT * seen[3]
-        apart = wp.length(wp.vec2(seen[0] - at[0], seen[1] - at[1])) > OTHER_WAY * SPACING
+        cost = remoteness(seen)
+        apart = between_places(seen, at) > OTHER_WAY * SPACING
         if cost < least:
             if apart:
                 other = at
@@ -191,10 +211,18 @@ def walked_place(owner: wp.int32, w: wp.vec3, n_q: wp.vec3, guess: wp.vec2, inde
     found = at
     shortest = wp.float32(NOWHERE)
     for _way in range(ways):
-        seen = between_relays(at, first, w, n_q, index)
+        begun = at
+        seen = at
+        for _step in range(STEPS):
+            seen, closest = between_relays(at, first, w, n_q, index)
+            moved = between_places(closest, at)
+            if moved < OTHER_WAY * SPACING or (ways == 2 and moved > between_places(closest, other)):
+                break
+            at = closest
         length = detour(seen, origin)
         if length < shortest:
             shortest = length
             found = seen
         at = other
+        other = begun
     return wp.vec3(found[0], found[1], wp.clamp(FAR - found[2] / SPACING, 0.0, 1.0))

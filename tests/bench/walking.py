@@ -33,6 +33,7 @@ def patches(*, quick: bool) -> dict[str, list[tuple[Patch, float]]]:
         "corner": [(unfolding.corner(*place), 1.0) for place in places],
         "rim": [(unfolding.cylinder_rim(depth), radius) for depth, radius in ((0.5, 0.8), (0.2, 0.5))],
         "on_rim": [(unfolding.cylinder_end(inside), 0.8) for inside in (0.0, 0.02, 0.04, 0.1)],
+        "on_rim_cut": [(unfolding.cylinder_end(0.0, clear=0.0), 0.8)],
         "bumpy": [(unfolding.bumpy(seed, 0.5, level=5 if quick else 6), 0.5) for seed in seeds],
     }
 

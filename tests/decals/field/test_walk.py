@@ -64,9 +64,11 @@ def test_images_run_on_over_the_rim_of_a_cylinder(depth: float, radius: float) -
     assert rms(unfolding.cylinder_rim(depth).errors(radius)) <= 0.005
 
 
-@pytest.mark.parametrize(("inside", "most"), [(0.0, 0.02), (0.01, 0.01), (0.1, 0.0025)])
+@pytest.mark.parametrize(
+    ("inside", "most"), [(0.0, 0.005), (0.01, 0.01), (0.02, 0.005), (0.04, 0.005), (0.1, 0.0018)]
+)
 def test_images_centred_near_the_rim_of_a_cylinder(inside: float, most: float) -> None:
-    """Walks past a focus, which are not the shortest, leave no relays."""
+    """Walks past a focus, which are not the shortest, leave no relays; relays that see badly count little."""
     errors = unfolding.cylinder_end(inside).errors(0.8)
     print(f"{rms(errors):.5f}, largest {errors.max():.4f} of the radius")
     assert rms(errors) <= most

@@ -184,21 +184,26 @@ def least(length: Callable[[Array], Array], low: Array, high: Array) -> Array:
     return low
 
 
-def cylinder_end(inside: float, count: int = 3000, sides: int = 1024) -> Patch:
+def cylinder_end(inside: float, count: int = 3000, sides: int = 1024, *, clear: float = 0.01) -> Patch:
     """The side of a cylinder just below its end, seen from the end, at a distance inside the rim.
 
     A path crosses the rim where the sum of both straight parts is least; there are two such places. From a
-    centre on the rim, another path runs along the side alone.
+    centre on the rim, another path runs along the side alone. A path that leaves the rim at an angle φ after
+    2φ of it, and then goes t down the side, is as long as that one if t ≈ φ. So the cut lies at z ≈ −s²/9,
+    within 0.0005. Points closer to it than `clear` are left out.
     """
     rng = np.random.default_rng(5)
     s, z = rng.uniform(-0.1, 0.75, count), rng.uniform(-0.25, 0, count)
+    if inside == 0:
+        kept = np.abs(z + s**2 / 9) >= clear
+        s, z = s[kept], z[kept]
 
     def length(at: Array) -> Array:
         result: Array = np.hypot(np.cos(at) - 1 + inside, np.sin(at)) + np.hypot(s - at, z)
         return result
 
     tried = np.linspace(-1.7, 1.7, 401)
-    nearest = np.array([length(np.full(count, at)) for at in tried]).argmin(axis=0)
+    nearest = np.array([length(np.full(len(s), at)) for at in tried]).argmin(axis=0)
     at = least(length, tried[nearest - 1], tried[nearest + 1])
     across = np.stack([np.sin(at), 1 - inside - np.cos(at)], axis=1)
     log = length(at)[:, None] * across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
