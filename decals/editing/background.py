@@ -12,7 +12,9 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
-from blobtree._typing import Int64Array
+import numpy as np
+from numpy.typing import ArrayLike
+
 from blobtree.device import core_left_free
 from blobtree.progress import Cancel, Progress
 from decals.editing.commands import DecalCommand
@@ -184,9 +186,9 @@ Step = Callable[[EditSession], str]
 """Edits a session, and returns a message for the user (empty for none)."""
 
 
-def are_many(numbers: Int64Array) -> bool:
+def are_many(numbers: ArrayLike) -> bool:
     """Return True if an edit of these decals belongs in the background."""
-    return len(numbers) > MAX_IMMEDIATE_DECALS
+    return np.size(numbers) > MAX_IMMEDIATE_DECALS
 
 
 def takes_long(command: Command) -> bool:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -72,7 +72,7 @@ class DecalCommand:
         Numbers of the decals.
     """
 
-    numbers: Int64Array
+    numbers: ArrayLike
 
     def __init_subclass__(cls) -> None:
         inherit_descriptions(cls)
@@ -97,10 +97,6 @@ class DeleteDecals(DecalCommand):
     """
 
     label: ClassVar[str] = "delete"
-
-    if TYPE_CHECKING:  # any array-like of numbers is converted
-
-        def __init__(self, numbers: ArrayLike) -> None: ...
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
@@ -131,12 +127,6 @@ class SetValues(DecalCommand):
 
     values: Mapping[str, ArrayLike]
     label: str = "set values"
-
-    if TYPE_CHECKING:  # any array-like of numbers is converted
-
-        def __init__(
-            self, numbers: ArrayLike, values: Mapping[str, ArrayLike], label: str = "set values"
-        ) -> None: ...
 
     @classmethod
     def each(cls, numbers: ArrayLike, label: str = "set values", **values: ArrayLike) -> Self:
@@ -180,16 +170,6 @@ class MapValues(DecalCommand):
     function: Callable[[Decals], ArrayLike]
     label: str = "set values"
 
-    if TYPE_CHECKING:  # any array-like of numbers is converted
-
-        def __init__(
-            self,
-            numbers: ArrayLike,
-            name: str,
-            function: Callable[[Decals], ArrayLike],
-            label: str = "set values",
-        ) -> None: ...
-
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
         taken = document.decals.take(self.numbers)
@@ -221,10 +201,6 @@ class ScaleDecals(DecalCommand):
 
     factor: float
     label: ClassVar[str] = "scale"
-
-    if TYPE_CHECKING:  # any array-like of numbers is converted
-
-        def __init__(self, numbers: ArrayLike, factor: float) -> None: ...
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
@@ -258,10 +234,6 @@ class TurnDecals(DecalCommand):
 
     degrees: float
     label: ClassVar[str] = "turn"
-
-    if TYPE_CHECKING:  # any array-like of numbers is converted
-
-        def __init__(self, numbers: ArrayLike, degrees: float) -> None: ...
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
@@ -297,10 +269,6 @@ class MoveDecals(DecalCommand):
     position: ArrayLike
     normal: ArrayLike
     label: ClassVar[str] = "move"
-
-    if TYPE_CHECKING:  # any array-like of numbers is converted
-
-        def __init__(self, numbers: ArrayLike, position: ArrayLike, normal: ArrayLike) -> None: ...
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
@@ -348,10 +316,6 @@ class OrderDecals(DecalCommand):
 
     front: bool
 
-    if TYPE_CHECKING:  # any array-like of numbers is converted
-
-        def __init__(self, numbers: ArrayLike, front: bool) -> None: ...
-
     def __post_init__(self) -> None:
         super().__post_init__()
         truth("front", self.front, InvalidEdit)
@@ -371,7 +335,7 @@ class OrderDecals(DecalCommand):
         """Return the numbers that the decals will have, in the order of `numbers`."""
         new, old = self._order(document)
         moved = dict(zip(old.tolist(), new.tolist(), strict=True))
-        return np.array([moved.get(number, number) for number in self.numbers.tolist()], np.int64)
+        return np.array([moved.get(number, number) for number in as_numbers(self.numbers).tolist()], np.int64)
 
     def _order(self, document: Document) -> tuple[Int64Array, Int64Array]:
         """Return all numbers of the ranks of the decals, and which decals come to have them."""
@@ -411,10 +375,6 @@ class DuplicateDecals(DecalCommand):
     """
 
     label: ClassVar[str] = "duplicate"
-
-    if TYPE_CHECKING:  # any array-like of numbers is converted
-
-        def __init__(self, numbers: ArrayLike) -> None: ...
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""

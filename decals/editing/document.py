@@ -9,11 +9,13 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Int64Array
 from blobtree.lazy import Lazy
 from decals.errors import InvalidEdit, InvalidMesh, InvalidScene
 from decals.index.editor import DecalEditor
+from decals.index.rows import as_numbers
 from decals.model import Decals
 from decals.receivers import check_receivers
 from decals.rendering.options import Drawing
@@ -366,7 +368,7 @@ class Document:
 
     # -- edits ------------------------------------------------------------------------------------------
 
-    def compute_replacement(self, numbers: Int64Array, decals: Decals, **parts: Any) -> Edit:
+    def compute_replacement(self, numbers: ArrayLike, decals: Decals, **parts: Any) -> Edit:
         """Return the edit that gives decals new values and replaces scene parts.
 
         Raises
@@ -381,7 +383,7 @@ class Document:
                 f"expected an image from 0 to {len(images) - 1}, got {last}; add the image first"
             )
         check_receivers(decals.receivers, parts.get("objects", self.objects), InvalidEdit)
-        return self._compute(DecalStates.existing(numbers, decals), parts)
+        return self._compute(DecalStates.existing(as_numbers(numbers), decals), parts)
 
     def compute_addition(self, decals: Decals) -> Edit:
         """Return the edit that adds decals under new numbers."""
@@ -389,8 +391,9 @@ class Document:
         first = self.decals.next_number
         return self.compute_replacement(np.arange(first, first + len(decals)), decals)
 
-    def compute_deletion(self, numbers: Int64Array, **parts: Any) -> Edit:
+    def compute_deletion(self, numbers: ArrayLike, **parts: Any) -> Edit:
         """Return the edit that deletes decals and replaces scene parts."""
+        numbers = as_numbers(numbers)
         self.decals.take(numbers)  # raises for numbers without a decal
         self._check_receivers(numbers, parts)
         return self._compute(DecalStates.deleted(numbers), parts)
