@@ -278,12 +278,6 @@ def {name}(
 
 _RANGE = '''\
 def {name}(a: wp.vec2, b: wp.vec2, parameter: wp.float32{tape}) -> wp.vec2:
-    """F is monotone, so its extremes lie at corners."""
-    return widened_range({partials}({low}, parameter{passed})[0], {partials}({high}, parameter{passed})[0])
-'''
-
-_RANGE = '''\
-def {name}(a: wp.vec2, b: wp.vec2, parameter: wp.float32{tape}) -> wp.vec2:
     """From the middle of the operands' ranges F changes no faster than `steepest` says."""
     max_a = a[1]
     max_b = b[1]

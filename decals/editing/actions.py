@@ -254,21 +254,12 @@ def _redo(session: EditSession, entry: UndoEntry) -> str:
     return f"redid: {session.redo()}"
 
 
+OWNERS = Actions, FileActions, DecalActions, BrushActions, TreeActions, VisibilityActions, ViewActions
+"""Classes of actions, in the order of the help."""
+
 KEYS = KeyTable(
     [
-        *(
-            binding
-            for owner in (
-                Actions,
-                FileActions,
-                DecalActions,
-                BrushActions,
-                TreeActions,
-                VisibilityActions,
-                ViewActions,
-            )
-            for binding, _ in registered_actions(owner).values()
-        ),
+        *(binding for owner in OWNERS for binding, _ in registered_actions(owner).values()),
         *UNREGISTERED,
     ]
 )

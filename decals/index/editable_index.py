@@ -22,7 +22,6 @@ MAX_SMALL_EDITS = 64
 """Number of decals smaller than the cells they share, from which the index is rebuilt."""
 
 LEVELS, TABLE, IDS = "index_levels", "index_table", "index_ids"
-_TYPES = {LEVELS: wp.vec4, TABLE: wp.vec4i, IDS: wp.int32}
 
 
 class EditableIndex:

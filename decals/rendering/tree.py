@@ -120,17 +120,7 @@ class Kinds:
     @classmethod
     def of(cls, tape: Tape) -> "Kinds":
         """Return the kinds that `tape` uses."""
-        return cls(
-            tape.skeletons,
-            tape.operators,
-            tape.registers,
-            tape.stretched,
-            tape.warps,
-            tape.warp_registers,
-            tape.fields,
-            tape.instruction_set,
-            tape.falloffs,
-        )
+        return cls(*(getattr(tape, name) for name in cls.__dataclass_fields__))
 
 
 @lru_cache(maxsize=32)
