@@ -103,7 +103,7 @@ def define_falloff(value: Any, slope: Any, *, name: str | None = None) -> Fallof
         kind,
         source.function,
         derivative.function,
-        _rim(g),
+        find_rim(g),
         steepest_distance,
         steepest_slope,
         digest,
@@ -131,18 +131,7 @@ def _check(source: CustomSource, derivative: CustomSource, g: Sampled, g_slope: 
     """Raise `InvalidDefinition` if samples show that g is no falloff, or that its derivative is wrong."""
     distances = np.linspace(0.0, 1.0, SAMPLES)
     values, slopes = g(distances), g_slope(distances)
-    for place, expected in ((0, 1.0), (-1, 0.0)):
-        if abs(values[place] - expected) > TOLERANCE:
-            raise source.refusal(
-                f"g({distances[place]:g}) = {values[place]:.6g}, expected {expected:g}; shift and scale it"
-            )
-    rises = np.diff(values)
-    if rises.max() > TOLERANCE:
-        worst = int(rises.argmax())
-        raise source.refusal(
-            f"g rises from {values[worst]:.6g} at d = {distances[worst]:.6g} to {values[worst + 1]:.6g}; "
-            "a falloff never rises"
-        )
+    check_falling(source, distances, values, "a falloff")
     inner = distances[1:-1]
     right, left = (g(inner + STEP) - g(inner)) / STEP, (g(inner) - g(inner - STEP)) / STEP
     smooth = np.abs(right - left) <= SLOPE_TOLERANCE * (1.0 + np.abs(slopes[1:-1]))
@@ -156,13 +145,29 @@ def _check(source: CustomSource, derivative: CustomSource, g: Sampled, g_slope: 
         )
     if (~smooth).mean() > MAX_KINK_SHARE:
         raise source.refusal("g has so many kinks or jumps that its derivative cannot be tried")
-    rim = _rim(g)
+    rim = find_rim(g)
     if float(-g_slope(np.array([rim]))[0]) < FLATTEST_RIM:
         raise source.refusal(
             f"g is flat where it is {ISO:g}, at d = {rim:.6g}, so it has no definite surface"
         )
     _check_single(source, distances, values)
     _check_single(derivative, distances, slopes)
+
+
+def check_falling(source: CustomSource, distances: Floats, values: Floats, what: str) -> None:
+    """Raise `InvalidDefinition` unless samples of g fall from 1 to 0 without rising."""
+    for place, expected in ((0, 1.0), (-1, 0.0)):
+        if abs(values[place] - expected) > TOLERANCE:
+            raise source.refusal(
+                f"g({distances[place]:g}) = {values[place]:.6g}, expected {expected:g}; shift and scale it"
+            )
+    rises = np.diff(values)
+    if rises.max() > TOLERANCE:
+        worst = int(rises.argmax())
+        raise source.refusal(
+            f"g rises from {values[worst]:.6g} at d = {distances[worst]:.6g} to {values[worst + 1]:.6g}; "
+            f"{what} never rises"
+        )
 
 
 def _check_single(source: CustomSource, distances: Floats, expected: Floats) -> None:
@@ -177,7 +182,7 @@ def _check_single(source: CustomSource, distances: Floats, expected: Floats) -> 
             )
 
 
-def _rim(g: Sampled) -> float:
+def find_rim(g: Sampled) -> float:
     """Return the distance with g = ISO, by bisection."""
     low, high = 0.0, 1.0
     for _ in range(53):

@@ -19,6 +19,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree.custom.checks import result_of
+from blobtree.custom.falloff import check_falling, find_rim
 from blobtree.custom.source import CustomSource, custom_source, kind_name
 from blobtree.errors import InvalidDefinition
 from blobtree.formulas.falloff import Falloff
@@ -324,19 +325,8 @@ def _check_field(source: CustomSource) -> float:
     """Raise `InvalidDefinition` if samples show that g is no field of decals; return its rim."""
     distances = np.linspace(0.0, 1.0, SAMPLES)
     values = _sampled(source, distances)
-    for place, expected in ((0, 1.0), (-1, 0.0)):
-        if abs(values[place] - expected) > TOLERANCE:
-            raise source.refusal(
-                f"g({distances[place]:g}) = {values[place]:.6g}, expected {expected:g}; shift and scale it"
-            )
-    falls = -np.diff(values)
-    if falls.min() < -TOLERANCE:
-        worst = int(falls.argmin())
-        raise source.refusal(
-            f"g rises from {values[worst]:.6g} at d = {distances[worst]:.6g} to {values[worst + 1]:.6g}; "
-            "the field of a decal never rises"
-        )
-    flat = (falls < LEAST_FALL) & (values[1:] > 0.45)
+    check_falling(source, distances, values, "the field of a decal")
+    flat = (-np.diff(values) < LEAST_FALL) & (values[1:] > 0.45)
     if flat.any():
         raise source.refusal(
             f"g is flat at d = {distances[int(flat.argmax())]:.6g}, inside its rim, "
@@ -349,11 +339,7 @@ def _check_field(source: CustomSource) -> float:
             f"for d = {distances[worst]:.6g} it returns {single[worst]:.6g} in single precision, "
             f"{values[worst]:.6g} in double"
         )
-    low, high = 0.0, 1.0
-    for _ in range(53):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if _sampled(source, np.array([middle]))[0] > 0.5 else (low, middle)
-    return 0.5 * (low + high)
+    return find_rim(partial(_sampled, source))
 
 
 def _check_law(law: CustomSource, field: CustomSource, rim: float) -> None:
