@@ -230,204 +230,193 @@ def evaluate(
     _limit(indexed, decals, on, device)
     if mapping is ImageMapping.WALKED:
         indexed.walked, indexed.walks = True, _walk_texels(walks, len(indexed.records) // RECORD, device)
-    owner: Any = wp.zeros(count, dtype=wp.int32, device=device)
-    uv: Any = wp.zeros(count, dtype=wp.vec2, device=device)
-    field: Any = wp.zeros(count, dtype=wp.float32, device=device)
-    inputs = [
-        wp.array(positions, dtype=wp.vec3, device=device),
-        wp.array(facings, dtype=wp.vec3, device=device),
-        int(contact),
-        indexed,
-    ]
-    wp.launch(
-        loaded(_with_law(sample_points, contact), device), count, inputs, [owner, uv, field], device=device
-    )
+    query = _Query(decals, indexed, positions, facings, contact, device)
     color = height = maps = None
     if images is not None:
         listed = each_image(images)
         pixels = [image_pixels(image, name=f"image {number}") for number, image in enumerate(listed)]
-        given = [*inputs, owner]
-        color = _colors(decals, texel_arrays(pixels), given, contact, device)
+        color = query.colors(_laid_out([linear_premultiplied(image) for image in pixels]))
         reliefs = [image.relief_texels() if hasattr(image, "relief_texels") else None for image in listed]
         if any(relief is not None for relief in reliefs):
-            height = _heights(decals, reliefs, pixels, given, contact, device)
+            height = query.heights(reliefs, pixels)
         if materials and any(hasattr(image, "surface_texels") for image in listed):
-            maps = _materials(decals, listed, pixels, facings, given, contact, device)
-    derivative = None
-    if jacobian:
-        center = owner.numpy(), uv.numpy()
-        derivative = _jacobians(positions, facings, inputs[2:], center, turns, contact, device)
-    near = _neighbors(decals, inputs, owner, contact, device) if neighbors else None
-    return Samples(owner.numpy(), uv.numpy(), field.numpy(), color, derivative, near, height, maps)
+            maps = query.materials(listed, pixels)
+    derivative = query.jacobians(turns) if jacobian else None
+    near = query.neighbors() if neighbors else None
+    return Samples(query.owners, query.uv, query.fields, color, derivative, near, height, maps)
 
 
-def _jacobians(
-    points: Float32Array,
-    normals: Float32Array,
-    modes: list[Any],
-    center: tuple[Int32Array, Float32Array],
-    normal_derivatives: Float64Array | None,
-    contact: AnyContact,
-    device: Any,
-) -> Float64Array:
-    """Return derivatives of image coordinates; `modes` are contact mode and indexed decals."""
-    spheres: Float32Array = modes[-1].records.numpy()[::RECORD, 3]
-    radii = np.ones(len(points))
-    owned = center[0] >= 0
-    radii[owned] = RIM_RADIUS * spheres[center[0][owned]]
+class _Query:
+    """Decals on a device that are evaluated at points, in a contact mode or law.
 
-    kernel = _with_law(sample_points, contact)
+    Attributes
+    ----------
+    owners, uv, fields
+        See `Samples`.
+    """
 
-    def sampled(points: Float32Array, normals: Float32Array) -> tuple[Int32Array, Float32Array]:
-        owner: Any = wp.zeros(len(points), dtype=wp.int32, device=device)
-        uv: Any = wp.zeros(len(points), dtype=wp.vec2, device=device)
-        field: Any = wp.zeros(len(points), dtype=wp.float32, device=device)
-        given: list[Any] = [wp.array(rows, dtype=wp.vec3, device=device) for rows in (points, normals)]
-        wp.launch(kernel, len(points), [*given, *modes], [owner, uv, field], device=device)
-        return owner.numpy(), uv.numpy()
+    def __init__(
+        self,
+        decals: Decals | DecalEditor,
+        indexed: Any,
+        points: Float32Array,
+        normals: Float32Array,
+        contact: AnyContact,
+        device: Any,
+    ) -> None:
+        self._decals, self._indexed, self._contact, self._device = decals, indexed, contact, device
+        self._rows = decals.decals if isinstance(decals, DecalEditor) else decals
+        self._points, self._normals = points, normals
+        self._inputs = self._inputs_at(points, normals)
+        outputs = self._sample(self._kernel(sample_points), self._inputs)
+        self._owner: Any = outputs[0]
+        self.owners, self.uv, self.fields = (array.numpy() for array in outputs)
 
-    return image_jacobians(sampled, points, normals, radii, center, normal_derivatives)
+    def _kernel(self, kernel: Any) -> Any:
+        """Return a kernel for a contact mode, or with the formulas of a contact law."""
+        law = self._contact if isinstance(self._contact, ContactLaw) else None
+        return loaded(kernel if law is None else law.formulas.kernel(kernel), self._device)
+
+    def _inputs_at(self, points: Float32Array, normals: Float32Array) -> list[Any]:
+        arrays: list[Any] = [wp.array(rows, dtype=wp.vec3, device=self._device) for rows in (points, normals)]
+        return [*arrays, int(self._contact), self._indexed]
+
+    def _zeros(self, *kinds: Any, count: int) -> list[Any]:
+        return [wp.zeros(count, dtype=kind, device=self._device) for kind in kinds]
+
+    def _sample(self, kernel: Any, inputs: list[Any]) -> list[Any]:
+        outputs = self._zeros(wp.int32, wp.vec2, wp.float32, count=len(inputs[0]))
+        wp.launch(kernel, len(inputs[0]), inputs, outputs, device=self._device)
+        return outputs
+
+    def jacobians(self, normal_derivatives: Float64Array | None) -> Float64Array:
+        """Return derivatives of image coordinates."""
+        spheres: Float32Array = self._indexed.records.numpy()[::RECORD, 3]
+        radii = np.ones(len(self._points))
+        owned = self.owners >= 0
+        radii[owned] = RIM_RADIUS * spheres[self.owners[owned]]
+        kernel = self._kernel(sample_points)
+
+        def sampled(points: Float32Array, normals: Float32Array) -> tuple[Int32Array, Float32Array]:
+            owner, uv, _ = self._sample(kernel, self._inputs_at(points, normals))
+            return owner.numpy(), uv.numpy()
+
+        center = self.owners, self.uv
+        return image_jacobians(sampled, self._points, self._normals, radii, center, normal_derivatives)
+
+    def neighbors(self) -> Neighbors:
+        """Return all decals with a field at points; the index lists whole influences, not only reaches."""
+        from decals.field.neighbor_kernels import list_neighbors  # compiled at the first use
+
+        indexed, device, count = self._indexed, self._device, len(self._points)
+        decals, rows = self._decals, self._rows
+        known = decals.numbers if isinstance(decals, DecalEditor) else np.arange(len(rows))
+        wide = index_on(rows, device, reach=1.0 / NEIGHBOR_REACH)
+        wide.stiffness, wide.surface, wide.limited = indexed.stiffness, indexed.surface, indexed.limited
+        if wide.limited:
+            wide.limits = wp.array(rows.limits_of(decals.receiver_table), dtype=wp.vec4, device=device)
+        kept = np.searchsorted(known, self.owners).astype(np.int32)
+        empty = self._zeros(wp.int32, wp.float32, count=0)
+        (counts,) = self._zeros(wp.int32, count=count)
+        placed: Any = wp.array(np.where(self.owners >= 0, kept, self.owners), dtype=wp.int32, device=device)
+        given = [*self._inputs[:-1], wide, placed]
+        kernel = self._kernel(list_neighbors)
+        wp.launch(kernel, count, [*given, empty[0]], [counts, empty[0], empty[1], empty[1]], device=device)
+        offsets = np.concatenate([[0], np.cumsum(counts.numpy(), dtype=np.int64)])
+        starts: Any = wp.array(offsets[:-1], dtype=wp.int32, device=device)
+        total = int(offsets[-1])
+        lists = self._zeros(wp.int32, wp.float32, wp.float32, count=total)
+        wp.launch(kernel, count if total else 0, [*given, starts], [counts, *lists], device=device)
+        found, fields, pushes = (values.numpy() for values in lists)
+        order = np.lexsort((found, np.repeat(np.arange(count), np.diff(offsets))))
+        return Neighbors(offsets, known[found[order]].astype(np.int32), fields[order], pushes[order])
+
+    def colors(self, images: tuple[Int32Array, Float32Array]) -> Float32Array:
+        """Return the colours of images by their extents and texels, over each other."""
+        min_count = int(self._rows.images.max(initial=NO_IMAGE)) + 1
+        extents, texels = images
+        if len(extents) < min_count:
+            raise InvalidImage(
+                f"images: expected {min_count} or more, got {len(extents)}; decals refer to them by number"
+            )
+        (colors,) = self._zeros(wp.vec4, count=len(self._points))
+        arrays: list[Any] = [
+            wp.array(extents, dtype=wp.vec3i, device=self._device),
+            wp.array(texels, dtype=wp.vec4, device=self._device),
+        ]
+        inputs = [*self._inputs, self._owner, *arrays]
+        wp.launch(self._kernel(color_points), len(colors), inputs, [colors], device=self._device)
+        result: Float32Array = colors.numpy()
+        return result
+
+    def heights(self, reliefs: Sequence[Float32Array | None], pixels: Sequence[Pixels]) -> Float32Array:
+        """Return heights in model units, mixed as a colour is, with the radius of each decal as its tint."""
+        layers = []
+        for relief, image in zip(reliefs, pixels, strict=True):
+            layer = np.zeros(image.shape, np.float32)
+            layer[..., 3] = unit_levels(image[..., 3])
+            if relief is not None:
+                layer[..., 0] = relief
+            layers.append(layer)
+        radii = RIM_RADIUS * self._indexed.records.numpy()[::RECORD, 3:]
+        return self._map_sums(layers, np.repeat(radii, 3, axis=1))[:, 0]
+
+    def materials(self, images: Sequence[Any], pixels: Sequence[Pixels]) -> MaterialSamples:
+        """Return the maps of materials, mixed as colours are, with the axes of each decal as its tint."""
+        given = []  # x, y, z of normals; roughness, metalness, 1; emission; occlusion
+        for image, pixel in zip(images, pixels, strict=True):
+            maps = np.zeros((*pixel.shape[:2], 12), np.float32)
+            if hasattr(image, "surface_texels"):
+                first, second = image.surface_texels()
+                maps[..., :2], maps[..., 3:5] = first[..., :2], first[..., 2:]
+                maps[..., 2] = np.sqrt(np.maximum(1.0 - (first[..., :2] ** 2).sum(axis=-1), 0.0))
+                maps[..., 5], maps[..., 6:10] = 1.0, second
+            alpha = unit_levels(pixel[..., 3:])
+            given.append(np.concatenate([maps * alpha, alpha], axis=-1))
+
+        def sums(columns: list[int], tints: Float32Array | float) -> Float32Array:
+            layers = [np.ascontiguousarray(maps[..., [*columns, -1]]) for maps in given]
+            return self._map_sums(layers, tints)[:, :3]
+
+        records, normals = self._indexed.records.numpy(), self._normals
+        facing, axis = records[1::RECORD, :3], records[2::RECORD, :3]
+        tilt = sums([0, 0, 0], axis) + sums([1, 1, 1], np.cross(facing, axis))
+        upright, roughness, metallic = sums([2, 3, 4], 1.0).T
+        emission = sums([6, 7, 8], 1.0)
+        part, occlusion, _ = sums([5, 9, 10], 1.0).T
+        unit = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.float32(1e-30))
+        owner_facing = facing[np.maximum(self.owners, 0)] if len(facing) else unit
+        # turned as the normal is on the way to the point; the inverse of `unroll_step`
+        cosine = np.maximum(1.0 + (owner_facing * unit).sum(axis=1, keepdims=True), 1e-4)
+        turned = tilt - (tilt * unit).sum(axis=1, keepdims=True) / cosine * (owner_facing + unit)
+        normal = (turned + upright[:, None] * unit).astype(np.float32)
+        return MaterialSamples(part, normal, roughness, metallic, occlusion, emission)
+
+    def _map_sums(self, layers: Sequence[Float32Array], tints: Float32Array | float) -> Float32Array:
+        """Return layers ``[h, w, 4]`` mixed as colours are, with other tints; without image, decals add 0."""
+        records = self._indexed.records
+        tinted = records.numpy().copy()
+        tinted[3::RECORD, :3] = np.where(tinted[2::RECORD, 3:] >= 0.0, tints, 0.0)
+        self._indexed.records = wp.array(tinted, dtype=wp.vec4, device=self._device)
+        try:
+            return self.colors(_laid_out(layers))
+        finally:
+            self._indexed.records = records
 
 
-def _with_law(kernel: Any, contact: AnyContact) -> Any:
-    """Return a kernel for a contact mode, or with the formulas of a contact law."""
-    return contact.formulas.kernel(kernel) if isinstance(contact, ContactLaw) else kernel
-
-
-def _neighbors(
-    decals: Decals | DecalEditor, inputs: list[Any], owner: Any, contact: AnyContact, device: Any
-) -> Neighbors:
-    """Return all decals with a field at points; the index lists whole influences, not only reaches."""
-    from decals.field.neighbor_kernels import list_neighbors  # compiled at the first use
-
-    points, normals, mode, indexed = inputs
-    if isinstance(decals, DecalEditor):
-        rows, known = decals.decals, decals.numbers
-    else:
-        rows, known = decals, np.arange(len(decals))
-    wide = index_on(rows, device, reach=1.0 / NEIGHBOR_REACH)
-    wide.stiffness, wide.surface, wide.limited = indexed.stiffness, indexed.surface, indexed.limited
-    if wide.limited:
-        wide.limits = wp.array(rows.limits_of(decals.receiver_table), dtype=wp.vec4, device=device)
-    owners = owner.numpy()
-    kept = np.searchsorted(known, owners).astype(np.int32)
-    empty: list[Any] = [wp.zeros(0, dtype=kind, device=device) for kind in (wp.int32, wp.float32)]
-    counts: Any = wp.zeros(len(points), dtype=wp.int32, device=device)
-    placed: Any = wp.array(np.where(owners >= 0, kept, owners), dtype=wp.int32, device=device)
-    given = [points, normals, mode, wide, placed]
-    kernel = loaded(_with_law(list_neighbors, contact), device)
-    wp.launch(kernel, len(points), [*given, empty[0]], [counts, empty[0], empty[1], empty[1]], device=device)
-    offsets = np.concatenate([[0], np.cumsum(counts.numpy(), dtype=np.int64)])
-    starts: Any = wp.array(offsets[:-1], dtype=wp.int32, device=device)
-    total = int(offsets[-1])
-    lists: list[Any] = [
-        wp.zeros(total, dtype=kind, device=device) for kind in (wp.int32, wp.float32, wp.float32)
-    ]
-    wp.launch(kernel, len(points) if total else 0, [*given, starts], [counts, *lists], device=device)
-    found, fields, pushes = (values.numpy() for values in lists)
-    order = np.lexsort((found, np.repeat(np.arange(len(points)), np.diff(offsets))))
-    return Neighbors(offsets, known[found[order]].astype(np.int32), fields[order], pushes[order])
-
-
-def texel_arrays(images: Sequence[Pixels]) -> tuple[Int32Array, Float32Array]:
-    """Lay out images of any sizes in one array of texels.
+def _laid_out(layers: Sequence[Float32Array]) -> tuple[Int32Array, Float32Array]:
+    """Return images ``float32[h, w, 4]`` in one array of texels, row after row, the upper row first.
 
     Returns
     -------
     extents : int32[k, 3]
         First texel, width and height of each image.
     texels : float32[t, 4]
-        Premultiplied linear colours, row after row, the upper row first.
     """
-    return _laid_out([linear_premultiplied(image) for image in images])
-
-
-def _laid_out(layers: Sequence[Float32Array]) -> tuple[Int32Array, Float32Array]:
-    """Return the extents and the texels of images ``float32[h, w, 4]`` in one array."""
     sizes = np.array([(layer.shape[1], layer.shape[0]) for layer in layers], np.int32).reshape(-1, 2)
     counts = sizes.prod(axis=1)
     texels = np.concatenate([np.zeros((0, 4), np.float32), *(layer.reshape(-1, 4) for layer in layers)])
     return np.column_stack([np.cumsum(counts) - counts, sizes]).astype(np.int32), texels
-
-
-def _heights(
-    decals: Decals | DecalEditor,
-    reliefs: Sequence[Float32Array | None],
-    pixels: Sequence[Pixels],
-    inputs: list[Any],
-    contact: AnyContact,
-    device: Any,
-) -> Float32Array:
-    """Return heights in model units, mixed as a colour is, with the radius of each decal as its tint."""
-    layers = []
-    for relief, image in zip(reliefs, pixels, strict=True):
-        layer = np.zeros(image.shape, np.float32)
-        layer[..., 3] = unit_levels(image[..., 3])
-        if relief is not None:
-            layer[..., 0] = relief
-        layers.append(layer)
-    radii = RIM_RADIUS * inputs[-2].records.numpy()[::RECORD, 3:]
-    return _map_sums(decals, layers, np.repeat(radii, 3, axis=1), inputs, contact, device)[:, 0]
-
-
-def _materials(
-    decals: Decals | DecalEditor,
-    images: Sequence[Any],
-    pixels: Sequence[Pixels],
-    normals: Float32Array,
-    inputs: list[Any],
-    contact: AnyContact,
-    device: Any,
-) -> MaterialSamples:
-    """Return the maps of materials, each mixed as a colour is, with the axes of each decal as its tint."""
-    given = []  # x, y, z of normals; roughness, metalness, 1; emission; occlusion
-    for image, pixel in zip(images, pixels, strict=True):
-        maps = np.zeros((*pixel.shape[:2], 12), np.float32)
-        if hasattr(image, "surface_texels"):
-            first, second = image.surface_texels()
-            maps[..., :2], maps[..., 3:5] = first[..., :2], first[..., 2:]
-            maps[..., 2] = np.sqrt(np.maximum(1.0 - (first[..., :2] ** 2).sum(axis=-1), 0.0))
-            maps[..., 5], maps[..., 6:10] = 1.0, second
-        alpha = unit_levels(pixel[..., 3:])
-        given.append(np.concatenate([maps * alpha, alpha], axis=-1))
-
-    def sums(columns: list[int], tints: Float32Array | float) -> Float32Array:
-        layers = [np.ascontiguousarray(maps[..., [*columns, -1]]) for maps in given]
-        return _map_sums(decals, layers, tints, inputs, contact, device)[:, :3]
-
-    records = inputs[-2].records.numpy()
-    facing, axis = records[1::RECORD, :3], records[2::RECORD, :3]
-    tilt = sums([0, 0, 0], axis) + sums([1, 1, 1], np.cross(facing, axis))
-    upright, roughness, metallic = sums([2, 3, 4], 1.0).T
-    emission = sums([6, 7, 8], 1.0)
-    part, occlusion, _ = sums([5, 9, 10], 1.0).T
-    unit = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.float32(1e-30))
-    owner_facing = facing[np.maximum(inputs[-1].numpy(), 0)] if len(facing) else unit
-    # turned as the normal is on the way to the point; the inverse of `unroll_step`
-    cosine = np.maximum(1.0 + (owner_facing * unit).sum(axis=1, keepdims=True), 1e-4)
-    turned = tilt - (tilt * unit).sum(axis=1, keepdims=True) / cosine * (owner_facing + unit)
-    normal = (turned + upright[:, None] * unit).astype(np.float32)
-    return MaterialSamples(part, normal, roughness, metallic, occlusion, emission)
-
-
-def _map_sums(
-    decals: Decals | DecalEditor,
-    layers: Sequence[Float32Array],
-    tints: Float32Array | float,
-    inputs: list[Any],
-    contact: AnyContact,
-    device: Any,
-) -> Float32Array:
-    """Return layers ``[h, w, 4]`` mixed as colours are, with other tints; without image, decals add 0."""
-    indexed = inputs[-2]
-    records = indexed.records
-    tinted = records.numpy().copy()
-    tinted[3::RECORD, :3] = np.where(tinted[2::RECORD, 3:] >= 0.0, tints, 0.0)
-    indexed.records = wp.array(tinted, dtype=wp.vec4, device=device)
-    try:
-        return _colors(decals, _laid_out(layers), inputs, contact, device)
-    finally:
-        indexed.records = records
 
 
 def _indexed(decals: Decals | DecalEditor, index: DecalIndex | None, device: Any) -> Any:
@@ -471,32 +460,6 @@ def _limit(
         indexed.surface = object_mask(on, decals.receiver_table)
     elif on is not None:
         indexed.surface = surface_mask(labels, decals.receiver_table)
-
-
-def _colors(
-    decals: Decals | DecalEditor,
-    images: tuple[Int32Array, Float32Array],
-    inputs: list[Any],
-    contact: AnyContact,
-    device: Any,
-) -> Float32Array:
-    """Return the colours of images by their extents and texels, over each other."""
-    rows = decals.decals if isinstance(decals, DecalEditor) else decals
-    min_count = int(rows.images.max(initial=NO_IMAGE)) + 1
-    extents, texels = images
-    if len(extents) < min_count:
-        raise InvalidImage(
-            f"images: expected {min_count} or more, got {len(extents)}; decals refer to them by number"
-        )
-    colors: Any = wp.zeros(len(inputs[0]), dtype=wp.vec4, device=device)
-    arrays: list[Any] = [
-        wp.array(extents, dtype=wp.vec3i, device=device),
-        wp.array(texels, dtype=wp.vec4, device=device),
-    ]
-    kernel = loaded(_with_law(color_points, contact), device)
-    wp.launch(kernel, len(inputs[0]), [*inputs, *arrays], [colors], device=device)
-    result: Float32Array = colors.numpy()
-    return result
 
 
 def _as_rows(name: str, values: ArrayLike, shape: tuple[int, ...] = (3,)) -> Float32Array:
