@@ -3,7 +3,7 @@
 import numpy as np
 
 from blobtree import Node
-from blobtree.tape.model import bounds_along
+from tests.blobtree.tape.evaluations import bounds_along
 from tests.blobtree.trees import points_around
 from tests.conformance import Rng, sample
 

@@ -17,7 +17,8 @@ from blobtree import InvalidNode, Node, from_json, to_json
 from blobtree.nodes.parameters import Parameter, Quantity, parameters_of
 from blobtree.nodes.primitives import Falling, Leaf, Pieces
 from blobtree.nodes.values import OPTIONAL, fields_of
-from blobtree.tape.model import bounds_along, gradients_at
+from blobtree.tape.model import gradients_at
+from tests.blobtree.tape.evaluations import bounds_along
 from tests.blobtree.trees import BUILT_IN_FALLOFFS, points_around, random_leaf, random_profile, triple
 from tests.oracles import blobtree as oracle
 

@@ -1,10 +1,9 @@
-"""A tree as a field: its program, its tape, and values, gradients, slope bounds, colours and projections."""
+"""A tree as a field: its program, its tape, and values, gradients and colours."""
 
 import reprlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike
 
@@ -13,13 +12,7 @@ from blobtree.errors import InvalidNode
 from blobtree.kernels import loaded
 from blobtree.lazy import Lazy
 from blobtree.tape.bounds import support_box
-from blobtree.tape.evaluate_kernels import (
-    evaluate_bounds,
-    evaluate_colors,
-    evaluate_gradients,
-    evaluate_values,
-    project_points,
-)
+from blobtree.tape.evaluate_kernels import evaluate_colors, evaluate_gradients, evaluate_values
 from blobtree.tape.program import Instruction, ProgramNode, compile_program
 from blobtree.tape.tape import Tape, compile_tape
 from blobtree.validation import point_array, points_or_point
@@ -77,71 +70,27 @@ def checked_tree(tree: object) -> ImplicitModel:
 
 def values_at(tape: Tape, points: ArrayLike) -> Float32Array:
     """Return the field values (n,) at `points` (n, 3)."""
-    return _evaluate(evaluate_values, tape, point_array(points), [], wp.float32)
+    return evaluate(evaluate_values, tape, points, wp.float32)
 
 
 def gradients_at(tape: Tape, points: ArrayLike) -> Float32Array:
     """Return the values and exact gradients (n, 4) at `points` (n, 3)."""
-    return _evaluate(evaluate_gradients, tape, point_array(points), [], wp.vec4)
-
-
-def bounds_at(tape: Tape, points: ArrayLike, reach: ArrayLike) -> Float32Array:
-    """Return the values at `points` (n, 3), and slope bounds over balls of radius `reach` (n,), as (n, 2)."""
-    array = point_array(points)
-    return bounds_along(tape, array, np.zeros_like(array), reach)[:, :2]
-
-
-def bounds_along(tape: Tape, points: ArrayLike, directions: ArrayLike, reach: ArrayLike) -> Float32Array:
-    """Return the values at `points` (n, 3), and bounds on rise and fall along `directions`, as (n, 3).
-
-    Directions (n, 3) are unit vectors, or 0 for all directions. The bounds hold up to the distances `reach`
-    (n,).
-    """
-    array = point_array(points)
-    reaches = np.broadcast_to(np.asarray(reach, np.float32), len(array))
-    extra: list[Any] = [
-        wp.array(point_array(directions), dtype=wp.vec3),
-        wp.array(reaches, dtype=wp.float32),
-    ]
-    return _evaluate(evaluate_bounds, tape, array, extra, wp.vec3)
+    return evaluate(evaluate_gradients, tape, points)
 
 
 def colors_at(tape: Tape, points: ArrayLike) -> Float32Array:
     """Return the blended colours (n, 3) at `points` (n, 3)."""
-    return _evaluate(evaluate_colors, tape, point_array(points), [], wp.vec4)[:, 1:]
+    return evaluate(evaluate_colors, tape, points)[:, 1:]
 
 
-def project(tape: Tape, points: ArrayLike, longest_step: float) -> tuple[Float32Array, Float32Array]:
-    """Return surface points (n, 3) near `points` (n, 3), and the outward unit normals (n, 3) there.
-
-    Newton's method follows the exact gradient in steps of at most `longest_step`. Points where the field is
-    flat keep their position and get the normal 0.
-    """
-    uploaded = tape.on()
-    start: wp.array[Any] = wp.array(point_array(points), dtype=wp.vec3)
-    positions, normals = wp.empty_like(start), wp.empty_like(start)
-    wp.launch(
-        loaded(tape.instruction_set.kernel_for(project_points)),
-        dim=len(start),
-        inputs=[start, longest_step, uploaded.data, uploaded.span],
-        outputs=[positions, normals],
-    )
-    return positions.numpy(), normals.numpy()
-
-
-def evaluate(kernel: wp.Kernel, tape: Tape, points: ArrayLike) -> Float32Array:
-    """Return the vectors (n, 4) that a kernel computes at `points` (n, 3)."""
-    return _evaluate(kernel, tape, point_array(points), [], wp.vec4)
-
-
-def _evaluate(
-    kernel: wp.Kernel, tape: Tape, points: Float32Array, extra: list[Any], dtype: Any
+def evaluate(
+    kernel: wp.Kernel, tape: Tape, points: ArrayLike, dtype: Any = wp.vec4, more: Sequence[Any] = ()
 ) -> Float32Array:
-    """Return the results of `kernel` at `points` (n, 3) as a NumPy array."""
-    uploaded = tape.on()
-    out: wp.array[Any] = wp.empty(len(points), dtype=dtype)
-    inputs = [wp.array(points, dtype=wp.vec3), *extra, uploaded.data, uploaded.span]
+    """Return what a kernel of points, `more` arrays and a tape computes at `points` (n, 3)."""
+    uploaded, rows = tape.on(), point_array(points)
+    out: wp.array[Any] = wp.empty(len(rows), dtype=dtype)
+    inputs = [wp.array(rows, dtype=wp.vec3), *more, uploaded.data, uploaded.span]
     instance = loaded(tape.instruction_set.kernel_for(kernel))
-    wp.launch(instance, dim=len(points), inputs=inputs, outputs=[out])
+    wp.launch(instance, dim=len(rows), inputs=inputs, outputs=[out])
     result: Float32Array = out.numpy()
     return result

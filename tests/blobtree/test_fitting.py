@@ -19,8 +19,8 @@ from blobtree import (
     polygonize,
     with_numeric_values,
 )
-from blobtree.tape.model import project
 from tests.bench.fitting import perturbed, random_model, recovery_error, samples_in
+from tests.blobtree.tape.evaluations import project
 
 Numbers = NDArray[np.float64]
 

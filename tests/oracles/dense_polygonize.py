@@ -11,7 +11,8 @@ from blobtree.formulas.falloff import ISO
 from blobtree.meshing.bisection_kernels import HALVINGS
 from blobtree.meshing.patches import EDGES, FLIPPED, KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
 from blobtree.tape.evaluate_kernels import STALLED
-from blobtree.tape.model import colors_at, project, values_at
+from blobtree.tape.model import colors_at, values_at
+from tests.blobtree.tape.evaluations import project
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,11 @@ from blobtree import Mesh, Node, Point, Polygonizer, Ricci, Sum, Union, polygoni
 from blobtree.cells.grid import BRANCHING, aligned_grid
 from blobtree.cells.sparse_cells import SparseCells, build_cells, split_tape
 from blobtree.formulas.falloff import ISO, RIM
-from blobtree.tape.model import bounds_at, values_at
+from blobtree.tape.model import values_at
 from tests.blobtree.custom_kinds import CUSTOM
 from tests.blobtree.meshing.edits import edited
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
+from tests.blobtree.tape.evaluations import bounds_at
 from tests.blobtree.trees import BLENDED, SHAPES, SOLIDS, random_leaf, random_trees
 from tests.oracles.dense_polygonize import polygonize as dense_polygonize
 

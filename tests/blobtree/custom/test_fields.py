@@ -22,10 +22,10 @@ from blobtree import (
     to_json,
 )
 from blobtree._typing import Float32Array, Float64Array
-from blobtree.tape.model import bounds_at
 from tests.blobtree.custom import field_kernels as kernels
 from tests.blobtree.custom_kinds import Lump, Waves
 from tests.blobtree.meshing.test_polygonize import assert_closed
+from tests.blobtree.tape.evaluations import bounds_at
 from tests.blobtree.trees import points_around
 from tests.oracles import direct_fields
 

@@ -18,7 +18,6 @@ from blobtree import (
     to_json,
 )
 from blobtree._typing import Float64Array
-from blobtree.tape.model import bounds_along
 from blobtree.tracing.trace import trace
 from tests.blobtree.custom.warp_kernels import (
     broken,
@@ -32,6 +31,7 @@ from tests.blobtree.custom.warp_kernels import (
 )
 from tests.blobtree.custom_kinds import SWAY_LIMITS as LIMITS
 from tests.blobtree.custom_kinds import GivenSway, Sway, Swirl
+from tests.blobtree.tape.evaluations import bounds_along
 from tests.oracles import blobtree as oracle
 
 ROD = Segment((0.2, 0, -2), (0.2, 0, 2), radius=0.3)

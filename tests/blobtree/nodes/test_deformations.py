@@ -28,10 +28,11 @@ from blobtree import (
 from blobtree._typing import Float64Array
 from blobtree.formulas.deformations import CURVE, curve_forward
 from blobtree.tape.codes import WARP_REGISTERS
-from blobtree.tape.model import bounds_along, gradients_at
+from blobtree.tape.model import gradients_at
 from blobtree.tape.program import postorder
 from blobtree.tracing.trace import trace
 from blobtree.tracing.tree_cells import trace_tolerance
+from tests.blobtree.tape.evaluations import bounds_along
 from tests.blobtree.transpile.warp_functions import call
 from tests.blobtree.trees import points_around, random_deformation, random_leaf
 from tests.oracles import blobtree as oracle

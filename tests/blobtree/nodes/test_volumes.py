@@ -28,8 +28,8 @@ from blobtree import (
 from blobtree._typing import Float64Array
 from blobtree.nodes.paths import moved, resized
 from blobtree.nodes.samples import Samples
-from blobtree.tape.model import bounds_at
 from tests.blobtree.meshing.test_polygonize import assert_closed
+from tests.blobtree.tape.evaluations import bounds_at
 from tests.blobtree.trees import points_around
 from tests.oracles.blobtree import value
 

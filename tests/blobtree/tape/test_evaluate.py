@@ -7,8 +7,9 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree import InvalidPoints, Point, Segment, Transform
-from blobtree.tape.model import bounds_along, bounds_at, colors_at, gradients_at, values_at
+from blobtree.tape.model import colors_at, gradients_at, values_at
 from blobtree.tape.program import postorder
+from tests.blobtree.tape.evaluations import bounds_along, bounds_at
 from tests.blobtree.tree_sets import BUILT_IN_TREES, EVERY_BATCH, FIRST_BATCHES, POINTS, Batch
 from tests.blobtree.trees import KINDS, points_around
 from tests.oracles import blobtree as oracle

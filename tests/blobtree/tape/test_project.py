@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from blobtree import ISO, Point, Segment
-from blobtree.tape.model import project
+from tests.blobtree.tape.evaluations import project
 from tests.blobtree.trees import points_around, random_trees
 
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from blobtree import Point
-from blobtree.tape.model import bounds_at, colors_at, gradients_at
+from blobtree.tape.model import colors_at, gradients_at
 from blobtree.tracing.trace import trace
 from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions
@@ -15,6 +15,7 @@ from decals.rendering.renderer import Renderer
 from decals.rendering.tree import Kinds, tracing_shader
 from decals.scenes.camera import Camera
 from tests.blobtree.custom_kinds import CUSTOM_TREES, EVERYTHING, Brick, Carve, Path, Ring, Soft
+from tests.blobtree.tape.evaluations import bounds_at
 from tests.blobtree.trees import points_around
 from tests.decals.glsl.functions import run_program
 from tests.decals.glsl.tapes import BOUND_AND_VALUE, COLOR, GRADIENT, MAIN, Model, assert_close, padded

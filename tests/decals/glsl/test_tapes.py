@@ -6,7 +6,7 @@ import pytest
 from blobtree import Box, Node, Point, Polyline, Segment, Superquadric, from_sdf
 from blobtree.formulas.blends import BLENDS
 from blobtree.tape.instruction_set import library
-from blobtree.tape.model import bounds_along, bounds_at, colors_at, gradients_at
+from blobtree.tape.model import colors_at, gradients_at
 from blobtree.tracing.trace import trace
 from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions
@@ -17,6 +17,7 @@ from tests.blobtree.nodes.test_blends import NODES as BLEND_NODES
 from tests.blobtree.nodes.test_deformations import STRONG
 from tests.blobtree.nodes.test_gradient_blends import CORE as GRADIENT_BLENDS
 from tests.blobtree.nodes.test_gradient_blends import LIBRARY as LIBRARY_GRADIENT_BLENDS
+from tests.blobtree.tape.evaluations import bounds_along, bounds_at
 from tests.blobtree.trees import (
     BLENDED,
     CONTACTS,
