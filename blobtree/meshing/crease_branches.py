@@ -190,8 +190,8 @@ def branch_combine(operator: wp.int32, a: Branch, b: Branch, parameter: wp.float
 @wp.func
 def branch_leaf(q: wp.vec3, r: wp.vec3, kind: wp.int32, tape: Texels, at: wp.int32) -> Branch:
     """Return the branch of a primitive, which is smooth."""
-    f = gradient_leaf(q, closest(kind, q, tape, at), wp.vec4(), wp.vec3(), 0.0, 0.0)
-    value = value_leaf(r, closest(kind, r, tape, at), wp.vec4(), wp.vec3(), 0.0, 0.0)
+    f = gradient_leaf(q, closest(kind, q, tape, at), wp.vec4(), wp.vec4(), 0.0)
+    value = value_leaf(r, closest(kind, r, tape, at), wp.vec4(), wp.vec4(), 0.0)
     return make_branch(value, 0, f)
 
 
@@ -205,9 +205,9 @@ def stretched_branch(q: wp.vec3, r: wp.vec3, kind: wp.int32, tape: Texels, at: w
         plain = branch_leaf(point, reference, kind, tape, at + PREFIX)
         return make_branch(plain[0], 0, gradient_pullback_affine(field_of(plain), tape, at))
     c = closest(kind, point, tape, at + PREFIX)
-    f = profiled_gradient_leaf(point, c, wp.vec4(), wp.vec3(), 0.0, 0.0, profile)
+    f = profiled_gradient_leaf(point, c, wp.vec4(), wp.vec4(), 0.0, profile)
     c = closest(kind, reference, tape, at + PREFIX)
-    value = profiled_value_leaf(reference, c, wp.vec4(), wp.vec3(), 0.0, 0.0, profile)
+    value = profiled_value_leaf(reference, c, wp.vec4(), wp.vec4(), 0.0, profile)
     return make_branch(value, 0, gradient_pullback_affine(f, tape, at))
 
 

@@ -133,49 +133,35 @@ def with_direction(bound: wp.vec3, bend: wp.float32, f: wp.vec4) -> Directed:
 
 
 @wp.func
-def directed_bound_leaf(
-    q: wp.vec3, c: wp.vec4, color: wp.vec4, direction: wp.vec3, reach: wp.float32, rate: wp.float32
-) -> Directed:
+def directed_bound_leaf(q: wp.vec3, c: wp.vec4, color: wp.vec4, ahead: wp.vec4, rate: wp.float32) -> Directed:
     """Return the bounds and the direction of a primitive.
 
     The gradient of g(d / s), d the distance from a convex skeleton, changes by 6 / s² per unit at most.
     """
     bend = float(UNBOUNDED)
+    direction = wp.vec3(ahead[0], ahead[1], ahead[2])
     if wp.dot(direction, direction) > 0.0:
         bend = STEEPEST_TURN * rate * rate
-    f = gradient_leaf(q, c, color, direction, reach, rate)
-    return with_direction(bound_leaf(q, c, color, direction, reach, rate), bend, f)
+    f = gradient_leaf(q, c, color, ahead, rate)
+    return with_direction(bound_leaf(q, c, color, ahead, rate), bend, f)
 
 
 @wp.func
 def directed_bound_direct(
-    kind: wp.int32,
-    q: wp.vec3,
-    tape: Texels,
-    at: wp.int32,
-    color: wp.vec4,
-    direction: wp.vec3,
-    reach: wp.float32,
-    speed: wp.float32,
+    kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32, color: wp.vec4, ahead: wp.vec4, speed: wp.float32
 ) -> Directed:
     """Return the bounds and the direction of a direct field."""
-    bound = bound_direct(kind, q, tape, at, color, direction, reach, speed)
+    bound = bound_direct(kind, q, tape, at, color, ahead, speed)
     return with_direction(bound, UNBOUNDED, direct_value_gradient(kind, q, tape, at))
 
 
 @wp.func
 def directed_profiled_bound_leaf(
-    q: wp.vec3,
-    c: wp.vec4,
-    color: wp.vec4,
-    direction: wp.vec3,
-    reach: wp.float32,
-    rate: wp.float32,
-    profile: wp.vec4,
+    q: wp.vec3, c: wp.vec4, color: wp.vec4, ahead: wp.vec4, rate: wp.float32, profile: wp.vec4
 ) -> Directed:
     """Return the bounds and the direction of a primitive with a profile."""
-    f = profiled_gradient_leaf(q, c, color, direction, reach, rate, profile)
-    bound = profiled_bound_leaf(q, c, color, direction, reach, rate, profile)
+    f = profiled_gradient_leaf(q, c, color, ahead, rate, profile)
+    bound = profiled_bound_leaf(q, c, color, ahead, rate, profile)
     return with_direction(bound, UNBOUNDED, f)
 
 
@@ -275,23 +261,14 @@ def painted(f: wp.vec4, x: wp.float32, y: wp.float32, z: wp.float32) -> Directed
 
 
 @wp.func
-def directed_color_leaf(
-    q: wp.vec3, c: wp.vec4, color: wp.vec4, direction: wp.vec3, reach: wp.float32, rate: wp.float32
-) -> Directed:
+def directed_color_leaf(q: wp.vec3, c: wp.vec4, color: wp.vec4, ahead: wp.vec4, rate: wp.float32) -> Directed:
     """Return the colour and the direction of a primitive."""
-    return painted(gradient_leaf(q, c, color, direction, reach, rate), color[0], color[1], color[2])
+    return painted(gradient_leaf(q, c, color, ahead, rate), color[0], color[1], color[2])
 
 
 @wp.func
 def directed_color_direct(
-    kind: wp.int32,
-    q: wp.vec3,
-    tape: Texels,
-    at: wp.int32,
-    color: wp.vec4,
-    direction: wp.vec3,
-    reach: wp.float32,
-    speed: wp.float32,
+    kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32, color: wp.vec4, ahead: wp.vec4, speed: wp.float32
 ) -> Directed:
     """Return the colour and the direction of a direct field."""
     return painted(direct_value_gradient(kind, q, tape, at), color[0], color[1], color[2])
@@ -299,16 +276,10 @@ def directed_color_direct(
 
 @wp.func
 def directed_profiled_color_leaf(
-    q: wp.vec3,
-    c: wp.vec4,
-    color: wp.vec4,
-    direction: wp.vec3,
-    reach: wp.float32,
-    rate: wp.float32,
-    profile: wp.vec4,
+    q: wp.vec3, c: wp.vec4, color: wp.vec4, ahead: wp.vec4, rate: wp.float32, profile: wp.vec4
 ) -> Directed:
     """Return the colour and the direction of a primitive with a profile."""
-    f = profiled_gradient_leaf(q, c, color, direction, reach, rate, profile)
+    f = profiled_gradient_leaf(q, c, color, ahead, rate, profile)
     return painted(f, color[0], color[1], color[2])
 
 

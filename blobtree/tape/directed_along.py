@@ -46,7 +46,7 @@ def changing(f: wp.vec4, d: wp.vec4) -> Directed:
 @wp.func
 def leaf_along(q: wp.vec3, velocity: wp.vec3, c: wp.vec4, drift: wp.vec4) -> Directed:
     """Return a primitive's field; its closest point and influence c change by `drift`."""
-    f, d = _leaf(q, velocity, c, drift, wp.vec4(), wp.vec3(), 0.0, 0.0)
+    f, d = _leaf(q, velocity, c, drift, wp.vec4(), wp.vec4(), 0.0)
     return changing(f, d)
 
 
@@ -55,7 +55,7 @@ def profiled_leaf_along(
     q: wp.vec3, velocity: wp.vec3, c: wp.vec4, drift: wp.vec4, profile: wp.vec4
 ) -> Directed:
     """Do the same for a primitive with a profile."""
-    f, d = _profiled_leaf(q, velocity, c, drift, wp.vec4(), wp.vec3(), 0.0, 0.0, profile)
+    f, d = _profiled_leaf(q, velocity, c, drift, wp.vec4(), wp.vec4(), 0.0, profile)
     return changing(f, d)
 
 

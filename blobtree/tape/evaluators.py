@@ -2,10 +2,10 @@
 
 Each evaluator is the set of functions over which the interpreter's loop is closed:
 
-* `leaf(q, c, color, direction, reach, rate)`: the contribution of a primitive at q. c is its closest point
-  and the influence there; `rate` bounds how fast |q − c| / influence changes;
-* `direct(kind, q, tape, at, color, direction, reach, speed)`: the contribution of a direct field at q, whose
-  parameters are at tape[at]; q moves at most at `speed`;
+* `leaf(q, c, color, ahead, rate)`: the contribution of a primitive at q. c is its closest point and the
+  influence there; `rate` bounds how fast |q − c| / influence changes;
+* `direct(kind, q, tape, at, color, ahead, speed)`: the contribution of a direct field at q, whose parameters
+  are at tape[at]; q moves at most at `speed`;
 * `profiled_leaf(..., profile)`: the same with a profile = (·, code of its falloff, k, weight);
 * `pullback_affine(f, tape, at)`: a result behind the map at tape[at], seen in front of it;
 * `pullback_warp(kind, f, q, tape, at)`: a subtree's result behind a warp and the map at tape[at], seen in
@@ -16,10 +16,10 @@ Each evaluator is the set of functions over which the interpreter's loop is clos
 * `paint(q, c, color, tape)`: the colour of a leaf at q, from its texel, for the three functions of leaves.
 
 Slopes are bounded along a ray (segment tracing: Galin, Guérin, Paris and Peytavie 2020): along q + u ·
-direction for u from 0 to `reach`, per unit of u. Behind an affine map the ray is still a line, along the
-mapped `direction`. Behind a warp the ray is bent, and for a skeleton that is not convex a line gives no
-bound. There `direction` is 0, and bounds follow from `speed` alone: a point moves at most that fast. With a
-direction of 0 from the start, bounds hold in all directions.
+direction for u from 0 to `reach`, per unit of u; `ahead` is (direction, reach). Behind an affine map the ray
+is still a line, along the mapped direction. Behind a warp the ray is bent, and for a skeleton that is not
+convex a line gives no bound. There the direction is 0, and bounds follow from `speed` alone: a point moves at
+most that fast. With a direction of 0 from the start, bounds hold in all directions.
 """
 
 from dataclasses import dataclass
@@ -197,23 +197,14 @@ def value_empty() -> wp.float32:
 
 
 @wp.func
-def value_leaf(
-    q: wp.vec3, c: wp.vec4, color: wp.vec4, direction: wp.vec3, reach: wp.float32, rate: wp.float32
-) -> wp.float32:
+def value_leaf(q: wp.vec3, c: wp.vec4, color: wp.vec4, ahead: wp.vec4, rate: wp.float32) -> wp.float32:
     """Return the field of one primitive."""
     return falloff(squared_distance(q, c))
 
 
 @wp.func
 def value_direct(
-    kind: wp.int32,
-    q: wp.vec3,
-    tape: Texels,
-    at: wp.int32,
-    color: wp.vec4,
-    direction: wp.vec3,
-    reach: wp.float32,
-    speed: wp.float32,
+    kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32, color: wp.vec4, ahead: wp.vec4, speed: wp.float32
 ) -> wp.float32:
     """Return the value of a direct field."""
     return direct_value_gradient(kind, q, tape, at)[0]
@@ -221,13 +212,7 @@ def value_direct(
 
 @wp.func
 def profiled_value_leaf(
-    q: wp.vec3,
-    c: wp.vec4,
-    color: wp.vec4,
-    direction: wp.vec3,
-    reach: wp.float32,
-    rate: wp.float32,
-    profile: wp.vec4,
+    q: wp.vec3, c: wp.vec4, color: wp.vec4, ahead: wp.vec4, rate: wp.float32, profile: wp.vec4
 ) -> wp.float32:
     """Return the field of one primitive with a profile."""
     return profile[3] * profile_value(wp.sqrt(squared_distance(q, c)), profile)
@@ -263,15 +248,15 @@ def bound_empty() -> wp.vec3:
 
 
 @wp.func
-def bound_leaf(
-    q: wp.vec3, c: wp.vec4, color: wp.vec4, direction: wp.vec3, reach: wp.float32, rate: wp.float32
-) -> wp.vec3:
+def bound_leaf(q: wp.vec3, c: wp.vec4, color: wp.vec4, ahead: wp.vec4, rate: wp.float32) -> wp.vec3:
     """Return (value at q, bound on the rise of the field ahead, bound on its fall) of one primitive.
 
     The distance d from a convex skeleton is a convex function along a line: nowhere ahead does it grow more
     slowly, or shrink faster, than at q. Where it shrinks, this bounds the rise of the field and the smallest
     distance ahead. Where it grows, the field falls, and the bound on its rise is not above 0.
     """
+    direction = wp.vec3(ahead[0], ahead[1], ahead[2])
+    reach = ahead[3]
     z = squared_distance(q, c)
     d = wp.sqrt(z)
     if wp.dot(direction, direction) == 0.0:
@@ -291,40 +276,31 @@ def bound_leaf(
 
 @wp.func
 def bound_direct(
-    kind: wp.int32,
-    q: wp.vec3,
-    tape: Texels,
-    at: wp.int32,
-    color: wp.vec4,
-    direction: wp.vec3,
-    reach: wp.float32,
-    speed: wp.float32,
+    kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32, color: wp.vec4, ahead: wp.vec4, speed: wp.float32
 ) -> wp.vec3:
     """Return (value at q, bound on the rise of a direct field ahead, bound on its fall).
 
     Both are its largest slope over the ball around the way ahead, or around all points within reach.
     """
+    direction = wp.vec3(ahead[0], ahead[1], ahead[2])
+    reach = ahead[3]
     value = direct_value_gradient(kind, q, tape, at)[0]
     rate = wp.length(direction)
     if rate > 0.0:
         middle = q + direction * (0.5 * reach)
-        ahead = direct_bounds(kind, middle, 0.5 * reach * rate * BALL_MARGIN, tape, at)[2] * rate
-        return wp.vec3(value, ahead, ahead)
+        along = direct_bounds(kind, middle, 0.5 * reach * rate * BALL_MARGIN, tape, at)[2] * rate
+        return wp.vec3(value, along, along)
     around = direct_bounds(kind, q, reach * speed, tape, at)[2] * speed
     return wp.vec3(value, around, around)
 
 
 @wp.func
 def profiled_bound_leaf(
-    q: wp.vec3,
-    c: wp.vec4,
-    color: wp.vec4,
-    direction: wp.vec3,
-    reach: wp.float32,
-    rate: wp.float32,
-    profile: wp.vec4,
+    q: wp.vec3, c: wp.vec4, color: wp.vec4, ahead: wp.vec4, rate: wp.float32, profile: wp.vec4
 ) -> wp.vec3:
     """Do the same as `bound_leaf` with a profile; a negative weight exchanges the bounds."""
+    direction = wp.vec3(ahead[0], ahead[1], ahead[2])
+    reach = ahead[3]
     u = wp.sqrt(squared_distance(q, c))
     weight = profile[3]
     value = weight * profile_value(u, profile)
@@ -394,9 +370,7 @@ def vector_empty() -> wp.vec4:
 
 
 @wp.func
-def gradient_leaf(
-    q: wp.vec3, c: wp.vec4, color: wp.vec4, direction: wp.vec3, reach: wp.float32, rate: wp.float32
-) -> wp.vec4:
+def gradient_leaf(q: wp.vec3, c: wp.vec4, color: wp.vec4, ahead: wp.vec4, rate: wp.float32) -> wp.vec4:
     """Return (value, ∇f) of one primitive."""
     z = squared_distance(q, c)
     g = (q - wp.vec3(c[0], c[1], c[2])) * (2.0 * falloff_derivative(z) / (c[3] * c[3]))
@@ -405,14 +379,7 @@ def gradient_leaf(
 
 @wp.func
 def gradient_direct(
-    kind: wp.int32,
-    q: wp.vec3,
-    tape: Texels,
-    at: wp.int32,
-    color: wp.vec4,
-    direction: wp.vec3,
-    reach: wp.float32,
-    speed: wp.float32,
+    kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32, color: wp.vec4, ahead: wp.vec4, speed: wp.float32
 ) -> wp.vec4:
     """Return (value, ∇f) of a direct field."""
     return direct_value_gradient(kind, q, tape, at)
@@ -420,13 +387,7 @@ def gradient_direct(
 
 @wp.func
 def profiled_gradient_leaf(
-    q: wp.vec3,
-    c: wp.vec4,
-    color: wp.vec4,
-    direction: wp.vec3,
-    reach: wp.float32,
-    rate: wp.float32,
-    profile: wp.vec4,
+    q: wp.vec3, c: wp.vec4, color: wp.vec4, ahead: wp.vec4, rate: wp.float32, profile: wp.vec4
 ) -> wp.vec4:
     """Return (value, ∇f) of one primitive with a profile; on the skeleton the gradient is 0."""
     u = wp.sqrt(squared_distance(q, c))
@@ -466,23 +427,14 @@ def gradient_combine(
 
 
 @wp.func
-def color_leaf(
-    q: wp.vec3, c: wp.vec4, color: wp.vec4, direction: wp.vec3, reach: wp.float32, rate: wp.float32
-) -> wp.vec4:
+def color_leaf(q: wp.vec3, c: wp.vec4, color: wp.vec4, ahead: wp.vec4, rate: wp.float32) -> wp.vec4:
     """Return (value, red, green, blue) of one primitive."""
     return wp.vec4(falloff(squared_distance(q, c)), color[0], color[1], color[2])
 
 
 @wp.func
 def color_direct(
-    kind: wp.int32,
-    q: wp.vec3,
-    tape: Texels,
-    at: wp.int32,
-    color: wp.vec4,
-    direction: wp.vec3,
-    reach: wp.float32,
-    speed: wp.float32,
+    kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32, color: wp.vec4, ahead: wp.vec4, speed: wp.float32
 ) -> wp.vec4:
     """Return (value, red, green, blue) of a direct field."""
     return wp.vec4(direct_value_gradient(kind, q, tape, at)[0], color[0], color[1], color[2])
@@ -490,13 +442,7 @@ def color_direct(
 
 @wp.func
 def profiled_color_leaf(
-    q: wp.vec3,
-    c: wp.vec4,
-    color: wp.vec4,
-    direction: wp.vec3,
-    reach: wp.float32,
-    rate: wp.float32,
-    profile: wp.vec4,
+    q: wp.vec3, c: wp.vec4, color: wp.vec4, ahead: wp.vec4, rate: wp.float32, profile: wp.vec4
 ) -> wp.vec4:
     """Return (value, red, green, blue) of one primitive with a profile."""
     value = profile[3] * profile_value(wp.sqrt(squared_distance(q, c)), profile)

@@ -76,13 +76,14 @@ def make_interpreter(evaluator: Evaluator) -> wp.Function:
         v = direction
         if not is_convex(code):
             v = wp.vec3()
+        ahead = wp.vec4(v[0], v[1], v[2], reach)
         texels = stride(code)
         at = first
         for _i in range(int(header[2])):
             c = closest(code, point, tape, at)
             rate = speed / min_influence(code, tape, at)
             at += texels
-            f = leaf(point, c, paint(point, c, tape[at - 1], tape), v, reach, rate)
+            f = leaf(point, c, paint(point, c, tape[at - 1], tape), ahead, rate)
             accumulator = combine(operator, accumulator, f, reach, header[3], tape)
         return accumulator
 
@@ -107,6 +108,7 @@ def make_interpreter(evaluator: Evaluator) -> wp.Function:
             v = direction_to_local(direction, tape, at)
             if not is_convex(kind):
                 v = wp.vec3()
+            ahead = wp.vec4(v[0], v[1], v[2], reach)
             c = closest(kind, local, tape, at + PREFIX)
             profile = tape[at + 3]
             rate = speed * profile[0] / min_influence(kind, tape, at + PREFIX)
@@ -114,9 +116,9 @@ def make_interpreter(evaluator: Evaluator) -> wp.Function:
             color = paint(local, c, tape[end - 1], tape)
             f = empty()
             if profile[2] == 0.0:
-                f = leaf(local, c, color, v, reach, rate)
+                f = leaf(local, c, color, ahead, rate)
             else:
-                f = profiled_leaf(local, c, color, v, reach, rate, profile)
+                f = profiled_leaf(local, c, color, ahead, rate, profile)
             accumulator = combine(operator, accumulator, pullback_affine(f, tape, at), reach, header[3], tape)
             at = end
         return accumulator
@@ -140,9 +142,10 @@ def make_interpreter(evaluator: Evaluator) -> wp.Function:
         for _i in range(int(header[2])):
             local = to_local(point, tape, at)
             v = direction_to_local(direction, tape, at)
+            ahead = wp.vec4(v[0], v[1], v[2], reach)
             end = at + PREFIX + direct_stride(kind)
             color = paint(local, wp.vec4(local[0], local[1], local[2], 1.0), tape[end - 1], tape)
-            f = direct(kind, local, tape, at + PREFIX, color, v, reach, speed * tape[at + 3][0])
+            f = direct(kind, local, tape, at + PREFIX, color, ahead, speed * tape[at + 3][0])
             accumulator = combine(operator, accumulator, pullback_affine(f, tape, at), reach, header[3], tape)
             at = end
         return accumulator

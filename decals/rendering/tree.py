@@ -432,7 +432,7 @@ case {code}:
         vec4 c = {closest}(point, tape, at);
         float rate = speed / {min_influence}(tape, at);
         at += {stride};
-        FIELD field = LEAF(point, c, PRIMITIVE_COLOR, {direction}, reach, rate);
+        FIELD field = LEAF(point, c, PRIMITIVE_COLOR, vec4({direction}, reach), rate);
         accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
     }}
     break;
@@ -454,11 +454,11 @@ case {code}:
     break;
 """
 
-_MAPPED_FIELD = "LEAF(local, c, PRIMITIVE_COLOR, {mapped}, reach, rate)"
+_MAPPED_FIELD = "LEAF(local, c, PRIMITIVE_COLOR, vec4({mapped}, reach), rate)"
 
 _PROFILED_FIELD = (
     f"profile.z == 0.0 ? {_MAPPED_FIELD}"
-    " : PROFILED_LEAF(local, c, PRIMITIVE_COLOR, {mapped}, reach, rate, profile)"
+    " : PROFILED_LEAF(local, c, PRIMITIVE_COLOR, vec4({mapped}, reach), rate, profile)"
 )
 
 
@@ -471,7 +471,7 @@ case {code}:
         float local_speed = speed * tape_texel(tape, map + {prefix} - 1).x;
         at += {stride};
         FIELD field = DIRECT(
-            {kind}, local, tape, map + {prefix}, PRIMITIVE_COLOR, along, reach, local_speed);
+            {kind}, local, tape, map + {prefix}, PRIMITIVE_COLOR, vec4(along, reach), local_speed);
         field = PULLBACK_AFFINE(field, tape, map);
         accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
     }}

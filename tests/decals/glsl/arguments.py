@@ -87,7 +87,7 @@ BY_NAME: dict[str, Draw] = {
     "c": ball, "cells_per_unit": among(0.25, 0.5, 1, 2, 4, 8),
     "center": place, "chord": share, "color": uniform(0, 1, 4), "complement": uniform(0.0, 0.5),
     "contact": whole(0, 4),
-    "decal": whole(0, DECALS),
+    "ahead": beside(units_or_none, powers(-3, 0.5)), "decal": whole(0, DECALS),
     "limit": whole(-1, DECALS),
     "direction": units, "distance": uniform(0.0, 1.5), "g": place, "kind": whole(0, len(WARPS)),
     "p": uniform(-1.5, 1.5, 4), "rate": uniform(0.1, 3.0), "min_influence": uniform(0.3, 2.5),
@@ -118,8 +118,6 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
     **{
         f"profile_{name}": {"u": uniform(0.0, 1.5)} for name in ("distance", "value", "slope", "steepest")
     },
-    "bound_leaf": {"direction": units_or_none},
-    "profiled_bound_leaf": {"direction": units_or_none},
     "unroll_step": {"step": place},
     "bound_pullback_affine": {"f": uniform(0, 3, 3)},
     "gradient_pullback_affine": {"f": four},
