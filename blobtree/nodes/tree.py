@@ -43,29 +43,19 @@ from blobtree.nodes.values import (
 )
 from blobtree.progress import Cancel, Progress
 from blobtree.pyvista_views import LEVELS, SLICE_RESOLUTION, slice_tree, to_polydata
-from blobtree.tape.attributes import (
-    attribute_names,
-    attribute_values,
-    labels_at,
-    numbers_at,
-    rest_coordinates_at,
-    rest_tape,
-)
-from blobtree.tape.model import ImplicitModel
+from blobtree.tape.attributes import attribute_at, attribute_names, rest_coordinates_at, rest_tape
+from blobtree.tape.model import ImplicitModel, one_or_rows
 from blobtree.tape.poses import has_warps, invert_map, maps_to_rest
 from blobtree.tape.program import Placement
 from blobtree.tape.tape import Tape
 from blobtree.tracing.trace import Hits, raycast
 from blobtree.validation import (
-    LARGEST_NUMBER,
-    LIMIT,
     Matrix,
     affine_matrix,
     finite_number,
     finite_vector,
     point_array,
     points_or_point,
-    real,
     shown,
     texts,
     truth,
@@ -489,61 +479,6 @@ class Node(ImplicitModel):
             )
         return vertices.min(axis=0), vertices.max(axis=0)
 
-    def __call__(self, points: ArrayLike) -> Float32Array:
-        """Return the field values at points.
-
-        Parameters
-        ----------
-        points : array-like (n, 3) or (3,)
-            Points in the world, or one point, in model units.
-
-        Returns
-        -------
-        numpy.ndarray
-            float32[n], or one number at one point: 0 outside every influence, 0.5 on the surface, more
-            inside.
-
-        Raises
-        ------
-        InvalidPoints
-            The points are not n rows of three finite numbers.
-
-        Examples
-        --------
-        >>> from blobtree import Point
-        >>> Point((0, 0, 0), radius=1.0)([[0, 0, 0], [1, 0, 0]]).round(3).tolist()
-        [1.0, 0.5]
-        >>> float(Point((0, 0, 0), radius=1.0)([0, 0, 0]))
-        1.0
-        """
-        return super().__call__(points)
-
-    def gradient(self, points: ArrayLike) -> Float32Array:
-        """Return the exact gradients of the field at points.
-
-        Parameters
-        ----------
-        points : array-like (n, 3) or (3,)
-            Points in the world, or one point, in model units.
-
-        Returns
-        -------
-        numpy.ndarray
-            float32[n, 3], or float32[3] at one point, per model unit; they point into the model.
-
-        Raises
-        ------
-        InvalidPoints
-            The points are not n rows of three finite numbers.
-
-        Examples
-        --------
-        >>> from blobtree import Point
-        >>> bool(Point((0, 0, 0), radius=1.0).gradient([[1, 0, 0]])[0, 0] < 0)
-        True
-        """
-        return super().gradient(points)
-
     def hessian(self, points: ArrayLike) -> Float32Array:
         """Return the exact second derivatives of the field at points.
 
@@ -569,9 +504,7 @@ class Node(ImplicitModel):
         >>> Point((0, 0, 0), radius=1.0).hessian([0, 0, 0]).diagonal().astype(float).round(3).tolist()
         [-1.238, -1.238, -1.238]
         """
-        array, single = points_or_point(points)
-        _, hessians = hessians_at(self.tape, array)
-        return hessians[0] if single else hessians
+        return one_or_rows(points, lambda rows: hessians_at(self.tape, rows)[1])
 
     def curvatures(self, points: ArrayLike) -> Curvatures:
         """Return mean, Gauss and principal curvatures at points of the surface.
@@ -637,32 +570,6 @@ class Node(ImplicitModel):
         """
         return parameter_gradient_of(self, point_array(points), parameters)
 
-    def colors(self, points: ArrayLike) -> Float32Array:
-        """Return the blended colours at points.
-
-        Parameters
-        ----------
-        points : array-like (n, 3) or (3,)
-            Points in the world, or one point, in model units.
-
-        Returns
-        -------
-        numpy.ndarray
-            float32[n, 3], or float32[3] at one point: red, green and blue, black outside every influence.
-
-        Raises
-        ------
-        InvalidPoints
-            The points are not n rows of three finite numbers.
-
-        Examples
-        --------
-        >>> from blobtree import Point
-        >>> Point((0, 0, 0), radius=1.0, color=(1, 0, 0)).colors([[0, 0, 0]]).tolist()
-        [[1.0, 0.0, 0.0]]
-        """
-        return super().colors(points)
-
     @property
     def attribute_names(self) -> list[str]:
         """Names of the attributes of all leaves, sorted."""
@@ -708,19 +615,7 @@ class Node(ImplicitModel):
         """
         if not isinstance(name, str):
             raise InvalidNode(f"name: expected the name of an attribute, got {shown(name)}")
-        values = attribute_values(self._program, name)
-        array, single = points_or_point(points)
-        given = next(value for value in values if value is not None)
-        rows: NDArray[Any]
-        if isinstance(given, str):
-            if default is not None and not isinstance(default, str):
-                raise InvalidNode(f"default: expected a label for {name!r}, got {default!r}")
-            rows = labels_at(self.tape, self._program, values, array, default or "")
-        else:
-            size = len(given) if isinstance(given, tuple) else 1
-            base = np.broadcast_to(_numbers(default, size), size)
-            rows = numbers_at(self.tape, self._program, values, array, base)
-        return rows[0] if single else rows
+        return one_or_rows(points, lambda rows: attribute_at(self.tape, self._program, name, rows, default))
 
     @Lazy
     def _rest_tape(self) -> Tape:
@@ -1267,17 +1162,6 @@ def _checks(kind: type[Node]) -> list[tuple[str, Callable[[Any], Any], Any]]:
 def _passes(default: Any, check: Callable[[Any], Any]) -> bool:
     """Return True if a check returns a default as it is."""
     return default is not MISSING and repr(check(default)) == repr(default)
-
-
-def _numbers(default: Any, size: int) -> NDArray[np.float64]:
-    """Return the default of an attribute as one number or `size` numbers."""
-    try:
-        numbers = np.asarray(real(0.0 if default is None else default), np.float64)
-    except (TypeError, ValueError, OverflowError):
-        numbers = np.empty((0, 0))
-    if numbers.shape not in ((), (size,)) or not (np.abs(numbers) <= LARGEST_NUMBER).all():
-        raise InvalidNode(f"default: expected a number, or {size} of them, got {default!r}; {LIMIT}")
-    return numbers
 
 
 def _bound(kind: type[Node], arguments: tuple[Any, ...], named: dict[str, Any]) -> dict[str, Any]:

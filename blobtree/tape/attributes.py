@@ -6,6 +6,7 @@ of colours blends them. For rest coordinates, they hold indices of maps to the p
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +19,7 @@ from blobtree.tape.model import colors_at, evaluate
 from blobtree.tape.program import Instruction, Run, distinct_placements
 from blobtree.tape.rest_kernels import evaluate_rest_coordinates
 from blobtree.tape.tape import Tape
+from blobtree.validation import LARGEST_NUMBER, LIMIT, real
 
 CHANNELS = 3
 """Numbers that a texel of colour holds."""
@@ -25,14 +27,44 @@ CHANNELS = 3
 AttributeValues = Sequence[float | tuple[float, ...] | str | None]
 
 
-def attribute_values(program: list[Instruction], name: str) -> list[float | tuple[float, ...] | str | None]:
-    """Return the value of an attribute for each leaf of a program, None for leaves without it.
+def attribute_names(program: list[Instruction]) -> list[str]:
+    """Return the names of all attributes of the leaves of a program, sorted."""
+    return sorted({name for own in _attributes(program) for name in own})
+
+
+def attribute_at(
+    tape: Tape,
+    program: list[Instruction],
+    name: str,
+    points: Float32Array,
+    default: float | ArrayLike | str | None,
+) -> NDArray[Any]:
+    """Return an attribute at `points` (n, 3): blended numbers (n,) or vectors (n, k), or labels (n,).
+
+    `default` is the value of leaves that have none, and outside all influences.
 
     Raises
     ------
     InvalidNode
-        No leaf has the attribute, or its values differ in type or length.
+        No leaf has the attribute, its values differ in type or length, or the default has another type.
     """
+    values = _values(program, name)
+    given = next(value for value in values if value is not None)
+    if isinstance(given, str):
+        if default is not None and not isinstance(default, str):
+            raise InvalidNode(f"default: expected a label for {name!r}, got {default!r}")
+        return _labels_at(tape, program, values, points, default or "")
+    size = len(given) if isinstance(given, tuple) else 1
+    base = np.broadcast_to(_numbers(default, size), size)
+    channels = np.zeros((len(values), CHANNELS))
+    for row, value in zip(channels, values, strict=True):
+        row[:size] = 0.0 if value is None else np.subtract(value, base)
+    blended = colors_at(_with_channels(tape, program, channels), points)[:, :size] + base.astype(np.float32)
+    return blended if isinstance(given, tuple) else blended[:, 0]
+
+
+def _values(program: list[Instruction], name: str) -> AttributeValues:
+    """Return the value of an attribute for each leaf of a program, None for leaves without it."""
     values = [own.get(name) for own in _attributes(program)]
     sizes = {_type_name(value) for value in values if value is not None}
     if not sizes:
@@ -46,27 +78,18 @@ def attribute_values(program: list[Instruction], name: str) -> list[float | tupl
     return values
 
 
-def attribute_names(program: list[Instruction]) -> list[str]:
-    """Return the names of all attributes of the leaves of a program, sorted."""
-    return sorted({name for own in _attributes(program) for name in own})
+def _numbers(default: Any, size: int) -> NDArray[np.float64]:
+    """Return the default of an attribute as one number or `size` numbers."""
+    try:
+        numbers = np.asarray(real(0.0 if default is None else default), np.float64)
+    except (TypeError, ValueError, OverflowError):
+        numbers = np.empty((0, 0))
+    if numbers.shape not in ((), (size,)) or not (np.abs(numbers) <= LARGEST_NUMBER).all():
+        raise InvalidNode(f"default: expected a number, or {size} of them, got {default!r}; {LIMIT}")
+    return numbers
 
 
-def numbers_at(
-    tape: Tape, program: list[Instruction], values: AttributeValues, points: ArrayLike, default: ArrayLike
-) -> Float32Array:
-    """Return blended numbers (n,) or vectors (n, k) at `points` (n, 3); `default` outside all influences."""
-    given = next(value for value in values if value is not None)
-    size = len(given) if isinstance(given, tuple) else 1
-    base = np.broadcast_to(np.asarray(default, np.float64), size)
-    channels = np.zeros((len(values), CHANNELS))
-    for row, value in zip(channels, values, strict=True):
-        row[:size] = 0.0 if value is None else np.subtract(value, base)
-    blended = colors_at(_with_channels(tape, program, channels), points)[:, :size] + base.astype(np.float32)
-    result: Float32Array = blended if isinstance(given, tuple) else blended[:, 0]
-    return result
-
-
-def labels_at(
+def _labels_at(
     tape: Tape, program: list[Instruction], values: AttributeValues, points: ArrayLike, default: str
 ) -> NDArray[np.str_]:
     """Return the label (n,) with the largest weight at `points` (n, 3); `default` outside all influences."""

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import warp as wp
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array
 from blobtree.errors import InvalidNode
@@ -39,22 +39,88 @@ class ImplicitModel(ProgramNode):
         return support_box(self._program)
 
     def __call__(self, points: ArrayLike) -> Float32Array:
-        """Return the field values (n,) at `points` (n, 3), or one value at one point (3,)."""
-        return _one_or_rows(points, lambda rows: values_at(self.tape, rows))
+        """Return the field values at points.
+
+        Parameters
+        ----------
+        points : array-like (n, 3) or (3,)
+            Points in the world, or one point, in model units.
+
+        Returns
+        -------
+        numpy.ndarray
+            float32[n], or one number at one point: 0 outside every influence, 0.5 on the surface, more
+            inside.
+
+        Raises
+        ------
+        InvalidPoints
+            The points are not n rows of three finite numbers.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> Point((0, 0, 0), radius=1.0)([[0, 0, 0], [1, 0, 0]]).round(3).tolist()
+        [1.0, 0.5]
+        >>> float(Point((0, 0, 0), radius=1.0)([0, 0, 0]))
+        1.0
+        """
+        return one_or_rows(points, lambda rows: values_at(self.tape, rows))
 
     def gradient(self, points: ArrayLike) -> Float32Array:
-        """Return the exact field gradients (n, 3) at `points` (n, 3), or one at one point (3,)."""
-        return _one_or_rows(points, lambda rows: gradients_at(self.tape, rows)[:, 1:])
+        """Return the exact gradients of the field at points.
+
+        Parameters
+        ----------
+        points : array-like (n, 3) or (3,)
+            Points in the world, or one point, in model units.
+
+        Returns
+        -------
+        numpy.ndarray
+            float32[n, 3], or float32[3] at one point, per model unit; they point into the model.
+
+        Raises
+        ------
+        InvalidPoints
+            The points are not n rows of three finite numbers.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> bool(Point((0, 0, 0), radius=1.0).gradient([[1, 0, 0]])[0, 0] < 0)
+        True
+        """
+        return one_or_rows(points, lambda rows: gradients_at(self.tape, rows)[:, 1:])
 
     def colors(self, points: ArrayLike) -> Float32Array:
-        """Return the blended colours (n, 3) at `points` (n, 3), or one at one point (3,).
+        """Return the blended colours at points.
 
-        It is black outside every primitive's influence.
+        Parameters
+        ----------
+        points : array-like (n, 3) or (3,)
+            Points in the world, or one point, in model units.
+
+        Returns
+        -------
+        numpy.ndarray
+            float32[n, 3], or float32[3] at one point: red, green and blue, black outside every influence.
+
+        Raises
+        ------
+        InvalidPoints
+            The points are not n rows of three finite numbers.
+
+        Examples
+        --------
+        >>> from blobtree import Point
+        >>> Point((0, 0, 0), radius=1.0, color=(1, 0, 0)).colors([[0, 0, 0]]).tolist()
+        [[1.0, 0.0, 0.0]]
         """
-        return _one_or_rows(points, lambda rows: colors_at(self.tape, rows))
+        return one_or_rows(points, lambda rows: colors_at(self.tape, rows))
 
 
-def _one_or_rows(points: ArrayLike, evaluate: Callable[[ArrayLike], Float32Array]) -> Float32Array:
+def one_or_rows(points: ArrayLike, evaluate: Callable[[Float32Array], NDArray[Any]]) -> NDArray[Any]:
     """Return a function's rows at points (n, 3), or its only row at one point (3,)."""
     array, single = points_or_point(points)
     rows = evaluate(array)
