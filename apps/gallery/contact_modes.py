@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from decals import Contact, Decals, Scene
-from decals.apps.gallery.helpers import Panel, camera_above, checker_image, main, plane
+from decals import Contact, Scene
+from decals.apps.gallery.helpers import Panel, camera_above, checker_image, flat_decals, main, plane
 
 
 def panels() -> Sequence[Panel]:
@@ -22,14 +22,7 @@ def cluster(radius: float) -> Scene:
     """Make seven equal decals, six of them around the first."""
     angles = np.arange(6) * np.pi / 3 + 0.2
     around = 0.56 * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
-    positions = np.concatenate([np.zeros((1, 3)), around]).astype(np.float32)
-    count = len(positions)
-    decals = Decals(
-        positions=positions,
-        normals=np.tile(np.array([0, 0, 1], np.float32), (count, 1)),
-        tangents=np.tile(np.array([1, 0, 0], np.float32), (count, 1)),
-        radii=np.full(count, radius, np.float32),
-    )
+    decals = flat_decals(np.concatenate([np.zeros((1, 3)), around]), radius)
     return Scene(objects=(plane(),), camera=camera_above(), images=(checker_image(6),), decals=decals)
 
 

@@ -21,7 +21,8 @@ from decals import (
     TreeObject,
     scatter,
 )
-from decals.apps.gallery.helpers import Panel, camera_at, main, sample, sample_camera
+from decals.apps.gallery.helpers import Panel, camera_at, main, sample_camera
+from decals.apps.models.samples import sample
 
 COUNT = 2000
 UP = (0.0, 1.0, 0.0)

@@ -11,31 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from decals import Camera, DecalImage, Decals, ImageMapping, MeshObject, Scene
 from decals.apps.gallery import SIDE
 from decals.apps.models.samples import axes_of, sample
-from decals.apps.models.shapes import rounded_box
 from decals.apps.views import frame, parse_view
 from decals.field.law import AnyContact
 from decals.rendering import Environment, Picture, Renderer
 from decals.rendering.options import RenderOptions
 from decals.scenes.pose import PosedScene
-
-__all__ = [
-    "CLAY",
-    "Panel",
-    "bumps",
-    "camera_above",
-    "camera_at",
-    "checker_image",
-    "cube",
-    "draw",
-    "main",
-    "plane",
-    "plate",
-    "ring_image",
-    "rounded_box",
-    "sample",
-    "sample_camera",
-    "single_decal",
-]
 
 Vector = tuple[float, float, float]
 MeshArrays = tuple[NDArray[np.float32], NDArray[np.int32]]
@@ -120,6 +100,17 @@ def sample_camera(name: str) -> Camera:
     return frame([sample(name)], parse_view(None, axes_of(name)), (1, 1))
 
 
+def flat_decals(positions: ArrayLike, radius: ArrayLike, *, tangent: ArrayLike = (1.0, 0.0, 0.0)) -> Decals:
+    """Return decals whose normals are the z axis; one radius stands for all."""
+    count = len(np.asarray(positions))
+    return Decals(
+        positions=np.asarray(positions, np.float32),
+        normals=np.tile(np.array([0, 0, 1], np.float32), (count, 1)),
+        tangents=np.tile(np.array(tangent, np.float32), (count, 1)),
+        radii=np.full(count, radius, np.float32),
+    )
+
+
 def single_decal(
     position: ArrayLike,
     normal: ArrayLike,
@@ -177,13 +168,12 @@ def cube(half: float = 0.8) -> MeshArrays:
         for side in (-1.0, 1.0):
             u, v = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
             normal = side * np.eye(3)[axis]
-            turn = side
             faces += [[len(vertices) + i for i in face] for face in ((0, 1, 2), (0, 2, 3))]
             vertices += [
-                normal - turn * u - v,
-                normal + turn * u - v,
-                normal + turn * u + v,
-                normal - turn * u + v,
+                normal - side * u - v,
+                normal + side * u - v,
+                normal + side * u + v,
+                normal - side * u + v,
             ]
     return (half * np.array(vertices)).astype(np.float32), np.array(faces, np.int32)
 

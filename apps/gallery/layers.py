@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from decals import NO_IMAGE, DecalImage, Decals, Interaction, Scene
-from decals.apps.gallery.helpers import Panel, camera_above, main, plane
+from decals.apps.gallery.helpers import Panel, camera_above, flat_decals, main, plane
 
 
 def panels() -> Sequence[Panel]:
@@ -41,13 +41,8 @@ def _lattice(side: int, step: float, *, angle: float) -> Decals:
     """Return decals on a square lattice, their images turned by an angle."""
     coordinates = (np.arange(side) - (side - 1) / 2) * step
     x, y = (part.reshape(-1) for part in np.meshgrid(coordinates, coordinates, indexing="xy"))
-    count = side * side
-    return Decals(
-        positions=np.column_stack([x, y, np.zeros(count)]).astype(np.float32),
-        normals=np.tile(np.array([0, 0, 1], np.float32), (count, 1)),
-        tangents=np.tile(np.array([np.cos(angle), np.sin(angle), 0], np.float32), (count, 1)),
-        radii=np.full(count, 0.72 * step, np.float32),
-    )
+    positions = np.column_stack([x, y, np.zeros(side * side)])
+    return flat_decals(positions, 0.72 * step, tangent=(np.cos(angle), np.sin(angle), 0))
 
 
 if __name__ == "__main__":

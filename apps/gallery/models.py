@@ -8,7 +8,8 @@ horse. With ``--side 2160`` the panels have the height of a 4k picture.
 from collections.abc import Sequence
 
 from decals import Contact, DecalImage, Scene, scatter
-from decals.apps.gallery.helpers import Panel, camera_at, main, sample, sample_camera
+from decals.apps.gallery.helpers import Panel, camera_at, main, sample_camera
+from decals.apps.models.samples import sample
 from decals.images import generate_image
 
 COVERS = {

@@ -14,7 +14,16 @@ from numpy.typing import NDArray
 from blobtree import RIM
 from decals import NO_IMAGE, Contact, Decals, Interaction, MeshObject, Scene, TreeObject, evaluate
 from decals.apps.gallery.field import BLUE, line
-from decals.apps.gallery.helpers import CLAY, Panel, camera_above, camera_at, main, plane, ring_image
+from decals.apps.gallery.helpers import (
+    CLAY,
+    Panel,
+    camera_above,
+    camera_at,
+    flat_decals,
+    main,
+    plane,
+    ring_image,
+)
 
 INFLUENCE = 0.6
 DISTANCES = (1.3, 1.05, 0.72, 0.4)
@@ -34,25 +43,14 @@ def panels() -> Sequence[Panel]:
 
 def _situation(distance: float) -> Scene:
     """Return two decals over the balls of their fields."""
-    up = (0, 0, 1)
     centers = [(-distance / 2, 0, 0), (distance / 2, 0, 0)]
-    balls = Decals(
-        positions=centers,
-        normals=[up] * 2,
-        tangents=[(1, 0, 0)] * 2,
-        radii=[INFLUENCE] * 2,
+    balls = flat_decals(centers, INFLUENCE).replace(
         images=[NO_IMAGE] * 2,
         tints=[BLUE] * 2,
         opacities=[0.45] * 2,
         interactions=[Interaction.INDEPENDENT] * 2,
     )
-    images = Decals(
-        positions=centers,
-        normals=[up] * 2,
-        tangents=[(1, 0, 0)] * 2,
-        radii=[RIM * INFLUENCE] * 2,
-        layers=[1] * 2,
-    )
+    images = flat_decals(centers, RIM * INFLUENCE).replace(layers=[1] * 2)
     return Scene(
         objects=(plane(1.4),),
         camera=camera_above(5.2),
@@ -68,12 +66,7 @@ def contact_field(first: NDArray[np.float64], second: NDArray[np.float64]) -> ND
     points = _SPACING * np.column_stack([np.arange(count) % side, np.arange(count) // side, np.zeros(count)])
     away = [np.sqrt(1.0 - np.cbrt(f.reshape(-1))) for f in (first, second)]
     steps = [np.outer(distance, (sign, 0.0, 0.0)) for distance, sign in zip(away, (1.0, -1.0), strict=True)]
-    decals = Decals(
-        positions=np.concatenate([points + step for step in steps]),
-        normals=np.tile((0.0, 0.0, 1.0), (2 * count, 1)),
-        tangents=np.tile((1.0, 0.0, 0.0), (2 * count, 1)),
-        radii=np.full(2 * count, RIM),
-    )
+    decals = flat_decals(np.concatenate([points + step for step in steps]), RIM)
     normals = np.tile((0.0, 0.0, 1.0), (count, 1))
     return evaluate(decals, points, normals, contact=Contact.PRODUCT).field.reshape(first.shape)
 

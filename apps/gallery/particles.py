@@ -8,7 +8,8 @@ their positions.
 from collections.abc import Sequence
 
 from decals import Contact, DecalImage, Scene, scatter
-from decals.apps.gallery.helpers import Panel, main, ring_image, sample, sample_camera
+from decals.apps.gallery.helpers import Panel, main, ring_image, sample_camera
+from decals.apps.models.samples import sample
 
 COUNT = 1000
 

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from decals import Contact, Decals, Scene
-from decals.apps.gallery.helpers import Panel, camera_above, checker_image, main, plane
+from decals import Contact, Scene
+from decals.apps.gallery.helpers import Panel, camera_above, checker_image, flat_decals, main, plane
 
 
 def panels() -> Sequence[Panel]:
@@ -18,14 +18,8 @@ def panels() -> Sequence[Panel]:
     around = (
         np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1) * (0.45 + 0.04 * np.arange(9))[:, None]
     )
-    positions = np.concatenate([np.zeros((1, 3)), around]).astype(np.float32)
-    count = len(positions)
-    decals = Decals(
-        positions=positions,
-        normals=np.tile(np.array([0, 0, 1], np.float32), (count, 1)),
-        tangents=np.tile(np.array([1, 0, 0], np.float32), (count, 1)),
-        radii=np.array([0.85, *(0.10 + 0.012 * np.arange(9))], np.float32),
-    )
+    radii = [0.85, *(0.10 + 0.012 * np.arange(9))]
+    decals = flat_decals(np.concatenate([np.zeros((1, 3)), around]), radii)
     scene = Scene(objects=(plane(),), camera=camera_above(), images=(checker_image(10),), decals=decals)
     return [Panel(scene, contact=mode) for mode in Contact]
 

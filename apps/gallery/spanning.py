@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 from blobtree import Point, Ricci
 from decals import DecalImage, MeshObject, Scene, TreeObject
-from decals.apps.gallery.helpers import Panel, camera_at, main, rounded_box, single_decal
+from decals.apps.gallery.helpers import Panel, camera_at, main, single_decal
+from decals.apps.models.shapes import rounded_box
 
 SAND, BLUE = (0.80, 0.73, 0.62), (0.42, 0.58, 0.72)
 
