@@ -1,7 +1,6 @@
 """``implicit-decals animate``: a turntable, or a scene in a sequence of poses, as pictures or as a video."""
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -22,11 +21,10 @@ from decals.apps.commands.options import (
     check_count,
     parse_size,
 )
-from decals.apps.commands.progress_bars import PREPARING, progress_bars
+from decals.apps.commands.progress_bars import preparing
 from decals.apps.commands.scatter_options import ScatterOptions
 from decals.apps.models.loading import (
     call_imported,
-    import_definitions,
     import_module_or_file,
     load_models,
 )
@@ -119,10 +117,7 @@ def animate(
         check_count("--frames", frames, 1, MAX_FRAMES)
     count = frames or (len(meshes) if meshes else DEFAULT_FRAMES)
     check_animation(output, VIDEO_SUFFIXES)
-    import_definitions(define)
-    with ExitStack() as stack:
-        progress = stack.enter_context(progress_bars())
-        progress(PREPARING, 0.0)
+    with preparing(define) as progress:
         function = _pose_function(poses) if poses is not None else None
         loaded = load_models(model, trust=trust)
         if isinstance(loaded, Scene):

@@ -19,8 +19,8 @@ from decals.apps.commands.options import (
     check_count,
     given,
 )
-from decals.apps.commands.progress_bars import PREPARING, progress_bars
-from decals.apps.models.loading import import_definitions, load_model
+from decals.apps.commands.progress_bars import preparing
+from decals.apps.models.loading import load_model
 from decals.apps.output import check_output, print_path
 
 
@@ -68,9 +68,7 @@ def bake(
     """
     check_output(output, (".glb",))
     check_count("--samples", samples, 1, MAX_SAMPLES)
-    import_definitions(define)
-    with progress_bars() as progress:
-        progress(PREPARING, 0.0)
+    with preparing(define) as progress:
         loaded = load_model(scene, trust=trust, crease_angle=crease_angle)
         bake_scene(
             loaded,

@@ -18,8 +18,8 @@ from decals.apps.commands.options import (
     Trust,
     given,
 )
-from decals.apps.commands.progress_bars import PREPARING, progress_bars
-from decals.apps.models.loading import import_definitions, load_model
+from decals.apps.commands.progress_bars import preparing
+from decals.apps.models.loading import load_model
 from decals.apps.output import check_output, print_path
 from decals.errors import InvalidInput
 
@@ -62,9 +62,7 @@ def displace(
         Keep the edges that unions, intersections and differences leave.
     """
     check_output(output, (".glb", *MESH_SUFFIXES))
-    import_definitions(define)
-    with progress_bars() as progress:
-        progress(PREPARING, 0.0)
+    with preparing(define) as progress:
         loaded = load_model(scene, trust=trust, crease_angle=crease_angle)
         if not isinstance(loaded, Scene):
             raise InvalidInput(f"expected a saved scene with decals, got {scene!r}; scatter writes one")

@@ -19,8 +19,8 @@ from decals.apps.commands.options import (
     Whole,
     given,
 )
-from decals.apps.commands.progress_bars import PREPARING, progress_bars
-from decals.apps.models.loading import import_definitions, load_models
+from decals.apps.commands.progress_bars import preparing
+from decals.apps.models.loading import load_models
 from decals.errors import InvalidInput
 
 LABELS = {
@@ -72,9 +72,7 @@ def measure(
     json_output
         Print one JSON object in place of a table, with the measures of each decal.
     """
-    import_definitions(define)
-    with progress_bars() as progress:
-        progress(PREPARING, 0.0)
+    with preparing(define) as progress:
         loaded = load_models([scene], trust=trust)
         if not isinstance(loaded, Scene):
             raise InvalidInput(f"expected a saved scene in JSON, got the model {scene!r}; scatter makes one")

@@ -9,8 +9,8 @@ from blobtree.meshing.polygonize import MAX_TRIANGLES
 from blobtree.pyvista_views import MESH_SUFFIXES, write_polydata
 from decals import MeshObject, Scene
 from decals.apps.commands.options import Definitions, OptionalWhole, Trust
-from decals.apps.commands.progress_bars import PREPARING, progress_bars
-from decals.apps.models.loading import import_definitions, load_model
+from decals.apps.commands.progress_bars import preparing
+from decals.apps.models.loading import load_model
 from decals.apps.output import check_output, print_path
 from decals.errors import InvalidInput, InvalidMesh, InvalidScene
 from decals.scenes.meshes import as_polydata
@@ -58,9 +58,7 @@ def polygonize(
         As --creases, with separate vertices and normals on the sides of a crease, so that it looks sharp.
     """
     check_output(output, MESH_SUFFIXES)
-    import_definitions(define)
-    with progress_bars() as progress:
-        progress(PREPARING, 0.0)
+    with preparing(define) as progress:
         loaded = load_model(model, trust=trust)
         if isinstance(loaded, MeshObject):
             raise InvalidInput(

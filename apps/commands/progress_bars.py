@@ -8,6 +8,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 
 from blobtree import Progress as Report
 from blobtree.progress import reporting
+from decals.apps.models.loading import import_definitions
 
 PREPARING = "preparing the surfaces"
 """Stage in which surfaces are built."""
@@ -42,6 +43,15 @@ def progress_bars() -> Iterator[Report]:
             bars.live.transient = True
             raise
         stages.complete()
+
+
+@contextmanager
+def preparing(define: list[str] | None) -> Iterator[Report]:
+    """Import the definitions of custom nodes, then show progress that begins with the preparation."""
+    import_definitions(define)
+    with progress_bars() as progress:
+        progress(PREPARING, 0.0)
+        yield progress
 
 
 class _Stages:

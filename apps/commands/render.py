@@ -24,9 +24,9 @@ from decals.apps.commands.options import (
     given,
     parse_size,
 )
-from decals.apps.commands.progress_bars import PREPARING, progress_bars
+from decals.apps.commands.progress_bars import preparing
 from decals.apps.commands.scatter_options import ScatterOptions
-from decals.apps.models.loading import import_definitions, load_models
+from decals.apps.models.loading import load_models
 from decals.apps.models.samples import axes_of
 from decals.apps.output import PICTURE_SUFFIXES, check_output, print_path
 from decals.apps.views import frame, parse_view
@@ -127,10 +127,8 @@ def render(
     check_output(output, PICTURE_SUFFIXES)
     if save is not None:
         check_output(save, (".json",))
-    import_definitions(define)
     with ExitStack() as stack:
-        progress = stack.enter_context(progress_bars())
-        progress(PREPARING, 0.0)
+        progress = stack.enter_context(preparing(define))
         loaded = load_models(model, trust=trust, crease_angle=crease_angle)
         if isinstance(loaded, Scene) and (decals is not None or image or seed is not None):
             raise InvalidInput("a saved scene has its own decals; leave out --decals, --image and --seed")

@@ -20,8 +20,8 @@ from decals.apps.commands.options import (
     Whole,
     check_count,
 )
-from decals.apps.commands.progress_bars import PREPARING, progress_bars
-from decals.apps.models.loading import import_definitions, load_models
+from decals.apps.commands.progress_bars import preparing
+from decals.apps.models.loading import load_models
 from decals.apps.models.samples import axes_of
 from decals.apps.output import check_output, print_path
 from decals.apps.views import frame, parse_view
@@ -112,9 +112,7 @@ def scatter(
         check_count("--images", images, 1, MAX_IMAGES)
     check_count("--seed", seed, 0, MAX_SEED)
     check_output(output, SUFFIXES)
-    import_definitions(define)
-    with progress_bars() as progress:
-        progress(PREPARING, 0.0)
+    with preparing(define) as progress:
         loaded = load_models(model, trust=trust, crease_angle=crease_angle)
         objects = loaded.objects if isinstance(loaded, Scene) else tuple(loaded)
         if not objects:
