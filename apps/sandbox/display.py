@@ -19,7 +19,7 @@ from decals.editing.slicing import CHOICES as SLICES
 from decals.editing.slicing import MOVE, NONE, TILT, TILTED, SliceDrag, SlicePlane
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.camera import UPRIGHT, Camera
-from decals.scenes.meshes import as_polydata
+from decals.scenes.meshes import as_polydata, meshed
 from decals.scenes.objects import SceneObject, TreeObject, bounds_of
 from decals.surfaces.surface import unit_rows
 from decals.validation import finite_number, one_of, whole_number
@@ -80,6 +80,11 @@ class DisplayOptions:
     overlay: str = OVERLAYS[0]
     slice: SlicePlane | None = None
 
+    @property
+    def replaces_scene(self) -> bool:
+        """True if an actor stands for the scene, which is not drawn."""
+        return self.mode not in MODES[:2] or self.slice is not None
+
 
 Shown = list[tuple[str, Any, dict[str, Any]]]
 """Data sets with their names and pyvista's options."""
@@ -112,7 +117,6 @@ class Display:
         self._key: tuple[object, ...] = ()
         self._meshes: tuple[Sequence[SceneObject], list[pv.PolyData]] = (), []
         self._names: list[str] = []
-        self._decorated: list[Any] = []
         self._axes = False
         self._slice_drag: SliceDrag | None = None
 
@@ -232,44 +236,39 @@ class Display:
             known = meshes[1] if meshes[0] is objects else None
             parts = known or [as_polydata([item], resolution=RESOLUTION) for item in objects]
             shown, message = show(fork, parts, options, modes)
+            polygonized = options.mode == MODES[1] and options.slice is None
+            drawn = meshed(objects, parts) if polygonized else None
 
             def install() -> None:
                 self._meshes = objects, parts
-                self._install(shown, message, options)
+                self._install(shown, message, options, drawn)
 
             return install
 
         return not self._worker.start(Job("view", work))
 
     def _clear(self) -> bool:
-        had, self._key = bool(self._names), ()
+        had, self._key = self._key != (), ()
         if had:
             self._install([], "", self.options)
         return had
 
-    def _install(self, shown: Shown, message: str, options: DisplayOptions) -> None:
-        """Exchange the actors, and hide the scene where a mesh stands for it."""
+    def _install(
+        self, shown: Shown, message: str, options: DisplayOptions, drawn: Sequence[object] | None = None
+    ) -> None:
+        """Exchange the actors and the drawn objects, and hide the scene where an actor stands for it."""
         plotter, subplot = self._window.plotter, self._window.subplot
-        for actor in self._decorated:
-            subplot.remove(actor)
-        self._decorated = []
+        subplot.drawn_objects = drawn
         for name in self._names:
             plotter.remove_actor(name, render=False, reset_camera=False)
         plotter.scalar_bars.clear()
         self._names, self.message = [name for name, _, _ in shown], message
-        replaced = bool(shown) and (options.mode != MODES[0] or options.slice is not None)
+        replaced = bool(shown) and options.replaces_scene
         subplot.actor.SetVisibility(not replaced)
         if replaced:  # a scene that is not drawn needs no warm-up
             subplot.status, self._window.warmup.status = FrameStatus.EMPTY, ""
         for name, data, given in shown:
-            keywords = dict(given)
-            decorated = keywords.pop("decals", False)
-            actor = plotter.add_mesh(
-                data, name=name, pickable=False, reset_camera=False, render=False, **keywords
-            )
-            if decorated:
-                subplot.apply(actor)
-                self._decorated.append(actor)
+            plotter.add_mesh(data, name=name, pickable=False, reset_camera=False, render=False, **given)
 
     # -- cameras ----------------------------------------------------------------------------------------
 
@@ -410,7 +409,7 @@ def show(
     message = ""
     if options.slice is not None:
         shown += _sliced(document, mesh, options.slice, LIFT * size)
-    elif options.mode != MODES[0]:
+    elif options.replaces_scene:
         shown.append(_moded(document, mesh, parts, options.mode))
     if options.overlay != OVERLAYS[0]:
         overlay, message = _overlay(document, mesh, options.overlay, modes, LIFT * size)
@@ -421,8 +420,6 @@ def show(
 def _moded(document: Document, mesh: pv.PolyData, parts: list[pv.PolyData], mode: str) -> Any:
     """Return the mesh of a mode with its name and options."""
     name = f"{PREFIX}mesh"
-    if mode == "polygonized":
-        return name, mesh, {"scalars": "RGB", "rgb": True, "smooth_shading": True, "decals": True}
     if mode == "wireframe":
         return name, mesh, {"style": "wireframe", "color": "#30506a", "line_width": 1}
     copy = mesh.copy(deep=False)

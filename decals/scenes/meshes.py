@@ -2,16 +2,19 @@
 
 import os
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from blobtree._typing import Float32Array, Int32Array
 from blobtree.meshing.mesh import Mesh
 from blobtree.meshing.polygonize import MAX_TRIANGLES
 from blobtree.progress import Progress
 from blobtree.pyvista_views import to_polydata, write_polydata
 from decals.errors import InvalidMesh, InvalidScene
-from decals.scenes.objects import MeshObject, SceneObject, shown_objects
+from decals.scenes.objects import MeshObject, SceneObject, TreeObject, shown_objects
+from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.normals import split_at_creases, vertex_normals
 
 if TYPE_CHECKING:
@@ -87,6 +90,56 @@ def _mesh_polydata(item: MeshObject, split_normals: bool) -> "pv.PolyData":
         normals = vertex_normals(vertices, faces)
     colors = np.tile(np.asarray(item.color, np.float32), (len(vertices), 1))
     return to_polydata(Mesh(vertices, faces, normals, colors))
+
+
+@dataclass(frozen=True, eq=False)
+class MeshedTree:
+    """A tree that is drawn as a mesh with the colours of its vertices; decals lie on it as on the tree.
+
+    Attributes
+    ----------
+    item : TreeObject
+        The tree.
+    vertices, faces, color : float32[n, 3], int32[m, 3], float32[n, 3]
+        The mesh; colours are sRGB.
+    """
+
+    item: TreeObject
+    vertices: Float32Array = field(repr=False)
+    faces: Int32Array = field(repr=False)
+    color: Float32Array = field(repr=False)
+
+    @classmethod
+    def of(cls, item: TreeObject, mesh: "pv.PolyData") -> "MeshedTree":
+        """Return a tree that is drawn as its mesh with "RGB" colours."""
+        colors = np.asarray(mesh["RGB"], np.float32) / 255.0
+        return cls(item, np.asarray(mesh.points, np.float32), mesh.regular_faces.astype(np.int32), colors)
+
+    @property
+    def name(self) -> str:
+        """Name of the object."""
+        return self.item.name
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels besides the name."""
+        return self.item.labels
+
+    @property
+    def named_only(self) -> bool:
+        """True if only decals lie on the object that name it."""
+        return self.item.named_only
+
+    @property
+    def surface(self) -> ImplicitSurface:
+        """Surface of the tree, over which decals walk."""
+        return self.item.surface
+
+
+def meshed(objects: Iterable[SceneObject], meshes: Iterable["pv.PolyData"]) -> list[SceneObject | MeshedTree]:
+    """Return objects of a scene with meshes in place of trees; `as_polydata` makes those of each object."""
+    pairs = zip(objects, meshes, strict=True)
+    return [MeshedTree.of(item, mesh) if isinstance(item, TreeObject) else item for item, mesh in pairs]
 
 
 def write_mesh(

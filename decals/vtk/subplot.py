@@ -127,6 +127,16 @@ class FrameStatus(Enum):
     """The frame was drawn."""
 
 
+class _Substitution:
+    """A scene that is drawn with other objects in place of its own."""
+
+    def __init__(self, scene: SceneLike, objects: Sequence[object]) -> None:
+        self._scene, self.objects = scene, tuple(objects)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._scene, name)
+
+
 class SubplotRenderer(KnownAttributes):
     """Draws a scene among the actors of one of pyvista's renderers; ``plotter.decals.subplot`` is one.
 
@@ -186,6 +196,7 @@ class SubplotRenderer(KnownAttributes):
         self._walking = False
         self.status = FrameStatus.EMPTY
         self._scene: SceneLike | None = None
+        self._substitution: _Substitution | None = None
         self._context = context
         self._frames: FrameRenderer | None = None
         self._failed: FrameKey | None = None
@@ -214,10 +225,29 @@ class SubplotRenderer(KnownAttributes):
             check_scene(scene)
         self._drop_cleared_scene()
         self.applied.check_mapping(self._drawing_of(scene).mapping)
-        self._scene, self._failed = scene, None
+        self._scene, self._failed, self._substitution = scene, None, None
         if scene is None:
             self._proxy_actor.remove()
         self._enclose_objects(bounds_of)
+
+    @property
+    def drawn_objects(self) -> Sequence[object] | None:
+        """Objects that are drawn in place of those of the scene, such as their meshes; None for its own.
+
+        Picks go on to meet the objects of the scene.
+        """
+        return None if self._substitution is None else self._substitution.objects
+
+    @drawn_objects.setter
+    def drawn_objects(self, objects: Sequence[object] | None) -> None:
+        scene, self._substitution = self._scene, None
+        if scene is not None and objects is not None:
+            self._substitution = _Substitution(scene, objects)
+
+    @property
+    def _drawn_scene(self) -> SceneLike | None:
+        """The scene as it is drawn."""
+        return self.scene if self._substitution is None or self.scene is None else self._substitution
 
     def _drop_cleared_scene(self) -> None:
         """Drop the scene if the proxy actor was removed, for example by ``plotter.clear()``."""
@@ -316,7 +346,7 @@ class SubplotRenderer(KnownAttributes):
     @property
     def shown_mapping(self) -> ImageMapping:
         """Image mapping of a frame that is drawn now: CORRECTED while walks are computed in a thread."""
-        mapping, scene = self.mapping, self._scene
+        mapping, scene = self.mapping, self._drawn_scene
         if mapping is not ImageMapping.WALKED or not self.walks_in_thread or scene is None:
             return mapping
         if self._frames is None or self._frames.renderer.walks_ready(scene):
@@ -532,7 +562,7 @@ class SubplotRenderer(KnownAttributes):
         samples
             Samples per pixel along each axis, at the window's size.
         """
-        scene = self.scene
+        scene = self._drawn_scene
         if scene is None or self._drawn_size is None:
             return 1.0
         options = self._frame_options(self._drawn_size, 1.0, samples)
@@ -576,7 +606,7 @@ class SubplotRenderer(KnownAttributes):
 
     def draw(self) -> None:
         """Draw into the frame that VTK is drawing; the proxy actor calls it."""
-        scene = self._scene
+        scene = self._drawn_scene
         if scene is None or self.vtk_renderer.GetSelector() is not None:
             return
         with self._attempt(scene, self.draw_scale, self.samples) as possible:
@@ -644,7 +674,7 @@ class SubplotRenderer(KnownAttributes):
         float or None
             Duration of the whole frame in seconds, 0 if parts were kept; None while it is incomplete.
         """
-        scene = self.scene
+        scene = self._drawn_scene
         if scene is None or self._drawn_size is None or not self._proxy_actor.visible:
             return 0.0
         with self._attempt(scene, 1.0, samples) as possible:
@@ -667,7 +697,7 @@ class SubplotRenderer(KnownAttributes):
             Status such as ``"shaders 3 of 7"``; None once the frame can be drawn, or if it cannot be drawn.
             An error is raised only once.
         """
-        scene = self.scene
+        scene = self._drawn_scene
         self.status = FrameStatus.DRAWN
         if scene is None or self._drawn_size is None or not self._proxy_actor.visible:
             return None

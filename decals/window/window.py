@@ -213,7 +213,7 @@ class EditWindow:
 
     def _content_version(self) -> tuple[object, ...]:
         subplot, document = self.subplot, self.document
-        drawing = subplot.drawing, subplot.shown_mapping
+        drawing = subplot.drawing, subplot.shown_mapping, id(subplot.drawn_objects)
         return id(document.objects), id(document.images), document.decals.version, *drawing
 
     # -- frames -----------------------------------------------------------------------------------------

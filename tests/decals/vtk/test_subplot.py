@@ -183,6 +183,29 @@ def prepared(subplot: SubplotRenderer, samples: int) -> int:
 
 
 @pytest.mark.slow_cases("2")
+def test_other_objects_are_drawn_in_place_of_the_scenes_while_picks_meet_its_own(plotter: Factory) -> None:
+    pl = plotter()
+    scene = both()
+    pl.decals.add_scene(scene, camera=True)
+    subplot = pl.decals.subplot
+    own, pick = shot(pl), subplot.at(80, 60)
+    subplot.drawn_objects = scene.objects[:1]
+    assert subplot.work_fraction(subplot.samples) == 1.0
+    drawn = shot(pl)
+    assert subplot.at(80, 60).position.tolist() == pick.position.tolist()
+    subplot.scene = scene.replace(objects=scene.objects[:1])
+    assert subplot.drawn_objects is None  # another scene has its own
+    np.testing.assert_array_equal(drawn, shot(pl))
+    assert np.abs(drawn - own).max() > 50
+    subplot.drawn_objects = scene.objects
+    np.testing.assert_array_equal(shot(pl), own)
+    subplot.drawn_objects = None
+    np.testing.assert_array_equal(shot(pl), drawn)
+    subplot.scene = None
+    subplot.drawn_objects = scene.objects
+    assert subplot.drawn_objects is None
+
+
 @pytest.mark.parametrize("samples", [1, 2])
 def test_a_frame_prepared_part_by_part_is_the_one_drawn_at_once(plotter: Factory, samples: int) -> None:
     other, pl = plotter(), plotter()
