@@ -2,9 +2,9 @@
 
 import time
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +15,7 @@ from blobtree.nodes.paths import Path
 from decals.editing.background import BackgroundJobs, Step, step_of, takes_long
 from decals.editing.brushes import BrushSettings
 from decals.editing.commands import SetDrawing
-from decals.editing.document import Edit
+from decals.editing.document import Document, Edit
 from decals.editing.prompts import PromptLine
 from decals.editing.queries import SurfacePick
 from decals.editing.session import Command, EditSession
@@ -26,6 +26,11 @@ from decals.validation import instance
 Cursor = Callable[[], SurfacePick | None]
 """Returns the surface point under the cursor, or None."""
 
+
+COMPILING = "kernels are compiled for this machine, once; try again in a moment"
+"""Message after input that needs them."""
+
+Answer = TypeVar("Answer")
 
 SLOW_STEP = 0.08
 """Processor time in seconds from which on a step of a drag counts as slow."""
@@ -237,11 +242,29 @@ class ActionState:
     def _done_now(self, step: Step) -> bool:
         """Carry out a step and return True, or return False if kernels must be compiled for it first."""
         try:
-            with without_compiling() if self.background.threaded else nullcontext():
+            with self._promptly():
                 self.message = step(self.session)
         except NotCompiled:
             return False
         return True
+
+    def _promptly(self) -> AbstractContextManager[None]:
+        """Return a context in which threads alone compile kernels, if there are any."""
+        return without_compiling() if self.background.threaded else nullcontext()
+
+    def asked(self, label: str, question: Callable[[Document], Answer]) -> Answer | None:
+        """Return the answer to a question about the document.
+
+        It is None if kernels must be compiled for it first. A thread does so, and a message says so.
+        """
+        try:
+            with self._promptly():
+                return question(self.session.document)
+        except NotCompiled:
+            fork = self.session.document.fork()
+            self.background.prepare(label, lambda: question(fork))
+            self.show(COMPILING)
+            return None
 
     def draw_with(self, label: str, *, last: bool = True, **options: Any) -> None:
         """Draw the scene with other options of `Drawing`; steps with one label are one undo entry."""

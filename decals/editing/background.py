@@ -327,6 +327,18 @@ class BackgroundJobs:
             self._following = True
             self.edit(label, step)
 
+    def prepare(self, label: str, call: Callable[[], object]) -> None:
+        """Call a function in the background for what it leaves behind, such as compiled kernels.
+
+        Nothing happens while an edit runs.
+        """
+
+        def work(_progress: Progress, _cancel: Cancel) -> Completion:
+            call()
+            return lambda: None
+
+        self._edits.start(Job(label, work))
+
     def when_followed(self, call: Callable[[], None]) -> None:
         """Call a function once all steps of `edit_latest` are adopted; calls keep their order.
 

@@ -102,8 +102,12 @@ class PointerTools:
     def at(self, x: float, y: float) -> SurfacePick | None:
         """Return the surface point at a pixel, or None."""
         x, y = _checked_pixel(x, y)
-        ray, document = self._ray(x, y), self.actions.state.session.document
-        surface_pick = None if ray is None else pick(document, *ray, contact=document.drawing.contact)
+        ray = self._ray(x, y)
+        if ray is None:
+            return None
+        surface_pick = self.actions.state.asked(
+            "find the surface", lambda document: pick(document, *ray, contact=document.drawing.contact)
+        )
         if surface_pick is None or self._occluded(x, y, surface_pick.position):
             return None
         return surface_pick

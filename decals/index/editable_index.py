@@ -8,11 +8,13 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, Int64Array
-from blobtree.kernels import loaded
+from blobtree.kernels import load_together, loaded
 from decals.index import edit_kernels as kernels
+from decals.index.build_kernels import list_cells
 from decals.index.change_log import ChangeLog
 from decals.index.decal_cells import FINEST, MAX_CELLS_OF_DECAL, NO_FLOOR, NO_PARITY, REACH_WITH_SLACK
 from decals.index.index import DecalIndex, has_nested, indexed_decals
+from decals.index.lookup import find_nested
 from decals.index.rows import with_spare
 from decals.model import RECORD
 
@@ -20,6 +22,9 @@ MAX_LEVELS = 128
 
 MAX_SMALL_EDITS = 64
 """Number of decals smaller than the cells they share, from which the index is rebuilt."""
+
+BUILD_KERNELS = (list_cells, find_nested)
+EDIT_KERNELS = (kernels.insert_decal, kernels.remove_decal, kernels.find_nested_with)
 
 LEVELS, TABLE, IDS = "index_levels", "index_table", "index_ids"
 
@@ -56,6 +61,10 @@ class EditableIndex:
     def level_count(self) -> int:
         """Number of levels."""
         return len(self._level_of)
+
+    def load_kernels(self) -> None:
+        """Load the kernels of the next change. Where none may be compiled, this fails, and no change does."""
+        load_together(BUILD_KERNELS if self.stale else EDIT_KERNELS, "cpu")
 
     def build(self, records: Float32Array, numbers: Int64Array, log: ChangeLog) -> bool:
         """Build the index of the decals of these numbers anew.

@@ -213,7 +213,7 @@ class DecalEditor:
             A number has no decal, or occurs twice. Nothing changes then.
         """
         rows = self._rows.require(numbers)
-        self._mark_stale_if_many(rows)
+        self._prepare_index(rows)
         self._dirty.add(self._log.version + 1, self._rows.balls(rows))
         self._remove_from_index(rows)
         self._rows.remove(rows)
@@ -230,7 +230,7 @@ class DecalEditor:
         _require_decals(decals)
         rows = self._rows.require_assignable(numbers, len(decals))
         codes_of(decals.receivers, self._rows.receiver_table)  # raises for too many different ones
-        self._mark_stale_if_many(rows)
+        self._prepare_index(rows)
         version, existing = self._log.version + 1, rows[self._rows.contains(rows)]
         balls_before = self._rows.balls(existing)
         self._remove_from_index(existing)
@@ -278,9 +278,10 @@ class DecalEditor:
 
     # -- index ------------------------------------------------------------------------------------------
 
-    def _mark_stale_if_many(self, rows: Int64Array) -> None:
-        """Leave the index to be rebuilt if that costs less than to change it for each decal."""
+    def _prepare_index(self, rows: Int64Array) -> None:
+        """Load the kernels of a change; leave the index to be rebuilt if that costs less than a change."""
         self._index.stale = self._index.stale or len(rows) > max(MAX_SINGLE_EDITS, len(self) // 8)
+        self._index.load_kernels()
 
     def _remove_from_index(self, rows: Int64Array) -> None:
         if not self._index.stale:

@@ -16,6 +16,7 @@ from decals.editing import (
     ScaleDecals,
     TurnDecals,
 )
+from decals.editing.action_state import COMPILING
 from decals.editing.background import BUSY, step_of
 from decals.editing.document import Document, Edit
 from decals.errors import InvalidEdit
@@ -81,6 +82,50 @@ def test_edits_whose_kernels_are_to_compile_go_to_the_background() -> None:
     state.end_stroke()
     assert state.session.document.decals[7].radii[0] == pytest.approx(6 * radius)
     assert state.session.labels == ("scale", "drag")
+
+
+def refuse_in_this_thread(kernels: object, device: object = None) -> None:
+    if threading.current_thread() is threading.main_thread():
+        raise NotCompiled
+
+
+def test_an_edit_is_not_carried_out_in_part_if_kernels_of_the_index_are_to_compile(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    actions = threaded()
+    state, before = actions.state, digest(actions.state.session.document)
+    with monkeypatch.context() as patched:
+        patched.setattr("decals.index.editable_index.load_together", refuse_in_this_thread)
+        for command in (ScaleDecals([7], 3.0), DeleteDecals([8])):
+            state.run(command)
+            assert state.background.busy
+            assert (digest(state.session.document), state.session.labels) == (before, ())
+            state.background.cancel()
+            finish(actions)
+    state.run(ScaleDecals([7], 3.0))
+    assert not state.background.busy
+    assert state.session.labels == ("scale",)
+    state.session.undo()
+    assert digest(state.session.document) == before
+
+
+def test_a_click_does_not_wait_for_kernels() -> None:
+    actions = threaded()
+    state, asked = actions.state, threading.Event()
+
+    def middle(document: Document) -> int:
+        if threading.current_thread() is threading.main_thread() and not asked.is_set():
+            raise NotCompiled
+        asked.set()
+        return len(document.decals)
+
+    assert state.asked("count", middle) is None
+    assert state.message == COMPILING
+    assert state.background.busy
+    finish(actions)
+    assert asked.is_set()
+    assert state.asked("count", middle) == len(state.session.document.decals)
+    assert state.session.labels == ()
 
 
 def test_what_hands_do_meanwhile_stays_and_counts() -> None:
