@@ -4,8 +4,11 @@
 
 Browsers vanish while they drag and while they wait for answers; a third one takes 2 s for each picture. The
 figures are printed as JSON: errors of the server, whether undoing all restores the first scene bit for bit,
-the growth of the memory once the first third has been sent and once the first half has, and for how long the
-server's loop was busy.
+and the growth of the memory once the first tenth has been sent and once the first half has.
+
+They also say for how long the server's loop did not return to its other tasks: time on the clock, which other
+work on the machine lengthens, and processor time of the loop's thread. The longest pauses are listed with the
+last message, the mode of the view, and the place in the program at which they were late.
 """
 
 import argparse
@@ -15,13 +18,17 @@ import ctypes
 import gc
 import json
 import logging
+import math
 import random
 import sys
 import tempfile
+import threading
 import time
 from collections import Counter
 from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -109,11 +116,115 @@ PICTURE_SECONDS = 2.0
 SAMPLES = 20
 """Looks at the memory during a run."""
 
-FIRST_PARTS = {"growth_mb_per_1000": 0.3, "steady_growth_mb_per_1000": 0.5}
+FIRST_PARTS = {"growth_mb_per_1000": 0.1, "steady_growth_mb_per_1000": 0.5}
 """Parts of a run after which the memory should not grow, by the name of the figure."""
 
 LATE_MS = 100.0
 """Milliseconds within which any input should be answered."""
+
+LISTED_PAUSES = 12
+"""Longest pauses that are listed."""
+
+TURN_SECONDS = 0.001
+"""Time for which the task that watches the loop sleeps."""
+
+PACKAGES = "blobtree", "decals"
+"""Packages one of whose functions a pause is attributed to."""
+
+
+@dataclass(frozen=True)
+class Pause:
+    """A time for which the loop does not return to its tasks.
+
+    Attributes
+    ----------
+    cause
+        What was going on.
+    place
+        Innermost function of our packages in which the loop's thread was late; empty for a short pause.
+    clock_ms, busy_ms
+        Milliseconds on the clock, and of the thread's processor time.
+    """
+
+    cause: str
+    place: str
+    clock_ms: float
+    busy_ms: float
+
+
+class LoopWatch:
+    """Measures the pauses of the running asyncio loop.
+
+    Parameters
+    ----------
+    cause
+        Returns what is going on.
+
+    Attributes
+    ----------
+    clock, busy
+        Numbers of pauses by their milliseconds on the clock, and by those of the thread's processor time.
+    longest
+        The longest late pause of each cause and place.
+    """
+
+    def __init__(self, cause: Callable[[], str]) -> None:
+        self._cause = cause
+        self.clock: Counter[float] = Counter()
+        self.busy: Counter[float] = Counter()
+        self.longest: dict[tuple[str, str], Pause] = {}
+        self._turned_at, self._place = math.inf, ""
+
+    async def run(self) -> None:
+        """Measure until the task is cancelled."""
+        ended = threading.Event()
+        thread = threading.Thread(target=self._look, args=(threading.get_ident(), ended), daemon=True)
+        thread.start()
+        try:
+            while True:
+                self._place, self._turned_at, busy_before = "", time.monotonic(), time.thread_time()
+                await asyncio.sleep(TURN_SECONDS)
+                clock = 1000.0 * (time.monotonic() - self._turned_at - TURN_SECONDS)
+                self._note(clock, 1000.0 * (time.thread_time() - busy_before))
+        finally:
+            ended.set()
+
+    def _note(self, clock: float, busy: float) -> None:
+        pause = Pause(self._cause(), self._place, round(max(clock, 0.0), 1), round(busy, 1))
+        self.clock[pause.clock_ms] += 1
+        self.busy[pause.busy_ms] += 1
+        key = pause.cause, pause.place
+        if clock > LATE_MS and (key not in self.longest or clock > self.longest[key].clock_ms):
+            self.longest[key] = pause
+
+    def _look(self, watched: int, ended: threading.Event) -> None:
+        """Note where the loop's thread is once a pause is late."""
+        while not ended.wait(LATE_MS / 4000.0):
+            late = time.monotonic() - self._turned_at > LATE_MS / 1000.0
+            if late and not self._place:
+                self._place = place_of(sys._current_frames().get(watched))
+
+
+def place_of(frame: FrameType | None) -> str:
+    """Return the innermost function of our packages that a frame is in."""
+    while frame is not None:
+        name = frame.f_globals.get("__name__", "")
+        if name.partition(".")[0] in PACKAGES:
+            return f"{name}.{frame.f_code.co_qualname}"
+        frame = frame.f_back
+    return "elsewhere"
+
+
+def summary(name: str, pauses: Counter[float]) -> dict[str, float]:
+    """Return the 99th percentile and the maximum of some pauses, and the number of late ones."""
+    milliseconds, times = np.transpose(sorted(pauses.items() or [(0.0, 1)]))
+    common = milliseconds[np.searchsorted(np.cumsum(times), 0.99 * times.sum())]
+    late = int(times[milliseconds > LATE_MS].sum())
+    return {
+        f"loop_{name}_p99_ms": float(common),
+        f"loop_{name}_max_ms": float(milliseconds[-1]),
+        f"loop_{name}_late": late,
+    }
 
 
 class Messages:
@@ -133,17 +244,17 @@ class Messages:
         self._modes = {name: getattr(window.subplot, name) for name in ("contact", "mapping", "stiffness")}
         self._browsers: list[Browser] = []
         self._tasks: list[asyncio.Task[None]] = []
-        self._busy_ms: Counter[float] = Counter({0.0: 1})
+        self._message = ""
+        self._watch = LoopWatch(lambda: f"{self._message} in mode {page.sandbox.display.options.mode}")
         self._memory: list[tuple[int, float]] = []
         self.changed = self.unanswered = 0
         self.restored = True
-        self.slowest: dict[str, float] = {}
 
     async def run(self, count: int, report: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
         """Send messages and return the figures; now and then, undo all that they did."""
         before = self._saved()
         self._browsers = [await self._connect(), await self._connect()]
-        self._tasks = [asyncio.create_task(self._watch_loop()), asyncio.create_task(self._read_slowly())]
+        self._tasks = [asyncio.create_task(self._watch.run()), asyncio.create_task(self._read_slowly())]
         for number in range(1, count + 1):
             labels = self._window.session.labels
             await self._send()
@@ -168,18 +279,16 @@ class Messages:
 
     def figures(self) -> dict[str, Any]:
         """Return the figures so far."""
-        busy, times = np.transpose(sorted(self._busy_ms.items()))
-        common = busy[np.searchsorted(np.cumsum(times), 0.99 * times.sum())]
+        longest = sorted(self._watch.longest.values(), key=lambda pause: -pause.clock_ms)
         return {
             "changed": self.changed,
             "restored": self.restored,
             "unanswered": self.unanswered,
             "memory_mb": round(self._memory[-1][1]) if self._memory else 0,
             **{name: round(growth(self._memory, part), 2) for name, part in FIRST_PARTS.items()},
-            "loop_busy_p99_ms": float(common),
-            "loop_busy_max_ms": float(busy[-1]),
-            "loop_late": int(times[busy > LATE_MS].sum()),
-            "slowest": dict(sorted(self.slowest.items(), key=lambda item: -item[1])[:5]),
+            **summary("clock", self._watch.clock),
+            **summary("busy", self._watch.busy),
+            "longest_pauses": [asdict(pause) for pause in longest[:LISTED_PAUSES]],
         }
 
     def _saved(self) -> tuple[str, bytes]:
@@ -188,13 +297,6 @@ class Messages:
             path = Path(folder) / "scene.json"
             self._window.document.scene.save(path)
             return digest(self._window.document), path.read_bytes()
-
-    async def _watch_loop(self) -> None:
-        """Note for how long the loop's thread computes between two turns of this task, by its own clock."""
-        while True:
-            before = time.thread_time()
-            await asyncio.sleep(0.001)
-            self._busy_ms[round(1000.0 * (time.thread_time() - before), 1)] += 1
 
     async def _read_slowly(self) -> None:
         browser = await self._connect()
@@ -260,7 +362,7 @@ class Messages:
 
     async def _answer(self, name: str, call: Awaitable[Any]) -> None:
         """Wait for the answer to a message; a refusal is one."""
-        began = time.thread_time()
+        self._message = name
         try:
             await asyncio.wait_for(call, WAIT_SECONDS)
         except TimeoutError:
@@ -268,8 +370,6 @@ class Messages:
         except Exception as error:  # the client raises a bare one for each refusal
             if type(error) is not Exception:
                 raise
-        spent = 1000.0 * (time.thread_time() - began)
-        self.slowest[name] = round(max(spent, self.slowest.get(name, 0.0)), 1)
 
     async def _reconnect(self, number: int, end: Callable[[int], Awaitable[None]]) -> None:
         await end(number)

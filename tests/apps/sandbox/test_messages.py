@@ -1,6 +1,14 @@
 """Random messages of browsers, valid and malformed: none raises, and undoing all restores the first state."""
 
+import asyncio
+import sys
+import time
+from collections import Counter
+
 import pytest
+
+from decals.errors import InvalidEdit
+from decals.validation import one_of
 
 pytest.importorskip("trame_vtk")
 
@@ -12,6 +20,45 @@ def test_growth_is_measured_after_the_first_part() -> None:
     assert growth(memory, 0.5) == pytest.approx(3.0)
     assert growth(memory, 0.3) == pytest.approx((-1.5 * 90 - 0.5 * 100 + 0.5 * 103 + 1.5 * 106) / 5)
     assert growth(memory[:1], 0.5) == 0.0
+
+
+def test_pauses_of_a_loop_are_measured_on_the_clock_and_attributed() -> None:
+    from tests.apps.sandbox.messages import LoopWatch, summary
+
+    causes = ["a short one"]
+    watch = LoopWatch(lambda: causes[-1])
+
+    async def check() -> None:
+        task = asyncio.create_task(watch.run())
+        await asyncio.sleep(0.05)
+        causes.append("a long one")
+        time.sleep(0.2)
+        await asyncio.sleep(0.01)
+        task.cancel()
+
+    asyncio.run(check())
+    pause = next(one for one in watch.longest.values() if one.cause == "a long one")
+    assert pause.place == "elsewhere"
+    assert pause.clock_ms > 190
+    assert pause.busy_ms < 100
+    assert summary("clock", watch.clock)["loop_clock_max_ms"] >= pause.clock_ms
+    assert summary("clock", watch.clock)["loop_clock_late"] >= 1
+    assert summary("busy", watch.busy)["loop_busy_late"] == 0
+    assert summary("busy", Counter({1.0: 98, 2.0: 1, 300.0: 1}))["loop_busy_p99_ms"] == 2.0
+
+
+def test_a_pause_is_attributed_to_our_innermost_function() -> None:
+    from tests.apps.sandbox.messages import place_of
+
+    places: list[str] = []
+
+    class Choices(set[str]):
+        def __contains__(self, value: object) -> bool:
+            places.append(place_of(sys._getframe()))
+            return True
+
+    one_of("name", "x", Choices(), InvalidEdit)
+    assert places == ["decals.validation.one_of"]
 
 
 @pytest.mark.slow
