@@ -80,8 +80,7 @@ class LabPage(Page):
 
     def _restart(self, number: int) -> None:
         """Start a lesson from its beginning."""
-        with self.sandbox.reported():
-            self.lab.start(number)
+        self.sandbox.attempt(lambda: self.lab.start(number))
 
     def _set_value(self, number: int, raw: Any, last: bool = True) -> None:
         """Set what a slider of the lesson moves."""

@@ -207,7 +207,7 @@ class Page:
                     html.Div(ABOVE_VIEW)
                 panels.build_start(self.sandbox)
                 with vuetify3.VFooter(app=True, height=28, classes="text-caption"):
-                    html.Span("{{ status }}", raw_attrs=['role="status"'])
+                    html.Span("{{ status }}", classes=("refused && 'refused'",), raw_attrs=['role="status"'])
 
     def _build_left_side(self) -> None:
         """Build what stands left of the view."""

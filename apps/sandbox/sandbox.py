@@ -7,10 +7,10 @@ window's session and its actions.
 import math
 import re
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
@@ -35,7 +35,7 @@ from decals.editing.scatter_commands import AddObject, RemoveObject
 from decals.editing.session import UndoEntry
 from decals.editing.tree_commands import RenameObject
 from decals.editing.visibility import RenameLayer, RenameNode
-from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.errors import InvalidEdit
 from decals.options import arguments_of
 from decals.rendering.environment import Environment
 from decals.scattering.scatter import scatter
@@ -69,12 +69,11 @@ Arguments = ParamSpec("Arguments")
 def event(
     method: Callable[Concatenate["Sandbox", Arguments], None],
 ) -> Callable[Concatenate["Sandbox", Arguments], None]:
-    """Let an event end the steps before it, turn its errors into the message, and draw the result."""
+    """Let an event be an attempt; see `Sandbox.attempt`."""
 
     @wraps(method)
     def reported(sandbox: "Sandbox", /, *arguments: Arguments.args, **options: Arguments.kwargs) -> None:
-        with sandbox.reported():
-            method(sandbox, *arguments, **options)
+        sandbox.attempt(lambda: method(sandbox, *arguments, **options))
 
     return reported
 
@@ -166,6 +165,7 @@ class Sandbox:
             "title": self._files.title,
             "status": self.status,
             "refusals": state.refusals,
+            "refused": bool(state.refusal),
             "busy": window.busy,
             "outline": self._outline(),
             "selected": self._selected(),
@@ -214,7 +214,7 @@ class Sandbox:
             self._window.warmup.status,
             state.background.progress,
             state.prompt.text,
-            state.message,
+            *dict.fromkeys((state.message, state.refusal)),
             self.display.message,
         )
         return " · ".join(filter(None, parts))
@@ -342,15 +342,14 @@ class Sandbox:
     def slide(self, step: Callable[[], None], *, last: bool) -> None:
         """Carry out a step of a slider; while it moves, only the newest one, before the next frame."""
 
-        def reported() -> None:
-            with self.reported(whole=last):
-                step()
-                self._last_step = math.inf if last else time.monotonic()
+        def stepped() -> None:
+            step()
+            self._last_step = math.inf if last else time.monotonic()
 
         if last:
-            reported()
+            self.attempt(stepped)
             return
-        self._step = reported
+        self._step = lambda: self.attempt(stepped, whole=False)
         self.schedule()
 
     def take_step(self) -> None:
@@ -363,8 +362,7 @@ class Sandbox:
         """End the moves of a slider whose browser has left, as one entry of the history."""
         self.take_step()
         self._last_step = math.inf
-        with self.reported():
-            self._trees.end_drag()
+        self.attempt(self._trees.end_drag)
 
     def settle(self) -> None:
         """Keep the view up to date, and end the edit of a slider that has rested; call this regularly."""
@@ -422,9 +420,12 @@ class Sandbox:
         width, height = self._window.plotter.window_size
         self._window.actions.perform(action, lambda: self._window.tools.at(width / 2, height / 2))
 
+    @event
     def go_to(self, entry: int) -> None:
         """End a drag, then undo or redo until so many entries of the history are done."""
         session = self._window.session
+        total = len(session.labels) + len(session.undone_labels)
+        number = whole_number("history", entry, 0, total, InvalidEdit)
 
         def step() -> None:
             while len(session.labels) > number:
@@ -432,10 +433,7 @@ class Sandbox:
             while len(session.labels) < number and session.redo() is not None:
                 pass
 
-        with self.reported():
-            total = len(session.labels) + len(session.undone_labels)
-            number = whole_number("history", entry, 0, total, InvalidEdit)
-            self._when_idle(step)
+        self._when_idle(step)
 
     def _when_idle(self, step: Callable[[], None]) -> None:
         """End a drag and take a step once its edits are adopted; `InvalidEdit` while another edit runs."""
@@ -480,8 +478,7 @@ class Sandbox:
                 session.undo()
             self.display.restore_camera(camera)
 
-        with self.reported():
-            self._when_idle(step)
+        self.attempt(lambda: self._when_idle(step))
 
     @event
     def new_model(self) -> None:
@@ -526,22 +523,24 @@ class Sandbox:
         One that was dropped on the key "light", and a Radiance file without a key, is the light.
         """
         for file in files if isinstance(files, list | tuple) else [files]:
-            with self.reported():
-                found, window = read_upload(file), self._window
-                file_name = str(file["name"])  # type: ignore[index]  # read_upload has checked it
-                name = plain_name(file_name)
-                if key == LIGHT or (not key and file_name.lower().endswith(HDR)):
-                    self._take_light(found, file)
-                elif isinstance(found, Scene):
-                    self._open(lambda *_, scene=found: scene, new_file(self._folder, name))
-                elif isinstance(found, DecalImage):
-                    self._take_image(found, key)
-                else:
-                    taken = {item.name for item in window.document.objects}
-                    renamed = replace(found, name=unused(name, taken))
-                    if isinstance(renamed, MeshObject):
-                        renamed = replace(renamed, source=None)  # the file that was read exists no more
-                    self._add_object(renamed)
+            self.attempt(partial(self._take_file, file, key))
+
+    def _take_file(self, file: object, key: str) -> None:
+        found, window = read_upload(file), self._window
+        file_name = str(file["name"])  # type: ignore[index]  # read_upload has checked it
+        name = plain_name(file_name)
+        if key == LIGHT or (not key and file_name.lower().endswith(HDR)):
+            self._take_light(found, file)
+        elif isinstance(found, Scene):
+            self._open(lambda *_: found, new_file(self._folder, name))
+        elif isinstance(found, DecalImage):
+            self._take_image(found, key)
+        else:
+            taken = {item.name for item in window.document.objects}
+            renamed = replace(found, name=unused(name, taken))
+            if isinstance(renamed, MeshObject):
+                renamed = replace(renamed, source=None)  # the file that was read exists no more
+            self._add_object(renamed)
 
     def _take_image(self, image: DecalImage, key: str) -> None:
         """Add an image that was dropped on a row, or replace that of the row."""
@@ -595,8 +594,8 @@ class Sandbox:
         self._files.write(name.strip(), bool(replace_existing), size=shown, video=video)
 
     def _open(self, load: Callable[[Progress, Cancel], Scene], path: Path) -> None:
-        self.in_lesson, self._before_lesson = False, None
         self._files.open(load, path)
+        self.in_lesson, self._before_lesson = False, None
         self._start = {**self._start, "open": False}
         self.display.bookmarks.clear()
 
@@ -623,7 +622,8 @@ class Sandbox:
         phase
             "begin", which cancels what the first finger did alone, "move", or "end".
         """
-        with self.reported(whole=phase == "end"):
+
+        def pinched() -> None:
             one_of("phase", phase, PHASES, InvalidEdit)
             if phase == "begin":
                 self._window.cancel_press()
@@ -631,6 +631,8 @@ class Sandbox:
             self._window.begin_motion()
             ratio = min(max(ratio, 1.0 / MAX_ZOOM), MAX_ZOOM)
             self._window.camera.move_and_zoom(min(max(moved, -1.0), 1.0), min(max(raised, -1.0), 1.0), ratio)
+
+        self.attempt(pinched, whole=phase == "end")
 
     @event
     def scatter(self) -> None:
@@ -726,14 +728,10 @@ class Sandbox:
             raise InvalidEdit(f"row: expected one of an object or a node, got {describe(key)}")
         return number, path
 
-    @contextmanager
-    def reported(self, *, whole: bool = True) -> Iterator[None]:
-        """Turn errors of the event into the message, and draw the result; an event ends the steps before."""
+    def attempt(self, request: Callable[[], None], *, whole: bool = True) -> None:
+        """End the steps before a request, carry it out as `ActionState.attempt` does, and draw the result."""
         self.take_step()
-        try:
-            yield
-        except ImplicitDecalsError as error:
-            self._state.refuse(error)
+        self._state.attempt(request)
         self._window.redraw(whole=whole)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, Int64Array
 from blobtree.kernels import NotCompiled, without_compiling
 from blobtree.nodes.paths import Path
-from decals.editing.background import BackgroundJobs, Step, step_of, takes_long
+from decals.editing.background import BackgroundJobs, Busy, Step, step_of, takes_long
 from decals.editing.brushes import BrushSettings
 from decals.editing.commands import SetDrawing
 from decals.editing.document import Document, Edit
@@ -110,6 +110,8 @@ class ActionState:
         The surface point of the last click, if it met one.
     message
         Result of the last action, in plain words.
+    refusal
+        Why the last input was refused; "" if it was not.
     refusals
         Number of inputs that were refused.
     prompt
@@ -130,7 +132,7 @@ class ActionState:
         self.primitive: tuple[int, Path] | None = None
         self.handle_offset: Float32Array = np.zeros(3, np.float32)
         self.picked: SurfacePick | None = None
-        self.message, self.refusals = "", 0
+        self.message, self.refusal, self.refusals = "", "", 0
         self.prompt = PromptLine(self.show)
         self.brush = BrushSettings()
         self.snap = 0.0
@@ -152,7 +154,30 @@ class ActionState:
     def refuse(self, error: Exception) -> None:
         """Set the message to the reason why an input was refused."""
         self.refusals += 1
-        self.show(str(error))
+        self.refusal = str(error)
+        self.show(self.refusal)
+
+    def attempt(self, request: Callable[[], None], *, waits: bool = True) -> None:
+        """Carry out a request of the user; an error becomes the message.
+
+        Parameters
+        ----------
+        request
+            The request.
+        waits
+            If True, a request that another edit blocks follows that edit, unless the selection changes.
+        """
+        self.refusal = ""
+        try:
+            request()
+        except Busy as error:
+            follows = waits and self.background.wait(
+                lambda: self.attempt(request), lambda: (self.selection, self.primitive)
+            )
+            if not follows:
+                self.refuse(error)
+        except ImplicitDecalsError as error:
+            self.refuse(error)
 
     # -- selection --------------------------------------------------------------------------------------
 
@@ -294,7 +319,7 @@ class ActionState:
             else:
                 self._slow_steps = self._slow_steps + 1 if time.thread_time() - began > SLOW_STEP else 0
         except ImplicitDecalsError as error:
-            self.message = str(error)
+            self.refuse(error)
 
 
 class WindowActions:

@@ -18,7 +18,7 @@ from decals.editing.session import EditSession, UndoEntry
 from decals.editing.tree_actions import TreeActions
 from decals.editing.view_actions import ViewActions
 from decals.editing.visibility_actions import VisibilityActions
-from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.errors import InvalidEdit
 from decals.field.mapping import ImageMapping
 from decals.record import Contact
 from decals.validation import describe
@@ -96,6 +96,8 @@ class Actions:
     def perform(self, name: str, cursor: Cursor) -> None:
         """Carry out an action; if that is impossible, nothing changes and ``state.message`` says why.
 
+        An action that another edit blocks follows that edit, unless it repeats or the selection changes.
+
         Parameters
         ----------
         name
@@ -112,10 +114,7 @@ class Actions:
             raise InvalidEdit(f"action: expected one of the key table, such as 'undo', got {describe(name)}")
         binding, method = self._actions[name]
         self.state.begin_series((name, self.state.selection) if binding.repeats else None, binding.summary)
-        try:
-            method(cursor)
-        except ImplicitDecalsError as error:
-            self.state.message = str(error)
+        self.state.attempt(lambda: method(cursor), waits=not binding.repeats)
 
     # -- selection --------------------------------------------------------------------------------------
 

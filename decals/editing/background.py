@@ -181,6 +181,14 @@ SAVE = "save"
 """Label of a save."""
 
 BUSY = "another edit is running; wait for it, or press Escape to cancel it"
+LEFT_OUT = "what waited for the edit was left out, because the selection changed meanwhile"
+MAX_WAITING = 8
+"""Most requests that wait for the running edit, and most files that wait to be written."""
+
+
+class Busy(InvalidEdit):
+    """The request has to wait for another edit."""
+
 
 Step = Callable[[EditSession], str]
 """Edits a session, and returns a message for the user (empty for none)."""
@@ -217,6 +225,16 @@ class _Request:
     done: Callable[[], None] | None = None
 
 
+@dataclass(eq=False)
+class _Waiting:
+    """A request of the user that waits for the running edit, and what it depends on, then and now."""
+
+    repeat: Callable[[], None]
+    context: Callable[[], object]
+    seen: object
+    outdated: bool = False
+
+
 class BackgroundJobs:
     """Runs at most one edit, and writes at most one file of a session, in threads.
 
@@ -244,7 +262,8 @@ class BackgroundJobs:
         self.threaded = threaded
         self._edits, self._saves = Worker(), Worker(finish_at_exit=True)
         self._latest: _Request | None = None
-        self._next_save: Job | None = None
+        self._next_saves: list[Job] = []
+        self._waiting: list[_Waiting] = []
         self._computing = self._following = False
         self._when_idle: list[Callable[[], None]] = []
 
@@ -366,11 +385,21 @@ class BackgroundJobs:
 
         Raises
         ------
-        InvalidEdit
+        Busy
             Another edit is running.
         """
         if self._edits.busy and (computing or not self._computing):
-            raise InvalidEdit(BUSY)
+            raise Busy(BUSY)
+
+    def wait(self, repeat: Callable[[], None], context: Callable[[], object]) -> bool:
+        """Call a function once no edit runs, unless ``context`` then returns something else than now.
+
+        What the running edit itself changes does not count. Return False if too many wait already.
+        """
+        if len(self._waiting) == MAX_WAITING:
+            return False
+        self._waiting.append(_Waiting(repeat, context, context()))
+        return True
 
     def _fork_job(self, request: _Request) -> Job:
         """Return the job that edits a fork; its completion adopts the fork, or repeats the job on a new one.
@@ -409,10 +438,8 @@ class BackgroundJobs:
     ) -> None:
         """Save the present state, then call ``saved``; if another file is being written, save after it."""
         job = self._save_job(self._session.begin_save(path, camera=camera), path, saved)
-        if self._start_writing(job):
-            return
-        self._next_save = job
-        self._show("still saving; a second save follows")
+        self._next_saves = [other for other in self._next_saves if other.label != SAVE]
+        self._write_in_turn(job)
 
     def _save_job(self, save: SaveJob, path: str | PathLike[str], saved: Callable[[], None]) -> Job:
         def work(progress: Progress, _cancel: Cancel) -> Completion:
@@ -438,20 +465,27 @@ class BackgroundJobs:
         self._start_writing(Job("autosave", work))
 
     def write(self, label: str, write: Callable[[Progress], None], message: str) -> None:
-        """Write a file of another format, then show a message.
+        """Write a file of another format, then show a message; files are written in turn.
 
         Raises
         ------
         InvalidEdit
-            Another file is being written.
+            Too many files wait already.
         """
 
         def work(progress: Progress, _cancel: Cancel) -> Completion:
             write(progress)
             return lambda: self._show(message)
 
-        if not self._start_writing(Job(label, work)):
-            raise InvalidEdit("another file is being written; wait for it")
+        self._write_in_turn(Job(label, work))
+
+    def _write_in_turn(self, job: Job) -> None:
+        if self._start_writing(job):
+            return
+        if len(self._next_saves) == MAX_WAITING:
+            raise InvalidEdit("other files are being written; wait for them")
+        self._next_saves.append(job)
+        self._show(f"another file is being written; the {job.label} follows")
 
     def _start_writing(self, job: Job) -> bool:
         """Start to write a file, and return True, or return False while another one is being written."""
@@ -463,7 +497,8 @@ class BackgroundJobs:
     @property
     def saving(self) -> bool:
         """True while a save runs, or waits for another file."""
-        return self._next_save is not None or (self._saves.busy and self._saves.label == SAVE)
+        running = self._saves.busy and self._saves.label == SAVE
+        return running or any(job.label == SAVE for job in self._next_saves)
 
     @property
     def writing(self) -> bool:
@@ -488,10 +523,16 @@ class BackgroundJobs:
         return self._following
 
     @property
+    def waiting(self) -> int:
+        """Number of requests and files that follow the running jobs."""
+        return len(self._waiting) + len(self._next_saves)
+
+    @property
     def progress(self) -> str:
         """Running jobs and their progress, in plain words."""
         stages = (worker.progress for worker in (self._edits, self._saves) if worker.busy)
-        return ", ".join(f"{stage}: {100 * part:.0f} %" if part else f"{stage} …" for stage, part in stages)
+        shown = [f"{stage}: {100 * part:.0f} %" if part else f"{stage} …" for stage, part in stages]
+        return ", ".join([*shown, *([f"{self.waiting} more after it"] if self.waiting else [])])
 
     def poll(self, *, dragging: bool = False, timeout: float | None = 0.0) -> bool:
         """Complete finished jobs, and return True if a job ended.
@@ -506,6 +547,8 @@ class BackgroundJobs:
         saved = self._complete(self._saves, timeout, self._start_next_save)
         if dragging and not self._following:
             return saved
+        for one in self._waiting:  # before the edit changes what is selected
+            one.outdated |= one.context() != one.seen
         return self._complete(self._edits, timeout, self._start_next_edit) or saved
 
     def _complete(self, worker: Worker, timeout: float | None, start_next: Callable[[], None]) -> bool:
@@ -527,24 +570,31 @@ class BackgroundJobs:
         return ended
 
     def _start_next_save(self) -> None:
-        """Start the save that was requested while another one ran."""
-        job, self._next_save = self._next_save, None
-        if job is not None:
-            self._saves.start(job)
+        """Write the next file that was requested while another one was written."""
+        if self._next_saves:
+            self._saves.start(self._next_saves.pop(0))
 
     def _start_next_edit(self) -> None:
-        """Start the latest queued step, or run the callbacks that wait for an empty queue."""
+        """Start the latest queued step, or run the callbacks that wait for an empty queue, then requests."""
         request, self._latest = self._latest, None
         self._computing = self._following = False
         if request is not None:
             self.edit_latest(request.label, request.step)
         self._call_waiting()
+        for one in self._waiting:
+            one.seen = one.context()
+        while self._waiting and not self._edits.busy:
+            one = self._waiting.pop(0)
+            if one.outdated:
+                self._show(LEFT_OUT)
+            else:
+                one.repeat()
 
     def cancel(self) -> None:
         """Cancel the running edit; saves go on."""
         if self._edits.busy:
             self._edits.cancel()
-            self._latest = None
+            self._latest, self._waiting = None, []
             self._show("cancelled")
 
     def close(self) -> None:

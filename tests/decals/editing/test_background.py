@@ -17,7 +17,7 @@ from decals.editing import (
     TurnDecals,
 )
 from decals.editing.action_state import COMPILING
-from decals.editing.background import BUSY, step_of
+from decals.editing.background import BUSY, MAX_WAITING, step_of
 from decals.editing.document import Document, Edit
 from decals.errors import InvalidEdit
 from tests.decals.editing.background import LONG, Held, finish, press, threaded
@@ -172,24 +172,81 @@ def test_an_undo_that_something_came_before_takes_nothing_back() -> None:
     assert session.labels == ("scale", "scale")
 
 
-def test_one_edit_at_a_time_and_who_comes_next_is_told() -> None:
-    actions = threaded()
-    session = actions.state.session
-    session.do(TurnDecals([1], 5.0))
+def held_edit(actions: Any) -> Held:
+    """An edit that goes on in the thread."""
     held = Held(ScaleDecals(np.arange(60), 2.0))
     actions.state.background.edit("scale", held)
     assert held.begun.wait(LONG)
+    return held
+
+
+def test_requests_follow_the_running_edit_in_their_order() -> None:
+    actions = threaded()
+    session = actions.state.session
+    held = held_edit(actions)
     state = digest(session.document)
-    for action in ("relax", "scatter", "undo", "redo"):
-        actions.state.message = ""
+    for action in ("relax", "undo", "relax"):
         press(actions, action)
-        assert actions.state.message == BUSY
+        assert (actions.state.message, actions.state.refusal) == ("", "")
+    assert actions.state.background.waiting == 3
+    assert actions.state.background.progress == "scale …, 3 more after it"
     assert digest(session.document) == state
-    assert "scale" in actions.state.background.progress
     held.go.set()
     finish(actions)
-    assert session.labels == ("turn", "scale")
-    assert actions.state.background.progress == ""
+    assert (session.labels, session.undone_labels) == (("scale", "relax"), ())
+    assert (actions.state.background.waiting, actions.state.background.progress) == (0, "")
+
+
+def test_a_request_is_left_out_if_the_user_selects_something_else_meanwhile() -> None:
+    actions = threaded()
+    session = actions.state.session
+    actions.state.selection = (1, 2)
+    held = held_edit(actions)
+    press(actions, "relax")
+    actions.state.selection = (3,)
+    press(actions, "undo")
+    held.go.set()
+    finish(actions)
+    assert (session.labels, session.undone_labels) == ((), ("scale",))
+
+
+def test_a_request_follows_an_edit_that_selects_something() -> None:
+    actions = threaded()
+    session = actions.state.session
+    actions.state.selection = tuple(range(60))
+    press(actions, "duplicate")
+    press(actions, "scatter")
+    assert actions.state.background.waiting == 1
+    finish(actions)
+    assert session.labels == ("duplicate", "scatter")
+
+
+def test_repeated_and_too_many_requests_are_refused() -> None:
+    actions = threaded()
+    held = held_edit(actions)
+    press(actions, "thicker")  # a key that is held down
+    assert (actions.state.refusal, actions.state.message) == (BUSY, BUSY)
+    for _ in range(MAX_WAITING):
+        press(actions, "relax")
+        assert actions.state.refusal == ""
+    press(actions, "relax")
+    assert (actions.state.refusal, actions.state.background.waiting) == (BUSY, MAX_WAITING)
+    press(actions, "deselect")
+    assert actions.state.background.waiting == 0
+    held.go.set()
+    finish(actions)
+    assert actions.state.session.labels == ()
+
+
+def test_a_refusal_stays_until_the_next_request() -> None:
+    actions = threaded()
+    held = held_edit(actions)
+    press(actions, "thicker")
+    held.go.set()
+    finish(actions)
+    assert (actions.state.message, actions.state.refusal) == ("scale", BUSY)
+    press(actions, "undo")
+    assert actions.state.refusal == ""
 
 
 def test_an_undo_waits_for_the_steps_of_a_drag() -> None:

@@ -12,6 +12,7 @@ import decals
 from blobtree import Point
 from blobtree.pyvista_views import MESH_SUFFIXES
 from decals.editing import Actions, EditSession, PointerTools, ScaleDecals
+from decals.editing.background import MAX_WAITING
 from decals.errors import InvalidEdit
 from decals.scenes.files import load_scene, save_scene
 from tests.decals.editing.background import LONG, finish, hold_writing, press, threaded
@@ -144,7 +145,7 @@ def test_an_image_that_does_not_exist_is_named(typist: Typist) -> None:
     assert typist.state.prompt.open
 
 
-def test_an_export_waits_for_no_save(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_export_follows_a_save(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     actions = threaded(path=tmp_path / "scene.json")
     begun, go = hold_writing(monkeypatch)
     press(actions, "save")
@@ -152,12 +153,16 @@ def test_an_export_waits_for_no_save(tmp_path: Path, monkeypatch: pytest.MonkeyP
     typist = Typist(actions)
     typist.key("e", ctrl=True)
     typist.enter(f"{tmp_path}/mesh.stl")
-    assert "another file is being written" in actions.state.message
+    actions.files.write(f"{tmp_path}/scene.py", False)
+    assert "another file is being written; the export follows" in actions.state.message
+    assert actions.state.background.waiting == 2
+    for number in range(MAX_WAITING - 2):
+        actions.files.write(f"{tmp_path}/scene-{number}.py", False)
+    with pytest.raises(InvalidEdit, match="other files are being written"):
+        actions.files.write(f"{tmp_path}/one-more.py", False)
     go.set()
     finish(actions)
-    typist.key("Return")
-    finish(actions)
-    assert (tmp_path / "mesh.stl").exists()
+    assert {"scene.json", "mesh.stl", "scene.py", "scene-5.py"} <= {path.name for path in tmp_path.iterdir()}
 
 
 def test_opening_another_scene_begins_anew_and_keeps_unsaved_changes(tmp_path: Path) -> None:

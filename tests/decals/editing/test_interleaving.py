@@ -35,19 +35,36 @@ class ThreadedAndDirect:
         self.live, self.shadow = threaded(path=path), Actions(EditSession(scene()))
         self.path, self.saved = Path(path), None
         self.pending: Callable[[], None] | None = None
+        self.pressed: Any = None
+        self.requests: dict[Any, Any] = {}
+        self.attempt, self.live.state.attempt = self.live.state.attempt, self._attempt
 
     def press(self, key: Any, chosen: Any) -> None:
         numbers = self.live.state.session.document.decals.numbers
         selection = {"all": numbers, "one": numbers[:1], "two": numbers[-2:]}[chosen]
-        at, was_busy = surface_pick(self.live), self.live.state.background.busy_editing
-        entries = self.shadow.state.session.next_undo, self.shadow.state.session.next_redo
         self.live.state.selection = tuple(selection.tolist())
-        self.live.perform(key, lambda: at)
-        echo = partial(self._echo, key, tuple(selection.tolist()), at, entries)
-        if self.live.state.background.busy_editing and not was_busy:
+        self.pressed = key, surface_pick(self.live)
+        self.live.perform(key, lambda at=self.pressed[1]: at)
+
+    def _attempt(self, request: Any, *, waits: bool = True) -> None:
+        """Carry out a request, at once or after another one, and echo it once it is seen."""
+        background = self.live.state.background
+        if not background.busy_editing:
+            self._echo_pending()
+        key, at = self.requests.setdefault(request, self.pressed)
+        entries = self.shadow.state.session.next_undo, self.shadow.state.session.next_redo
+        echo = partial(self._echo, key, self.live.state.selection, at, entries)
+        was_busy, waiting = background.busy_editing, background.waiting
+        self.attempt(request, waits=waits)
+        if background.busy_editing and not was_busy:
             self.pending = echo
-        elif self.live.state.message != BUSY:
+        elif background.waiting == waiting and self.live.state.refusal != BUSY:
             echo()
+
+    def _echo_pending(self) -> None:
+        if self.pending is not None:
+            self.pending()
+            self.pending = None
 
     def _echo(self, key: Any, selection: Any, at: Any, entries: Any) -> None:
         """Do what was seen now; an undo only where nothing else came before it."""
@@ -59,9 +76,8 @@ class ThreadedAndDirect:
 
     def look(self) -> None:
         self.live.state.background.poll(timeout=LONG)
-        if not self.live.state.background.busy_editing and self.pending is not None:
-            self.pending()
-            self.pending = None
+        if not self.live.state.background.busy_editing:
+            self._echo_pending()
 
     def escape(self) -> None:
         self.live.state.background.cancel()
@@ -69,7 +85,7 @@ class ThreadedAndDirect:
 
     def save(self) -> None:
         self.saved = self.live.state.session.document.decals.decals.packed().tobytes()
-        self.live.perform("save", lambda: None)
+        self.live.files.save(lambda: None)
 
     def settle(self) -> None:
         while self.live.state.background.busy:

@@ -58,7 +58,7 @@ def test_who_asks_twice_to_save_gets_the_later_state(tmp_path: Path, monkeypatch
     path = tmp_path / "scene.json"
     actions, go = saving_twice(path, monkeypatch)
     session = actions.state.session
-    assert "a second save follows" in actions.state.message
+    assert "the save follows" in actions.state.message
     press(actions, "deselect")
     go.set()
     finish(actions)
