@@ -76,7 +76,7 @@ def opened(
         if decals is not None or seed is not None:
             raise InvalidInput("an empty scene has no decals; name a model, or leave out --decals and --seed")
         scene = empty_scene(image or DEFAULT_IMAGES, UPRIGHT[up or "y"])
-        path = path or (Path(model[0]) if model else new_file(Path(), "scene"))
+        path = path or (Path(model[0]) if model else new_file(Path(), "scene", recover=True))
     else:
         with progress_bars() as progress:
             progress(PREPARING, 0.0)
@@ -90,7 +90,7 @@ def opened(
                 options = ScatterOptions.from_arguments(decals, image, seed)
                 where = parse_view(None, axes_of(model[0]) if up is None else UPRIGHT[up])
                 scene = options.scene(loaded, where, pixels, progress)
-                path = path or new_file(Path(), f"{Path(model[0]).stem}-decals")
+                path = path or new_file(Path(), f"{Path(model[0]).stem}-decals", recover=True)
 
     def load_recovered(path: Path) -> Scene:
         recovered = load_models([str(path)], trust=trust)

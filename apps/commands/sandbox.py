@@ -139,7 +139,7 @@ def sandbox(
             window.show()
             server = serve(f"sandbox {id(window)}", client_type="vue3")
             in_lesson = lab or lessons is not None
-            start = not model and not in_lesson
+            start = not model and not in_lesson and not window.session.modified  # nothing was recovered
             page(server, window, in_lesson=in_lesson, start=start, done=done, shared=share)
             ready = server.controller.on_server_ready
             if done or session:

@@ -54,7 +54,7 @@ class LabPage(Page):
         values = {**super().values(), "in_lesson": self.sandbox.in_lesson}
         if self.sandbox.in_lesson:
             self.lab.refresh()
-            values |= self.lab.values()
+            values |= {**self.lab.values(), "title": self.lab.lesson.settings.title}
         elif self._shown.get("in_lesson"):
             self.lab.leave()
         return values
@@ -64,7 +64,7 @@ class LabPage(Page):
             client.Style(STYLE)
             with html.Div(v_if="!in_lesson"):
                 self._build_outline()
-            with html.Div(v_if="in_lesson", classes="pa-3"):
+            with html.Div(v_if="in_lesson", classes="pa-3 lesson-side"):
                 with html.Div(classes="d-flex align-center ga-1 mb-2"):
                     vuetify3.VSelect(
                         model_value=("lab_number",),
@@ -74,7 +74,7 @@ class LabPage(Page):
                     )
                     icon_button("mdi-restart", "start the lesson again", (self._restart, "[lab_number]"))
                     icon_button("mdi-close", "leave the lesson", self.sandbox.close_lesson)
-                html.Div(v_html=("lab_text",), classes="lesson")
+                html.Div(v_html=("lab_text",), classes="lesson", tabindex=0)
                 self._build_question()
                 build_controls("lab_sliders", self._set_value, "c.number", key="lab_number + c.name")
 

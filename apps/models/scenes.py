@@ -9,14 +9,18 @@ import numpy as np
 
 from decals import Camera, DecalImage, Scene
 from decals.apps.views import parse_view
+from decals.editing.recovery import recovery_path
 from decals.scenes.camera import Axes
 
 
-def new_file(folder: Path, name: str) -> Path:
-    """Return the first path that does not exist: NAME.json, NAME-2.json, ..."""
+def new_file(folder: Path, name: str, *, recover: bool = False) -> Path:
+    """Return the first path that does not exist: NAME.json, NAME-2.json, ...
+
+    Unless ``recover`` is True, nor do unsaved changes of it exist.
+    """
     endings = chain([""], (f"-{number}" for number in count(2)))
     paths = (folder / f"{name}{ending}.json" for ending in endings)
-    return next(path for path in paths if not path.exists())
+    return next(p for p in paths if not p.exists() and (recover or not recovery_path(p).exists()))
 
 
 def empty_scene(images: Sequence[str], axes: Axes) -> Scene:

@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 from decals import DecalImage, Scene, load_model
-from decals.editing.recovery import SUFFIX
+from decals.editing.recovery import SUFFIX, in_use
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.images import read_image
 from decals.scenes.objects import SceneObject
@@ -53,14 +53,15 @@ def listed(folder: Path) -> dict[str, list[dict[str, str]]]:
     """Return the files that a start page offers, the latest first: "recent" models and "recovered" ones.
 
     Each has a "name" relative to the folder and a "when". A recovered one stands for the unsaved changes of
-    the scene of its name.
+    the scene of its name, which no session shows.
     """
     found: dict[str, list[tuple[float, str]]] = {"recent": [], "recovered": []}
     for entry in _files(folder):
         name = os.path.relpath(entry.path, folder)
         when = entry.stat(follow_symlinks=False).st_mtime
         if name.endswith(SUFFIX):
-            found["recovered"].append((when, name.removesuffix(SUFFIX) + ".json"))
+            if not in_use(Path(entry.path)):
+                found["recovered"].append((when, name.removesuffix(SUFFIX) + ".json"))
         elif Path(name).suffix.lower() in MODELS:
             found["recent"].append((when, name))
     return {

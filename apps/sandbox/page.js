@@ -78,7 +78,49 @@
     },
   };
 
-  // The view shows an image without the text that screen readers ask for.
-  const describe = () => document.querySelectorAll("img:not([alt])").forEach((image) => (image.alt = ""));
-  new MutationObserver(describe).observe(document, { childList: true, subtree: true });
+  // Keys with Ctrl act from everywhere as in the view; in a field, only the one that saves, after the field's change.
+  document.addEventListener("keydown", (event) => {
+    const { key, ctrlKey, metaKey, shiftKey, target } = event;
+    const view = document.querySelector("[role=application]");
+    const typing = target.matches("input, textarea");
+    if (!(ctrlKey || metaKey) || view.contains(target) || !/^[aeisyz]$/i.test(key)) return;
+    if (typing && !/^s$/i.test(key)) return;
+    event.preventDefault();
+    if (typing) target.blur();
+    if (/^[ei]$/i.test(key) || (shiftKey && /^s$/i.test(key))) view.focus({ preventScroll: true });
+    view.dispatchEvent(new KeyboardEvent("keydown", { key, ctrlKey, metaKey, shiftKey }));
+  });
+
+  // Of the toolbar and of the outline, Tab reaches one button; arrows lead from it to the others.
+  const BUTTONS = "button, [role=button]";
+  const rove = (group, reached = group.reached) => {
+    const buttons = [...group.querySelectorAll(BUTTONS)];
+    group.reached = buttons.includes(reached) ? reached : buttons[0];
+    buttons.forEach((button) => (button.tabIndex = button === group.reached ? 0 : -1));
+    return buttons;
+  };
+  document.addEventListener("focusin", ({ target }) => {
+    const group = target.closest("[data-roving]");
+    if (group && target.matches(BUTTONS)) rove(group, target);
+  });
+  document.addEventListener("keydown", (event) => {
+    const { key, target } = event;
+    const group = target.matches(BUTTONS) && target.closest("[data-roving]");
+    const sideways = { ArrowLeft: -1, ArrowRight: 1 }[key];
+    const step = sideways ?? { ArrowUp: -1, ArrowDown: 1 }[key];
+    if (!group || !step) return;
+    const buttons = rove(group).filter((one) => sideways || one === target || one.matches("[role=button]"));
+    const next = buttons[buttons.indexOf(target) + step];
+    if (!next) return;
+    event.preventDefault();
+    event.stopPropagation();
+    next.focus();
+  }, true);
+
+  // The view shows an image without the text that screen readers ask for; new buttons join their group.
+  const complete = () => {
+    document.querySelectorAll("img:not([alt])").forEach((image) => (image.alt = ""));
+    document.querySelectorAll("[data-roving]").forEach((group) => rove(group));
+  };
+  new MutationObserver(complete).observe(document, { childList: true, subtree: true });
 })();

@@ -207,7 +207,7 @@ class Page:
                     html.Div(ABOVE_VIEW)
                 panels.build_start(self.sandbox)
                 with vuetify3.VFooter(app=True, height=28, classes="text-caption"):
-                    html.Span("{{ status }}", classes=("refused && 'refused'",), raw_attrs=['role="status"'])
+                    html.Span("{{ status }}", raw_attrs=['role="status" :class="{status: true, refused}"'])
 
     def _build_left_side(self) -> None:
         """Build what stands left of the view."""
@@ -229,8 +229,11 @@ class Page:
         self._build_history()
 
     def _build_toolbar(self) -> None:
-        with vuetify3.VAppBar(
-            density="compact", flat=True, border=True, height=(TOOLBAR_HEIGHT,), classes="toolbar"
+        with (
+            vuetify3.VAppBar(
+                density="compact", flat=True, border=True, height=(TOOLBAR_HEIGHT,), classes="toolbar"
+            ),
+            html.Div(style="display: contents", raw_attrs=['role="toolbar" data-roving', *named("'tools'")]),
         ):
             html.H1("{{ title }}", classes="text-h6 mx-3")
             if self._ends:
@@ -259,7 +262,7 @@ class Page:
     def _build_outline(self) -> None:
         vuetify3.VListSubheader("Outline", raw_attrs=['role="heading" aria-level="2"'])
         with (
-            vuetify3.VList(nav=True),
+            vuetify3.VList(nav=True, raw_attrs=["data-roving"]),
             html.Div(
                 v_for="row in outline",
                 key="row.key",
@@ -359,7 +362,7 @@ class Page:
                 click=self.sandbox.unwrap,
             )
         html.P(
-            "{{ outline.length > 1 ? 'Select a node in the outline.' : 'Add a primitive.' }}",
+            "{{ outline.length > 1 ? 'Select a node in the outline.' : 'Add a primitive or drop a model.' }}",
             v_if="!panel.kind",
             classes="pa-3 text-caption",
         )

@@ -27,6 +27,9 @@ DEFAULTS = {
 }
 """How elements look unless they say otherwise."""
 
+TILE_WIDTH = 120
+"""Width of a sample on the start page, in pixels: six fit beside each other."""
+
 BRUSH_ICONS = {
     Brush.SELECT: "mdi-cursor-default-outline",
     Brush.BOX: "mdi-selection-drag",
@@ -95,11 +98,10 @@ def build_controls(source: str, event: Any, who: str, *, key: str = "c.name") ->
     key
         Expression that tells the control from those of another selection.
     """
-    with html.Div(v_for=f"c in {source}", key=key, classes="mb-2"):
+    with html.Div(v_for=f"c in {source}", key=key, title=("c.doc",), classes="mb-2"):
         html.Label(
             "{{ c.label }}{{ c.unit ? ', ' + c.unit : '' }}",
             v_if="c.kind !== 'switch'",
-            title=("c.doc",),
             classes="text-caption",
         )
         with html.Div(v_if="c.kind === 'number' || c.kind === 'field'", classes="d-flex align-center"):
@@ -147,7 +149,6 @@ def build_controls(source: str, event: Any, who: str, *, key: str = "c.name") ->
             v_if="c.kind === 'switch'",
             model_value=("c.value",),
             label=("c.label",),
-            title=("c.doc",),
             update_modelValue=(event, f"[{who}, $event, true]"),
             color="primary",
         )
@@ -189,7 +190,7 @@ def build_start(sandbox: Sandbox) -> None:
             with (
                 html.Div(v_for="name in start.samples", key="name"),
                 vuetify3.VCard(
-                    width=140,
+                    width=TILE_WIDTH,
                     variant="outlined",
                     click=(sandbox.open_sample, "[name]"),
                     raw_attrs=named("'sample ' + name"),
@@ -216,7 +217,7 @@ def build_start(sandbox: Sandbox) -> None:
 
 
 def _start_tile(icon: str, text: str, click: Any) -> None:
-    with vuetify3.VCard(width=140, variant="outlined", click=click, raw_attrs=named(f"'{text}'")):
+    with vuetify3.VCard(width=TILE_WIDTH, variant="outlined", click=click, raw_attrs=named(f"'{text}'")):
         with html.Div(classes="d-flex align-center justify-center", style="height: 88px"):
             vuetify3.VIcon(icon, size=40)
         html.Div(text, classes="text-caption text-center pa-1")

@@ -461,6 +461,7 @@ class Sandbox:
         self._window.background.require_idle()
         if not self.in_lesson and self._window.document.objects:
             self._before_lesson = self._window.session.next_undo, self.display.kept_camera()
+            self._files.set_aside()
         self._start_lesson(number)
         self.in_lesson, self._start = True, {**self._start, "open": False}
 
@@ -477,6 +478,7 @@ class Sandbox:
             while session.labels and session.next_undo is not entry:
                 session.undo()
             self.display.restore_camera(camera)
+            self._files.take_back()
 
         self.attempt(lambda: self._when_idle(step))
 
@@ -484,7 +486,7 @@ class Sandbox:
     def new_model(self) -> None:
         """Begin an empty scene."""
         scene = empty_scene(FIRST_IMAGES, UPRIGHT["y"])
-        self._open(lambda *_: scene, new_file(self._folder, "scene"))
+        self._open(lambda *_: scene, "scene")
 
     @event
     def open_sample(self, name: str) -> None:
@@ -495,7 +497,7 @@ class Sandbox:
             direction = axes_of(name).preset(THREE_QUARTER)
             return cover(sample(name), images=FIRST_IMAGES, view_direction=direction, progress=progress)
 
-        self._open(load, new_file(self._folder, f"{name}-decals"))
+        self._open(load, f"{name}-decals")
 
     @event
     def open_file(self, name: str) -> None:
@@ -514,7 +516,7 @@ class Sandbox:
             return found if isinstance(found, Scene) else _bare_scene(found)
 
         is_scene = path.suffix == ".json" and (not path.exists() or is_scene_file(path))
-        self._open(load, path if is_scene else new_file(self._folder, f"{path.stem}-decals"))
+        self._open(load, path if is_scene else f"{path.stem}-decals")
 
     def upload(self, files: object, key: str = "") -> None:
         """Take files that were dropped on the page: images and models are added, a scene is opened.
@@ -532,7 +534,7 @@ class Sandbox:
         if key == LIGHT or (not key and file_name.lower().endswith(HDR)):
             self._take_light(found, file)
         elif isinstance(found, Scene):
-            self._open(lambda *_: found, new_file(self._folder, name))
+            self._open(lambda *_: found, name)
         elif isinstance(found, DecalImage):
             self._take_image(found, key)
         else:
@@ -593,8 +595,10 @@ class Sandbox:
         shown = (numbers[0], numbers[1]) if len(numbers) == 2 else None
         self._files.write(name.strip(), bool(replace_existing), size=shown, video=video)
 
-    def _open(self, load: Callable[[Progress, Cancel], Scene], path: Path) -> None:
-        self._files.open(load, path)
+    def _open(self, load: Callable[[Progress, Cancel], Scene], path: Path | str) -> None:
+        """Open a scene that belongs to a path, or to a new file of a name."""
+        self._files.recovery.keep()  # so that its name is taken
+        self._files.open(load, new_file(self._folder, path) if isinstance(path, str) else path)
         self.in_lesson, self._before_lesson = False, None
         self._start = {**self._start, "open": False}
         self.display.bookmarks.clear()

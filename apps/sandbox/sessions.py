@@ -29,6 +29,9 @@ MAX_MEGABYTES = 4000.0
 CHECK_SECONDS = 5.0
 """Time between two looks at idle sessions and their memory."""
 
+COOKIE_SECONDS = 30 * 24 * 3600
+"""Time for which a browser that was closed finds its session again."""
+
 STOP_SECONDS = 20.0
 """Time in which a session must have kept its changes."""
 
@@ -271,7 +274,7 @@ class Sessions:
             response = await self._file(session, request)
         else:
             response = _page("The session starts.", refresh=True)
-        response.set_cookie(self._cookie, key, httponly=True, samesite="Strict")
+        response.set_cookie(self._cookie, key, max_age=COOKIE_SECONDS, httponly=True, samesite="Strict")
         return response
 
     async def _open(self, key: str) -> bool:

@@ -167,6 +167,8 @@ class ActionState:
         waits
             If True, a request that another edit blocks follows that edit, unless the selection changes.
         """
+        if self.message == self.refusal:
+            self.message = ""
         self.refusal = ""
         try:
             request()

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from enum import StrEnum
+from itertools import chain, count
 from os import PathLike
 from pathlib import Path
 
@@ -93,6 +94,8 @@ class FileActions(WindowActions):
         self.screenshot: Callable[[], UInt8Array] | None = None
         self.folder: Path | None = None
         self.recovery = self._recovery_beside(path)
+        self._exists = path is not None and Path(path).exists()
+        self._aside: tuple[str | PathLike[str] | None, RecoveryFile, bool] | None = None
         self._closing = False
         self._discarded: object = NOTHING
 
@@ -112,11 +115,20 @@ class FileActions(WindowActions):
 
     @Group.SCENE.action("save", "Ctrl+s", summary="save")
     def save(self, cursor: Cursor) -> None:
-        """Save the scene; a scene without a file asks for its name."""
+        """Save the scene; a scene without a file asks for its name.
+
+        If another program has written the file of a new scene meanwhile, the name gets a number.
+        """
         if self.path is None:
             self.save_as(cursor)
         else:
-            self._save_to(self.path)
+            self._save_to(self._own_path(self.path))
+
+    def _own_path(self, path: str | PathLike[str]) -> Path:
+        """Return the path of the scene's file, or one with a number if a new scene would replace a file."""
+        numbered = (Path(path).with_stem(f"{Path(path).stem}-{number}") for number in count(2))
+        names = chain([Path(path)], numbered)
+        return next(name for name in names if self._exists or not name.exists())
 
     @Group.SCENE.action("save_as", "Ctrl+Shift+s", summary="save to another file")
     def save_as(self, _cursor: Cursor) -> None:
@@ -135,7 +147,7 @@ class FileActions(WindowActions):
     def _save_to(self, path: str | PathLike[str]) -> None:
         def saved() -> None:
             self.recovery.belong_to(path)
-            self.path = path
+            self.path, self._exists = path, True
 
         self._state.background.save(path, self.camera(), saved)
 
@@ -180,7 +192,7 @@ class FileActions(WindowActions):
             What a video shows; see `Video`.
         """
         path, shows = self._checked_path(text, suffixes), member("video", video, Video, InvalidEdit)
-        own = self.path is not None and path.absolute() == Path(self.path).absolute()
+        own = self._exists and self.path is not None and path.absolute() == Path(self.path).absolute()
         if not own:
             _refuse_to_replace(path, replace)
         suffix = path.suffix.lower()
@@ -241,7 +253,7 @@ class FileActions(WindowActions):
         def done() -> None:
             if len(session.labels) == entries + 1:
                 session.forget_history()
-            self.path = path
+            self.path, self._exists = path, path.exists()
             self.recovery = self._recovery_beside(path)
             if recover:
                 self.recover(load_scene)
@@ -250,7 +262,27 @@ class FileActions(WindowActions):
         if session.modified:
             self.recovery.keep()
         self.recovery.release()
+        self._leave_aside()
         state.background.compute(f"open {path.name}", compute, done)
+
+    def set_aside(self) -> None:
+        """Keep the scene's file and its unsaved changes as they are while another scene is shown."""
+        if self._aside is None:
+            self.recovery.keep()
+            self._aside = self.path, self.recovery, self._exists
+            self.path, self.recovery, self._exists = None, self._recovery_beside(None), False
+
+    def take_back(self) -> None:
+        """Continue with the file that was set aside, if one was."""
+        if self._aside is not None:
+            self.recovery.remove()
+            (self.path, self.recovery, self._exists), self._aside = self._aside, None
+
+    def _leave_aside(self) -> None:
+        """Leave unsaved changes that were set aside to the next window."""
+        if self._aside is not None:
+            self._aside[1].release()
+            self._aside = None
 
     @Group.SCENE.action("add_image", "Ctrl+i", summary="add an image for decals")
     def add_image(self, _cursor: Cursor) -> None:
@@ -340,6 +372,7 @@ class FileActions(WindowActions):
         else:
             self.recovery.keep()
             self.recovery.release()
+        self._leave_aside()
 
     def _discard_changes(self) -> None:
         """Note that the present changes may be lost; later ones count again."""
@@ -355,7 +388,7 @@ class FileActions(WindowActions):
         if self.path is None:
             self._ask_for_name(self._save_before_closing)
         else:
-            self._save_before_closing(self.path)
+            self._save_before_closing(self._own_path(self.path))
 
     def _save_before_closing(self, path: str | PathLike[str]) -> None:
         self._save_to(path)

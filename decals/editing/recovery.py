@@ -61,6 +61,21 @@ def recovery_path(path: str | PathLike[str], *, number: int = 1) -> Path:
     return scene.with_name(f"{scene.stem}{ending}{SUFFIX}")
 
 
+def in_use(path: Path) -> bool:
+    """Return True if a window has a recovery file."""
+    try:
+        lock = FileLock.acquire(_lock_path(path))
+    except OSError:
+        return False
+    if lock is not None:
+        lock.release()
+    return lock is None
+
+
+def _lock_path(path: Path) -> Path:
+    return path.with_name(f".{path.name}.lock")
+
+
 class RecoveryFile:
     """Keeps a recovery file while a session has unsaved changes; each window of a scene has its own.
 
@@ -119,7 +134,7 @@ class RecoveryFile:
     def _acquire(self, path: Path) -> bool:
         """Take a recovery file for this window, unless another one has it."""
         try:
-            self._lock = FileLock.acquire(path.with_name(f".{path.name}.lock"))
+            self._lock = FileLock.acquire(_lock_path(path))
         except OSError:  # nor can the recovery file be written there
             self._path = path
             return True

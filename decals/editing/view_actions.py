@@ -69,7 +69,9 @@ class ViewActions(WindowActions):
         up = self.axes.up if upright else -np.sign(parts[1]) * np.array(self.axes.front)
         self._state.camera.look(parts @ self.axes.matrix, up)
 
-    @Group.CAMERA.action("frame", "Home", summary="show what is selected, or everything, as large as fits")
+    @Group.CAMERA.action(
+        "frame", "f", "Home", summary="show what is selected, or everything, as large as fits"
+    )
     def frame(self, _cursor: Cursor) -> None:
         """Show the selected decals or node, or the whole scene, as large as it fits."""
         state, document = self._state, self._state.session.document

@@ -42,7 +42,7 @@ class VisibilityActions(WindowActions):
             session.do(ShowDecals())
         self._state.message = "everything is shown"
 
-    @Group.SCENE.action("isolate", "f", summary="hide everything else")
+    @Group.SCENE.action("isolate", "Shift+f", summary="hide everything else")
     def isolate(self, cursor: Cursor) -> None:
         """Hide all decals but the selected ones; else all but the node, or the object under the cursor."""
         if self._state.selection:

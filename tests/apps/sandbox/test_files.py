@@ -50,6 +50,10 @@ def test_the_start_page_lists_samples_files_and_recovered_sessions(
 ) -> None:
     blobtree.save(BALL, tmp_path / "ball.json")
     (tmp_path / "lost.recovery.json").write_text("{}")
+    window.session.do(ScaleDecals([1], 2.0))
+    shown = window.actions.files.recovery.keep()  # of this session, which goes on
+    assert shown is not None
+    assert shown.exists()
     (tmp_path / ".hidden.json").write_text("{}")
     (tmp_path / "notes.txt").write_text("")
     (tmp_path / "more").mkdir()
@@ -65,7 +69,7 @@ def test_the_start_page_lists_samples_files_and_recovered_sessions(
     finish(window)
     values = sandbox.values()
     assert (values["start"]["open"], values["outline"][0]["kind"], values["done"]) == (False, "image", [])
-    assert values["title"] == "scene.json"
+    assert values["title"] == "scene-2.json"  # that of the former scene is for its unsaved changes
     assert listed(tmp_path / "none") == {"recent": [], "recovered": []}
 
 

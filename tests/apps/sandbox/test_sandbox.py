@@ -90,6 +90,7 @@ def test_lessons_are_started_and_left(window: EditWindow) -> None:
     sandbox = Sandbox(window, start=True, lessons=["One", "Two"], start_lesson=start)
     before, camera = digest(window.document), window.plotter.camera.position
     assert sandbox.values()["start"]["lessons"] == ["One", "Two"]
+    window.actions.files.path = "mine.json"
     wrong: list[Any] = [2, -1, True, None, "0", []]
     for number in wrong:
         sandbox.open_lesson(number)
@@ -98,8 +99,10 @@ def test_lessons_are_started_and_left(window: EditWindow) -> None:
     sandbox.open_lesson(1)
     assert (started, sandbox.in_lesson, sandbox.values()["start"]["open"]) == ([1], True, False)
     sandbox.open_lesson(0)
+    assert sandbox.values()["title"] == "*untitled"  # the scene's file is not that of the lesson
     sandbox.close_lesson()
     assert not sandbox.in_lesson
+    assert sandbox.values()["title"] == "mine.json"
     assert (digest(window.document), window.plotter.camera.position) == (before, camera)
     assert len(sandbox.values()["undone"]) == 2
     sandbox.open_lesson(0)
@@ -359,7 +362,7 @@ def test_wrong_events_say_why_and_change_nothing(window: EditWindow) -> None:
     sandbox.set_control("node", "radius", 0.5)
     assert "no node is selected" in sandbox.status
     assert sandbox.values()["refusals"] == 1  # fields show their values again
-    for key in ("0/7", "9", "x", "object x", None, 3, "image 0"):
+    for key in ("0/7", "9", "x", "object x", None, 3, "image 7"):
         sandbox.select(key)  # type: ignore[arg-type]
         assert "expected" in sandbox.status
     sandbox.select("0/1")
@@ -371,6 +374,7 @@ def test_wrong_events_say_why_and_change_nothing(window: EditWindow) -> None:
         assert "expected" in sandbox.status
     for event, value in ((sandbox.add, "No"), (sandbox.wrap, "Sum"), (sandbox.combine, "Union")):
         event(value)
+        finish(window)
         assert "expected" in sandbox.status or "select" in sandbox.status
     sandbox.unwrap()
     assert "one operand" in sandbox.status

@@ -91,6 +91,9 @@ def test_each_browser_has_a_session_of_its_own(folder: Path) -> None:
         async with browser() as one, browser() as two:
             for client, number in ((one, "1"), (two, "2"), (one, "1")):
                 assert await opened(client, url) == f"session {number} /index.html"
+                async with client.get(url) as answer:  # also a browser that was closed meanwhile
+                    (cookie,) = answer.cookies.values()
+                    assert int(cookie["max-age"]) > 7 * 24 * 3600
                 assert (await text(client, f"{url}/a.js"))[1] == f"session {number} /a.js"
                 async with client.ws_connect(f"{url}/ws") as socket:
                     await socket.send_bytes(b"x" * 300_000)

@@ -245,8 +245,9 @@ def test_a_refusal_stays_until_the_next_request() -> None:
     held.go.set()
     finish(actions)
     assert (actions.state.message, actions.state.refusal) == ("scale", BUSY)
-    press(actions, "undo")
-    assert actions.state.refusal == ""
+    actions.state.refuse(InvalidEdit("no"))
+    actions.state.attempt(lambda: None)
+    assert (actions.state.message, actions.state.refusal) == ("", "")
 
 
 def test_an_undo_waits_for_the_steps_of_a_drag() -> None:

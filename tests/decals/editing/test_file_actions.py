@@ -13,6 +13,7 @@ from blobtree import Point
 from blobtree.pyvista_views import MESH_SUFFIXES
 from decals.editing import Actions, EditSession, PointerTools, ScaleDecals
 from decals.editing.background import MAX_WAITING
+from decals.editing.recovery import in_use
 from decals.errors import InvalidEdit
 from decals.scenes.files import load_scene, save_scene
 from tests.decals.editing.background import LONG, finish, hold_writing, press, threaded
@@ -163,6 +164,44 @@ def test_an_export_follows_a_save(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     go.set()
     finish(actions)
     assert {"scene.json", "mesh.stl", "scene.py", "scene-5.py"} <= {path.name for path in tmp_path.iterdir()}
+
+
+def test_a_new_scene_never_replaces_a_file_of_another_window(tmp_path: Path) -> None:
+    first, second = (Actions(EditSession(scene()), path=tmp_path / "scene.json") for _ in range(2))
+    first.state.session.do(ScaleDecals([1], 2.0))
+    for actions in (first, second, first, second):
+        press(actions, "save")
+    assert first.files.title == "scene.json"
+    assert second.files.title == "scene-2.json"
+    radii = [load_scene(tmp_path / name).decals.radii[1] for name in ("scene.json", "scene-2.json")]
+    assert radii[0] == pytest.approx(2 * radii[1])
+
+
+def test_a_scene_that_is_set_aside_keeps_its_file_and_its_unsaved_changes(tmp_path: Path) -> None:
+    path, unsaved = tmp_path / "scene.json", tmp_path / "scene.recovery.json"
+    actions = Actions(EditSession(scene()), path=path)
+    files, session = actions.files, actions.state.session
+    session.do(ScaleDecals([1], 2.0))
+    radius = session.document.decals[1].radii[0]
+    files.set_aside()
+    files.set_aside()
+    assert (files.path, files.title) == (None, "*untitled")
+    session.do(ScaleDecals([1], 3.0))
+    files.update()
+    files.recovery.keep()
+    assert load_scene(unsaved).decals.radii[1] == radius
+    assert in_use(unsaved)
+    session.undo()
+    files.take_back()
+    assert (files.path, load_scene(unsaved).decals.radii[1]) == (path, radius)
+    press(actions, "save")
+    assert path.exists()
+    assert not unsaved.exists()
+    session.do(ScaleDecals([1], 4.0))
+    files.set_aside()
+    files.finish()
+    assert not in_use(unsaved)
+    assert load_scene(unsaved).decals.radii[1] == pytest.approx(4 * radius)
 
 
 def test_opening_another_scene_begins_anew_and_keeps_unsaved_changes(tmp_path: Path) -> None:
