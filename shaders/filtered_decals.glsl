@@ -7,7 +7,7 @@ const int ELASTIC = 3;
 const bool PARTED = decal_nested && decal_contact == ELASTIC;  // small decals part the images of larger ones
 const int MANY = 100;
 const int MAX_BOUNDARIES = 2;  // through a pixel whose shares are computed
-const int SIDE_PARTS = 4;      // parts of each side of pixels with more
+const int SIDE_PARTS = 4;      // parts of each side of pixels with more, if both sides are about equally long
 const float MAX_SIDE = 0.15;   // of a pixel or a part of one, in visible radii
 ivec2 pixel_parts = ivec2(1);  // along the sides of a listed pixel, as far as its first drawing has found them
 const vec3 EVERYWHERE = vec3(1.0, 0.0, 0.0);  // line with the whole pixel on its inner side
@@ -380,6 +380,13 @@ ivec2 parts_beside(int owner, vec3 right, vec3 up) {
     return ivec2(clamp(ceil(vec2(length(right), length(up)) / longest), 1.0, float(SIDE_PARTS)));
 }
 
+// Parts of a pixel with many boundaries: SIDE_PARTS², in shape close to squares.
+ivec2 parts_at_boundaries(vec3 right, vec3 up) {
+    float ratio = length(up) / max(length(right), 1e-30);
+    int across = ratio > 2.0 ? SIDE_PARTS / 2 : ratio < 0.5 ? 2 * SIDE_PARTS : SIDE_PARTS;
+    return ivec2(across, SIDE_PARTS * SIDE_PARTS / across);
+}
+
 // Premultiplied linear colour of the owner and the decals below it, averaged over a pixel or a part of one. `share` is
 // that of the part, `boundaries` those through it.
 vec4 layers_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, float share, out int boundaries) {
@@ -396,7 +403,8 @@ vec4 layers_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, float share,
         if (!decal_layered) {
             break;
         }
-        owner = owner_below(q, n, rank_of(owner, decal_records), next_number_below(owner, decal_records),
+        vec3 left = q + centre.x * right + centre.y * up;  // upper decals may cover q alone
+        owner = owner_below(left, n, rank_of(owner, decal_records), next_number_below(owner, decal_records),
             decal_contact);
     }
     return color;
@@ -426,7 +434,7 @@ vec4 exact_color(vec3 q, vec3 n, vec3 right, vec3 up) {
         }
         int boundaries;
         vec4 color = layers_average(owner, point, n, part_right, part_up, 1.0 / float(parts.x * parts.y), boundaries);
-        parts = whole && boundaries > MAX_BOUNDARIES ? ivec2(SIDE_PARTS) : parts;
+        parts = whole && boundaries > MAX_BOUNDARIES ? parts_at_boundaries(right, up) : parts;
         if (whole && parts != ivec2(1)) {
             i = -1;
 #ifdef MATERIALS

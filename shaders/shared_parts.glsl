@@ -38,7 +38,7 @@ vec4 part_color(Surface surface, int i, inout ivec2 parts) {
     int boundaries;
     vec4 color = layers_average(owner, q, surface.normal, right, up, share, boundaries);
     if (whole && boundaries > MAX_BOUNDARIES) {
-        parts = ivec2(SIDE_PARTS);
+        parts = parts_at_boundaries(surface.right, surface.up);
     }
     return color;
 }

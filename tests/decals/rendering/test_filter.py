@@ -87,6 +87,16 @@ def test_one_sample_a_pixel_is_near_the_mean(
         assert apart.max() <= 9.1
 
 
+@pytest.mark.parametrize("target", [(-1.32, 1.06, 0.0), (-1.35, 1.09, 0.0)])
+def test_two_layers_whose_rims_meet_in_grazing_pixels(drawer: Renderer, target: tuple[float, ...]) -> None:
+    """The upper decal covers the middle of parts in which the lower one ends as well."""
+    view = flat_view(85, "layers")
+    view = replace(view, camera=replace(view.camera, target=target, fov=0.8))
+    options = RenderOptions((24, 12), samples=1, filtered=True, lights=FLAT)
+    pixels = drawer.render(view, options)[..., :3]
+    assert np.abs(pixels - expected_picture(view, (24, 12), samples=256)).max() <= 5
+
+
 SLOPES = st.tuples(*[st.floats(-1, 1)] * 2).filter(lambda a: max(map(abs, a)) > 1e-3)
 
 
