@@ -1,8 +1,7 @@
 """From models to a scene in one call: decals over all of them, and a camera that shows them."""
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Iterable, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -15,7 +14,7 @@ from decals.rendering.options import SceneLike, is_scene_like, relief_ranges
 from decals.scattering.orientation import Direction
 from decals.scattering.scatter import scatter
 from decals.scattering.sizing import Sizing
-from decals.scenes.camera import THREE_QUARTER, Camera, Vector
+from decals.scenes.camera import THREE_QUARTER, UPRIGHT, Camera, Vector
 from decals.scenes.files import load_model
 from decals.scenes.objects import SceneObject, as_objects
 from decals.scenes.recipe import Recipe
@@ -23,15 +22,6 @@ from decals.scenes.scene import Scene, as_images
 from decals.surfaces.convert import Model
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import describe, instance, member
-
-UPWARD: Mapping[str, tuple[Vector, Vector]] = MappingProxyType(
-    {
-        "x": ((1.0, 0.0, 0.0), (0.35, -0.55, 1.0)),
-        "y": ((0.0, 1.0, 0.0), THREE_QUARTER),
-        "z": ((0.0, 0.0, 1.0), (0.55, -1.0, 0.35)),
-    }
-)
-"""For each axis that may point upward: its direction, and the direction from three-quarters in front."""
 
 FRAMING_SAMPLES = 2000
 """Points per object that the camera is fitted to."""
@@ -100,10 +90,10 @@ def cover(
     >>> len(scene.decals)
     12
     """
-    if not isinstance(up, str) or up not in UPWARD:
+    if not isinstance(up, str) or up not in UPRIGHT:
         raise InvalidScene(f"up: expected 'x', 'y' or 'z', got {describe(up)}")
-    upward, toward = UPWARD[up]
-    toward = toward if view_direction is None else view_direction
+    axes = UPRIGHT[up]
+    toward = axes.preset("three-quarter") if view_direction is None else view_direction
     rule = member("sizing", sizing, Sizing, InvalidScattering)
     with reporting(progress) as report:
         report("reading models and images", 0.0)
@@ -126,7 +116,7 @@ def cover(
         )
         heights = relief_ranges(pictures)[decals.images, 1] * decals.radii
         raised = float(heights.max(initial=0.0))
-        camera = fitting_camera(objects, direction=toward, up=upward, raised=raised)
+        camera = fitting_camera(objects, direction=toward, up=axes.up, raised=raised)
     recipe = Recipe.of(
         "decals.cover",
         seed=seed,
@@ -146,7 +136,7 @@ def fitting_camera(
     objects: Sequence[SceneObject],
     *,
     direction: Vector = THREE_QUARTER,
-    up: Vector = UPWARD["y"][0],
+    up: Vector = UPRIGHT["y"].up,
     aspect: float = 4 / 3,
     raised: float = 0.0,
 ) -> Camera:

@@ -18,7 +18,7 @@ from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.values import fields_of, left_out
 from decals.errors import InvalidScene
 from decals.images.builtin import is_builtin
-from decals.model import Decals
+from decals.model import COLUMNS, Decals
 from decals.rendering.environment import Environment
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Background, Drawing
@@ -30,23 +30,6 @@ from decals.scenes.scene import DecalImage, Scene
 
 MAX_ROWS = 2000
 """Decals that a script lists as text; more stand in the file of arrays."""
-
-COLUMNS = (
-    "positions",
-    "normals",
-    "tangents",
-    "radii",
-    "images",
-    "spill",
-    "interactions",
-    "layers",
-    "tints",
-    "opacities",
-    "receivers",
-    "fade_angles",
-    "fade_depths",
-)
-
 
 LIMITS = COLUMNS[-3:]
 """Columns that are written if some decals have them."""
