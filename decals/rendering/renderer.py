@@ -414,14 +414,7 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
     formulas, materials, relief = None, has_materials(scene), has_relief(scene)
     light = light_variant(options.lights, environment, materials=materials, relief=relief)
     if has_decals:
-        formulas = (
-            options.contact,
-            scene.decals.layered,
-            is_limited(scene),
-            uploads.nested(scene),
-            _is_filtered(scene, options),
-            options.mapping is ImageMapping.WALKED,
-        )
+        formulas = options.contact, *_variant(uploads, scene, options).values()
     tasks = [WarmupTask(SHADERS, partial(context.probe, backend)) for backend in PassBackend]
     tasks += [task for plan in objects for task in plan.tasks]
     tasks += [WarmupTask(SHAPES, partial(uploads.drawable, item)) for item in drawn_objects(scene)]
@@ -503,11 +496,15 @@ def _library(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> str:
     """Return the formulas of the decals; nothing for a scene without decals."""
     if not len(scene.decals):
         return ""
-    return decal_library(
-        options.contact,
-        layered=scene.decals.layered,
-        limited=is_limited(scene),
-        nested=uploads.nested(scene),
-        walked=options.mapping is ImageMapping.WALKED,
-        filtered=_is_filtered(scene, options),
-    )
+    return decal_library(options.contact, **_variant(uploads, scene, options))
+
+
+def _variant(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> dict[str, bool]:
+    """Return the arguments of `decal_library` for a scene with decals."""
+    return {
+        "layered": scene.decals.layered,
+        "limited": is_limited(scene),
+        "nested": uploads.nested(scene),
+        "walked": options.mapping is ImageMapping.WALKED,
+        "filtered": _is_filtered(scene, options),
+    }

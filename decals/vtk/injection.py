@@ -122,7 +122,7 @@ class Injection:
         self._mapper.SetVBOShiftScaleMethod(NO_SHIFT_SCALE)
         self._subplot = weakref.ref(subplot)
         self._additions = ShaderAdditions(actor)
-        self._variant: tuple[AnyContact, bool, bool, bool] | None = None
+        self._library = ""
         self._code: dict[ShaderTag, str] = {}
         self._written = False
         injection = weakref.ref(self)
@@ -145,17 +145,10 @@ class Injection:
             return
         self._add_normals()  # the mapper's input may have been replaced
         subplot, data, _ = source
-        variant = subplot.contact, data.layered, data.limited, data.nested
-        if variant != self._variant:
-            self._variant, self._code = (
-                variant,
-                _code(
-                    decal_library(
-                        subplot.contact, layered=data.layered, limited=data.limited, nested=data.nested
-                    ),
-                    self._paint,
-                ),
-            )
+        variant = {"layered": data.layered, "limited": data.limited, "nested": data.nested}
+        library = decal_library(subplot.contact, **variant)  # computed once for each variant
+        if library != self._library:
+            self._library, self._code = library, _code(library, self._paint)
         self._additions.write(self._code)
         self._written = True
 
