@@ -347,6 +347,10 @@ class Document:
         """Return an object by its index, or raise `InvalidEdit`."""
         return self.objects[whole_number("object", number, 0, len(self.objects) - 1, InvalidEdit)]
 
+    def objects_with(self, number: int, item: SceneObject) -> tuple[SceneObject, ...]:
+        """Return the objects with another one at an index."""
+        return (*self.objects[:number], item, *self.objects[number + 1 :])
+
     # -- forks ------------------------------------------------------------------------------------------
 
     def fork(self) -> "Document":

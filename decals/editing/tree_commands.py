@@ -79,10 +79,13 @@ class PrimitiveCommand:
 
     def tree(self, document: Document) -> Node:
         """Return the object's tree, or raise `InvalidEdit`."""
+        return self._item(document).tree
+
+    def _item(self, document: Document) -> TreeObject:
         item = document.object(self.object)
         if not isinstance(item, TreeObject):
             raise InvalidEdit(f"expected a BlobTree, object {item.name!r} is a mesh")
-        return item.tree
+        return item
 
     def compute_exchange(
         self, document: Document, node: Node, offset: ArrayLike = (0.0, 0.0, 0.0), *, quick: bool = False
@@ -100,12 +103,10 @@ class PrimitiveCommand:
         quick
             If True, the tree is not checked for a visible surface.
         """
-        before = self.tree(document)
-        after = with_node(before, self.path, node)
-        item = self._exchanged(document, after)
+        item = self._exchanged(document, node)
         if not truth("quick", quick, InvalidEdit):
             item.surface  # noqa: B018  # raises for a tree without a visible surface
-        objects = self._with_object(document, item)
+        objects = document.objects_with(self.object, item)
         numbers, points = followers(
             document, self.object, tuple(self.path), item, np.asarray(offset, np.float64)
         )
@@ -114,18 +115,13 @@ class PrimitiveCommand:
 
     def compute_repainting(self, document: Document, node: Node) -> Edit:
         """Return the edit that puts a node of the same shape at the path."""
-        item = self._exchanged(document, with_node(self.tree(document), self.path, node))
-        return document.compute_parts(objects=self._with_object(document, item))
+        item = self._exchanged(document, node)
+        return document.compute_parts(objects=document.objects_with(self.object, item))
 
-    def _exchanged(self, document: Document, tree: Node) -> TreeObject:
-        """Return the command's object with another tree."""
-        before = document.objects[self.object]
-        assert isinstance(before, TreeObject)
-        return with_tree(before, tree)
-
-    def _with_object(self, document: Document, item: SceneObject) -> tuple[SceneObject, ...]:
-        """Return the document's objects with the command's object exchanged."""
-        return (*document.objects[: self.object], item, *document.objects[self.object + 1 :])
+    def _exchanged(self, document: Document, node: Node) -> TreeObject:
+        """Return the command's object with another node at the path."""
+        item = self._item(document)
+        return with_tree(item, with_node(item.tree, self.path, node))
 
 
 @dataclass(frozen=True, eq=False)
@@ -676,7 +672,7 @@ class RenameObject:
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
         renamed = flagged(document.object(self.number), name=self.name)
-        objects = (*document.objects[: self.number], renamed, *document.objects[self.number + 1 :])
+        objects = document.objects_with(self.number, renamed)
         check_names(objects)
         return document.compute_parts(objects=objects)
 

@@ -229,13 +229,13 @@ class RenameNode:
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
-        item, objects = document.object(self.object), list(document.objects)
+        item = document.object(self.object)
         if not isinstance(item, TreeObject):
             raise InvalidEdit(f"expected a BlobTree, object {item.name!r} is a mesh; rename the object")
         node_at(item.tree, self.path)  # raises InvalidNode if the path leads to no node
         names = _renamed(item.names, tuple(self.path), self.name)
-        objects[self.object] = flagged(item, names=names)
-        return Edit() if names == item.names else document.compute_parts(objects=tuple(objects))
+        objects = document.objects_with(self.object, flagged(item, names=names))
+        return Edit() if names == item.names else document.compute_parts(objects=objects)
 
 
 @dataclass(frozen=True, eq=False)
