@@ -166,7 +166,6 @@ def _row(
         "texels": texel_lines(texels),
         "call": f"{source.function.key}({', '.join(['x', *readings])})",
     }
-    value_name = f"custom_{kind}_value_gradient_{digest}"
     scope: dict[str, Any] = {source.function.key: source.function}
     body = _GIVEN.format(**shared)
     if claims.derived:
@@ -174,8 +173,7 @@ def _row(
         scope[derivative.key] = derivative
         rest = "".join(f", {reading}" for reading in readings)
         body = _DERIVED.format(derivative=derivative.key, rest=rest)
-    value_gradient = generated(value_name, _VALUE.format(name=value_name, body=body, **shared), scope)
-    bounds_name = f"custom_{kind}_bounds_{digest}"
+    value_gradient = generated(kind, digest, "value_gradient", _VALUE, scope, body=body, **shared)
     slope, called = bound_call(claims.steepest, ("x", "radius"), readings)
     scope = {source.function.key: source.function, **called}
     value = shared["call"] if claims.derived else f"{shared['call']}[0]"
@@ -183,8 +181,7 @@ def _row(
     if claims.interval is not None:
         call, called = bound_call(claims.interval, ("x", "radius"), readings)
         between, scope = f"    r = {call}\n", {**scope, **called}
-    text = _BOUNDS.format(name=bounds_name, slope=slope, range=between, **shared)
-    bounds = generated(bounds_name, text, scope)
+    bounds = generated(kind, digest, "bounds", _BOUNDS, scope, slope=slope, range=between, **shared)
     return FieldKind(kind, value_gradient, bounds, texels, windowed=True, digest=digest)
 
 

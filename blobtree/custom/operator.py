@@ -323,16 +323,11 @@ def _directed_row(kind: str, digest: str, source: CustomSource, claims: Claims) 
     texts |= _slots(len(source.parameters) - 4)
     scope: dict[str, Any] = {function.key: function, envelope.function.key: envelope.function}
     scope |= {"UNBOUNDED": UNBOUNDED, "widened_range": widened_range}
-
-    def made(part: str, template: str) -> wp.Function:
-        name = f"custom_{kind}_{part}_{digest}"
-        return generated(name, template.format(name=name, **texts), scope)
-
     return Operator(
         kind,
-        made("partials", _DIRECTED_PARTIALS),
-        made("slope", _DIRECTED_SLOPE),
-        made("range", _DIRECTED_RANGE),
+        generated(kind, digest, "partials", _DIRECTED_PARTIALS, scope, **texts),
+        generated(kind, digest, "slope", _DIRECTED_SLOPE, scope, **texts),
+        generated(kind, digest, "range", _DIRECTED_RANGE, scope, **texts),
         cast("wp.Function", shape.choice),
         commutes=False,
         starts_from_zero=claims.like == "blend",
@@ -363,21 +358,16 @@ def _row(kind: str, digest: str, source: CustomSource, claims: Claims) -> Operat
     else:
         texts["steepest"] = f"{bound.function.key}(max_a, max_b{texts['extra']})"
         scope[bound.function.key] = bound.function
-
-    def made(part: str, template: str) -> wp.Function:
-        name = f"custom_{kind}_{part}_{digest}"
-        return generated(name, template.format(name=name, **texts), scope)
-
-    partials = made("partials", _PARTIALS)
+    partials = generated(kind, digest, "partials", _PARTIALS, scope, **texts)
     texts["partials"] = partials.key
     scope[partials.key] = partials
     return Operator(
         kind,
         partials,
-        made("slope", _SLOPE),
+        generated(kind, digest, "slope", _SLOPE, scope, **texts),
         monotone_range(partials, falls_with_b=claims.like == "difference")
         if claims.monotone
-        else made("range", _RANGE),
+        else generated(kind, digest, "range", _RANGE, scope, **texts),
         cast("wp.Function", shape.choice),
         commutes=claims.order_free,
         starts_from_zero=claims.like == "blend",

@@ -153,10 +153,10 @@ def _row(
     """Return the row of the table, with functions generated around the user's."""
     readings, texels = tape_readings(parameters, skipped=INFLUENCE_SLOT)
     texels = max(texels, 1)
-    name = f"custom_{kind}_closest_{digest}"
-    call = f"{source.function.key}({', '.join(['q', *readings])})"
-    text = _CLOSEST.format(name=name, texels=texel_lines(texels), call=call, influence=INFLUENCE_SLOT)
-    closest = generated(name, text, {source.function.key: source.function})
+    texts = {"texels": texel_lines(texels), "influence": str(INFLUENCE_SLOT)}
+    texts["call"] = f"{source.function.key}({', '.join(['q', *readings])})"
+    scope = {source.function.key: source.function}
+    closest = generated(kind, digest, "closest", _CLOSEST, scope, **texts)
     smallest = cast(wp.Function, min_influence_of_one)
     return Skeleton(kind, closest, smallest, texels, folds_maps=False, convex=convex, digest=digest)
 

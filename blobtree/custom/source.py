@@ -119,9 +119,13 @@ def node_class(
     return node_type
 
 
-def generated(name: str, source: str, scope: dict[str, Any]) -> wp.Function:
-    """Return the typed function `name` of a generated source."""
-    return warp_function(defined(name, source, {"wp": wp, **scope, "__name__": f"blobtree.custom.{name}"}))
+def generated(
+    kind: str, digest: str, part: str, template: str, scope: dict[str, Any], **texts: str
+) -> wp.Function:
+    """Return the typed function of a template, a part of a custom kind; `scope` has what it calls."""
+    name = f"custom_{kind}_{part}_{digest}"
+    known = {"wp": wp, **scope, "__name__": f"blobtree.custom.{name}"}
+    return warp_function(defined(name, template.format(name=name, **texts), known))
 
 
 def _python_function(function: Any) -> FunctionType:

@@ -15,6 +15,7 @@ import inspect
 import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -205,23 +206,20 @@ def _row(
 ) -> SpaceWarp:
     """Return the row of the table, with functions generated around the user's."""
     readings, count = tape_readings(parameters, FIRST_NUMBER)
-    texels = texel_lines(count if parameters else 0)
-
-    def made(part: str, template: str, functions: list[wp.Function], **parts: str) -> wp.Function:
-        name = f"custom_{kind}_{part}_{digest}"
-        text = template.format(name=name, texels=texels, **parts)
-        return generated(name, text, {function.key: function for function in functions})
-
+    made = partial(generated, kind, digest, texels=texel_lines(count if parameters else 0))
     rest = "".join(f", {reading}" for reading in readings)
-    forward = made("forward", _FORWARD, [source.function], call=f"{source.function.key}(q{rest})")
+    function = source.function
+    forward = made("forward", _FORWARD, {function.key: function}, call=f"{function.key}(q{rest})")
     if claims.pullback is None:
-        derivative = directional_derivative(source.function, [next(iter(source.parameters))])
-        pullback = made("pullback", _DERIVED, [derivative], derivative=derivative.key, rest=rest)
+        derivative = directional_derivative(function, [next(iter(source.parameters))])
+        scope = {derivative.key: derivative}
+        pullback = made("pullback", _DERIVED, scope, derivative=derivative.key, rest=rest)
     else:
         function = claims.pullback.function
-        pullback = made("pullback", _GIVEN, [function], call=f"{function.key}(q, g{rest})")
+        call = f"{function.key}(q, g{rest})"
+        pullback = made("pullback", _GIVEN, {function.key: function}, call=call)
     call, called = bound_call(claims.stretch, ("q", "reach"), readings)
-    stretch = made("stretch", _STRETCH, list(called.values()), call=call)
+    stretch = made("stretch", _STRETCH, called, call=call)
     return SpaceWarp(kind, forward, pullback, stretch, claims.box, digest=digest)
 
 
