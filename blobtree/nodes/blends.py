@@ -24,7 +24,7 @@ from blobtree.formulas.gradient_blends import GRADIENT_BLEND
 from blobtree.lazy import Lazy
 from blobtree.nodes.parameters import Parameter, Quantity
 from blobtree.nodes.tree import (
-    LARGEST_EXPONENT,
+    EXPONENT,
     AssociativeCombination,
     Intersection,
     Macro,
@@ -81,16 +81,7 @@ class SuperellipticBlend(AssociativeCombination):
     operator = SUPERELLIPTIC
 
     width: Annotated[float, _WIDTH] = field(kw_only=True)
-    exponent: Annotated[
-        float,
-        Parameter(
-            Quantity.FACTOR,
-            "exponent n",
-            low=1.0,
-            high=LARGEST_EXPONENT,
-            hint="1 is the sum; for more use a union",
-        ),
-    ] = field(kw_only=True)
+    exponent: Annotated[float, EXPONENT] = field(kw_only=True)
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array
 from blobtree.errors import InvalidNode
+from blobtree.nodes.numeric_parameters import nodes_with_paths
 from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.primitives import Cone, Leaf, Point, Segment
 from blobtree.nodes.tree import Node, Transform
@@ -29,14 +30,7 @@ Path = tuple[int, ...]
 def primitive_paths(tree: Node) -> list[Path]:
     """Return the paths of all primitives, from left to right."""
     checked_tree(tree)
-    paths: list[Path] = []
-    pending: list[tuple[Path, Node]] = [((), tree)]
-    while pending:
-        path, node = pending.pop()
-        if isinstance(node, Leaf):
-            paths.append(path)
-        pending.extend(((*path, i), child) for i, child in reversed(list(enumerate(node.children))))
-    return paths
+    return [path for path, node in nodes_with_paths(tree) if isinstance(node, Leaf)]
 
 
 def nodes_along(tree: Node, path: Path) -> Iterator[Node]:

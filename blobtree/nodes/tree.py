@@ -1010,6 +1010,16 @@ class Intersection(AssociativeCombination):
     operator = INTERSECTION
 
 
+EXPONENT = Parameter(
+    Quantity.FACTOR,
+    "exponent n",
+    low=1.0,
+    high=LARGEST_EXPONENT,
+    hint="1 is the sum; for more use a union",
+)
+"""Exponent of the sum of powers in a blend."""
+
+
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class Ricci(AssociativeCombination):
     """Blend F = (Σ fᵢⁿ)^(1/n) (Ricci 1973): exponent 1 is the sum, a large one nears the union.
@@ -1026,16 +1036,7 @@ class Ricci(AssociativeCombination):
     file_tag = "ricci"
     operator = RICCI
 
-    exponent: Annotated[
-        float,
-        Parameter(
-            Quantity.FACTOR,
-            "exponent n",
-            low=1.0,
-            high=LARGEST_EXPONENT,
-            hint="1 is the sum; for more use a union",
-        ),
-    ] = field(kw_only=True)
+    exponent: Annotated[float, EXPONENT] = field(kw_only=True)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

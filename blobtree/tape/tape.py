@@ -208,16 +208,16 @@ def _texels(
             yield _warp_texels(WARP, step, of_warps[id(step)], instruction_set)
         case LeaveWarp(entry):
             yield _warp_texels(UNWARP, entry, of_warps[id(entry)], instruction_set)
-        case Run(FieldKind() as kind, _, operator, parameters, primitives):
-            code = instruction_set.fields.index(kind) + FIELD
+        case Run(kind, stretched, operator, parameters, primitives):
             parameter = _parameter(parameters, region)
+            if isinstance(kind, FieldKind):
+                code = instruction_set.fields.index(kind) + FIELD
+                texels = _field_texels(primitives, instruction_set, region)
+            else:
+                code = instruction_set.skeletons.index(kind) + (STRETCHED if stretched else 0)
+                texels = _primitive_texels(primitives, instruction_set, region, stretched=stretched)
             yield np.array([[code, instruction_set.operators.index(operator), len(primitives), parameter]])
-            yield _field_texels(primitives, instruction_set, region)
-        case Run(Skeleton() as kind, stretched, operator, parameters, primitives):
-            code = instruction_set.skeletons.index(kind) + (STRETCHED if stretched else 0)
-            parameter = _parameter(parameters, region)
-            yield np.array([[code, instruction_set.operators.index(operator), len(primitives), parameter]])
-            yield _primitive_texels(primitives, instruction_set, region, stretched=stretched)
+            yield texels
 
 
 def _parameter(parameters: tuple[float, ...], region: DataRegion) -> float:
