@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from blobtree._typing import BoolArray, Float32Array, IndexArray, Int64Array
+from blobtree._typing import BoolArray, Float32Array, Int64Array
 from blobtree.cells.sparse_cells import SparseCells
 from blobtree.meshing.adaptive_cell_kernels import write_polygons
 from blobtree.meshing.adaptive_cells import AdaptiveCells
@@ -78,10 +78,13 @@ class AdaptivePasses:
         np.maximum.at(result, owners[largest], np.broadcast_to(errors[:, None], owners.shape)[largest])
         return result
 
-    def _divisions(self) -> IndexArray:
-        """Return how often each leaf is to be divided to meet the chord error."""
-        ratio = self._errors / (ALLOWED_SHARE * self.allowed)
-        times: IndexArray = np.ceil(0.5 * np.log2(np.maximum(ratio, 1.0))).astype(np.intp)
+    def _divisions(self, scale: float = 1.0) -> Float32Array:
+        """Return how often each leaf is to be divided to meet the chord error.
+
+        `scale` is the size of all leaves over the present one.
+        """
+        ratio = np.maximum(scale**2 * self._errors / (ALLOWED_SHARE * self.allowed), 1.0)
+        times: Float32Array = np.ceil(0.5 * np.log2(ratio))
         return times
 
     def expected_triangles(self, divisions: int | None = None, scale: float = 1.0) -> float:
@@ -89,8 +92,7 @@ class AdaptivePasses:
 
         `scale` is the size of all leaves over the present one.
         """
-        ratio = np.maximum(scale**2 * self._errors / (ALLOWED_SHARE * self.allowed), 1.0)
-        times = np.ceil(0.5 * np.log2(ratio))
+        times = self._divisions(scale)
         if divisions is not None:
             times = np.minimum(times, divisions)
         return float(2.0 * (4.0**times).sum() / scale**2)

@@ -158,13 +158,7 @@ def max_curvatures(positions: Float32Array, normals: Float32Array) -> Float64Arr
     return curvatures
 
 
-def smooth_crosses(
-    positions: Float32Array,
-    normals: Float32Array,
-    directions: Float64Array,
-    *,
-    rounds: int = SMOOTHING_ROUNDS,
-) -> Float64Array:
+def smooth_crosses(positions: Float32Array, normals: Float32Array, directions: Float64Array) -> Float64Array:
     """Turn tangents by quarter turns, and as little more as makes neighbours agree, ``float64[n, 3]``.
 
     A cross looks the same after a quarter turn, so its fourth power is averaged among neighbours, as in
@@ -180,7 +174,7 @@ def smooth_crosses(
     turns = np.where(valid, turns / np.maximum(np.abs(turns), 1e-12), 0.0) ** 4
     angles = np.einsum("nj,nj->n", directions, first) + 1j * np.einsum("nj,nj->n", directions, second)
     crosses = _phases(angles) ** 4
-    for _ in range(rounds):
+    for _ in range(SMOOTHING_ROUNDS):
         crosses = _phases(crosses + (turns * crosses[indices]).sum(axis=1))
     roots = np.exp(0.25j * np.angle(crosses))
     smooth: Float64Array = roots.real[:, None] * first + roots.imag[:, None] * second
