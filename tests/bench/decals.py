@@ -21,6 +21,7 @@ import argparse
 import json
 import platform
 import sys
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
@@ -65,6 +66,14 @@ def graphics() -> str:
     return f"{processor}; {card}; {versions('numpy', 'warp-lang', 'moderngl')}"
 
 
+def printed(figures: Figures, targets: Mapping[str, str], machine: str, *, width: int = 28) -> Figures:
+    """Print figures with their targets, and the machine on which they were measured; return them."""
+    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", machine, sep="\n")
+    for name, value in figures.items():
+        print(f"{name:{width}} {value:12.4g}  {targets.get(name, '')}".rstrip())
+    return figures
+
+
 def measure_index(device: str) -> Figures:
     """Measure the index on a device, and print the figures."""
     import warp as wp
@@ -73,22 +82,15 @@ def measure_index(device: str) -> Figures:
     from tests.bench import decal_index
 
     start_warp()
-    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}")
-    print(f"{wp.get_device(device).name}; numpy {version('numpy')}, warp {wp.__version__}", flush=True)
-    figures = decal_index.measure(device)
-    for name, value in figures.items():
-        print(f"{name:28} {value:12.4g}  {decal_index.TARGETS.get(name, '')}".rstrip())
-    return figures
+    machine = f"{wp.get_device(device).name}; numpy {version('numpy')}, warp {wp.__version__}"
+    return printed(decal_index.measure(device), decal_index.TARGETS, machine)
 
 
 def measure_million(*, quick: bool) -> Figures:
     """Render a million decals, and print the figures."""
     from tests.bench import decal_figures
 
-    figures = decal_figures.million((320, 240) if quick else (800, 600))
-    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", graphics(), sep="\n")
-    print(*(f"{name:28} {value:12.4g}" for name, value in figures.items()), sep="\n")
-    return figures
+    return printed(decal_figures.million((320, 240) if quick else (800, 600)), {}, graphics())
 
 
 def measure_faults(seed: int, *, quick: bool) -> Figures:
@@ -96,54 +98,35 @@ def measure_faults(seed: int, *, quick: bool) -> Figures:
     from tests.bench import decal_faults
 
     figures = decal_faults.measure(seed, quick=quick)
-    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", versions("numpy", "warp-lang"), sep="\n")
-    for name, value in figures.items():
-        print(f"{name:28} {value:12.4g}  {decal_faults.TARGETS.get(name, '')}".rstrip())
-    return figures
+    return printed(figures, decal_faults.TARGETS, versions("numpy", "warp-lang"))
 
 
 def measure_pixels(seed: int, *, quick: bool) -> Figures:
     """Count pixels of covered models without an image, and print the figures."""
     from tests.bench import decal_pixels
 
-    figures = decal_pixels.measure(seed, quick=quick)
-    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", graphics(), sep="\n")
-    for name, value in figures.items():
-        print(f"{name:28} {value:12.4g}  {decal_pixels.TARGETS.get(name, '')}".rstrip())
-    return figures
+    return printed(decal_pixels.measure(seed, quick=quick), decal_pixels.TARGETS, graphics())
 
 
 def measure_contact(*, quick: bool) -> Figures:
     """Compare the contact modes, and print the figures."""
     from tests.bench import contact_modes
 
-    figures = contact_modes.measure(quick=quick)
-    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", graphics(), sep="\n")
-    for name, value in figures.items():
-        print(f"{name:28} {value:12.4g}  {contact_modes.TARGETS.get(name, '')}".rstrip())
-    return figures
+    return printed(contact_modes.measure(quick=quick), contact_modes.TARGETS, graphics())
 
 
 def measure_filter(*, quick: bool) -> Figures:
     """Compare one filtered sample a pixel with many, and print the figures."""
     from tests.bench import filtering
 
-    figures = filtering.measure(quick=quick)
-    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", graphics(), sep="\n")
-    for name, value in figures.items():
-        print(f"{name:28} {value:12.4g}  {filtering.TARGETS.get(name, '')}".rstrip())
-    return figures
+    return printed(filtering.measure(quick=quick), filtering.TARGETS, graphics())
 
 
 def measure_walk(*, quick: bool) -> Figures:
     """Measure the walked image mapping, and print the figures."""
     from tests.bench import walking
 
-    figures = walking.measure(quick=quick)
-    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", graphics(), sep="\n")
-    for name, value in figures.items():
-        print(f"{name:28} {value:12.4g}  {walking.TARGETS.get(name, '')}".rstrip())
-    return figures
+    return printed(walking.measure(quick=quick), walking.TARGETS, graphics())
 
 
 def measure_paper(part: str, *, quick: bool) -> Figures:
@@ -151,10 +134,7 @@ def measure_paper(part: str, *, quick: bool) -> Figures:
     from tests.bench import paper_methods, paper_octree
 
     measure = paper_octree.measure if part == "octree" else paper_methods.measure
-    figures = measure(quick=quick)
-    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", graphics(), sep="\n")
-    print(*(f"{name:36} {value:12.4g}" for name, value in figures.items()), sep="\n")
-    return figures
+    return printed(measure(quick=quick), {}, graphics(), width=36)
 
 
 def measure_peers(*, quick: bool) -> Figures:

@@ -25,8 +25,8 @@ from blobtree._typing import Float32Array, Float64Array
 from tests.blobtree.custom import field_kernels as kernels
 from tests.blobtree.custom_kinds import Lump, Waves
 from tests.blobtree.meshing.test_polygonize import assert_closed
-from tests.blobtree.tape.evaluations import bounds_at
 from tests.blobtree.trees import points_around
+from tests.bounds import assert_bounds_hold
 from tests.oracles import direct_fields
 
 LUMP = Lump((0.2, 0.0, 0.1), (3.0, 2.5, 3.0), (0.1, 0.2, 0.0), 0.6, color=(1, 0, 0))
@@ -60,19 +60,7 @@ def test_values_and_gradients_are_those_of_float64(node: Node) -> None:
 
 @EACH
 def test_bounds_hold(node: Node) -> None:
-    rng = np.random.default_rng(2)
-    centers = points_around(rng, node, 200)
-    reach = (10.0 ** rng.uniform(-3.0, 0.3, 200)).astype(np.float32)
-    bounds = bounds_at(node.tape, centers, reach)[:, 1]
-    for _ in range(10):
-        offsets = rng.normal(size=(200, 3))
-        offsets *= (reach * rng.uniform(0, 1, 200) / np.linalg.norm(offsets, axis=1))[:, None]
-        change = np.abs(value(node, centers + offsets) - value(node, centers))
-        assert (change <= bounds * np.linalg.norm(offsets, axis=1) + 1e-6).all()
-    for center, radius in zip(centers[:40], reach[:40], strict=True):
-        smallest, largest = node.interval(center - radius, center + radius)
-        inside = value(node, rng.uniform(center - radius, center + radius, (100, 3)))
-        assert smallest - 1e-6 <= inside.min() <= inside.max() <= largest + 1e-6
+    assert_bounds_hold(node, value, np.random.default_rng(2), count=200, rounding=1e-6)
 
 
 @EACH

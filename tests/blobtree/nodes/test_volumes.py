@@ -29,8 +29,8 @@ from blobtree._typing import Float64Array
 from blobtree.nodes.paths import moved, resized
 from blobtree.nodes.samples import Samples
 from tests.blobtree.meshing.test_polygonize import assert_closed
-from tests.blobtree.tape.evaluations import bounds_at
 from tests.blobtree.trees import points_around
+from tests.bounds import assert_bounds_hold
 from tests.oracles.blobtree import value
 
 
@@ -85,19 +85,7 @@ def test_a_sampled_ball_is_a_point() -> None:
 
 @EACH
 def test_bounds_hold(node: Volume) -> None:
-    rng = np.random.default_rng(4)
-    centers = points_around(rng, node, 300)
-    reach = (10.0 ** rng.uniform(-3.0, 0.3, 300)).astype(np.float32)
-    bounds = bounds_at(node.tape, centers, reach)[:, 1]
-    for _ in range(10):
-        offsets = rng.normal(size=(300, 3))
-        offsets *= (reach * rng.uniform(0, 1, 300) / np.linalg.norm(offsets, axis=1))[:, None]
-        change = np.abs(value(node, centers + offsets) - value(node, centers))
-        assert (change <= bounds * np.linalg.norm(offsets, axis=1) + 1e-5).all()
-    for center, radius in zip(centers[:50], reach[:50], strict=True):
-        smallest, largest = node.interval(center - radius, center + radius)
-        inside = value(node, rng.uniform(center - radius, center + radius, (200, 3)))
-        assert smallest - 1e-5 <= inside.min() <= inside.max() <= largest + 1e-5
+    assert_bounds_hold(node, value, np.random.default_rng(4), count=300, rounding=1e-5)
 
 
 @EACH
