@@ -25,7 +25,7 @@ from decals.images.texels import decode_srgb
 from decals.index.editor import DecalEditor
 from decals.index.index import DecalIndex
 from decals.model import Decals
-from decals.rendering.options import Drawing, ImageLike, SceneLike, drawing_of
+from decals.rendering.options import Drawing, ImageLike, SceneLike, drawing_of, modes_of
 from decals.scenes.cover import scene_or_objects
 from decals.scenes.objects import SceneObject
 from decals.scenes.origin import WORLD
@@ -131,8 +131,7 @@ def bake(
         if not objects:
             raise InvalidScene("expected at least one object to bake, got none; add a mesh or a BlobTree")
         meshes = [bake_mesh(item, resolution=resolution, creases=creases, report=report) for item in objects]
-        shown = drawing.contact, drawing.mapping, drawing.stiffness
-        colors = SurfaceColors(meshes, objects, decals, images, *shown)
+        colors = SurfaceColors(meshes, objects, decals, images, drawing)
         maps = None
         if vertex_colors:
             nodes = _colored_nodes(meshes, colors, report)
@@ -172,8 +171,8 @@ class SurfaceColors:
         The decals on them.
     images : sequence of images
         Images of the decals.
-    contact, mapping, stiffness
-        See `bake`.
+    drawing : Drawing
+        Has the modes of the decals.
     """
 
     def __init__(
@@ -182,17 +181,13 @@ class SurfaceColors:
         objects: Sequence[object],
         decals: Decals | DecalEditor,
         images: Sequence[ImageLike],
-        contact: AnyContact,
-        mapping: ImageMapping,
-        stiffness: float,
+        drawing: Drawing,
     ) -> None:
         self._meshes, self._objects, self._decals = meshes, objects, decals
         self.has_materials = any(hasattr(image, "surface_texels") for image in images)
         self._materials = list(images)
         self._images = [DecalImage(f"image {i}", image.pixels) for i, image in enumerate(images)]
-        self._contact, self._mapping, self._stiffness = contact, mapping, stiffness
-        self._index = DecalIndex.of(decals) if isinstance(decals, Decals) else None
-        self._walks = walks_for(mapping, decals, objects)
+        self._options = evaluation_options(drawing, decals, objects)
 
     def at(
         self, number: int, points: Float32Array, normals: Float32Array, tangents: Float32Array | None = None
@@ -206,14 +201,10 @@ class SurfaceColors:
             self._decals,
             points,
             normals,
-            mapping=self._mapping,
-            contact=self._contact,
-            stiffness=self._stiffness,
-            index=self._index,
             images=self._images if tangents is None else self._materials,
             materials=tangents is not None,
             on=self._objects[number],
-            walks=self._walks,
+            **self._options,
         )
         over = samples.color
         assert over is not None  # there are images, if only an empty list of them
@@ -221,6 +212,14 @@ class SurfaceColors:
         if tangents is None or samples.materials is None:
             return colors
         return surface_values(colors, samples.materials, normals, tangents)
+
+
+def evaluation_options(
+    drawing: Drawing, decals: Decals | DecalEditor, objects: Sequence[object]
+) -> dict[str, Any]:
+    """Return the arguments of `evaluate` that are the same everywhere on some objects."""
+    index = DecalIndex.of(decals) if isinstance(decals, Decals) else None
+    return modes_of(drawing) | {"index": index, "walks": walks_for(drawing.mapping, decals, objects)}
 
 
 def _textured_node(mesh: BakeMesh, part: Unwrapped, size: int, tangents: bool) -> Node:

@@ -15,17 +15,14 @@ from blobtree.meshing.polygonize import polygonize
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.pyvista_views import MESH_SUFFIXES, to_polydata, write_polydata
 from blobtree.validation import truth
-from decals.baking.bake import SUFFIX, SurfaceColors, bake
+from decals.baking.bake import SUFFIX, SurfaceColors, bake, evaluation_options
 from decals.baking.meshes import bake_mesh
 from decals.errors import InvalidMesh, InvalidScene
 from decals.field.evaluate import evaluate
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.field.walks import Walks, walks_for
 from decals.images.texels import encode_srgb
-from decals.index.index import DecalIndex
 from decals.model import Decals
-from decals.rendering.options import Drawing
 from decals.scenes.cover import as_scene
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject
 from decals.scenes.pose import PosedMesh, PosedScene
@@ -62,8 +59,7 @@ class DisplacedScene(PosedScene):
         """Return all objects as one mesh with normals and the colours of surface and decals, as "RGB"."""
         with reporting() as report:
             meshes = [bake_mesh(item, resolution=None, creases=False, report=report) for item in self.objects]
-        modes = self.drawing.contact, self.drawing.mapping, self.drawing.stiffness
-        colors = SurfaceColors(meshes, self.objects, self.decals, self.images, *modes)
+        colors = SurfaceColors(meshes, self.objects, self.decals, self.images, self.drawing)
         first, *others = (
             to_polydata(
                 Mesh(
@@ -179,7 +175,7 @@ def displace(
             f"scene: expected a Scene at rest, got a {type(scene).__name__}; heights move surfaces at rest"
         )
     known = as_scene(scene)
-    modes = known.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping)
+    drawing = known.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping)
     if edge_length is not None:
         edge_length = real_number("edge_length", edge_length, "a length above 0", _is_positive, InvalidScene)
     creases = truth("creases", creases, InvalidScene)
@@ -194,8 +190,7 @@ def displace(
     if sum(fewest) > subdivide.MAX_FACES:
         raise subdivide.too_many(f"about {sum(fewest):.2g}")
     objects: list[SceneObject | PosedMesh] = []
-    index = DecalIndex.of(known.decals)
-    walks = walks_for(modes.mapping, known.decals, known.objects)
+    options = evaluation_options(drawing, known.decals, known.objects) | {"images": known.images}
     with reporting(progress, cancel) as report:
         for number, item in enumerate(known.objects):
             report_part = partial(_report_part, report, number, len(known.objects))
@@ -209,10 +204,12 @@ def displace(
             for first in range(0, len(normals), BLOCK):
                 report_part("reading heights", first / len(normals))
                 at = slice(first, first + BLOCK)
-                heights[at] = _heights(known, modes, index, walks, item, rest.vertices[at], normals[at])
+                found = evaluate(known.decals, rest.vertices[at], normals[at], on=item, **options)
+                assert found.height is not None  # there are images with relief
+                heights[at] = found.height
             moved = (rest.vertices + heights[:, None].astype(np.float64) * normals).astype(np.float32)
             objects.append(PosedMesh(rest, moved, colors) if heights.any() else item)
-    return DisplacedScene(tuple(objects), known.decals, known.images, known.camera, modes)
+    return DisplacedScene(tuple(objects), known.decals, known.images, known.camera, drawing)
 
 
 def _report_part(report: Progress, number: int, count: int, stage: str, fraction: float) -> None:
@@ -222,31 +219,6 @@ def _report_part(report: Progress, number: int, count: int, stage: str, fraction
 
 def _is_positive(value: float) -> bool:
     return value > 0.0
-
-
-def _heights(
-    scene: Scene,
-    modes: Drawing,
-    index: DecalIndex,
-    walks: Walks | None,
-    item: SceneObject,
-    points: Float32Array,
-    normals: Float32Array,
-) -> Float32Array:
-    heights = evaluate(
-        scene.decals,
-        points,
-        normals,
-        mapping=modes.mapping,
-        contact=modes.contact,
-        stiffness=modes.stiffness,
-        index=index,
-        walks=walks,
-        images=scene.images,
-        on=item,
-    ).height
-    assert heights is not None  # there are images with relief
-    return heights
 
 
 class _Edges:

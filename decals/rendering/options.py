@@ -164,6 +164,11 @@ class Drawing:
         return RenderOptions(size, **{field.name: getattr(self, field.name) for field in fields(Drawing)})
 
 
+def modes_of(drawing: Drawing) -> dict[str, Any]:
+    """Return contact mode, image mapping and stiffness, as arguments of `decals.evaluate`."""
+    return {"contact": drawing.contact, "mapping": drawing.mapping, "stiffness": drawing.stiffness}
+
+
 @dataclass(frozen=True)
 class RenderOptions(Drawing):
     """Everything that decides a picture besides its scene and viewpoint: a `Drawing`, and the size.

@@ -16,6 +16,7 @@ from decals.field.law import AnyContact
 from decals.field.mapping import IMAGE_RADIUS_SQUARED, ImageMapping
 from decals.field.walks import walks_for
 from decals.model import Decals, Interaction
+from decals.rendering.options import modes_of
 from decals.scattering.domain import Domain, apportion
 from decals.scattering.neighbors import FacingTree, ideal_spacing, spacing_of_distances
 from decals.scenes.objects import MeshObject, SceneObject
@@ -207,7 +208,6 @@ def measure(
     if not scene.objects:
         raise InvalidScene("expected a scene with an object to measure, got none; add one")
     drawing = scene.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping)
-    modes = {name: getattr(drawing, name) for name in ("contact", "stiffness", "mapping")}
     walks = walks_for(drawing.mapping, scene.decals, scene.objects)
     with reporting(progress) as report:
         report("measuring", 0.0)
@@ -220,7 +220,7 @@ def measure(
         for number, item in enumerate(scene.objects):
             rows = np.flatnonzero(points.surface_ids == number)
             for part, normals, turns in _drawn(item, points.positions[rows], points.normals[rows], scene):
-                sums.add(part, normals, turns, modes | {"on": item, "walks": walks}, rng)
+                sums.add(part, normals, turns, modes_of(drawing) | {"on": item, "walks": walks}, rng)
                 done += len(part)
                 report("measuring", done / samples)
     return sums.result(domain.area, samples)

@@ -296,15 +296,8 @@ def textured(size: int, samples: int = 1) -> Array:
     meshes = [
         bake_mesh(item, resolution=None, creases=False, report=lambda *_: None) for item in scene.objects
     ]
-    colors = bake_module.SurfaceColors(
-        meshes,
-        scene.objects,
-        scene.decals,
-        scene.images,
-        decals.Contact.PRODUCT,
-        decals.ImageMapping.CORRECTED,
-        2.0,
-    )
+    drawing = scene.drawing.overridden(contact=decals.Contact.PRODUCT)
+    colors = bake_module.SurfaceColors(meshes, scene.objects, scene.decals, scene.images, drawing)
     return bake_texture(
         meshes, unwrap(meshes, size, lambda *_: None), size, samples, colors.at, lambda *_: None
     )
