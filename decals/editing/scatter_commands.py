@@ -22,7 +22,7 @@ from decals.scenes.recipe import Recipe
 from decals.validation import describe, finite_number, finite_vector, instance, one_of, whole_number
 
 SPACING = 3.0**0.5 / 1.03
-"""Distance of neighbours among decals without gaps, in radii (see `sizing.RADIUS_MARGIN`)."""
+"""Distance of neighbours among decals without gaps, in radii (see `covering.RADIUS_MARGIN`)."""
 
 MAX_SCATTERED_DECALS = 1_000_000
 

@@ -261,7 +261,7 @@ class ListedPass(PixelPass):
         rows, columns = np.nonzero(_read_raw(whole, len(targets), marks, area).view(np.uint8))
         if not len(rows):
             return
-        texels = np.column_stack([columns, rows]).astype(np.int32) + area[:2]
+        texels = np.column_stack([columns, rows]) + area[:2]
         with self._draw_listed(texels.astype(np.int32)) as drawn:
             for number, target in enumerate(targets):
                 pixels = _read_raw(whole, number, target, area).copy()

@@ -9,12 +9,14 @@ from numpy.typing import ArrayLike
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from decals.errors import InvalidScattering
 from decals.model import Decals
+from decals.scattering.covering import covering_radii
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.gap_filling import EVEN, center_outsized
 from decals.scattering.mean_normals import mean_normals
 from decals.scattering.neighbors import NearestFacing
 from decals.scattering.orientation import Direction, as_direction, max_curvatures, tangents
-from decals.scattering.sizing import Sizing, covering_radii, delaunay_radii, touching_radii, turned_normals
+from decals.scattering.sizing import Sizing, delaunay_radii, touching_radii
+from decals.scattering.turned_normals import turned_normals
 from decals.scattering.variation import ImageChoice, Jitter, image_shares, random_images, ranked_images
 from decals.validation import member, real_number
 

@@ -6,9 +6,10 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from blobtree._typing import Float32Array, Float64Array, Int64Array
+from decals.scattering.covering import RADIUS_MARGIN, covering_radii
 from decals.scattering.domain import OrientedPoints
 from decals.scattering.orientation import Orientation, gradient_of, tangents
-from decals.scattering.sizing import RADIUS_MARGIN, covering_radii, delaunay_radii, touching_radii
+from decals.scattering.sizing import delaunay_radii, touching_radii
 from tests.decals.meshes import plane
 
 

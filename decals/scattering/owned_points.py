@@ -1,0 +1,231 @@
+"""Points on surfaces, and the decals that may own them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
+from decals.field.radial import TOP_MARGIN
+from decals.model import FACING_LIMIT
+from decals.record import MIN_KEPT_RADIUS
+from decals.scattering.domain import OrientedPoints
+from decals.scattering.neighbors import FacingTree
+
+DOUBTFUL = 0.3
+"""Difference of the cosine between a decal's and a point's normal from the facing limit, below which the
+surface's smooth normals may decide whether the decal faces the point."""
+
+NEARLY_BARE = 0.975
+"""Distance of a point from its owner, in the owner's radii, from which smooth normals may make it bare."""
+
+CANDIDATES = 6
+"""Nearest decals that face a point and may own it, whatever their radii."""
+
+ARC_REACH = 2.0
+"""Ratio of the distances of two decals from a point up to which the length to the farther one is measured."""
+
+TIE = 0.004
+"""Difference of two powers at a point, in squared radii of its owner, up to which either decal may own it."""
+
+Shade: TypeAlias = Callable[[OrientedPoints], OrientedPoints]
+"""Return points on surfaces with the smooth normals of the picture; drop those whose normals are the same."""
+
+
+@dataclass(frozen=True)
+class Centers:
+    """All decals, in a search tree; `gaps` are the distances to the nearest other decals, ``[n]``."""
+
+    points: OrientedPoints
+    tree: FacingTree
+    gaps: Float64Array
+
+    @staticmethod
+    def of(decals: OrientedPoints) -> "Centers":
+        """Return decals with their search tree."""
+        tree = FacingTree(decals.positions, decals.normals)
+        distances, _ = tree.around(2)
+        gaps = distances[:, 1] if distances.shape[1] > 1 else np.full(len(decals), np.inf)
+        return Centers(decals, tree, gaps)
+
+    def find(self, points: OrientedPoints) -> "OwnedPoints":
+        """Return points with their nearest decals."""
+        decals = self.points
+        distances, indices, doubts = self.tree.nearest_and_doubts(
+            points.positions, points.normals, count=CANDIDATES
+        )
+        close = np.isfinite(distances) & (distances <= ARC_REACH * distances[:, :1])
+        rows, owners = np.nonzero(close)[0], indices[close]
+        offsets = points.positions[rows].astype(np.float64) - decals.positions[owners]
+        n_p, n_q = decals.normals[owners].astype(np.float64), points.normals[rows].astype(np.float64)
+        lengths = distances.copy()
+        lengths[close] = _arc_lengths(offsets, n_p, n_q)
+        return OwnedPoints(points, lengths, distances, indices, doubts, self)
+
+
+@dataclass(frozen=True)
+class OwnedPoints:
+    """Points, and the nearest `CANDIDATES` decals that face each: distances and indices, -1 for none.
+
+    `lengths` are the distances along the surface, at which images end; straight ones for decals beyond
+    `ARC_REACH`. All three are ``[n, k]``. `doubts` say how little decides which decals face it, ``[n]``.
+    """
+
+    points: OrientedPoints
+    lengths: Float64Array
+    distances: Float64Array
+    decals: Int64Array
+    doubts: Float32Array
+    centers: Centers
+
+    def __getitem__(self, rows: Int64Array) -> "OwnedPoints":
+        return replace(
+            self,
+            points=self.points[rows],
+            lengths=self.lengths[rows],
+            distances=self.distances[rows],
+            decals=self.decals[rows],
+            doubts=self.doubts[rows],
+        )
+
+    def with_shading(self, shade: Shade | None, radii: Float64Array) -> "OwnedPoints":
+        """Return the points, doubtful and nearly bare ones with the normals of `shade` as well."""
+        if shade is None:
+            return self
+        rows = np.flatnonzero((self.doubts < DOUBTFUL) | (self.shares(radii) > NEARLY_BARE))
+        return self.joined(self.centers.find(shade(self.points[rows])))
+
+    def powers(self, radii: Float64Array) -> Float64Array:
+        """Return the powers of points, which decide between cells (`decals.field.radial`); ∞ for no decal."""
+        return np.where(self.decals >= 0, self.distances**2 - radii[self.decals] ** 2, np.inf)
+
+    def lowest(self, radii: Float64Array, count: int) -> tuple[Int64Array, Float64Array, Float64Array]:
+        """Return the decals of least powers, these powers, and the offsets of the centres.
+
+        The offsets ``[n, count, 3]`` are those of the centres' feet on the tangent planes of the points.
+        """
+        powers = self.powers(radii)
+        columns = np.argsort(powers, axis=1)[:, :count]
+        decals = np.take_along_axis(self.decals, columns, axis=1)
+        positions = self.points.positions.astype(np.float64)
+        normals = self.points.normals.astype(np.float64)
+        offsets = self.centers.points.positions[decals] - positions[:, None]
+        offsets -= np.einsum("nki,ni->nk", offsets, normals)[..., None] * normals[:, None]
+        return decals, np.take_along_axis(powers, columns, axis=1), offsets
+
+    def owners(self, radii: Float64Array) -> Int64Array:
+        """Return the columns of the owners, ``[n]``: of least power, or the smallest that is nested above it.
+
+        The image of the smallest must reach the point: the rule of `decals.field.radial.nested_owner`.
+        """
+        powers = self.powers(radii)
+        columns: Int64Array = powers.argmin(axis=1)
+        lowest = np.take_along_axis(self.decals, columns[:, None], axis=1)
+        own, larger = radii[self.decals], radii[lowest]
+        smaller = (powers <= 0.0) & (own < larger)
+        least = MIN_KEPT_RADIUS * larger
+        # nested decals are at most so far apart
+        apart = least + np.sqrt(least**2 + larger**2 - np.where(smaller, own, larger) ** 2)
+        smaller &= self.centers.gaps[self.decals] <= apart
+        rows = np.flatnonzero(smaller.any(axis=1))
+        rows = rows[(smaller[rows] & self._nested(self.decals[rows], lowest[rows], radii)).any(axis=1)]
+        decals, own = self.decals[rows], powers[rows]
+        facing = np.einsum("nki,ni->nk", self.centers.points.normals[decals], self.points.normals[rows])
+        above = smaller[rows] & self._nested(decals, lowest[rows], radii)
+        above &= (facing > FACING_LIMIT + TOP_MARGIN) & (self.lengths[rows] <= radii[decals])
+        for column in range(decals.shape[1]):
+            lower = own < own[:, column : column + 1]
+            parted = lower & ~self._nested(decals, decals[:, column : column + 1], radii)
+            above[:, column] &= ~parted.any(axis=1)
+        top = np.where(above, radii[decals], np.inf).argmin(axis=1)
+        columns[rows] = np.where(above.any(axis=1), top, columns[rows])
+        return columns
+
+    def _nested(self, decals: Int64Array, others: Int64Array, radii: Float64Array) -> BoolArray:
+        """Return True for pairs of decals that are nested: `decals.record.balls_nested`."""
+        positions = self.centers.points.positions
+        offsets = positions[decals].astype(np.float64) - positions[others]
+        squared = np.einsum("...i,...i->...", offsets, offsets)
+        smaller, larger = (choose(radii[decals], radii[others]) for choose in (np.minimum, np.maximum))
+        difference = larger**2 - smaller**2
+        least = 2.0 * MIN_KEPT_RADIUS * np.sqrt(squared)
+        nested: BoolArray = (squared - difference <= least * smaller) | (
+            squared + difference <= least * larger
+        )
+        return nested
+
+    def shares(self, radii: Float64Array) -> Float64Array:
+        """Return the distance from the owner in its radii, ``[n]``; above 1 the point is bare.
+
+        On lines of contact, where several decals are as good as owners, it is the largest of theirs.
+        """
+        columns = self.owners(radii)[:, None]
+        powers = self.powers(radii)
+        shares = np.where(self.decals >= 0, self.lengths, 0.0) / radii[self.decals]
+        own = np.take_along_axis(powers, columns, 1)
+        tolerance = TIE * radii[np.take_along_axis(self.decals, columns, 1)] ** 2
+        tied = (powers <= own + tolerance) & (own == powers.min(axis=1, keepdims=True))
+        result: Float64Array = np.where(tied, shares, np.take_along_axis(shares, columns, 1)).max(axis=1)
+        return result
+
+    def risky(self, radii: Float64Array, share: float, apart: float) -> "OwnedPoints":
+        """Return points beyond a share of the radius: the ones nearest to bare in each cube of side `apart`.
+
+        Points of one cube are compared if the same three decals meet there.
+        """
+        shares = self.shares(radii)
+        rows = np.flatnonzero(shares > share)
+        nearest = np.argsort(self.powers(radii)[rows], axis=1)[:, :3]
+        corners = np.take_along_axis(self.decals[rows], nearest, axis=1)
+        cubes = np.floor(self.points.positions[rows].astype(np.float64) / (apart or 1.0)).astype(np.int64)
+        places = np.hstack([corners, cubes])
+        order = np.lexsort((-shares[rows], *places.T))
+        return self[rows[order[firsts(places[order])]]]
+
+    def joined(self, *others: "OwnedPoints") -> "OwnedPoints":
+        """Return the points of all."""
+        parts = (self, *others)
+        return OwnedPoints(
+            OrientedPoints.joined([part.points for part in parts]),
+            np.concatenate([part.lengths for part in parts]),
+            np.concatenate([part.distances for part in parts]),
+            np.concatenate([part.decals for part in parts]),
+            np.concatenate([part.doubts for part in parts]),
+            self.centers,
+        )
+
+    def peaks(self, least: Float64Array) -> "OwnedPoints":
+        """Return the farthest point of each corner of a Voronoi cell, at least so far from its owner.
+
+        Points with the same owner and the same next two decals share a corner of the owner's cell. `least`
+        holds a distance for each decal.
+        """
+        owners = self.decals[:, 0]
+        outer = np.flatnonzero((owners >= 0) & (self.lengths[:, 0] > least[owners]))
+        corners = np.hstack([self.decals[outer, :1], np.sort(self.decals[outer, 1:3], axis=1)])
+        order = np.lexsort((-self.lengths[outer, 0], *corners.T))
+        return self[outer[order[firsts(corners[order])]]]
+
+
+def firsts(rows: Int64Array) -> BoolArray:
+    """Return True for rows that differ from the one before."""
+    first = np.ones(len(rows), np.bool_)
+    first[1:] = (rows[1:] != rows[:-1]).any(axis=1)
+    return first
+
+
+def _arc_lengths(w: Float64Array, n_p: Float64Array, n_q: Float64Array) -> Float64Array:
+    """Return the lengths along the surface at which the corrected mapping draws offsets w, ``float64[n]``.
+
+    `decals.field.mapping.unroll` states the formula.
+    """
+    a, b = -np.einsum("ni,ni->n", w, n_p), np.einsum("ni,ni->n", w, n_q)
+    squared = np.einsum("ni,ni->n", w, w)
+    arc = (a * b > 0.0) & (squared > 0.0)
+    sine = np.clip(0.5 * np.linalg.norm(n_q - n_p, axis=1), 1e-6, 1.0)
+    stretch = np.arcsin(sine) / sine
+    y = (b - a) / np.where(arc, a + b, 1.0)
+    longer = squared + a * b * (1.0 + 2.0 * y * y) * (stretch**2 - 1.0) / sine**2
+    lengths: Float64Array = np.sqrt(np.where(arc, longer, squared))
+    return lengths

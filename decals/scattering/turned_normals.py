@@ -1,0 +1,111 @@
+"""Normals of decals at lips and behind thin walls."""
+
+import numpy as np
+
+from blobtree._typing import Float32Array, Float64Array, Int64Array
+from decals.model import FACING_LIMIT
+from decals.scattering.domain import OrientedPoints
+from decals.scattering.neighbors import NearestFacing
+from decals.surfaces.surface import unit_rows
+
+LIP_RATIO = 1.2
+"""Distance of the nearest facing decal, in expected radii, from which a point may lie at a lip."""
+
+LIP_NEARNESS = 0.95
+"""Share of that distance within which a decal that faces away must lie, or the point lies at no lip."""
+
+ON_EDGE = 0.7
+"""Least cosine between the normal of a decal turned to a lip and that of the surface at its centre."""
+
+MAX_BEHIND, BEHIND = 0.25, 0.02
+"""Largest cosine between the normals of a decal and of surface behind a wall, and least product of the
+heights of the centre above that surface and of that surface above the decal's, in squared distances."""
+
+EVEN_AROUND, MAX_ASIDE, MIN_ASIDE = 0.995, 0.05, 0.3
+"""Least cosine between the normals of a decal and of its surface where the surface around it is flat; largest
+cosine between the normals of such a decal and of surface that it sees edge-on, and for other decals the
+largest absolute value; and least height of that
+surface's points over the centre, along their normals, in distances."""
+
+TURN_MARGIN = 0.03
+"""Amount by which a decal turns beyond the facing limit, as a cosine."""
+
+MAX_TURN = 20.0
+"""Largest angle in degrees by which a decal turns away from surface behind a wall."""
+
+
+def turned_normals(
+    decals: OrientedPoints,
+    own: Float32Array,
+    samples: OrientedPoints,
+    nearest: NearestFacing,
+    radii: Float64Array,
+) -> Float32Array:
+    """Return the normals of decals, turned toward lips and away from surface behind walls, ``float32[n, 3]``.
+
+    At the edge of a thin wall, a ledge or an ear, the decals next to a point may all face away from it. The
+    next that faces it would need an outsized radius, and cover its neighbours. A decal on the edge itself
+    that is next to such points gets the mean of their normals and its own; its image bends over the edge.
+
+    The floor of a thin cup, seen through the wall from a decal outside, may face that decal, as their normals
+    are nearly perpendicular. The decal turns away, by at most `MAX_TURN` degrees. So does a decal on flat
+    surface from faces that it sees edge-on, where its image would be stretched.
+
+    Parameters
+    ----------
+    decals
+        Centres and normals of the decals.
+    own
+        Normals of the surfaces at the centres, ``float32[n, 3]``.
+    samples
+        Points spread evenly over the area to cover.
+    nearest
+        Finds the decals nearest to the samples.
+    radii
+        Expected radius of each decal, ``float64[n]``.
+    """
+    normals = decals.normals.astype(np.float64)
+    changed = np.zeros(len(decals), np.bool_)
+    facing, owners = nearest.of(decals.positions, decals.normals)
+    owned = owners >= 0
+    lips = np.flatnonzero(owned & (facing > LIP_RATIO * radii[owners]))
+    if len(lips):
+        from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
+
+        distances, rows = cKDTree(decals.positions).query(samples.positions[lips])
+        close = distances < LIP_NEARNESS * facing[lips]
+        lips, rows = lips[close], rows[close]
+        toward = unit_rows(_sums(samples.normals[lips], rows, len(decals))).astype(np.float64)
+        turned = unit_rows(toward + normals).astype(np.float64)
+        on_edge = toward.any(axis=1) & (np.einsum("ni,ni->n", turned, own) > ON_EDGE)
+        normals[on_edge] = turned[on_edge]
+        changed |= on_edge
+    cosines = np.einsum("ni,ni->n", normals.astype(np.float32)[owners], samples.normals)
+    seen = np.flatnonzero(owned & (cosines < max(MAX_BEHIND, MAX_ASIDE)))
+    rows, cosines = owners[seen], cosines[seen]
+    offsets = samples.positions[seen].astype(np.float64) - decals.positions[rows]
+    depths = np.einsum("ni,ni->n", offsets, normals[rows])
+    heights = np.einsum("ni,ni->n", offsets, samples.normals[seen].astype(np.float64))
+    squared = np.einsum("ni,ni->n", offsets, offsets)
+    flat = (np.einsum("ni,ni->n", normals, own.astype(np.float64)) > EVEN_AROUND)[rows]
+    seen_aside = (flat | (cosines > -MAX_ASIDE)) & (cosines < MAX_ASIDE)
+    edge_on = seen_aside & (heights > MIN_ASIDE * np.sqrt(squared))
+    behind = ((cosines < MAX_BEHIND) & (depths * heights > BEHIND * squared)) | edge_on
+    rows = rows[behind]
+    away = unit_rows(_sums(samples.normals[seen[behind]], rows, len(decals))).astype(np.float64)
+    worst = np.full(len(decals), -1.0)
+    np.maximum.at(worst, rows, cosines[behind])
+    angles = np.arccos(FACING_LIMIT - TURN_MARGIN) - np.arccos(np.clip(worst, -1.0, 1.0))
+    turn = np.flatnonzero(away.any(axis=1) & (angles > 0) & (angles <= np.radians(MAX_TURN)))
+    across = away[turn] - np.einsum("ni,ni->n", away[turn], normals[turn])[:, None] * normals[turn]
+    angle = angles[turn, None]
+    normals[turn] = np.cos(angle) * normals[turn] - np.sin(angle) * unit_rows(across)
+    changed[turn] = True
+    result = decals.normals.copy()
+    result[changed] = unit_rows(normals[changed])
+    return result
+
+
+def _sums(vectors: Float32Array, rows: Int64Array, count: int) -> Float64Array:
+    """Return the sum of the vectors of each row, ``float64[count, 3]``."""
+    return np.stack([np.bincount(rows, vectors[:, k], count) for k in range(3)], axis=1)
