@@ -88,7 +88,9 @@ def test_one_sample_a_pixel_is_near_the_mean(
 
 
 @pytest.mark.parametrize("target", [(-1.32, 1.06, 0.0), (-1.35, 1.09, 0.0)])
-def test_two_layers_whose_rims_meet_in_grazing_pixels(drawer: Renderer, target: tuple[float, ...]) -> None:
+def test_two_layers_whose_rims_meet_in_grazing_pixels(
+    drawer: Renderer, target: tuple[float, float, float]
+) -> None:
     """The upper decal covers the middle of parts in which the lower one ends as well."""
     view = flat_view(85, "layers")
     view = replace(view, camera=replace(view.camera, target=target, fov=0.8))
