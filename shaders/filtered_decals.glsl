@@ -200,7 +200,9 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 ce
     Bumps bumps = Bumps(vec4(0.0), vec4(0.0), vec4(0.0));
     ivec2 beside = ivec2(-1);
     vec3 first_line = EVERYWHERE, second_line = EVERYWHERE;  // contact lines with `beside`
-    int above = -1, below = -1, nested_count = 0, lower_rims = 0;
+    int above = -1, below = -1, rival = -1, nested_count = 0, lower_rims = 0;
+    float least = 0.0;  // power of `rival`, the strongest neighbour
+    bool above_nested = false;
     vec3 above_line = -0.5 * EVERYWHERE;
     float half_pixel = 0.5 * (length(right) + length(up));
     boundaries = 0;
@@ -214,7 +216,8 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 ce
             if (other == owner || dot(offset, offset) >= reach * reach || !acts(offset, n, other)) {
                 continue;
             }
-            bool outside = power(offset, RIM * other_ball.w) > 0.0;
+            float other_power = power(offset, RIM * other_ball.w);
+            bool outside = other_power > 0.0;
             int other_rank = decal_layered ? rank_of(other, decal_records) : 0;
             bool together = touches && other_rank == rank;
             bool nested = decal_nested && together
@@ -230,6 +233,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 ce
                 lower_rims += !higher && abs(line.x) < 0.5 ? 1 : 0;
                 if (higher && (nested || outside)) {
                     boundaries += line.x > -0.5 ? 1 : 0;
+                    above_nested = line.x > above_line.x ? nested : above_nested;
                     above = line.x > above_line.x ? other : above;
                     above_line.x = max(line.x, above_line.x);
                 } else if (nested && !outside) {
@@ -237,11 +241,16 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 ce
                 }
                 continue;
             }
+            rival = other_power < least ? other : rival;
+            least = min(other_power, least);
             if (decal_contact == ELASTIC) {
                 pushes += push_of(w, ball, other_ball);
             }
             vec3 line = contact_line(q, right, up, ball, other_ball);
-            boundaries += line.x < 0.5 ? (half_pixel > MAX_SIDE * RIM * other_ball.w ? MANY : 1) : 0;
+            if (line.x < 0.5) {
+                bool corner = decal_nested && ball_line(q, right, up, other_ball).x < 0.5;
+                boundaries += corner || half_pixel > MAX_SIDE * RIM * other_ball.w ? MANY : 1;
+            }
             if (line.x < min(first_line.x, 0.5)) {
                 second_line = first_line;
                 first_line = line;
@@ -258,6 +267,14 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 ce
         Place place = place_of(above, above_ball, q, n, right, up, vec4(0.0));
         above_line = rim_line(place.arc, per_above * right, per_above * up);
         bool ends = above_line.x <= -0.5;
+        WHERE (above_nested && rival >= 0) {
+            vec4 rival_ball = decal_texel(4 * rival);
+            if (!balls_nested(rival_ball.xyz - above_ball.xyz, RIM * above_ball.w, RIM * rival_ball.w)) {
+                float inside = contact_line(q, right, up, above_ball, rival_ball).x;
+                ends = ends || inside <= -0.5;
+                boundaries += abs(inside) < 0.5 ? MANY : 0;
+            }
+        }
         bool cut = place.arc.x <= 1.0 && power(q - above_ball.xyz, RIM * above_ball.w) <= 0.0;  // by other decals
         boundaries -= ends ? 1 : 0;
         above = ends || cut ? -1 : above;
@@ -269,6 +286,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 ce
     // code once even where no pixel needs it.
     vec3 owner_part = vec3(1.0, 0.0, 0.0);
     vec4 over = vec4(0.0), color = vec4(0.0);
+    float hidden = 0.0;  // by the one above: if that is nested, its transparent parts hide the others as well
     vec2 covered = vec2(0.0);  // sum of the centres of parts, times alpha
     ivec2 others = beside;
     for (int decal = above < 0 ? owner : above; decal >= 0;) {
@@ -307,7 +325,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 ce
         WHERE (first) {
             vec3 rim = rim_line(place.arc, per_radius * right, per_radius * up);
             boundaries += rim.x < 0.5 ? (lower_rims > 0 ? MANY : 1) : 0;
-            boundaries += above >= 0 && boundaries > 1 ? MANY : 0;
+            boundaries += (above >= 0 && boundaries > 1) || (below >= 0 && beside.x >= 0) ? MANY : 0;
             part.yz = centre;
             if (boundaries > (above < 0 ? 0 : 1)) {
                 part = inner_part(rim, first_line, second_line);
@@ -323,11 +341,12 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 ce
         }
         vec4 own_color = part.x * image_average(decal, place, at, n, part.x);
         if (decal == above) {
-#ifdef MATERIALS
-            material_left *= 1.0 - own_color.a;
-#endif
             over = own_color;
-            centre = centre_under(centre, over.a, part.yz);
+            hidden = above_nested ? part.x : over.a;
+#ifdef MATERIALS
+            material_left *= 1.0 - hidden;
+#endif
+            centre = centre_under(centre, hidden, part.yz);
             decal = owner;
             continue;
         }
@@ -338,7 +357,7 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 ce
     }
     centre = centre_under(centre, color.a, covered / max(color.a, 1e-4));
     boundaries += boundaries > 0 && nested_count > 0 && nested_count + boundaries > 2 ? MANY : 0;
-    return over + (1.0 - over.a) * color;
+    return over + (1.0 - hidden) * color;
 }
 
 // The decal with the largest part of a pixel whose centre no decal covers, or -1.

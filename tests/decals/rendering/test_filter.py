@@ -65,6 +65,7 @@ def difference(drawer: Renderer, angle: float, kind: str, contact: str = "elasti
     "compute-80-waves-elastic-46",
     "compute-45-waves-product-42",
     "compute-45-waves-radial-43",
+    "compute-45-nested-elastic-45",
 )
 @pytest.mark.parametrize(
     ("angle", "kind", "contact", "least"),
@@ -76,6 +77,7 @@ def difference(drawer: Renderer, angle: float, kind: str, contact: str = "elasti
         (45, "layers", "elastic", 46),
         (45, "plain", "product", 50),
         (85, "plain", "elastic", 50),
+        (45, "nested", "elastic", 45),
     ],
 )
 def test_one_sample_a_pixel_is_near_the_mean(
@@ -83,6 +85,8 @@ def test_one_sample_a_pixel_is_near_the_mean(
 ) -> None:
     apart = difference(drawer, angle, kind, contact)
     assert peak_ratio(apart) > least
+    if kind == "nested":  # corners of images that others cut are less exact
+        assert apart.max() <= 31
     if kind == "plain":  # rims and contact lines; 1 is the noise of 64 points
         assert apart.max() <= 9.1
 
