@@ -1,6 +1,6 @@
 """Tracing cells: the table of blocks that rays read, and the pruned tapes of blocks with surface."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -62,11 +62,28 @@ class TracingCells:
     counts: tuple[int, int, int]
     tolerance: float
     instruction_set: InstructionSet
+    _on_devices: "dict[str, DeviceCells]" = field(default_factory=dict, repr=False)
 
     @property
     def nbytes(self) -> int:
         """Bytes of the arrays."""
         return self.tape.nbytes + self.blocks.nbytes
+
+    def on(self, device: str) -> "DeviceCells":
+        """Return the cells in the memory of a Warp device, as long as they are kept here."""
+        if device not in self._on_devices:
+            self._on_devices[device] = self._uploaded(device)
+        return self._on_devices[device]
+
+    def _uploaded(self, device: str) -> "DeviceCells":
+        arrays: Any = RayCells()
+        arrays.lower, arrays.counts = wp.vec3(*self.lower.tolist()), wp.vec3i(*self.counts)
+        arrays.block_size, arrays.tolerance = self.block_size, self.tolerance
+        copy = device != "cpu"  # the processor's kernels read the arrays themselves
+        arrays.tape = wp.array(self.tape, dtype=wp.vec4, device=device, copy=copy)
+        arrays.start = self.start
+        arrays.blocks = wp.array(self.blocks, dtype=wp.int32, device=device, copy=copy)
+        return DeviceCells(arrays.tape, arrays, self.instruction_set)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +94,6 @@ class DeviceCells:
     arrays: Any
     """`ray_kernels.RayCells`, the argument of kernels."""
     instruction_set: InstructionSet
-    nbytes: int
 
 
 def tracing_cells(tree: ImplicitModel, *, device: str | None = None) -> TracingCells:
@@ -90,7 +106,7 @@ def tracing_cells(tree: ImplicitModel, *, device: str | None = None) -> TracingC
 
 def device_cells(tree: ImplicitModel, *, device: str | None = None) -> DeviceCells:
     """Return the cells for rays through `tree` in a device's memory."""
-    return _device_cells(tree.tape, *_corners(tree), known_device(device))
+    return tracing_cells(tree, device=device).on(known_device(device))
 
 
 def trace_tolerance(bounds: tuple[Float32Array, Float32Array]) -> float:
@@ -173,16 +189,3 @@ def _layers(empty: BoolArray) -> Int32Array:
         bits = np.ascontiguousarray(words)[..., None].view(np.uint8)
         layers += np.unpackbits(bits, axis=2, bitorder="little")[..., : empty.shape[2]]
     return layers.astype(np.int32)
-
-
-@sized_cache(MAX_CELLS_BYTES)
-def _device_cells(tape: Tape, lower: Corner, upper: Corner, device: str) -> DeviceCells:
-    cells = _tracing_cells(tape, lower, upper, device)
-    arrays: Any = RayCells()
-    arrays.lower, arrays.counts = wp.vec3(*cells.lower.tolist()), wp.vec3i(*cells.counts)
-    arrays.block_size, arrays.tolerance = cells.block_size, cells.tolerance
-    copy = device != "cpu"  # the processor's kernels read the arrays themselves
-    arrays.tape = wp.array(cells.tape, dtype=wp.vec4, device=device, copy=copy)
-    arrays.start = cells.start
-    arrays.blocks = wp.array(cells.blocks, dtype=wp.int32, device=device, copy=copy)
-    return DeviceCells(arrays.tape, arrays, cells.instruction_set, cells.nbytes)

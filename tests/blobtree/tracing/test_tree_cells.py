@@ -1,5 +1,8 @@
 """The table of blocks that rays read matches the field."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_cdt
@@ -7,10 +10,12 @@ from scipy.ndimage import distance_transform_cdt
 from blobtree import ISO, Node, Point
 from blobtree._typing import Int32Array
 from blobtree.cells.refine_kernels import SURELY_INSIDE
+from blobtree.sized_cache import SizedCache
 from blobtree.tape.model import values_at
 from blobtree.tape.tape import Tape
+from blobtree.tracing import tree_cells
 from blobtree.tracing.ray_kernels import EMPTY
-from blobtree.tracing.tree_cells import BLOCKS_ALONG, MAX_LAYERS, TracingCells, tracing_cells
+from blobtree.tracing.tree_cells import BLOCKS_ALONG, MAX_LAYERS, TracingCells, device_cells, tracing_cells
 from tests.blobtree.trees import random_trees
 from tests.oracles import blobtree as oracle
 
@@ -82,3 +87,15 @@ def test_all_blocks_of_an_empty_tree_are_empty() -> None:
     nothing = Point((0, 0, 0), radius=0.1) & Point((9, 9, 9), radius=0.1)
     cells = tracing_cells(nothing, device="cpu")
     assert (cells.blocks == EMPTY - MAX_LAYERS).all()
+
+
+def test_cells_on_a_device_are_kept_as_long_as_those_of_the_host(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tree_cells, "_tracing_cells", SizedCache(tree_cells._tracing_cells._function, 1))
+    on_device = device_cells(THIN)
+    assert device_cells(THIN) is on_device
+    assert on_device.tape.ptr == tracing_cells(THIN).tape.ctypes.data  # shared by the processor
+    kept = weakref.ref(on_device)
+    del on_device
+    device_cells(CORNERS)
+    gc.collect()
+    assert kept() is None
