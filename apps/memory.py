@@ -10,15 +10,34 @@ from typing import Any
 CYCLE_THRESHOLDS = 700, 10, 10
 """Python's own thresholds for its search of cycles; the command line begins with higher ones."""
 
-ALLOCATION = {-1: 4_000_000, -3: 1_000_000, -8: 2}
-"""Options of glibc's ``mallopt``: free bytes at the end of the heap that are kept (M_TRIM_THRESHOLD), bytes
-from which on memory is returned as soon as it is free (M_MMAP_THRESHOLD), and heaps (M_ARENA_MAX)."""
+ALLOCATION = {-1: 4_000_000, -3: 1_000_000}
+"""Options of glibc's ``mallopt``: free bytes at the end of the heap that are kept (M_TRIM_THRESHOLD), and
+bytes from which on memory is returned as soon as it is free (M_MMAP_THRESHOLD)."""
+
+MAX_HEAPS = -8
+"""Option of ``mallopt``: number of heaps (M_ARENA_MAX)."""
 
 TRIM_SECONDS = 10.0
 """Time between two returns of free memory to the system."""
 
 ACTIVE_SHARE = 0.1
 """Share of one core from which on a process has been active, so that memory may have become free."""
+
+
+def share_heap() -> None:
+    """Let all threads share one heap; call this before any thread has begun.
+
+    Otherwise glibc makes heaps for the first threads, eight for each core. They all get gaps, as a thread's
+    results are freed by others.
+    """
+    if (library := _glibc()) is not None:
+        library.mallopt(MAX_HEAPS, 1)
+
+
+def _glibc() -> Any:
+    """Return the C library if it is glibc, else None."""
+    library = ctypes.CDLL(None) if sys.platform.startswith("linux") else None
+    return library if hasattr(library, "malloc_trim") else None
 
 
 def keep_memory_low(trim_seconds: float = TRIM_SECONDS) -> None:
@@ -37,10 +56,7 @@ def keep_memory_low(trim_seconds: float = TRIM_SECONDS) -> None:
     gc.freeze()
     gc.set_threshold(*CYCLE_THRESHOLDS)
     gc.collect()  # the thresholds of the next search follow from what this one has found
-    if not sys.platform.startswith("linux"):
-        return
-    library = ctypes.CDLL(None)
-    if not hasattr(library, "malloc_trim"):  # another C library
+    if (library := _glibc()) is None:
         return
     for option, value in ALLOCATION.items():
         library.mallopt(option, value)

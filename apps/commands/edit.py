@@ -18,7 +18,7 @@ from decals.apps.commands.options import (
     UpAxis,
     parse_size,
 )
-from decals.apps.memory import keep_memory_low
+from decals.apps.memory import keep_memory_low, share_heap
 from decals.apps.models.loading import import_definitions
 from decals.errors import InvalidInput
 from decals.validation import stiffness_number
@@ -64,6 +64,7 @@ def edit(
         The JSON file that Ctrl + S writes. Default: the opened scene, or a new file such as MODEL-decals.json
         or scene.json.
     """
+    share_heap()
     pixels = parse_size(size)
     check_options(decals, seed, save)
     if stiffness is not None:

@@ -120,11 +120,12 @@ def sandbox(
             return _show_window(command(1))
         return _serve_sessions(command, sessions, host, port, browser=browser)
     from decals.apps.commands.opening import check_options, opened, report_unsaved
-    from decals.apps.memory import keep_memory_low
+    from decals.apps.memory import keep_memory_low, share_heap
     from decals.apps.models.loading import import_definitions
     from decals.window import EditWindow
     from decals.window.host_plotter import new_plotter
 
+    share_heap()
     check_options(decals, seed, save)
     serve, page = _toolkit(lessons)
     import_definitions(define)

@@ -33,3 +33,32 @@ def test_a_session_returns_the_gaps_of_its_heap(seconds: float, returned: bool) 
     at_once, later = map(float, subprocess.check_output(command, text=True).split())
     assert (later > 40.0) == returned
     assert at_once < 40.0 or returned
+
+
+HEAPS = """
+import ctypes, sys, threading
+from decals.apps.memory import share_heap
+
+if sys.argv[1] == "shared":
+    share_heap()
+begun = threading.Barrier(5)
+
+def work():
+    kept = [bytes(1000) for _ in range(100)]
+    begun.wait()
+
+for _ in range(4):
+    threading.Thread(target=work).start()
+begun.wait()
+library = ctypes.CDLL(None)
+output = ctypes.c_void_p.in_dll(library, "stdout")
+library.malloc_info(0, output)
+library.fflush(output)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems have another allocator")
+@pytest.mark.parametrize("kind", ["shared", "several"])
+def test_all_threads_share_a_heap(kind: str) -> None:
+    report = subprocess.check_output([sys.executable, "-c", HEAPS, kind], text=True)
+    assert (report.count("<heap nr=") == 1) == (kind == "shared")
