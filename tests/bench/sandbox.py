@@ -1,7 +1,8 @@
 """The sandbox in headless Chromium: milliseconds from a slider or a drag to the next frame in the browser.
 
 ``server_ms`` is the time of a drag on the server alone: from its message until the picture is sent.
-``server_slider_ms`` is that of a slider.
+``server_slider_ms`` is that of a slider. With ``--server-only``, ``server_traced_ms`` and so on are of a
+camera that turns, by the mode of the view.
 
     python -m tests.bench.sandbox
     python -m tests.bench.sandbox --decals 1000 --events 20 --json sandbox.json
@@ -24,6 +25,7 @@ from trame.app import get_server
 
 import decals
 from blobtree import Point
+from decals.apps.sandbox.display import MODES
 from decals.apps.sandbox.page import Page as SandboxPage
 from decals.window import EditWindow
 from decals.window.host_plotter import new_plotter
@@ -160,9 +162,23 @@ async def _on_server(
         page.view.update()  # as after each message of the view
     await asyncio.sleep(REST_SECONDS)
     driver.event("LeftButtonReleaseEvent", (x, y))
+    figures |= _summary("server", on_server)
+    for mode in MODES:
+        page.sandbox.set_control("display", "mode", mode)
+        await asyncio.sleep(REST_SECONDS)
+        while window.busy or page.values()["display"]["busy"]:
+            await asyncio.sleep(0.05)
+        on_server.clear()
+        for step in range(events):
+            await asyncio.sleep(REST_SECONDS)
+            window.begin_motion()
+            window.subplot.vtk_renderer.camera.Azimuth((-5.0, 5.0)[step % 2])
+            page.view.update()
+        await asyncio.sleep(REST_SECONDS)
+        figures |= _summary(f"server_{mode}", on_server)
     await server.stop()
     await task
-    return figures | _summary("server", on_server)
+    return figures
 
 
 def _picked_decal(window: EditWindow) -> tuple[int, int]:
@@ -194,6 +210,7 @@ def _clock(page: SandboxPage, window: EditWindow) -> list[float]:
     page.view._publish = publish  # type: ignore[method-assign]
     page.sandbox.schedule = starting(page.sandbox.schedule)
     window.tools.move = starting(window.tools.move)  # type: ignore[method-assign]
+    window.begin_motion = starting(window.begin_motion)  # type: ignore[method-assign]
     return times
 
 
@@ -238,7 +255,7 @@ def main() -> None:
     options = parser.parse_args()
     figures = asyncio.run(measure(options.decals, options.events, server_only=options.server_only))
     for name, value in figures.items():
-        print(f"{name:24} {value:10.1f}")
+        print(f"{name:28} {value:10.1f}")
     if options.json is not None:
         options.json.write_text(json.dumps(figures))
 

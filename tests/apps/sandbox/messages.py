@@ -33,7 +33,7 @@ from typing import Any
 
 import numpy as np
 
-from decals.apps.memory import keep_memory_low
+from decals.apps.memory import keep_memory_low, share_heap
 from decals.editing.actions import KEYS
 from decals.window import EditWindow
 from tests.apps.sandbox.test_connections import CALLS, SIZE, Browser, Connect, serve
@@ -48,6 +48,7 @@ KINDS = ["Point", "Torus", "Box", "Twist", "Offset", "Union", "Difference", "Not
 NAMES = ["radius", "center", "degrees", "color", "opacity", "layer", "image", "tint", "spill", "interaction"]
 OPTIONS = ["mode", "overlay", "slice", "slice_position", "slice_normal", "up", "orthographic", "axes"]
 SHOWN = ["traced", "polygonized", "normals", "none", "seeds", "owners", "folds", "contact lines", "x", "z"]
+FIRST_VIEW = {"mode": "traced", "overlay": "none", "slice": "none"}
 CHANGES = ["rename", "remove", "duplicate", "move", "group", "hide", "lock", "isolate"]
 HANDLES = ["move", "move x", "turn y", "scale", "start 0", "slice", "tilt slice"]
 EVENTS: dict[str, list[list[Any]]] = {
@@ -306,15 +307,23 @@ class Messages:
             await browser.close()
 
     async def _undo_all(self) -> None:
-        """End all input, undo everything, and wait until nothing is to be done."""
+        """End all input, undo everything, show the scene itself, and wait until nothing is to be done."""
         for number in range(len(self._browsers)):
             await self._answer("mouse", self._mouse(number, "up"))
         self._page.sandbox.end_input()
         await self._wait_until(lambda: not self._window.background.busy)
         self._page.sandbox.go_to(0)
+        for option, first in FIRST_VIEW.items():
+            self._page.sandbox.set_control("display", option, first)
         for name, mode in self._modes.items():  # keys change those of the window, as they move the camera
             setattr(self._window.subplot, name, mode)
-        await self._wait_until(lambda: not self._window.busy)
+        for _ in range(2):  # the view shows what was being made, then the scene
+            await self._wait_until(self._rests)
+
+    def _rests(self) -> bool:
+        """Bring the page up to date, and return True if nothing is to be done."""
+        self._page.refresh()
+        return not (self._window.busy or self._page.sandbox.display.values()["busy"])
 
     @staticmethod
     async def _wait_until(true: Callable[[], bool]) -> None:
@@ -429,6 +438,7 @@ def measure(
     count: int, seed: int, report: Callable[[dict[str, Any]], None] = lambda _: None
 ) -> dict[str, Any]:
     """Send random messages to a server of this process, and return the figures."""
+    share_heap()
     figures: dict[str, Any] = {}
     errors: list[str] = []
 
