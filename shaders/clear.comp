@@ -1,4 +1,4 @@
-// Empties the G-buffer: where few units fill pixels, faster than by the framebuffer.
+// Empties the G-buffer, or the rest buffer in its place: where few units fill pixels, faster than by the framebuffer.
 layout(local_size_x = GROUP, local_size_y = GROUP) in;
 uniform ivec2 first_texel;  // the lower left one of a rectangle
 uniform ivec2 end_texel;    // past its upper right one

@@ -54,10 +54,12 @@ float offset_ray(vec3 origin, vec3 direction, float start, inout Foot foot, out 
             inside = vec2(t, near.gap);
         }
         if (met) {
-            if (abs(near.gap) <= exactness || inside.x - outside.x <= exactness || outside.y < 0.0) {
-                return now;
+            float share = outside.y / max(outside.y - inside.y, 1e-30);
+            float hit = outside.y < 0.0 ? now : mix(outside.x, inside.x, share);  // where the gap is 0 if it changes evenly
+            if (abs(hit - now) <= tolerance) {
+                return hit;
             }
-            t = mix(outside.x, inside.x, clamp(outside.y / (outside.y - inside.y), 0.1, 0.9));
+            t = mix(outside.x, inside.x, clamp(share, 0.1, 0.9));
         }
     }
     return met ? inside.x : -1.0;

@@ -1,5 +1,7 @@
 """The G-buffer: the visible surface at every pixel, which all kinds of objects write."""
 
+from collections.abc import Sequence
+
 import moderngl
 import numpy as np
 
@@ -57,19 +59,23 @@ class GBuffer:
 
     def clear(self, width: int, height: int, part: Part = WHOLE) -> None:
         """Clear these rows of the lower left part of this size."""
-        if self._clear_program is None:
-            self.use(width, height, part)  # first: it ends scissors of other passes
-            self._framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-        else:
-            self._clear_by_compute(self._clear_program, Rectangle(0, 0, width, height).rows(part))
+        rows = Rectangle(0, 0, width, height).rows(part)
+        if self.clear_by_compute((self.position, self.normal, self.color), rows):
             self._bind(self._depth_framebuffer, width, height, part)
             self._depth_framebuffer.clear(depth=1.0)
+        else:
+            self.use(width, height, part)  # first: it ends scissors of other passes
+            self._framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
 
-    def _clear_by_compute(self, program: moderngl.ComputeShader, rectangle: Rectangle) -> None:
-        for unit, texture in enumerate((self.position, self.normal, self.color)):
+    def clear_by_compute(self, textures: Sequence[moderngl.Texture], rectangle: Rectangle) -> bool:
+        """Clear three textures, if passes are compute shaders; return False without doing so otherwise."""
+        if self._clear_program is None:
+            return False
+        for unit, texture in enumerate(textures):
             texture.bind_to_image(unit, read=False, write=True)
-        run_pixels(program, rectangle)
+        run_pixels(self._clear_program, rectangle)
         self._gl.memory_barrier()
+        return True
 
     def complete_depth(self, width: int, height: int, part: Part = WHOLE) -> None:
         """Write the depth of surface that was not rasterised, in the lower left part of this size.

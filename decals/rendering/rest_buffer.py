@@ -31,7 +31,7 @@ class RestBuffer:
         self._framebuffer = context.gl.framebuffer(rest, gbuffer.depth)
         surface = [gbuffer.position, gbuffer.normal, gbuffer.color]
         self._with_surface = context.gl.framebuffer([*surface, *rest], gbuffer.depth)
-        self._gl = context.gl
+        self._gl, self._gbuffer = context.gl, gbuffer
 
     def use(self, width: int, height: int, part: Part = WHOLE) -> None:
         """Restrict the next draws to these rows of the lower left part of this size."""
@@ -56,6 +56,9 @@ class RestBuffer:
 
     def clear(self, width: int, height: int, part: Part = WHOLE) -> None:
         """Clear these rows of the lower left part of this size; the depth stays."""
+        rows = Rectangle(0, 0, width, height).rows(part)
+        if self._gbuffer.clear_by_compute(list(self.textures.values()), rows):
+            return
         self.use(width, height, part)
         self._framebuffer.depth_mask = False
         self._framebuffer.clear(0.0, 0.0, 0.0, 0.0)

@@ -287,7 +287,7 @@ def _iterations(lengths: Int64Array, *, layered: bool) -> int:
 class DecalData:
     """Records and index of a set of decals, as ``shaders/decals.glsl`` reads them.
 
-    ``lookups`` is the number of points that are looked up for a pixel.
+    ``lookups`` is the number of points that are looked up for a pixel; ``version`` is that of an editor.
     """
 
     def __init__(
@@ -295,11 +295,11 @@ class DecalData:
     ) -> None:
         self._context = context
         self.limited = limited
-        self._version = 0
+        self.version = 0
         iterations = context.max_loop_iterations
         self._loop_limit = LoopLimit(None if iterations is None else iterations // lookups)
         if isinstance(decals, DecalEditor):
-            self._version = decals.version
+            self.version = decals.version
             arrays, index = decals.arrays, decals.index
         else:
             index = DecalIndex.of(decals)
@@ -312,7 +312,7 @@ class DecalData:
             }
             indexed = index.on("cpu", records=arrays[RECORDS], layered=decals.layered, copy=False)
             self.nested = has_nested(indexed, len(decals))
-        self._loop_limit.check(index, layered=decals.layered, version=self._version)
+        self._loop_limit.check(index, layered=decals.layered, version=self.version)
         self._textures = {
             name: DataTexture(context, array) for name, array in arrays.items() if limited or name != LIMITS
         }
@@ -336,7 +336,7 @@ class DecalData:
         """
         index = editor.index
         self._loop_limit.check(index, layered=editor.layered, version=editor.version)
-        byte_count, since, self._version = 0, self._version, editor.version
+        byte_count, since, self.version = 0, self.version, editor.version
         for name, ranges in editor.changed_rows(since).items():
             if name not in self._textures:
                 continue
@@ -586,6 +586,7 @@ class Uploads:
             self._environments,
         )
         self._masks: tuple[tuple[int, ...], DataTexture] | None = None
+        self._relief: tuple[ReliefArray, DecalData, int, Relief] | None = None
         self.walk_cache = WalkCache()
         self._walks: tuple[Walks, DataTexture] | None = None
 
@@ -646,7 +647,10 @@ class Uploads:
         )
         decals = self.decals(scene)
         assert decals is not None
-        return Relief(array, scene, stepped=decals.layered or decals.nested or decals.limited)
+        kept, stepped = self._relief, decals.layered or decals.nested or decals.limited
+        if kept is None or kept[:2] != (array, decals) or kept[2] != decals.version:
+            self._relief = kept = array, decals, decals.version, Relief(array, scene, stepped=stepped)
+        return kept[3]
 
     def _masks_of(self, scene: SceneLike, objects: Sequence[object]) -> DataTexture | None:
         """Return the masks of objects of a scene; None if its decals are not limited."""

@@ -17,9 +17,11 @@ from blobtree import Node, Point
 from decals import Camera, Decals, Scene
 from decals.index import DecalEditor
 from decals.rendering import Buffers, Renderer, RenderOptions
+from decals.rendering.gbuffer import GBuffer
 from decals.rendering.materials import CONE_LENGTHS, RIM_KNOTS, rim_heights, rim_slopes, slope_bounds
 from decals.rendering.offset_tree import Shell
 from decals.rendering.pixel_pass import BACKEND_VARIABLE
+from decals.rendering.rest_buffer import RestBuffer
 from decals.shaders import compose
 from tests.decals.relief import expected_heights
 from tests.decals.rendering.test_edited import EditedScene
@@ -144,11 +146,32 @@ def test_silhouettes_rise_and_an_edit_moves_them(renderers: dict[str, Renderer])
     renderer.buffers(edited, options)
     editor.delete(list(range(15)))
     shown = renderer.buffers(edited, options)
+    assert (shown.object_id >= 0).sum() < covered.sum()
+    editor.change(20, radii=[2.0 * editor.decals.radii.max()])
+    shown = renderer.buffers(edited, options)
     anew = renderer.buffers(hills.replace(decals=editor.decals), options)
     assert np.array_equal(shown.position, anew.position)
-    assert (shown.object_id >= 0).sum() < covered.sum()
     at = renderer.buffers_at(edited, 24, 18, options)
     assert np.allclose(at.position[0, 0], shown.position[36 - 1 - 18, 24], atol=1e-5)
+
+
+@pytest.mark.parametrize("backend", ["fragment", "compute"])
+def test_clearing_empties_the_rest_pose_of_a_part(renderers: dict[str, Renderer], backend: str) -> None:
+    context = renderers[backend].context
+    with context.current():
+        gbuffer = GBuffer(context, (24, 16))
+        rest = RestBuffer(context, gbuffer)
+        ones = np.ones((16, 24, 4), np.float32)
+        for texture in rest.textures.values():
+            texture.write(ones.tobytes())
+        rest.clear(20, 10)
+        expected = ones.copy()
+        expected[:10, :20] = 0.0
+        for texture in rest.textures.values():
+            found = np.frombuffer(texture.read(), np.float32).reshape(ones.shape)
+            assert np.array_equal(found, expected)
+        rest.release()
+        gbuffer.release()
 
 
 @pytest.mark.slow
