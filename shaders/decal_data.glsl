@@ -10,3 +10,17 @@ uniform sampler2D decal_walks;  // see decals/field/walks.py
 uniform int decal_mapping;
 uniform float decal_stiffness;
 uniform sampler2DArray decal_images;  // linear, premultiplied
+
+#ifdef STORED  // the same in storage buffers (`decals.rendering.uploads.STORED`), which many look-ups read faster
+layout(std430, binding = 1) readonly buffer StoredRecords { vec4 stored_records[]; };
+layout(std430, binding = 2) readonly buffer StoredLevels { vec4 stored_levels[]; };
+layout(std430, binding = 3) readonly buffer StoredTable { ivec4 stored_table[]; };
+layout(std430, binding = 4) readonly buffer StoredIds { int stored_ids[]; };
+
+vec4 fetch_decal_records(ivec2 texel, int level) { return stored_records[texel.y << 12 | texel.x]; }
+vec4 fetch_index_levels(ivec2 texel, int level) { return stored_levels[texel.y << 12 | texel.x]; }
+ivec4 fetch_index_table(ivec2 texel, int level) { return stored_table[texel.y << 12 | texel.x]; }
+ivec4 fetch_index_ids(ivec2 texel, int level) { return ivec4(stored_ids[texel.y << 12 | texel.x]); }
+#else
+#define fetch_decal_records(texel, level) texelFetch(decal_records, texel, level)
+#endif

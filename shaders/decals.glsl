@@ -47,7 +47,7 @@ struct DecalHit {
 };
 
 vec4 decal_texel(int i) {
-    return texelFetch(decal_records, ivec2(i & 4095, i >> 12), 0);
+    return fetch_decal_records(ivec2(i & 4095, i >> 12), 0);
 }
 
 DecalHit decal_hit(int owner, vec3 q, vec3 n) {

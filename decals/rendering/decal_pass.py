@@ -41,7 +41,7 @@ from decals.rendering.pixel_pass import (
     use_textures,
 )
 from decals.rendering.rest_buffer import RestBuffer
-from decals.rendering.uploads import DataTexture, DecalData, ImageArray
+from decals.rendering.uploads import DataTexture, DecalData, ImageArray, stored
 from decals.rendering.viewpoint import WHOLE, Part, Rectangle, Tile
 
 BODY = "decal_pass.glsl"
@@ -110,6 +110,8 @@ class DecalSource:
         self.decals.use(program, unit)
         if self.relief is not None:
             self.relief.use(program, self.lights)
+            if isinstance(program, moderngl.ComputeShader):
+                self.decals.store()
         unit += self.decals.texture_count
         for name, data in (
             ("decal_materials", self.materials),
@@ -239,8 +241,11 @@ def decal_programs(
     variants = {"DECALS": True, "POSED": posed, "LIMITED": limited, "FILTERED": filtered}
     variants |= {"MATERIALS": materials, "RELIEF": relief}
     slots |= {"relief": "//@ include relief.glsl"} if relief and library else {}
-    defines = {name: value and bool(library) for name, value in variants.items()}
     compute = context.backend is PassBackend.COMPUTE
+    if relief and compute:
+        slots |= {"functions": stored(library)}
+        variants |= {"STORED": True}
+    defines = {name: value and bool(library) for name, value in variants.items()}
     stages: list[dict[str, bool | int]] = [{}]
     if defines["FILTERED"] and (compute or context.software):
         stages = [{"MARKED": targets + 2 * defines["MATERIALS"]}, {"LISTED": True, "SHARED": compute}]

@@ -8,6 +8,7 @@ rises at most by the slope of a cone that contains the heights up to some distan
 2006). The longest of the steps for four distances is taken. As most cones are far steeper than the heights,
 a longer step is tried first; where the cones at both of its ends do not cover it, the ray goes back to the
 end of the shorter one (Keinert et al. 2014).
+Between a point outside and one inside, the hit lies where two secants agree; the gap there is not looked up.
 Cones around the rays of squares of pixels first find where these begin (``shaders/offset_start.glsl``).
 """
 
@@ -27,6 +28,7 @@ from decals.rendering.gbuffer import GBuffer
 from decals.rendering.pixel_pass import GROUP, PassBackend, PixelPass, Program, attach_camera, set_uniform
 from decals.rendering.rest_buffer import RestBuffer
 from decals.rendering.tree import Kinds, TreeDrawable, covered_rectangle, draw_box, tracing_slots
+from decals.rendering.uploads import stored
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile
 from decals.shaders import Source, compose
 
@@ -227,7 +229,7 @@ class OffsetTreeDrawable(TreeDrawable):
 
 def offset_program(context: Context, kinds: Kinds, source: DecalSource) -> Program:
     """Return the program that traces moved trees of these kinds, for the context's backend."""
-    slots, defines = offset_slots(kinds, source.constants(), source.law), _defines(source.limited)
+    slots, defines = _filled(context, kinds, source)
     if context.backend is PassBackend.COMPUTE:
         defines |= {"GROUP": GROUP}
         return attach_camera(
@@ -239,17 +241,23 @@ def offset_program(context: Context, kinds: Kinds, source: DecalSource) -> Progr
 
 def start_program(context: Context, kinds: Kinds, source: DecalSource) -> Program:
     """Return the program that finds where the rays of squares of pixels begin."""
-    slots = offset_slots(kinds, source.constants(), source.law)
-    return attach_camera(
-        context.pixel_program("offset_start.glsl", 1, slots=slots, defines=_defines(source.limited))
-    )
+    slots, defines = _filled(context, kinds, source)
+    return attach_camera(context.pixel_program("offset_start.glsl", 1, slots=slots, defines=defines))
 
 
 @lru_cache(maxsize=64)
-def offset_slots(kinds: Kinds, constants: str, law: ContactLaw | None) -> dict[str, str | Source]:
+def offset_slots(
+    kinds: Kinds, constants: str, law: ContactLaw | None, *, buffers: bool
+) -> dict[str, str | Source]:
     """Return the fillings of ``offset_foot.glsl``: the cases of `kinds` and the formulas of decals."""
-    return tracing_slots(kinds, decal_functions(law)) | {"constants": constants, "functions": ""}
+    slots = tracing_slots(kinds, decal_functions(law)) | {"constants": constants, "functions": ""}
+    return slots | {"library": stored(str(slots["library"]))} if buffers else slots
 
 
-def _defines(limited: bool) -> dict[str, str | int | float | bool]:
-    return {"RELIEF": True, "LIMITED": limited, "BLOCK": BLOCK}
+def _filled(
+    context: Context, kinds: Kinds, source: DecalSource
+) -> tuple[dict[str, str | Source], dict[str, str | int | float | bool]]:
+    """Return slots and defines of ``offset_foot.glsl``."""
+    compute = context.backend is PassBackend.COMPUTE
+    slots = offset_slots(kinds, source.constants(), source.law, buffers=compute)
+    return slots, {"RELIEF": True, "LIMITED": source.limited, "BLOCK": BLOCK, "STORED": compute}

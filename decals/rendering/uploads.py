@@ -158,6 +158,17 @@ _TEXTURE_KINDS = {
 }
 
 
+STORED = ("decal_records", "index_levels", "index_table", "index_ids")
+"""Arrays that storage buffers hold too, bound from 1 on, for compute shaders with many look-ups a pixel."""
+
+
+def stored(library: str) -> str:
+    """Return GLSL of decal formulas that reads storage buffers, by functions of ``decal_data.glsl``."""
+    for name in STORED:
+        library = library.replace(f"texelFetch({name}, ", f"fetch_{name}(")
+    return library
+
+
 class DataTexture:
     """A ``float32[n, 4]``, ``int32[n]`` or ``int32[n, 4]`` array as a texture.
 
@@ -190,6 +201,8 @@ class DataTexture:
         )
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._shape, self._kind = array.shape[1:], array.dtype
+        self._gl = context.gl
+        self._buffer: moderngl.Buffer | None = None
 
     def read(self) -> NDArray[Any]:
         """Read the array back: the same shape, type and bits."""
@@ -206,15 +219,25 @@ class DataTexture:
             width, height = (ROW_TEXELS, left // ROW_TEXELS) if whole_rows else (min(ROW_TEXELS - x, left), 1)
             part = np.ascontiguousarray(array[done : done + width * height], self._kind)
             self.texture.write(part, viewport=(x, y, width, height))
+            if self._buffer is not None:
+                self._buffer.write(part, (first + done) * part[0].nbytes)
             done += width * height
 
     def use(self, unit: int) -> None:
         """Bind the texture to a unit."""
         self.texture.use(unit)
 
+    def store(self, binding: int) -> None:
+        """Bind a storage buffer with the same contents; the first call makes it."""
+        if self._buffer is None:
+            self._buffer = self._gl.buffer(self.texture.read())
+        self._buffer.bind_to_storage_buffer(binding)
+
     def release(self) -> None:
         """Release the memory."""
         self.texture.release()
+        if self._buffer is not None:
+            self._buffer.release()
 
 
 def _kind(array: NDArray[Any]) -> tuple[int, str]:
@@ -362,6 +385,11 @@ class DecalData:
         units = range(first_unit, first_unit + len(self._textures))
         for name, value in self.bind(units).items():
             set_uniform(program, name, value)
+
+    def store(self) -> None:
+        """Bind the storage buffers `STORED`."""
+        for binding, name in enumerate(STORED, 1):
+            self._textures[name].store(binding)
 
     def bind(self, units: Sequence[int]) -> dict[str, int]:
         """Bind the textures to `texture_count` units; return the uniforms of a program by their names."""

@@ -18,7 +18,9 @@ from decals.apps.gallery import relief as example
 from decals.rendering import Renderer, RenderOptions
 from decals.scenes.pose import PosedMesh, PosedScene
 
-RUNS = 5
+RUNS = 25
+WARM_UP = 8.0
+"""Seconds for which frames are drawn first: a graphics card at rest runs slowly."""
 SIZE = (400, 300)
 
 Figures = dict[str, float]
@@ -32,14 +34,15 @@ def measure(size: tuple[int, int], views: int) -> Figures:
     moved = decals.displace(scene)
     seconds = time.process_time() - begin
     times: dict[str, list[float]] = {"flat": [], "relief": [], "displaced": []}
+    shown: dict[str, Scene | PosedScene] = {"flat": flat, "relief": scene, "displaced": moved}
     with Renderer() as renderer:
-        for run in range(RUNS + 1):
-            shown: dict[str, Scene | PosedScene] = {"flat": flat, "relief": scene, "displaced": moved}
+        end = time.perf_counter() + WARM_UP
+        while time.perf_counter() < end:
+            renderer.time_frame(scene, RenderOptions(size=size))
+        for _ in range(RUNS):
             for name, one in shown.items():
                 renderer.time_frame(one, RenderOptions(size=size))  # uploads
-                frame = renderer.time_frame(one, RenderOptions(size=size))
-                if run:
-                    times[name].append(frame)
+                times[name].append(renderer.time_frame(one, RenderOptions(size=size)))
     usual = {name: statistics.median(values) for name, values in times.items()}
     item = moved.objects[0]
     assert isinstance(item, PosedMesh)

@@ -9,6 +9,7 @@ import pytest
 from decals.errors import InvalidImage, TooMuchData
 from decals.images.texels import linear_premultiplied
 from decals.rendering.context import Context
+from decals.rendering.pixel_pass import supports_compute
 from decals.rendering.uploads import (
     ROW_TEXELS,
     DataTexture,
@@ -27,6 +28,13 @@ void main() {{
     int i = int(gl_FragCoord.x) + {width} * int(gl_FragCoord.y);
     value = {result}(texelFetch(data, ivec2(i & 4095, i >> 12), 0){swizzle});
 }}
+"""
+
+COPY = """#version 430 core
+layout(local_size_x = 1) in;
+layout(std430, binding = 1) readonly buffer From {{ {kind} from[]; }};
+layout(std430, binding = 5) writeonly buffer To {{ {kind} to[]; }};
+void main() {{ to[gl_WorkGroupID.x] = from[gl_WorkGroupID.x]; }}
 """
 
 
@@ -64,6 +72,28 @@ def test_a_shader_reads_element_i(context: Context, kind: str, result: str) -> N
     context.gl.vertex_array(program, []).render(vertices=3)
     read = np.frombuffer(target.read(), array.dtype).reshape(width * height, -1)
     np.testing.assert_array_equal(read, array.reshape(count, -1))
+
+
+@pytest.mark.parametrize("row", [(4,), ()])
+def test_storage_buffers_hold_what_was_written(context: Context, row: tuple[int, ...]) -> None:
+    if not supports_compute(context.gl):
+        pytest.skip("this context has no compute shaders, which alone read storage buffers")
+    kind = "vec4" if row else "int"
+    array = np.arange(4100 * (4 if row else 1)).reshape(4100, *row)
+    array = array.astype(np.float32 if row else np.int32)
+    data = DataTexture(context, array)
+    data.store(1)  # before the write
+    array[4090:4100] = -array[:10]
+    data.write(4090, array[4090:4100])
+    copy = context.gl.buffer(reserve=array.nbytes)
+    copy.bind_to_storage_buffer(5)
+    data.store(1)
+    program = context.gl.compute_shader(COPY.format(kind=kind))
+    program.run(len(array))
+    context.gl.memory_barrier()
+    np.testing.assert_array_equal(np.frombuffer(copy.read(), array.dtype).reshape(array.shape), array)
+    for resource in (program, copy, data):
+        resource.release()
 
 
 @pytest.mark.parametrize("array", [np.zeros(3), np.zeros((3, 3), np.float32), np.zeros((3, 1), np.int32)])

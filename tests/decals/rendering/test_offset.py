@@ -132,8 +132,10 @@ def test_first_hits_are_those_of_short_steps_in_float64(
     assert moved.max() > 0.05
 
 
-def test_silhouettes_rise_and_an_edit_moves_them(renderers: dict[str, Renderer]) -> None:
-    renderer, options = renderers["fragment"], RenderOptions(size=(48, 36))
+@pytest.mark.slow_cases("compute")
+@pytest.mark.parametrize("backend", ["fragment", "compute"])
+def test_silhouettes_rise_and_an_edit_moves_them(renderers: dict[str, Renderer], backend: str) -> None:
+    renderer, options = renderers[backend], RenderOptions(size=(48, 36))
     oracle = SumOfBalls(*PAIR)
     scene = raised(oracle, tree_of(PAIR), 30, relief=0.5)
     hills = scene.replace(images=[waves(1, relief=0.5)] * 2)
