@@ -98,7 +98,7 @@ def _try_steepness(
         if change > bound * distance * (1.0 + VALUE_TOLERANCE) + VALUE_TOLERANCE * (1.0 + row[0]):
             raise trial.source.refusal(
                 f"f changes by {change:.6g} from {shown(q)} to {shown(q + offset)}, {distance:.6g} away, "
-                f"more than steepest = {bound:.6g} allows{_with(trial)}; claim a larger slope"
+                f"more than steepest = {bound:.6g} allows{trial.with_values}; claim a larger slope"
             )
 
 
@@ -121,9 +121,5 @@ def _try_intervals(
                 raise trial.source.refusal(
                     f"interval: f({shown(p)}) = {value:.6g} is not between {bounds[0]:.6g} and "
                     f"{bounds[1]:.6g}, claimed for the ball of radius {radius:.6g} around {shown(q)}"
-                    f"{_with(trial)}"
+                    f"{trial.with_values}"
                 )
-
-
-def _with(trial: Trial) -> str:
-    return f", with {trial.values}" if trial.values else ""

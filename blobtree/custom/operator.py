@@ -18,8 +18,8 @@ from typing import Any, Literal, cast, get_args
 
 import warp as wp
 
-from blobtree.custom.checks import Claims, check_directed_operator, check_operator
 from blobtree.custom.definition import CustomNode, Limits, custom_parameters, defined_kind
+from blobtree.custom.operator_checks import Claims, check_directed_operator, check_operator
 from blobtree.custom.source import CustomSource, custom_source, generated, kind_name
 from blobtree.formulas.gradient_blends import UNBOUNDED
 from blobtree.formulas.operators import (

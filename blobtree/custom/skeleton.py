@@ -24,7 +24,6 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree.custom.bounds_kernels import skeleton_boxes
-from blobtree.custom.checks import check_skeleton
 from blobtree.custom.definition import (
     CustomNode,
     Limits,
@@ -34,6 +33,7 @@ from blobtree.custom.definition import (
     tape_readings,
     texel_lines,
 )
+from blobtree.custom.skeleton_checks import check_skeleton
 from blobtree.custom.source import CustomSource, generated, kind_name
 from blobtree.errors import InvalidNode
 from blobtree.formulas.skeletons import Skeleton, min_influence_of_one

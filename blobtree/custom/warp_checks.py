@@ -73,7 +73,7 @@ def _try_determinants(trial: Trial, smooth: list[tuple[Float64Array, Float64Arra
         if abs(determinant) <= SINGULAR * float(np.linalg.norm(jacobian, 2)) ** 3 or len(signs) > 1:
             raise trial.source.refusal(
                 f"its Jacobian is singular at or near q = {shown(q)} (determinant {determinant:.3g}), so "
-                f"that it flattens or folds space, with {trial.values}; limit its parameters"
+                f"that it flattens or folds space{trial.with_values}; limit its parameters"
             )
 
 
@@ -89,7 +89,7 @@ def _try_pullback(
         if np.abs(seen - expected).max() > 20.0 * SLOPE_TOLERANCE * (1.0 + np.abs(expected).max()):
             raise trial.source.refusal(
                 f"pullback: for q = {shown(q)} and g = {shown(g)} it returns {shown(seen)}, but the "
-                f"transposed Jacobian times g is {shown(expected)} by differences, with {trial.values}"
+                f"transposed Jacobian times g is {shown(expected)} by differences{trial.with_values}"
             )
 
 
@@ -106,7 +106,7 @@ def _try_stretch(
         if norm > bound * (1.0 + SLOPE_TOLERANCE):
             raise trial.source.refusal(
                 f"stretch: the norm of its Jacobian at q = {shown(q)} is {norm:.6g}, more than "
-                f"{bound:.6g}, with {trial.values}"
+                f"{bound:.6g}{trial.with_values}"
             )
     for q, other in zip(points, rng.permutation(points), strict=True):
         apart = float(np.linalg.norm(other - q))
@@ -116,7 +116,7 @@ def _try_stretch(
         if moved > bound * apart * (1.0 + SLOPE_TOLERANCE) + SLOPE_TOLERANCE:
             raise trial.source.refusal(
                 f"stretch: {shown(q)} and {shown(other)} are {apart:.6g} apart, their images {moved:.6g}, "
-                f"more than {bound:.6g} times as much, with {trial.values}; it may jump between them"
+                f"more than {bound:.6g} times as much{trial.with_values}; it may jump between them"
             )
 
 
@@ -130,7 +130,7 @@ def _try_box(trial: Trial, claims: WarpClaims, numbers: tuple[float, ...], rng: 
         if (q < lower - slack).any() or (q > upper + slack).any():
             raise trial.source.refusal(
                 f"box: {shown(q)} comes from {shown(image)}, but the box {shown(lower)} to "
-                f"{shown(upper)} around that does not hold it, with {trial.values}"
+                f"{shown(upper)} around that does not hold it{trial.with_values}"
             )
 
 
