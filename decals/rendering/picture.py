@@ -13,7 +13,7 @@ from blobtree._typing import Float32Array, Int32Array, UInt8Array
 from blobtree.files import write_atomically
 from decals.errors import InvalidScene
 from decals.rendering.options import STUDIO, Size
-from decals.rendering.progressive import Targets
+from decals.rendering.targets import Targets
 from decals.rendering.viewpoint import Tile
 from decals.validation import as_path
 

@@ -22,6 +22,8 @@ from decals.field.mapping import ImageMapping
 from decals.index.editor import DecalEditor
 from decals.rendering.context import Context
 from decals.rendering.decal_pass import decal_library, decal_programs
+from decals.rendering.dirty_regions import TargetState
+from decals.rendering.frame_plan import FramePlan, FrameRequest, decal_source, plan_frame
 from decals.rendering.gbuffer import depth_program
 from decals.rendering.light_pass import light_program, light_variant, resolve_program
 from decals.rendering.materials import has_materials, has_relief
@@ -37,18 +39,8 @@ from decals.rendering.options import (
 )
 from decals.rendering.picture import Buffers, TiledArray, TiledBuffers
 from decals.rendering.pixel_pass import CameraBuffer, PassBackend
-from decals.rendering.progressive import (
-    BUFFERS_SLOT,
-    WHOLE_SLOT,
-    FramePlan,
-    FrameRequest,
-    ProgressiveFrame,
-    TargetPool,
-    Targets,
-    TargetState,
-    decal_source,
-    plan_frame,
-)
+from decals.rendering.progressive import ProgressiveFrame
+from decals.rendering.targets import BUFFERS_SLOT, WHOLE_SLOT, TargetPool, Targets
 from decals.rendering.tree import TreeHolder
 from decals.rendering.uploads import DecalData, ImageArray, UploadedScene, Uploads, register, warmup_of
 from decals.rendering.viewpoint import (

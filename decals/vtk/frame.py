@@ -17,8 +17,10 @@ from _moderngl import DefaultLoader  # type: ignore[import-untyped]
 from decals.errors import NoGraphics
 from decals.rendering import Renderer, RenderOptions, SceneLike, Size
 from decals.rendering.context import Context
+from decals.rendering.dirty_regions import TargetState, decal_version, same_objects
 from decals.rendering.pixel_pass import CameraBuffer, set_uniform, use_textures
-from decals.rendering.progressive import ProgressiveFrame, Targets, TargetState, decal_version, same_objects
+from decals.rendering.progressive import ProgressiveFrame
+from decals.rendering.targets import Targets
 from decals.rendering.viewpoint import Projection, Rectangle
 from decals.rendering.warmup import WarmupPlan, WarmupThread
 from decals.shaders import compose

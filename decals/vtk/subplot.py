@@ -24,10 +24,10 @@ from decals.field.mapping import ImageMapping
 from decals.images.load import AnyImage
 from decals.receivers import label_names
 from decals.rendering import Environment, Renderer, RenderOptions, SceneLike, Size
+from decals.rendering.dirty_regions import same_objects
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Drawing, check_scene, drawing_of
 from decals.rendering.pixel_pass import CameraBuffer
-from decals.rendering.progressive import same_objects
 from decals.rendering.viewpoint import Projection
 from decals.scenes.objects import Box, SceneObject, as_crease_angle, bounds_of
 from decals.scenes.scene import Scene

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blobtree._typing import Float64Array
+from decals.rendering.dirty_regions import MAX_RECTANGLES, TargetState, ball_extents, joined, regions_of
 from decals.rendering.options import RenderOptions
 from decals.rendering.pixel_pass import GROUP
-from decals.rendering.progressive import MAX_RECTANGLES, TargetState, ball_extents, joined, regions_of
 from decals.rendering.viewpoint import TILE_MARGIN, PictureView, Projection, Rectangle, tiles
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene

@@ -1,0 +1,107 @@
+"""The textures that all passes draw into."""
+
+from collections.abc import Iterator
+
+from decals.rendering.context import DEPTH, Context
+from decals.rendering.decal_pass import DecalPass
+from decals.rendering.dirty_regions import TargetState
+from decals.rendering.gbuffer import GBuffer
+from decals.rendering.light_pass import LightPass, ResolvePass
+from decals.rendering.mesh import PosedMeshDrawable
+from decals.rendering.options import Size
+from decals.rendering.rest_buffer import RestBuffer
+from decals.rendering.uploads import UploadedScene
+
+TEXTURE_KINDS = ("f4", "f4", "f2", DEPTH, "f2", "f2", "f1")
+"""Kinds of the textures of targets without buffers."""
+
+
+class Targets:
+    """The targets of all passes, for tiles up to a size.
+
+    Attributes
+    ----------
+    state
+        Everything that the picture in the targets depends on; None while it is incomplete.
+    frame
+        The frame that was drawn last, complete or not.
+    """
+
+    def __init__(self, context: Context, size: Size, *, buffers: bool) -> None:
+        self.buffers = buffers
+        self.state: TargetState | None = None
+        self.frame: object = None
+        self.gbuffer = GBuffer(context, size)
+        self._context = context
+        self._rest: RestBuffer | None = None
+        self.decal_pass = DecalPass(context, size, buffers=buffers)
+        self.light_pass = LightPass(context, size)
+        self.resolve = ResolvePass(context, size)
+
+    def rest_for(self, uploaded: UploadedScene) -> RestBuffer | None:
+        """Return the rest buffer if some objects are posed, or moved by heights, else None."""
+        if not any(isinstance(drawable, PosedMeshDrawable) for drawable in uploaded.drawables) and not any(
+            map(uploaded.moves, uploaded.drawables)
+        ):
+            return None
+        if self._rest is None:
+            self._rest = RestBuffer(self._context, self.gbuffer)
+        return self._rest
+
+    def release(self) -> None:
+        """Release the memory."""
+        self.state = self.frame = None
+        if self._rest is not None:
+            self._rest.release()
+        self.gbuffer.release()
+        self.decal_pass.release()
+        self.light_pass.release()
+        self.resolve.release()
+
+
+WHOLE_SLOT, BUFFERS_SLOT = "whole", "buffers"
+"""Slots of pictures that are drawn at once, and of pictures with buffers."""
+
+
+class TargetPool:
+    """The targets of a renderer, by slot: each keeps its targets while its pictures have the same size."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._targets: dict[str, Targets] = {}
+
+    def get(self, slot: str) -> Targets | None:
+        """Return the targets of a slot's last picture; None before the first."""
+        return self._targets.get(slot)
+
+    def of(self, slot: str, size: Size) -> Targets:
+        """Return targets of a size; those of the slot's last picture if they have it."""
+        targets = self._targets.get(slot)
+        if targets is None or targets.gbuffer.size != size:
+            if targets is not None:
+                targets.release()
+            targets = self._targets[slot] = Targets(self._context, size, buffers=slot == BUFFERS_SLOT)
+        return targets
+
+    def make(self, slot: str, size: Size) -> Iterator[Targets | None]:
+        """Yield None after each new texture, for memory is allocated slowly, and targets of a size last."""
+        targets = self._targets.get(slot)
+        if targets is None or targets.gbuffer.size != size:
+            if targets is not None:
+                self._targets.pop(slot).release()
+            self._context.clear_spare_textures()
+            for kind in TEXTURE_KINDS:
+                self._context.prepare_texture(size, kind)
+                yield None
+        yield self.of(slot, size)
+
+    def forget(self) -> None:
+        """Draw the next pictures from the beginning."""
+        for targets in self._targets.values():
+            targets.state = None
+
+    def release(self) -> None:
+        """Release the memory."""
+        for targets in self._targets.values():
+            targets.release()
+        self._targets.clear()
