@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from cyclopts import Parameter
 
 from decals import MeshObject, Scene, pose, turntable
@@ -149,19 +148,19 @@ def _pose_function(module: str) -> Poses:
 
 
 def _mesh_function(scene: Scene, files: Sequence[str]) -> Poses:
-    """Return the function whose poses are the vertices of files, one after another."""
+    """Return the function whose poses are the meshes of files, one after another."""
     names = [item.name for item in scene.objects if isinstance(item, MeshObject)]
     if len(names) != 1:
         raise InvalidInput(f"--meshes: expected a scene with one mesh, got {len(names)}; use --poses")
 
-    def vertices(t: float) -> Any:
+    def mesh(t: float) -> Any:
         loaded = load_models([files[min(int(t * len(files) + 1e-6), len(files) - 1)]])
         item = None if isinstance(loaded, Scene) else loaded[0]
         if not isinstance(item, MeshObject):
             raise InvalidInput("--meshes: expected mesh files, got a scene or a tree; use --poses")
-        return {names[0]: np.add(item.vertices, item.origin, dtype=np.float64)}
+        return {names[0]: item}
 
-    return vertices
+    return mesh
 
 
 def _posed(

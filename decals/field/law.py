@@ -18,7 +18,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from blobtree.custom.checks import result_of
+from blobtree.custom.checks import result_of, shown
 from blobtree.custom.falloff import check_falling, find_rim
 from blobtree.custom.source import CustomSource, custom_source, kind_name
 from blobtree.errors import InvalidDefinition
@@ -44,6 +44,9 @@ SINGLE_TOLERANCE = 1e-4
 
 LEAST_FALL = 1e-7
 """Least fall of g between two samples inside the rim, so that it has an inverse there."""
+
+LARGEST_FALL = 0.1
+"""Largest fall of g between two samples inside the rim; more is a jump."""
 
 LARGEST_CUT = 5e-3
 """Largest change of F by a neighbour beyond the reach of the index, which is left out."""
@@ -313,12 +316,17 @@ def _sampled(source: CustomSource, *arguments: Floats, single: bool = False) -> 
     precision = np.float32 if single else np.float64
     reference = source.reference(precision)
     rows = [[precision(value) for value in row] for row in zip(*arguments, strict=True)]
-    places = [partial("({}) = ({})".format, ", ".join(source.parameters), row) for row in rows]
+    names = ", ".join(source.parameters)
+    places = [partial(_place, f"({names})" if len(arguments) > 1 else names, row) for row in rows]
     values = [
         result_of(source, lambda *given: np.ravel(reference(*given)), row, place, 1)
         for row, place in zip(rows, places, strict=True)
     ]
-    return np.concatenate(values).astype(np.float64)
+    return np.ravel(values).astype(np.float64)
+
+
+def _place(names: str, values: list[Any]) -> str:
+    return f"{names} = {shown(values)}"
 
 
 def _check_field(source: CustomSource) -> float:
@@ -331,6 +339,13 @@ def _check_field(source: CustomSource) -> float:
         raise source.refusal(
             f"g is flat at d = {distances[int(flat.argmax())]:.6g}, inside its rim, "
             "so it has no inverse there; let it fall"
+        )
+    jumps = (-np.diff(values) > LARGEST_FALL) & (values[:-1] > 0.5)
+    if jumps.any():
+        place = int(jumps.argmax())
+        raise source.refusal(
+            f"g jumps from {values[place]:.6g} at d = {distances[place]:.6g} to {values[place + 1]:.6g}, "
+            "inside its rim, so images have a gap there; let it fall more slowly"
         )
     single = _sampled(source, distances, single=True)
     if np.abs(single - values).max() > SINGLE_TOLERANCE:

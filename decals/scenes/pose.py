@@ -9,14 +9,14 @@ This removes the limitation that section 3.5 of the paper states.
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import decals
 from blobtree import Node, polygonize
-from blobtree._typing import Float32Array, Float64Array, Int32Array
+from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.errors import InvalidNode
 from blobtree.validation import real, truth
 from decals.errors import InvalidScene
@@ -27,13 +27,20 @@ from decals.scenes.camera import Camera
 from decals.scenes.objects import Box, Color, MeshObject, SceneObject, TreeObject
 from decals.scenes.origin import Origin
 from decals.scenes.scene import DecalImage, Scene
+from decals.surfaces.convert import as_shape, is_model
 from decals.validation import describe, instance, whole_number
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 TREE_RESOLUTION = 128
 """Cells along the longest side of the mesh of a posed tree."""
 
-WEIGHT_ERROR = 1e-3
-"""Largest difference of a vertex's summed skin weights from 1."""
+SHARED_EDGES = 1 / 3
+"""Least share of the edges of a rest pose that a posed mesh has too; polygons may be divided otherwise."""
+
+WEIGHT_ERROR, LAST_ROW_ERROR = 1e-3, 1e-6
+"""Largest differences of a vertex's summed skin weights from 1, and of a matrix's last row from 0 0 0 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +147,7 @@ def require_scene(name: str, scene: object, advice: str) -> Scene:
 
 def pose(
     scene: Scene,
-    poses: Mapping[str, ArrayLike | Node],
+    poses: Mapping[str, "ArrayLike | MeshObject | pv.PolyData | Node"],
     *,
     rigid: bool = False,
     camera: Camera | None = None,
@@ -155,10 +162,11 @@ def pose(
     ----------
     scene : Scene
         Scene with objects in their rest pose, and decals on them.
-    poses : mapping from str to float[n, 3] or Node
-        For some objects, by name: new positions of all vertices of a mesh; or the posed tree, with the same
-        leaves as the tree at rest, from left to right. Warps bend and twist it, and skeletons may move; see
-        `blobtree.Node.rest_coordinates`. The tree at rest may have other warps.
+    poses : mapping from str to float[n, 3], MeshObject, pyvista.PolyData or Node
+        For some objects, by name: new positions of all vertices of a mesh, or a mesh with these and the same
+        faces; or the posed tree, with the same leaves as the tree at rest, from left to right. Warps bend
+        and twist it, and skeletons may move; see `blobtree.Node.rest_coordinates`. The tree at rest may have
+        other warps.
     rigid : bool
         True for decals that keep their shape: each moves and turns with the nearest triangle of a posed mesh,
         and meets its neighbours in the new pose.
@@ -174,8 +182,9 @@ def pose(
     Raises
     ------
     InvalidScene
-        No object has such a name, the positions are not as many as its vertices, or a posed tree has other
-        leaves than the tree at rest.
+        No object has such a name, the positions are not as many as its vertices, a posed mesh has other
+        faces, a posed tree has other leaves than the tree at rest, or a rigid decal lies on a triangle whose
+        area in the pose is zero.
 
     See Also
     --------
@@ -249,6 +258,12 @@ def _carried(scene: Scene, posed: Mapping[str, PosedMesh]) -> Decals:
         before, after = (
             vertices.astype(np.float64)[mesh.faces[faces]] for vertices in (mesh.rest.vertices, mesh.vertices)
         )
+        flat = np.flatnonzero(~np.cross(after[:, 1] - after[:, 0], after[:, 2] - after[:, 0]).any(axis=1))
+        if len(flat):
+            raise InvalidScene(
+                f"pose of {item.name!r}: expected triangles with area below rigid decals, got none for decal "
+                f"{own[flat[0]]}; leave out rigid, or repair triangle {faces[flat[0]]}"
+            )
         offsets = decals.positions[own] - np.einsum("nc,nca->na", weights, before)
         turns = _frames(after) @ _frames(before).transpose(0, 2, 1)
         moved = np.einsum("nc,nca->na", weights, after) + np.einsum("nab,nb->na", turns, offsets)
@@ -272,7 +287,9 @@ def _frames(corners: Float64Array) -> Float64Array:
     return frames
 
 
-def _posed(item: SceneObject, given: ArrayLike | Node, resolution: int) -> PosedMesh:
+def _posed(
+    item: SceneObject, given: "ArrayLike | MeshObject | pv.PolyData | Node", resolution: int
+) -> PosedMesh:
     """Return an object in a pose."""
     if isinstance(item, TreeObject):
         if not isinstance(given, Node):
@@ -304,10 +321,29 @@ def _posed_tree(item: TreeObject, tree: Node, resolution: int) -> PosedMesh:
     return PosedMesh(rest, mesh.vertices, moved.tree.colors(mesh.vertices), moved)
 
 
-def _posed_mesh(rest: MeshObject, vertices: ArrayLike) -> PosedMesh:
+def _posed_mesh(rest: MeshObject, given: "ArrayLike | MeshObject | pv.PolyData") -> PosedMesh:
+    name, vertices = f"pose of {rest.name!r}", cast(Any, given)
     advice = "a pose has the vertices of the rest pose"
-    positions = _numbers(f"pose of {rest.name!r}", vertices, rest.vertices.shape, advice)
+    faces = None
+    if is_model(given) and not isinstance(given, str | os.PathLike | tuple | list):
+        vertices, faces = cast(Any, as_shape(given, name=name, error=InvalidScene))
+        if isinstance(given, MeshObject):
+            vertices = np.add(vertices, given.origin, dtype=np.float64)
+    positions = _numbers(name, vertices, rest.vertices.shape, advice)
+    if faces is not None:
+        shared = np.isin(_edges(rest.faces), _edges(faces)).mean()
+        if shared < SHARED_EDGES:
+            raise InvalidScene(
+                f"{name}: expected the faces of the rest pose, got a mesh that has {shared:.0%} of its "
+                "edges; give a mesh of the same topology"
+            )
     return PosedMesh(rest, (positions - np.asarray(rest.origin)).astype(np.float32))
+
+
+def _edges(faces: Int32Array) -> Int64Array:
+    """Return the edges of triangles, each as one number."""
+    ends = np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64), axis=1)
+    return np.unique(ends[:, 0] << 32 | ends[:, 1])
 
 
 def skin(vertices: ArrayLike, weights: ArrayLike, transforms: ArrayLike) -> Float64Array:
@@ -320,7 +356,8 @@ def skin(vertices: ArrayLike, weights: ArrayLike, transforms: ArrayLike) -> Floa
     weights : float[n, j]
         Weights of j joints for each vertex, from 0, whose sum is 1.
     transforms : float[j, 4, 4]
-        Matrices of the joints, from the rest pose to the new one, for column vectors.
+        Matrices of the joints, from the rest pose to the new one, for column vectors: the last row of each is
+        [0, 0, 0, 1], and its last column the translation.
 
     Returns
     -------
@@ -329,7 +366,8 @@ def skin(vertices: ArrayLike, weights: ArrayLike, transforms: ArrayLike) -> Floa
     Raises
     ------
     InvalidScene
-        Arrays of other shapes, values that are not finite, negative weights, or sums other than 1.
+        Arrays of other shapes, values that are not finite, negative weights, sums other than 1, or matrices
+        with another last row.
 
     Examples
     --------
@@ -344,8 +382,15 @@ def skin(vertices: ArrayLike, weights: ArrayLike, transforms: ArrayLike) -> Floa
     matrices = _numbers("transforms", transforms, (-1, 4, 4), "give one matrix per joint")
     advice = "give one row per vertex, one column per joint"
     shares = _numbers("weights", weights, (len(points), len(matrices)), advice)
-    off = np.abs(shares.sum(axis=1) - 1.0)
-    if shares.min(initial=0.0) < 0.0 or off.max(initial=0.0) > WEIGHT_ERROR:
+    astray = np.abs(matrices[:, 3] - [0.0, 0.0, 0.0, 1.0]).max(axis=1) > LAST_ROW_ERROR
+    if astray.any():
+        worst = int(astray.argmax())
+        raise InvalidScene(
+            "transforms: expected matrices whose last row is [0, 0, 0, 1], got "
+            f"{matrices[worst, 3].tolist()} in matrix {worst}; transpose matrices for row vectors"
+        )
+    off = np.where((shares < 0.0).any(axis=1), np.inf, np.abs(shares.sum(axis=1) - 1.0))
+    if off.max(initial=0.0) > WEIGHT_ERROR:
         worst = int(off.argmax())
         raise InvalidScene(
             "weights: expected numbers from 0 whose sum is 1 for each vertex, "
@@ -362,11 +407,14 @@ def _numbers(name: str, values: ArrayLike, shape: tuple[int, ...], advice: str) 
     try:
         array = np.asarray(real(values), np.float64)
     except (TypeError, ValueError, OverflowError):
-        raise InvalidScene(f"{name}: expected numbers of shape [{lengths}], got {describe(values)}") from None
+        found = describe(values)
+        raise InvalidScene(f"{name}: expected numbers of shape [{lengths}], got {found}; {advice}") from None
     fits = array.ndim == len(shape) and all(e in (-1, s) for s, e in zip(array.shape, shape, strict=True))
     if not fits:
         raise InvalidScene(f"{name}: expected shape [{lengths}], got {list(array.shape)}; {advice}")
     if not np.isfinite(array).all():
         row = int(np.argwhere(~np.isfinite(array))[0][0])
-        raise InvalidScene(f"{name}: expected finite numbers, got {array[row].tolist()} in row {row}")
+        raise InvalidScene(
+            f"{name}: expected finite numbers, got {array[row].tolist()} in row {row}; drop or repair it"
+        )
     return array

@@ -52,6 +52,21 @@ def plateau(d: wp.float32) -> wp.float32:
 
 
 @wp.func
+def jumping(d: wp.float32) -> wp.float32:
+    return wp.where(d <= 0.5, 1.0 - 0.5 * d, 0.0)
+
+
+@wp.func
+def root(d: wp.float32) -> wp.float32:
+    return wp.sqrt(0.5 - d)
+
+
+@wp.func
+def short(d: wp.float32) -> wp.float32:
+    return wp.max(wp.min(1.0 - d, 3.0 - 5.0 * d), 0.0)
+
+
+@wp.func
 def two_distances(d: wp.float32, e: wp.float32) -> wp.float32:
     return d + e
 
@@ -180,6 +195,8 @@ def test_a_definition_is_made_once() -> None:
         ((from_half,), r"g\(0\) = 0.5, expected 1"),
         ((never_zero,), r"g\(1\) = 0.0183156, expected 0"),
         ((plateau,), "g is flat at d = 0, inside its rim"),
+        ((jumping,), "g jumps from 0.75 at d = 0.5 to 0, inside its rim"),
+        ((root,), r"for d = 0.501 it returns nan; expected 1 finite numbers"),
         ((two_distances,), "expected the distance"),
         (("round",), "field: expected a typed function or one of wyvill, .*got 'round'"),
         (("wyvill", too_weak), "expected 0 where the fields are equal"),
@@ -192,6 +209,10 @@ def test_a_definition_is_made_once() -> None:
 def test_wrong_functions_are_refused(arguments: tuple[Any, ...], says: str) -> None:
     with pytest.raises(InvalidDefinition, match=says):
         define_contact(*arguments)
+
+
+def test_a_field_may_end_inside_the_reach_of_its_neighbours() -> None:
+    assert define_contact(short).rim == pytest.approx(0.5, abs=1e-6)
 
 
 def test_only_product_and_min_combine() -> None:

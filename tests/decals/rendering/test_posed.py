@@ -5,6 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+import pyvista as pv
 from numpy.typing import NDArray
 
 import decals
@@ -31,6 +32,13 @@ def sheet(*, side: int = 33) -> MeshObject:
     a = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).reshape(-1)
     faces = np.concatenate([np.stack([a, a + side, a + side + 1], 1), np.stack([a, a + side + 1, a + 1], 1)])
     return MeshObject("sheet", np.stack([x, y, 0 * x], -1).reshape(-1, 3), faces)
+
+
+def renumbered() -> MeshObject:
+    """Return a sheet with as many vertices, in another order."""
+    item = sheet()
+    order = np.random.default_rng(0).permutation(len(item.vertices))
+    return MeshObject("other", item.vertices, order[item.faces])
 
 
 def covered(item: MeshObject, *, count: int = 40, camera: Camera = VIEW) -> Scene:
@@ -186,6 +194,29 @@ def test_rigid_decals_move_and_turn_with_their_triangles() -> None:
     np.testing.assert_allclose(moved.tangents[:-1], scene.decals.tangents @ turn.T, atol=2e-5)
     np.testing.assert_array_equal(moved.radii, both.decals.radii)
     np.testing.assert_array_equal(moved.positions[-1], alone.positions[0])
+
+
+def test_a_pose_may_be_a_mesh_of_the_same_topology() -> None:
+    item = sheet()
+    points = np.column_stack([item.vertices[:, :2], item.vertices[:, 0] ** 2])
+    scene = covered(item, count=3)
+    expected = cast(Any, decals.pose(scene, {"sheet": points}).objects[0]).vertices
+    other = np.vstack([item.faces[:5, [1, 2, 0]], item.faces[5:]])
+    for mesh in (
+        pv.PolyData.from_regular_faces(points, item.faces.tolist()),
+        MeshObject("other", points, other),
+    ):
+        posed = decals.pose(scene, {"sheet": mesh}).objects[0]
+        np.testing.assert_allclose(cast(Any, posed).vertices, expected, atol=1e-6)
+
+
+def test_rigid_decals_need_triangles_with_area() -> None:
+    item = sheet()
+    scene = covered(item)
+    half = np.where(item.vertices[:, :1] < 0, item.vertices * [1, 0, 0], item.vertices)
+    decals.pose(scene, {"sheet": half})
+    with pytest.raises(InvalidScene, match=r"'sheet': expected triangles with area .* leave out rigid"):
+        decals.pose(scene, {"sheet": half}, rigid=True)
 
 
 def limb(end: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Node:
@@ -355,7 +386,9 @@ def test_a_posed_scene_is_drawn_only(vtk_display: None) -> None:
         ({"ball": np.zeros((3, 3))}, "expected names of objects of the scene"),
         ({"sheet": np.zeros((3, 3))}, r"expected shape \[1089, 3\], got \[3, 3\]; a pose has the vertices"),
         ({"sheet": np.full((1089, 3), np.nan)}, "expected finite numbers"),
-        ({"sheet": "here"}, "expected numbers of shape"),
+        ({"sheet": "here"}, r"expected numbers of shape \[1089, 3\], got 'here'; a pose has the vertices"),
+        ({"sheet": pv.Sphere()}, r"expected shape \[1089, 3\], got \[842, 3\]; a pose has the vertices"),
+        ({"sheet": renumbered()}, "expected the faces of the rest pose, got a mesh that has 0% of its edges"),
         ([("sheet", 1)], "expected positions by the names of objects"),
     ],
 )
@@ -386,11 +419,13 @@ def test_skin_blends_the_joints_linearly() -> None:
     [
         ([[0.5, 0.2]], [np.eye(4)] * 2, r"whose sum is 1 .* at vertex 0; divide each row"),
         ([[1.5, -0.5]], [np.eye(4)] * 2, "expected numbers from 0"),
+        ([[0.5, 0.5], [1.5, -0.5]], [np.eye(4)] * 2, r"got \[1.5, -0.5\] at vertex 1"),
         ([[1.0]], [np.eye(4)] * 2, r"weights: expected shape \[1, 2\]"),
         ([[1.0]], [np.eye(3)], r"transforms: expected shape \[n, 4, 4\]"),
-        ([[np.inf]], [np.eye(4)], "expected finite numbers"),
+        ([[np.inf]], [np.eye(4)], "expected finite numbers, .* in row 0; drop or repair it"),
+        ([[1.0]], [np.eye(4)[::-1]], r"last row is \[0, 0, 0, 1\], got \[1.0, .* in matrix 0; transpose"),
     ],
 )
 def test_invalid_skins(weights: Any, transforms: Any, message: str) -> None:
     with pytest.raises(InvalidScene, match=message):
-        decals.skin([[0, 0, 0]], weights, transforms)
+        decals.skin([[0, 0, 0]] * len(weights), weights, transforms)
