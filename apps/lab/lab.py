@@ -23,7 +23,8 @@ from decals.apps.sandbox.controls import STEPS, Control, exchanged, number_of
 from decals.apps.sandbox.decal_panel import set_drawing
 from decals.editing.commands import ReplaceScene, SetValues
 from decals.editing.queries import move_decals
-from decals.errors import ImplicitDecalsError
+from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.validation import whole_number
 from decals.vtk.component import show_camera
 from decals.window import EditWindow
 
@@ -57,7 +58,7 @@ class Lab:
 
     Notes
     -----
-    Events never raise for bad values: the scene stays as it was, and the window's message says why.
+    Events raise errors of the library for bad values, and the scene stays as it was.
     """
 
     def __init__(self, window: EditWindow, lessons: Sequence[Lesson]) -> None:
@@ -202,9 +203,7 @@ class Lab:
 
     def start(self, number: int) -> None:
         """Start a lesson, from its beginning: its scene replaces the present one."""
-        if isinstance(number, bool) or not isinstance(number, int) or number not in range(len(self._lessons)):
-            self._show(f"lesson: expected one from 0 to {len(self._lessons) - 1}, got {number!r:.40}")
-            return
+        number = whole_number("lesson", number, 0, len(self._lessons) - 1, InvalidEdit)
         window, lesson = self._window, self._lessons[number]
         settings = lesson.settings
         self._window.actions.state.end_stroke()
@@ -230,15 +229,8 @@ class Lab:
 
     def set_value(self, number: int, raw: Any, last: bool = True) -> None:
         """Set what a slider of the lesson moves; with ``last`` False, more values follow."""
-        try:
-            self._set(self.lesson.settings.sliders[number], raw, bool(last))
-        except (IndexError, TypeError):
-            self._show(f"slider: expected one of the lesson, got {number!r:.40}")
-        except ImplicitDecalsError as error:
-            self._window.actions.state.refuse(error)
-
-    def _set(self, slider: Slider, raw: Any, last: bool) -> None:
-        state, path = self._window.actions.state, slider.path
+        sliders, state = self.lesson.settings.sliders, self._window.actions.state
+        path = sliders[whole_number("slider", number, 0, len(sliders) - 1, InvalidEdit)].path
         if path.startswith("probe."):
             x, y, z = exchanged(self._probe, [AXES.index(path[-1])], number_of(path, raw))
             self._probe = x, y, z
@@ -277,9 +269,6 @@ class Lab:
     def check(self) -> None:
         """Check the answer: the verdict appears once it is computed, until the scene changes."""
         self._asking = True
-
-    def _show(self, message: str) -> None:
-        self._window.actions.state.show(message)
 
     def _mark_probe(self) -> None:
         """Show the probe in the view, if the lesson moves it."""

@@ -32,6 +32,9 @@ OVERLAYS = "none", "contact lines", "owners", "stretch", "folds", "seeds"
 RESOLUTION = 96
 """Cells along the longest side of the meshes that modes and overlays use."""
 
+SCALE = {"n_labels": 2, "label_font_size": 16, "title_font_size": 18}
+"""How the scale of colours looks: numbers at its ends alone leave room for its title."""
+
 LIFT = 0.003
 """Distance of overlays above the surface, in sizes of the scene, so that they are not hidden."""
 
@@ -155,7 +158,7 @@ class Display:
             doc, step = "distance of the slice from the origin of the model", (high - low) / STEPS
             position = Control("slice_position", "number", plane.position, doc, length, low, high, step)
             yield position, lambda at: change(slice=plane.at(at))
-            normal = Control("slice_normal", "vector", plane.normal, "direction across the slice")
+            normal = Control("slice_normal", "vector", plane.normal, "x, y, z; what lies on that side is cut")
             yield normal, lambda along: change(slice=SlicePlane.across(plane.point, along))
         up_doc = "axis that points upward in the model"
         yield choice("up", up, UPRIGHT, up_doc), lambda axis: setattr(view, "axes", UPRIGHT[axis])
@@ -268,7 +271,8 @@ class Display:
         if replaced:  # a scene that is not drawn needs no warm-up
             subplot.status, self._window.warmup.status = FrameStatus.EMPTY, ""
         for name, data, given in shown:
-            plotter.add_mesh(data, name=name, pickable=False, reset_camera=False, render=False, **given)
+            shown_as = {"pickable": False, "reset_camera": False, "render": False, **given}
+            plotter.add_mesh(data, name=name, scalar_bar_args=dict(SCALE), **shown_as)
 
     # -- cameras ----------------------------------------------------------------------------------------
 
@@ -448,9 +452,8 @@ def _sliced(document: Document, mesh: pv.PolyData, cut: SlicePlane, lift: float)
             continue
         field: Any = item.tree.slice(cut.point, cut.normal, resolution=RESOLUTION)
         plane = {"scalars": "field", "cmap": "cividis", "clim": (0.0, 1.0), "lighting": False}
-        shown.append(
-            (f"{PREFIX}plane {number}", field["plane"].threshold(SHOWN_FIELD, scalars="field"), plane)
-        )
+        inside = field["plane"].clip_scalar(scalars="field", value=SHOWN_FIELD, invert=False)
+        shown.append((f"{PREFIX}plane {number}", inside, plane))
         for part, width in (("lines", 1), ("surface", 4)):
             if field[part].n_points:
                 lifted = field[part].translate(lift * np.array(cut.normal))

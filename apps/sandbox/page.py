@@ -278,7 +278,8 @@ class Page:
                 enter=SEND_NAME,
                 blur=SEND_NAME,
                 escape="renamed = {key: '', name: ''}",
-                __events=[("enter", "keyup.enter"), ("escape", "keyup.esc"), "blur"],
+                focus="$event.target.select()",
+                __events=[("enter", "keyup.enter"), ("escape", "keyup.esc"), "blur", "focus"],
             )
             vuetify3.VListItem(
                 v_if="renamed.key !== row.key",
@@ -305,7 +306,7 @@ class Page:
                     raw_attrs=[f':aria-pressed="row.{flag}"', *named(f"'{change} ' + row.label")],
                 )
         self._build_row_menu()
-        with html.Div(v_if="selected", classes="d-flex ga-1 px-2"):
+        with html.Div(v_if="selected", classes="d-flex ga-1 px-2 row-changes"):
             for change, icon in ROW_CHANGES.items():
                 panels.icon_button(
                     icon,

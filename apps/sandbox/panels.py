@@ -266,7 +266,7 @@ def build_driver() -> None:
     with html.Div(v_if="driving.shared", classes="d-flex align-center ga-2 mr-2"):
         html.Span(
             "{{ driving.drives ? 'You drive' : 'Browser ' + driving.driver + ' drives' }}, "
-            "{{ driving.browsers - 1 }} watch",
+            "{{ driving.browsers - 1 }} watching",
             classes="text-caption",
             raw_attrs=['role="status"'],
         )

@@ -14,6 +14,8 @@ from functools import partial, wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
+import numpy as np
+
 from blobtree import Node
 from blobtree._typing import Int64Array
 from blobtree.custom.definition import custom_kinds
@@ -24,7 +26,7 @@ from decals.apps.models.samples import SAMPLES, axes_of, sample
 from decals.apps.models.scenes import empty_scene, new_file
 from decals.apps.sandbox import catalog, decal_panel
 from decals.apps.sandbox.controls import controls_of, exchanged, parsed, parsed_option
-from decals.apps.sandbox.display import PHASES, Display
+from decals.apps.sandbox.display import PHASES, Display, DisplayOptions
 from decals.apps.sandbox.folder import HDR, MODELS, keep_upload, listed, plain_name, read_upload, unused
 from decals.apps.sandbox.outline import key_of, outline, parse_key
 from decals.apps.views import THREE_QUARTER
@@ -40,6 +42,7 @@ from decals.options import arguments_of
 from decals.rendering.environment import Environment
 from decals.scattering.scatter import scatter
 from decals.scenes.camera import UPRIGHT, Camera
+from decals.scenes.cover import fitting_camera
 from decals.scenes.files import is_scene_file, load_model
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject, bounds_of, flagged
 from decals.scenes.scene import DecalImage, Scene
@@ -462,6 +465,7 @@ class Sandbox:
         if not self.in_lesson and self._window.document.objects:
             self._before_lesson = self._window.session.next_undo, self.display.kept_camera()
             self._files.set_aside()
+        self.display.options = DisplayOptions()
         self._start_lesson(number)
         self.in_lesson, self._start = True, {**self._start, "open": False}
 
@@ -493,9 +497,12 @@ class Sandbox:
         """Open a sample with scattered decals."""
         one_of("sample", name, SAMPLES, InvalidEdit)
 
+        direction, size = axes_of(name).preset(THREE_QUARTER), self._window.plotter.window_size
+
         def load(progress: Progress, _cancel: Cancel) -> Scene:
-            direction = axes_of(name).preset(THREE_QUARTER)
-            return cover(sample(name), images=FIRST_IMAGES, view_direction=direction, progress=progress)
+            return _fitted(
+                cover(sample(name), images=FIRST_IMAGES, view_direction=direction, progress=progress), size
+            )
 
         self._open(load, f"{name}-decals")
 
@@ -513,8 +520,9 @@ class Sandbox:
             if not path.exists():  # the recovery file has everything
                 return empty_scene(FIRST_IMAGES, UPRIGHT["y"])
             found = load_model(path)
-            return found if isinstance(found, Scene) else _bare_scene(found)
+            return found if isinstance(found, Scene) else _fitted(_bare_scene(found), size)
 
+        size = self._window.plotter.window_size
         is_scene = path.suffix == ".json" and (not path.exists() or is_scene_file(path))
         self._open(load, path if is_scene else f"{path.stem}-decals")
 
@@ -601,6 +609,7 @@ class Sandbox:
         self._files.open(load, new_file(self._folder, path) if isinstance(path, str) else path)
         self.in_lesson, self._before_lesson = False, None
         self._start = {**self._start, "open": False}
+        self.display.options = DisplayOptions()
         self.display.bookmarks.clear()
 
     # -- view, decals and outline -----------------------------------------------------------------------
@@ -764,6 +773,14 @@ def _showing(document: Document, image: int, layer: int) -> SetValues:
 def _decals_of(document: Document, layer: int) -> Int64Array:
     numbers: Int64Array = document.decals.numbers[document.decals.column("layers") == layer]
     return numbers
+
+
+def _fitted(scene: Scene, size: Sequence[int]) -> Scene:
+    """Return a scene whose camera looks from the same side, so that its objects fit into a view of a size."""
+    camera, aspect = scene.camera, size[0] / size[1]
+    x, y, z = np.subtract(camera.position, camera.target).tolist()
+    fitted = fitting_camera(scene.objects, direction=(x, y, z), up=camera.up, aspect=aspect)
+    return scene.replace(camera=fitted)
 
 
 def _bare_scene(item: SceneObject) -> Scene:

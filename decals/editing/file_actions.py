@@ -223,7 +223,7 @@ class FileActions(WindowActions):
             else:
                 write_mesh(scene.objects, path, progress=progress)
 
-        self._state.background.write("export", write, f"exported to {text}")
+        self._state.background.write(f"export to {text}", write, f"exported to {text}")
 
     def open(
         self, load: Callable[[Progress, Cancel], Scene], path: str | PathLike[str], recover: bool = True

@@ -88,6 +88,7 @@ class PointerTools:
         self._press, self._press_position = Press.UP, (0.0, 0.0)
         self._drag: DecalDrag | SurfaceDrag | None = None
         self._brush: BrushStroke | None = None
+        self._brush_start: object = None
 
     @property
     def dragging(self) -> bool:
@@ -163,8 +164,20 @@ class PointerTools:
             lambda: state.session.document, state.brush, state.run_latest, self._also_select
         )
         state.begin_stroke(self._brush.label)
+        self._brush_start = state.session.position
         self._brush.touch(surface_pick.position, surface_pick.normal)
         return True
+
+    def _end_brush(self, brush: BrushStroke) -> None:
+        """End a stroke of the brush; a message says if it changed nothing."""
+        state, start = self.actions.state, self._brush_start
+        state.end_stroke()
+
+        def check() -> None:
+            if state.session.position is start and state.brush.brush is not Brush.PAINT:
+                state.show(f"{brush.label}: nothing to change here")
+
+        state.background.when_followed(check)
 
     def move(self, x: float, y: float) -> bool:
         """Handle a move of the pointer."""
@@ -206,7 +219,7 @@ class PointerTools:
             self._select_inside(line)
             return True
         if brush is not None:
-            self.actions.state.end_stroke()
+            self._end_brush(brush)
             return True
         if press is Press.DOWN:
             self._perform("Click", x, y, ctrl=ctrl, shift=shift)

@@ -16,6 +16,7 @@ from decals.apps.lab.lab import Lab, Results, measured
 from decals.apps.lab.lesson import LESSONS, load_lesson, load_lessons, shown
 from decals.apps.lab.measures import MEASURES
 from decals.apps.lab.plots import LEFT, TOP
+from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.window import EditWindow
 from tests.apps.lab.answers import ANSWERS, STEP
 from tests.decals.editing.scenes import digest
@@ -136,8 +137,8 @@ def test_a_lesson_whose_decal_was_deleted_says_so(lab: Lab, window: EditWindow) 
     lab.check()
     values = wait(lab)
     assert "undo, or start the lesson again" in values["lab_verdict"]["text"]
-    lab.set_value(number_of(lab, "Blue decal"), 0.25)
-    assert "deleted" in window.actions.state.message
+    with pytest.raises(InvalidLesson, match="deleted"):
+        lab.set_value(number_of(lab, "Blue decal"), 0.25)
     window.session.undo()
     lab.check()
     assert "apart" in wait(lab)["lab_verdict"]["text"]
@@ -151,10 +152,10 @@ def test_wrong_events_change_nothing(lab: Lab, window: EditWindow, number: Any, 
     lab.start(1)
     wait(lab)
     before = digest(window.document)
-    lab.set_value(number, value)
-    assert digest(window.document) == before
-    assert "expected" in window.actions.state.message
-    lab.start(number if number != 0 else True)
+    with pytest.raises(ImplicitDecalsError, match="expected"):
+        lab.set_value(number, value)
+    with pytest.raises(InvalidEdit, match="lesson: expected a whole number from 0 to 5"):
+        lab.start(number if number != 0 else True)
     assert digest(window.document) == before
 
 

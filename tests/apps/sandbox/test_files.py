@@ -13,8 +13,9 @@ from PIL import Image
 
 import blobtree
 import decals
-from blobtree import Point
+from blobtree import Point, Segment
 from decals.apps.models.samples import SAMPLES
+from decals.apps.sandbox.display import DisplayOptions
 from decals.apps.sandbox.folder import listed, read_upload, thumbnails
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing.commands import ScaleDecals
@@ -22,6 +23,7 @@ from decals.errors import ImplicitDecalsError
 from decals.scenes.files import load_scene, save_scene
 from decals.scenes.meshes import write_mesh
 from decals.window import EditWindow
+from decals.window.host_plotter import pixels_of
 from tests.apps.sandbox.test_sandbox import covered, finish
 
 BALL = Point((0, 0, 0), radius=1.0)
@@ -71,6 +73,22 @@ def test_the_start_page_lists_samples_files_and_recovered_sessions(
     assert (values["start"]["open"], values["outline"][0]["kind"], values["done"]) == (False, "image", [])
     assert values["title"] == "scene-2.json"  # that of the former scene is for its unsaved changes
     assert listed(tmp_path / "none") == {"recent": [], "recovered": []}
+
+
+def test_an_opened_model_fits_into_a_narrow_view_which_is_not_sliced(
+    sandbox: Sandbox, window: EditWindow, tmp_path: Path
+) -> None:
+    blobtree.save(Segment((-2, 0, 0), (2, 0, 0), radius=0.3), tmp_path / "bar.json")
+    window.plotter.window_size = (60, 120)
+    sandbox.set_control("display", "slice", "y")
+    sandbox.open_file("bar.json")
+    finish(window)
+    points, _ = window.document.objects[0].surface.sample(500, seed=1)
+    pixels = pixels_of(window.subplot, points)
+    assert (pixels > 0).all()
+    assert (pixels < (60, 120)).all()
+    assert np.ptp(pixels[:, 0]) > 40
+    assert sandbox.display.options == DisplayOptions()
 
 
 def test_a_model_is_opened_changed_saved_and_opened_again(

@@ -111,6 +111,18 @@ def stroke(session: EditSession, brush: Brush, places: list[tuple[int, int]]) ->
     return actions, [np.asarray(pick.position, np.float64) for pick in met if pick is not None]
 
 
+def test_a_stroke_that_changes_nothing_says_so() -> None:
+    session = covered_ball(0)
+    actions, _ = stroke(session, Brush.ERASE, [(80, 90), (110, 105)])
+    assert actions.state.message == "erase brush: nothing to change here"
+    stroke(session, Brush.SCATTER, [(80, 90), (110, 105)])
+    actions, _ = stroke(session, Brush.ERASE, [(80, 90), (110, 105)])
+    assert session.labels == ("scatter brush", "erase brush")
+    assert "nothing" not in actions.state.message
+    actions, _ = stroke(session, Brush.PAINT, [(80, 90), (110, 105)])
+    assert "nothing" not in actions.state.message
+
+
 def test_the_align_brush_turns_images_along_the_stroke() -> None:
     session = covered_ball(60)
     before = session.document.decals.decals

@@ -155,7 +155,9 @@ def test_an_export_follows_a_save(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     typist.key("e", ctrl=True)
     typist.enter(f"{tmp_path}/mesh.stl")
     actions.files.write(f"{tmp_path}/scene.py", False)
-    assert "another file is being written; the export follows" in actions.state.message
+    assert (
+        f"another file is being written; the export to {tmp_path}/scene.py follows" in actions.state.message
+    )
     assert actions.state.background.waiting == 2
     for number in range(MAX_WAITING - 2):
         actions.files.write(f"{tmp_path}/scene-{number}.py", False)
