@@ -3,6 +3,7 @@
 import asyncio
 import errno
 import ipaddress
+import os
 import secrets
 import signal
 import socket
@@ -224,16 +225,23 @@ def _show_window(command: list[str]) -> int:
     try:
         webview: Any = import_module("webview")
     except ImportError:
-        raise MissingPackage(
-            "--desktop needs pywebview; install it with: pip install 'pywebview[qt]', or leave out --desktop"
-        ) from None
+        raise _missing_window("pywebview") from None
     with subprocess.Popen(command, stdin=PIPE, stdout=PIPE, text=True) as process:
         assert process.stdout is not None
         url = next((line.strip() for line in process.stdout if line.startswith("http://")), "")
         if url:
             webview.create_window(TITLE, url, width=WINDOW_SIZE[0], height=WINDOW_SIZE[1])
-            webview.start()
+            try:
+                webview.start(gui="qt" if sys.platform == "linux" else None)
+            except webview.WebViewException:  # pywebview draws windows with other packages
+                raise _missing_window("Qt") from None
     return process.returncode  # the end of its standard input has ended it
+
+
+def _missing_window(package: str) -> MissingPackage:
+    return MissingPackage(
+        f"--desktop needs {package}; install it with: pip install 'pywebview[qt]', or leave out --desktop"
+    )
 
 
 def _unused(first: Path, taken: Collection[Path]) -> Path:
@@ -262,7 +270,8 @@ def _as_arguments(options: dict[str, Any]) -> list[str]:
 
 def _end_with_input() -> None:
     """End this process as Ctrl + C does, once the server of sessions closes its standard input."""
-    sys.stdin.buffer.read()
+    while os.read(sys.stdin.fileno(), 4096):  # Python cannot end while a thread is in its buffered reader
+        pass
     signal.raise_signal(signal.SIGINT)
 
 

@@ -3,6 +3,7 @@
 import argparse
 import asyncio
 import errno
+import subprocess
 import sys
 import unittest.mock
 import webbrowser
@@ -174,13 +175,25 @@ def test_a_window_of_its_own_shows_a_session(
     assert "pip install 'pywebview[qt]'" in capsys.readouterr().err
     shown: list[Any] = []
     window = SimpleNamespace(
-        create_window=lambda *a, **_: shown.append(a), start=lambda: shown.append("start")
+        create_window=lambda *a, **_: shown.append(a),
+        start=lambda gui: shown.append("start"),
+        WebViewException=LookupError,
     )
     monkeypatch.setitem(sys.modules, "webview", window)
     program = "import sys; print('log\\nhttp://127.0.0.1:1/', flush=True); sys.stdin.read(); sys.exit(3)"
     monkeypatch.setattr(sandbox_module, "_commands", lambda *_: lambda _: [sys.executable, "-c", program])
     assert run(["sandbox", "--desktop"]) == 3
     assert shown == [(sandbox_module.TITLE, "http://127.0.0.1:1/"), "start"]
+    window.start = lambda gui: [][0]  # pywebview alone draws no window on Linux
+    assert run(["sandbox", "--desktop"]) == 2
+    assert "needs Qt; install it with: pip install 'pywebview[qt]'" in capsys.readouterr().err
+
+
+def test_a_session_may_end_before_its_input() -> None:
+    end = "from decals.apps.commands.sandbox import _end_with_input as end; "
+    wait = "import threading, time; threading.Thread(target=end, daemon=True).start(); time.sleep(0.2)"
+    with subprocess.Popen([sys.executable, "-c", end + wait], stdin=subprocess.PIPE) as process:
+        assert process.wait(60) == 0
 
 
 def test_unsaved_changes_are_kept(
