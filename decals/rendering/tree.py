@@ -5,7 +5,7 @@ milliseconds: so one program per set of kinds, none per tree.
 """
 
 import inspect
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Protocol, runtime_checkable
@@ -257,34 +257,38 @@ def _falloff_numbers(kinds: Kinds) -> str:
 
 def _interpreter(name: str, evaluator: Evaluator, glsl_type: str, kinds: Kinds) -> Source:
     """Return the loop of ``interpreter.glsl`` closed over one evaluator."""
-    return compose(
-        "interpreter.glsl",
-        version=None,
-        defines={
-            "INTERPRET": f"interpret_{name}",
-            "FIELD": glsl_type,
-            "LEAF": evaluator.leaf.key,
-            "DIRECT": evaluator.direct.key,
-            "PROFILED_LEAF": evaluator.profiled_leaf.key,
-            "PULLBACK_AFFINE": evaluator.pullback_affine.key,
-            "PULLBACK_WARP": evaluator.pullback_warp.key,
-            "COMBINE": evaluator.combine.key,
-            "PRIMITIVE_COLOR": "tape_texel(tape, at - 1)"
-            if name in ("color", "directed_color")
-            else "vec4(0.0)",
-        },
-        slots={
-            "registers": "".join(
-                [
-                    *(f"FIELD r{i} = FIELD(0.0);\n" for i in range(kinds.registers)),
-                    *(f"vec4 w{i} = vec4(0.0);\n" for i in range(kinds.warp_registers)),
-                ]
-            ),
-            "runs": "".join(_run_cases(kinds)),
-            "stack": _stack_cases(kinds.registers) if kinds.registers else "",
-            "warps": _warp_cases(kinds.warp_registers) if kinds.warps else "",
-        },
-    )
+    colored = name in ("color", "directed_color")
+    defines = {
+        "INTERPRET": f"interpret_{name}",
+        "FIELD": glsl_type,
+        "LEAF": evaluator.leaf.key,
+        "DIRECT": evaluator.direct.key,
+        "PROFILED_LEAF": evaluator.profiled_leaf.key,
+        "PULLBACK_AFFINE": evaluator.pullback_affine.key,
+        "PULLBACK_WARP": evaluator.pullback_warp.key,
+        "COMBINE": evaluator.combine.key,
+        "PRIMITIVE_COLOR": "tape_texel(tape, at - 1)" if colored else "vec4(0.0)",
+    }
+    return _loop(kinds, defines, _run_cases(kinds), "vec4 w{i} = vec4(0.0);\n", _warp_cases)
+
+
+def _loop(
+    kinds: Kinds,
+    defines: Mapping[str, str],
+    runs: Iterable[str],
+    warp_register: str,
+    warp_cases: Callable[[int], str],
+) -> Source:
+    """Return ``interpreter.glsl`` with the cases of `kinds`; `warp_register` declares register i of warps."""
+    registers = [f"FIELD r{i} = FIELD(0.0);\n" for i in range(kinds.registers)]
+    registers += [warp_register.format(i=i) for i in range(kinds.warp_registers)]
+    slots = {
+        "registers": "".join(registers),
+        "runs": "".join(runs),
+        "stack": _stack_cases(kinds.registers) if kinds.registers else "",
+        "warps": warp_cases(kinds.warp_registers) if kinds.warps else "",
+    }
+    return compose("interpreter.glsl", version=None, defines=defines, slots=slots)
 
 
 def _run_cases(kinds: Kinds) -> Iterable[str]:
@@ -297,49 +301,29 @@ def _run_cases(kinds: Kinds) -> Iterable[str]:
             "direction": "local_direction" if skeleton.convex else "vec3(0.0)",
             "mapped": "direction_to_local(local_direction, tape, map)" if skeleton.convex else "vec3(0.0)",
         }
-        yield _RUN.format(code=code, stride=skeleton.stride, **names)
+        yield _run_case(code, _RUN, stride=skeleton.stride, **names)
         if kinds.stretched:
-            yield _STRETCHED_RUN.format(
-                code=code + STRETCHED,
-                **names,
-                stride=skeleton.stride + PREFIX,
-                prefix=PREFIX,
-                field=(_PROFILED_FIELD if kinds.falloffs else _MAPPED_FIELD).format(**names),
-            )
+            field = (_PROFILED_FIELD if kinds.falloffs else _MAPPED_FIELD).format(**names)
+            stride = skeleton.stride + PREFIX
+            yield _run_case(code + STRETCHED, _STRETCHED_RUN, stride=stride, field=field, **names)
     for code in kinds.fields:
         stride = kinds.instruction_set.fields[code].stride + PREFIX
-        yield _DIRECT_RUN.format(code=code + FIELD, kind=code, stride=stride, prefix=PREFIX)
+        yield _run_case(code + FIELD, _DIRECT_RUN, stride=stride, kind=code)
 
 
 def _interpreter_along(kinds: Kinds) -> Source:
     """Return the loop of ``interpreter.glsl`` for the derivative of (value, direction) along `direction`."""
     from blobtree.tape import directed_along as along
 
-    return compose(
-        "interpreter.glsl",
-        version=None,
-        defines={
-            "INTERPRET": "interpret_along",
-            "FIELD": "mat2x4",
-            "PULLBACK_AFFINE": _key(along.pullback_affine_along),
-            "PULLBACK_WARP": _key(along.pullback_warp_along),
-            "COMBINE": _key(along.combine_along),
-        },
-        slots={
-            "registers": "".join(
-                [
-                    *(f"FIELD r{i} = FIELD(0.0);\n" for i in range(kinds.registers)),
-                    *(
-                        f"vec3 w{i} = vec3(0.0); vec3 v{i} = vec3(0.0);\n"
-                        for i in range(kinds.warp_registers)
-                    ),
-                ]
-            ),
-            "runs": "".join(_run_cases_along(kinds)),
-            "stack": _stack_cases(kinds.registers) if kinds.registers else "",
-            "warps": _warp_cases_along(kinds.warp_registers) if kinds.warps else "",
-        },
-    )
+    defines = {
+        "INTERPRET": "interpret_along",
+        "FIELD": "mat2x4",
+        "PULLBACK_AFFINE": _key(along.pullback_affine_along),
+        "PULLBACK_WARP": _key(along.pullback_warp_along),
+        "COMBINE": _key(along.combine_along),
+    }
+    register = "vec3 w{i} = vec3(0.0); vec3 v{i} = vec3(0.0);\n"
+    return _loop(kinds, defines, _run_cases_along(kinds), register, _warp_cases_along)
 
 
 def _key(function: Any) -> str:
@@ -354,47 +338,45 @@ def _run_cases_along(kinds: Kinds) -> Iterable[str]:
     for code in kinds.skeletons:
         skeleton = kinds.instruction_set.skeletons[code]
         closest = directional_derivative(skeleton.closest, ["q"]).key
-        yield _RUN_ALONG.format(
-            code=code, stride=skeleton.stride, closest=closest, leaf=_key(along.leaf_along)
+        yield _run_case(
+            code, _RUN_ALONG, stride=skeleton.stride, closest=closest, leaf=_key(along.leaf_along)
         )
         if kinds.stretched:
             field = f"{_key(along.leaf_along)}(local, velocity, c, drift)"
             if kinds.falloffs:
                 profiled = f"{_key(along.profiled_leaf_along)}(local, velocity, c, drift, profile)"
                 field = f"profile.z == 0.0 ? {field} : {profiled}"
-            yield _STRETCHED_RUN_ALONG.format(
-                code=code + STRETCHED,
-                stride=skeleton.stride + PREFIX,
-                prefix=PREFIX,
-                closest=closest,
-                field=field,
+            stride = skeleton.stride + PREFIX
+            yield _run_case(
+                code + STRETCHED, _STRETCHED_RUN_ALONG, stride=stride, closest=closest, field=field
             )
     for code in kinds.fields:
-        yield _DIRECT_RUN_ALONG.format(
-            code=code + FIELD,
-            kind=code,
-            stride=kinds.instruction_set.fields[code].stride + PREFIX,
-            prefix=PREFIX,
-            direct=directional_derivative(direct_value_gradient, ["q"]).key,
-        )
+        direct = _key(directional_derivative(direct_value_gradient, ["q"]))
+        stride = kinds.instruction_set.fields[code].stride + PREFIX
+        yield _run_case(code + FIELD, _DIRECT_RUN_ALONG, stride=stride, kind=code, direct=direct)
 
 
-_RUN_ALONG = """\
+def _run_case(code: int, body: str, **names: str | int) -> str:
+    """Return the case of a run: `body` computes the field of each primitive, and they are combined."""
+    return f"""\
 case {code}:
     for (int i = 0; i < count; i++) {{
-        vec4 c;
-        vec4 drift;
-        {closest}(point, local_direction, tape, at, c, drift);
-        at += {stride};
-        FIELD field = {leaf}(point, local_direction, c, drift);
+{body.format(prefix=PREFIX, **names)}\
         accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
     }}
     break;
 """
 
+
+_RUN_ALONG = """\
+        vec4 c;
+        vec4 drift;
+        {closest}(point, local_direction, tape, at, c, drift);
+        at += {stride};
+        FIELD field = {leaf}(point, local_direction, c, drift);
+"""
+
 _STRETCHED_RUN_ALONG = """\
-case {code}:
-    for (int i = 0; i < count; i++) {{
         int map = at;
         vec3 local = to_local(point, tape, map);
         vec3 velocity = direction_to_local(local_direction, tape, map);
@@ -405,14 +387,9 @@ case {code}:
         at += {stride};
         FIELD field = {field};
         field = PULLBACK_AFFINE(field, tape, map);
-        accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
-    }}
-    break;
 """
 
 _DIRECT_RUN_ALONG = """\
-case {code}:
-    for (int i = 0; i < count; i++) {{
         int map = at;
         vec3 local = to_local(point, tape, map);
         vec3 velocity = direction_to_local(local_direction, tape, map);
@@ -421,26 +398,16 @@ case {code}:
         {direct}({kind}, local, velocity, tape, map + {prefix}, f, change_of_f);
         at += {stride};
         FIELD field = PULLBACK_AFFINE(FIELD(f, change_of_f), tape, map);
-        accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
-    }}
-    break;
 """
 
 _RUN = """\
-case {code}:
-    for (int i = 0; i < count; i++) {{
         vec4 c = {closest}(point, tape, at);
         float rate = speed / {min_influence}(tape, at);
         at += {stride};
         FIELD field = LEAF(point, c, PRIMITIVE_COLOR, vec4({direction}, reach), rate);
-        accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
-    }}
-    break;
 """
 
 _STRETCHED_RUN = """\
-case {code}:
-    for (int i = 0; i < count; i++) {{
         int map = at;
         vec3 local = to_local(point, tape, map);
         vec4 c = {closest}(local, tape, map + {prefix});
@@ -449,9 +416,6 @@ case {code}:
         at += {stride};
         FIELD field = {field};
         field = PULLBACK_AFFINE(field, tape, map);
-        accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
-    }}
-    break;
 """
 
 _MAPPED_FIELD = "LEAF(local, c, PRIMITIVE_COLOR, vec4({mapped}, reach), rate)"
@@ -463,8 +427,6 @@ _PROFILED_FIELD = (
 
 
 _DIRECT_RUN = """\
-case {code}:
-    for (int i = 0; i < count; i++) {{
         int map = at;
         vec3 local = to_local(point, tape, map);
         vec3 along = direction_to_local(local_direction, tape, map);
@@ -473,9 +435,6 @@ case {code}:
         FIELD field = DIRECT(
             {kind}, local, tape, map + {prefix}, PRIMITIVE_COLOR, vec4(along, reach), local_speed);
         field = PULLBACK_AFFINE(field, tape, map);
-        accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
-    }}
-    break;
 """
 
 
