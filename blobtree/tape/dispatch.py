@@ -1,8 +1,8 @@
 """Dispatch by a code on the tape: functions that return, or call, what one row of a table has.
 
 A row's function may declare fewer parameters than its dispatch: it gets the first ones. So operators without
-several parameters do not take the tape. `decals/rendering/tree.py` writes the same dispatch in GLSL, over the
-kinds in use alone.
+several parameters do not take the tape. `decals/rendering/tracing_shader.py` writes the same dispatch in
+GLSL, over the kinds in use alone.
 """
 
 from collections.abc import Callable

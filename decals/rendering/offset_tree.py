@@ -27,7 +27,8 @@ from decals.rendering.decal_pass import DecalSource, decal_functions
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.pixel_pass import GROUP, PassBackend, PixelPass, Program, attach_camera, set_uniform
 from decals.rendering.rest_buffer import RestBuffer
-from decals.rendering.tree import Kinds, TreeDrawable, covered_rectangle, draw_box, tracing_slots
+from decals.rendering.tracing_shader import Kinds, tracing_slots
+from decals.rendering.tree import TreeDrawable, covered_rectangle, draw_box
 from decals.rendering.uploads import stored
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile
 from decals.shaders import Source, compose

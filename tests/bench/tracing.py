@@ -63,7 +63,8 @@ def warp_times(device: str, counts: tuple[int, ...], size: tuple[int, int], runs
 def record(path: Path, counts: tuple[int, ...], size: tuple[int, int]) -> None:
     """Write the shaders, textures and uniforms of the scenes, and distances traced by Warp."""
     from decals.rendering.pixel_pass import GROUP, PassBackend  # `warp_times` needs no OpenGL
-    from decals.rendering.tree import Kinds, covered_rectangle, tracing_shader, tracing_uniforms
+    from decals.rendering.tracing_shader import Kinds, tracing_shader
+    from decals.rendering.tree import covered_rectangle, tracing_uniforms
     from decals.rendering.viewpoint import PictureView
     from decals.shaders import compose
 

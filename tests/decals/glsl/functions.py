@@ -15,7 +15,7 @@ from blobtree.formulas.warps import WARPS
 from blobtree.transpile.builtins import type_name
 from blobtree.transpile.glsl import uniforms_of
 from decals.rendering.context import Context
-from decals.rendering.tree import Kinds
+from decals.rendering.tracing_shader import Kinds
 from decals.rendering.uploads import ROW_TEXELS, DataTexture
 from tests.blobtree.transpile.warp_functions import TypedFunction
 

@@ -6,7 +6,7 @@ import pytest
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.tape.model import gradients_at
 from decals.rendering.context import Context
-from decals.rendering.tree import Kinds
+from decals.rendering.tracing_shader import Kinds
 from tests.blobtree.trees import points_around
 from tests.conformance import AWAY, sample
 from tests.decals.glsl.tapes import GRADIENT

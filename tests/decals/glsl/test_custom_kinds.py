@@ -12,7 +12,7 @@ from blobtree.tracing.trace import trace
 from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
-from decals.rendering.tree import Kinds, tracing_shader
+from decals.rendering.tracing_shader import Kinds, tracing_shader
 from decals.scenes.camera import Camera
 from tests.blobtree.custom_kinds import CUSTOM_TREES, EVERYTHING, Brick, Carve, Path, Ring, Soft
 from tests.blobtree.tape.evaluations import bounds_at

@@ -26,7 +26,7 @@ from blobtree.tape.dispatch import (
 from blobtree.transpile.builtins import BUILTINS, HELPERS, Expression
 from blobtree.transpile.glsl import translate_library
 from decals.rendering.context import Context
-from decals.rendering.tree import _dispatch
+from decals.rendering.tracing_shader import _dispatch
 from tests.blobtree.transpile.warp_functions import TypedFunction, call, typed_functions
 from tests.decals.glsl.arguments import COUNT, arguments_of
 from tests.decals.glsl.functions import AGREEMENT, ALL_KINDS, run_program, through_glsl

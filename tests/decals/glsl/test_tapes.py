@@ -11,7 +11,7 @@ from blobtree.tracing.trace import trace
 from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
-from decals.rendering.tree import Kinds, tracing_shader
+from decals.rendering.tracing_shader import Kinds, tracing_shader
 from decals.scenes.camera import Camera
 from tests.blobtree.nodes.test_blends import NODES as BLEND_NODES
 from tests.blobtree.nodes.test_deformations import STRONG
