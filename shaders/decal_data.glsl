@@ -1,4 +1,4 @@
-// Records, index and images of decals: decals.rendering.uploads.DecalData.
+// Records, index and images of decals: decals.rendering.decal_data.DecalData.
 uniform sampler2D decal_records;  // decal i: 4i (position, s), 4i + 1 (normal, rank), (u, image), (tint, opacity)
 uniform sampler2D index_levels;
 uniform isampler2D index_table;

@@ -1,10 +1,10 @@
 from .context import Context
+from .drawable import Drawable, register
 from .environment import Environment
 from .lights import Light, Lighting
 from .options import STUDIO, TRANSPARENT, Background, Drawing, RenderOptions, SceneLike, Size
 from .picture import Buffers, Picture
 from .renderer import Renderer
-from .uploads import Drawable, register
 from .viewpoint import Projection, Viewpoint
 
 __all__ = [

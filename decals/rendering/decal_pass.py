@@ -26,7 +26,10 @@ from decals.field.receivers import acts, fade_at
 from decals.index.lookup import next_number_below
 from decals.record import Contact, balls_nested, has_cells
 from decals.rendering.context import Context
+from decals.rendering.data_texture import DataTexture
+from decals.rendering.decal_data import DecalData, stored
 from decals.rendering.gbuffer import GBuffer
+from decals.rendering.image_array import ImageArray
 from decals.rendering.lights import Lighting
 from decals.rendering.materials import MaterialArray, Relief
 from decals.rendering.pixel_pass import (
@@ -41,7 +44,6 @@ from decals.rendering.pixel_pass import (
     use_textures,
 )
 from decals.rendering.rest_buffer import RestBuffer
-from decals.rendering.uploads import DataTexture, DecalData, ImageArray, stored
 from decals.rendering.viewpoint import WHOLE, Part, Rectangle, Tile
 
 BODY = "decal_pass.glsl"

@@ -23,13 +23,13 @@ from blobtree._typing import Float32Array, Float64Array
 from blobtree.progress import reporting
 from decals.field.law import ContactLaw
 from decals.rendering.context import Context
+from decals.rendering.decal_data import stored
 from decals.rendering.decal_pass import DecalSource, decal_functions
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.pixel_pass import GROUP, PassBackend, PixelPass, Program, attach_camera, set_uniform
 from decals.rendering.rest_buffer import RestBuffer
 from decals.rendering.tracing_shader import Kinds, tracing_slots
 from decals.rendering.tree import TreeDrawable, covered_rectangle, draw_box
-from decals.rendering.uploads import stored
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile
 from decals.shaders import Source, compose
 

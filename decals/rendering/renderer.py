@@ -21,10 +21,13 @@ from decals.errors import InvalidPoints, InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.index.editor import DecalEditor
 from decals.rendering.context import Context
+from decals.rendering.decal_data import DecalData
 from decals.rendering.decal_pass import decal_library, decal_programs
 from decals.rendering.dirty_regions import TargetState
+from decals.rendering.drawable import register, warmup_of
 from decals.rendering.frame_plan import FramePlan, FrameRequest, decal_source, plan_frame
 from decals.rendering.gbuffer import depth_program
+from decals.rendering.image_array import ImageArray
 from decals.rendering.light_pass import light_program, light_variant, resolve_program
 from decals.rendering.materials import has_materials, has_relief
 from decals.rendering.mesh import ColoredMesh, MeshDrawable, PosedColoredMesh, PosedMeshDrawable
@@ -42,7 +45,7 @@ from decals.rendering.pixel_pass import CameraBuffer, PassBackend
 from decals.rendering.progressive import ProgressiveFrame
 from decals.rendering.targets import BUFFERS_SLOT, WHOLE_SLOT, TargetPool, Targets
 from decals.rendering.tree import TreeHolder
-from decals.rendering.uploads import DecalData, ImageArray, UploadedScene, Uploads, register, warmup_of
+from decals.rendering.uploads import UploadedScene, Uploads
 from decals.rendering.viewpoint import (
     MAX_TILE,
     TILE_MARGIN,

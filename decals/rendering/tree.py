@@ -9,10 +9,10 @@ from blobtree import Node
 from blobtree._typing import Float64Array
 from blobtree.tracing.tree_cells import TracingCells, tracing_cells
 from decals.rendering.context import Context
+from decals.rendering.data_texture import DataTexture
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.pixel_pass import GROUP, PassBackend, Program, attach_camera, set_uniform
 from decals.rendering.tracing_shader import Kinds, tracing_shader
-from decals.rendering.uploads import DataTexture
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile
 from decals.rendering.warmup import SHADERS, SHAPES, WarmupPlan, WarmupTask
 from decals.shaders import compose

@@ -18,9 +18,10 @@ from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.receivers import EVERYTHING, surface_mask
 from decals.rendering import Renderer, SceneLike
+from decals.rendering.decal_data import DecalData
 from decals.rendering.decal_pass import decal_library
+from decals.rendering.image_array import ImageArray
 from decals.rendering.pixel_pass import CameraBuffer
-from decals.rendering.uploads import DecalData, ImageArray
 from decals.rendering.viewpoint import PictureView, Rectangle
 from decals.shaders import compose
 from decals.surfaces.normals import CREASE_ANGLE

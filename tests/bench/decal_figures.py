@@ -14,8 +14,8 @@ from decals.index.index import DecalIndex
 from decals.model import Decals
 from decals.record import Contact
 from decals.rendering import Renderer
+from decals.rendering.decal_data import DecalData
 from decals.rendering.options import RenderOptions
-from decals.rendering.uploads import DecalData
 from decals.scenes.scene import Scene
 from tests.bench.scenes import bench_scene
 from tests.decals.field import log_maps, test_contact, test_radial

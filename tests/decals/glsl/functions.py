@@ -15,8 +15,8 @@ from blobtree.formulas.warps import WARPS
 from blobtree.transpile.builtins import type_name
 from blobtree.transpile.glsl import uniforms_of
 from decals.rendering.context import Context
+from decals.rendering.data_texture import ROW_TEXELS, DataTexture
 from decals.rendering.tracing_shader import Kinds
-from decals.rendering.uploads import ROW_TEXELS, DataTexture
 from tests.blobtree.transpile.warp_functions import TypedFunction
 
 AGREEMENT = 1e-5

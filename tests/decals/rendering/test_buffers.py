@@ -9,14 +9,9 @@ import pytest
 from decals.errors import InvalidImage, TooMuchData
 from decals.images.texels import linear_premultiplied
 from decals.rendering.context import Context
+from decals.rendering.data_texture import ROW_TEXELS, DataTexture
+from decals.rendering.image_array import ImageArray, common_shape, resized
 from decals.rendering.pixel_pass import supports_compute
-from decals.rendering.uploads import (
-    ROW_TEXELS,
-    DataTexture,
-    ImageArray,
-    common_shape,
-    resized,
-)
 from decals.shaders import Source, compose
 
 SIZES = [0, 1, 4095, 4096, 4097, 1024 * 1024 + 7]

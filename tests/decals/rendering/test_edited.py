@@ -10,9 +10,9 @@ import pytest
 from blobtree import Point
 from decals.index.editor import DecalEditor
 from decals.model import Interaction
+from decals.rendering.decal_data import DecalData
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
-from decals.rendering.uploads import DecalData
 from decals.scattering.scatter import scatter
 from decals.scenes.camera import DEFAULT_DIRECTION, Camera
 from decals.scenes.objects import MeshObject, TreeObject

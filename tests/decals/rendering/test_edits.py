@@ -8,7 +8,8 @@ import pytest
 from decals.index.editor import DecalEditor
 from decals.model import Decals
 from decals.rendering.context import Context
-from decals.rendering.uploads import DataTexture, DecalData
+from decals.rendering.data_texture import DataTexture
+from decals.rendering.decal_data import DecalData
 
 
 def some(rng: np.random.Generator, count: int) -> Decals:

@@ -10,8 +10,8 @@ from decals.errors import TooMuchData
 from decals.index.editor import DecalEditor
 from decals.index.index import DecalIndex
 from decals.model import Decals, Interaction
+from decals.rendering.decal_data import LoopLimit
 from decals.rendering.renderer import Renderer
-from decals.rendering.uploads import LoopLimit
 from tests.decals.rendering.pictures import WHITE
 from tests.decals.rendering.test_millions import PAPER, check_one_point, one_point
 from tests.decals.shapes import View
