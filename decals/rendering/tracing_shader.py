@@ -343,10 +343,10 @@ def _run_case(code: int, body: str, **names: str | int) -> str:
     """Return the case of a run: `body` computes the field of each primitive, and they are combined."""
     return f"""\
 case {code}:
-    for (int i = 0; i < count; i++) {{
+    do {{
 {body.format(prefix=PREFIX, **names)}\
         accumulator = COMBINE(operator_, accumulator, field, reach, header.w, tape);
-    }}
+    }} while (--count > 0);
     break;
 """
 
@@ -422,18 +422,21 @@ _DIRECT_RUN = """\
 
 
 def _stack_cases(registers: int) -> str:
-    """Return registers as scalars behind a switch: an indexed array costs several times as much."""
-    store = " ".join(f"case {i}: r{i} = accumulator; break;" for i in range(registers))
-    load = " ".join(f"case {i}: kept = r{i}; break;" for i in range(registers))
+    """Return registers as scalars behind conditions: an indexed array costs several times as much.
+
+    A switch is a loop to Mesa, whose software rasteriser bounds the turns of all loops of a pixel.
+    """
+    store = " ".join(f"if (count == {i}) {{ r{i} = accumulator; }}" for i in range(registers))
+    load = " ".join(f"if (count == {i}) {{ kept = r{i}; }}" for i in range(1, registers))
     return f"""\
 case {PUSH}:
-    switch (count) {{ {store} }}
+    {store}
     accumulator = FIELD(0.0);
     break;
 case {POP}:
 case {POP_SWAPPED}: {{
     FIELD kept = r0;
-    switch (count) {{ {load} }}
+    {load}
     accumulator = int(header.x) == {POP}
         ? COMBINE(operator_, kept, accumulator, reach, header.w, tape)
         : COMBINE(operator_, accumulator, kept, reach, header.w, tape);

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blobtree import Box, Node, Point, Polyline, Segment, Superquadric, from_sdf
+from blobtree import Box, Node, Point, Polyline, Segment, SolidContact, Superquadric, from_sdf
 from blobtree.formulas.blends import BLENDS
 from blobtree.tape.instruction_set import library
 from blobtree.tape.model import colors_at, gradients_at
@@ -237,3 +237,21 @@ def test_a_traced_picture_is_what_warp_traces(renderer: Renderer, name: str) -> 
     gradient = tree.gradient(points[smooth])
     normal = -gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
     np.testing.assert_allclose(buffers.normal.reshape(-1, 3)[both][smooth], normal, atol=1e-4)
+
+
+@pytest.mark.slow
+def test_rays_that_graze_bulges_show_the_surface_that_they_hit(renderer: Renderer) -> None:
+    """They take some 2,000 evaluations of the tape. Mesa ends all loops of a pixel after 65,535 turns."""
+    balls = [Point(centre, radius=size) for centre, size in (((-0.7, 0, 0), 1.0), ((0.9, 0, 0), 1.0))]
+    tree = SolidContact(
+        (*balls, Point((0.1, 1.5, 0), radius=0.8)), stiffness=(1, 0.1, 1), width=0.4, height=0.06
+    )
+    camera = Camera((0.1, 0.9, 11.0), target=(-0.567, 1.051, 0.0), up=(0, 1, 0), fov=0.032)
+    seen = renderer.buffers(View((Model(tree),), camera), RenderOptions((24, 16)))
+    rays = camera.rays(24, 16)
+    column, row = np.meshgrid(np.arange(24) + 0.5, np.arange(16)[::-1] + 0.5)
+    hits = tree.raycast(rays.origins(column, row).reshape(-1, 3), rays.directions(column, row).reshape(-1, 3))
+    both = (seen.object_id.ravel() >= 0) & hits.hit
+    assert 100 < both.sum() < len(both)
+    cosines = (seen.normal.reshape(-1, 3) * hits.normals).sum(axis=1)
+    assert cosines[both].min() > 0.99
