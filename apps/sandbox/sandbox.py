@@ -483,6 +483,7 @@ class Sandbox:
                 session.undo()
             self.display.restore_camera(camera)
             self._files.take_back()
+            self._state.show("")
 
         self.attempt(lambda: self._when_idle(step))
 

@@ -59,8 +59,13 @@ class DecalMaterial(DecalImage):
     normal : image, optional
         Normals in tangent space, x to the right, y up (OpenGL's, as in glTF); stored as uint8[h, w, 3].
         By default flat.
-    roughness, metallic, occlusion : image or float, optional
-        Linear values, of which the first channel counts; stored as uint8[h, w]. By default 1, 0 and 1.
+    roughness : image or float, optional
+        From 0 (a mirror) to 1 (matt), the default. Of images the first channel counts, linear; stored as
+        uint8[h, w].
+    metallic : image or float, optional
+        From 0 (no metal), the default, to 1 (metal). Images as for the roughness.
+    occlusion : image or float, optional
+        Share of the light from all around that arrives, 1 by default. Images as for the roughness.
     emission : image, optional
         Light that the decal sheds itself, sRGB; stored as uint8[h, w, 3]. By default none.
     height : image or float[h, w], optional

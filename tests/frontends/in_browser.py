@@ -169,6 +169,10 @@ async def sandbox(picture: str | None = None) -> None:
         await until(lambda: set(window.session.labels) == {"set radius"} and not window.session.stroke_open)
         slid = window.session.labels
         assert np.abs(await shows(browser, plotter) - first).mean() > 0.5
+        for key, labels in (("z", slid[:-1]), ("y", slid)):  # the pointer is not over the view
+            await browser.get_by_role("slider", name="radius").press(f"Control+{key}")
+            await until(lambda labels=labels: window.session.labels == labels)  # type: ignore[misc]
+        await by_keys(browser)
         await browser.get_by_role("button", name="Add", exact=True).click()
         await browser.get_by_text("Torus", exact=True).click()
         await until(lambda: window.session.labels[-1:] == ("add a primitive",))
@@ -206,6 +210,26 @@ async def sandbox(picture: str | None = None) -> None:
         await until(lambda: window.session.undone_labels == (*slid, "add a primitive", "set ring_radius"))
         assert all("127.0.0.1" in url for url in requests)
     window.close()
+
+
+async def by_keys(browser: Page) -> None:
+    """Arrows lead through the toolbar and the outline, and few steps of Tab from there to the fields."""
+
+    async def focused() -> str:
+        return str(
+            await browser.evaluate("document.activeElement.ariaLabel ?? document.activeElement.innerText")
+        )
+
+    await browser.get_by_role("button", name="File", exact=True).focus()
+    for key, name in (("ArrowRight", "View"), ("ArrowLeft", "File"), ("Tab", "Point"), ("ArrowUp", "Point")):
+        await browser.keyboard.press(key)
+        assert (await focused()).strip().lower() == name.lower()
+    await browser.keyboard.press("ArrowRight")
+    assert await focused() == "hide Point"
+    steps = 0
+    while await focused() != "center 1":
+        await browser.keyboard.press("Tab")
+        assert (steps := steps + 1) < 10
 
 
 async def creature(picture: str | None = None) -> None:
@@ -430,7 +454,7 @@ async def panels(picture: str | None = None) -> None:
 
     async def rename(label: str, name: str) -> None:
         await row(label).first.dblclick()
-        await browser.keyboard.press("Control+a")
+        await browser.get_by_role("textbox", name=f"new name of {label}", exact=True).wait_for()
         await browser.keyboard.type(name)
         await browser.keyboard.press("Enter")
         await row(name).wait_for()
@@ -519,6 +543,10 @@ async def lab(picture: str | None = None) -> None:
                 await browser.get_by_role("button", name="Check the answer").click()
                 kind = "success" if attempt.right else "warning"
                 await browser.locator(f".v-alert.text-{kind}").get_by_text(attempt.words).wait_for()
+            lowest = browser.get_by_label(lab_page.lab.values()["lab_sliders"][-1]["label"], exact=True).last
+            box = await lowest.bounding_box()
+            assert box is not None
+            assert box["y"] + box["height"] <= 800  # in sight below text, question and verdict
             if number == 0:
                 await accessible(browser)
             if picture is not None and number == 1:
