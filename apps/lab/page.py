@@ -86,13 +86,6 @@ class LabPage(Page):
         """Set what a slider of the lesson moves."""
         self.sandbox.slide(lambda: self.lab.set_value(number, raw, last), last=bool(last))
 
-    @staticmethod
-    def _build_values() -> None:
-        with html.Table(v_if="lab_values.length", classes="mb-2 text-caption", style="width: 100%"):  # noqa: SIM117  (one level of HTML a line)
-            with html.Tr(v_for="v in lab_values", key="v.label"):
-                html.Td("{{ v.label }}")
-                html.Td("{{ v.text }}", style="text-align: right; font-variant-numeric: tabular-nums")
-
     def _build_question(self) -> None:
         with vuetify3.VSheet(border=True, rounded=True, classes="pa-2 my-2"):
             html.Div("{{ lab_question }}", classes="lesson font-weight-medium mb-2")
@@ -120,7 +113,10 @@ class LabPage(Page):
                 vuetify3.VBtn("Plots", value="plots")
                 vuetify3.VBtn("Model", value="model")
             with html.Div(v_if="in_lesson && lab_side === 'plots'", classes="px-2 pb-2"):
-                self._build_values()
+                with html.Table(v_if="lab_values.length", classes="mb-2 text-caption", style="width: 100%"):  # noqa: SIM117  (one level of HTML a line)
+                    with html.Tr(v_for="v in lab_values", key="v.label"):
+                        html.Td("{{ v.label }}")
+                        html.Td("{{ v.text }}", style="text-align: right; font-variant-numeric: tabular-nums")
                 with html.Div(v_for="p in lab_plots", key="p.title", classes="mb-2"):
                     html.Div("{{ p.title }}", classes="text-body-2 font-weight-medium")
                     html.Div(v_html=("p.svg",))

@@ -186,14 +186,14 @@ def build_start(sandbox: Sandbox) -> None:
         vuetify3.VCardText(),
     ):
         with html.Div(classes="d-flex flex-wrap ga-3 mb-4"):
-            _start_tile("mdi-plus", "New model", sandbox.new_model)
+            shown = {"width": TILE_WIDTH, "variant": "outlined"}
+            with vuetify3.VCard(click=sandbox.new_model, raw_attrs=named("'New model'"), **shown):
+                vuetify3.VIcon("mdi-plus", size=40, style="height: 88px; width: 100%")
+                html.Div("New model", classes="text-caption text-center pa-1")
             with (
                 html.Div(v_for="name in start.samples", key="name"),
                 vuetify3.VCard(
-                    width=TILE_WIDTH,
-                    variant="outlined",
-                    click=(sandbox.open_sample, "[name]"),
-                    raw_attrs=named("'sample ' + name"),
+                    click=(sandbox.open_sample, "[name]"), raw_attrs=named("'sample ' + name"), **shown
                 ),
             ):
                 vuetify3.VImg(src=("thumbnails[name]",), height=88, cover=True, alt="")
@@ -214,13 +214,6 @@ def build_start(sandbox: Sandbox) -> None:
             with html.Div(v_if=f"start.{family}.length", classes="mt-4"):
                 html.H2(heading, classes="text-subtitle-2")
                 build_list(f"start.{family}", title, subtitle, event, chosen)
-
-
-def _start_tile(icon: str, text: str, click: Any) -> None:
-    with vuetify3.VCard(width=TILE_WIDTH, variant="outlined", click=click, raw_attrs=named(f"'{text}'")):
-        with html.Div(classes="d-flex align-center justify-center", style="height: 88px"):
-            vuetify3.VIcon(icon, size=40)
-        html.Div(text, classes="text-caption text-center pa-1")
 
 
 def build_files(sandbox: Sandbox) -> None:
@@ -300,7 +293,6 @@ def build_view_menu(sandbox: Sandbox) -> None:
             for text, action in moves.items():
                 perform = sandbox.perform, f"['{action}']"
                 vuetify3.VBtn(text, title=SUMMARIES[action], size="x-small", click=perform)
-        with html.Div(classes="d-flex flex-wrap ga-1"):
             vuetify3.VBtn("Keep this view", size="x-small", click=(sandbox.move_camera, "['keep']"))
             vuetify3.VBtn(
                 "{{ name }}",
@@ -386,7 +378,8 @@ def build_pick() -> None:
 
 def build_actions(sandbox: Sandbox) -> None:
     """Build the menu of all actions, with their keys, by group."""
-    with menu("Actions", "mdi-keyboard-outline", max_height=560), vuetify3.VList():
+    shown = {"model_value": ("help && driving.drives",), "update_modelValue": (sandbox.show_help, "[$event]")}
+    with menu("Actions", "mdi-keyboard-outline", max_height=560, **shown), vuetify3.VList():
         for group in Group:
             bindings = [binding for binding in KEYS.bindings if _offered(binding, group)]
             if bindings:

@@ -169,6 +169,7 @@ class Sandbox:
             "status": self.status,
             "refusals": state.refusals,
             "refused": bool(state.refusal),
+            "help": window.actions.help_visible,
             "busy": window.busy,
             "outline": self._outline(),
             "selected": self._selected(),
@@ -416,6 +417,10 @@ class Sandbox:
                 f"select a node with one operand; a {type(node).__name__} has {len(node.children)}"
             )
         self._trees.replace_node(lambda node: node.children[0])
+
+    def show_help(self, shown: bool) -> None:
+        """Show or hide the list of all actions."""
+        self._window.actions.help_page = int(bool(shown))
 
     @event
     def perform(self, action: str) -> None:

@@ -129,7 +129,7 @@ class Overlay:
             self._status.SetInput("\n".join(wrapped))
 
     def hide_status(self) -> None:
-        """Leave the status to a page around the plotter."""
+        """Leave status and help to a page around the plotter."""
         self.shows_status = False
         self._status.SetInput("")
 
@@ -141,6 +141,8 @@ class Overlay:
         int
             Number of pages: several in a low window.
         """
+        if not self.shows_status:
+            return 1
         width, height = self._renderer.GetSize()
         lines = self._help_lines
         fitting = (height - HELP_BORDER) / (LINE_HEIGHT * MIN_HELP_SIZE)

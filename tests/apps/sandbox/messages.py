@@ -68,6 +68,7 @@ EVENTS: dict[str, list[list[Any]]] = {
     "combine": [KINDS],
     "unwrap": [],
     "perform": [ACTIONS],
+    "show_help": [[True, False]],
     "go_to": [[0, 1, 2, 3, 5]],
     "set_control display": [
         ["display"],

@@ -4,7 +4,7 @@ import json
 import threading
 import time
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -355,6 +355,19 @@ def test_a_new_node_without_a_selection_is_an_object(vtk_display: None) -> None:
             finish(window)
             sandbox.select("")
         assert [item.name for item in window.document.objects] == ["box 1", "point 1"]
+
+
+def test_the_help_is_a_list_of_the_page(window: EditWindow) -> None:
+    sandbox = Sandbox(window)
+    for show in (partial(sandbox.perform, "help"), partial(sandbox.show_help, True)):
+        show()
+        assert sandbox.values()["help"]
+        assert not window.overlay.help_visible  # the page's text is larger
+        sandbox.show_help(False)
+        assert not sandbox.values()["help"]
+    sandbox.perform("help")
+    sandbox.perform("help")
+    assert not sandbox.values()["help"]
 
 
 def test_wrong_events_say_why_and_change_nothing(window: EditWindow) -> None:
