@@ -107,7 +107,8 @@ def covering_radii(
         Seed of the trials.
     shade
         Returns points with the smooth normals of the picture, which decide there which decals face a point.
-        Points that are nearly bare, or that a decal faces barely or barely not, are covered with both.
+        Points that are nearly bare, or that a decal faces barely or barely not, are covered with both. Those
+        that their owner barely faces are covered without it as well.
     even
         True if the decals should be of about equal size: before one becomes outsized, others grow.
     nearest

@@ -12,10 +12,14 @@ from decals.model import FACING_LIMIT
 from decals.record import MIN_KEPT_RADIUS
 from decals.scattering.domain import OrientedPoints
 from decals.scattering.neighbors import FacingTree
+from decals.surfaces.surface import unit_rows
 
 DOUBTFUL = 0.3
 """Difference of the cosine between a decal's and a point's normal from the facing limit, below which the
 surface's smooth normals may decide whether the decal faces the point."""
+
+BARELY = 0.06
+"""Difference of that cosine from the facing limit, below which a decal barely faces a point."""
 
 NEARLY_BARE = 0.975
 """Distance of a point from its owner, in the owner's radii, from which smooth normals may make it bare."""
@@ -90,11 +94,29 @@ class OwnedPoints:
         )
 
     def with_shading(self, shade: Shade | None, radii: Float64Array) -> "OwnedPoints":
-        """Return the points, doubtful and nearly bare ones with the normals of `shade` as well."""
+        """Return the points, doubtful and nearly bare ones with the normals of `shade` as well.
+
+        Points that their owner barely faces are returned with normals that it does not face, too: on curved
+        surface it faces no points a little farther on.
+        """
         if shade is None:
             return self
         rows = np.flatnonzero((self.doubts < DOUBTFUL) | (self.shares(radii) > NEARLY_BARE))
-        return self.joined(self.centers.find(shade(self.points[rows])))
+        others = OrientedPoints.joined([shade(self.points[rows]), self._averted(radii)])
+        return self.joined(self.centers.find(others))
+
+    def _averted(self, radii: Float64Array) -> OrientedPoints:
+        """Return the points that their owner barely faces, with normals that it does not face.
+
+        The factor 1.2 makes up for the length of the normals before they are units.
+        """
+        doubtful = self[np.flatnonzero(self.doubts < BARELY)]
+        owners = np.take_along_axis(doubtful.decals, doubtful.owners(radii)[:, None], axis=1)[:, 0]
+        axes = self.centers.points.normals[owners]
+        cosines = np.einsum("ni,ni->n", doubtful.points.normals, axes)
+        rows = np.flatnonzero((owners >= 0) & (cosines < FACING_LIMIT + BARELY))
+        points = doubtful.points[rows]
+        return replace(points, normals=unit_rows(points.normals - 1.2 * BARELY * axes[rows]))
 
     def powers(self, radii: Float64Array) -> Float64Array:
         """Return the powers of points, which decide between cells (`decals.field.radial`); ∞ for no decal."""

@@ -2,6 +2,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import pyvista as pv
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import SphericalVoronoi
@@ -44,6 +45,20 @@ def test_sphere_is_covered_evenly_at_any_size(scale: float) -> None:
     spacing = np.sqrt(2 * ball.area / np.sqrt(3) / 500)
     assert np.linalg.norm(ball.project(decals.positions)[0] - decals.positions, axis=1).max() < 1e-4 * spacing
     assert np.array_equal(decals.normals, ball.normal(decals.positions))
+
+
+@pytest.mark.slow  # 0.7 s of processor time
+@pytest.mark.parametrize("seed", [0, 1])
+def test_no_gap_opens_where_a_decal_faces_the_surface_no_longer(seed: int) -> None:
+    """Beside the seam of a ball and a box, which is thinner than the distance of the samples."""
+    block = pv.Cube(x_length=2, y_length=2, z_length=1).triangulate().clean()
+    ball = ImplicitSurface(Point((0, 0, 0.5), radius=0.8))
+    decals = scatter([block, ball], count=150, seed=seed)
+    rng = np.random.default_rng(9)
+    angles, heights = rng.uniform(0, 2 * np.pi, 40_000), rng.uniform(1e-4, 0.02, 40_000)
+    across = np.sqrt(0.64 - heights**2)
+    normals = np.column_stack([across * np.cos(angles), across * np.sin(angles), heights]) / 0.8
+    assert covered(decals, 0.8 * normals + [0, 0, 0.5], normals).all()
 
 
 def test_radii_match_voronoi_cells() -> None:
