@@ -73,7 +73,7 @@ def handles_of(tree: Node, path: Path, length: float) -> list[Handle]:
         handles.append(Handle(f"move {name}", middle + length * np.eye(3)[axis]))
         handles.append(Handle(f"turn {name}", middle + TURN_PLACE * length * across / math.sqrt(2.0)))
     handles.append(Handle("scale", middle + SCALE_PLACE * length / math.sqrt(3.0)))
-    alone = len(points) == 1 and np.allclose(points[0].position, middle, atol=1e-3 * length)
+    alone = len(points) == 1 and math.dist(points[0].position, middle) <= 1e-3 * length
     return handles if alone else handles + points
 
 

@@ -1,5 +1,6 @@
 """Handles of nodes: where they lie, and what a drag of one does; the oracle is plain NumPy."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -104,6 +105,13 @@ def test_handles_stand_at_ends_and_control_points_also_below_maps() -> None:
     _, name, value = moved_point(twisted, (0,), "end 0", (0, 2, 1))
     assert name == "end"
     np.testing.assert_allclose(value, (2, 0, 1), atol=1e-8)
+
+
+@pytest.mark.parametrize(("length", "count"), [(1.0, 8), (math.nan, 9)])
+def test_a_point_alone_has_its_gizmo_only_and_a_view_without_scale_warns_of_nothing(
+    length: float, count: int
+) -> None:
+    assert len(handles_of(TREE, (0,), length)) == count
 
 
 @pytest.mark.parametrize("name", ["move", "move z", "turn y", "scale", "end 0"])
