@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree._typing import Float32Array, Int64Array
+from blobtree._typing import Float32Array, Float64Array, Int64Array
 from blobtree.validation import LARGEST_NUMBER, SMALLEST_NUMBER
 from decals.editing.commands import DeleteDecals, SetValues
 from decals.editing.document import Document, Edit
@@ -192,15 +192,22 @@ class BrushDecals:
         near = document.decals.decals.positions[
             np.linalg.norm(document.decals.decals.positions - center, axis=1) < 2.0 * reach + spacing
         ]
-        kept: list[int] = []
-        taken = [*near.astype(np.float64)]
-        for row in np.flatnonzero(np.linalg.norm(points.positions - center, axis=1) <= reach).tolist():
-            position = points.positions[row].astype(np.float64)
-            if not taken or (np.linalg.norm(np.array(taken) - position, axis=1) >= spacing).all():
-                kept.append(row)
-                taken.append(position)
-            if len(kept) == MAX_NEW_DECALS:
-                break
+        positions = points.positions.astype(np.float64)
+
+        def far(rows: Int64Array, place: Float64Array) -> Int64Array:
+            """Return those of some points that keep their distance from a place."""
+            kept_rows: Int64Array = rows[np.linalg.norm(positions[rows] - place, axis=1) >= spacing]
+            return kept_rows
+
+        inside = np.flatnonzero(np.linalg.norm(points.positions - center, axis=1) <= reach)
+        taken, kept = [*near.astype(np.float64)], list[int]()
+        for free in np.split(inside, [2 * MAX_NEW_DECALS]):  # where most stay, the first ones are enough
+            for place in taken if len(kept) < MAX_NEW_DECALS else ():
+                free = far(free, place)
+            while len(free) and len(kept) < MAX_NEW_DECALS:
+                kept.append(int(free[0]))
+                taken.append(positions[kept[-1]])
+                free = far(free, taken[-1])
         return SurfacePoints(points.positions[kept], points.normals[kept], points.objects[kept])
 
 
