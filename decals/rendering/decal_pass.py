@@ -156,7 +156,7 @@ class DecalPass:
         self._context = context
         self._size = size
         self.material_targets: dict[str, moderngl.Texture] = {}
-        self._passes: dict[tuple[object, ...], PixelPass] = {}
+        self._last: tuple[tuple[object, ...], PixelPass] | None = None
 
     def draw(
         self,
@@ -200,25 +200,30 @@ class DecalPass:
         return read_floats(self._framebuffer, 1, tile)
 
     def _pass(self, library: str, **variant: bool) -> PixelPass:
-        """Return the pass with a library of decal formulas; an empty one is for scenes without decals."""
+        """Return the pass with a library of decal formulas; an empty one is for scenes without decals.
+
+        Only the last pass is kept, as it holds its programs; the context keeps those of others for a while.
+        """
         key = library, *variant.values()
-        if key not in self._passes:
+        if self._last is None or self._last[0] != key:
             if variant["materials"] and not self.material_targets:
                 self.material_targets["g_material"] = self._context.texture(self._size, "f4")
                 self.material_targets["g_glow"] = self._context.texture(self._size, "f2")
             targets = [*self._targets, *(self.material_targets.values() if variant["materials"] else ())]
             programs = decal_programs(self._context, library, len(self._targets), **variant)
+            if self._last is not None:
+                self._last[1].release()
             if len(programs) == 1:
-                self._passes[key] = PixelPass(self._context.gl, programs[0], targets)
+                self._last = key, PixelPass(self._context.gl, programs[0], targets)
             else:
                 kind = IndirectPass if self._context.backend is PassBackend.COMPUTE else ListedPass
-                self._passes[key] = kind(self._context.gl, programs, targets)
-        return self._passes[key]
+                self._last = key, kind(self._context.gl, programs, targets)
+        return self._last[1]
 
     def release(self) -> None:
         """Release the memory."""
-        for painting in self._passes.values():
-            painting.release()
+        if self._last is not None:
+            self._last[1].release()
         self._framebuffer.release()
         for target in (*self._targets, *self.material_targets.values()):
             target.release()

@@ -61,7 +61,7 @@ class LightPass:
         self.light = context.texture(size, "f2")
         self.light.repeat_x = self.light.repeat_y = False  # it may be magnified
         self._context = context
-        self._passes: dict[tuple[object, ...], PixelPass] = {}
+        self._last: tuple[tuple[object, ...], PixelPass] | None = None
         self._pass(**light_variant(None, None))
 
     def draw(
@@ -103,16 +103,19 @@ class LightPass:
         light_pass.run(rectangle.rows(part))
 
     def _pass(self, **variant: Any) -> PixelPass:
+        """Return the pass of a variant; only the last one is kept, as it holds its program."""
         key = tuple(variant.values())
-        if key not in self._passes:
+        if self._last is None or self._last[0] != key:
             program = light_program(self._context, **variant)
-            self._passes[key] = PixelPass(self._context.gl, program, [self.light])
-        return self._passes[key]
+            if self._last is not None:
+                self._last[1].release()
+            self._last = key, PixelPass(self._context.gl, program, [self.light])
+        return self._last[1]
 
     def release(self) -> None:
         """Release the memory."""
-        for light_pass in self._passes.values():
-            light_pass.release()
+        if self._last is not None:
+            self._last[1].release()
         self.light.release()
 
 

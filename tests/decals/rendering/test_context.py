@@ -1,7 +1,9 @@
 """Contexts: what they cannot do they say; they nest; programs are compiled once."""
 
+import gc
 import subprocess
 import sys
+import weakref
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -14,8 +16,11 @@ from decals.errors import NoGraphics
 from decals.model import Decals
 from decals.rendering import Renderer, RenderOptions
 from decals.rendering.context import Context
+from decals.rendering.lights import Lighting
 from decals.rendering.pixel_pass import BACKEND_VARIABLE
+from decals.rendering.targets import WHOLE_SLOT
 from decals.shaders import CompileError, Source, compose
+from decals.surfaces.normals import vertex_normals
 from tests.decals.rendering.pictures import view_of
 from tests.decals.shapes import torus
 
@@ -151,6 +156,31 @@ def test_a_renderer_takes_over_the_context_of_the_one_before() -> None:
         np.testing.assert_array_equal(thread.submit(drawn, second).result(), picture)
         assert second.context._programs == programs
         thread.submit(second.release).result()
+
+
+def test_programs_of_former_options_are_released_unless_the_context_keeps_them(
+    context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("decals.rendering.context.MAX_PROGRAMS", 1)
+    shape = torus(rows=12, columns=6)
+    normals = vertex_normals(shape.vertices, shape.faces)[::9]
+    tangents = np.cross(normals, (0.1, 0.2, 1.0))
+    view = view_of(Decals(shape.vertices[::9], normals, tangents, 0.3), shape)
+    with Renderer(context) as renderer:
+
+        def drawn_by(**drawing: Any) -> np.ndarray:
+            return renderer.render(view, RenderOptions(size=(16, 12), samples=1, **drawing))
+
+        first = drawn_by(contact="product")
+        decal_pass, light_pass = (
+            weakref.ref(getattr(renderer._targets.get(WHOLE_SLOT), name)._last[1].program)
+            for name in ("decal_pass", "light_pass")
+        )
+        drawn_by(contact="elastic", lights=Lighting(()))
+        gc.collect()
+        assert decal_pass() is None
+        assert light_pass() is None
+        np.testing.assert_array_equal(drawn_by(contact="product"), first)
 
 
 @pytest.mark.usefixtures("no_idle")
