@@ -183,10 +183,10 @@ def require_rgba(name: str, pixels: Any, error: type[ImplicitDecalsError] = Inva
     """
     expected = f"{name}: expected uint8, uint16 or float32 pixels [h, w, 4]"
     if not isinstance(pixels, np.ndarray):
-        raise error(f"{expected}, got {describe(pixels)}; use load_image")
+        raise error(f"{expected}, got {describe(pixels)}; use decals.DecalImage.load")
     kinds = np.uint8, np.uint16, np.float32
     if pixels.dtype not in kinds or pixels.ndim != 3 or pixels.shape[2] != 4 or 0 in pixels.shape:
-        raise error(f"{expected}, got {pixels.dtype}{list(pixels.shape)}; use load_image")
+        raise error(f"{expected}, got {pixels.dtype}{list(pixels.shape)}; use decals.DecalImage.load")
     if pixels.dtype == np.float32:
         low, high, alpha = (float(of) for of in (pixels.min(), pixels.max(), pixels[..., 3].max()))
         if not (low >= 0.0 and high <= MAX_LIGHT and alpha <= 1.0):
@@ -386,7 +386,8 @@ def unit_interval(name: str, values: Any, shape: tuple[int, ...]) -> Float64Arra
 def bool_array(name: str, values: Any, count: int) -> BoolArray:
     """Return truth values as a new array; one stands for all rows, None is False."""
     array = np.array(one_or_each(False if values is None else values, count))
-    _check_shape(name, array.shape, (count,))
+    if not isinstance(values, str):
+        _check_shape(name, array.shape, (count,))
     if count and array.dtype != np.bool_:
         raise InvalidDecals(f"{name}: expected True or False, got {array.dtype}; compare or cast it first")
     return array.astype(np.bool_)

@@ -204,3 +204,10 @@ def test_a_scene_file_holds_images_that_have_no_file(tmp_path: Path) -> None:
         (tmp_path / "bad.json").write_text(text[:start] + damage + text[start + 40 :])
         with pytest.raises(InvalidImage, match="an image within the file"):
             decals.load_scene(tmp_path / "bad.json")
+
+
+def test_the_advice_about_pixels_without_alpha_works() -> None:
+    pixels = np.full((4, 4, 3), 9, np.uint8)
+    with pytest.raises(InvalidScene, match=r"got uint8\[4, 4, 3\]; use decals\.DecalImage\.load"):
+        decals.DecalImage("grey", pixels)
+    assert decals.DecalImage.load(pixels).pixels.tolist() == [[[9, 9, 9, 255]] * 4] * 4

@@ -166,6 +166,7 @@ def test_tints_are_packed_as_linear_light() -> None:
         ("images", [0.5, 1.0], "whole numbers"),
         ("images", [0], "shape"),
         ("spill", [0, 1], "True or False"),
+        ("spill", "yes", "expected True or False, got <U3"),
         ("interactions", [0, 3], "got 3 in row 1"),
         ("interactions", [0.0, 1.0], "whole numbers"),
         ("layers", [0, LAYER_LIMIT], "in row 1"),
