@@ -34,8 +34,8 @@ from decals.shaders import Source, compose
 MIN_VERSION = 330
 """Version of OpenGL that is enough for everything but compute shaders; macOS ends at 410."""
 
-MAX_PROGRAMS = 16
-"""Programs that are kept whether they are used or not; without a graphics card, one takes 8 MB."""
+MAX_PROGRAM_TEXT = 600_000
+"""Characters of the programs that are kept, used or not; the memory of a program grows with its text."""
 
 MAX_ANISOTROPY = 8.0
 """Greatest ratio of a pixel's footprint in an image at which the image is not blurred."""
@@ -252,11 +252,16 @@ class Context:
         if program is None:
             program = compiled()
         self._programs[key] = program  # the last one now
-        while len(self._programs) > MAX_PROGRAMS:
+        while self._text_length > MAX_PROGRAM_TEXT and len(self._programs) > 1:
             oldest: Any = self._programs.pop(next(iter(self._programs)))
             weakref.finalize(oldest, self._unused.append, oldest.mglo).atexit = False
         kept: Compiled = program
         return kept
+
+    @property
+    def _text_length(self) -> int:
+        """Characters of the programs that are kept."""
+        return sum(len(text) for key in self._programs for text in key)
 
     def pixel_program(
         self, body: str, targets: int, *, slots: Slots | None = None, defines: Defines | None = None

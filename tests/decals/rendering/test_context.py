@@ -89,11 +89,12 @@ def test_a_program_is_compiled_once(context: Context) -> None:
 def test_programs_that_were_not_wanted_for_long_are_released(
     context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("decals.rendering.context.MAX_PROGRAMS", 2)
+    monkeypatch.setattr("decals.rendering.context.MAX_PROGRAM_TEXT", 2000)
 
     def program(number: int) -> moderngl.Program:
         text = f"#version 330 core\nout vec4 c; void main() {{ c = vec4({number}.0); }}"
-        return context.program(compose("screen.vert"), Source.named("a", text))
+        vertex = compose("screen.vert")
+        return context.program(vertex, Source.named("a", f"{text:{900 - len(vertex.text)}}"))
 
     with context.current():
         frame = context.gl.simple_framebuffer((2, 2), dtype="f4")
@@ -161,7 +162,7 @@ def test_a_renderer_takes_over_the_context_of_the_one_before() -> None:
 def test_programs_of_former_options_are_released_unless_the_context_keeps_them(
     context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("decals.rendering.context.MAX_PROGRAMS", 1)
+    monkeypatch.setattr("decals.rendering.context.MAX_PROGRAM_TEXT", 1)
     shape = torus(rows=12, columns=6)
     normals = vertex_normals(shape.vertices, shape.faces)[::9]
     tangents = np.cross(normals, (0.1, 0.2, 1.0))
