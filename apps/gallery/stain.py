@@ -26,7 +26,7 @@ def panels() -> Sequence[Panel]:
         ),
         camera=camera_at((0.35, -4.1, 3.3), (0.0, 0.0, 0.25), fov=27.0),
         images=(DecalImage.load("spatter"),),
-        decals=single_decal((0.0, -0.05, 0.45), (0.0, -0.64, 0.77), 0.95),
+        decals=single_decal((-0.1, -0.2, 0.32), (0.0, -0.5, 0.87), 0.9),
     )
     return (Panel(scene),)
 
