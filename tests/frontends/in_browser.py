@@ -508,6 +508,10 @@ async def panels(picture: str | None = None) -> None:
         assert np.abs(await shows(browser, plotter) - before).mean() > 5
         await choose(browser, "contact", "radial")
         await done("set contact")
+        sandbox_page.sandbox.unwrap()  # is refused, in red
+        await browser.locator(".refused").wait_for()
+        await accessible(browser)
+        await browser.get_by_label("light or dark").click()
         await accessible(browser)
         await browser.get_by_text("Start", exact=True).click()
         await until(lambda: digest(document) == state)
