@@ -52,7 +52,7 @@ class _Job:
             with core_left_free(), reporting(self._report):
                 self.walks = _walks_of(self.key, self._rows, self._previous)
         except Exception as error:  # raised by `WalkCache.get`
-            self.error = error
+            self.error = error.with_traceback(None)  # its frames would keep meshes and relays
 
     def _report(self, stage: str, _fraction: float) -> None:
         if self.cancelled.is_set():

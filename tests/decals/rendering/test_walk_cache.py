@@ -98,6 +98,8 @@ def test_a_failure_is_raised_by_the_picture_and_the_next_state_is_tried(
     gate.open.set()
     monkeypatch.setattr(walks, "_walk", lambda _rows, _meshes: 1 / 0)
     wait_for(cache, session)
+    assert cache._error is not None
+    assert cache._error.__traceback__ is None  # else its frames would keep the meshes
     for _ in range(2):
         with pytest.raises(ZeroDivisionError):
             cache.get(session.document)
