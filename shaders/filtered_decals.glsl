@@ -4,7 +4,6 @@
 //@ include decals.glsl
 const float REACH = 0.575;  // see decals/record.py
 const int ELASTIC = 3;
-const int CHORD = 0;  // image mapping
 const bool PARTED = decal_nested && decal_contact == ELASTIC;  // small decals part the images of larger ones
 const int MANY = 100;
 const int MAX_BOUNDARIES = 2;  // through a pixel whose shares are computed
@@ -104,50 +103,6 @@ void part_image(inout Place place, Bumps bumps, vec3 n, int decal) {
     place.uv = uv;
 }
 
-// True if the image of a decal may end before points that lie this much farther from its centre than q.
-bool may_end(int decal, vec4 ball, vec3 q, vec3 n, float more) {
-    vec3 w = q - ball.xyz;
-    float scale = (1.0 + more / max(length(w), 1e-6 * ball.w)) / (RIM * ball.w);
-    return has_cells(decal_contact) && decal_mapping != CHORD
-        && arc_bound(scale * w, decal_texel(4 * decal + 1).xyz, n) >= 1.0;
-}
-
-// Two decals across the borders of another one that cut the most from the pixel, these borders, and the ends of their
-// images as lines; EVERYWHERE where they do not end.
-struct Beside {
-    ivec2 decals;
-    vec3 border;
-    vec3 second_border;
-    vec3 end;
-    vec3 second_end;
-};
-
-void add_beside(inout Beside beside, int decal, vec3 border, vec3 end) {
-    if (border.x < min(beside.border.x, 0.5)) {
-        beside = Beside(ivec2(decal, beside.decals.x), border, beside.border, end, beside.end);
-    } else if (border.x < min(beside.second_border.x, 0.5)) {
-        beside.decals.y = decal;
-        beside.second_border = border;
-        beside.second_end = end;
-    }
-}
-
-// The border against a decal whose image has this end: the contact line, as far as the image reaches. Adds to
-// `boundaries` where they meet in the pixel.
-vec3 border_of(vec3 line, vec3 end, inout int boundaries) {
-    boundaries += max(abs(line.x), abs(end.x)) < 0.5 ? MANY : 0;
-    return -end.x > line.x ? -end : line;
-}
-
-// What a border against another decal adds to `boundaries`.
-int borders_with(vec3 border, vec3 q, vec3 right, vec3 up, vec4 other_ball) {
-    if (border.x >= 0.5) {
-        return 0;
-    }
-    bool corner = decal_nested && ball_line(q, right, up, other_ball).x < 0.5;
-    return corner || 0.5 * (length(right) + length(up)) > MAX_SIDE * RIM * other_ball.w ? MANY : 1;
-}
-
 #ifdef MATERIALS
 // Sums of decals.glsl.
 struct Maps {
@@ -243,14 +198,13 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 ce
     bool touches = !decal_layered || is_contact_rank(rank);
     vec4 pushes = vec4(0.0);
     Bumps bumps = Bumps(vec4(0.0), vec4(0.0), vec4(0.0));
-    Beside beside = Beside(ivec2(-1), EVERYWHERE, EVERYWHERE, EVERYWHERE, EVERYWHERE);
-    ivec4 ending = ivec4(-1);  // decals whose images may end in the pixel
-    int above = -1, below = -1, rival = -1, next = -1, nested_count = 0, lower_rims = 0;
-    float least = 0.0, next_power = 1e30;  // powers of `rival`, the strongest neighbour, and of the next after the owner
+    ivec2 beside = ivec2(-1);
+    vec3 first_line = EVERYWHERE, second_line = EVERYWHERE;  // contact lines with `beside`
+    int above = -1, below = -1, rival = -1, nested_count = 0, lower_rims = 0;
+    float least = 0.0;  // power of `rival`, the strongest neighbour
     bool above_nested = false;
-    vec3 above_line = -0.5 * EVERYWHERE, below_line = EVERYWHERE;
+    vec3 above_line = -0.5 * EVERYWHERE;
     float half_pixel = 0.5 * (length(right) + length(up));
-    bool ends = may_end(owner, ball, q, n, half_pixel);
     boundaries = 0;
     for (int level = 0; level < index_level_count; level++) {
         ivec2 span = cell_range(q, level);
@@ -293,84 +247,64 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 ce
                 pushes += push_of(w, ball, other_ball);
             }
             vec3 line = contact_line(q, right, up, ball, other_ball);
-            float touching = half_pixel * (2.0 * RIM * other_ball.w + half_pixel);  // power where a ball meets the pixel
-            if (ends && line.x >= 0.5 && other_power < min(touching, next_power)) {
-                next = other;
-                next_power = other_power;
+            if (line.x < 0.5) {
+                bool corner = decal_nested && ball_line(q, right, up, other_ball).x < 0.5;
+                boundaries += corner || half_pixel > MAX_SIDE * RIM * other_ball.w ? MANY : 1;
             }
-            if (line.x < 0.5 && may_end(other, other_ball, q, n, half_pixel)) {
-                ending = ivec4(other, ending.xyz);
-                continue;
+            if (line.x < min(first_line.x, 0.5)) {
+                second_line = first_line;
+                first_line = line;
+                beside = ivec2(other, beside.x);
+            } else if (line.x < min(second_line.x, 0.5)) {
+                second_line = line;
+                beside.y = other;
             }
-            boundaries += borders_with(line, q, right, up, other_ball);
-            add_beside(beside, other, line, EVERYWHERE);
         }
     }
-    bool lies_on = below >= 0;
-    below = lies_on ? below : next;
-    ending = above < 0 ? ending : ivec4(above, ending.xyz);
-    ending = below < 0 || !ends ? ending : ivec4(below, ending.xyz);
-    for (; ending.x >= 0; ending = ivec4(ending.yzw, -1)) {  // their images may end before their balls
-        vec4 other_ball = decal_texel(4 * ending.x);
-        float scale = 1.0 / (RIM * other_ball.w);
-        Place place = place_of(ending.x, other_ball, q, n, right, up, vec4(0.0));
-        vec3 end = rim_line(place.arc, scale * right, scale * up);
-        if (ending.x == above) {
-            bool gone = end.x <= -0.5;
-            WHERE (above_nested && rival >= 0) {
-                vec4 rival_ball = decal_texel(4 * rival);
-                if (!balls_nested(rival_ball.xyz - other_ball.xyz, RIM * other_ball.w, RIM * rival_ball.w)) {
-                    float inside = contact_line(q, right, up, other_ball, rival_ball).x;
-                    gone = gone || inside <= -0.5;
-                    boundaries += abs(inside) < 0.5 ? MANY : 0;
-                }
+    WHERE (above >= 0) {  // its image may end before its ball
+        vec4 above_ball = decal_texel(4 * above);
+        float per_above = 1.0 / (RIM * above_ball.w);
+        Place place = place_of(above, above_ball, q, n, right, up, vec4(0.0));
+        above_line = rim_line(place.arc, per_above * right, per_above * up);
+        bool ends = above_line.x <= -0.5;
+        WHERE (above_nested && rival >= 0) {
+            vec4 rival_ball = decal_texel(4 * rival);
+            if (!balls_nested(rival_ball.xyz - above_ball.xyz, RIM * above_ball.w, RIM * rival_ball.w)) {
+                float inside = contact_line(q, right, up, above_ball, rival_ball).x;
+                ends = ends || inside <= -0.5;
+                boundaries += abs(inside) < 0.5 ? MANY : 0;
             }
-            bool cut = place.arc.x <= 1.0 && power(q - other_ball.xyz, RIM * other_ball.w) <= 0.0;  // by other decals
-            above_line = end;
-            boundaries -= gone ? 1 : 0;
-            above = gone || cut ? -1 : above;
-        } else if (ending.x == below) {
-            below_line = end;
-        } else {
-            vec3 line = border_of(contact_line(q, right, up, ball, other_ball), end, boundaries);
-            boundaries += borders_with(line, q, right, up, other_ball);
-            add_beside(beside, ending.x, line, end);
         }
+        bool cut = place.arc.x <= 1.0 && power(q - above_ball.xyz, RIM * above_ball.w) <= 0.0;  // by other decals
+        boundaries -= ends ? 1 : 0;
+        above = ends || cut ? -1 : above;
     }
     if (decal_contact != ELASTIC) {
         pushes.w = contact_distance(contact_at(q, n, owner, decal_contact).x);
     }
     // The one above, the owner, and those beside it or the one below in turn; in one loop, because some drivers run
     // code once even where no pixel needs it.
-    vec3 owner_part = vec3(1.0, 0.0, 0.0), owner_end = EVERYWHERE;
+    vec3 owner_part = vec3(1.0, 0.0, 0.0);
     vec4 over = vec4(0.0), color = vec4(0.0);
     float hidden = 0.0;  // by the one above: if that is nested, its transparent parts hide the others as well
     vec2 covered = vec2(0.0);  // sum of the centres of parts, times alpha
-    ivec2 others = beside.decals;
+    ivec2 others = beside;
     for (int decal = above < 0 ? owner : above; decal >= 0;) {
-        bool first = decal == owner, across = decal == beside.decals.x || decal == beside.decals.y;
+        bool first = decal == owner, across = decal == beside.x || decal == beside.y;
         vec4 own_ball = decal_texel(4 * decal);
         vec3 part = vec3(1.0, 0.0, 0.0);
         ivec2 neighbours = ivec2(-1);
         WHERE (!first) {
             vec3 line = EVERYWHERE, other_line = EVERYWHERE;
-            vec3 rim = decal == above ? above_line : below_line;
+            vec3 rim = decal == above ? above_line : ball_line(q, right, up, own_ball);
             if (across) {
-                bool second = decal == beside.decals.y;
-                int third = second ? beside.decals.x : beside.decals.y;
+                int third = decal == beside.x ? beside.y : beside.x;
                 neighbours = ivec2(owner, third);
-                rim = second ? beside.second_end : beside.end;
-                line = border_of(contact_line(q, right, up, own_ball, ball), owner_end, boundaries);
+                line = contact_line(q, right, up, own_ball, ball);
                 if (third >= 0) {
-                    vec3 third_end = second ? beside.end : beside.second_end;
                     other_line = contact_line(q, right, up, own_ball, decal_texel(4 * third));
-                    other_line = border_of(other_line, third_end, boundaries);
                 }
-            } else if (decal == below && !lies_on) {
-                neighbours.x = owner;
-                line = -owner_end;
             }
-            rim = rim.x < 1.0 ? rim : ball_line(q, right, up, own_ball);
             part = inner_part(rim, line, other_line);
         }
         vec3 at = first ? q : q + part.y * right + part.z * up;
@@ -390,16 +324,15 @@ vec4 layer_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, inout vec2 ce
         }
         WHERE (first) {
             vec3 rim = rim_line(place.arc, per_radius * right, per_radius * up);
-            owner_end = has_cells(decal_contact) ? rim : EVERYWHERE;
             boundaries += rim.x < 0.5 ? (lower_rims > 0 ? MANY : 1) : 0;
-            boundaries += (above >= 0 && boundaries > 1) || (lies_on && beside.decals.x >= 0) ? MANY : 0;
+            boundaries += (above >= 0 && boundaries > 1) || (below >= 0 && beside.x >= 0) ? MANY : 0;
             part.yz = centre;
             if (boundaries > (above < 0 ? 0 : 1)) {
-                part = inner_part(rim, beside.border, beside.second_border);
+                part = inner_part(rim, first_line, second_line);
             }
             place.uv += part.y * place.uv_right + part.z * place.uv_up;
             owner_part = part;
-            if (below >= 0 && (lies_on || others.x < 0)) {  // the owner lies on it, or it comes next
+            if (below >= 0) {  // the owner lies on it
                 others = ivec2(part.x < 1.0 ? below : -1, -1);
             }
         }

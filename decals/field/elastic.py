@@ -34,13 +34,13 @@ With pushes of planes, its smallness prevents folds: tests and benchmark find no
 
 import warp as wp
 
-from decals.field.image_place import image_place, image_uv, reaches
+from decals.field.image_place import image_reaches
 from decals.field.mapping import tangent_coordinates, unroll_step
 from decals.field.radial import (
     NO_OWNER,
     RIM_SQUARED,
-    comes_after,
     comes_next,
+    is_above,
     lies_on_top,
     nested_owner,
     power,
@@ -83,9 +83,6 @@ PARTING = 0.35
 
 RIM_BUMP = 0.375
 """Height 1 − d²/(1 + REACH_MARGIN) of a bump's base on the rim, d = 1."""
-
-MAX_HOLDERS = 1 << 30
-"""Above the number of decals at a point."""
 
 MAX_KEPT = 8
 """Number of decals or complements that are kept. Where more act, the index is traversed a second time."""
@@ -270,20 +267,18 @@ def kept_owner(
     first: wp.vec4i,
     last: wp.vec4i,
     closest: wp.int32,
-    after: wp.int32,
     index: IndexedDecals,
 ) -> wp.int32:
     """Return the topmost decal of `decals.field.radial.nested_owner`, given all candidates at q."""
     a = first
     b = last
     closest_ball = index.records[RECORD * closest]
-    least = power(q - xyz(closest_ball), RIM_RADIUS * closest_ball[3])
-    tried = wp.int32(after)
+    tried = wp.int32(closest)
     while True:
         tried_ball = index.records[RECORD * tried]
         radius = RIM_RADIUS * tried_ball[3]
         own = power(q - xyz(tried_ball), radius)
-        inside = bool(tried != after)
+        inside = bool(tried != closest)
         if inside:
             inside = lies_on_top(n_q, tried, index.records)
         lower = wp.int32(NO_OWNER)
@@ -296,10 +291,9 @@ def kept_owner(
                 ball = index.records[RECORD * decal]
                 offset = q - xyz(ball)
                 if field_complement(wp.dot(offset, offset) / (ball[3] * ball[3])) <= 0.5:
-                    other = power(offset, RIM_RADIUS * ball[3])
-                    if inside and other >= least and other < own:
+                    if inside and power(offset, RIM_RADIUS * ball[3]) < own:
                         inside = balls_nested(xyz(ball) - xyz(tried_ball), radius, RIM_RADIUS * ball[3])
-                    if other >= least and comes_next(
+                    if comes_next(
                         ball, decal, lower_size, lower, tried_ball[3], tried, closest_ball, closest
                     ):
                         lower = decal
@@ -314,96 +308,67 @@ def kept_owner(
 
 @wp.func
 def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.vec4:
-    """Return (owner, E, uv) at q; (NO_OWNER, 0) outside all rims. The decals must not be layered.
+    """Return (owner, E, shift) at q; (NO_OWNER, 0) outside all rims. The decals must not be layered.
 
-    They are those of `cell_owner`, `elastic_contact` and `image_uv`. A traversal of the index finds the
-    candidates, and of the holders of q, whose rims contain it, the number, the topmost, and the one of least
-    power. This one is the owner, unless it is nested with another holder above it that faces the surface
-    well. Only sets with nested decals (`IndexedDecals.nested`) are searched for such a holder. Where the
-    image of the decal found ends before q, another traversal finds the next one. It is the same code in a
-    loop, because some drivers run a branch even where no pixel needs it.
+    They are those of `cell_owner` and `elastic_contact`. One traversal of the index finds the candidates,
+    and of the holders of q, whose rims contain it, the number, the topmost, and the one of least power. This
+    one is the owner, unless it is nested with another holder above it that faces the surface well, and whose
+    image reaches q. Only sets with nested decals (`IndexedDecals.nested`) are searched for such a holder.
     """
-    owner = wp.int32(NO_OWNER)
-    own_ball = wp.vec4(0.0, 0.0, 0.0, 0.0)
-    place = wp.vec3(0.0, 0.0, 0.0)
+    closest = wp.int32(NO_OWNER)
+    least = wp.float32(0.0)
+    topmost = wp.int32(NO_OWNER)
+    topmost_ball = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    holders = wp.int32(0)
     count = wp.int32(0)
     a = wp.vec4i(NO_OWNER, NO_OWNER, NO_OWNER, NO_OWNER)
     b = wp.vec4i(NO_OWNER, NO_OWNER, NO_OWNER, NO_OWNER)
-    last = wp.int32(NO_OWNER)
-    last_power = wp.float32(0.0)
-    last_size = wp.float32(0.0)
-    upper = wp.int32(NO_OWNER)
-    left = wp.int32(MAX_HOLDERS)
-    searching = bool(True)
-    while searching:
-        closest = wp.int32(NO_OWNER)
-        closest_ball = wp.vec4(0.0, 0.0, 0.0, 0.0)
-        least = wp.float32(0.0)
-        topmost = wp.int32(NO_OWNER)
-        topmost_ball = wp.vec4(0.0, 0.0, 0.0, 0.0)
-        holders = wp.int32(0)
-        count = wp.int32(0)
-        for level in range(index.level_count):
-            span = cell_range(q, level, index)
-            for j in range(span[0], span[1]):
-                decal = index.ids[j]
-                ball = index.records[RECORD * decal]
-                offset = q - xyz(ball)
-                squared = wp.dot(offset, offset)
-                size = ball[3] * ball[3]
-                if squared < REACH_SQUARED * size:
-                    if acts(offset, n_q, decal, index):
-                        b = wp.vec4i(a[3], b[0], b[1], b[2])
-                        a = wp.vec4i(decal, a[0], a[1], a[2])
-                        count += 1
-                        if field_complement(squared / size) <= 0.5:
-                            own = power(offset, RIM_RADIUS * ball[3])
-                            if comes_after(own, ball[3], decal, last_power, last_size, last):
-                                holders += 1
-                                if topmost < 0 or size_above(ball[3], decal, topmost_ball[3], topmost):
-                                    topmost = decal
-                                    topmost_ball = ball
-                                if closest < 0 or comes_after(
-                                    least, closest_ball[3], closest, own, ball[3], decal
-                                ):
-                                    closest = decal
-                                    closest_ball = ball
-                                    least = own
-        if closest < 0 and owner < 0:
-            return wp.vec4(float(NO_OWNER), 0.0, 0.0, 0.0)
-        shown = wp.int32(closest)
-        shown_ball = wp.vec4(closest_ball[0], closest_ball[1], closest_ball[2], closest_ball[3])
-        if index.nested and topmost != closest:
-            after = wp.int32(closest)
-            if upper >= 0:
-                after = upper
-            if holders > 2 and count > MAX_KEPT:  # rarely
-                shown = nested_owner(q, n_q, closest, after, index)
-            elif holders > 2:
-                shown = kept_owner(q, n_q, a, b, closest, after, index)
-            elif upper < 0:
-                offset = xyz(topmost_ball) - xyz(closest_ball)
-                if balls_nested(offset, RIM_RADIUS * closest_ball[3], RIM_RADIUS * topmost_ball[3]):
-                    if lies_on_top(n_q, topmost, index.records):
-                        shown = topmost
-            shown_ball = index.records[RECORD * shown]
-        searching = bool(False)
-        if closest >= 0:
-            w = (q - xyz(shown_ball)) / (RIM_RADIUS * shown_ball[3])
-            there = image_place(w, n_q, shown, index)
-            ends = bool(not reaches(there[2]))
-            if not ends or (owner < 0 and shown == closest):
-                owner = shown
-                own_ball = shown_ball
-                place = there
-            upper = shown
-            if shown == closest:
-                upper = NO_OWNER
-                left = wp.min(left, holders) - 1  # fewer each time, also where powers are rounded
-                last = closest
-                last_power = least
-                last_size = closest_ball[3]
-            searching = ends and left > 0
+    for level in range(index.level_count):
+        span = cell_range(q, level, index)
+        for j in range(span[0], span[1]):
+            decal = index.ids[j]
+            ball = index.records[RECORD * decal]
+            offset = q - xyz(ball)
+            squared = wp.dot(offset, offset)
+            size = ball[3] * ball[3]
+            if squared < REACH_SQUARED * size:
+                if acts(offset, n_q, decal, index):
+                    b = wp.vec4i(a[3], b[0], b[1], b[2])
+                    a = wp.vec4i(decal, a[0], a[1], a[2])
+                    count += 1
+                    if field_complement(squared / size) <= 0.5:
+                        holders += 1
+                        if topmost < 0 or size_above(ball[3], decal, topmost_ball[3], topmost):
+                            topmost = decal
+                            topmost_ball = ball
+                        own = power(offset, RIM_RADIUS * ball[3])
+                        if (
+                            closest < 0
+                            or own < least
+                            or (own == least and is_above(decal, closest, index.records))
+                        ):
+                            least = own
+                            closest = decal
+    if closest < 0:
+        return wp.vec4(float(NO_OWNER), 0.0, 0.0, 0.0)
+    owner = wp.int32(closest)
+    own_ball = index.records[RECORD * closest]
+    if index.nested and topmost != closest:
+        if holders == 2:
+            offset = xyz(topmost_ball) - xyz(own_ball)
+            if balls_nested(offset, RIM_RADIUS * own_ball[3], RIM_RADIUS * topmost_ball[3]):
+                if lies_on_top(n_q, topmost, index.records):
+                    owner = topmost
+        elif count <= MAX_KEPT:
+            owner = kept_owner(q, n_q, a, b, closest, index)
+        traversing = bool(holders > 2 and count > MAX_KEPT)
+        searching = bool(traversing or owner != closest)
+        while searching:
+            if traversing:  # rarely
+                owner = nested_owner(q, n_q, closest, owner, index)
+            searching = bool(owner != closest and not image_reaches(q, n_q, owner, index))
+            traversing = True
+        own_ball = index.records[RECORD * owner]
     radius = RIM_RADIUS * own_ball[3]
     w = (q - xyz(own_ball)) / radius
     distance = wp.length(w)
@@ -429,6 +394,4 @@ def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.v
         sums = sum_of_pushes(q, n_q, owner, ray, distance, index)
         squares = sums[0]
         shift = wp.vec2(sums[1], sums[2])
-    pushed = wp.vec3(pushed_along_ray(wp.min(distance, 1.0), squares), shift[0], shift[1])
-    uv = image_uv(place, distance, pushed, index)
-    return wp.vec4(float(owner), pushed[0], uv[0], uv[1])
+    return wp.vec4(float(owner), pushed_along_ray(wp.min(distance, 1.0), squares), shift[0], shift[1])

@@ -1,4 +1,4 @@
-"""Place of a surface point in the image of a decal, before and after contact; whether the image reaches it.
+"""Place of a surface point in the undeformed image of a decal, and whether the image reaches the point.
 
 Rims are balls: they end at the chord. Images end at the length along the surface, which is longer where the
 surface bends.
@@ -9,14 +9,7 @@ surface bends.
 
 import warp as wp
 
-from decals.field.contact import contact_uv, rim_distance
-from decals.field.mapping import (
-    IMAGE_RADIUS_SQUARED,
-    ImageMapping,
-    image_distance,
-    tangent_coordinates,
-    unroll,
-)
+from decals.field.mapping import IMAGE_RADIUS_SQUARED, ImageMapping, tangent_coordinates, unroll
 from decals.field.walk import walked_place
 from decals.index.lookup import IndexedDecals
 from decals.record import RECORD, visible_radius, xyz
@@ -31,22 +24,13 @@ MAX_ARC = 0.4126
 
 
 @wp.func
-def arc_bound(w: wp.vec3, n_p: wp.vec3, n_q: wp.vec3) -> wp.float32:
-    """Return a bound on the squared length along the surface of `decals.field.mapping.unroll`."""
-    turn = n_q - n_p
-    return wp.dot(w, w) * (1.0 + MAX_ARC * wp.dot(turn, turn))
-
-
-@wp.func
 def image_place(w: wp.vec3, n_q: wp.vec3, decal: wp.int32, index: IndexedDecals) -> wp.vec3:
     """Return the direction (x, y) of a point at w from a decal's centre, and its length along the surface.
 
-    All are in visible radii. In the mapping CHORD, the length is that of the chord.
+    All are in visible radii. The mapping is CORRECTED or WALKED.
     """
     normal = xyz(index.records[RECORD * decal + 1])
-    arc = wp.vec4(w[0], w[1], w[2], wp.length(w))
-    if index.mapping != ImageMapping.CHORD:
-        arc = unroll(w, normal, n_q)
+    arc = unroll(w, normal, n_q)
     place = tangent_coordinates(xyz(arc), normal, xyz(index.records[RECORD * decal + 2]))
     length = arc[3]
     if index.walked:
@@ -58,31 +42,13 @@ def image_place(w: wp.vec3, n_q: wp.vec3, decal: wp.int32, index: IndexedDecals)
 
 
 @wp.func
-def reaches(length: wp.float32) -> wp.bool:
-    """Return True if an image does not end before a point at this length along the surface."""
-    return 0.25 * length * length <= IMAGE_RADIUS_SQUARED
-
-
-@wp.func
 def image_reaches(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, index: IndexedDecals) -> wp.bool:
     """Return True if the image of a decal does not end before q, a point inside its rim."""
     if index.mapping == ImageMapping.CHORD:
         return True
     w = (q - xyz(index.records[RECORD * decal])) / visible_radius(decal, index.records)
-    if not index.walked and arc_bound(w, xyz(index.records[RECORD * decal + 1]), n_q) < 1.0:
+    turn = n_q - xyz(index.records[RECORD * decal + 1])
+    if not index.walked and wp.dot(w, w) * (1.0 + MAX_ARC * wp.dot(turn, turn)) < 1.0:
         return True  # as most points, without the length
-    return reaches(image_place(w, n_q, decal, index)[2])
-
-
-@wp.func
-def image_uv(place: wp.vec3, chord: wp.float32, pushed: wp.vec3, index: IndexedDecals) -> wp.vec2:
-    """Return image coordinates after contact, given those of `image_place` and the length of the chord.
-
-    `pushed` is that of `decals.field.ownership.contact_at`. The displacement fades toward the rim, where no
-    image moves.
-    """
-    drawn = image_distance(rim_distance(pushed[0]), chord, place[2])
-    uv = contact_uv(wp.vec2(place[0], place[1]), drawn)
-    if index.nested:
-        uv += 0.5 * wp.max(1.0 - drawn * drawn, 0.0) * wp.vec2(pushed[1], pushed[2])
-    return uv
+    length = image_place(w, n_q, decal, index)[2]
+    return 0.25 * length * length <= IMAGE_RADIUS_SQUARED

@@ -22,9 +22,12 @@ from decals.field.contact import (
     add_pushes,
     contact_complement,
     contact_push,
+    contact_uv,
+    rim_distance,
 )
 from decals.field.elastic import MAX_KEPT, elastic_contact, single_layer_elastic
-from decals.field.image_place import image_place, image_uv
+from decals.field.image_place import image_place
+from decals.field.mapping import ImageMapping, image_distance, tangent_coordinates
 from decals.field.radial import NO_OWNER as CELL_NO_OWNER
 from decals.field.radial import cell_owner, radial_complement
 from decals.field.receivers import complement_of
@@ -169,10 +172,23 @@ def uv_at(
 ) -> wp.vec2:
     """Return image coordinates in the owner's image, a disc of radius ½ around (½, ½) (`in_image`).
 
-    `pushed` is that of `contact_at`.
+    `pushed` is that of `contact_at`. The displacement fades toward the rim, where no image moves.
     """
-    w = (q - xyz(index.records[RECORD * owner])) / visible_radius(owner, index.records)
-    return image_uv(image_place(w, n_q, owner, index), wp.length(w), pushed, index)
+    w = q - xyz(index.records[RECORD * owner])
+    drawn = rim_distance(pushed[0])
+    place = wp.vec2(0.0, 0.0)
+    if index.mapping == ImageMapping.CHORD:
+        normal = xyz(index.records[RECORD * owner + 1])
+        place = tangent_coordinates(w, normal, xyz(index.records[RECORD * owner + 2]))
+    else:
+        small = w / visible_radius(owner, index.records)
+        unrolled = image_place(small, n_q, owner, index)
+        place = wp.vec2(unrolled[0], unrolled[1])
+        drawn = image_distance(drawn, wp.length(small), unrolled[2])
+    uv = contact_uv(place, drawn)
+    if index.nested:
+        uv += 0.5 * wp.max(1.0 - drawn * drawn, 0.0) * wp.vec2(pushed[1], pushed[2])
+    return uv
 
 
 @wp.func
@@ -182,9 +198,9 @@ def single_layer_at(
     contact: wp.int32,
     index: IndexedDecals,
 ) -> wp.vec4:
-    """Return (owner, E, uv) at q in all contact modes but RADIAL; (NO_OWNER, 0) outside all rims.
+    """Return (owner, E, shift) at q in all contact modes but RADIAL; (NO_OWNER, 0) outside all rims.
 
-    They are those of `owner_at`, `contact_at` and `uv_at`. The decals must not be layered.
+    They are those of `owner_at` and `contact_at`. The decals must not be layered.
     """
     if contact == Contact.ELASTIC:
         return single_layer_elastic(q, n_q, index)
@@ -212,6 +228,9 @@ def single_layer_at(
                     least = e
     if owner < 0:
         return wp.vec4(float(NO_OWNER), 0.0, 0.0, 0.0)
+    if count > MAX_KEPT:
+        deformed = pushed_complement(q, n_q, owner, contact, index)
+        return wp.vec4(float(owner), deformed, 0.0, 0.0)
     per_span = 1.0 / wp.max(1.0 - 2.0 * least, MIN_SPAN)
     per_least = 1.0 / wp.max(least, MIN_COMPLEMENT)
     push = wp.float32(0.0)
@@ -220,8 +239,4 @@ def single_layer_at(
         push = add_pushes(push, b, least, per_span, per_least, contact)
     if ties > 1:  # on a contact line
         push = 1.0
-    deformed = contact_complement(least, push)
-    if count > MAX_KEPT:
-        deformed = pushed_complement(q, n_q, owner, contact, index)
-    uv = uv_at(q, n_q, owner, wp.vec3(deformed, 0.0, 0.0), index)
-    return wp.vec4(float(owner), deformed, uv[0], uv[1])
+    return wp.vec4(float(owner), contact_complement(least, push), 0.0, 0.0)

@@ -11,11 +11,8 @@ Two decals are nested if one of them would keep less than MIN_KEPT_RADIUS of its
 Nested decals do not push each other. The smaller one lies above the other, and of equal ones that of the
 lower number, on surface that it faces well (`lies_on_top`), as far as its image reaches (`image_reaches`).
 So a small decal deep inside a large one is seen whole, and R ≥ MIN_KEPT_RADIUS·ρ: no image is compressed more
-than 1/MIN_KEPT_RADIUS times.
-
-There are no gaps. Every point inside a rim lies at least in the cell of the decal of least |q − p|² − ρ². If
-the image of that decal ends before the point, its cell does not count there, and the next one is the least.
-Beyond a plane, an image shows its rim.
+than 1/MIN_KEPT_RADIUS times. There are no gaps: every point inside a rim lies at least in the cell of the
+decal of least |q − p|² − ρ².
 """
 
 # ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
@@ -132,24 +129,6 @@ def comes_next(
     return balls_nested(xyz(ball) - xyz(closest_ball), RIM_RADIUS * closest_ball[3], RIM_RADIUS * ball[3])
 
 
-@wp.func
-def comes_after(
-    power: wp.float32,
-    size: wp.float32,
-    decal: wp.int32,
-    last_power: wp.float32,
-    last_size: wp.float32,
-    last: wp.int32,
-) -> wp.bool:
-    """Return True if a decal with this power at a point comes after `last` in the order of closeness.
-
-    Of equal powers, that of the upper decal is the first. A negative `last` comes before all.
-    """
-    return (
-        last < 0 or power > last_power or (power == last_power and size_above(last_size, last, size, decal))
-    )
-
-
 # -- owner ----------------------------------------------------------------------------------------------
 
 
@@ -161,13 +140,12 @@ def nested_owner(
 
     Only decals nested with that one can share q with it. Those above it that face the surface well are tried
     from the topmost down: each traversal finds whether q lies in the cell of one, and the next one. `after`
-    is `closest` to begin at the top. Decals of less power than `closest` do not count.
+    is `closest` to begin at the top.
     """
     rank = wp.int32(0)
     if index.layered:
         rank = rank_of(closest, index.records)
     closest_ball = index.records[RECORD * closest]
-    least = power(q - xyz(closest_ball), RIM_RADIUS * closest_ball[3])
     tried = wp.int32(after)
     while True:
         tried_ball = index.records[RECORD * tried]
@@ -182,10 +160,9 @@ def nested_owner(
                 decal = index.ids[j]
                 if decal != tried and complement_of(q, n_q, decal, index) <= 0.5:
                     ball = index.records[RECORD * decal]
-                    other = power(q - xyz(ball), RIM_RADIUS * ball[3])
-                    if inside and other >= least and other < own:
+                    if inside and power(q - xyz(ball), RIM_RADIUS * ball[3]) < own:
                         inside = balls_nested(xyz(ball) - xyz(tried_ball), radius, RIM_RADIUS * ball[3])
-                    if other >= least and comes_next(
+                    if comes_next(
                         ball, decal, lower_size, lower, tried_ball[3], tried, closest_ball, closest
                     ):
                         if lies_on_top(n_q, decal, index.records):
@@ -200,60 +177,35 @@ def nested_owner(
 
 
 @wp.func
-def closest_decal(q: wp.vec3, n_q: wp.vec3, rank: wp.int32, last: wp.int32, index: IndexedDecals) -> wp.vec2i:
-    """Return the contact decal of a rank of least power at q after `last`, and the number of those after it.
-
-    Only decals count whose rims contain q. The decal is NO_OWNER if there is none.
-    """
-    last_power = wp.float32(0.0)
-    last_size = wp.float32(0.0)
-    if last >= 0:
-        last_power = power_of(q, last, index.records)
-        last_size = index.records[RECORD * last][3]
-    closest = wp.int32(NO_OWNER)
-    least = wp.float32(0.0)
-    size = wp.float32(0.0)
-    count = wp.int32(0)
-    for level in range(index.level_count):
-        span = rank_range(q, rank, level, index)
-        for j in range(span[0], span[1]):
-            decal = index.ids[j]
-            if decal != last and complement_of(q, n_q, decal, index) <= 0.5:
-                own = power_of(q, decal, index.records)
-                own_size = index.records[RECORD * decal][3]
-                if comes_after(own, own_size, decal, last_power, last_size, last):
-                    count += 1
-                    if closest < 0 or comes_after(least, size, closest, own, own_size, decal):
-                        closest = decal
-                        least = own
-                        size = own_size
-    return wp.vec2i(closest, count - 1)
-
-
-@wp.func
 def cell_owner(q: wp.vec3, n_q: wp.vec3, rank: wp.int32, index: IndexedDecals) -> wp.int32:
     """Return the topmost contact decal of a rank whose cell contains q; NO_OWNER outside all rims.
 
-    Its image must reach q. Where no image does, it is the decal of least power.
+    The image of an upper one must reach q.
     """
-    first = closest_decal(q, n_q, rank, NO_OWNER, index)
-    closest = wp.int32(first[0])
-    left = wp.int32(first[1])
-    while left > 0:
-        owner = wp.int32(closest)
-        searching = bool(index.nested)
-        while searching:
-            owner = nested_owner(q, n_q, closest, owner, index)
-            searching = bool(owner != closest and not image_reaches(q, n_q, owner, index))
-        if owner != closest or image_reaches(q, n_q, owner, index):
+    owner = wp.int32(NO_OWNER)
+    least = wp.float32(0.0)
+    holders = wp.int32(0)
+    for level in range(index.level_count):
+        span = rank_range(q, rank, level, index)
+        for j in range(span[0], span[1]):
+            if complement_of(q, n_q, index.ids[j], index) <= 0.5:
+                holders += 1
+                own = power_of(q, index.ids[j], index.records)
+                if (
+                    owner < 0
+                    or own < least
+                    or (own == least and is_above(index.ids[j], owner, index.records))
+                ):
+                    least = own
+                    owner = index.ids[j]
+    if holders < 2 or not index.nested:
+        return owner
+    closest = owner
+    while True:
+        owner = nested_owner(q, n_q, closest, owner, index)
+        if owner == closest or image_reaches(q, n_q, owner, index):
             return owner
-        found = closest_decal(q, n_q, rank, closest, index)
-        closest = found[0]
-        left = wp.min(left - 1, found[1])  # fewer each time, also where powers are rounded
-    if closest >= 0:
-        if image_reaches(q, n_q, closest, index):
-            return closest
-    return first[0]
+    return owner
 
 
 # -- deformation ----------------------------------------------------------------------------------------

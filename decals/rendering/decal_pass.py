@@ -10,7 +10,6 @@ from blobtree._typing import Float32Array
 from blobtree.formulas.falloff import RIM
 from blobtree.transpile.glsl import translate_library
 from decals.field.elastic import bump_at, image_shift, join_bumps
-from decals.field.image_place import arc_bound
 from decals.field.law import AnyContact, ContactLaw
 from decals.field.mapping import ImageMapping, in_image, tangent_coordinates, unroll_step
 from decals.field.ownership import contact_at, owner_at, owner_below, single_layer_at, uv_at
@@ -295,7 +294,6 @@ FILTER_FUNCTIONS = (
     is_above,
     lies_on_top,
     has_cells,
-    arc_bound,
     pixel_line,
     inner_part,
     push_gradient,

@@ -140,7 +140,6 @@ class OwnedPoints:
         """Return the columns of the owners, ``[n]``: of least power, or the smallest that is nested above it.
 
         The image of the smallest must reach the point: the rule of `decals.field.radial.nested_owner`.
-        Where the image of the owner ends, pictures may show another decal, so they leave no more bare.
         """
         powers = self.powers(radii)
         columns: Int64Array = powers.argmin(axis=1)

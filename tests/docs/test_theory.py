@@ -90,21 +90,13 @@ def shown_in_cells(world: World, group: Ints, contact: Contact) -> tuple[Ints, A
     stacked = (kept <= LEAST_PART) | (kept.T <= LEAST_PART) | (distance == 0)
     power = world.distances[:, group] ** 2 - radii**2
     inside = world.e[:, group] <= 0.5
-    reached = inside & world.reaches[:, group]
-    order = np.argsort(np.lexsort((np.broadcast_to(group, power.shape), radii + 0 * power, power)), axis=1)
-    owner, pending = np.full(len(power), -1), inside.any(axis=1)
     upper_first = np.lexsort((group, radii))
-    while pending.any():
-        lowest = np.where(inside, order, len(group)).argmin(axis=1)
-        shown = np.full(len(power), -1)
-        for i in upper_first[::-1]:
-            less = inside & (power < power[:, i : i + 1])
-            on_top = reached[:, i] & world.tops[:, group[i]] | (lowest == i)
-            shown[inside[:, i] & ~(less & ~stacked[i]).any(axis=1) & on_top] = i
-        ends = ~reached[np.arange(len(power)), shown]
-        owner = np.where(pending & ((owner < 0) | ~ends), shown, owner)
-        inside[np.arange(len(power)), lowest] = False
-        pending &= ends & inside.any(axis=1)
+    owner = np.full(len(power), -1)
+    for i in upper_first[::-1]:
+        less = inside & (power < power[:, i : i + 1])
+        shows = world.tops[:, group[i]] & world.reaches[:, group[i]]
+        on_top = shows | ~less.any(axis=1)
+        owner[inside[:, i] & ~(less & ~stacked[i]).any(axis=1) & on_top] = i
     ray = world.points - centres[owner]
     x = np.linalg.norm(ray, axis=1)
     ray /= np.maximum(x, 1e-300)[:, None]

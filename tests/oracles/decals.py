@@ -203,8 +203,7 @@ class _Scene:
     def cells(self, members: Any, *, elastic: bool) -> Any:
         """Convex cells between radical planes. Of stacked decals the smallest shows that faces q well.
 
-        Its image must reach q. If that of the decal of least power does not, this one is left out, and the
-        rest decide. Where no image reaches q, the decal of least power shows.
+        Its image must reach q.
         """
         centres, radii = self.centres[members], self.radii[members]
         squared, facing = self.squared[:, members], self.facing[:, members]
@@ -214,30 +213,19 @@ class _Scene:
         away = np.where(self.spill[members], 4.0, self.cosine[:, members] - ON_TOP)
         # Only the nearest few of each point, in order of their numbers: all the rows that are compared.
         few = np.argsort(~near, axis=1, kind="stable")[:, : max(1, near.sum(axis=1).max(initial=0))]
-        power_few, held_few, near_few, away_few = (
+        power_few, inside_few, near_few, away_few = (
             np.take_along_axis(each, few, axis=1) for each in (power, inside, near, away)
         )
-        spare_few = self.spare(held_few, members[few])
-        reached_few = held_few & (spare_few >= 0)
         stacked_few = _stacked(centres[few][:, :, None], centres[few][:, None], radii[few], radii[few])
+        # Beyond the plane to j where j has less power, unless i and j are stacked or j faces away.
         less = power_few[:, None, :] < power_few[:, :, None]
+        beyond = less & (inside_few[:, None, :] & ~stacked_few)
+        lowest = ~(less & inside_few[:, None, :]).any(axis=2)
+        spare_few = self.spare(inside_few, members[few])
+        shows = inside_few & ~beyond.any(axis=2) & ((away_few > 0) & (spare_few >= 0) | lowest)
         upper = np.argsort(np.argsort(radii, kind="stable"), kind="stable")
-        order = np.argsort(np.lexsort((few, radii[few], power_few)), axis=1)
-        rows, left_few = np.arange(len(few)), held_few.copy()
-        for turn in range(few.shape[1]):
-            lowest = left_few & (order == np.where(left_few, order, len(members)).min(axis=1)[:, None])
-            # Beyond the plane to j where j has less power, unless i and j are stacked or j faces away.
-            beyond = less & (left_few[:, None, :] & ~stacked_few)
-            shows = left_few & ~beyond.any(axis=2) & (reached_few & (away_few > 0) | lowest)
-            found = np.where(shows, upper[few], len(members)).argmin(axis=1)
-            if turn == 0:
-                uppermost = found
-            pending = ~reached_few[rows, uppermost]
-            uppermost = np.where(pending & reached_few[rows, found], found, uppermost)
-            left_few &= ~lowest
-            if not (left_few.any(axis=1) & pending).any():
-                break
-        owner, owned = few[rows, uppermost], held_few.any(axis=1)
+        uppermost = np.where(shows, upper[few], len(members)).argmin(axis=1)
+        owner, owned = few[np.arange(len(few)), uppermost], shows.any(axis=1)
         apart = centres[None] - centres[owner][:, None]
         distance = np.linalg.norm(apart, axis=2)
         stacked = _stacked(centres[owner][:, None], centres[None], radii[owner], radii)
@@ -259,10 +247,9 @@ class _Scene:
         gap = np.abs(power_few[:, None] - power_few[:, :, None]) / sizes
         gap[:, np.arange(few.shape[1]), np.arange(few.shape[1])] = 4.0
         doubt = np.minimum((np.abs(power) / radii**2).min(axis=1), gap.min(axis=(1, 2)))
-        over = (held_few[:, None, :] & stacked_few & less).any(axis=2)
-        doubt = np.minimum(doubt, np.where(held_few & over, np.abs(away_few), 4.0).min(axis=1))
-        several = held_few.sum(axis=1, keepdims=True) > 1
-        doubt = np.minimum(doubt, np.where(held_few & several, np.abs(spare_few), 4.0).min(axis=1))
+        over = (inside_few[:, None, :] & stacked_few & less).any(axis=2)
+        unsure = np.minimum(np.abs(away_few), np.abs(spare_few))
+        doubt = np.minimum(doubt, np.where(inside_few & over, unsure, 4.0).min(axis=1))
         if elastic:
             aside = facing & stacked & (squared < 1.6 * RIM**2) & (radii < radii[owner][:, None])
             doubt = np.minimum(doubt, np.where(aside, np.abs(away), 4.0).min(axis=1))

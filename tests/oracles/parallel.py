@@ -8,7 +8,7 @@ Variables that a loop changes begin as literals: one that begins as a Warp const
 """
 
 # mypy: disable-error-code="call-arg, call-overload"
-# ruff: noqa: SIM102, SIM114  (Warp evaluates both sides of `and` and `or`)
+# ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
 import math
 
 import warp as wp
@@ -253,68 +253,6 @@ def spare(q: wp.vec3d, n: wp.vec3d, i: wp.int32, corrected: wp.bool, these: Memb
 
 
 @wp.func
-def holds(q: wp.vec3d, n: wp.vec3d, i: wp.int32, rank: wp.int32, last: wp.int32, these: Members) -> wp.bool:
-    """Return True if q lies in the rim of i, of this rank, and i comes after `last` in their order."""
-    if these.ranks[i] != rank or not facing(n, i, these) or power(q, i, these) > ZERO:
-        return False
-    if last < 0:
-        return True
-    ahead = power(q, i, these) - power(q, last, these)
-    if ahead == ZERO:
-        larger = these.radii[i] - these.radii[last]
-        return larger > 0.0 or (larger == 0.0 and i > last)
-    return ahead > ZERO
-
-
-@wp.func
-def lowest_of(
-    q: wp.vec3d, n: wp.vec3d, first: wp.int32, rank: wp.int32, last: wp.int32, these: Members
-) -> wp.int32:
-    """The first member that holds q after `last`; −1 without."""
-    lowest = wp.int32(-1)
-    for i in range(first, first + these.size):
-        if holds(q, n, i, rank, last, these):
-            if lowest < 0:
-                lowest = i
-            elif not holds(q, n, i, rank, lowest, these):
-                lowest = i
-    return lowest
-
-
-@wp.func
-def uppermost_of(
-    q: wp.vec3d,
-    n: wp.vec3d,
-    first: wp.int32,
-    rank: wp.int32,
-    last: wp.int32,
-    lowest: wp.int32,
-    corrected: wp.bool,
-    these: Members,
-) -> wp.int32:
-    """The smallest of those after `last` whose cell holds q: the lowest, or one that faces and reaches q."""
-    found = wp.int32(-1)
-    for i in range(first, first + these.size):
-        if holds(q, n, i, rank, last, these):
-            inside = bool(True)
-            if i != lowest:
-                if these.spill[i] == 0 and wp.dot(n, wide(these.normals[i])) <= ON_TOP:
-                    inside = False
-                if spare(q, n, i, corrected, these) < ZERO:
-                    inside = False
-            for j in range(first, first + these.size):
-                if j != i and holds(q, n, j, rank, last, these):
-                    if power(q, j, these) < power(q, i, these) and not lie_over(i, j, these):
-                        inside = False
-            if inside:
-                if found < 0:
-                    found = i
-                elif these.radii[i] < these.radii[found]:  # of equal ones the first stays
-                    found = i
-    return found
-
-
-@wp.func
 def convex(
     q: wp.vec3d,
     n: wp.vec3d,
@@ -326,37 +264,36 @@ def convex(
 ) -> Answer:
     """Radial and elastic contact: the uppermost cell that holds q, and where q lies on the ray to its end.
 
-    Its image reaches q. If that of the lowest one does not, it is left out; if no image does, it shows.
+    The image of an upper decal reaches q.
     """
     owner = wp.int32(-1)
-    lowest = lowest_of(q, n, first, rank, -1, these)
-    last = wp.int32(-1)
-    while lowest >= 0:
-        found = uppermost_of(q, n, first, rank, last, lowest, corrected, these)
-        if owner < 0:
-            owner = found
-        last = lowest
-        lowest = lowest_of(q, n, first, rank, last, these)
-        if spare(q, n, found, corrected, these) >= ZERO:
-            owner = found
-            lowest = -1
     doubt = wp.float64(4.0)
-    ends = wp.float64(4.0)
-    holders = wp.int32(0)
+    smallest = wp.float64(1e300)
     for i in range(first, first + these.size):
         if these.ranks[i] == rank and facing(n, i, these):
             own = power(q, i, these)
-            if own <= ZERO:
-                holders += 1
-                ends = wp.min(ends, wp.abs(spare(q, n, i, corrected, these)))
+            r = wp.float64(these.radii[i])
+            inside = bool(own <= ZERO)
+            away = wp.dot(n, wide(these.normals[i])) - ON_TOP
+            left = wp.float64(4.0)
+            if inside:
+                left = spare(q, n, i, corrected, these)
+            shows = bool((these.spill[i] != 0 or away > ZERO) and left >= ZERO)
+            lowest = bool(True)
             for j in range(first, first + these.size):
                 if j != i and these.ranks[j] == rank and facing(n, j, these):
                     doubt = wp.min(doubt, doubt_of_pair(own, power(q, j, these), i, j, these))
-                    if power(q, j, these) < own and own <= ZERO:
-                        if these.spill[i] == 0 and lie_over(i, j, these):
-                            doubt = wp.min(doubt, wp.abs(wp.dot(n, wide(these.normals[i])) - ON_TOP))
-    if holders > 1:
-        doubt = wp.min(doubt, ends)
+                    if power(q, j, these) < own:
+                        lowest = False
+                        if not lie_over(i, j, these):
+                            inside = False
+                        elif own <= ZERO:
+                            doubt = wp.min(doubt, wp.abs(left))
+                            if these.spill[i] == 0:
+                                doubt = wp.min(doubt, wp.abs(away))
+            if inside and (shows or lowest) and r < smallest:  # of equal ones the first stays
+                smallest = r
+                owner = i
     if owner < 0:
         return Answer(owner, ONE, doubt, FOUR)
     w = q - wide(these.positions[owner])

@@ -163,58 +163,6 @@ def test_a_larger_decal_shows_between_end_and_rim_of_one_above(
     assert (owner > 0).any()
 
 
-def surface_points(kind: str, rng: np.random.Generator, count: int) -> Any:
-    """Random points and normals of a surface of size 1, in float64."""
-    if kind == "sphere":
-        points = unit(rng.normal(size=(count, 3)))
-        return points, points
-    if kind == "torus":
-        turn, tilt = rng.uniform(0, 2 * np.pi, (2, count))
-        normals = np.stack([np.cos(turn) * np.cos(tilt), np.sin(turn) * np.cos(tilt), np.sin(tilt)], -1)
-        ring = np.stack([np.cos(turn), np.sin(turn), 0 * turn], -1)
-        return 0.7 * ring + 0.3 * normals, normals
-    if kind == "box":
-        points, rows, side = rng.uniform(-0.5, 0.5, (count, 3)), np.arange(count), rng.integers(0, 3, count)
-        normals = np.zeros((count, 3))
-        normals[rows, side] = np.sign(points[rows, side])
-        points[rows, side] = 0.5 * normals[rows, side]
-        return points, normals
-    x, y = rng.uniform(-1, 1, (2, count))
-    height = 0.2 * np.sin(5 * x) * np.sin(4 * y)
-    slopes = 1.0 * np.cos(5 * x) * np.sin(4 * y), 0.8 * np.sin(5 * x) * np.cos(4 * y)
-    return np.stack([x, y, height], -1), unit(np.stack([-slopes[0], -slopes[1], 1 + 0 * x], -1))
-
-
-def colored(decals: Decals, points: Any, normals: Any, **modes: Any) -> Any:
-    """Where decals with opaque images colour the surface."""
-    white = np.full((4, 4, 4), 255, np.uint8)
-    color = evaluate(decals, points, normals, images=[white], device="cpu", **modes).color
-    assert color is not None
-    return color[:, 3] > 0.99
-
-
-@pytest.mark.ordinary_cases("1-bumpy", "2-torus")
-@pytest.mark.parametrize("kind", ["sphere", "torus", "box", "bumpy"])
-@pytest.mark.parametrize("layers", [1, 2])
-def test_no_point_that_an_image_reaches_is_bare(kind: str, layers: int) -> None:
-    """Of decals placed at random: a point that one of them colours alone is coloured by all together."""
-    rng, covered = np.random.default_rng(5), 0
-    for _ in range(5):
-        points, normals = surface_points(kind, rng, 20_000)
-        count = int(rng.integers(3, 9))
-        near = np.argsort(np.linalg.norm(points - points[0], axis=1))
-        centres, radii = near[rng.integers(0, 2500, count)], rng.uniform(0.15, 0.5, count)
-        frame, images = (normals[centres], rng.normal(size=(count, 3))), np.zeros(count, np.int32)
-        decals = Decals(points[centres], *frame, radii, images=images, layers=rng.integers(0, layers, count))
-        alone = [colored(decals[[i]], points, normals) for i in range(count)]
-        inside = np.any(alone, axis=0)
-        covered += inside.sum()
-        for contact in CELLS:
-            together = colored(decals, points, normals, contact=contact)
-            assert np.array_equal(inside, together)
-    assert covered > 5_000
-
-
 def pair(distance: float, radius: float, other: Any) -> Any:
     return Decals([[0.0, 0, 0], [distance, 0, 0]], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, [radius, other])
 

@@ -151,11 +151,6 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
         "tried_size": uniform(0.3, 2.5), "tried": whole(0, DECALS), "closest": whole(0, DECALS),
     },
     "nested_owner": {"closest": whole(0, DECALS), "after": whole(0, DECALS)},
-    "comes_after": {
-        **{name: among(-1, -0.5, 0) for name in ("power", "last_power")},
-        **{name: among(0.5, 1, 2) for name in ("size", "last_size")}, "last": whole(-1, DECALS),
-    },
-    "closest_decal": {"rank": among(1), "last": whole(-1, DECALS)},
     "kept_owner": {
         "first": kept, "last": kept, "closest": whole(0, DECALS), "after": whole(0, DECALS),
     },

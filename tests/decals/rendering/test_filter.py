@@ -50,33 +50,6 @@ def test_upper_images_end_at_their_length_along_the_surface(drawer: Renderer, la
     assert error[np.hypot(x, y) < 30].max() <= 8
 
 
-@pytest.mark.ordinary_cases("fragment-plain")
-@pytest.mark.parametrize("kind", ["plain", "waves"])
-def test_neighbours_show_where_images_end_at_contact_lines(drawer: Renderer, kind: str) -> None:
-    """Of three unlike decals on a ball, the image of the closest one ends before that of another one."""
-    centres = np.array([[0.16, 0.66, 0.73], [0.71, -0.02, 0.70], [-0.37, -0.51, 0.78]])
-    centres /= np.linalg.norm(centres, axis=1, keepdims=True)
-    radii, size = np.array([0.79, 0.48, 0.79]), 96
-    points = np.random.default_rng(0).normal(size=(100_000, 3))
-    points /= np.linalg.norm(points, axis=1, keepdims=True)
-    chords = np.linalg.norm(points[:, None] - centres, axis=2)
-    images_reach = 2 * np.arcsin(np.minimum(chords / 2, 1)) <= radii
-    closest = np.where(chords <= radii, chords**2 - radii**2, np.inf).argmin(axis=1)
-    ended = ~images_reach[np.arange(len(points)), closest] & images_reach.any(axis=1)
-    assert ended.sum() > 10
-    decals = Decals(centres, centres, [[0.3, 1, 0.2]] * 3, radii, images=[0, 1, 2])
-    shades = [grey(240), grey(80), grey(160)] if kind == "plain" else [waves()] * 3
-    images = [DecalImage(f"image {number}", shade) for number, shade in enumerate(shades)]
-    ball = TreeObject("ball", Point((0, 0, 0), radius=1.0))
-    camera = Camera((0.0, 0.0, 8.0), up=(0, 1, 0), fov=15)
-    scene = Scene(objects=[ball], camera=camera, decals=decals, images=images)
-    options = RenderOptions((size, size), samples=1, filtered=True, lights=FLAT)
-    means = drawer.render(scene, replace(options, filtered=False, samples=8))
-    error = np.abs(drawer.render(scene, options).astype(int) - means)
-    y, x = np.mgrid[:size, :size] - 0.5 * (size - 1)
-    assert error[np.hypot(x, y) < 40].max() <= (8 if kind == "plain" else 12)
-
-
 def difference(drawer: Renderer, angle: float, kind: str, contact: str = "elastic") -> np.ndarray:
     """Differences of a filtered picture from the means, in levels of 255."""
     options = RenderOptions(SIZE, samples=1, filtered=True, contact=contact, lights=FLAT)
@@ -87,7 +60,9 @@ def difference(drawer: Renderer, angle: float, kind: str, contact: str = "elasti
 
 @pytest.mark.slow_cases(
     "fragment-80-waves-elastic-46",
+    "fragment-45-waves-radial-43",
     "fragment-45-layers-elastic-46",
+    "fragment-85-plain-elastic-50",
     "compute-0-waves-elastic-44",
     "compute-80-waves-elastic-46",
     "compute-45-waves-product-42",
