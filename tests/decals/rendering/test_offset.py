@@ -94,7 +94,7 @@ def distances_of(buffers: Buffers, origins: Array, ways: Array) -> Array:
     ("backend", "balls", "count", "view"),
     [
         ("fragment", PAIR, 12, VIEW),
-        ("fragment", PAIR, 12, CLOSE),
+        pytest.param("fragment", PAIR, 12, CLOSE, marks=pytest.mark.slow),
         pytest.param("fragment", BALL, 9, VIEW, marks=pytest.mark.slow),
         pytest.param("compute", PAIR, 30, VIEW, marks=pytest.mark.slow),
         pytest.param("compute", PAIR, 30, CLOSE, marks=pytest.mark.slow),

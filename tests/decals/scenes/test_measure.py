@@ -118,6 +118,7 @@ def item(name: str, surface: MeshSurface) -> decals.MeshObject:
     return decals.MeshObject(name, surface.vertices, surface.faces)
 
 
+@pytest.mark.ordinary_cases("box on a floor")
 @pytest.mark.parametrize(
     "objects",
     [
