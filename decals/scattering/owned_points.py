@@ -18,7 +18,7 @@ DOUBTFUL = 0.3
 """Difference of the cosine between a decal's and a point's normal from the facing limit, below which the
 surface's smooth normals may decide whether the decal faces the point."""
 
-BARELY = 0.06
+BARELY = 0.045
 """Difference of that cosine from the facing limit, below which a decal barely faces a point."""
 
 NEARLY_BARE = 0.975

@@ -183,7 +183,10 @@ async def _on_server(
 
 def _picked_decal(window: EditWindow) -> tuple[int, int]:
     """Select the decal in the middle of the view, and return its pixel, counted from the lower left."""
-    number, (x, y) = next(Driver(window).visible())
+    driver = Driver(window)
+    if next(driver.visible(), None) is None:
+        driver.finish()  # a thread compiles the kernels of the first pick
+    number, (x, y) = next(driver.visible())
     window.actions.state.selection = (number,)
     return x, y
 

@@ -45,7 +45,10 @@ CUBE = CORNERS, np.array([face for a, b, c, d in SIDES for face in ((a, b, c), (
 def test_without_nested_decals_their_code_is_left_out(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, filtered: bool
 ) -> None:
-    """That changes no bit, of pictures and of samples. It changes pictures of nested decals."""
+    """That changes no bit of pictures and of samples. It changes pictures of nested decals.
+
+    Filtered pictures change by a few levels, because that code divides more of the pixels at corners.
+    """
     shape, options = torus(), RenderOptions(size=SIZE, samples=1, filtered=filtered)
     dense = scattered(shape, 500, 8, radii=(0.2, 0.22))
     kept: list[int] = []
@@ -63,10 +66,11 @@ def test_without_nested_decals_their_code_is_left_out(
         points = decals, buffers.position[seen], buffers.normal[seen]
         uv = evaluate(*points).uv
         with monkeypatch.context() as patch:
-            patch.setattr("decals.rendering.uploads.has_nested", lambda *_, value=same: value)
+            patch.setattr("decals.rendering.decal_data.has_nested", lambda *_, value=same: value)
             patch.setattr("decals.field.evaluate.index_on", index_without_nested)
             other = renderer.render(replace(view, decals=decals[:]), options)
-            assert (other == first).all() == same
+            change = np.abs(other.astype(int) - first).max()
+            assert (change <= (8 if filtered else 0)) == same
             assert (evaluate(*points).uv == uv).all() == same
         assert has_nested(index_on(decals, "cpu"), len(decals)) != same
 
