@@ -33,7 +33,7 @@ from decals.validation import describe, instance, whole_number
 if TYPE_CHECKING:
     import pyvista as pv
 
-TREE_RESOLUTION = 128
+TREE_RESOLUTION = 192
 """Cells along the longest side of the mesh of a posed tree."""
 
 SHARED_EDGES = 1 / 3
