@@ -95,6 +95,7 @@ class FileActions(WindowActions):
         self.folder: Path | None = None
         self.recovery = self._recovery_beside(path)
         self._exists = path is not None and Path(path).exists()
+        self._begun: Path | None = None
         self._aside: tuple[str | PathLike[str] | None, RecoveryFile, bool] | None = None
         self._closing = False
         self._discarded: object = NOTHING
@@ -125,10 +126,13 @@ class FileActions(WindowActions):
             self._save_to(self._own_path(self.path))
 
     def _own_path(self, path: str | PathLike[str]) -> Path:
-        """Return the path of the scene's file, or one with a number if a new scene would replace a file."""
+        """Return the path of the scene's file, or one with a number if a new scene would replace a file.
+
+        A file that a save of this scene is writing, or has just written, is its own.
+        """
         numbered = (Path(path).with_stem(f"{Path(path).stem}-{number}") for number in count(2))
         names = chain([Path(path)], numbered)
-        return next(name for name in names if self._exists or not name.exists())
+        return next(name for name in names if self._exists or name == self._begun or not name.exists())
 
     @Group.SCENE.action("save_as", "Ctrl+Shift+s", summary="save to another file")
     def save_as(self, _cursor: Cursor) -> None:
@@ -149,6 +153,7 @@ class FileActions(WindowActions):
             self.recovery.belong_to(path)
             self.path, self._exists = path, True
 
+        self._begun = Path(path)
         self._state.background.save(path, self.camera(), saved)
 
     # -- other files ------------------------------------------------------------------------------------

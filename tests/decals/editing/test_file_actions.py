@@ -252,3 +252,19 @@ def test_the_suffix_is_the_format(name: str, tmp_path: Path) -> None:
     actions.files.write(name, True)
     actions.files.write("copy.json", False)
     assert actions.files.path == tmp_path / "copy.json"
+
+
+def test_a_second_save_writes_the_file_of_the_first(tmp_path: Path) -> None:
+    """The first one has written the file of a new scene, and its completion has not been called yet."""
+    actions = threaded(path=tmp_path / "scene.json")
+    actions.files.save(lambda: None)
+    worker = actions.state.background._saves
+    assert worker._thread is not None
+    worker._thread.join(LONG)
+    assert (tmp_path / "scene.json").exists()
+    actions.state.session.do(ScaleDecals([1], 2.0))
+    actions.files.save(lambda: None)
+    finish(actions)
+    assert not list(tmp_path.glob("scene-*.json"))
+    expected = actions.state.session.document.decals.decals.radii
+    np.testing.assert_array_equal(load_scene(tmp_path / "scene.json").decals.radii, expected)
