@@ -63,7 +63,7 @@ class EditableIndex:
         return len(self._level_of)
 
     def load_kernels(self) -> None:
-        """Load the kernels of the next change. Where none may be compiled, this fails, and no change does."""
+        """Load the kernels of the next change, so that a missing one raises before anything changes."""
         load_together(BUILD_KERNELS if self.stale else EDIT_KERNELS, "cpu")
 
     def build(self, records: Float32Array, numbers: Int64Array, log: ChangeLog) -> bool:
