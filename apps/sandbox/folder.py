@@ -11,7 +11,7 @@ from decals import DecalImage, Scene, load_model
 from decals.editing.recovery import SUFFIX, in_use
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.images import read_image
-from decals.scenes.objects import SceneObject
+from decals.scenes.objects import SceneObject, unused_name
 from decals.validation import describe
 
 MODELS = (".json", ".ply", ".obj", ".stl", ".vtp", ".vtk", ".glb", ".gltf", ".off")
@@ -110,7 +110,7 @@ def keep_upload(file: object, folder: Path) -> Path:
     path = folder / f"{stem}{suffix}"
     try:
         if not (path.is_file() and path.read_bytes() == content):
-            path = folder / f"{unused(stem, {other.stem for other in folder.iterdir()})}{suffix}"
+            path = folder / f"{unused_name(stem, {other.stem for other in folder.iterdir()}, ' ')}{suffix}"
             with path.open("xb") as kept:
                 kept.write(content)
     except OSError as error:
@@ -139,15 +139,6 @@ def plain_name(name: str) -> str:
     """Return the stem of a file's name without characters that mean something in paths."""
     stem = Path(name.replace("\\", "/")).stem
     return "".join(c if c.isalnum() or c in "-_ " else "-" for c in stem)[:60].strip() or "model"
-
-
-def unused(name: str, taken: set[str]) -> str:
-    """Return a name, with a number behind it if it is taken."""
-    return next(
-        candidate
-        for number in range(1, len(taken) + 2)
-        if (candidate := name if number == 1 else f"{name} {number}") not in taken
-    )
 
 
 def thumbnails() -> dict[str, str]:

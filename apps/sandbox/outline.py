@@ -12,6 +12,7 @@ from PIL import Image
 
 from blobtree.nodes.paths import Path as TreePath
 from decals.editing.document import Document
+from decals.editing.outline_actions import Part
 from decals.images.texels import as_bytes
 from decals.scenes.objects import TreeObject
 from decals.scenes.scene import DecalImage
@@ -30,7 +31,7 @@ class Row:
     Attributes
     ----------
     key
-        Text that names the row: "object/path".
+        Text that names the row; see `decals.editing.outline_actions.Part.key`.
     label
         Name of the object, node or layer; the class of a node without a name.
     kind
@@ -50,17 +51,6 @@ class Row:
     hidden: bool = False
     locked: bool = False
     picture: str = ""
-
-
-def key_of(number: int, path: TreePath) -> str:
-    """Return the key of a node's row."""
-    return "/".join(map(str, (number, *path)))
-
-
-def parse_key(key: str) -> tuple[int, TreePath]:
-    """Return object and path of a row's key; raise `ValueError` for other texts."""
-    number, *path = map(int, key.split("/"))
-    return number, tuple(path)
 
 
 def outline(document: Document) -> list[dict[str, Any]]:
@@ -112,6 +102,6 @@ def _nodes(number: int, item: TreeObject) -> list[Row]:
         kind = "primitive" if count == 0 else "modifier" if count == 1 else "combination"
         hidden, locked = (bool(path) and path in paths for paths in (item.hidden, item.locked))
         label = item.names.get(path, type(node).__name__)
-        rows.append(Row(key_of(number, path), label, kind, 1 + len(path), hidden, locked))
+        rows.append(Row(Part("node", number, path).key, label, kind, 1 + len(path), hidden, locked))
         pending.extend(((*path, i), child) for i, child in reversed(list(enumerate(node.children))))
     return rows

@@ -8,7 +8,6 @@ import math
 import re
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial, wraps
 from pathlib import Path
@@ -17,9 +16,7 @@ from typing import Any, Concatenate, ParamSpec
 import numpy as np
 
 from blobtree import Node
-from blobtree._typing import Int64Array
 from blobtree.custom.definition import custom_kinds
-from blobtree.nodes.paths import Path as TreePath
 from blobtree.progress import Cancel, Progress
 from decals import cover
 from decals.apps.models.samples import SAMPLES, axes_of, sample
@@ -27,16 +24,14 @@ from decals.apps.models.scenes import empty_scene, new_file
 from decals.apps.sandbox import catalog, decal_panel
 from decals.apps.sandbox.controls import controls_of, exchanged, parsed, parsed_option
 from decals.apps.sandbox.display import PHASES, Display, DisplayOptions
-from decals.apps.sandbox.folder import HDR, MODELS, keep_upload, listed, plain_name, read_upload, unused
-from decals.apps.sandbox.outline import key_of, outline, parse_key
+from decals.apps.sandbox.folder import HDR, MODELS, keep_upload, listed, plain_name, read_upload
+from decals.apps.sandbox.outline import outline
 from decals.apps.views import THREE_QUARTER
-from decals.editing.commands import AddImage, DeleteDecals, RemoveImage, ReplaceImage, SetValues
-from decals.editing.document import Document
+from decals.editing.commands import AddImage, ReplaceImage
+from decals.editing.outline_actions import Part, image_on_layer
 from decals.editing.recovery import recovery_path
-from decals.editing.scatter_commands import AddObject, RemoveObject
+from decals.editing.scatter_commands import AddObject
 from decals.editing.session import UndoEntry
-from decals.editing.tree_commands import RenameObject
-from decals.editing.visibility import RenameLayer, RenameNode
 from decals.errors import InvalidEdit
 from decals.options import arguments_of
 from decals.rendering.environment import Environment
@@ -44,7 +39,7 @@ from decals.scattering.scatter import scatter
 from decals.scenes.camera import UPRIGHT, Camera
 from decals.scenes.cover import fitting_camera
 from decals.scenes.files import is_scene_file, load_model
-from decals.scenes.objects import MeshObject, SceneObject, TreeObject, bounds_of, flagged
+from decals.scenes.objects import MeshObject, SceneObject, TreeObject, bounds_of, unused_name
 from decals.scenes.scene import DecalImage, Scene
 from decals.validation import describe, finite_number, one_of, whole_number
 from decals.window import EditWindow
@@ -198,7 +193,7 @@ class Sandbox:
     def _selected(self) -> str:
         """Return the key of the selected row."""
         if (primitive := self._state.primitive) is not None:
-            return key_of(*primitive)
+            return Part("node", *primitive).key
         return "" if self._shown_image is None else f"image {self._shown_image}"
 
     def _pick(self) -> dict[str, str]:
@@ -272,13 +267,11 @@ class Sandbox:
     @event
     def mark(self, key: str) -> None:
         """Mark the node of a row too, or no longer; marked nodes are grouped and removed together."""
-        number, path = self._row(key)
-        self._trees.select_node(number, path)
+        node = Part.node(key)
+        self._trees.select_node(node.number, node.path)
         self._outline()  # forgets the marks of a former tree
-        key = key_of(number, path)
-        self._marked = [k for k in self._marked if k != key and self._row(k)[0] == number] + (
-            [] if key in self._marked else [key]
-        )
+        others = [k for k in self._marked if k != node.key and Part.node(k).number == node.number]
+        self._marked = others + ([] if node.key in self._marked else [node.key])
 
     @event
     def select(self, key: str) -> None:
@@ -288,15 +281,15 @@ class Sandbox:
         if key == "":
             state.primitive = None
             return
-        family, number, path = _parsed(key)
-        if family == "layer":
-            state.selection = state.selectable(_decals_of(document, number))
-        elif family == "image":
+        kind, number, path = Part.named(key)
+        if kind == "layer":
+            state.selection = state.selectable(document.decals_of_layer(number))
+        elif kind == "image":
             self._image = whole_number("image", number, 0, len(document.images) - 1, InvalidEdit)
             state.primitive, state.selection = None, ()
         else:
             self._trees.select_node(number, path)
-            self._marked = [key_of(number, path)]
+            self._marked = [Part("node", number, path).key]
 
     @property
     def _shown_image(self) -> int | None:
@@ -430,30 +423,8 @@ class Sandbox:
 
     @event
     def go_to(self, entry: int) -> None:
-        """End a drag, then undo or redo until so many entries of the history are done."""
-        session = self._window.session
-        total = len(session.labels) + len(session.undone_labels)
-        number = whole_number("history", entry, 0, total, InvalidEdit)
-
-        def step() -> None:
-            while len(session.labels) > number:
-                session.undo()
-            while len(session.labels) < number and session.redo() is not None:
-                pass
-
-        self._when_idle(step)
-
-    def _when_idle(self, step: Callable[[], None]) -> None:
-        """End a drag and take a step once its edits are adopted; `InvalidEdit` while another edit runs."""
-        background = self._window.background
-
-        def followed() -> None:
-            background.require_idle(computing=False)
-            step()
-
-        if self._window.session.stroke_open:
-            self._trees.end_drag()
-        background.when_followed(followed)
+        """Undo or redo until so many entries of the history are done."""
+        self._window.actions.go_to(entry)
 
     # -- files ------------------------------------------------------------------------------------------
 
@@ -490,7 +461,7 @@ class Sandbox:
             self._files.take_back()
             self._state.show("")
 
-        self.attempt(lambda: self._when_idle(step))
+        self.attempt(lambda: self._window.actions.when_idle(step))
 
     @event
     def new_model(self) -> None:
@@ -553,24 +524,24 @@ class Sandbox:
             self._take_image(found, key)
         else:
             taken = {item.name for item in window.document.objects}
-            renamed = replace(found, name=unused(name, taken))
+            renamed = replace(found, name=unused_name(name, taken, " "))
             if isinstance(renamed, MeshObject):
                 renamed = replace(renamed, source=None)  # the file that was read exists no more
             self._add_object(renamed)
 
     def _take_image(self, image: DecalImage, key: str) -> None:
         """Add an image that was dropped on a row, or replace that of the row."""
-        family, row, _ = _parsed(key) if key else ("", 0, ())
+        row = Part.named(key) if key else None
         session, state = self._window.session, self._state
         count, shown = len(session.document.images), ""
-        if family == "image":
-            state.run(ReplaceImage(row, image))
+        if row is not None and row.kind == "image":
+            state.run(ReplaceImage(row.number, image))
             return
         with session.stroke("add an image"):
             session.do(AddImage(image))
-            if family == "layer":
-                session.do(_showing(session.document, count, row))
-                shown = f" and shown on {session.document.layer_names.get(row, f'layer {row}')}"
+            if row is not None and row.kind == "layer":
+                session.do(image_on_layer(session.document, count, row.number))
+                shown = f" and shown on {session.document.layer_names.get(row.number, row.key)}"
         state.show(f"added image {count}{shown or '; choose it for the selected decals'}")
 
     def _take_light(self, picture: Any, file: object) -> None:
@@ -668,84 +639,8 @@ class Sandbox:
 
     @event
     def change_row(self, key: str, change: str, value: Any = None) -> None:
-        """Change what a row of the outline stands for.
-
-        If the row is one of several marked ones, all are removed or grouped.
-
-        Parameters
-        ----------
-        key
-            Key of the row.
-        change
-            Action: "rename", "remove", "duplicate", "group", "move", "hide", "lock" or "isolate".
-            "hide" shows a hidden row, and "lock" unlocks a locked one.
-        value
-            New name; or the key of the row to which a row is moved: a node, or the layer of an image.
-        """
-        family, number, path = _parsed(key)
-        actions, document = self._window.actions, self._window.document
-        run, flag = actions.state.run, {"hide": "hidden", "lock": "locked"}.get(str(change), "")
-        marked = self._marked if key in self._marked else [key]
-        match family, change:
-            case "layer", "hide" | "lock":
-                actions.visibility.flag_layer(flag, number)
-            case "layer", "isolate":
-                actions.visibility.isolate_layer(number)
-            case "layer", "remove":
-                run(DeleteDecals(_decals_of(document, number)))
-            case "layer", "rename":
-                run(RenameLayer(number, value))
-            case "image", "remove":
-                run(RemoveImage(number))
-            case "image", "move":
-                self._show_image(number, value)
-            case "object" | "node", "hide" | "lock":
-                for row in marked:
-                    actions.visibility.flag_node(flag, *self._row(row))
-            case "object" | "node", "isolate":
-                actions.visibility.isolate_node(number, path)
-            case "node", "rename":
-                run(RenameNode(number, path, value))
-            case "node", "group":
-                actions.trees.group_nodes(number, [self._row(other)[1] for other in marked])
-            case "node", "remove" if len(marked) > 1:
-                actions.trees.delete_nodes(number, [self._row(other)[1] for other in marked])
-            case "node", "remove" | "duplicate" | "move":
-                target = self._row(value) if change == "move" else (number, ())
-                if target[0] != number:
-                    raise InvalidEdit("a node can be moved inside its own object only")
-                actions.trees.select_node(number, path)
-                if change == "move":
-                    actions.trees.move_node(target[1])
-                elif change == "remove":
-                    actions.trees.delete_selected()
-                else:
-                    actions.trees.duplicate_selected()
-            case "object", "rename":
-                run(RenameObject(number, value))
-            case "object", "remove":
-                run(RemoveObject(number))
-            case "object", "duplicate":
-                item = document.object(number)
-                name = unused(item.name, {other.name for other in document.objects})
-                run(AddObject(flagged(item, name=name)))
-            case _:
-                raise InvalidEdit(f"change: {describe(change)} is none for {describe(key)}")
-
-    def _show_image(self, number: int, key: object) -> None:
-        """Let the decals of a layer show an image."""
-        family, layer, _ = _parsed(key)
-        if family != "layer":
-            raise InvalidEdit(f"an image can be moved onto a layer only, got {describe(key)}")
-        self._state.run(_showing(self._window.document, number, layer))
-
-    @staticmethod
-    def _row(key: object) -> tuple[int, TreePath]:
-        """Return object and path of a row's key, or raise `InvalidEdit`."""
-        family, number, path = _parsed(key)
-        if family not in ("object", "node"):
-            raise InvalidEdit(f"row: expected one of an object or a node, got {describe(key)}")
-        return number, path
+        """Change what a row of the outline stands for; see `OutlineActions.change`."""
+        self._window.actions.outline.change(key, change, value, self._marked)
 
     def attempt(self, request: Callable[[], None], *, whole: bool = True) -> None:
         """End the steps before a request, carry it out as `ActionState.attempt` does, and draw the result."""
@@ -757,28 +652,6 @@ class Sandbox:
 def first_line(kind: type[Node]) -> str:
     """Return the first line of a class's description, without marks of code."""
     return (kind.__doc__ or "").strip().split("\n")[0].replace("`", "")
-
-
-def _parsed(key: object) -> tuple[str, int, TreePath]:
-    """Return family, number and path of a row's key, or raise `InvalidEdit`."""
-    family, _, rest = str(key).rpartition(" ")
-    with suppress(ValueError):
-        number, path = parse_key(rest)
-        if family in ("object", "layer", "image") and not path:
-            return family, number, path
-        if family == "":
-            return "node", number, path
-    raise InvalidEdit(f"row: expected one of an object, a node, a layer or an image, got {describe(key)}")
-
-
-def _showing(document: Document, image: int, layer: int) -> SetValues:
-    """Return the command that lets the decals of a layer show an image."""
-    return SetValues.each(_decals_of(document, layer), "change the image", images=image)
-
-
-def _decals_of(document: Document, layer: int) -> Int64Array:
-    numbers: Int64Array = document.decals.numbers[document.decals.column("layers") == layer]
-    return numbers
 
 
 def _fitted(scene: Scene, size: Sequence[int]) -> Scene:

@@ -14,6 +14,7 @@ from decals.editing.commands import DeleteDecals, DuplicateDecals
 from decals.editing.decal_actions import DecalActions
 from decals.editing.file_actions import FileActions
 from decals.editing.key_bindings import UNREGISTERED, Group, KeyTable, registered_actions
+from decals.editing.outline_actions import OutlineActions
 from decals.editing.session import EditSession, UndoEntry
 from decals.editing.tree_actions import TreeActions
 from decals.editing.view_actions import ViewActions
@@ -21,7 +22,7 @@ from decals.editing.visibility_actions import VisibilityActions
 from decals.errors import InvalidEdit
 from decals.field.mapping import ImageMapping
 from decals.record import Contact
-from decals.validation import describe
+from decals.validation import describe, whole_number
 
 STIFFNESSES = 1.0, 1.5, 2.0, 3.0, 6.0
 """Stiffnesses that a key goes through."""
@@ -51,6 +52,8 @@ class Actions:
         Actions on the scene's file.
     visibility : VisibilityActions
         Actions that hide and lock.
+    outline : OutlineActions
+        Actions on the rows of an outline.
     view : ViewActions
         Actions that move the camera.
     brush : BrushActions
@@ -85,6 +88,7 @@ class Actions:
         self.trees = TreeActions(self.state)
         self.files = FileActions(self.state, path)
         self.visibility = VisibilityActions(self.state)
+        self.outline = OutlineActions(self.state, self.trees, self.visibility)
         self.view, self.brush = ViewActions(self.state), BrushActions(self.state)
         self.help_page, self.help_pages = 0, 1
         self._actions = {
@@ -199,8 +203,7 @@ class Actions:
         """Undo or redo an entry after the steps of a drag, in the background if it changes many decals."""
         state = self.state
 
-        def followed() -> None:
-            state.background.require_idle(computing=False)
+        def step_once() -> None:
             entry = next_entry()
             if entry is None:
                 state.message = f"nothing to {name}"
@@ -209,7 +212,39 @@ class Actions:
             else:
                 state.message = step(state.session, entry)
 
-        state.background.when_followed(followed)
+        self.when_idle(step_once)
+
+    def when_idle(self, step: Callable[[], None]) -> None:
+        """End a drag, and take a step once its edits are adopted; `Busy` while another edit runs."""
+        background = self.state.background
+
+        def followed() -> None:
+            background.require_idle(computing=False)
+            step()
+
+        if self.state.session.stroke_open:
+            self.trees.end_drag()
+        background.when_followed(followed)
+
+    def go_to(self, count: int) -> None:
+        """End a drag, then undo or redo until so many entries of the history are done.
+
+        Raises
+        ------
+        InvalidEdit
+            The history has fewer entries, or another edit runs.
+        """
+        session = self.state.session
+        total = len(session.labels) + len(session.undone_labels)
+        number = whole_number("history", count, 0, total, InvalidEdit)
+
+        def step() -> None:
+            while len(session.labels) > number:
+                session.undo()
+            while len(session.labels) < number and session.redo() is not None:
+                pass
+
+        self.when_idle(step)
 
     @Group.SCENE.action("next_contact", "p", summary="contact mode: product, min, radial, elastic")
     def next_contact(self, _cursor: Cursor) -> None:

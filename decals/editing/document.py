@@ -351,6 +351,11 @@ class Document:
         """Return the objects with another one at an index."""
         return (*self.objects[:number], item, *self.objects[number + 1 :])
 
+    def decals_of_layer(self, layer: int) -> Int64Array:
+        """Return the numbers of the decals of a layer."""
+        numbers: Int64Array = self.decals.numbers[self.decals.column("layers") == layer]
+        return numbers
+
     # -- forks ------------------------------------------------------------------------------------------
 
     def fork(self) -> "Document":

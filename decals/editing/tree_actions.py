@@ -121,7 +121,7 @@ class TreeActions(WindowActions):
         return pick.object, path_of(tree, seen)
 
     def _tree(self, number: int) -> Node:
-        item = self._state.session.document.objects[number]
+        item = self._state.session.document.object(number)
         if not isinstance(item, TreeObject):
             raise InvalidEdit(f"{item.name!r} is a mesh and has no primitives; point at a BlobTree")
         return item.tree
@@ -250,7 +250,6 @@ class TreeActions(WindowActions):
 
     def select_node(self, number: int, path: Path) -> None:
         """Select a node of an object's tree, with its handle on the side that the camera sees."""
-        self._state.session.document.object(number)  # raises for a number without an object
         low, high = node_in_world(self._tree(number), path).support
         eye, _ = self._state.camera.eye_and_target()
         toward = unit_rows((np.asarray(eye) - (low + high) / 2)[None])[0]

@@ -89,7 +89,7 @@ class VisibilityActions(WindowActions):
         elif layer in document.hidden.decals.layers:
             self._state.run(ShowDecals([layer]))
         else:
-            numbers = document.decals.numbers[document.decals.column("layers") == layer]
+            numbers = document.decals_of_layer(layer)
             if not len(numbers):
                 raise InvalidEdit(f"layer: expected one with decals, got {describe(layer)}")
             self._state.run(HideDecals(numbers))
@@ -97,5 +97,5 @@ class VisibilityActions(WindowActions):
     def isolate_layer(self, layer: int) -> None:
         """Hide the decals of all other layers; if none is visible, show them."""
         document = self._state.session.document
-        others = document.decals.numbers[document.decals.column("layers") != layer]
+        others = np.setdiff1d(document.decals.numbers, document.decals_of_layer(layer))
         self._state.run(HideDecals(others) if len(others) else ShowDecals())

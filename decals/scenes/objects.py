@@ -2,8 +2,9 @@
 
 import operator
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain, count
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, cast
 
@@ -404,15 +405,15 @@ def as_objects(models: Iterable[object], *, crease_angle: float = CREASE_ANGLE) 
     objects: list[SceneObject] = []
     for number, model in enumerate(models, 1):
         item = as_object(model, f"model {number}", crease_angle=crease_angle)
-        objects.append(_renamed(item, {other.name for other in objects}))
+        name = unused_name(item.name, {other.name for other in objects}, "-")
+        objects.append(item if name == item.name else replace(item, name=name))
     return list(with_common_origin(objects))
 
 
-def _renamed(item: SceneObject, taken: set[str]) -> SceneObject:
-    name, number = item.name, 2
-    while name in taken:
-        name, number = f"{item.name}-{number}", number + 1
-    return item if name == item.name else replace(item, name=name)
+def unused_name(name: str, taken: Collection[str], separator: str) -> str:
+    """Return a name; if it is taken, with a separator and a number from 2 on behind it."""
+    numbered = chain([name], (f"{name}{separator}{number}" for number in count(2)))
+    return next(one for one in numbered if one not in taken)
 
 
 def bounds_of(objects: Iterable[SceneObject]) -> Box:

@@ -1,0 +1,156 @@
+"""Actions on the parts of a scene that an outline lists: objects, nodes, layers of decals, and images."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any, NamedTuple, Self
+
+from blobtree.nodes.paths import Path
+from decals.editing.action_state import ActionState, WindowActions
+from decals.editing.commands import DeleteDecals, RemoveImage, SetValues
+from decals.editing.document import Document
+from decals.editing.scatter_commands import AddObject, RemoveObject
+from decals.editing.tree_actions import TreeActions
+from decals.editing.tree_commands import RenameObject
+from decals.editing.visibility import RenameLayer, RenameNode
+from decals.editing.visibility_actions import VisibilityActions
+from decals.errors import InvalidEdit
+from decals.scenes.objects import flagged, unused_name
+from decals.validation import describe
+
+FLAGS = {"hide": "hidden", "lock": "locked"}
+"""What two of the changes set."""
+
+
+class Part(NamedTuple):
+    """A part of a scene, and its key in an outline.
+
+    Attributes
+    ----------
+    kind
+        "object", "node", "layer" or "image".
+    number
+        Number of the layer; index of the image, or of the object, to which a node belongs.
+    path
+        Path of the node in the object's tree.
+    """
+
+    kind: str
+    number: int
+    path: Path = ()
+
+    @property
+    def key(self) -> str:
+        """Text that names the part: "object 0", "layer 0", "image 0", and "0/1/2" for a node."""
+        path = "/".join(map(str, (self.number, *self.path)))
+        return path if self.kind == "node" else f"{self.kind} {path}"
+
+    @classmethod
+    def named(cls, key: object) -> Self:
+        """Return the part of a key, which the scene need not have; raise `InvalidEdit` for other texts."""
+        kind, _, rest = str(key).rpartition(" ")
+        with suppress(ValueError):
+            number, *path = map(int, rest.split("/"))
+            if kind == "" or (kind in ("object", "layer", "image") and not path):
+                return cls(kind or "node", number, tuple(path))
+        raise InvalidEdit(
+            f"row: expected that of an object, a node, a layer or an image, got {describe(key)}"
+        )
+
+    @classmethod
+    def node(cls, key: object) -> Self:
+        """Return the node of a key, the root for an object; raise `InvalidEdit` for other keys."""
+        part = cls.named(key)
+        if part.kind not in ("object", "node"):
+            raise InvalidEdit(f"row: expected that of an object or a node, got {describe(key)}")
+        return part._replace(kind="node")
+
+
+def image_on_layer(document: Document, image: int, layer: int) -> SetValues:
+    """Return the command that lets the decals of a layer show an image."""
+    return SetValues.each(document.decals_of_layer(layer), "change the image", images=image)
+
+
+class OutlineActions(WindowActions):
+    """Actions on parts of the scene, whatever is selected.
+
+    Parameters
+    ----------
+    state
+        State of the window.
+    trees, visibility
+        Other actions of the window, which these use.
+    """
+
+    def __init__(self, state: ActionState, trees: TreeActions, visibility: VisibilityActions) -> None:
+        super().__init__(state)
+        self._trees, self._visibility = trees, visibility
+
+    def change(self, key: object, change: object, value: Any = None, marked: Sequence[str] = ()) -> None:
+        """Change a part of the scene; if it is one of several marked nodes, hide, lock, group or remove all.
+
+        Parameters
+        ----------
+        key
+            Key of the part; see `Part.key`.
+        change
+            "rename", "remove", "duplicate", "group", "move", "hide", "lock" or "isolate". "hide" shows a
+            hidden part, and "lock" unlocks a locked one.
+        value
+            New name; or the key of the part to which a part is moved: a node, or the layer of an image.
+        marked
+            Keys of the marked nodes, of one object.
+
+        Raises
+        ------
+        InvalidEdit
+            The scene has no such part, or it has no such change.
+        """
+        kind, number, path = Part.named(key)
+        document, run = self._state.session.document, self._state.run
+        nodes = [path] if key not in marked else [Part.node(other).path for other in marked]
+        match kind, change:
+            case "layer", "hide" | "lock":
+                self._visibility.flag_layer(FLAGS[str(change)], number)
+            case "layer", "isolate":
+                self._visibility.isolate_layer(number)
+            case "layer", "remove":
+                run(DeleteDecals(document.decals_of_layer(number)))
+            case "layer", "rename":
+                run(RenameLayer(number, value))
+            case "image", "remove":
+                run(RemoveImage(number))
+            case "image", "move":
+                target = Part.named(value)
+                if target.kind != "layer":
+                    raise InvalidEdit(f"an image can be moved onto a layer only, got {describe(value)}")
+                run(image_on_layer(document, number, target.number))
+            case "object" | "node", "hide" | "lock":
+                for node in nodes:
+                    self._visibility.flag_node(FLAGS[str(change)], number, node)
+            case "object" | "node", "isolate":
+                self._visibility.isolate_node(number, path)
+            case "node", "rename":
+                run(RenameNode(number, path, value))
+            case "node", "group":
+                self._trees.group_nodes(number, nodes)
+            case "node", "remove":
+                self._trees.delete_nodes(number, nodes)
+            case "node", "duplicate":
+                self._trees.select_node(number, path)
+                self._trees.duplicate_selected()
+            case "node", "move":
+                target = Part.node(value)
+                if target.number != number:
+                    raise InvalidEdit("a node can be moved inside its own object only")
+                self._trees.select_node(number, path)
+                self._trees.move_node(target.path)
+            case "object", "rename":
+                run(RenameObject(number, value))
+            case "object", "remove":
+                run(RemoveObject(number))
+            case "object", "duplicate":
+                item = document.object(number)
+                name = unused_name(item.name, {other.name for other in document.objects}, " ")
+                run(AddObject(flagged(item, name=name)))
+            case _:
+                raise InvalidEdit(f"change: {describe(change)} is none for {describe(key)}")

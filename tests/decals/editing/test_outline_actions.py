@@ -1,0 +1,95 @@
+"""Parts of a scene by their keys, their changes, and steps through the history."""
+
+from typing import Any
+
+import pytest
+
+from decals.editing import Actions, EditSession
+from decals.editing.outline_actions import Part
+from decals.errors import InvalidEdit, InvalidInput
+from decals.scenes.objects import TreeObject
+from tests.decals.editing.scenes import digest, goes_back_and_forth, scene, tree_of
+
+
+@pytest.mark.parametrize(
+    ("key", "part"),
+    [
+        ("object 1", Part("object", 1)),
+        ("layer -3", Part("layer", -3)),
+        ("image 0", Part("image", 0)),
+        ("0", Part("node", 0)),
+        ("2/0/1", Part("node", 2, (0, 1))),
+    ],
+)
+def test_a_key_names_a_part(key: str, part: Part) -> None:
+    assert (Part.named(key), part.key) == (part, key)
+
+
+@pytest.mark.parametrize(
+    "key", ["", "x", "object", "object x", "object 0/1", "node 0", "0//1", None, 1.5, ()]
+)
+def test_other_texts_name_no_part(key: Any) -> None:
+    with pytest.raises(InvalidEdit, match="row: expected that of an object, a node"):
+        Part.named(key)
+
+
+def test_a_node_is_that_of_its_row_or_the_root_of_an_object() -> None:
+    assert (Part.node("object 1"), Part.node("0/1")) == (Part("node", 1), Part("node", 0, (1,)))
+    with pytest.raises(InvalidEdit, match="row: expected that of an object or a node, got 'layer 0'"):
+        Part.node("layer 0")
+
+
+def test_changes_are_undone_exactly() -> None:
+    actions = Actions(EditSession(scene()))
+    change, document = actions.outline.change, actions.state.session.document
+    change("0/0", "rename", "body")
+    change("layer 0", "rename", "scales")
+    change("object 1", "duplicate")
+    change("image 1", "move", "layer 0")
+    change("0/1", "hide")
+    change("0/0", "lock")
+    assert [item.name for item in document.objects] == ["blob", "box", "box 2"]
+    blob = document.objects[0]
+    assert isinstance(blob, TreeObject)
+    assert (blob.names, blob.hidden, blob.locked) == ({(0,): "body"}, ((1,),), ((0,),))
+    assert set(document.decals.decals.images.tolist()) == {1}
+    goes_back_and_forth(actions.state.session)
+
+
+@pytest.mark.parametrize(
+    "change", ["hide", "lock", "isolate", "rename", "remove", "duplicate", "group", "move"]
+)
+@pytest.mark.parametrize("key", ["7/0", "object 7", "image 7"])
+def test_parts_that_are_missing_are_refused(key: str, change: str) -> None:
+    actions = Actions(EditSession(scene()))
+    before = digest(actions.state.session.document)
+    with pytest.raises(InvalidInput):
+        actions.outline.change(key, change, "0/0", ["0/0", key] if key[0].isdigit() else ())
+    assert digest(actions.state.session.document) == before
+
+
+def test_history_is_entered_anywhere() -> None:
+    actions = Actions(EditSession(scene()))
+    session, states = actions.state.session, [digest(actions.state.session.document)]
+    for name in ("one", "two", "three"):
+        actions.outline.change("object 0", "rename", name)
+        states.append(digest(session.document))
+    for count in (1, 3, 0, 2):
+        actions.go_to(count)
+        assert (len(session.labels), digest(session.document)) == (count, states[count])
+    wrong: list[Any] = [4, -1, "1", True]
+    for count in wrong:
+        with pytest.raises(InvalidEdit, match="history: expected a whole number from 0 to 3"):
+            actions.go_to(count)
+
+
+def test_a_step_ends_a_drag() -> None:
+    actions = Actions(EditSession(scene()))
+    actions.trees.select_node(0, (0,))
+    before, steps = tree_of(actions.state.session.document), list[bool]()
+    actions.trees.begin_drag()
+    actions.trees.drag((0.1, 0, 0))
+    actions.when_idle(lambda: steps.append(True))
+    assert (steps, actions.state.session.stroke_open) == ([True], False)
+    actions.go_to(0)
+    assert tree_of(actions.state.session.document) == before
