@@ -24,6 +24,19 @@ EYE_DISTANCE = 10.0
 """Distance from which the rays of a map start, in widths of the map."""
 
 
+def as_index(part: str, number: Any, count: int) -> int:
+    """Return the index of one of so many parts of a scene, which a formula computed.
+
+    Raises
+    ------
+    InvalidLesson
+        The scene has no such part, perhaps any more.
+    """
+    if np.ndim(number) or number not in range(count):
+        raise InvalidLesson(f"the scene has no {part} {number!s}; undo, or start the lesson again")
+    return int(number)
+
+
 @dataclass(frozen=True, eq=False)
 class Points:
     """Points of the scene.
@@ -106,9 +119,7 @@ class Experiment:
 
     def decal(self, number: Any) -> int:
         """Return the row of a decal; raise `InvalidLesson` if the scene has lost it."""
-        if np.ndim(number) or number != int(number) or not 0 <= number < len(self.decals):
-            raise InvalidLesson(f"the scene has no decal {number!s}; undo, or start the lesson again")
-        return int(number)
+        return as_index("decal", number, len(self.decals))
 
     # -- points -----------------------------------------------------------------------------------------
 

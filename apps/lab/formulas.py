@@ -56,13 +56,10 @@ class Measure:
         Function of a scope and the arguments.
     arguments
         Kind of each argument: "number", or "formula" for one that is evaluated at other points.
-    doc
-        What it is.
     """
 
     function: Callable[..., Any]
     arguments: tuple[str, ...]
-    doc: str
 
 
 @dataclass(frozen=True)
@@ -79,7 +76,7 @@ class Formula:
     Examples
     --------
     >>> from decals.apps.lab.formulas import Measure, parse
-    >>> measures = {"double": Measure(lambda scope, x: 2 * x, ("number",), "twice a number")}
+    >>> measures = {"double": Measure(lambda scope, x: 2 * x, ("number",))}
     >>> formula = parse("double(3) + x > 10", measures, {"x"})
     >>> bool(formula.evaluate({"x": 5.0}))
     True

@@ -17,7 +17,7 @@ from decals.apps.lab.bindings import AXES, MODES, binding
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Scope
 from decals.apps.lab.lesson import Lesson, Slider
-from decals.apps.lab.plots import described, drawn
+from decals.apps.lab.plots import drawn
 from decals.apps.lab.relaxing import Recording
 from decals.apps.sandbox.controls import STEPS, Control, exchanged, number_of
 from decals.apps.sandbox.decal_panel import set_drawing
@@ -287,7 +287,7 @@ def measured(lesson: Lesson, experiment: Experiment, key: object = None) -> Resu
         {"title": plot.title, "note": plot.note, "svg": drawn(plot, lesson, scope)}
         for plot in lesson.settings.plots
     ]
-    return Results(key, described(lesson, scope), plots, lesson.verdict(scope))
+    return Results(key, lesson.values(scope), plots, lesson.verdict(scope))
 
 
 def _html(text: str) -> str:

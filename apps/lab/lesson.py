@@ -52,14 +52,7 @@ class Slider(Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Value(Struct, forbid_unknown_fields=True, frozen=True):
-    """A live value; conditions are shown as yes or no."""
-
-    label: str
-    formula: str
-
-
-class Curve(Struct, forbid_unknown_fields=True, frozen=True):
-    """One curve of a plot."""
+    """A live value, or a curve of a plot; live conditions are shown as yes or no."""
 
     label: str
     formula: str
@@ -69,7 +62,7 @@ class Plot(Struct, forbid_unknown_fields=True, frozen=True):
     """Curves over a range or the lesson's line, or a map of colours over two ranges or the surface."""
 
     title: str
-    curves: tuple[Curve, ...] = ()
+    curves: tuple[Value, ...] = ()
     map: str = ""
     red: str = ""
     red_label: str = ""
@@ -168,6 +161,13 @@ class Lesson:
     def moves_probe(self) -> bool:
         """True if a slider moves the probe, so that it is shown."""
         return any(slider.path.startswith("probe.") for slider in self.settings.sliders)
+
+    def values(self, scope: Scope) -> list[dict[str, str]]:
+        """Return the live values: label and text of each."""
+        return [
+            {"label": value.label, "text": shown(self.formulas[value.formula].evaluate(scope))}
+            for value in self.settings.values
+        ]
 
     def verdict(self, scope: Scope) -> tuple[bool, str]:
         """Return whether the scene answers the question, and the text to say so."""

@@ -12,7 +12,7 @@ from blobtree._typing import Float64Array
 from blobtree.formulas.falloff import RIM
 from blobtree.meshing.clip import enclosed_volume
 from decals.apps.lab.errors import InvalidLesson
-from decals.apps.lab.experiment import Experiment, Points, Scope
+from decals.apps.lab.experiment import Experiment, Points, Scope, as_index
 from decals.apps.lab.formulas import Evaluate, Measure
 from decals.field.evaluate import Samples, evaluate
 from decals.field.jacobian import folds_of, stretch_of
@@ -46,17 +46,14 @@ def measure(*arguments: str) -> Callable[[Function], Function]:
     """Register a function as a measure of its name; see `Measure` for the kinds of arguments."""
 
     def register(function: Function) -> Function:
-        doc = (function.__doc__ or "").strip().removeprefix("Return ").rstrip(".")
-        MEASURES[function.__name__.strip("_")] = Measure(function, arguments, doc)
+        MEASURES[function.__name__] = Measure(function, arguments)
         return function
 
     return register
 
 
 for _kind in (*Contact, *Interaction):
-    MEASURES[_kind.name.lower()] = Measure(
-        lambda scope, value=float(_kind): value, (), f"number of {type(_kind).__name__}.{_kind.name}"
-    )
+    MEASURES[_kind.name.lower()] = Measure(lambda scope, value=float(_kind): value, ())
 
 # -- arithmetic -----------------------------------------------------------------------------------------
 
@@ -103,28 +100,21 @@ def distance(scope: Scope, i: Any, k: Any) -> float:
     return float(np.linalg.norm(place - other))
 
 
-@measure("number")
-def radius(scope: Scope, i: Any) -> float:
-    """Return the visible radius of decal i."""
-    return float(scope.experiment.decals.radii[scope.experiment.decal(i)])
+def _value(scope: Scope, column: str, number: Any) -> Any:
+    """Return the value of a decal in an array of `decals.Decals`."""
+    return getattr(scope.experiment.decals, column)[scope.experiment.decal(number)].item()
 
 
-@measure("number")
-def influence(scope: Scope, i: Any) -> float:
-    """Return the influence radius s of decal i, where its field ends."""
-    return float(scope.experiment.decals.influence[scope.experiment.decal(i)])
+DECAL_COLUMNS = {
+    "radius": "radii",
+    "influence": "influence",
+    "layer": "layers",
+    "interaction": "interactions",
+}
+"""Arrays of decals by the names of measures: visible and influence radius, layer and interaction."""
 
-
-@measure("number")
-def layer(scope: Scope, i: Any) -> int:
-    """Return the layer of decal i."""
-    return int(scope.experiment.decals.layers[scope.experiment.decal(i)])
-
-
-@measure("number")
-def interaction(scope: Scope, i: Any) -> int:
-    """Return the interaction of decal i: independent, push or overlap."""
-    return int(scope.experiment.decals.interactions[scope.experiment.decal(i)])
+for _name, _column in DECAL_COLUMNS.items():
+    MEASURES[_name] = Measure(lambda scope, i, column=_column: _value(scope, column, i), ("number",))
 
 
 @measure()
@@ -150,7 +140,7 @@ def _center(experiment: Experiment, number: Any) -> Float64Array:
 def d(scope: Scope, i: Any) -> Float64Array:
     """Return the distance from decal i over its influence radius."""
     offsets = scope.points.positions - _center(scope.experiment, i)
-    return np.asarray(np.linalg.norm(offsets, axis=1) / influence(scope, i))
+    return np.asarray(np.linalg.norm(offsets, axis=1) / _value(scope, "influence", i))
 
 
 @measure("number")
@@ -253,9 +243,7 @@ def _solids(scope: Scope) -> SolidContact:
 
 
 def _solid(scope: Scope, number: Any, solids: tuple[Node, ...]) -> Node:
-    if np.ndim(number) or number != int(number) or not 0 <= number < len(solids):
-        raise InvalidLesson(f"the scene has no solid {number!s}; undo, or start the lesson again")
-    return solids[int(number)]
+    return solids[as_index("solid", number, len(solids))]
 
 
 @measure("number")
@@ -277,8 +265,7 @@ def _field(node: Node, points: Points) -> Float64Array:
 @measure("number", "number")
 def area(scope: Scope, i: Any, k: Any) -> float:
     """Return the area of the contact of solids i and k; 0 if they are apart."""
-    pair = tuple(sorted((int(i), int(k))))
-    return float(sum(surface.area for surface in _contacts(_solids(scope)) if surface.pair == pair))
+    return float(sum(surface.area for surface in _contacts_of(_solids(scope), i, k)))
 
 
 @measure("number")
@@ -311,8 +298,7 @@ def penetration(scope: Scope, i: Any, k: Any) -> float:
 def bulge(scope: Scope, i: Any, k: Any) -> float:
     """Return the width of the bulge of solid i around its contact with solid k."""
     model = _solids(scope)
-    pair = tuple(sorted((int(i), int(k))))
-    rings = [ring for s in _contacts(model) if s.pair == pair for ring in s.outlines]
+    rings = [ring for surface in _contacts_of(model, i, k) for ring in surface.outlines]
     if not rings:
         return 0.0
     vertices = _mesh(_solid(scope, i, model.solids())).vertices
@@ -333,6 +319,12 @@ def _volume(node: Node) -> float:
     return enclosed_volume(mesh.vertices, mesh.faces)
 
 
+def _contacts_of(model: SolidContact, i: Any, k: Any) -> list[Any]:
+    """Return the surfaces at which two solids touch."""
+    pair = sorted(as_index("solid", number, len(model.children)) for number in (i, k))
+    return [surface for surface in _contacts(model) if surface.pair == tuple(pair)]
+
+
 @lru_cache(maxsize=4)
 def _contacts(model: SolidContact) -> Any:
     return tuple(model.contacts(resolution=RESOLUTION))
@@ -348,30 +340,16 @@ def step(scope: Scope) -> int:
     return 0 if relaxed is None else relaxed.step
 
 
-@measure("number")
-def energy(scope: Scope, n: Any) -> Any:
-    """Return the energy of the particles after step n."""
-    return _recorded(scope, "energies", n)
-
-
-@measure("number")
-def rho(scope: Scope, n: Any) -> Any:
-    """Return the least distance of particles after step n over the largest possible one."""
-    return _recorded(scope, "rhos", n)
-
-
-@measure("number")
-def variation(scope: Scope, n: Any) -> Any:
-    """Return the variation of the distances to the nearest particles after step n."""
-    return _recorded(scope, "variations", n)
-
-
 def _recorded(scope: Scope, name: str, n: Any) -> Any:
-    """Return a measure after steps; NaN for steps that were not taken yet."""
+    """Return a measure of `Relaxed` after steps; NaN for steps that were not taken yet."""
     values = np.array(getattr(scope.experiment.relaxed, name, ()), np.float64)
     numbers = np.rint(np.nan_to_num(n, nan=-1.0)).astype(int)
     taken = (numbers >= 0) & (numbers < len(values))
     return np.where(taken, np.append(values, np.nan)[np.where(taken, numbers, -1)], np.nan)
+
+
+for _name, _column in (("energy", "energies"), ("rho", "rhos"), ("variation", "variations")):
+    MEASURES[_name] = Measure(lambda scope, n, column=_column: _recorded(scope, column, n), ("number",))
 
 
 # -- formulas at other points ---------------------------------------------------------------------------
@@ -411,7 +389,7 @@ def at(scope: Scope, i: Any, formula: Evaluate) -> float:
 def between(scope: Scope, i: Any, k: Any, formula: Evaluate) -> float:
     """Return the value of a formula between decals i and k, where their fields are equal."""
     first, last = (_center(scope.experiment, number) for number in (i, k))
-    reach, other = influence(scope, i), influence(scope, k)
+    reach, other = (_value(scope, "influence", number) for number in (i, k))
     return _value_at(scope, first + reach / (reach + other) * (last - first), formula)
 
 

@@ -9,7 +9,7 @@ from PIL import Image
 
 from blobtree._typing import BoolArray, Float64Array
 from decals.apps.lab.experiment import MAP_PIXELS, Points, Scope
-from decals.apps.lab.lesson import Lesson, Plot, shown
+from decals.apps.lab.lesson import Lesson, Plot
 from decals.apps.lab.measures import owner
 from decals.apps.sandbox.outline import png_url
 
@@ -222,12 +222,3 @@ def _colored(
         image[lines & np.isfinite(values)] = (*LINE, 255)
     image[red] = (*RED, 255)
     return Image.fromarray(image, "RGBA")
-
-
-def described(lesson: Lesson, scope: Scope) -> list[dict[str, str]]:
-    """Return the live values of a lesson: label and text."""
-    formulas = lesson.formulas
-    return [
-        {"label": value.label, "text": shown(formulas[value.formula].evaluate(scope))}
-        for value in lesson.settings.values
-    ]

@@ -10,9 +10,9 @@ from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.formulas import MAX_LENGTH, Measure, parse
 
 MEASURES = {
-    "two": Measure(lambda scope: 2.0, (), "2"),
-    "double": Measure(lambda scope, a: 2.0 * a, ("number",), "twice"),
-    "later": Measure(lambda scope, formula: formula({"x": 10.0}), ("formula",), "at x = 10"),
+    "two": Measure(lambda scope: 2.0, ()),
+    "double": Measure(lambda scope, a: 2.0 * a, ("number",)),
+    "later": Measure(lambda scope, formula: formula({"x": 10.0}), ("formula",)),
 }
 
 numbers = st.floats(-1e3, 1e3, allow_nan=False).map(lambda value: f"({value!r})")

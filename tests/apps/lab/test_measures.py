@@ -148,10 +148,19 @@ def test_steps_that_were_not_taken_have_no_measures() -> None:
     assert np.isnan(value("rho(0)", experiment()))
 
 
-@pytest.mark.parametrize("text", ["f(2)", "radius(-1)", "distance(0, 1.5)", "area(0, 1)", "solid(0)"])
+GONE = "f(2)", "radius(-1)", "distance(0, 1.5)", "layer(0 / 0)", "radius(1 / 0)", "area(0, 1)", "solid(0)"
+
+
+@pytest.mark.parametrize("text", GONE)
 def test_a_measure_of_a_part_that_is_gone_says_what_to_do(text: str) -> None:
     with pytest.raises(InvalidLesson, match="undo, or start the lesson again"):
         value(text, experiment())
+
+
+@pytest.mark.parametrize("text", ["area(0, 2)", "area(0 / 0, 1)", "bulge(0, 0.5)", "volume(-1)"])
+def test_a_measure_of_a_solid_that_is_gone_says_so(text: str) -> None:
+    with pytest.raises(InvalidLesson, match="the scene has no solid"):
+        value(text, experiment(objects=(TreeObject("balls", BALLS),), in_space=True))
 
 
 def test_maps_show_what_the_camera_sees() -> None:
