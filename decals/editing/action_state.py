@@ -1,8 +1,8 @@
 """State that the actions of one window share: selection, messages, strokes and background jobs."""
 
 import time
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
 from typing import Any, Protocol, TypeVar
 
@@ -17,10 +17,11 @@ from decals.editing.brushes import BrushSettings
 from decals.editing.commands import SetDrawing
 from decals.editing.document import Document, Edit
 from decals.editing.prompts import PromptLine
-from decals.editing.queries import SurfacePick
+from decals.editing.queries import SurfacePick, on_shown_surfaces
 from decals.editing.session import Command, EditSession
 from decals.editing.tree_commands import same_structure
 from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.scenes.objects import Paths, SceneObject
 from decals.validation import instance
 
 Cursor = Callable[[], SurfacePick | None]
@@ -191,11 +192,12 @@ class ActionState:
         return np.array(self.selection, np.int64)
 
     def selectable(self, numbers: ArrayLike) -> tuple[int, ...]:
-        """Return those of some numbers that belong to a decal whose layer is not locked."""
+        """Return the numbers of decals whose layer is not locked, and that lie on something that is shown."""
         document, given = self.session.document, np.asarray(numbers, np.int64)
         exist: Int64Array = given[document.decals.has(given)]
         locked = np.isin(document.decals.take(exist).layers, document.locked_layers)
-        return tuple(exist[~locked].tolist())
+        free = exist[~locked]
+        return tuple(free[on_shown_surfaces(document, free)].tolist())
 
     @property
     def primitive_is_subject(self) -> bool:
@@ -209,7 +211,7 @@ class ActionState:
             self.handle_offset = handle_offset
 
     def _drop_deleted(self, edit: Edit) -> None:
-        """Deselect decals that an edit deleted, and the primitive if its path leads elsewhere now."""
+        """Deselect decals that an edit deleted or hid, and the primitive if its path leads elsewhere now."""
         before, after = edit.parts_before.objects, edit.parts_after.objects
         if self.primitive is not None and before is not None:
             number = self.primitive[0]
@@ -218,6 +220,9 @@ class ActionState:
                 self.primitive = None
         exist = self.session.document.decals.has(np.array(self.selection, np.int64))
         self.selection = tuple(n for n, kept in zip(self.selection, exist, strict=True) if kept)
+        if self.selection and _hidden_paths(before) != _hidden_paths(after):
+            with suppress(NotCompiled):  # what is selected can be projected
+                self.selection = self.selectable(self.selection)
 
     # -- strokes ----------------------------------------------------------------------------------------
 
@@ -322,6 +327,10 @@ class ActionState:
                 self._slow_steps = self._slow_steps + 1 if time.thread_time() - began > SLOW_STEP else 0
         except ImplicitDecalsError as error:
             self.refuse(error)
+
+
+def _hidden_paths(objects: Sequence[SceneObject] | None) -> list[Paths]:
+    return [item.hidden for item in objects or ()]
 
 
 class WindowActions:

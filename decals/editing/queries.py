@@ -309,6 +309,18 @@ def facing_decals(
     return seen
 
 
+def on_shown_surfaces(document: Document, numbers: ArrayLike) -> BoolArray:
+    """Return True for each decal that reaches a surface which is not hidden."""
+    decals, objects = document.decals.take(numbers), document.shown_objects
+    if not len(decals) or not any(item.hidden for item in document.objects):
+        return np.ones(len(decals), np.bool_)
+    if not objects:
+        return np.zeros(len(decals), np.bool_)
+    nearest = nearest_points(objects, decals.positions)
+    reached: BoolArray = np.linalg.norm(nearest.positions - decals.positions, axis=1) < decals.radii
+    return reached
+
+
 ANGLES, RINGS = 48, 12
 """Directions in which an outline is sampled, and steps from the centre to the rim."""
 

@@ -177,9 +177,9 @@ def test_rows_are_hidden_locked_and_isolated(window: EditWindow) -> None:
     sandbox.select("layer 0")
     assert sandbox.values()["decal"]["count"] == 0  # locked
     sandbox.change_row("layer 0", "lock")
+    sandbox.change_row("0/1", "hide")
     sandbox.select("layer 0")
     assert sandbox.values()["decal"]["count"] == 20
-    sandbox.change_row("0/1", "hide")
     sandbox.change_row("0/0", "isolate")
     assert flags() == ["0/1"]
     sandbox.change_row("0/0", "isolate")

@@ -219,6 +219,31 @@ def test_keys_hide_isolate_lock_and_show(tmp_path: Path) -> None:
     goes_back_and_forth(session)
 
 
+def test_decals_on_hidden_parts_are_not_selected() -> None:
+    first, second = TreeObject("one", A + B), TreeObject("other", D)
+    session = EditSession(decals.cover([first, second], count=60, images=["eye"]))
+    actions, document = Actions(session), session.document
+    positions = document.decals.decals.positions
+    on_first, left = positions[:, 0] < 3.0, positions[:, 0] < -0.5
+    everything, on_one = (tuple(np.flatnonzero(rows).tolist()) for rows in (on_first | True, on_first))
+    actions.state.selection = everything
+    actions.visibility.isolate_node(0, ())
+    assert actions.state.selection == on_one
+    actions.perform("select_all", lambda: None)
+    assert actions.state.selection == on_one
+    actions.visibility.isolate_node(0, (0,))  # a part of a blend
+    kept = np.isin(np.arange(60), actions.state.selection)
+    assert kept[left].all()
+    assert not kept[positions[:, 0] > 1.6].any()
+    actions.perform("undo", lambda: None)
+    actions.perform("undo", lambda: None)
+    actions.perform("select_all", lambda: None)
+    assert actions.state.selection == everything
+    for number in (0, 1):
+        actions.visibility.flag_node("hidden", number, ())
+    assert actions.state.selection == ()
+
+
 @pytest.mark.parametrize("wrong", [((5,),), ((0, -1),), (0,), "x", ((0.5,),), 3, (("a",),)])
 def test_wrong_paths_are_refused(wrong: Any) -> None:
     with pytest.raises(InvalidScene, match="expected paths of its nodes"):
