@@ -32,6 +32,7 @@ from decals.editing.outline_actions import Part, image_on_layer
 from decals.editing.recovery import recovery_path
 from decals.editing.scatter_commands import AddObject
 from decals.editing.session import UndoEntry
+from decals.editing.tree_actions import FollowedNode
 from decals.errors import InvalidEdit
 from decals.options import arguments_of
 from decals.rendering.environment import Environment
@@ -126,7 +127,6 @@ class Sandbox:
         self._files.screenshot = lambda: window.plotter.screenshot(None, return_img=True)
         self._files.folder, self._files.show_view = self._folder, self.display.show_from
         self._setters: dict[str, Callable[[Any, Any, bool, object], None]] = {
-            "node": self._set_parameter,
             "display": lambda name, raw, _, index: self.display.set_option(name, raw, index),
             "decals": lambda name, raw, last, _: decal_panel.set_decal_value(
                 self._state, name, raw, last=last
@@ -239,6 +239,11 @@ class Sandbox:
             self._outlined = shown
         return self._rows
 
+    def _selected_label(self) -> str:
+        """Return the name of the selected node, else that of its class."""
+        panel = self._panel()
+        return str(panel["name"] or panel["kind"])
+
     def _panel(self) -> dict[str, Any]:
         """Return title and controls of the selected node."""
         if self._state.primitive is None:
@@ -314,17 +319,18 @@ class Sandbox:
         index
             Leads through lists to the number that is set.
         """
+        node = self._trees.follow_selected()  # a typed value may wait for an edit that selects another one
+        setters = self._setters | {"node": partial(self._set_parameter, node)}
 
         def step() -> None:
-            setter = self._setters[one_of("panel", panel, self._setters, InvalidEdit)]
-            setter(name, raw, bool(last), index)
+            setters[one_of("panel", panel, setters, InvalidEdit)](name, raw, bool(last), index)
 
         self.slide(step, last=bool(last))
 
-    def _set_parameter(self, name: str, raw: Any, last: bool, index: object) -> None:
-        node = self._trees.selected_node
+    def _set_parameter(self, followed: FollowedNode, name: str, raw: Any, last: bool, index: object) -> None:
+        _, _, node = followed.find(self._window.document)
         value = exchanged(getattr(node, str(name), ()), index, raw)
-        self._trees.set_parameter(name, parsed(node, name, value), last=last)
+        self._trees.set_parameter(followed, name, parsed(node, name, value), last=last)
 
     def _set_image(self, name: str, raw: Any, last: bool, _index: object) -> None:
         if (number := self._shown_image) is None:
@@ -391,7 +397,7 @@ class Sandbox:
             low, high = node.bounds
             return catalog.new_node(kind, (node,), size=float((high - low).max()))
 
-        self._trees.replace_node(wrapped)
+        self._trees.replace_node(wrapped, f"put {self._selected_label()} under {kind}")
 
     @event
     def combine(self, kind: str) -> None:
@@ -399,7 +405,7 @@ class Sandbox:
         node = self._trees.selected_node
         if len(node.children) < 2:
             raise InvalidEdit(f"select a node with two or more operands; a {type(node).__name__} has fewer")
-        self._trees.replace_node(lambda node: catalog.new_node(kind, node.children))
+        self._trees.replace_node(lambda node: catalog.new_node(kind, node.children), f"combine with {kind}")
 
     @event
     def unwrap(self) -> None:
@@ -409,7 +415,7 @@ class Sandbox:
             raise InvalidEdit(
                 f"select a node with one operand; a {type(node).__name__} has {len(node.children)}"
             )
-        self._trees.replace_node(lambda node: node.children[0])
+        self._trees.replace_node(lambda node: node.children[0], f"remove {self._selected_label()}")
 
     def show_help(self, shown: bool) -> None:
         """Show or hide the list of all actions."""

@@ -305,19 +305,35 @@ class ActionState:
 
     def run_step(self, command: Command, *, last: bool) -> None:
         """Carry out a step of a slider; steps with one label and selection are one undo entry."""
-        self.begin_series((command.label, self.selection), command.label)
-        self.run_latest(command)
+        series, long = (command.label, self.selection), takes_long(command)
+        self.run_in_series(series, command.label, step_of(command), long=long, last=last)
         if last:
             self.end_stroke()
+
+    def run_in_series(
+        self, series: tuple[str, object], label: str, step: Step, *, long: bool, last: bool
+    ) -> None:
+        """Carry out a step of a series as `run_latest_step` does.
+
+        The last one raises `Busy` if it has to wait, so `attempt` lets it follow the running edit.
+        """
+        if last and long and not self.background.following:
+            self.background.require_idle()  # before a stroke begins, which the running edit would notice
+        self.begin_series(series, label)
+        try:
+            self.run_latest_step(label, step, long=long, waits=last)
+        except Busy:
+            self.end_stroke()
+            raise
 
     def run_latest(self, command: Command) -> None:
         """Carry out a command of a drag; errors become the message."""
         self.run_latest_step(command.label, step_of(command), long=takes_long(command))
 
-    def run_latest_step(self, label: str, step: Step, *, long: bool) -> None:
+    def run_latest_step(self, label: str, step: Step, *, long: bool, waits: bool = False) -> None:
         """Carry out a step of a drag, in the background if it is long; errors become the message.
 
-        Two slow steps in a row count as long for the rest of the stroke.
+        Two slow steps in a row count as long for the rest of the stroke. ``waits`` raises `Busy`.
         """
         try:
             began = time.thread_time()
@@ -326,6 +342,8 @@ class ActionState:
             else:
                 self._slow_steps = self._slow_steps + 1 if time.thread_time() - began > SLOW_STEP else 0
         except ImplicitDecalsError as error:
+            if waits and isinstance(error, Busy):
+                raise
             self.refuse(error)
 
 

@@ -243,6 +243,7 @@ class Actions:
                 session.undo()
             while len(session.labels) < number and session.redo() is not None:
                 pass
+            self.state.show(f"history: after {session.labels[-1]}" if number else "history: at the start")
 
         self.when_idle(step)
 

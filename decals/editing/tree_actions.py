@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,11 @@ from blobtree._typing import Float32Array, Float64Array
 from blobtree.formulas.falloff import RIM
 from blobtree.nodes.paths import Path, node_at, node_in_world, primitive_at
 from blobtree.nodes.places import Place
-from blobtree.nodes.surgery import Join, dominant_primitive, join_of, path_of, world_space_path
+from blobtree.nodes.surgery import Join, dominant_primitive, join_of, path_of, paths_after, world_space_path
 from decals.editing.action_state import Cursor, WindowActions, require_pick
 from decals.editing.background import Step
 from decals.editing.decal_actions import TINTS
+from decals.editing.document import Document
 from decals.editing.gizmo import Handle, HandleDrag, Ray, handles_of, moved_point, snap_distance
 from decals.editing.key_bindings import Group
 from decals.editing.queries import SurfacePick
@@ -31,6 +33,7 @@ from decals.editing.tree_commands import (
     MoveBranch,
     MovePrimitive,
     PaintPrimitive,
+    PrimitiveCommand,
     RemovePrimitive,
     ReplaceNode,
     ResizePrimitive,
@@ -72,11 +75,42 @@ MAX_DECALS_IN_DRAG = 5_000
 """With more decals than this, dragging a primitive runs in the background."""
 
 
+@dataclass(eq=False)
+class FollowedNode:
+    """A node that is found again after edits of its tree.
+
+    Attributes
+    ----------
+    place
+        Index of its object, and its path in the object's tree; None for no node.
+    item
+        The object with that tree.
+    """
+
+    place: tuple[int, Path] | None
+    item: SceneObject | None
+
+    def find(self, document: Document) -> tuple[int, Path, Node]:
+        """Return the node's object, path and present state; raise `InvalidEdit` if it is not there."""
+        before = self.item
+        if self.place is None or not isinstance(before, TreeObject):
+            raise InvalidEdit("no node is selected; select one in the outline, or press M on the surface")
+        number, path = self.place
+        item = document.object(number)
+        if isinstance(item, TreeObject) and item.name == before.name:
+            for found in paths_after(before.tree, item.tree, [path]):
+                self.place, self.item = (number, found), item
+                return number, found, node_at(item.tree, found)
+        raise InvalidEdit("the node was removed or replaced meanwhile; select another one")
+
+
 class TreeActions(WindowActions):
     """Actions on the selected primitive, or on the primitive or object under the cursor."""
 
     _color_index = 0
     _handle_drag: tuple[HandleDrag, tuple[int, Path]] | None = None
+    _followed = FollowedNode(None, None)
+    _dragged_object: int | None = None
 
     # -- the selected primitive -------------------------------------------------------------------------
 
@@ -219,6 +253,14 @@ class TreeActions(WindowActions):
 
     def _drag_to(self, command: MovePrimitive | TransformPrimitive | SetParameter | DragSurface) -> None:
         """Replace the edit of the open stroke by that of a command."""
+        step, long = self._drag_step(command)
+        self._state.run_latest_step(command.label, step, long=long)
+
+    def _drag_step(
+        self, command: MovePrimitive | TransformPrimitive | SetParameter | DragSurface
+    ) -> tuple[Step, bool]:
+        """Return the step that replaces the edit of the open stroke, and True if it takes long."""
+        self._dragged_object = command.object
 
         def step(session: EditSession) -> str:
             session.revert_stroke()
@@ -226,13 +268,14 @@ class TreeActions(WindowActions):
             return command.label
 
         many = len(self._state.session.document.decals) > MAX_DECALS_IN_DRAG
-        self._state.run_latest_step(command.label, step, long=many or isinstance(command, DragSurface))
+        return step, many or isinstance(command, DragSurface)
 
     def end_drag(self) -> None:
         """End the drag; if the object has no visible surface left, the drag is reverted."""
-        state, self._handle_drag = self._state, None
-        if state.primitive is not None:
-            step = _surface_check(state.primitive[0])
+        state, number = self._state, self._dragged_object
+        self._handle_drag = self._dragged_object = None
+        if number is not None:
+            step = _surface_check(number)
             state.background.when_followed(
                 lambda: state.run_latest_step("drag", step, long=not state.background.busy_editing)
             )
@@ -243,10 +286,15 @@ class TreeActions(WindowActions):
     @property
     def selected_node(self) -> Node:
         """The node that is selected; `InvalidEdit` if none is."""
-        if self._state.primitive is None:
-            raise InvalidEdit("no node is selected; select one in the outline, or press M on the surface")
-        number, path = self._state.primitive
-        return node_at(self._tree(number), path)
+        return self.follow_selected().find(self._state.session.document)[2]
+
+    def follow_selected(self) -> FollowedNode:
+        """Return the selected node, if any, to be found after edits that select another one."""
+        selected, known = self._state.primitive, self._followed
+        item = None if selected is None else self._state.session.document.object(selected[0])
+        if known.place != selected or known.item is not item:
+            self._followed = FollowedNode(selected, item)
+        return self._followed
 
     def select_node(self, number: int, path: Path) -> None:
         """Select a node of an object's tree, with its handle on the side that the camera sees."""
@@ -255,25 +303,32 @@ class TreeActions(WindowActions):
         toward = unit_rows((np.asarray(eye) - (low + high) / 2)[None])[0]
         self._state.select_primitive(number, path, float((high - low).min()) / 2 * toward)
 
-    def set_parameter(self, name: str, value: Any, *, last: bool = True) -> None:
-        """Set a parameter of the selected node.
+    def set_parameter(self, node: FollowedNode, name: str, value: Any, *, last: bool = True) -> None:
+        """Set a parameter of a node.
 
         Parameters
         ----------
+        node
+            The node, which `follow_selected` returned.
         name
             Name of the parameter.
         value
             Its new value.
         last
             If False, more values of the same parameter follow, as from a slider: all are one undo entry.
+
+        Raises
+        ------
+        Busy
+            The last value has to wait for another edit.
         """
-        self.selected_node  # noqa: B018  # raises without a selected node
         state = self._state
-        assert state.primitive is not None
-        command = SetParameter(*state.primitive, name, value, quick=True)
+        number, path, _ = node.find(state.session.document)
+        command = SetParameter(number, path, name, value, quick=True)
         command.changed_node(state.session.document)  # raises before a stroke begins
-        state.begin_series(("set", (*state.primitive, name)), command.label)
-        self._drag_to(command)
+        step, long = self._drag_step(command)
+        series = "set", (number, path, name)
+        state.run_in_series(series, command.label, step, long=long, last=last)
         if last:
             self.end_drag()
 
@@ -293,25 +348,26 @@ class TreeActions(WindowActions):
             self._add_tree(kind.lower(), lambda: make(*_place_of_object(objects, *view)), middle)
             return
         number, path = state.primitive
-        tree = self._tree(number)
 
-        def command() -> tuple[StructureCommand, ...]:
+        def command(tree: Node) -> tuple[StructureCommand, ...]:
             node = make(*_place_on(node_in_world(tree, path)))
             return (AddPrimitive(number, world_space_path(tree, path), node),)
 
-        self._restructure_later(AddPrimitive.label, command, middle)
+        self._restructure_later(f"add {kind}", number, command, middle)
 
-    def replace_node(self, make: Callable[[Node], Node]) -> None:
+    def replace_node(self, make: Callable[[Node], Node], label: str) -> None:
         """Put what a function returns for the selected node in its place, and select it.
 
         The function runs in the background.
         """
-        node = self.selected_node
+        self.selected_node  # noqa: B018  # raises without a selected node
         assert self._state.primitive is not None
         number, path = self._state.primitive
-        self._restructure_later(
-            ReplaceNode.label, lambda: (ReplaceNode(number, path, make(node)),), np.zeros(3, np.float32)
-        )
+
+        def command(tree: Node) -> tuple[StructureCommand, ...]:
+            return (ReplaceNode(number, path, make(node_at(tree, path)), label),)
+
+        self._restructure_later(label, number, command, np.zeros(3, np.float32))
 
     def move_node(self, target: Path) -> None:
         """Move the selected node to another place in its tree, and keep it selected; see `MoveBranch`."""
@@ -449,15 +505,16 @@ class TreeActions(WindowActions):
 
     def _restructure(self, *commands: StructureCommand, handle_offset: Float32Array | None = None) -> None:
         """Carry out the first command that leaves a visible surface, and select its primitive."""
-        self._restructure_later(commands[0].label, lambda: commands, handle_offset)
+        self._restructure_later(commands[0].label, commands[0].object, lambda _: commands, handle_offset)
 
     def _restructure_later(
         self,
         label: str,
-        commands: Callable[[], tuple[StructureCommand, ...]],
+        number: int,
+        commands: Callable[[Node], tuple[StructureCommand, ...]],
         handle_offset: Float32Array | None,
     ) -> None:
-        """Do the same for what a function returns.
+        """Do the same for what a function returns for the tree of an object.
 
         The function may take long, and the edit builds a new surface, so both run in the background.
         """
@@ -465,15 +522,16 @@ class TreeActions(WindowActions):
 
         def step(session: EditSession) -> str:
             failure: Exception | None = None
-            for command in commands():
+            tree = PrimitiveCommand(number, ()).tree(session.document)
+            for command in commands(tree):
                 try:
-                    _, path = command.restructure(command.tree(session.document))
+                    _, path = command.restructure(tree)
                     session.do(command)
                 except ImplicitDecalsError as error:
                     failure = failure or error
                     continue
                 result[:] = [] if path is None else [(command.object, path)]
-                return command.message
+                return command.label
             assert failure is not None
             raise failure
 

@@ -411,12 +411,10 @@ def compute_restructured(document: Document, number: int, tree: Node) -> Edit:
 class StructureCommand(PrimitiveCommand):
     """Base of commands that change the structure of a tree."""
 
-    label: ClassVar[str]
-
     @property
-    def message(self) -> str:
-        """Result for the user, in plain words."""
-        return self.label
+    def label(self) -> str:
+        """What the command does."""
+        raise NotImplementedError  # every subclass has its own
 
     def restructure(self, tree: Node) -> tuple[Node, Path | None]:
         """Return the new tree, and the path of the command's node in it, if it still exists."""
@@ -452,7 +450,11 @@ class AddPrimitive(StructureCommand):
 
     node: Node
     join: Join | str = Join.BLEND
-    label: ClassVar[str] = "add a primitive"
+
+    @property
+    def label(self) -> str:
+        """The class of the new node."""
+        return f"add {type(self.node).__name__}"
 
     def restructure(self, tree: Node) -> tuple[Node, Path]:
         """Return the new tree, and the path of the new node."""
@@ -469,6 +471,8 @@ class ReplaceNode(StructureCommand):
     ----------
     node
         The new node, in the space of the old one.
+    label
+        Name of the undo entry.
 
     Examples
     --------
@@ -483,7 +487,7 @@ class ReplaceNode(StructureCommand):
     """
 
     node: Node
-    label: ClassVar[str] = "replace a node"
+    label: str = "replace a node"
 
     def restructure(self, tree: Node) -> tuple[Node, Path]:
         """Return the new tree, and the path of the new node."""
@@ -700,12 +704,11 @@ class JoinPrimitive(StructureCommand):
     """
 
     join: Join | str
-    label: ClassVar[str] = "join in another way"
 
     @property
-    def message(self) -> str:
-        """Result for the user, in plain words."""
-        return f"joined by {Join(self.join).value}"
+    def label(self) -> str:
+        """How the primitive is joined."""
+        return f"join by {self.join.value if isinstance(self.join, Join) else self.join}"
 
     def restructure(self, tree: Node) -> tuple[Node, Path]:
         """Return the new tree, and the path of the node in it."""

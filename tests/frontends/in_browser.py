@@ -175,7 +175,7 @@ async def sandbox(picture: str | None = None) -> None:
         await by_keys(browser)
         await browser.get_by_role("button", name="Add", exact=True).click()
         await browser.get_by_text("Torus", exact=True).click()
-        await until(lambda: window.session.labels[-1:] == ("add a primitive",))
+        await until(lambda: window.session.labels[-1:] == ("add Torus",))
         field = browser.get_by_role("textbox", name="ring radius")
         await field.fill("0.6")
         await field.press("Enter")
@@ -207,7 +207,7 @@ async def sandbox(picture: str | None = None) -> None:
         await until(lambda: not np.allclose(normal(), before))
         await browser.get_by_text("Start", exact=True).click()
         await until(lambda: digest(window.document) == state)
-        await until(lambda: window.session.undone_labels == (*slid, "add a primitive", "set ring_radius"))
+        await until(lambda: window.session.undone_labels == (*slid, "add Torus", "set ring_radius"))
         assert all("127.0.0.1" in url for url in requests)
     window.close()
 

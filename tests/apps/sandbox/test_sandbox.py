@@ -16,6 +16,7 @@ import decals
 from blobtree import Point, Torus, Twist, Union
 from decals.apps.sandbox.outline import outline
 from decals.apps.sandbox.sandbox import REST_SECONDS, Sandbox
+from decals.editing import tree_actions
 from decals.editing.action_state import SLOW_STEP
 from decals.editing.actions import KEYS
 from decals.editing.commands import ReplaceScene
@@ -337,13 +338,47 @@ def test_nodes_are_added_wrapped_and_combined_anew(window: EditWindow) -> None:
     finish(window)
     assert isinstance(tree_of(window.document), Union)
     assert shapes(window) == ["Union", "Point", "Point", "Torus"]
+    assert sandbox.values()["done"] == [
+        "add Torus",
+        "put Torus under Twist",
+        "remove Twist",
+        "combine with Union",
+    ]
     sandbox.go_to(1)
+    assert sandbox.status == "history: after add Torus"
     assert shapes(window) == ["Sum", "Point", "Point", "Torus"]
     sandbox.go_to(0)
+    assert sandbox.status == "history: at the start"
     assert digest(window.document) == before
     assert len(sandbox.values()["undone"]) == 4
     sandbox.go_to(4)
     assert shapes(window) == ["Union", "Point", "Point", "Torus"]
+
+
+@pytest.mark.parametrize("many", [0, 5000])
+def test_typed_values_follow_an_edit_that_selects_another_node(
+    window: EditWindow, monkeypatch: pytest.MonkeyPatch, many: int
+) -> None:
+    monkeypatch.setattr(tree_actions, "MAX_DECALS_IN_DRAG", many)
+    sandbox = Sandbox(window)
+    sandbox.select("0/1")
+    sandbox.wrap("Twist")
+    sandbox.set_control("node", "radius", "0.7")
+    sandbox.set_control("node", "center", "0.5", index=[1])
+    assert (window.actions.state.refusal, window.background.waiting) == ("", 0 if many else 2)
+    finish(window)
+    twist: Any = tree_of(window.document).children[1]
+    assert (type(twist), twist.child) == (Twist, Point((1.2, 0.5, 0), radius=0.7))
+    assert sandbox.values()["selected"] == "0/1"
+    assert window.session.labels[-2:] == (
+        ("set center", "put Point under Twist") if many else ("set radius", "set center")
+    )
+    sandbox.perform("delete")
+    sandbox.set_control("node", "degrees", "5")
+    finish(window)
+    assert shapes(window) == ["Point"]
+    if not many:
+        assert "removed or replaced" in sandbox.status
 
 
 def test_a_new_node_without_a_selection_is_an_object(vtk_display: None) -> None:

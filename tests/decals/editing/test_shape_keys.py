@@ -70,7 +70,7 @@ def test_the_ways_to_join_go_round_and_the_primitive_stays_held(user: UserInput)
         assert primitive_at(user.tree, user.held[1]) == ball
         seen.append(user.actions.state.message)
     words = ("soft union", "union", "intersection", "difference", "blend")
-    assert seen == [f"joined by {word}" for word in words]
+    assert seen == [f"join by {word}" for word in words]
     np.testing.assert_allclose(user.tree(points), before(points), atol=5e-6)
     assert len(user.session.labels) == 6
     undo_all(user)
@@ -81,14 +81,14 @@ def test_a_way_to_join_that_leaves_nothing_is_passed_over() -> None:
     actions = Actions(session)
     actions.state.primitive = (0, (1,))
     actions.perform("next_join", lambda: None)
-    assert actions.state.message == "joined by difference"  # what both have in common is nothing
+    assert actions.state.message == "join by difference"  # what both have in common is nothing
 
 
 def test_a_hole_is_held_by_its_tool(user: UserInput) -> None:
     tool = (1,)
     assert primitive_at(CARVED, tool) == Point((0, -0.9, 0.6), radius=0.5)
     user.actions.perform("next_join", lambda: user.tools.at(*user.pixel((0, -0.55, 0.85))))
-    assert user.actions.state.message == "joined by blend"
+    assert user.actions.state.message == "join by blend"
     assert primitive_at(user.tree, user.held[1]) == primitive_at(CARVED, tool)
 
 

@@ -57,7 +57,7 @@ def test_the_handle_of_what_is_new_drags_it(driver: Driver) -> None:
     grip.move()
     grip.end()
     driver.finish()
-    assert driver.session.labels == ("add a primitive", "move a primitive")
+    assert driver.session.labels == ("add Point", "move a primitive")
     np.testing.assert_allclose(driver.window.actions.trees.handle_position - before, (0.3, 0, 0), atol=0.1)
 
 
