@@ -11,6 +11,7 @@ from blobtree.cells.grid import BRANCHING, grid_from
 from blobtree.cells.refine_kernels import SURELY_OUTSIDE
 from blobtree.cells.sparse_cells import SparseCells, build_cells
 from blobtree.device import known_device
+from blobtree.lazy import Lazy
 from blobtree.sized_cache import sized_cache
 from blobtree.tape.instruction_set import InstructionSet
 from blobtree.tape.model import ImplicitModel
@@ -68,6 +69,17 @@ class TracingCells:
     def nbytes(self) -> int:
         """Bytes of the arrays."""
         return self.tape.nbytes + self.blocks.nbytes
+
+    @Lazy
+    def crossed_box(self) -> tuple[Float32Array, Float32Array] | None:
+        """Lower and upper corner (3,) of all blocks with a tape; None if there are none."""
+        crossed = self.blocks.reshape(self.counts) >= 0
+        if not crossed.any():
+            return None
+        ends = [np.flatnonzero(crossed.any(axis=others))[[0, -1]] for others in ((1, 2), (0, 2), (0, 1))]
+        low, high = np.transpose(ends)
+        low, high = self.lower + self.block_size * low, self.lower + self.block_size * (high + 1)
+        return low.astype(np.float32), high.astype(np.float32)
 
     def on(self, device: str) -> "DeviceCells":
         """Return the cells in the memory of a Warp device, as long as they are kept here."""
@@ -148,9 +160,10 @@ def _table(cells: SparseCells, first_texels: Int32Array, counts: IndexArray) -> 
         known = _refined(known, level.children.numpy())
     x, y, z = np.maximum(counts, 1)
     known = known[:x, :y, :z]
-    blocks = np.where(known >= 0, np.append(first_texels, 0)[known], known)
-    empty = known == SURELY_OUTSIDE
-    return np.where(empty, EMPTY - _layers(empty), blocks).astype(np.int32)
+    crossed, empty = known >= 0, known == SURELY_OUTSIDE
+    blocks = np.where(empty, EMPTY - _layers(empty), known)
+    blocks[crossed] = first_texels[known[crossed]]
+    return blocks
 
 
 def _refined(known: Int32Array, children: Int32Array) -> Int32Array:
@@ -169,14 +182,15 @@ def _refined(known: Int32Array, children: Int32Array) -> Int32Array:
 def _layers(empty: BoolArray) -> Int32Array:
     """Return the number of layers of empty blocks around each empty one (nx, ny, nz), MAX_LAYERS at most.
 
-    The blocks of a column are the bits of one word, 64 at most. Blocks beyond the grid are empty.
+    The blocks of a column are the bits of one word, 64 at most. Blocks beyond the grid are empty. The numbers
+    are counted as binary digits, each in words of its own.
     """
     columns = np.ones((*empty.shape[:2], BLOCKS_ALONG), np.bool_)
     columns[..., : empty.shape[2]] = empty
     words = np.packbits(columns, axis=2, bitorder="little").view("<u8")[..., 0]
     lowest, highest = np.uint64(1), np.uint64(1 << 63)
-    layers = np.zeros(empty.shape, np.uint8)
-    for _ in range(MAX_LAYERS):
+    digits = np.zeros((MAX_LAYERS.bit_length(), *words.shape), np.uint64)
+    for number in range(1, MAX_LAYERS + 1):
         words = words & ((words << lowest) | lowest) & ((words >> lowest) | highest)
         for axis in (0, 1):
             along = np.moveaxis(words, axis, 0)
@@ -186,6 +200,9 @@ def _layers(empty: BoolArray) -> Int32Array:
             words = np.moveaxis(eroded, 0, axis)
         if not words.any():
             break
-        bits = np.ascontiguousarray(words)[..., None].view(np.uint8)
-        layers += np.unpackbits(bits, axis=2, bitorder="little")[..., : empty.shape[2]]
-    return layers.astype(np.int32)
+        for place, digit in enumerate(digits):
+            digit[:] = digit | words if number >> place & 1 else digit & ~words
+    layers = np.zeros(columns.shape, np.uint8)
+    for digit in digits[::-1]:
+        layers += layers + np.unpackbits(digit[..., None].view(np.uint8), axis=2, bitorder="little")
+    return layers[..., : empty.shape[2]].astype(np.int32)

@@ -172,7 +172,7 @@ class DecalRows:
 
     def _uncount(self, rows: Int64Array) -> None:
         """Subtract the decals in these rows from the counts of ranks."""
-        self._rank_counts.subtract(self._ranks(rows[self._present[rows]]).tolist())
+        self._rank_counts.subtract(Counter(self._ranks(rows[self._present[rows]]).tolist()))
 
 
 def as_numbers(numbers: ArrayLike) -> Int64Array:

@@ -30,13 +30,7 @@ def box_around(objects: Iterable[SceneObject]) -> Box:
 
 def _tree_box(item: TreeObject) -> Box:
     """Return the box of all blocks with a tape, or of the field's support if there are none."""
-    cells = tracing_cells(item.tree)
-    crossed = np.argwhere(cells.blocks.reshape(cells.counts) >= 0)
-    if not len(crossed):
-        return item.tree.support
-    low = cells.lower + cells.block_size * crossed.min(axis=0)
-    high = cells.lower + cells.block_size * (crossed.max(axis=0) + 1)
-    return low.astype(np.float32), high.astype(np.float32)
+    return tracing_cells(item.tree).crossed_box or item.tree.support
 
 
 NAME = "plotter.decals"
