@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.kernels import loaded
 from blobtree.progress import reporting
+from blobtree.validation import items
 from decals.field.mapping import ImageMapping
 from decals.field.walk import (
     CELLS,
@@ -37,7 +38,7 @@ from decals.field.walk_kernels import (
 from decals.index.editor import RECORDS, DecalEditor
 from decals.model import Decals
 from decals.record import RECORD, RIM_RADIUS
-from decals.surfaces.convert import as_surface
+from decals.surfaces.convert import as_surface, is_model, is_surface
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 
@@ -89,7 +90,7 @@ class Walks:
     def over(
         cls,
         decals: Decals | DecalEditor,
-        models: Iterable[Any],
+        models: Any,
         *,
         previous: "Walks | None" = None,
         only: ArrayLike | None = None,
@@ -103,7 +104,7 @@ class Walks:
         ----------
         decals : Decals or DecalEditor
             The decals.
-        models : sequence of models
+        models : model or sequence of models
             Objects of a scene, meshes, BlobTrees or surfaces.
         previous : Walks, optional
             Earlier walks, of which those of decals and surfaces that have not changed are kept.
@@ -121,7 +122,10 @@ class Walks:
         >>> (0.6 * (seen.uv - 0.5)).round(3).tolist()
         [[0.2..., 0.1...]]
         """
-        return cls.of_rows(walk_rows(decals), models, previous=previous, only=only)
+        single = is_model(models) or is_surface(getattr(models, "surface", None))
+        members = None if single else items(models)
+        several = (models,) if members is None else members
+        return cls.of_rows(walk_rows(decals), several, previous=previous, only=only)
 
     @classmethod
     def of_rows(

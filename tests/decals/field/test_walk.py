@@ -7,13 +7,14 @@ import pytest
 import pyvista as pv
 
 from blobtree import HalfSpace, Intersection, Point
-from decals.errors import InvalidScene
+from decals.errors import InvalidMesh, InvalidScene
 from decals.field.evaluate import evaluate
 from decals.field.mapping import ImageMapping
 from decals.field.walk import CELLS, GRID, NONE, NOWHERE, RELAY, RELAYS
 from decals.field.walks import Walks
 from decals.index.editor import DecalEditor
 from decals.model import Decals
+from decals.scenes.objects import MeshObject
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.topology import edge_twins
@@ -114,6 +115,21 @@ def test_decals_that_the_corrected_mapping_draws_correctly_get_no_relays() -> No
     points = log_maps.unit(rng.normal(size=(500, 3)))
     walked = evaluate(decals, points, points, mapping="walked", walks=walks, device="cpu")
     assert walked.uv == pytest.approx(evaluate(decals, points, points, device="cpu").uv, abs=1e-6)
+
+
+def test_one_model_stands_for_a_sequence_of_one() -> None:
+    cube = pv.Cube()
+    decals = Decals([[0.4, 0, 0.5]], [[0, 0, 1]], [[1, 0, 0]], [0.3])
+    several = Walks.over(decals, [cube]).texels
+    assert len(several) == 1 + GRID
+    mesh = cube.triangulate()
+    pair = np.asarray(mesh.points), mesh.regular_faces
+    for one in (cube, MeshSurface(*pair), MeshObject("cube", *pair), pair, iter([cube])):
+        np.testing.assert_array_equal(Walks.over(decals, one).texels, several)
+    wrong: Any
+    for wrong in (5, None, [5], MeshSurface):
+        with pytest.raises(InvalidMesh, match="surface: expected a model, got"):
+            Walks.over(decals, wrong)
 
 
 def test_walks_fade_into_the_corrected_mapping_where_they_do_not_lead() -> None:
