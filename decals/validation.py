@@ -53,14 +53,19 @@ def instance(name: str, value: object, kind: type[T], error: type[ImplicitDecals
     return value
 
 
-def member(name: str, value: Any, kind: type[E], error: type[ImplicitDecalsError]) -> E:
-    """Return a member of an enumeration, which may be given by its value, or by its name in any case."""
-    words = {one: one.value if isinstance(one.value, str) else one.name.lower() for one in kind}
+def member(
+    name: str, value: Any, kind: type[E], error: type[ImplicitDecalsError], among: Collection[E] = ()
+) -> E:
+    """Return a member of an enumeration, which may be given by its value, or by its name in any case.
+
+    With ``among``, only these members are accepted.
+    """
+    words = {one: one.value if isinstance(one.value, str) else one.name.lower() for one in among or kind}
     if isinstance(value, str):
         for one, word in words.items():
             if value.strip().lower() in (word, one.name.lower()):
                 return one
-    if isinstance(value, kind):
+    if isinstance(value, kind) and value in words:
         return value
     choices = ", ".join(map(repr, words.values()))
     raise error(f"{name}: expected one of {choices}, got {describe(value)}")

@@ -269,9 +269,7 @@ def define_contact(
     >>> decals.evaluate(pair, [[-0.1, 0, 0]], [[0, 0, 1]], contact=law).field.round(2)
     array([0.76], dtype=float32)
     """
-    base = member("combine", combine, Contact, InvalidScene)
-    if base not in (Contact.PRODUCT, Contact.MIN):
-        raise InvalidScene(f"combine: expected 'product' or 'min', got {base.name.lower()!r}")
+    base = member("combine", combine, Contact, InvalidScene, (Contact.PRODUCT, Contact.MIN))
     if isinstance(field, str) and field not in FALLOFF_NAMES:
         raise InvalidDefinition(
             f"field: expected a typed function or one of {', '.join(FALLOFF_NAMES)}, got {field!r}"

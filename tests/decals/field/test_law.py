@@ -215,8 +215,7 @@ def test_a_field_may_end_inside_the_reach_of_its_neighbours() -> None:
     assert define_contact(short).rim == pytest.approx(0.5, abs=1e-6)
 
 
-def test_only_product_and_min_combine() -> None:
-    with pytest.raises(
-        decals.errors.InvalidScene, match="combine: expected 'product' or 'min', got 'radial'"
-    ):
-        define_contact(cosine_bump, combine="radial")
+@pytest.mark.parametrize("wrong", ["radial", decals.Contact.ELASTIC, "sum", None])
+def test_only_product_and_min_combine(wrong: Any) -> None:
+    with pytest.raises(decals.errors.InvalidScene, match="combine: expected one of 'product', 'min', got"):
+        define_contact(cosine_bump, combine=wrong)
