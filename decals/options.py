@@ -19,7 +19,7 @@ from blobtree.colors import Rgb, Rgba, color_rgb
 from blobtree.nodes.parameters import with_parameters
 from blobtree.validation import truth
 from decals.errors import InvalidInput
-from decals.validation import finite_number, member, one_of
+from decals.validation import member, number_of, one_of
 
 Source = Callable[..., Any]
 """A function, or a class whose fields are options."""
@@ -92,16 +92,8 @@ class Option:
             return truth(self.name, raw, error)
         if self.kind in (Rgb, Rgba):
             return color_rgb(self.name, raw, error)
-        number = finite_number(self.name, _number(raw), error)
+        number = number_of(self.name, raw, error)
         return round(number) if self.kind is int else number
-
-
-def _number(raw: Any) -> Any:
-    """Return the number of a text; other values as they are."""
-    try:
-        return float(raw) if isinstance(raw, str) else raw
-    except ValueError:
-        return raw
 
 
 def _is_enum(kind: Any) -> bool:

@@ -4,6 +4,7 @@ import math
 import os
 import tempfile
 from collections.abc import Callable, Collection
+from contextlib import suppress
 from enum import Enum, IntEnum
 from importlib import import_module
 from pathlib import Path
@@ -97,6 +98,13 @@ def whole_number(name: str, value: Any, low: int, high: int | None, error: type[
 def finite_number(name: str, value: Any, error: type[ImplicitDecalsError]) -> float:
     """Return a finite number as a float."""
     return real_number(name, value, "a finite number", math.isfinite, error)
+
+
+def number_of(name: str, value: Any, error: type[ImplicitDecalsError]) -> float:
+    """Return a finite number that a form sent, as a number or as text."""
+    with suppress(ValueError):
+        value = float(value) if isinstance(value, str) else value
+    return finite_number(name, value, error)
 
 
 def real_number(

@@ -21,14 +21,16 @@ import numpy as np
 
 from blobtree.nodes.parameters import parameters_of
 from decals.apps.lab.errors import InvalidLesson
-from decals.apps.sandbox.controls import exchanged, number_of
+from decals.apps.sandbox.controls import exchanged
 from decals.editing.commands import MoveDecals, SetValues
 from decals.editing.document import Document
 from decals.editing.queries import nearest_points
 from decals.editing.session import Command
 from decals.editing.tree_commands import SetParameter
+from decals.errors import InvalidEdit
 from decals.model import Decals, Interaction
 from decals.scenes.objects import SceneObject, TreeObject
+from decals.validation import number_of
 
 AXES = "xyz"
 COLUMNS = {"radius": "radii", "opacity": "opacities", "layer": "layers", "interaction": "interactions"}
@@ -68,11 +70,11 @@ class DecalPath:
         """Return the command that sets a value."""
         chosen = [numbers[row] for row in self.rows(len(numbers))]
         if self.name not in AXES:
-            value = value if self.name == "interaction" else number_of(self.name, value)
+            value = value if self.name == "interaction" else number_of(self.name, value, InvalidEdit)
             value = round(value) if self.name == "layer" else value
             return SetValues(chosen, {COLUMNS[self.name]: value}, f"set {self.name}")
         place = document.decals.take(np.array(chosen[:1])).positions.astype(np.float64)
-        place[0, AXES.index(self.name)] = number_of(self.name, value)
+        place[0, AXES.index(self.name)] = number_of(self.name, value, InvalidEdit)
         point = nearest_points(document.objects, place)
         return MoveDecals(chosen[:1], point.positions[0], point.normals[0])
 
@@ -109,7 +111,8 @@ class NodePath:
     def command(self, document: Document, numbers: Sequence[int], value: Any) -> Command:
         """Return the command that sets a value."""
         self.read(document.objects, document.decals.decals)
-        value = exchanged(self._parameter(document.objects), list(self.index), number_of(self.name, value))
+        number, parameter = number_of(self.name, value, InvalidEdit), self._parameter(document.objects)
+        value = exchanged(parameter, list(self.index), number)
         return SetParameter(self.object, self.path, self.name, value, quick=True)
 
 

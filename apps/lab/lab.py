@@ -19,12 +19,12 @@ from decals.apps.lab.experiment import Experiment, Scope
 from decals.apps.lab.lesson import Lesson, Slider
 from decals.apps.lab.plots import drawn
 from decals.apps.lab.relaxing import Recording
-from decals.apps.sandbox.controls import STEPS, Control, exchanged, number_of
+from decals.apps.sandbox.controls import STEPS, Control, exchanged
 from decals.apps.sandbox.decal_panel import set_drawing
 from decals.editing.commands import ReplaceScene, SetValues
 from decals.editing.queries import move_decals
 from decals.errors import ImplicitDecalsError, InvalidEdit
-from decals.validation import whole_number
+from decals.validation import number_of, whole_number
 from decals.vtk.component import show_camera
 from decals.window import EditWindow
 
@@ -232,17 +232,17 @@ class Lab:
         sliders, state = self.lesson.settings.sliders, self._window.actions.state
         path = sliders[whole_number("slider", number, 0, len(sliders) - 1, InvalidEdit)].path
         if path.startswith("probe."):
-            x, y, z = exchanged(self._probe, [AXES.index(path[-1])], number_of(path, raw))
+            x, y, z = exchanged(self._probe, [AXES.index(path[-1])], number_of(path, raw, InvalidEdit))
             self._probe = x, y, z
             self._mark_probe()
         elif path in MODES:
             set_drawing(state, path, raw, last=last)
         elif path in ("step", "seed") and self._recording is not None:
+            number = round(max(number_of(path, raw, InvalidEdit), 0.0))
             if path == "seed":
-                self._recording = self._recorded(round(max(number_of(path, raw), 0.0)))
-                self._step = -1
+                self._recording, self._step = self._recorded(number), -1
             else:
-                self._target = round(min(max(number_of(path, raw), 0.0), self._recording.iterations))
+                self._target = min(number, self._recording.iterations)
         else:
             command = binding(path).command(self._window.document, self.numbers, raw)
             state.run_step(command, last=last)

@@ -1,7 +1,6 @@
 """Controls of a panel, from the parameters that classes of nodes declare."""
 
 import re
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
 from math import isfinite
@@ -16,7 +15,7 @@ from blobtree.transpile.python import plain_python
 from decals.errors import InvalidEdit
 from decals.options import Option, options_of
 from decals.validation import describe as described
-from decals.validation import finite_number, one_of
+from decals.validation import number_of, one_of
 
 SLIDER_REACH = 4.0
 """Largest value of a slider for a number without unit and range, over the present value or 1."""
@@ -198,20 +197,13 @@ def parsed(node: Node, name: str, raw: Any) -> Any:
     if parameter.quantity in (Quantity.COLOR, Quantity.FALLOFF, Quantity.CHOICE):
         return raw
 
-    def number(part: Any) -> float:
-        given = number_of(name, part)
-        return round(given) if parameter.whole else given
+    def numbers(part: Any) -> Any:
+        if isinstance(part, list | tuple):
+            return tuple(map(numbers, part))
+        number = number_of(name, part, InvalidEdit)
+        return round(number) if parameter.whole else number
 
-    if isinstance(raw, list | tuple):
-        return tuple(tuple(map(number, row)) if isinstance(row, list | tuple) else number(row) for row in raw)
-    return number(raw)
-
-
-def number_of(name: str, raw: Any) -> float:
-    """Return the finite number that a page sent, as a number or as text, or raise `InvalidEdit`."""
-    with suppress(ValueError):
-        raw = float(raw) if isinstance(raw, str) else raw
-    return finite_number(name, raw, InvalidEdit)
+    return numbers(raw)
 
 
 def exchanged(value: Any, index: object, raw: Any) -> Any:

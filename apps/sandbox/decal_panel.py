@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from decals.apps.sandbox.controls import STEPS, Control, number_of, option_control, parsed_option
+from decals.apps.sandbox.controls import STEPS, Control, option_control, parsed_option
 from decals.apps.sandbox.outline import picture
 from decals.editing.action_state import ActionState
 from decals.editing.brushes import Brush, BrushSettings, default_decal_radius, default_radius, positive_number
 from decals.editing.commands import ReplaceImage, SetValues
+from decals.editing.decal_actions import FIRST_DECAL_COUNT
 from decals.editing.document import Document
 from decals.errors import InvalidEdit
 from decals.model import FADE_ANGLES, FADE_DEPTHS, NO_IMAGE, Decals
@@ -21,7 +22,7 @@ from decals.scattering.scatter import scatter
 from decals.scenes.material import DecalMaterial
 from decals.scenes.objects import bounds_of
 from decals.scenes.scene import DecalImage
-from decals.validation import describe, one_of
+from decals.validation import describe, number_of, one_of
 
 PLAIN = "tint alone"
 """Choice of an image that stands for none."""
@@ -105,14 +106,14 @@ def parsed_decal_value(document: Document, name: str, raw: Any) -> Any:
             return "" if raw == ANY_OBJECT else raw
         case "fade_angle" | "fade_depth":
             least = (FADE_ANGLES if name == "fade_angle" else FADE_DEPTHS)[0]
-            number = number_of(name, raw)
+            number = number_of(name, raw, InvalidEdit)
             return 0.0 if 0.0 <= number < least else number
         case str() if name in COLUMNS:
             return replace(options_of(Decals)[COLUMNS[name]], name=name).parsed(raw, InvalidEdit)
     raise InvalidEdit(f"value of decals: expected one of {', '.join(COLUMNS)}, got {describe(name)}")
 
 
-def set_decal_value(state: ActionState, name: str, raw: Any, *, last: bool) -> None:
+def set_decal_value(state: ActionState, name: str, raw: Any, *, last: bool, **_others: object) -> None:
     """Set a value of all selected decals; moves of a slider are one undo entry."""
     numbers = state.selected_numbers
     value = parsed_decal_value(state.session.document, name, raw)
@@ -128,21 +129,19 @@ def brush_values(document: Document, brush: BrushSettings) -> dict[str, Any]:
         return {"brush": str(brush.brush), "controls": []}
     usual = default_radius(document) if document.objects else 1.0
     decal = brush.decal_radius or (default_decal_radius(document) if document.objects else 0.1)
-    shown = {"radius": (brush.radius or usual, usual / STEPS, 4.0 * usual)}
+    shown: dict[str, tuple[float, ...]] = {"radius": (brush.radius or usual, usual / STEPS, 4.0 * usual)}
     if brush.brush is Brush.SCATTER:
-        shown |= {"decal_radius": (decal, usual / STEPS, usual), "density": (brush.density, 0.05, 1.0)}
+        shown |= {"decal_radius": (decal, usual / STEPS, usual), "density": (brush.density,)}
     options = options_of(BrushSettings)
     controls = [option_control(options[name], *values) for name, values in shown.items()]
     return {"brush": str(brush.brush), "controls": controls}
 
 
-def set_brush(brush: BrushSettings, name: str, raw: Any) -> None:
+def set_brush(brush: BrushSettings, name: str, raw: Any, **_others: object) -> None:
     """Set the brush, or one of its numbers, to what a page sent."""
     value = parsed_option(BrushSettings, name, raw)
     if name != "brush":
         positive_number(name, value)
-    if name == "density" and value > 1.0:
-        raise InvalidEdit(f"density: expected at most 1, got {value:g}")
     setattr(brush, name, value)
 
 
@@ -155,7 +154,7 @@ def drawing_controls(drawing: Drawing) -> list[dict[str, Any]]:
     return [option_control(options[name], value) for name, value in values_of(Drawing, drawing).items()]
 
 
-def set_drawing(state: ActionState, name: str, raw: Any, *, last: bool) -> None:
+def set_drawing(state: ActionState, name: str, raw: Any, *, last: bool, **_others: object) -> None:
     """Set an option of how the scene is drawn; moves of a slider are one undo entry."""
     drawing = state.session.document.drawing
     one_of("option", name, values_of(Drawing, drawing), InvalidEdit)
@@ -165,15 +164,11 @@ def set_drawing(state: ActionState, name: str, raw: Any, *, last: bool) -> None:
     state.draw_with(f"set {name}", last=last, **{whole: value})
 
 
-FIRST_COUNT = 100
-"""Decals that are scattered over a scene without any."""
-
-
 def first_scatter_values(count: int) -> dict[str, Any]:
     """Return the options of `decals.scatter` at the beginning, for a scene with a number of decals."""
     options = options_of(scatter).values()
     first = {o.name: o.default for o in options if o.name not in NOT_OF_SCATTER}
-    return first | {"count": count or FIRST_COUNT}
+    return first | {"count": count or FIRST_DECAL_COUNT}
 
 
 def scatter_controls(values: dict[str, Any]) -> list[dict[str, Any]]:

@@ -8,7 +8,7 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
 
-from decals.apps.sandbox.controls import STEPS, Control, exchanged, number_of
+from decals.apps.sandbox.controls import STEPS, Control, exchanged
 from decals.apps.sandbox.cube import cube_cells
 from decals.apps.sandbox.decal_panel import brush_values
 from decals.editing.background import Job, Worker
@@ -22,7 +22,7 @@ from decals.scenes.camera import UPRIGHT, Camera
 from decals.scenes.meshes import as_polydata, meshed
 from decals.scenes.objects import SceneObject, TreeObject, bounds_of
 from decals.surfaces.surface import unit_rows
-from decals.validation import finite_number, one_of, whole_number
+from decals.validation import finite_number, number_of, one_of, whole_number
 from decals.vtk.subplot import FrameStatus
 from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of, ray_through
@@ -168,7 +168,7 @@ class Display:
         yield parallel, lambda on: setattr(camera, "parallel", on)
         yield Control("axes", "switch", self._axes, "show the axes"), self._show_axes
 
-    def set_option(self, name: str, value: Any, index: object = ()) -> None:
+    def set_option(self, name: str, value: Any, index: object = (), **_others: object) -> None:
         """Set a control of the view; ``index`` holds that of the number of the normal.
 
         Raises
@@ -186,7 +186,7 @@ class Display:
             case "vector" if not index:
                 take(value)
             case _:
-                take(exchanged(control.value, index, number_of(name, value)))
+                take(exchanged(control.value, index, number_of(name, value, InvalidEdit)))
 
     def _set_snap(self, distance: float) -> None:
         if distance < 0.0:

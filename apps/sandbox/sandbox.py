@@ -126,14 +126,12 @@ class Sandbox:
         window.redraw(whole=True)
         self._files.screenshot = lambda: window.plotter.screenshot(None, return_img=True)
         self._files.folder, self._files.show_view = self._folder, self.display.show_from
-        self._setters: dict[str, Callable[[Any, Any, bool, object], None]] = {
-            "display": lambda name, raw, _, index: self.display.set_option(name, raw, index),
-            "decals": lambda name, raw, last, _: decal_panel.set_decal_value(
-                self._state, name, raw, last=last
-            ),
-            "brush": lambda name, raw, *_: decal_panel.set_brush(self._state.brush, name, raw),
+        self._setters: dict[str, Callable[..., None]] = {
+            "display": self.display.set_option,
+            "decals": partial(decal_panel.set_decal_value, self._state),
+            "brush": partial(decal_panel.set_brush, self._state.brush),
             "image": self._set_image,
-            "drawing": lambda name, raw, last, _: decal_panel.set_drawing(self._state, name, raw, last=last),
+            "drawing": partial(decal_panel.set_drawing, self._state),
             "scattering": self._set_scattering,
         }
         self._lessons, self._start_lesson = list(lessons), start_lesson
@@ -323,21 +321,24 @@ class Sandbox:
         setters = self._setters | {"node": partial(self._set_parameter, node)}
 
         def step() -> None:
-            setters[one_of("panel", panel, setters, InvalidEdit)](name, raw, bool(last), index)
+            setter = setters[one_of("panel", panel, setters, InvalidEdit)]
+            setter(name, raw, last=bool(last), index=index)
 
         self.slide(step, last=bool(last))
 
-    def _set_parameter(self, followed: FollowedNode, name: str, raw: Any, last: bool, index: object) -> None:
+    def _set_parameter(
+        self, followed: FollowedNode, name: str, raw: Any, *, last: bool, index: object
+    ) -> None:
         _, _, node = followed.find(self._window.document)
         value = exchanged(getattr(node, str(name), ()), index, raw)
         self._trees.set_parameter(followed, name, parsed(node, name, value), last=last)
 
-    def _set_image(self, name: str, raw: Any, last: bool, _index: object) -> None:
+    def _set_image(self, name: str, raw: Any, *, last: bool, **_others: object) -> None:
         if (number := self._shown_image) is None:
             raise InvalidEdit("no image is selected; click on one in the outline")
         decal_panel.set_image_value(self._state, number, name, raw, last=last)
 
-    def _set_scattering(self, name: str, raw: Any, _last: bool, _index: object) -> None:
+    def _set_scattering(self, name: str, raw: Any, **_others: object) -> None:
         one_of("option", name, self._scatter_values(), InvalidEdit)
         self._scattering[name] = parsed_option(scatter, name, raw)
         self._state.show(f"set {name}")

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,7 @@ from decals.editing.scatter_commands import SPACING, RelaxDecals
 from decals.editing.session import Command
 from decals.errors import InvalidEdit
 from decals.model import NO_IMAGE, Decals
+from decals.options import Values
 from decals.scattering.orientation import tangents
 from decals.scenes.objects import bounds_of
 from decals.validation import describe, finite_number, finite_vector, whole_number
@@ -29,6 +30,9 @@ CANDIDATES = 30
 
 STEEP = 0.2
 """Cosine of the angle between a stroke and a surface beyond which the align brush skips a decal."""
+
+LEAST_DENSITY = 0.05
+"""Low end of the slider of the density."""
 
 MAX_NEW_DECALS = 400
 """Decals that one touch of the scatter brush adds, at most."""
@@ -76,7 +80,7 @@ class BrushSettings:
     brush: Brush = Brush.SELECT
     radius: float = 0.0
     decal_radius: float = 0.0
-    density: float = 1.0
+    density: Annotated[float, Values(LEAST_DENSITY, 1.0)] = 1.0
     images: tuple[int, ...] = ()
     seed: int = 0
 
@@ -95,10 +99,10 @@ def decals_within(document: Document, point: ArrayLike, radius: float) -> Int64A
 
 
 def positive_number(name: str, value: float) -> float:
-    """Return a number above 0 of a usable size, or raise `InvalidEdit`."""
-    number = finite_number(name, value, InvalidEdit)
-    if not SMALLEST_NUMBER <= number <= LARGEST_NUMBER:
-        raise InvalidEdit(f"{name}: expected a number above 0, at most {LARGEST_NUMBER:g}, got {number:g}")
+    """Return a number of a brush, above 0 and of a usable size, or raise `InvalidEdit`."""
+    number, most = finite_number(name, value, InvalidEdit), 1.0 if name == "density" else LARGEST_NUMBER
+    if not SMALLEST_NUMBER <= number <= most:
+        raise InvalidEdit(f"{name}: expected a number above 0, at most {most:g}, got {number:g}")
     return number
 
 
@@ -148,8 +152,6 @@ class BrushDecals:
         reach = positive_number("radius", self.radius)
         decal_radius = positive_number("decal radius", self.decal_radius)
         density = positive_number("density", self.density)
-        if density > 1.0:
-            raise InvalidEdit(f"density: expected a number above 0 and at most 1, got {density:g}")
         if not isinstance(self.images, tuple | list):
             raise InvalidEdit(
                 f"images: expected indices of images, such as (0, 2), got {describe(self.images)}"

@@ -48,7 +48,7 @@ from decals.errors import ImplicitDecalsError, InvalidEdit, InvalidImage, Invali
 from decals.scenes.camera import Camera
 from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.scene import DecalImage, Scene
-from decals.validation import finite_number, finite_vector, whole_number
+from decals.validation import finite_number, finite_vector, number_of, whole_number
 from tests.decals.editing.scenes import TREE, digest, one, scene
 
 RIVET = DecalImage.load("rivet")
@@ -216,12 +216,21 @@ def test_a_camera_to_save_is_one(tmp_path: Path) -> None:
 def test_checks_give_what_fits_or_say_what_came(value: Any) -> None:
     fits = type(value) in (int, float) and abs(value) <= sys.float_info.max
     checked(finite_number, value, fits)
+    if not isinstance(value, str):
+        checked(number_of, value, fits)
     checked(
         lambda name, number, error: whole_number(name, number, -3, 3, error),
         value,
         type(value) is int and -3 <= value <= 3,
     )
     checked(finite_vector, value, isinstance(value, list) and len(value) == 3 and np.isfinite(value).all())
+
+
+@pytest.mark.parametrize("text", ["", " ", "x", "nan", "-inf", "1e999", "1,5", "٣x"])
+def test_a_form_sends_numbers_as_text(text: str) -> None:
+    assert number_of("it", " -1.5e2 ", InvalidEdit) == -150.0
+    with pytest.raises(InvalidEdit, match="it: expected a finite number, got"):
+        number_of("it", text, InvalidEdit)
 
 
 def checked(check: Any, value: Any, fits: Any) -> None:
