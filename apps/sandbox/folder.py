@@ -8,6 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 from decals import DecalImage, Scene, load_model
+from decals.apps.models.samples import sample_mesh
 from decals.editing.recovery import SUFFIX, in_use
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.images import read_image
@@ -92,7 +93,9 @@ def read_upload(file: object) -> Scene | SceneObject | DecalImage:
         path = Path(folder) / f"{plain_name(name)}{suffix}"
         path.write_bytes(content)
         try:
-            return DecalImage(path.stem, read_image(path)) if suffix in IMAGES else load_model(path)
+            if suffix in IMAGES:
+                return DecalImage(path.stem, read_image(path))
+            return load_model(path, samples=sample_mesh)
         except ImplicitDecalsError as error:
             raise InvalidEdit(str(error).replace(f"{folder}{os.sep}", "")) from error
 

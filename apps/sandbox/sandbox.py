@@ -13,13 +13,11 @@ from functools import partial, wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
-import numpy as np
-
 from blobtree import Node
 from blobtree.custom.definition import custom_kinds
 from blobtree.progress import Cancel, Progress
 from decals import cover
-from decals.apps.models.samples import SAMPLES, axes_of, sample
+from decals.apps.models.samples import SAMPLES, axes_of, sample, sample_mesh
 from decals.apps.models.scenes import empty_scene, new_file
 from decals.apps.sandbox import catalog, decal_panel
 from decals.apps.sandbox.controls import controls_of, exchanged, parsed, parsed_option
@@ -37,9 +35,9 @@ from decals.errors import InvalidEdit
 from decals.options import arguments_of
 from decals.rendering.environment import Environment
 from decals.scattering.scatter import scatter
-from decals.scenes.camera import UPRIGHT, Camera
+from decals.scenes.camera import DEFAULT_DIRECTION, UPRIGHT
 from decals.scenes.cover import fitting_camera
-from decals.scenes.files import is_scene_file, load_model
+from decals.scenes.files import is_scene_file, load_model, load_scene
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject, bounds_of, unused_name
 from decals.scenes.scene import DecalImage, Scene
 from decals.validation import describe, finite_number, one_of, whole_number
@@ -480,13 +478,13 @@ class Sandbox:
     def open_sample(self, name: str) -> None:
         """Open a sample with scattered decals."""
         one_of("sample", name, SAMPLES, InvalidEdit)
-
-        direction, size = axes_of(name).preset(THREE_QUARTER), self._window.plotter.window_size
+        axes, (width, height) = axes_of(name), self._window.plotter.window_size
+        toward = axes.preset(THREE_QUARTER)
 
         def load(progress: Progress, _cancel: Cancel) -> Scene:
-            return _fitted(
-                cover(sample(name), images=FIRST_IMAGES, view_direction=direction, progress=progress), size
-            )
+            scene = cover(sample(name), images=FIRST_IMAGES, view_direction=toward, progress=progress)
+            camera = fitting_camera(scene.objects, direction=toward, up=axes.up, aspect=width / height)
+            return scene.replace(camera=camera)
 
         self._open(load, f"{name}-decals")
 
@@ -503,10 +501,13 @@ class Sandbox:
         def load(_progress: Progress, _cancel: Cancel) -> Scene:
             if not path.exists():  # the recovery file has everything
                 return empty_scene(FIRST_IMAGES, UPRIGHT["y"])
-            found = load_model(path)
-            return found if isinstance(found, Scene) else _fitted(_bare_scene(found), size)
+            found = load_model(path, samples=sample_mesh)
+            if isinstance(found, Scene):
+                return found
+            camera = fitting_camera([found], direction=DEFAULT_DIRECTION, aspect=width / height)
+            return Scene(objects=[found], camera=camera, images=FIRST_IMAGES)
 
-        size = self._window.plotter.window_size
+        width, height = self._window.plotter.window_size
         is_scene = path.suffix == ".json" and (not path.exists() or is_scene_file(path))
         self._open(load, path if is_scene else f"{path.stem}-decals")
 
@@ -590,7 +591,8 @@ class Sandbox:
     def _open(self, load: Callable[[Progress, Cancel], Scene], path: Path | str) -> None:
         """Open a scene that belongs to a path, or to a new file of a name."""
         self._files.recovery.keep()  # so that its name is taken
-        self._files.open(load, new_file(self._folder, path) if isinstance(path, str) else path)
+        path = new_file(self._folder, path) if isinstance(path, str) else path
+        self._files.open(load, path, recover=partial(load_scene, samples=sample_mesh))
         self.in_lesson, self._before_lesson = False, None
         self._start = {**self._start, "open": False}
         self.display.options = DisplayOptions()
@@ -659,17 +661,3 @@ class Sandbox:
 def first_line(kind: type[Node]) -> str:
     """Return the first line of a class's description, without marks of code."""
     return (kind.__doc__ or "").strip().split("\n")[0].replace("`", "")
-
-
-def _fitted(scene: Scene, size: Sequence[int]) -> Scene:
-    """Return a scene whose camera looks from the same side, so that its objects fit into a view of a size."""
-    camera, aspect = scene.camera, size[0] / size[1]
-    x, y, z = np.subtract(camera.position, camera.target).tolist()
-    fitted = fitting_camera(scene.objects, direction=(x, y, z), up=camera.up, aspect=aspect)
-    return scene.replace(camera=fitted)
-
-
-def _bare_scene(item: SceneObject) -> Scene:
-    """Return a scene of one object, without decals."""
-    images = tuple(DecalImage.load(source) for source in FIRST_IMAGES)
-    return Scene(objects=[item], camera=Camera.framing(item.bounds), images=images)

@@ -231,7 +231,10 @@ class FileActions(WindowActions):
         self._state.background.write(f"export to {text}", write, f"exported to {text}")
 
     def open(
-        self, load: Callable[[Progress, Cancel], Scene], path: str | PathLike[str], recover: bool = True
+        self,
+        load: Callable[[Progress, Cancel], Scene],
+        path: str | PathLike[str],
+        recover: Callable[[Path], Scene] = load_scene,
     ) -> None:
         """Open another scene in the place of the present one, whose unsaved changes are kept for recovery.
 
@@ -244,7 +247,7 @@ class FileActions(WindowActions):
         path
             File to save to, which has to be inside `folder`.
         recover
-            If True, unsaved changes of an earlier window of this file are taken over.
+            Reads the unsaved changes that an earlier window of this file left, which are taken over.
         """
         path = self.inside(path)
         state, session = self._state, self._state.session
@@ -260,8 +263,7 @@ class FileActions(WindowActions):
                 session.forget_history()
             self.path, self._exists = path, path.exists()
             self.recovery = self._recovery_beside(path)
-            if recover:
-                self.recover(load_scene)
+            self.recover(recover)
             self.show_view(session.document.camera)
 
         if session.modified:

@@ -4,6 +4,7 @@ import io
 import runpy
 import tempfile
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,17 +15,20 @@ from PIL import Image
 import blobtree
 import decals
 from blobtree import Point, Segment
-from decals.apps.models.samples import SAMPLES
+from decals.apps.models.samples import SAMPLES, sample
 from decals.apps.sandbox.display import DisplayOptions
 from decals.apps.sandbox.folder import listed, read_upload, thumbnails
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing.commands import ScaleDecals
 from decals.errors import ImplicitDecalsError
+from decals.scenes.camera import UPRIGHT
 from decals.scenes.files import load_scene, save_scene
 from decals.scenes.meshes import write_mesh
+from decals.scenes.objects import MeshObject
 from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of
 from tests.apps.sandbox.test_sandbox import covered, finish
+from tests.decals.editing.scenes import box
 
 BALL = Point((0, 0, 0), radius=1.0)
 
@@ -89,6 +93,34 @@ def test_an_opened_model_fits_into_a_narrow_view_which_is_not_sliced(
     assert (pixels < (60, 120)).all()
     assert np.ptp(pixels[:, 0]) > 40
     assert sandbox.display.options == DisplayOptions()
+
+
+@pytest.mark.parametrize("name", ["saved", "lost"])
+def test_a_scene_of_a_sample_is_opened_and_recovered(
+    name: str, sandbox: Sandbox, window: EditWindow, tmp_path: Path
+) -> None:
+    scene = decals.cover(sample("knot"), count=3, images=["scale"])
+    save_scene(scene, tmp_path / {"saved": "saved.json", "lost": "lost.recovery.json"}[name])
+    sandbox.open_file(f"{name}.json")
+    finish(window)
+    assert [item.name for item in window.document.objects] == ["knot"], sandbox.status
+    assert len(window.document.decals) == 3
+    content = (tmp_path / "saved.json").read_bytes() if name == "saved" else b""
+    sandbox.upload({"name": "again.json", "content": content})
+    finish(window)
+    assert window.actions.files.title == ("again.json" if content else "*lost.json")
+
+
+def test_a_sample_stands_upright(
+    sandbox: Sandbox, window: EditWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    low = MeshObject("horse", *box((-1, -1, -1), (1, 1, 1)))
+    monkeypatch.setattr("decals.apps.sandbox.sandbox.sample", lambda _: low)
+    monkeypatch.setattr("decals.apps.sandbox.sandbox.cover", partial(decals.cover, count=3))
+    sandbox.open_sample("horse")
+    finish(window)
+    assert window.document.camera.up == (0.0, 0.0, 1.0)
+    assert window.actions.view.axes == UPRIGHT["z"]
 
 
 def test_a_model_is_opened_changed_saved_and_opened_again(
