@@ -44,7 +44,7 @@ class Control:
         Name of the parameter.
     kind
         "number" (a slider and a field), "field" (a number alone), "vector" and "list" (fields), "color",
-        "choice", "switch" or "text" (shown only).
+        "choice", "choices" (any number of them), "switch" or "text" (shown only).
     value
         The present value: a number, numbers, "#rrggbb", or text.
     doc

@@ -134,11 +134,21 @@ def brush_values(document: Document, brush: BrushSettings) -> dict[str, Any]:
         shown |= {"decal_radius": (decal, usual / STEPS, usual), "density": (brush.density,)}
     options = options_of(BrushSettings)
     controls = [option_control(options[name], *values) for name, values in shown.items()]
+    if brush.brush is Brush.SCATTER:
+        names, doc = tuple(image_names(document)[1:]), described(BrushSettings)["images"]
+        chosen = [names[image] for image in brush.images if image < len(names)] or list(names)
+        controls.append(asdict(Control("images", "choices", chosen, doc, choices=names)))
     return {"brush": str(brush.brush), "controls": controls}
 
 
-def set_brush(brush: BrushSettings, name: str, raw: Any, **_others: object) -> None:
-    """Set the brush, or one of its numbers, to what a page sent."""
+def set_brush(state: ActionState, name: str, raw: Any, **_others: object) -> None:
+    """Set the brush, its images, or one of its numbers, to what a page sent."""
+    brush, names = state.brush, image_names(state.session.document)[1:]
+    if name == "images":
+        given = raw if isinstance(raw, list) else [raw]
+        images = [names.index(one_of("image", one, names, InvalidEdit)) for one in given]
+        brush.images = tuple(images) if len(images) < len(names) else ()
+        return
     value = parsed_option(BrushSettings, name, raw)
     if name != "brush":
         positive_number(name, value)

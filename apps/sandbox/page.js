@@ -52,7 +52,14 @@
       trame.trigger("handle", [name, phase, x, y, event.ctrlKey || event.metaKey]);
     },
 
-    // Send files that were chosen or dropped, or the key of another row that was dropped on a row.
+    // Return the key of the place of the pointer in the view.
+    place(event) {
+      const box = event.currentTarget.getBoundingClientRect();
+      const steps = (share) => Math.round(10000 * share);
+      return `view ${steps((event.clientX - box.left) / box.width)}/${steps((box.bottom - event.clientY) / box.height)}`;
+    },
+
+    // Send files that were chosen or dropped, or the key of a row that was dropped on another or on the view.
     take(event, key = "") {
       event.preventDefault();
       const source = event.dataTransfer ?? event.target;
@@ -60,7 +67,7 @@
         trame.state.set("dropped_on", key);
         trame.state.set("dropped", Array.from(source.files));
       } else if (key) {
-        trame.trigger("move", [source.getData("text/plain"), key]);
+        trame.trigger(key.startsWith("view ") ? "place" : "move", [source.getData("text/plain"), key]);
       }
     },
 

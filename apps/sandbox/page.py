@@ -120,6 +120,7 @@ class Page:
         trigger("pinch")(self.sandbox.pinch)
         trigger("look")(lambda side: self.sandbox.move_camera("look", side))
         trigger("rename")(lambda key, name: change_row(key, "rename", name))
+        trigger("place")(self.sandbox.place_image)
         trigger("move")(lambda key, target: change_row(key, "move", target))
         self._build()
         server.controller.on_server_ready.add(self._start)
@@ -186,7 +187,7 @@ class Page:
                     html.Div(
                         style="height: 100%; position: relative; touch-action: none",
                         dragover="$event.preventDefault()",
-                        drop="utils.sandbox.take($event)",
+                        drop="utils.sandbox.take($event, utils.sandbox.place($event))",
                         __events=["dragover", "drop"],
                         raw_attrs=[
                             'role="application"',

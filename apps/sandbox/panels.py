@@ -138,7 +138,8 @@ def build_controls(source: str, event: Any, who: str, *, key: str = "c.name") ->
             change=(event, f"[{who}, $event.target.value, true]"),
         )
         vuetify3.VSelect(
-            v_if="c.kind === 'choice'",
+            v_if="c.kind === 'choice' || c.kind === 'choices'",
+            multiple=("c.kind === 'choices'",),
             model_value=("c.value",),
             items=("c.choices",),
             raw_attrs=named("c.label"),

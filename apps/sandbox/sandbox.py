@@ -27,6 +27,7 @@ from decals.apps.sandbox.outline import outline
 from decals.apps.views import THREE_QUARTER
 from decals.editing.commands import AddImage, ReplaceImage
 from decals.editing.outline_actions import Part, image_on_layer
+from decals.editing.queries import SurfacePick
 from decals.editing.recovery import recovery_path
 from decals.editing.scatter_commands import AddObject
 from decals.editing.session import UndoEntry
@@ -52,6 +53,9 @@ FIRST_IMAGES = ("scale",)
 
 LIGHT = "light"
 """Key under which a page sends a picture of all directions."""
+
+PLACE, PLACE_STEPS = re.compile(r"view (\d{1,5})/(\d{1,5})"), 10_000
+"""Key of a place of the view, and steps across the view that it counts, from the lower left corner."""
 
 MAX_ZOOM = 4.0
 """Largest factor of one step of two fingers."""
@@ -127,7 +131,7 @@ class Sandbox:
         self._setters: dict[str, Callable[..., None]] = {
             "display": self.display.set_option,
             "decals": partial(decal_panel.set_decal_value, self._state),
-            "brush": partial(decal_panel.set_brush, self._state.brush),
+            "brush": partial(decal_panel.set_brush, self._state),
             "image": self._set_image,
             "drawing": partial(decal_panel.set_drawing, self._state),
             "scattering": self._set_scattering,
@@ -515,7 +519,8 @@ class Sandbox:
         """Take files that were dropped on the page: images and models are added, a scene is opened.
 
         An image that was dropped on the row of a layer shows on its decals, on that of an image replaces it.
-        One that was dropped on the key "light", and a Radiance file without a key, is the light.
+        One that was dropped on a place of the view, see `surface_at`, shows on a new decal there.
+        One that was dropped on the key "light", and a Radiance file without a row, is the light.
         """
         for file in files if isinstance(files, list | tuple) else [files]:
             self.attempt(partial(self._take_file, file, key))
@@ -524,7 +529,7 @@ class Sandbox:
         found, window = read_upload(file), self._window
         file_name = str(file["name"])  # type: ignore[index]  # read_upload has checked it
         name = plain_name(file_name)
-        if key == LIGHT or (not key and file_name.lower().endswith(HDR)):
+        if key == LIGHT or (not _row_of(key) and file_name.lower().endswith(HDR)):
             self._take_light(found, file)
         elif isinstance(found, Scene):
             self._open(lambda *_: found, name)
@@ -538,8 +543,8 @@ class Sandbox:
             self._add_object(renamed)
 
     def _take_image(self, image: DecalImage, key: str) -> None:
-        """Add an image that was dropped on a row, or replace that of the row."""
-        row = Part.named(key) if key else None
+        """Add an image that was dropped on a row or on the view, or replace that of the row."""
+        row, pick = _row_of(key), self.surface_at(key)
         session, state = self._window.session, self._state
         count, shown = len(session.document.images), ""
         if row is not None and row.kind == "image":
@@ -550,7 +555,32 @@ class Sandbox:
             if row is not None and row.kind == "layer":
                 session.do(image_on_layer(session.document, count, row.number))
                 shown = f" and shown on {session.document.layer_names.get(row.number, row.key)}"
-        state.show(f"added image {count}{shown or '; choose it for the selected decals'}")
+            elif pick is not None:
+                self._window.actions.decals.add_decal(lambda: pick, images=[count])
+                shown = " and a decal"
+        name = decal_panel.image_names(session.document)[-1]
+        state.show(f"added image {name}{shown or '; choose it for the selected decals'}")
+
+    @event
+    def place_image(self, key: str, place: str) -> None:
+        """Add a decal at a place of the view, see `surface_at`, that shows the image of a row."""
+        row = Part.named(key)
+        if row.kind != "image":
+            raise InvalidEdit("an image alone can be dropped on the view; drop other rows on rows")
+        self._window.actions.decals.add_decal(lambda: self.surface_at(place), images=[row.number])
+
+    def surface_at(self, place: object) -> SurfacePick | None:
+        """Return the surface point at a place of the view, or None.
+
+        "view 5000/0" is the middle of the lower edge, "view 10000/10000" the upper right corner.
+        """
+        found = PLACE.fullmatch(str(place))
+        if found is None:
+            return None
+        width, height = self._window.plotter.window_size
+        return self._window.tools.at(
+            int(found[1]) * width / PLACE_STEPS, int(found[2]) * height / PLACE_STEPS
+        )
 
     def _take_light(self, picture: Any, file: object) -> None:
         """Light the scene with a picture of all directions, which is kept in the folder."""
@@ -656,6 +686,11 @@ class Sandbox:
         self.take_step()
         self._state.attempt(request)
         self._window.redraw(whole=whole)
+
+
+def _row_of(key: str) -> Part | None:
+    """Return the part of the scene whose row a key names; None for no key and a place of the view."""
+    return Part.named(key) if key and PLACE.fullmatch(str(key)) is None else None
 
 
 def first_line(kind: type[Node]) -> str:

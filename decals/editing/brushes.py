@@ -298,11 +298,10 @@ class BrushStroke:
         match settings.brush:
             case Brush.SCATTER:
                 size = settings.decal_radius or default_decal_radius(document)
+                images = tuple(i for i in settings.images if i < len(document.images))
                 settings.seed += 1
                 self._run(
-                    BrushDecals(
-                        position, normal, radius, size, settings.density, settings.images, settings.seed
-                    )
+                    BrushDecals(position, normal, radius, size, settings.density, images, settings.seed)
                 )
             case Brush.PUSH if last is not None:
                 steps = int(np.ceil(np.linalg.norm(position - last) / (radius / 2)))

@@ -77,11 +77,12 @@ class DecalActions(WindowActions):
         return self._state.session.document.decals[int(self._state.selected_numbers[-1])]
 
     @Group.DECALS.action("add_decal", "Ctrl+Click", "a", summary="add a decal under the cursor")
-    def add_decal(self, cursor: Cursor) -> None:
-        """Add a decal like the last selected one, and select it."""
+    def add_decal(self, cursor: Cursor, **values: ArrayLike) -> None:
+        """Add a decal like the last selected one, but with other values of `Decals`, and select it."""
         state, pick = self._state, require_pick(cursor)
         model = state.selection[-1] if state.selection else None
-        state.run(AddDecals(new_decal(state.session.document, pick.position, pick.normal, model)))
+        decal = new_decal(state.session.document, pick.position, pick.normal, model)
+        state.run(AddDecals(decal.replace(**values)))
         state.selection = (state.session.document.decals.next_number - 1,)
 
     @Group.DECALS.action("larger", "Ctrl+WheelUp", "plus", "equal", "KP_Add", summary="larger", repeats=True)

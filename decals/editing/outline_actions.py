@@ -118,6 +118,7 @@ class OutlineActions(WindowActions):
             case "layer", "rename":
                 run(RenameLayer(number, value))
             case "image", "remove":
+                self._state.brush.images = ()  # its indices stand for other images now
                 run(RemoveImage(number))
             case "image", "move":
                 target = Part.named(value)

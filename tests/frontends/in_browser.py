@@ -441,7 +441,7 @@ DROP = """(label) => {
 
 
 async def panels(picture: str | None = None) -> None:
-    """A user renames and drags rows, drops an image on a layer, and sets material, scattering and drawing."""
+    """A user renames and drags rows, drops images, and sets material, scattering and drawing."""
     plotter = pv.Plotter(off_screen=True)
     server = get_server("panels", client_type="vue3")
     window = EditWindow(decals.cover(BLOB, count=40, images=["tile", "scale"]), plotter=plotter)
@@ -475,6 +475,10 @@ async def panels(picture: str | None = None) -> None:
         await browser.evaluate(DROP, "armour")
         await done("add an image")
         assert set(document.decals.decals.images.tolist()) == {2}
+        await row("tile").drag_to(browser.get_by_label("view of the scene"))
+        await done("add")
+        (added,) = window.actions.state.selection
+        assert document.decals[added].images.tolist() == [0]
         await row("body").click(button="right")
         await browser.get_by_text("Isolate, or show all", exact=True).click()
         await done("isolate")

@@ -87,8 +87,8 @@ EVENTS: dict[str, list[list[Any]]] = {
     ],
     "set_control brush": [
         ["brush"],
-        ["brush", "radius", "density"],
-        ["select", "scatter", "push", "lasso", 0.3],
+        ["brush", "radius", "density", "images"],
+        ["select", "scatter", "push", "lasso", 0.3, ["scale"]],
     ],
     "set_control drawing": [
         ["drawing"],
@@ -105,7 +105,8 @@ EVENTS: dict[str, list[list[Any]]] = {
     "drag_handle": [HANDLES, ["begin", "move", "end"], [0.1, 0.5, 0.8], [0.3, 0.6], [True, False]],
     "open_file": [["../x.json", "none.json", "a\0.json"]],
     "write_file": [["../x.py", "x.exe", "no/x.json"]],
-    "upload": [[[{}], [{"name": "a.ply", "content": b"x"}], 3], [*KEYS_OF_ROWS, "light"]],
+    "place_image": [KEYS_OF_ROWS, ["view 5000/5000", "view 0/0", "view 1", "0"]],
+    "upload": [[[{}], [{"name": "a.ply", "content": b"x"}], 3], [*KEYS_OF_ROWS, "light", "view 5000/5000"]],
 }
 """Arguments of the page's events, by their names; a second word tells two kinds of one event apart."""
 

@@ -375,7 +375,9 @@ def test_brush_and_drawing_are_set(sandbox: Sandbox, shared: EditWindow) -> None
     ends = pixels_of(shared.subplot, [camera.focal_point, np.array(camera.focal_point) + camera.up])
     length = np.linalg.norm(ends[1] - ends[0]) / shared.plotter.window_size[1]
     assert sandbox.values()["gizmo"]["brush"] == pytest.approx(0.7 * length, rel=0.1)
-    for name, value in (("brush", "smear"), ("radius", 0), ("density", 2), ("color", 1), ("radius", None)):
+    wrong_brush: list[tuple[str, Any]] = [("brush", "smear"), ("radius", 0), ("density", 2), ("color", 1)]
+    wrong_brush += [("radius", None), ("images", "moss"), ("images", [[]]), ("images", None)]
+    for name, value in wrong_brush:
         sandbox.set_control("brush", name, value)
         assert "expected" in sandbox.status
     sandbox.set_control("brush", "brush", "select")
@@ -469,6 +471,76 @@ def test_images_become_materials_and_are_dropped_on_rows(sandbox: Sandbox, share
     assert sandbox.values()["done"][-2:] == ["add an image", "replace an image"]
     sandbox.upload(given, "image 9")
     assert "expected" in sandbox.status
+    sandbox.go_to(0)
+    assert digest(shared.document) == before
+
+
+def test_the_scatter_brush_adds_the_chosen_images(sandbox: Sandbox, shared: EditWindow) -> None:
+    before, brush = digest(shared.document), shared.actions.state.brush
+    for name in ("scale", "eye"):
+        shared.session.do(AddImage(decals.DecalImage.load(name)))
+    sandbox.set_control("brush", "brush", "scatter")
+
+    def chosen() -> list[str]:
+        controls = {control["name"]: control for control in sandbox.values()["brush"]["controls"]}
+        assert controls["images"]["choices"][-2:] == ("scale", "eye")
+        value: list[str] = controls["images"]["value"]
+        return value
+
+    every = chosen()
+    assert every[-2:] == ["scale", "eye"]
+    sandbox.set_control("brush", "images", ["eye"])
+    assert chosen() == ["eye"]
+    assert list(brush.images) == [len(every) - 1]
+    for images in (every, []):
+        sandbox.set_control("brush", "images", images)
+        assert (chosen(), list(brush.images)) == (every, [])
+    sandbox.set_control("brush", "images", ["scale"])
+    sandbox.change_row("image 0", "remove")
+    assert not brush.images
+    sandbox.set_control("brush", "brush", "select")
+    sandbox.go_to(0)
+    assert digest(shared.document) == before
+
+
+def test_an_image_that_is_dropped_on_the_view_becomes_a_decal_there(
+    sandbox: Sandbox, shared: EditWindow
+) -> None:
+    before, count = digest(shared.document), len(shared.document.images)
+    sandbox.move_camera("frame")
+    (width, height), tools = shared.plotter.window_size, shared.tools
+    column, row = next(
+        (column, row)
+        for row in range(2000, 9000, 500)
+        for column in range(1000, 9000, 500)
+        if tools.at(column * width / 10_000, row * height / 10_000) is not None
+    )
+    pick = tools.at(column * width / 10_000, row * height / 10_000)
+    assert pick is not None
+    file = io.BytesIO()
+    Image.new("RGBA", (8, 8), "red").save(file, "PNG")
+    given, place = [{"name": "red.png", "content": file.getvalue()}], f"view {column}/{row}"
+    sandbox.upload(given, place)
+    (number,) = shared.actions.state.selection
+    decal = shared.document.decals[number]
+    assert decal.images.tolist() == [count]
+    np.testing.assert_allclose(decal.positions[0], pick.position)
+    assert sandbox.values()["done"] == ["add an image"]
+    assert sandbox.status == "added image red and a decal"
+    sandbox.place_image("image 0", place)
+    assert shared.document.decals[shared.actions.state.selection[0]].images.tolist() == [0]
+    added = len(shared.document.decals)
+    sandbox.upload(given, "view 0/10000")  # beside the model: the image alone is added
+    assert (len(shared.document.images), len(shared.document.decals)) == (count + 2, added)
+    assert "choose it" in sandbox.status
+    sandbox.place_image("image 0", "view 0/10000")
+    assert "no surface" in sandbox.status
+    for wrong in ("view 1", "view 1/2/3", "view a/b", "view -5/1", "", None):
+        sandbox.place_image("image 0", wrong)  # type: ignore[arg-type]
+        assert "no surface" in sandbox.status, wrong
+    for key, reason in (("image 9", "expected"), ("layer 0", "an image alone"), ("0", "an image alone")):
+        sandbox.place_image(key, place)
+        assert reason in sandbox.status, key
     sandbox.go_to(0)
     assert digest(shared.document) == before
 
