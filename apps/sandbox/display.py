@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pyvista as pv
@@ -14,6 +14,7 @@ from decals.apps.sandbox.decal_panel import brush_values
 from decals.editing.background import Job, Worker
 from decals.editing.document import Document
 from decals.editing.gizmo import AXES
+from decals.editing.overlays import MODES as SAMPLING_MODES
 from decals.editing.overlays import contact_lines, sample_surface
 from decals.editing.slicing import CHOICES as SLICES
 from decals.editing.slicing import MOVE, NONE, TILT, TILTED, SliceDrag, SlicePlane
@@ -91,14 +92,6 @@ class DisplayOptions:
 
 Shown = list[tuple[str, Any, dict[str, Any]]]
 """Data sets with their names and pyvista's options."""
-
-
-class Sampling(Protocol):
-    """The modes in which decals are sampled for overlays."""
-
-    contact: Any
-    mapping: Any
-    stiffness: float
 
 
 class Display:
@@ -224,11 +217,11 @@ class Display:
         window = self._window
         if self._worker.busy or window.tools.dragging or window.background.following:
             return False
-        options, document, modes = self.options, window.document, window.subplot
+        options, document = self.options, window.document
         if options == DisplayOptions() or not document.objects:
             return self._clear()
-        content = document.objects, document.decals.version, modes.contact, modes.mapping, modes.stiffness
-        key = options, *content
+        modes = [getattr(document.drawing, name) for name in SAMPLING_MODES]
+        key = options, document.objects, document.decals.version, *modes
         if key == self._key:
             return False
         self._key = key
@@ -238,7 +231,7 @@ class Display:
             objects = fork.objects
             known = meshes[1] if meshes[0] is objects else None
             parts = known or [as_polydata([item], resolution=RESOLUTION) for item in objects]
-            shown, message = show(fork, parts, options, modes)
+            shown, message = show(fork, parts, options)
             polygonized = options.mode == MODES[1] and options.slice is None
             drawn = meshed(objects, parts) if polygonized else None
 
@@ -401,9 +394,7 @@ class Display:
         self._window.subplot.vtk_renderer.reset_camera_clipping_range()
 
 
-def show(
-    document: Document, parts: list[pv.PolyData], options: DisplayOptions, modes: Sampling
-) -> tuple[Shown, str]:
+def show(document: Document, parts: list[pv.PolyData], options: DisplayOptions) -> tuple[Shown, str]:
     """Return the data sets that show a document, and a message with what they measure."""
     low, high = bounds_of(document.objects)
     size = float((high - low).max())
@@ -416,7 +407,7 @@ def show(
     elif options.replaces_scene:
         shown.append(_moded(document, mesh, parts, options.mode))
     if options.overlay != OVERLAYS[0]:
-        overlay, message = _overlay(document, mesh, options.overlay, modes, LIFT * size)
+        overlay, message = _overlay(document, mesh, options.overlay, LIFT * size)
         shown += overlay
     return shown, message
 
@@ -461,9 +452,7 @@ def _sliced(document: Document, mesh: pv.PolyData, cut: SlicePlane, lift: float)
     return shown
 
 
-def _overlay(
-    document: Document, mesh: pv.PolyData, overlay: str, modes: Sampling, lift: float
-) -> tuple[Shown, str]:
+def _overlay(document: Document, mesh: pv.PolyData, overlay: str, lift: float) -> tuple[Shown, str]:
     """Return the data sets of an overlay, and what it measures."""
     name = f"{PREFIX}overlay"
     points, normals = np.asarray(mesh.points, np.float32), np.asarray(mesh["Normals"], np.float32)
@@ -476,15 +465,7 @@ def _overlay(
         return [(name, lifted, options)], f"{len(chosen)} seeds"
     triangles = mesh.regular_faces
     faces = triangles.astype(np.int32)
-    samples = sample_surface(
-        document,
-        points,
-        unit_rows(normals),
-        faces,
-        contact=modes.contact,
-        mapping=modes.mapping,
-        stiffness=modes.stiffness,
-    )
+    samples = sample_surface(document, points, unit_rows(normals), faces)
     above = points + lift * normals
     if overlay == "contact lines":
         lines = contact_lines(above + lift * normals, faces, samples.owners)
@@ -495,8 +476,8 @@ def _overlay(
         return [(name, drawn, {"color": LINE_COLOR, "line_width": 3})], ""
     lifted = pv.PolyData.from_regular_faces(above, triangles)
     if overlay == "owners":
-        palette = np.vstack([OWNER_COLORS[samples.owners % len(OWNER_COLORS)]])
-        lifted["owners"] = np.where((samples.owners >= 0)[:, None], palette, NO_OWNER).astype(np.uint8)
+        colors = OWNER_COLORS[samples.owners % len(OWNER_COLORS)]
+        lifted["owners"] = np.where((samples.owners >= 0)[:, None], colors, NO_OWNER).astype(np.uint8)
         shown_count = len(np.unique(samples.owners[samples.owners >= 0]))
         return [(name, lifted, {"scalars": "owners", "rgb": True})], f"{shown_count} decals show"
     folded = int(samples.folds.sum())

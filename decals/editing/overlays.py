@@ -9,13 +9,13 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
 from decals.editing.document import Document
 from decals.field.evaluate import evaluate
 from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of
-from decals.field.law import AnyContact
-from decals.field.mapping import ImageMapping
 from decals.field.walks import walks_for
-from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS
 
 INSIDE = 0.5
 """Distance of a rim from the middle of its image, in image coordinates."""
+
+MODES = "contact", "mapping", "stiffness"
+"""Options of a drawing on which the samples depend."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +26,6 @@ class SurfaceSamples:
     ----------
     owners
         Number of the decal that shows at each vertex, −1 for none, int32, shape (n,).
-    fields
-        Field of the owner after contact, 0 without one, float32, shape (n,).
     stretch
         Of the middle of each triangle inside one decal: ratio of the largest to the smallest stretch of the
         image, as `decals.measure` has it; 1 keeps shapes, NaN elsewhere. Shape (m,).
@@ -36,22 +34,14 @@ class SurfaceSamples:
     """
 
     owners: Int32Array
-    fields: Float32Array
     stretch: Float64Array
     folds: BoolArray
 
 
 def sample_surface(
-    document: Document,
-    vertices: Float32Array,
-    normals: Float32Array,
-    faces: Int32Array,
-    *,
-    contact: AnyContact = DEFAULT_CONTACT,
-    mapping: ImageMapping = ImageMapping.CORRECTED,
-    stiffness: float = DEFAULT_STIFFNESS,
+    document: Document, vertices: Float32Array, normals: Float32Array, faces: Int32Array
 ) -> SurfaceSamples:
-    """Evaluate the decals of a document on a triangle mesh of its surface.
+    """Evaluate the decals of a document on a triangle mesh of its surface, in the modes of its drawing.
 
     Parameters
     ----------
@@ -61,15 +51,12 @@ def sample_surface(
         Vertices and unit normals, shape (n, 3) each.
     faces
         Triangles, counter-clockwise from outside, shape (m, 3).
-    contact, mapping, stiffness
-        Modes, as for `decals.evaluate`.
     """
-    modes: dict[str, Any] = {"contact": contact, "mapping": mapping, "stiffness": stiffness}
-    modes["walks"] = walks_for(mapping, document.decals, document.objects)
+    modes: dict[str, Any] = {name: getattr(document.drawing, name) for name in MODES}
+    modes["walks"] = walks_for(document.drawing.mapping, document.decals, document.objects)
     samples = evaluate(document.decals, vertices, normals, **modes)
     inside = np.linalg.norm(samples.uv - INSIDE, axis=1) <= INSIDE
     owners = np.where(inside, samples.owner, -1).astype(np.int32)
-    fields = np.where(inside, samples.field, 0.0).astype(np.float32)
     stretch, folds = np.full(len(faces), np.nan), np.zeros(len(faces), np.bool_)
     rows = np.flatnonzero((owners[faces] >= 0).all(axis=1) & (np.ptp(owners[faces], axis=1) == 0))
     if len(rows):
@@ -83,7 +70,7 @@ def sample_surface(
         stretch[rows] = stretch_of(maps)
         a, b, c = np.moveaxis(corners.astype(np.float64), 1, 0)
         folds[rows] = folds_of(maps, np.cross(b - a, c - a))
-    return SurfaceSamples(owners, fields, stretch, folds)
+    return SurfaceSamples(owners, stretch, folds)
 
 
 def contact_lines(vertices: Float32Array, faces: Int32Array, owners: Int32Array) -> Float32Array:
