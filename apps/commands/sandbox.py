@@ -93,7 +93,7 @@ def sandbox(
         Address to serve the page at, such as 0.0.0.0 for all networks. Its URL then has a token, without
         which the page does not work. Default: this machine only.
     share
-        All browsers show one session: one drives, the others watch, and ask for control.
+        All browsers show one session: the driver edits it, the others watch and can ask for control.
     sessions
         Most sessions at the same time. One without a browser is saved and ended after half an hour.
     browser

@@ -285,14 +285,14 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
             self._take_size()
         self._tell()
 
-    # -- who drives -----------------------------------------------------------------------------------
+    # -- the driver -------------------------------------------------------------------------------------
 
     def _allows(self, client: str, name: str, arguments: tuple[Any, ...]) -> bool:
         asks = name == TRIGGER and arguments[:1] == ("ask_to_drive",)
         return not self._shared or client == self._driver or name in LOOKS or asks
 
     def driving(self, client: str) -> dict[str, Any]:
-        """Return what a browser shows of who drives."""
+        """Return what a browser shows of the driver."""
         return {
             "shared": self._shared,
             "drives": not self._shared or client == self._driver,
@@ -324,7 +324,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
             self._resizes[self._driver][1]()
 
     def _tell(self) -> None:
-        """Send each browser what it shows of who drives."""
+        """Send each browser what it shows of the driver."""
         if self._shared:
             for client in self._numbers:
                 self.publish("trame.state.topic", {"driving": self.driving(client)}, client_id=client)

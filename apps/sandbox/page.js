@@ -71,13 +71,6 @@
       }
     },
 
-    // Return the menu of a row at the pointer.
-    menu(event, row) {
-      const node = ["combination", "modifier", "primitive"].includes(row.kind);
-      const place = { x: event.clientX, y: event.clientY };
-      return { open: row.kind !== "more", ...place, key: row.key, label: row.label, kind: node ? "node" : row.kind };
-    },
-
     // Send the name in the field of a row, unless it is as before, and return the hidden field.
     rename(field, row) {
       if (field.key && field.name !== row.label) trame.trigger("rename", [field.key, field.name]);
@@ -90,8 +83,8 @@
     const { key, ctrlKey, metaKey, shiftKey, target } = event;
     const view = document.querySelector("[role=application]");
     const typing = target.matches("input, textarea");
-    if (!(ctrlKey || metaKey) || view.contains(target) || !/^[aeisyz]$/i.test(key)) return;
-    if (typing && !/^s$/i.test(key)) return;
+    const keys = typing ? "s" : view.dataset.ctrlKeys;
+    if (!(ctrlKey || metaKey) || view.contains(target) || !keys.includes(key.toLowerCase())) return;
     event.preventDefault();
     if (typing) target.blur();
     if (/^[ei]$/i.test(key) || (shiftKey && /^s$/i.test(key))) view.focus({ preventScroll: true });

@@ -14,6 +14,7 @@ from decals.apps.sandbox.folder import thumbnails
 from decals.apps.sandbox.panels import DEFAULTS, named
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.apps.sandbox.view import StreamedView
+from decals.editing.actions import KEYS
 from decals.window import EditWindow, browser_keys
 
 REFRESH_SECONDS = 0.1
@@ -67,6 +68,21 @@ ROW_FLAGS = (
 )
 """Buttons of a row: its change, the row's value, and icons for true and false."""
 
+NODE = "combination modifier primitive"
+SHAPES = f"object mesh {NODE}"
+"""Kinds of rows of nodes, and of all that has a shape."""
+
+SHOW_MENU = "menu = {...row, open: row.kind !== 'more', x: $event.clientX, y: $event.clientY}"
+"""Show the menu of a row at the pointer."""
+
+CTRL_KEYS = "".join(
+    gesture[-1]
+    for binding in KEYS.bindings
+    for gesture in binding.gestures
+    if gesture.startswith("Ctrl+") and len(gesture.split("+")[-1]) == 1
+)
+"""Letters that have an action together with Ctrl."""
+
 RENAME_ROW = "!['image', 'more'].includes(row.kind) && (renamed = {key: row.key, name: row.label})"
 SEND_NAME = "renamed = utils.sandbox.rename(renamed, row)"
 """Show the field of a row's name; send what stands there, and hide the field."""
@@ -95,7 +111,7 @@ class Page:
     done
         Show a button that saves and ends the server.
     shared
-        One browser drives, the others watch.
+        One browser is the driver, the others watch.
     options
         Options of the `Sandbox`.
     """
@@ -113,7 +129,7 @@ class Page:
         server.state.update({**self.values(), "catalog": self.sandbox.catalog(), "thumbnails": thumbnails()})
         server.state.update({"theme": "light", "dropped": None, "dropped_on": ""})
         server.state.renamed = {"key": "", "name": ""}
-        server.state.menu = {"open": False, "x": 0, "y": 0, "key": "", "label": "", "kind": ""}
+        server.state.menu = {"open": False, "x": 0, "y": 0}
         server.state.change("dropped")(self._take_dropped)
         trigger, change_row = server.controller.trigger, self.sandbox.change_row
         trigger("handle")(self.sandbox.drag_handle)
@@ -192,6 +208,7 @@ class Page:
                         raw_attrs=[
                             'role="application"',
                             *named("'view of the scene'"),
+                            f'data-ctrl-keys="{CTRL_KEYS}"',
                             *(f'@{name}.capture="utils.sandbox.{name}($event)"' for name in TOUCH_EVENTS),
                         ],
                         **browser_keys(self._window),
@@ -292,7 +309,7 @@ class Page:
                 style=("`padding-left: ${8 + 14 * row.depth}px; opacity: ${row.hidden ? 0.6 : 1}`",),
                 classes="flex-grow-1",
                 click=(self._click, "[row.key, $event.ctrlKey || $event.metaKey, selected]"),
-                contextmenu="$event.preventDefault(); menu = utils.sandbox.menu($event, row)",
+                contextmenu=f"$event.preventDefault(); {SHOW_MENU}",
                 dragstart="$event.dataTransfer.setData('text/plain', row.key)",
                 dragover="$event.preventDefault()",
                 drop="utils.sandbox.take($event, row.key)",
@@ -328,14 +345,14 @@ class Page:
             vuetify3.VList(),
         ):
             for title, kinds, event in (
-                ("Rename", "object mesh node layer", "renamed = {key: menu.key, name: menu.label}"),
-                ("Duplicate", "object mesh node", (change, "[menu.key, 'duplicate']")),
-                ("Group", "node", (change, "[menu.key, 'group']")),
-                ("Remove", "object mesh node layer image", (change, "[menu.key, 'remove']")),
-                ("Hide or show", "object mesh node layer", (change, "[menu.key, 'hide']")),
-                ("Lock or unlock", "object mesh node layer", (change, "[menu.key, 'lock']")),
-                ("Isolate, or show all", "object mesh node layer", (change, "[menu.key, 'isolate']")),
-                ("Frame", "object mesh node", (self._frame, "[menu.key]")),
+                ("Rename", f"{SHAPES} layer", "renamed = {key: menu.key, name: menu.label}"),
+                ("Duplicate", SHAPES, (change, "[menu.key, 'duplicate']")),
+                ("Group", NODE, (change, "[menu.key, 'group']")),
+                ("Remove", f"{SHAPES} layer image", (change, "[menu.key, 'remove']")),
+                ("Hide or show", f"{SHAPES} layer", (change, "[menu.key, 'hide']")),
+                ("Lock or unlock", f"{SHAPES} layer", (change, "[menu.key, 'lock']")),
+                ("Isolate, or show all", f"{SHAPES} layer", (change, "[menu.key, 'isolate']")),
+                ("Frame", SHAPES, (self._frame, "[menu.key]")),
             ):
                 vuetify3.VListItem(title=title, v_if=f"'{kinds}'.includes(menu.kind)", click=event)
 

@@ -256,7 +256,7 @@ def build_files(sandbox: Sandbox) -> None:
 
 
 def build_driver() -> None:
-    """Build who drives a shared page, and the button that asks for control or passes it."""
+    """Build the name of the driver of a shared page, and the button that asks for control or passes it."""
     with html.Div(v_if="driving.shared", classes="d-flex align-center ga-2 mr-2"):
         html.Span(
             "{{ driving.drives ? 'You drive' : 'Browser ' + driving.driver + ' drives' }}, "

@@ -1,4 +1,4 @@
-"""Several browsers at one server: who drives, and what becomes of input that a browser leaves behind."""
+"""Several browsers at one server: their driver, and what becomes of input that a browser leaves behind."""
 
 import asyncio
 import gzip
