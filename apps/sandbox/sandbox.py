@@ -19,12 +19,13 @@ from blobtree.progress import Cancel, Progress
 from decals import cover
 from decals.apps.models.samples import SAMPLES, axes_of, sample, sample_mesh
 from decals.apps.models.scenes import empty_scene, new_file
-from decals.apps.sandbox import catalog, decal_panel
+from decals.apps.sandbox import decal_panel
 from decals.apps.sandbox.controls import controls_of, exchanged, parsed, parsed_option
 from decals.apps.sandbox.display import PHASES, Display, DisplayOptions
 from decals.apps.sandbox.folder import HDR, MODELS, keep_upload, listed, plain_name, read_upload
 from decals.apps.sandbox.outline import outline
 from decals.apps.views import THREE_QUARTER
+from decals.editing import new_nodes
 from decals.editing.commands import AddImage, ReplaceImage
 from decals.editing.outline_actions import Part, image_on_layer
 from decals.editing.queries import SurfacePick
@@ -222,9 +223,9 @@ class Sandbox:
     def catalog() -> dict[str, Any]:
         """Return the names of the kinds that can be added, by family, and what each is."""
         return {
-            **catalog.families(),
+            **new_nodes.families(),
             "custom": [kind.__name__ for kind in custom_kinds()],
-            "docs": {name: first_line(kind) for name, kind in catalog.kinds().items()},
+            "docs": {name: first_line(kind) for name, kind in new_nodes.kinds().items()},
         }
 
     def _outline(self) -> list[dict[str, Any]]:
@@ -238,11 +239,6 @@ class Sandbox:
                 self._rows, self._marked = rows, []
             self._outlined = shown
         return self._rows
-
-    def _selected_label(self) -> str:
-        """Return the name of the selected node, else that of its class."""
-        panel = self._panel()
-        return str(panel["name"] or panel["kind"])
 
     def _panel(self) -> dict[str, Any]:
         """Return title and controls of the selected node."""
@@ -388,37 +384,22 @@ class Sandbox:
     @event
     def add(self, kind: str) -> None:
         """Add a primitive of a kind: blended to the selected node, or as an object."""
-        name = catalog.checked_kind(kind).__name__
-        self._trees.add_node(name, lambda center, size: catalog.new_node(name, center=center, size=size))
+        self._trees.add_node(kind)
 
     @event
     def wrap(self, kind: str) -> None:
         """Put the selected node under a new node with one operand, such as a warp."""
-        catalog.checked_kind(kind)
-
-        def wrapped(node: Node) -> Node:
-            low, high = node.bounds
-            return catalog.new_node(kind, (node,), size=float((high - low).max()))
-
-        self._trees.replace_node(wrapped, f"put {self._selected_label()} under {kind}")
+        self._trees.wrap_node(kind)
 
     @event
     def combine(self, kind: str) -> None:
         """Combine the operands of the selected node in another way."""
-        node = self._trees.selected_node
-        if len(node.children) < 2:
-            raise InvalidEdit(f"select a node with two or more operands; a {type(node).__name__} has fewer")
-        self._trees.replace_node(lambda node: catalog.new_node(kind, node.children), f"combine with {kind}")
+        self._trees.combine_operands(kind)
 
     @event
     def unwrap(self) -> None:
         """Replace the selected node by its only operand."""
-        node = self._trees.selected_node
-        if len(node.children) != 1:
-            raise InvalidEdit(
-                f"select a node with one operand; a {type(node).__name__} has {len(node.children)}"
-            )
-        self._trees.replace_node(lambda node: node.children[0], f"remove {self._selected_label()}")
+        self._trees.unwrap_node()
 
     def show_help(self, shown: bool) -> None:
         """Show or hide the list of all actions."""

@@ -20,6 +20,7 @@ from decals.editing.decal_actions import TINTS
 from decals.editing.document import Document
 from decals.editing.gizmo import Handle, HandleDrag, Ray, handles_of, moved_point, snap_distance
 from decals.editing.key_bindings import Group
+from decals.editing.new_nodes import checked_kind, new_node
 from decals.editing.queries import SurfacePick
 from decals.editing.scatter_commands import AddObject, RemoveObject
 from decals.editing.session import EditSession
@@ -332,30 +333,66 @@ class TreeActions(WindowActions):
         if last:
             self.end_drag()
 
-    def add_node(self, kind: str, make: Callable[[Float64Array, float], Node]) -> None:
-        """Blend a new node into the selected one and select it; without a selected one it is an object.
+    def add_node(self, kind: str) -> None:
+        """Blend a new primitive into the selected node and select it; without a node it is an object.
 
         Parameters
         ----------
         kind
-            Name of its class.
-        make
-            Returns the node, in the world, for a centre, shape (3,), and a size. It runs in the background.
+            Name of its class; see `decals.editing.new_nodes.kinds`.
         """
-        state, middle = self._state, np.zeros(3, np.float32)
+        kind, state, middle = checked_kind(kind).__name__, self._state, np.zeros(3, np.float32)
         if state.primitive is None:
             objects, view = state.session.document.objects, state.camera.eye_and_target()
-            self._add_tree(kind.lower(), lambda: make(*_place_of_object(objects, *view)), middle)
+            self._add_tree(
+                kind.lower(), lambda: new_node(kind, (), *_place_of_object(objects, *view)), middle
+            )
             return
         number, path = state.primitive
 
         def command(tree: Node) -> tuple[StructureCommand, ...]:
-            node = make(*_place_on(node_in_world(tree, path)))
+            node = new_node(kind, (), *_place_on(node_in_world(tree, path)))
             return (AddPrimitive(number, world_space_path(tree, path), node),)
 
         self._restructure_later(f"add {kind}", number, command, middle)
 
-    def replace_node(self, make: Callable[[Node], Node], label: str) -> None:
+    def wrap_node(self, kind: str) -> None:
+        """Put the selected node under a new node of a kind with one operand, such as a warp."""
+        kind = checked_kind(kind).__name__
+
+        def wrapped(node: Node) -> Node:
+            low, high = node.bounds
+            return new_node(kind, (node,), size=float((high - low).max()))
+
+        self._replace_node(wrapped, f"put {self._selected_label} under {kind}")
+
+    def combine_operands(self, kind: str) -> None:
+        """Combine the operands of the selected node by a node of another kind."""
+        node = self.selected_node
+        if len(node.children) < 2:
+            raise InvalidEdit(f"select a node with two or more operands; a {type(node).__name__} has fewer")
+        self._replace_node(lambda node: new_node(kind, node.children), f"combine with {kind}")
+
+    def unwrap_node(self) -> None:
+        """Replace the selected node by its only operand."""
+        node = self.selected_node
+        if len(node.children) != 1:
+            raise InvalidEdit(
+                f"select a node with one operand; a {type(node).__name__} has {len(node.children)}"
+            )
+        self._replace_node(lambda node: node.children[0], f"remove {self._selected_label}")
+
+    @property
+    def _selected_label(self) -> str:
+        """Name of the selected node, else of its class."""
+        node = self.selected_node
+        assert self._state.primitive is not None
+        number, path = self._state.primitive
+        item = self._state.session.document.objects[number]
+        assert isinstance(item, TreeObject)
+        return item.names.get(path, type(node).__name__)
+
+    def _replace_node(self, make: Callable[[Node], Node], label: str) -> None:
         """Put what a function returns for the selected node in its place, and select it.
 
         The function runs in the background.

@@ -11,17 +11,17 @@ import pytest
 from blobtree import Node, Point, Polygon, Twist, define_falloff
 from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.nodes.parameters import parameters_of
-from decals.apps.sandbox import catalog
 from decals.apps.sandbox.controls import controls_of, hex_color, parsed
+from decals.editing import new_nodes
 from decals.errors import InvalidEdit
 
 BALL = Point((1, 2, 3), radius=0.5, color=(1.0, 0.5, 0.0))
 OPERANDS = BALL, Point((1.4, 2, 3), radius=0.4), Point((1, 2.4, 3), radius=0.4)
-KINDS = list(catalog.built_in_kinds())
+KINDS = list(new_nodes.built_in_kinds())
 
 
 def made(name: str) -> Node:
-    return catalog.new_node(name, OPERANDS[: catalog.operand_range(catalog.kinds()[name])[0]])
+    return new_nodes.new_node(name, OPERANDS[: new_nodes.operand_range(new_nodes.kinds()[name])[0]])
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -93,7 +93,7 @@ def test_what_a_page_sends_is_parsed() -> None:
     assert parsed(BALL, "radius", "0.75") == 0.75
     assert parsed(BALL, "width", "") is None
     assert parsed(square, "points", [["0", 1, "2.5"]]) == ((0.0, 1.0, 2.5),)
-    assert parsed(catalog.new_node("Noise"), "seed", "7.0") == 7
+    assert parsed(new_nodes.new_node("Noise"), "seed", "7.0") == 7
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_what_a_page_sends_is_parsed() -> None:
         (BALL, "centre", 1),
         (BALL, 7, 1),
         (Twist(BALL, 20.0), "radius", 1),
-        (catalog.new_node("Noise"), "seed", "inf"),
+        (new_nodes.new_node("Noise"), "seed", "inf"),
     ],
 )
 def test_wrong_values_are_refused(node: Node, name: Any, raw: Any) -> None:

@@ -1,46 +1,46 @@
-"""New nodes of the sandbox: every class gives one with a surface, or is left out for a stated reason."""
+"""New nodes: every class gives one with a surface, or is left out for a stated reason."""
 
 import numpy as np
 import pytest
 
 from blobtree import InvalidNode, Node, Point
 from blobtree.nodes.kinds import NODE_KINDS
-from decals.apps.sandbox import catalog
+from decals.editing import new_nodes
 from decals.errors import InvalidEdit
 from tests.blobtree.custom_kinds import Ring, Soft
 
 OPERANDS = Point((0, 0, 0), radius=0.5), Point((0.5, 0, 0), radius=0.4), Point((0, 0.5, 0), radius=0.4)
-KINDS = [*catalog.built_in_kinds(), "Ring", "Soft"]
+KINDS = [*new_nodes.built_in_kinds(), "Ring", "Soft"]
 
 
 def test_every_built_in_class_is_offered_once() -> None:
-    families = [*catalog.families().values()]
+    families = [*new_nodes.families().values()]
     names = [name for family in families for name in family]
     assert len(names) == len(set(names))
-    left_out = {NODE_KINDS[tag].__name__ for tag in catalog.NOT_OFFERED}
+    left_out = {NODE_KINDS[tag].__name__ for tag in new_nodes.NOT_OFFERED}
     assert {kind.__name__ for kind in NODE_KINDS.values()} - left_out <= set(names)
 
 
 @pytest.mark.slow_cases("GradientBlend")
 @pytest.mark.parametrize("name", KINDS)
 def test_a_new_node_has_a_surface(name: str) -> None:
-    count = catalog.operand_range(catalog.kinds()[name])[0]
-    low, high = catalog.new_node(name, OPERANDS[:count]).bounds
+    count = new_nodes.operand_range(new_nodes.kinds()[name])[0]
+    low, high = new_nodes.new_node(name, OPERANDS[:count]).bounds
     assert (high > low).all()
 
 
 @pytest.mark.parametrize("name", ["Point", "Torus", "Polygon", "Cylinder", "Ellipsoid"])
 def test_a_new_primitive_stands_where_it_is_wanted(name: str) -> None:
     center = np.array([4.0, -2.0, 7.0])
-    low, high = catalog.new_node(name, center=center, size=3.0).bounds
+    low, high = new_nodes.new_node(name, center=center, size=3.0).bounds
     np.testing.assert_allclose((low + high) / 2, center, atol=1.0)
     assert 1.0 < (high - low).max() < 8.0
 
 
 def test_custom_kinds_are_offered() -> None:
-    assert Ring.__name__ in catalog.families()["primitives"]
-    assert Soft.__name__ in catalog.families()["combinations"]
-    ring: Node = catalog.new_node("Ring")
+    assert Ring.__name__ in new_nodes.families()["primitives"]
+    assert Soft.__name__ in new_nodes.families()["combinations"]
+    ring: Node = new_nodes.new_node("Ring")
     assert isinstance(ring, Ring)
 
 
@@ -49,4 +49,4 @@ def test_custom_kinds_are_offered() -> None:
 )
 def test_wrong_kinds_and_operands_are_refused(name: str, count: int) -> None:
     with pytest.raises((InvalidEdit, InvalidNode)):
-        catalog.new_node(name, OPERANDS[:count])
+        new_nodes.new_node(name, OPERANDS[:count])

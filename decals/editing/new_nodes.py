@@ -1,6 +1,6 @@
 """New nodes for a scene: primitives of every kind, and what can stand above a node.
 
-Values follow from the declarations of the classes, so a new class is in the catalog at once.
+Values follow from the declarations of the classes, so a new class can be added at once.
 """
 
 import itertools
@@ -90,7 +90,7 @@ def _operand_fields(kind: type[Node]) -> dict[str, bool]:
 
 
 def families() -> dict[str, list[str]]:
-    """Return the names of all classes in the order of the catalog, by what they are.
+    """Return the names of all classes in the order of `kinds`, by their number of operands.
 
     "primitives" have no operands, "modifiers" (warps, offsets, shells) have one, "combinations" more.
     """
@@ -102,7 +102,7 @@ def families() -> dict[str, list[str]]:
 
 
 def new_node(
-    name: str, operands: tuple[Node, ...] = (), *, center: Float64Array | None = None, size: float = 1.0
+    name: str, operands: tuple[Node, ...] = (), center: Float64Array | None = None, size: float = 1.0
 ) -> Node:
     """Return a node of a class with natural values.
 
