@@ -75,7 +75,7 @@ def event(
 
     @wraps(method)
     def reported(sandbox: "Sandbox", /, *arguments: Arguments.args, **options: Arguments.kwargs) -> None:
-        sandbox.attempt(lambda: method(sandbox, *arguments, **options))
+        sandbox.attempt(partial(method, sandbox, *arguments, **options))
 
     return reported
 
@@ -104,6 +104,11 @@ class Sandbox:
         True while the page shows a lesson.
     schedule
         Asks for a call of `take_step` before the next frame. Default: it is called at once.
+    add, wrap, combine, unwrap
+        Events that add a primitive of a kind, put the selected node under another one, combine its operands
+        in another way, and replace it by its only operand; see `TreeActions`.
+    go_to
+        Event that goes to an entry of the history; see `Actions.go_to`.
 
     Notes
     -----
@@ -124,6 +129,9 @@ class Sandbox:
         self._state, self._trees, self._files = actions.state, actions.trees, actions.files
         self._folder = (Path() if folder is None else folder).resolve()
         self.display = Display(window)
+        self.add, self.wrap = self._event(self._trees.add_node), self._event(self._trees.wrap_node)
+        self.combine = self._event(self._trees.combine_operands)
+        self.unwrap, self.go_to = self._event(self._trees.unwrap_node), self._event(actions.go_to)
         window.overlay.hide_status()  # the page has its own, and handles
         window.handle.visible = False
         window.redraw(whole=True)
@@ -381,26 +389,6 @@ class Sandbox:
         """Drag a handle of the selected node; see `Display.drag_handle`."""
         self.slide(lambda: self.display.drag_handle(name, phase, x, y, snap=bool(snap)), last=phase != "move")
 
-    @event
-    def add(self, kind: str) -> None:
-        """Add a primitive of a kind: blended to the selected node, or as an object."""
-        self._trees.add_node(kind)
-
-    @event
-    def wrap(self, kind: str) -> None:
-        """Put the selected node under a new node with one operand, such as a warp."""
-        self._trees.wrap_node(kind)
-
-    @event
-    def combine(self, kind: str) -> None:
-        """Combine the operands of the selected node in another way."""
-        self._trees.combine_operands(kind)
-
-    @event
-    def unwrap(self) -> None:
-        """Replace the selected node by its only operand."""
-        self._trees.unwrap_node()
-
     def show_help(self, shown: bool) -> None:
         """Show or hide the list of all actions."""
         self._window.actions.help_page = int(bool(shown))
@@ -410,11 +398,6 @@ class Sandbox:
         """Carry out an action of the key table at the middle of the view."""
         width, height = self._window.plotter.window_size
         self._window.actions.perform(action, lambda: self._window.tools.at(width / 2, height / 2))
-
-    @event
-    def go_to(self, entry: int) -> None:
-        """Undo or redo until so many entries of the history are done."""
-        self._window.actions.go_to(entry)
 
     # -- files ------------------------------------------------------------------------------------------
 
@@ -661,6 +644,15 @@ class Sandbox:
     def change_row(self, key: str, change: str, value: Any = None) -> None:
         """Change what a row of the outline stands for; see `OutlineActions.change`."""
         self._window.actions.outline.change(key, change, value, self._marked)
+
+    def _event(self, action: Callable[Arguments, None]) -> Callable[Arguments, None]:
+        """Return an event that attempts an action of the window."""
+
+        @wraps(action)
+        def reported(*arguments: Arguments.args, **options: Arguments.kwargs) -> None:
+            self.attempt(partial(action, *arguments, **options))
+
+        return reported
 
     def attempt(self, request: Callable[[], None], *, whole: bool = True) -> None:
         """End the steps before a request, carry it out as `ActionState.attempt` does, and draw the result."""

@@ -1,6 +1,7 @@
 """View, decal panel and outline changes of the sandbox, without a browser."""
 
 import io
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -53,10 +54,12 @@ def sandbox(shared: EditWindow) -> Iterator[Sandbox]:
 def settle(sandbox: Sandbox, window: EditWindow) -> None:
     """Wait until the view shows what it should: one call installs what was made, the next begins new work."""
     finish(window)
-    idle = 0
+    idle, end = 0, time.monotonic() + 60.0
     while idle < 3:
         sandbox.settle()
         idle = 0 if sandbox.values()["display"]["busy"] else idle + 1
+        assert time.monotonic() < end
+        time.sleep(0.002)
 
 
 def picture(window: EditWindow) -> np.ndarray:

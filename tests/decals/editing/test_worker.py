@@ -7,6 +7,7 @@ import pytest
 
 from blobtree import device as launch
 from decals.editing.background import Job, Worker
+from tests.decals.editing.background import LONG
 
 
 def nothing() -> None:
@@ -19,18 +20,18 @@ def test_a_job_gives_its_outcome_and_tells_how_far_it_is() -> None:
     def work(tell: Any, stop: Any) -> Any:
         tell("thinking", 0.5)
         told.set()
-        assert go.wait(5)
+        assert go.wait(LONG)
         return nothing
 
     assert worker.poll() is None
     assert worker.start(Job("double", work))
-    assert told.wait(5)
+    assert told.wait(LONG)
     assert worker.busy
     assert worker.progress == ("thinking", 0.5)
     assert worker.poll() is None
     assert not worker.start(Job("another", work))
     go.set()
-    assert worker.poll(timeout=5) is nothing
+    assert worker.poll(timeout=LONG) is nothing
     assert not worker.busy
 
 
@@ -44,11 +45,11 @@ def test_a_cancelled_job_comes_to_nothing() -> None:
         return nothing
 
     worker.start(Job("endless", work))
-    assert begun.wait(5)
+    assert begun.wait(LONG)
     assert not worker.cancelling
     worker.cancel()
     assert worker.cancelling
-    assert worker.poll(timeout=5) is None
+    assert worker.poll(timeout=LONG) is None
     assert not worker.busy
     assert not worker.cancelling
 
@@ -61,7 +62,7 @@ def test_what_a_job_raises_is_raised_where_it_is_asked_for() -> None:
 
     worker.start(Job("fails", work))
     with pytest.raises(ValueError, match="no"):
-        worker.poll(timeout=5)
+        worker.poll(timeout=LONG)
     assert not worker.busy
 
 
@@ -74,6 +75,6 @@ def test_a_job_leaves_a_core_to_the_window(monkeypatch: pytest.MonkeyPatch) -> N
         return nothing
 
     worker.start(Job("count", work))
-    assert worker.poll(timeout=5) is nothing
+    assert worker.poll(timeout=LONG) is nothing
     assert seen == [3]
     assert launch._thread_count() == 4
