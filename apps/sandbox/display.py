@@ -33,8 +33,9 @@ OVERLAYS = "none", "contact lines", "owners", "stretch", "folds", "seeds"
 RESOLUTION = 96
 """Cells along the longest side of the meshes that modes and overlays use."""
 
-SCALE = {"n_labels": 2, "label_font_size": 16, "title_font_size": 18}
-"""How the scale of colours looks: numbers at its ends alone leave room for its title."""
+SCALE = {"n_labels": 0, "title_font_size": 16, "width": 0.4, "position_x": 0.02, "position_y": 0.02}
+SCALE |= {"color": "black", "background_color": "white", "fill": True}
+"""How the scale of colours looks: its title has the numbers of its ends, so all text is on its background."""
 
 LIFT = 0.003
 """Distance of overlays above the surface, in sizes of the scene, so that they are not hidden."""
@@ -257,7 +258,8 @@ class Display:
         subplot.drawn_objects = drawn
         for name in self._names:
             plotter.remove_actor(name, render=False, reset_camera=False)
-        plotter.scalar_bars.clear()
+        for title in [*plotter.scalar_bars.keys()]:
+            plotter.remove_scalar_bar(title, render=False)
         self._names, self.message = [name for name, _, _ in shown], message
         replaced = bool(shown) and options.replaces_scene
         subplot.actor.SetVisibility(not replaced)
@@ -265,7 +267,9 @@ class Display:
             subplot.status, self._window.warmup.status = FrameStatus.EMPTY, ""
         for name, data, given in shown:
             shown_as = {"pickable": False, "reset_camera": False, "render": False, **given}
-            plotter.add_mesh(data, name=name, scalar_bar_args=dict(SCALE), **shown_as)
+            low, high = given.get("clim", (0.0, 0.0))
+            title = f"{given.get('scalars')}, {low:.3g} to {high:.3g}".replace("-", "\N{MINUS SIGN}")
+            plotter.add_mesh(data, name=name, scalar_bar_args={**SCALE, "title": title}, **shown_as)
 
     # -- cameras ----------------------------------------------------------------------------------------
 
@@ -464,16 +468,15 @@ def _overlay(document: Document, mesh: pv.PolyData, overlay: str, lift: float) -
         options = {"color": LINE_COLOR, "point_size": 7, "render_points_as_spheres": True}
         return [(name, lifted, options)], f"{len(chosen)} seeds"
     triangles = mesh.regular_faces
-    faces = triangles.astype(np.int32)
-    samples = sample_surface(document, points, unit_rows(normals), faces)
-    above = points + lift * normals
+    faces, above, normals = triangles.astype(np.int32), points + lift * normals, unit_rows(normals)
     if overlay == "contact lines":
-        lines = contact_lines(above + lift * normals, faces, samples.owners)
+        lines = contact_lines(document, points, normals, faces, lift=lift)
         if not len(lines):
             return [], "no decals touch"
         cells = np.column_stack([np.full(len(lines), 2), np.arange(2 * len(lines)).reshape(-1, 2)])
         drawn = pv.PolyData(lines.reshape(-1, 3), lines=cells.ravel())
         return [(name, drawn, {"color": LINE_COLOR, "line_width": 3})], ""
+    samples = sample_surface(document, points, normals, faces)
     lifted = pv.PolyData.from_regular_faces(above, triangles)
     if overlay == "owners":
         colors = OWNER_COLORS[samples.owners % len(OWNER_COLORS)]

@@ -10,12 +10,16 @@ from decals.editing.document import Document
 from decals.field.evaluate import evaluate
 from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of
 from decals.field.walks import walks_for
+from decals.surfaces.surface import unit_rows
 
 INSIDE = 0.5
 """Distance of a rim from the middle of its image, in image coordinates."""
 
 MODES = "contact", "mapping", "stiffness"
 """Options of a drawing on which the samples depend."""
+
+CROSSING_STEPS = 5
+"""Halvings of an edge until the point at which the decal changes is known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +56,8 @@ def sample_surface(
     faces
         Triangles, counter-clockwise from outside, shape (m, 3).
     """
-    modes: dict[str, Any] = {name: getattr(document.drawing, name) for name in MODES}
-    modes["walks"] = walks_for(document.drawing.mapping, document.decals, document.objects)
-    samples = evaluate(document.decals, vertices, normals, **modes)
-    inside = np.linalg.norm(samples.uv - INSIDE, axis=1) <= INSIDE
-    owners = np.where(inside, samples.owner, -1).astype(np.int32)
+    modes = _modes(document)
+    owners = _owners(document, vertices, normals, modes)
     stretch, folds = np.full(len(faces), np.nan), np.zeros(len(faces), np.bool_)
     rows = np.flatnonzero((owners[faces] >= 0).all(axis=1) & (np.ptp(owners[faces], axis=1) == 0))
     if len(rows):
@@ -73,26 +74,68 @@ def sample_surface(
     return SurfaceSamples(owners, stretch, folds)
 
 
-def contact_lines(vertices: Float32Array, faces: Int32Array, owners: Int32Array) -> Float32Array:
-    """Return the lines between the decals of a mesh as segments, float32, shape (k, 2, 3).
+def _modes(document: Document) -> dict[str, Any]:
+    """Return the modes of a document's drawing, as `decals.evaluate` takes them."""
+    modes = {name: getattr(document.drawing, name) for name in MODES}
+    return modes | {"walks": walks_for(document.drawing.mapping, document.decals, document.objects)}
 
-    A triangle with vertices of two decals gets the segment between the middles of the edges that join them;
-    one with three decals gets three segments from its middle. Rims beside bare surface are no contact lines.
+
+def _owners(
+    document: Document, points: Float32Array, normals: Float32Array, modes: dict[str, Any]
+) -> Int32Array:
+    """Return the number of the decal that shows at each point; −1 where its image ends."""
+    samples = evaluate(document.decals, points, normals, **modes)
+    inside = np.linalg.norm(samples.uv - INSIDE, axis=1) <= INSIDE
+    return np.where(inside, samples.owner, -1).astype(np.int32)
+
+
+def contact_lines(
+    document: Document,
+    vertices: Float32Array,
+    normals: Float32Array,
+    faces: Int32Array,
+    *,
+    lift: float = 0.0,
+) -> Float32Array:
+    """Return the lines between the decals on a triangle mesh as segments, float32, shape (k, 2, 3).
+
+    A triangle with vertices of two decals gets the segment between the points of its edges at which the decal
+    changes; one with three decals gets three segments from the middle of these points. Rims beside bare
+    surface are no contact lines.
 
     Parameters
     ----------
-    vertices, faces
-        A triangle mesh, shapes (n, 3) and (m, 3).
-    owners
-        Decal of each vertex; −1 for none.
+    document, vertices, normals, faces
+        As for `sample_surface`.
+    lift
+        Distance of the lines above the mesh.
     """
-    numbers = owners[faces]
-    faces, numbers = faces[(numbers >= 0).all(axis=1)], numbers[(numbers >= 0).all(axis=1)]
-    points = vertices[faces].astype(np.float64)
-    middles = (points + np.roll(points, -1, axis=1)) / 2
-    crossed = numbers != np.roll(numbers, -1, axis=1)
+    modes = _modes(document)
+    owners = _owners(document, vertices, normals, modes)
+    faces = faces[(owners[faces] >= 0).all(axis=1)]
+    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1)
+    crossed = owners[edges[..., 0]] != owners[edges[..., 1]]
+    if not crossed.any():
+        return np.zeros((0, 2, 3), np.float32)
+    pairs, numbers = np.unique(edges[crossed], axis=0, return_inverse=True)
+    first, second = pairs.T
+
+    def between(rows: Float32Array, parts: Float64Array) -> Float32Array:
+        places: Float32Array = np.asarray(
+            rows[first] + parts[:, None] * (rows[second] - rows[first]), np.float32
+        )
+        return places
+
+    low, high = np.zeros(len(pairs)), np.ones(len(pairs))
+    for _ in range(CROSSING_STEPS):
+        middle = (low + high) / 2
+        facing = unit_rows(between(normals, middle))
+        same = _owners(document, between(vertices, middle), facing, modes) == owners[first]
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    points = np.zeros((*crossed.shape, 3))
+    points[crossed] = between(vertices + lift * normals, (low + high) / 2)[numbers.ravel()]
     two, three = crossed.sum(axis=1) == 2, crossed.all(axis=1)
-    ends = middles[two][crossed[two]].reshape(-1, 2, 3)
-    centers = np.broadcast_to(points[three].mean(axis=1)[:, None], (int(three.sum()), 3, 3))
-    spokes = np.stack([middles[three], centers], axis=2).reshape(-1, 2, 3)
+    ends = points[two][crossed[two]].reshape(-1, 2, 3)
+    centers = np.broadcast_to(points[three].mean(axis=1, keepdims=True), points[three].shape)
+    spokes = np.stack([points[three], centers], axis=2).reshape(-1, 2, 3)
     return np.concatenate([ends, spokes]).astype(np.float32)

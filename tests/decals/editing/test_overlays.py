@@ -46,10 +46,14 @@ def test_a_decal_alone_is_not_stretched() -> None:
 
 def test_two_decals_meet_on_their_bisector_and_stretch_there() -> None:
     vertices, normals, faces = plane()
-    samples = sample_surface(document([[-0.6125, 0, 0], [0.6125, 0, 0]]), vertices, normals, faces)
-    lines = contact_lines(vertices, faces, samples.owners)
+    two = document([[-0.6, 0, 0], [0.625, 0, 0]])
+    samples = sample_surface(two, vertices, normals, faces)
+    lines = contact_lines(two, vertices, normals, faces, lift=0.25)
     assert len(lines) > 20
-    np.testing.assert_allclose(lines[..., 0], 0.0, atol=0.05)  # the size of a square
+    inner = lines[np.abs(lines[..., 1]).max(axis=1) < 0.75]  # beside the ends, where the rims part
+    np.testing.assert_allclose(inner[..., 0], 0.0125, atol=0.05 / 2**5)  # squares have sides of 0.05
+    np.testing.assert_allclose(lines[..., 0], 0.0125, atol=0.05)
+    np.testing.assert_array_equal(lines[..., 2], 0.25)
     assert np.abs(lines[..., 1]).max() < np.sqrt(1 - 0.6125**2) + 0.05
     middles = vertices[faces].mean(axis=1)
     near = (np.abs(middles[:, 0]) < 0.1) & np.isfinite(samples.stretch)
@@ -57,7 +61,11 @@ def test_two_decals_meet_on_their_bisector_and_stretch_there() -> None:
 
 
 def test_three_decals_in_one_triangle_give_three_spokes() -> None:
-    corners, face = np.array([[0, 0, 0], [3, 0, 0], [0, 3, 0]], np.float32), np.array([[0, 1, 2]], np.int32)
-    lines = contact_lines(corners, face, np.array([4, 5, 6], np.int32))
-    np.testing.assert_allclose(lines[:, 1], [[1, 1, 0]] * 3)
-    assert len(contact_lines(corners, face, np.array([4, 4, -1], np.int32))) == 0
+    corners, face = np.array([[0, 0, 0], [2, 0, 0], [0, 2, 0]], np.float32), np.array([[0, 1, 2]], np.int32)
+    up = np.tile(np.array([0, 0, 1], np.float32), (3, 1))
+    lines = contact_lines(document([[-0.1, -0.1, 0], [1.9, 0, 0], [0, 1.9, 0]]), corners, up, face)
+    middle = lines[:, 0].mean(axis=0)
+    np.testing.assert_allclose(lines[:, 1], [middle] * 3, atol=1e-6)
+    bare = document([[0, 0, 0], [1.5, 0, 0]])  # the third corner has no decal
+    assert len(contact_lines(bare, corners, up, face)) == 0
+    assert len(contact_lines(document([[0, 0, 0]]), corners / np.float32(9), up, face)) == 0
