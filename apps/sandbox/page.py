@@ -328,7 +328,7 @@ class Page:
             for change, icon in ROW_CHANGES.items():
                 panels.icon_button(
                     icon,
-                    f"{change} what is selected",
+                    f"{change} the selection",
                     (self.sandbox.change_row, f"[selected, '{change}']"),
                     variant="text",
                 )

@@ -351,10 +351,10 @@ def build_options(sandbox: Sandbox) -> None:
 
 
 def _build_light(sandbox: Sandbox) -> None:
-    """Build what loads and removes the picture of all directions that lights the scene."""
+    """Build the inputs that load and remove the panorama that lights the scene."""
     take = f"utils.sandbox.take($event, '{LIGHT}')"
     with html.Div(dragover="$event.preventDefault()", drop=take, __events=["dragover", "drop"]):
-        html.Label("light from a picture of all directions; choose or drop one", classes="text-caption")
+        html.Label("light from a panorama: choose or drop a file", classes="text-caption")
         html.Input(type="file", accept=",".join(IMAGES), raw_attrs=named("'picture of light'"), change=take)
         present = "drawing.some(c => c.name.startsWith('environment.'))"
         vuetify3.VBtn("Remove this light", v_if=present, variant="tonal", click=sandbox.remove_light)

@@ -53,7 +53,7 @@ FIRST_IMAGES = ("scale",)
 """Images of a scene at the beginning."""
 
 LIGHT = "light"
-"""Key under which a page sends a picture of all directions."""
+"""Key under which a page sends a panorama, which lights the scene."""
 
 PLACE, PLACE_STEPS = re.compile(r"view (\d{1,5})/(\d{1,5})"), 10_000
 """Key of a place of the view, and steps across the view that it counts, from the lower left corner."""
@@ -547,7 +547,7 @@ class Sandbox:
         )
 
     def _take_light(self, picture: Any, file: object) -> None:
-        """Light the scene with a picture of all directions, which is kept in the folder."""
+        """Light the scene with a panorama, which is kept in the folder."""
         present, up = self._window.document.drawing.environment, self._window.actions.view.axes.up
         checked = Environment(picture, up=up) if present is None else replace(present, picture=picture)
         changed = replace(checked, picture=checked.picture.kept_at(keep_upload(file, self._folder)))
@@ -555,7 +555,7 @@ class Sandbox:
 
     @event
     def remove_light(self) -> None:
-        """Light the scene as without a picture of all directions."""
+        """Light the scene as without a panorama."""
         self._state.draw_with("remove environment", environment=None)
 
     def _add_object(self, item: SceneObject) -> None:

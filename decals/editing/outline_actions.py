@@ -123,7 +123,7 @@ class OutlineActions(WindowActions):
             case "image", "move":
                 target = Part.named(value)
                 if target.kind != "layer":
-                    raise InvalidEdit(f"an image can be moved onto a layer only, got {describe(value)}")
+                    raise InvalidEdit(f"move: expected the row of a layer, got {describe(value)}")
                 run(image_on_layer(document, number, target.number))
             case "object" | "node", "hide" | "lock":
                 for node in nodes:
@@ -142,7 +142,7 @@ class OutlineActions(WindowActions):
             case "node", "move":
                 target = Part.node(value)
                 if target.number != number:
-                    raise InvalidEdit("a node can be moved inside its own object only")
+                    raise InvalidEdit(f"move: expected a row of the same object, got {describe(value)}")
                 self._trees.select_node(number, path)
                 self._trees.move_node(target.path)
             case "object", "rename":
@@ -154,4 +154,4 @@ class OutlineActions(WindowActions):
                 name = unused_name(item.name, {other.name for other in document.objects}, " ")
                 run(AddObject(flagged(item, name=name)))
             case _:
-                raise InvalidEdit(f"change: {describe(change)} is none for {describe(key)}")
+                raise InvalidEdit(f"change: expected one that {describe(key)} has, got {describe(change)}")

@@ -70,7 +70,7 @@ class ViewActions(WindowActions):
         self._state.camera.look(parts @ self.axes.matrix, up)
 
     @Group.CAMERA.action(
-        "frame", "f", "Home", summary="show what is selected, or everything, as large as fits"
+        "frame", "f", "Home", summary="show the selection, or everything, as large as it fits"
     )
     def frame(self, _cursor: Cursor) -> None:
         """Show the selected decals or node, or the whole scene, as large as it fits."""

@@ -24,7 +24,7 @@ class VisibilityActions(WindowActions):
         """Return object and path of the selected node, else those of the object under the cursor."""
         return self._state.primitive or (require_pick(cursor).object, ())
 
-    @Group.SCENE.action("hide", "v", summary="hide what is selected, else the object")
+    @Group.SCENE.action("hide", "v", summary="hide the selection, else the object")
     def hide(self, cursor: Cursor) -> None:
         """Hide the selected decals or node, or the object under the cursor."""
         if self._state.selection:
@@ -51,7 +51,7 @@ class VisibilityActions(WindowActions):
         else:
             self.isolate_node(*self._subject(cursor))
 
-    @Group.SCENE.action("lock", "Shift+l", summary="lock what is selected, else the object; or unlock it")
+    @Group.SCENE.action("lock", "Shift+l", summary="lock the selection, else the object; or unlock it")
     def lock(self, cursor: Cursor) -> None:
         """Lock the layers of the selected decals, the selected node, or the object under the cursor."""
         if self._state.selection:
