@@ -1,20 +1,24 @@
 """Warp devices: start of Warp, launches on every core, and memory.
 
 Warp runs a CPU launch on one thread, but runs several launches at once. `launch` therefore divides the
-indices of a launch into slices, and runs these on a pool of threads.
+indices of a launch into slices, and runs these on a pool of threads. A slice of a kernel is as long as the
+kernel's former launches suggest.
 """
 
+import math
 import os
 import re
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import warp as wp
@@ -33,6 +37,9 @@ REPORTED_SLICES_PER_THREAD = 32
 
 MIN_SLICE = 256
 """Fewest indices of a slice."""
+
+MIN_SLICE_SECONDS = 2.5e-4
+"""Least processor time of a slice; its start takes about a fifth of that, and only one starts at a time."""
 
 PAGE_BYTES = 4096
 """Size of a page of memory on most machines."""
@@ -173,6 +180,27 @@ def _cached_pool(workers: int, leaves_core_free: bool) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(max_workers=workers, thread_name_prefix=name)
 
 
+_index_seconds: WeakKeyDictionary[wp.Kernel, float] = WeakKeyDictionary()
+"""Processor time per index of kernels that ran on the CPU, as far as it is known."""
+
+
+def _slice_count(kernel: wp.Kernel, count: int, *, reported: bool) -> int:
+    """Return the number of slices of a launch: many for all threads, but none that is too short.
+
+    A launch with reports is long work. It has the same slices every time, so that it reports as often.
+    """
+    most = -(-count // MIN_SLICE)
+    if reported:
+        return min(_thread_count() * REPORTED_SLICES_PER_THREAD, most)
+    worthwhile = count * _index_seconds.get(kernel, math.inf) / MIN_SLICE_SECONDS
+    return max(1, int(min(_thread_count() * SLICES_PER_THREAD, most, worthwhile)))
+
+
+def _note_cost(kernel: wp.Kernel, index_seconds: float) -> None:
+    """Keep the cost of an index; it falls by half at most, since the next indices may cost more again."""
+    _index_seconds[kernel] = max(index_seconds, _index_seconds.get(kernel, 0.0) / 2.0)
+
+
 def launch(
     kernel: wp.Kernel,
     count: int,
@@ -194,20 +222,23 @@ def launch(
     if not wp.get_device(device).is_cpu:
         wp.launch(kernel, dim=count, inputs=[0, *inputs], outputs=[*outputs], device=device)
         return
-    per_thread = SLICES_PER_THREAD if step is None else REPORTED_SLICES_PER_THREAD
-    slices = min(_thread_count() * per_thread, -(-count // MIN_SLICE))
+    slices = _slice_count(kernel, count, reported=step is not None)
     bounds = [count * i // slices for i in range(slices + 1)]
 
-    def run(first: int, last: int) -> None:
+    def run(first: int, last: int) -> float:
+        began = time.thread_time()
         wp.launch(kernel, dim=last - first, inputs=[first, *inputs], outputs=[*outputs], device=device)
+        return time.thread_time() - began
 
     if slices == 1:
-        run(0, count)
+        _note_cost(kernel, run(0, count) / count)
         return
-    results = _thread_pool().map(run, bounds[:-1], bounds[1:])
-    for number, _ in enumerate(results, 1):
+    seconds = 0.0
+    for number, taken in enumerate(_thread_pool().map(run, bounds[:-1], bounds[1:]), 1):
+        seconds += taken
         if step is not None:
             step(number / slices)
+    _note_cost(kernel, seconds / count)
 
 
 # -- memory ---------------------------------------------------------------------------------------------

@@ -1,11 +1,13 @@
 """Arrays of any size, and the number of threads of launches."""
 
 from threading import Thread
+from typing import Any
 
 import numpy as np
 import pytest
 
 import blobtree.device as blobtree_launch
+from blobtree.cells.scan import arange
 from blobtree.device import core_left_free, prefaulted_array
 
 
@@ -41,3 +43,35 @@ def test_the_only_core_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(blobtree_launch, "_core_count", lambda: 1)
     with core_left_free():
         assert blobtree_launch._thread_count() == 1
+
+
+class _Kernel:
+    """Stands for a kernel whose cost is given."""
+
+
+def test_slices_are_as_long_as_former_launches_of_a_kernel_suggest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(blobtree_launch, "_core_count", lambda: 4)
+    kernel: Any = _Kernel()
+
+    def slices(index_seconds: float | None) -> int:
+        if index_seconds is not None:
+            blobtree_launch._note_cost(kernel, index_seconds)
+        return blobtree_launch._slice_count(kernel, 100_000, reported=False)
+
+    assert slices(None) == 16, "four per thread while the cost is not known"
+    assert slices(1e-8) == 4, "a thousandth of a second is four slices"
+    assert [slices(0.0), slices(0.0), slices(0.0)] == [2, 1, 1], "the cost falls by half at most"
+    assert slices(1e-4) == 16
+    assert blobtree_launch._slice_count(kernel, 300, reported=False) == 2, "256 indices or more are a slice"
+    blobtree_launch._index_seconds[kernel] = 0.0
+    assert blobtree_launch._slice_count(kernel, 100_000, reported=True) == 128, "reports come as often"
+
+
+@pytest.mark.parametrize("slices", [1, 7])
+def test_a_launch_reaches_every_index_and_notes_the_cost(
+    slices: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(blobtree_launch, "_slice_count", lambda *_, **__: slices)
+    monkeypatch.setattr(blobtree_launch, "_index_seconds", noted := {})
+    assert np.array_equal(arange(10_000, "cpu").numpy(), np.arange(10_000))
+    assert [0.0 < cost < 1e-3 for cost in noted.values()] == [True]
