@@ -33,7 +33,13 @@ OVERLAYS = "none", "contact lines", "owners", "stretch", "folds", "seeds"
 RESOLUTION = 96
 """Cells along the longest side of the meshes that modes and overlays use."""
 
-SCALE = {"n_labels": 0, "title_font_size": 16, "width": 0.4, "position_x": 0.02, "position_y": 0.02}
+SCALE: dict[str, Any] = {
+    "n_labels": 0,
+    "title_font_size": 16,
+    "width": 0.4,
+    "position_x": 0.02,
+    "position_y": 0.02,
+}
 SCALE |= {"color": "black", "background_color": "white", "fill": True}
 """How the scale of colours looks: its title has the numbers of its ends, so all text is on its background."""
 

@@ -72,6 +72,7 @@ def test_a_launch_reaches_every_index_and_notes_the_cost(
     slices: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(blobtree_launch, "_slice_count", lambda *_, **__: slices)
-    monkeypatch.setattr(blobtree_launch, "_index_seconds", noted := {})
+    noted: dict[Any, float] = {}
+    monkeypatch.setattr(blobtree_launch, "_index_seconds", noted)
     assert np.array_equal(arange(10_000, "cpu").numpy(), np.arange(10_000))
     assert [0.0 < cost < 1e-3 for cost in noted.values()] == [True]
