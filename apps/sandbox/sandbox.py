@@ -21,7 +21,7 @@ from decals.apps.models.samples import SAMPLES, axes_of, sample, sample_mesh
 from decals.apps.models.scenes import empty_scene, new_file
 from decals.apps.sandbox import decal_panel
 from decals.apps.sandbox.controls import controls_of, exchanged, parsed, parsed_option
-from decals.apps.sandbox.display import PHASES, Display, DisplayOptions
+from decals.apps.sandbox.display import PHASES, Display
 from decals.apps.sandbox.folder import HDR, MODELS, keep_upload, listed, plain_name, read_upload
 from decals.apps.sandbox.outline import outline
 from decals.apps.views import THREE_QUARTER
@@ -45,6 +45,7 @@ from decals.scenes.scene import DecalImage, Scene
 from decals.validation import describe, finite_number, one_of, whole_number
 from decals.window import EditWindow
 from decals.window.host_plotter import show_background
+from decals.window.view_modes import DisplayOptions
 
 REST_SECONDS = 1.0
 """A slider that rests so long has ended its edit: one moved by keys does not tell its end."""

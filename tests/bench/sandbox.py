@@ -25,10 +25,10 @@ from trame.app import get_server
 
 import decals
 from blobtree import Point
-from decals.apps.sandbox.display import MODES
 from decals.apps.sandbox.page import Page as SandboxPage
 from decals.window import EditWindow
 from decals.window.host_plotter import new_plotter
+from decals.window.view_modes import MODES
 from tests.decals.window.driver import Driver
 
 if TYPE_CHECKING:

@@ -15,7 +15,6 @@ from blobtree import Point, Transform
 from blobtree.nodes.paths import node_at
 from blobtree.nodes.surgery import move_branch
 from decals.apps.sandbox.decal_panel import drawing_controls
-from decals.apps.sandbox.display import MODES, OVERLAYS
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing.commands import AddImage, ReplaceImage, SetDrawing
 from decals.field.mapping import ImageMapping
@@ -26,6 +25,7 @@ from decals.scenes.camera import PRESETS
 from decals.scenes.objects import MeshObject
 from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of
+from decals.window.view_modes import MODES, OVERLAYS
 from tests.apps.sandbox.test_sandbox import TREE, finish
 from tests.decals.editing.scenes import box, digest, tree_of
 

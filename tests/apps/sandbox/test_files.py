@@ -16,7 +16,6 @@ import blobtree
 import decals
 from blobtree import Point, Segment
 from decals.apps.models.samples import SAMPLES, sample
-from decals.apps.sandbox.display import DisplayOptions
 from decals.apps.sandbox.folder import listed, read_upload, thumbnails
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing.commands import ScaleDecals
@@ -27,6 +26,7 @@ from decals.scenes.meshes import write_mesh
 from decals.scenes.objects import MeshObject
 from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of
+from decals.window.view_modes import DisplayOptions
 from tests.apps.sandbox.test_sandbox import covered, finish
 from tests.decals.editing.scenes import box
 
