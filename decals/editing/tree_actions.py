@@ -156,10 +156,13 @@ class TreeActions(WindowActions):
         return pick.object, path_of(tree, seen)
 
     def _tree(self, number: int) -> Node:
+        return self._item(number).tree
+
+    def _item(self, number: int) -> TreeObject:
         item = self._state.session.document.object(number)
         if not isinstance(item, TreeObject):
             raise InvalidEdit(f"{item.name!r} is a mesh and has no primitives; point at a BlobTree")
-        return item.tree
+        return item
 
     def _middle(self, number: int, path: Path) -> Float32Array:
         """Return the middle of a primitive's box, which moves with the primitive."""
@@ -287,7 +290,11 @@ class TreeActions(WindowActions):
     @property
     def selected_node(self) -> Node:
         """The node that is selected; `InvalidEdit` if none is."""
-        return self.follow_selected().find(self._state.session.document)[2]
+        return self._selected()[2]
+
+    def _selected(self) -> tuple[int, Path, Node]:
+        """Return object, path and node of the selected node; raise `InvalidEdit` if none is."""
+        return self.follow_selected().find(self._state.session.document)
 
     def follow_selected(self) -> FollowedNode:
         """Return the selected node, if any, to be found after edits that select another one."""
@@ -385,21 +392,15 @@ class TreeActions(WindowActions):
     @property
     def _selected_label(self) -> str:
         """Name of the selected node, else of its class."""
-        node = self.selected_node
-        assert self._state.primitive is not None
-        number, path = self._state.primitive
-        item = self._state.session.document.objects[number]
-        assert isinstance(item, TreeObject)
-        return item.names.get(path, type(node).__name__)
+        number, path, node = self._selected()
+        return self._item(number).names.get(path, type(node).__name__)
 
     def _replace_node(self, make: Callable[[Node], Node], label: str) -> None:
         """Put what a function returns for the selected node in its place, and select it.
 
         The function runs in the background.
         """
-        self.selected_node  # noqa: B018  # raises without a selected node
-        assert self._state.primitive is not None
-        number, path = self._state.primitive
+        number, path, _ = self._selected()
 
         def command(tree: Node) -> tuple[StructureCommand, ...]:
             return (ReplaceNode(number, path, make(node_at(tree, path)), label),)
@@ -408,9 +409,8 @@ class TreeActions(WindowActions):
 
     def move_node(self, target: Path) -> None:
         """Move the selected node to another place in its tree, and keep it selected; see `MoveBranch`."""
-        self.selected_node  # noqa: B018  # raises without a selected node
-        assert self._state.primitive is not None
-        self._restructure(MoveBranch(*self._state.primitive, target))
+        number, path, _ = self._selected()
+        self._restructure(MoveBranch(number, path, target))
 
     def group_nodes(self, number: int, paths: Sequence[Path]) -> None:
         """Put operands of one combination of an object under a group, and select it; see `GroupOperands`."""
@@ -427,9 +427,8 @@ class TreeActions(WindowActions):
         def step(session: EditSession) -> str:
             with session.stroke(RemovePrimitive.label):
                 for node in nodes:
-                    item = session.document.objects[number]
-                    assert isinstance(item, TreeObject)
-                    session.do(RemovePrimitive(number, path_of(item.tree, node)))
+                    tree = RemovePrimitive(number, ()).tree(session.document)
+                    session.do(RemovePrimitive(number, path_of(tree, node)))
             return RemovePrimitive.label
 
         self._state.background.edit(RemovePrimitive.label, step)
@@ -522,11 +521,10 @@ class TreeActions(WindowActions):
 
     def duplicate_selected(self) -> None:
         """Add a copy of the selected primitive, to the right of it as seen."""
-        assert self._state.primitive is not None
+        number, path, _ = self._selected()
         eye, target = (np.asarray(point, np.float64) for point in self._state.camera.eye_and_target())
         toward = eye - target
         aside = np.cross(toward, np.eye(3)[np.abs(toward).argmin()])
-        number, path = self._state.primitive
         distance = _thickness(node_in_world(self._tree(number), path))
         self._restructure(DuplicatePrimitive(number, path, distance * unit_rows(aside[None])[0]))
 
@@ -537,8 +535,8 @@ class TreeActions(WindowActions):
 
     def delete_selected(self) -> None:
         """Remove the selected primitive."""
-        assert self._state.primitive is not None
-        self._restructure(RemovePrimitive(*self._state.primitive))
+        number, path, _ = self._selected()
+        self._restructure(RemovePrimitive(number, path))
 
     def _restructure(self, *commands: StructureCommand, handle_offset: Float32Array | None = None) -> None:
         """Carry out the first command that leaves a visible surface, and select its primitive."""
