@@ -24,8 +24,12 @@ DEFAULTS = {
     "VCheckbox": COMPACT,
     "VTextField": OUTLINED,
     "VSelect": OUTLINED,
+    "VMenu": {"transition": False},
 }
-"""How elements look unless they say otherwise."""
+"""How elements look unless they say otherwise.
+
+Menus do not grow when they open: the list of a `VSelect` in one would change its width while it measures it.
+"""
 
 TILE_WIDTH = 120
 """Width of a sample on the start page, in pixels: six fit beside each other."""

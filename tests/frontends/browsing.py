@@ -20,6 +20,9 @@ PICTURE = "canvas, img.image-display-area"
 """Where trame's views show what they get."""
 ABOVE = "svg, .brush { visibility: hidden !important }"
 """Hides the orientation cube, handles and the circle of the brush."""
+ERRORS = """window.pageErrors = [];
+window.addEventListener('error', event => window.pageErrors.push(event.message));"""
+"""Collects the errors that a page shows in its console, also those of observers."""
 LOSS = 2.0
 """Levels of 255 in the mean that JPEG may take away."""
 
@@ -31,16 +34,19 @@ def browser_path() -> str | None:
 
 @asynccontextmanager
 async def opened(url: str, *, size: tuple[int, int] = SIZE) -> AsyncIterator[Page]:
-    """A page in a browser without a screen."""
+    """A page in a browser without a screen, which must end without an error."""
     async with async_playwright() as player:
         browser = await player.chromium.launch(
             executable_path=browser_path(), args=["--no-sandbox", "--disable-gpu"]
         )
         page = await browser.new_page(viewport={"width": size[0], "height": size[1]})
         page.set_default_timeout(1000 * PATIENCE)
+        await page.add_init_script(ERRORS)
         await page.goto(url)
         await page.wait_for_selector(PICTURE)
         yield page
+        errors = await page.evaluate("window.pageErrors")
+        assert errors == [], errors
         await browser.close()
 
 
