@@ -33,7 +33,7 @@ from decals.apps.sandbox.page import Page as SandboxPage
 from decals.editing.scatter_commands import decals_on
 from decals.scenes.camera import UPRIGHT
 from decals.window import EditWindow, notebook
-from tests.apps.lab.answers import ANSWERS
+from tests.apps.lab.answers import ANSWERS, STEP
 from tests.decals.editing.scenes import digest, scene, tree_of
 from tests.decals.vtk.scenes import both
 from tests.decals.window.driver import Driver
@@ -538,19 +538,11 @@ async def lab(picture: str | None = None) -> None:
             await choose(browser, "lesson", lab_page.lab.values()["lab_titles"][number]["title"])
             await until(partial(shows_lesson, lab_page, number))
             for attempt in attempts:
-                for name, value in attempt.settings:
-                    sliders = lab_page.lab.values()["lab_sliders"]
-                    label = next(s["name"] for s in sliders if s["name"].startswith(name))
-                    if isinstance(value, str):
-                        await choose(browser, label, value)
-                        continue
-                    field = browser.get_by_role("textbox", name=label, exact=True)
-                    await field.fill(str(value))
-                    await field.press("Enter")
-                await until(lambda: not lab_page.lab.busy)
-                await browser.get_by_role("button", name="Check the answer").click()
+                await answer(browser, lab_page, *attempt.settings)
                 kind = "success" if attempt.right else "warning"
                 await browser.locator(f".v-alert.text-{kind}").get_by_text(attempt.words).wait_for()
+            if not attempts[-1].right:
+                await find_step(browser, lab_page)
             lowest = browser.get_by_label(lab_page.lab.values()["lab_sliders"][-1]["label"], exact=True).last
             box = await lowest.bounding_box()
             assert box is not None
@@ -563,6 +555,36 @@ async def lab(picture: str | None = None) -> None:
                 image.resize((960, 600), Image.Resampling.LANCZOS).save(picture, quality=80, optimize=True)
         assert all("127.0.0.1" in url or url.startswith("data:") for url in requests)
     window.close()
+
+
+async def answer(browser: Page, lab_page: LabPage, *settings: tuple[str, float | str]) -> None:
+    """Move controls of a lesson, named by the beginning of their label, and check the answer."""
+    for name, value in settings:
+        sliders = lab_page.lab.values()["lab_sliders"]
+        label = next(s["name"] for s in sliders if s["name"].startswith(name))
+        if isinstance(value, str):
+            await choose(browser, label, value)
+            continue
+        field = browser.get_by_role("textbox", name=label, exact=True)
+        await field.fill(str(value))
+        await field.press("Enter")
+    await until(lambda: not lab_page.lab.busy)
+    await browser.get_by_role("button", name="Check the answer").click()
+
+
+async def find_step(browser: Page, lab_page: LabPage) -> None:
+    """Find the first even step by what the verdict says: go back, or move further."""
+    low, high = 1, 60
+    while high - low > 1:
+        middle = (low + high) // 2
+        await answer(browser, lab_page, (STEP, middle))
+        verdict = browser.locator(".v-alert").get_by_text(re.compile(rf"after step {middle} ", re.IGNORECASE))
+        text = await verdict.inner_text()
+        if text.startswith("Right"):
+            return
+        low, high = (low, middle) if "Go back" in text else (middle, high)
+    await answer(browser, lab_page, (STEP, high))
+    await browser.locator(".v-alert.text-success").get_by_text(f"after step {high} ").wait_for()
 
 
 def shows_lesson(lab_page: LabPage, number: int) -> bool:
