@@ -165,7 +165,8 @@ class FileActions(WindowActions):
             raise InvalidEdit("the scene has no object to export; press N to add one")
 
         def accept(text: str, repeated: bool) -> None:
-            self.write(text, repeated, suffixes=MESH_SUFFIXES)
+            _refuse_to_replace(self._checked_path(text, MESH_SUFFIXES), repeated)
+            self.write(text, True, suffixes=MESH_SUFFIXES)
 
         first = Path(self.path or UNTITLED).with_suffix(MESH_SUFFIXES[0])
         self._state.prompt.begin(TextPrompt(f"export to ({', '.join(MESH_SUFFIXES)})", str(first), accept))
@@ -198,8 +199,8 @@ class FileActions(WindowActions):
         """
         path, shows = self._checked_path(text, suffixes), member("video", video, Video, InvalidEdit)
         own = self._exists and self.path is not None and path.absolute() == Path(self.path).absolute()
-        if not own:
-            _refuse_to_replace(path, replace)
+        if path.exists() and not (own or replace):
+            raise InvalidEdit(f"{path} exists; choose to replace it, or give another name")
         suffix = path.suffix.lower()
         if suffix == ".json":
             self._save_to(path)

@@ -105,6 +105,17 @@ def test_export_writes_all_objects(typist: Typist, tmp_path: Path, suffix: str) 
     assert typist.state.session.labels == ()
 
 
+def test_an_export_replaces_a_file_after_a_second_return_only(typist: Typist, tmp_path: Path) -> None:
+    path = tmp_path / "mesh.ply"
+    path.write_text("precious")
+    typist.key("e", ctrl=True)
+    typist.enter(str(path))
+    assert "exists; press Return again" in typist.state.message
+    assert path.read_text() == "precious"
+    typist.key("Return")
+    assert pv.read(path).n_points > 100
+
+
 def test_exported_objects_keep_their_colours(typist: Typist, tmp_path: Path) -> None:
     typist.key("e", ctrl=True)
     typist.enter(f"{tmp_path}/mesh.ply")
@@ -247,7 +258,7 @@ def test_the_suffix_is_the_format(name: str, tmp_path: Path) -> None:
     actions.files.folder = tmp_path
     actions.files.write(name, False)
     assert (tmp_path / name).stat().st_size > 100
-    with pytest.raises(InvalidEdit, match="exists"):
+    with pytest.raises(InvalidEdit, match="exists; choose to replace it, or give another name"):
         actions.files.write(name, False)
     actions.files.write(name, True)
     actions.files.write("copy.json", False)
