@@ -48,7 +48,7 @@ WINDOW_SIZE = 1280, 800
 """Width and height of a window of its own, in pixels."""
 
 FIRST_SIZE = (700, 700)
-"""Width and height of the view in pixels until the page tells its own."""
+"""Width and height of the view in pixels until the page sends its own."""
 
 
 def sandbox(
@@ -147,7 +147,7 @@ def sandbox(
             if done or session:
                 ready.add(lambda **_: print(_url(host, server.port, ""), flush=True))
             query = _protect(server, host)
-            own_browser = browser and bool(query)  # trame's knows no token
+            own_browser = browser and bool(query)  # trame opens it without the token
             if session:
                 ready.add(lambda **_: threading.Thread(target=_end_with_input, daemon=True).start())
             else:

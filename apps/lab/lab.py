@@ -1,7 +1,7 @@
 """The state of the contact lab, and the events that its page sends.
 
 The lab runs on an edit window like the sandbox. Values and plots are computed in a thread from immutable
-values, so that the page never waits for them.
+values, so that they never block the page.
 """
 
 from collections.abc import Sequence

@@ -41,7 +41,7 @@ Range = tuple[float, float]
 
 
 class Slider(Struct, forbid_unknown_fields=True, frozen=True):
-    """A slider, or a choice, of one parameter of the scene; `Lab` knows the paths."""
+    """A slider, or a choice, of one parameter of the scene, see `bindings` for its path."""
 
     label: str
     path: str

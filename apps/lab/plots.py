@@ -24,7 +24,7 @@ SAMPLES = 401
 """Samples of a curve."""
 
 COLORS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
-"""Colours that people with colour-blindness tell apart, after Okabe and Ito."""
+"""Colours that differ for people with colour-blindness, too, after Okabe and Ito."""
 
 DASHES = ("", "6 3", "2 2", "8 3 2 3", "1 3", "10 4")
 SCALE = np.array(

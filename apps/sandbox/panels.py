@@ -56,7 +56,7 @@ CURVE = """<svg viewBox="-0.02 -0.02 1.04 1.04" preserveAspectRatio="none"
 
 
 def named(expression: str) -> list[str]:
-    """Return the attribute that tells screen readers what an element is, from an expression of the page."""
+    """Return the attribute that names an element for screen readers, from an expression of the page."""
     return [f':aria-label="{expression}"']
 
 
@@ -100,7 +100,7 @@ def build_controls(source: str, event: Any, who: str, *, key: str = "c.name") ->
     who
         Arguments that identify the control ``c``, as expressions of the page.
     key
-        Expression that tells the control from those of another selection.
+        Expression that distinguishes the control from those of another selection.
     """
     with html.Div(v_for=f"c in {source}", key=key, title=("c.doc",), classes="mb-2"):
         html.Label(

@@ -1,4 +1,4 @@
-"""What a page of the sandbox shows and does: an edit window, seen as plain values.
+"""An edit window as plain values, which a page of the sandbox shows, and the events of that page.
 
 The page (`decals.apps.sandbox.page`) draws these values and sends its events here. All behaviour is in the
 window's session and its actions.
@@ -48,7 +48,7 @@ from decals.window.host_plotter import show_background
 from decals.window.view_modes import DisplayOptions
 
 REST_SECONDS = 1.0
-"""A slider that rests so long has ended its edit: one moved by keys does not tell its end."""
+"""A slider that rests so long has ended its edit: keys that move it send no end."""
 
 FIRST_IMAGES = ("scale",)
 """Images of a scene at the beginning."""
@@ -82,7 +82,7 @@ def event(
 
 
 class Sandbox:
-    """The state of a sandbox page, and the events that it understands.
+    """The state of a sandbox page, and its events.
 
     Parameters
     ----------

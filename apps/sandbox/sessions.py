@@ -1,6 +1,6 @@
 """One session for each browser: a process of its own, behind the address of one server.
 
-The server starts a process when a browser comes for the first time, and knows the browser by a cookie. It
+The server starts a process when a browser comes for the first time, and finds it by a cookie later. It
 passes requests and messages on, and ends processes without a browser.
 """
 
@@ -83,7 +83,7 @@ class Session:
 
     @property
     def megabytes(self) -> float:
-        """Memory of the process; 0 if the system does not tell."""
+        """Memory of the process; 0 if it is unknown."""
         try:
             pages = int(Path(f"/proc/{self._process.pid}/statm").read_text(encoding="ascii").split()[1])
         except (OSError, IndexError):

@@ -23,7 +23,7 @@ LIFT = 0.003
 OWNER_COLORS = np.array(
     [(230, 159, 0), (86, 180, 233), (0, 158, 115), (240, 228, 66), (0, 114, 178), (204, 121, 167)], np.uint8
 )
-"""Colours of owners in turn (Okabe and Ito's, which the colour-blind tell apart)."""
+"""Colours of owners in turn, after Okabe and Ito: they differ for people with colour-blindness, too."""
 
 NO_OWNER = (150, 150, 150)
 SHOWN_FIELD = 0.002
