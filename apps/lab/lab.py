@@ -6,7 +6,7 @@ values, so that they never block the page.
 
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -145,7 +145,7 @@ class Lab:
         step = slider.step or (slider.high - slider.low) / STEPS
         kind = "choice" if slider.choices else "number"
         control = Control(slider.label, kind, value, "", "", slider.low, slider.high, step, slider.choices)
-        return {"number": number, **asdict(control)}
+        return {"number": number, **vars(control)}
 
     def _read(self, path: str) -> Any:
         if path.startswith("probe."):

@@ -1,7 +1,7 @@
 """Controls of a panel, from the parameters that classes of nodes declare."""
 
 import re
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache
 from math import isfinite
 from typing import Any
@@ -88,7 +88,7 @@ def controls_of(node: Node, size: float) -> list[dict[str, Any]]:
         Size of the object, for the ends of sliders of lengths.
     """
     values = ((declared, getattr(node, name)) for name, declared in parameters_of(type(node)).items())
-    return [asdict(_control(declared, value, size)) for declared, value in values if value != {}]
+    return [vars(_control(declared, value, size)) for declared, value in values if value != {}]
 
 
 def _control(parameter: Parameter, value: Any, size: float) -> Control:
@@ -134,7 +134,7 @@ def option_control(
         low = high = 0.0
     step = 1.0 if option.kind is int else (high - low) / STEPS
     slider = values.unit, low, high, step, choices
-    return asdict(Control(option.name, kind, value, option.doc, *slider, label=values.label))
+    return vars(Control(option.name, kind, value, option.doc, *slider, label=values.label))
 
 
 def parsed_option(of: Any, name: Any, raw: Any) -> Any:

@@ -1,10 +1,10 @@
 """The orientation cube of the view: a click on a side, an edge or a corner looks from there."""
 
+from functools import lru_cache
 from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from blobtree._typing import Float64Array
 from decals.editing.view_actions import SIDE_KEYS
@@ -20,7 +20,8 @@ WORDS = (("bottom", "top"), 1), (("back", "front"), 2), (("left", "right"), 0)
 """Names of the directions against and along the axes to the right, upward and toward the front."""
 
 
-def cube_cells(axes: Axes, toward: ArrayLike, up: ArrayLike) -> list[dict[str, Any]]:
+@lru_cache(maxsize=1)  # the camera rests most of the time
+def cube_cells(axes: Axes, toward: tuple[float, ...], up: tuple[float, ...]) -> list[dict[str, Any]]:
     """Return the visible parts of the cube as polygons of an SVG, in which the cube is 2 wide.
 
     Each has a name, as `ViewActions.look_from` takes it, a title, its corners, and on the middle of a side

@@ -1,6 +1,6 @@
 """The panel of the selected decals, of the brush and of the contact modes."""
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -70,11 +70,11 @@ def decal_controls(document: Document, selection: tuple[int, ...]) -> list[dict[
         value = getattr(last, array)[0]
         if name == "image":
             controls.append(
-                asdict(Control(name, "choice", names[int(value) + 1], "image", choices=tuple(names)))
+                vars(Control(name, "choice", names[int(value) + 1], "image", choices=tuple(names)))
             )
         elif name == "receivers":
             choices, doc = tuple(receiver_choices(document, receivers)), described(Decals)[array]
-            controls.append(asdict(Control(name, "choice", receivers or ANY_OBJECT, doc, choices=choices)))
+            controls.append(vars(Control(name, "choice", receivers or ANY_OBJECT, doc, choices=choices)))
         else:
             ends = (reach / STEPS, reach) if name == "radius" else ()
             controls.append(option_control(replace(options[array], name=name), value.tolist(), *ends))
@@ -137,7 +137,7 @@ def brush_values(document: Document, brush: BrushSettings) -> dict[str, Any]:
     if brush.brush is Brush.SCATTER:
         names, doc = tuple(image_names(document)[1:]), described(BrushSettings)["images"]
         chosen = [names[image] for image in brush.images if image < len(names)] or list(names)
-        controls.append(asdict(Control("images", "choices", chosen, doc, choices=names)))
+        controls.append(vars(Control("images", "choices", chosen, doc, choices=names)))
     return {"brush": str(brush.brush), "controls": controls}
 
 

@@ -1,7 +1,7 @@
 """How the view shows the scene: its controls, handles and cameras."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -69,7 +69,7 @@ class Display:
     def values(self) -> dict[str, Any]:
         """Return plain values for a page."""
         return {
-            "controls": [asdict(control) for control, _ in self._options()],
+            "controls": [vars(control) for control, _ in self._options()],
             "bookmarks": [name for name, _ in self.bookmarks],
             "busy": self._worker.busy,
         }
@@ -255,7 +255,8 @@ class Display:
         """Return the orientation cube; see `cube_cells`."""
         eye, target = self._window.camera.eye_and_target()
         up = self._window.subplot.vtk_renderer.camera.up
-        return cube_cells(self._window.actions.view.axes, np.subtract(eye, target), up)
+        toward = tuple(np.subtract(eye, target).tolist())
+        return cube_cells(self._window.actions.view.axes, toward, tuple(up))
 
     def _brush_size(self) -> float:
         """Return the radius of the brush at the target, in heights of the view; 0 without one."""

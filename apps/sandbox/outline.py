@@ -1,7 +1,7 @@
 """The outline of a scene: objects, the nodes of their trees, layers and images, as rows of a list."""
 
 from base64 import b64encode
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -69,7 +69,7 @@ def outline(document: Document) -> list[dict[str, Any]]:
     for number, image in enumerate(document.images):
         name = Path(image.source).name
         rows.append(Row(f"image {number}", name, "image", 0, picture=picture(image)))
-    return [asdict(row) for row in rows]
+    return [vars(row) for row in rows]
 
 
 _pictures: WeakKeyDictionary[DecalImage, dict[int, str]] = WeakKeyDictionary()

@@ -85,7 +85,7 @@ def test_a_click_on_the_middle_of_the_cube_keeps_the_view(standing: str) -> None
             continue
         parts = np.sum([PRESETS[word] for word in name.split()], axis=0)
         up = axes.up if parts[[0, 2]].any() else -parts[1] * np.array(axes.front)
-        cells = cube_cells(axes, parts @ axes.matrix, up)
+        cells = cube_cells(axes, tuple(parts @ axes.matrix), tuple(up))
         assert {cell["name"] for cell in cells if middle(cell["points"])} == {name}
         assert max(abs(float(x)) for cell in cells for x in cell["points"].replace(",", " ").split()) < 1.8
         names |= {cell["name"] for cell in cells}
