@@ -178,7 +178,7 @@ def _commands(
         if number > 1:  # others have their own files
             known = names.get(number)
             path = names[number] = known or _unused(first, names.values())
-            if known is not None and _exists(known):
+            if known is not None and _exists(known) and not (options["lab"] or options["lessons"]):
                 opened, given = [str(known)], {**options, "decals": None, "image": None, "seed": None}
         given = {**given, "save": path, "port": 0, "no_browser": True, "session": True}
         return [sys.executable, "-m", "decals", "sandbox", *opened, *_as_arguments(given)]

@@ -22,6 +22,7 @@ from decals.apps.lab.relaxing import Recording
 from decals.apps.sandbox.controls import STEPS, Control, exchanged
 from decals.apps.sandbox.decal_panel import set_drawing
 from decals.editing.commands import ReplaceScene, SetValues
+from decals.editing.gizmo import Ray, on_plane
 from decals.editing.queries import move_decals
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.validation import number_of, whole_number
@@ -56,6 +57,11 @@ class Lab:
     lessons
         The lessons.
 
+    Attributes
+    ----------
+    probe
+        The point at which values are measured.
+
     Notes
     -----
     Events raise errors of the library for bad values, and the scene stays as it was.
@@ -73,7 +79,7 @@ class Lab:
         self._asking = False
         self._submitted: object = None
         self._number = self._first = self._step = self._target = 0
-        self._probe = self.lesson.settings.probe
+        self.probe = self.lesson.settings.probe
         self._recording: Recording | None = None
 
     # -- state ------------------------------------------------------------------------------------------
@@ -108,7 +114,7 @@ class Lab:
             contact=drawing.contact,
             stiffness=drawing.stiffness,
             mapping=drawing.mapping,
-            probe=self._probe,
+            probe=self.probe,
             camera=lesson.scene.camera,
             size=lesson.size,
             in_space=settings.space,
@@ -118,7 +124,7 @@ class Lab:
 
     def _key(self) -> object:
         document = self._window.document
-        drawn_with = document.drawing, self._probe, self._step
+        drawn_with = document.drawing, self.probe, self._step
         return self._number, document.objects, document.decals.version, drawn_with
 
     def values(self) -> dict[str, Any]:
@@ -149,7 +155,7 @@ class Lab:
 
     def _read(self, path: str) -> Any:
         if path.startswith("probe."):
-            return self._probe[AXES.index(path[-1])]
+            return self.probe[AXES.index(path[-1])]
         match path:
             case mode if mode in MODES:
                 value = getattr(self._window.document.drawing, path)
@@ -209,13 +215,15 @@ class Lab:
         self._window.actions.state.end_stroke()
 
         def started() -> None:
-            self._number, self._asked, self._asking, self._probe = number, None, False, settings.probe
+            self._number, self._asked, self._asking, self.probe = number, None, False, settings.probe
             self._results = self._pending = None
             self._first = window.document.decals.next_number - len(lesson.scene.decals)
             self._step = self._target = 0
             self._recording = self._recorded(0) if settings.steps else None
             window.subplot.scene = window.document  # its bounds, before the camera's planes follow from them
             show_camera(window.plotter, lesson.scene)
+            width, height = window.plotter.window_size
+            window.subplot.vtk_renderer.camera.zoom(min(width / height, 1.0))  # a narrow view shows it all
             self._mark_probe()
             window.redraw(whole=True)
 
@@ -232,8 +240,8 @@ class Lab:
         sliders, state = self.lesson.settings.sliders, self._window.actions.state
         path = sliders[whole_number("slider", number, 0, len(sliders) - 1, InvalidEdit)].path
         if path.startswith("probe."):
-            x, y, z = exchanged(self._probe, [AXES.index(path[-1])], number_of(path, raw, InvalidEdit))
-            self._probe = x, y, z
+            x, y, z = exchanged(self.probe, [AXES.index(path[-1])], number_of(path, raw, InvalidEdit))
+            self.probe = x, y, z
             self._mark_probe()
         elif path in MODES:
             set_drawing(state, path, raw, last=last)
@@ -246,6 +254,17 @@ class Lab:
         else:
             command = binding(path).command(self._window.document, self.numbers, raw)
             state.run_step(command, last=last)
+
+    def move_probe(self, ray: Ray) -> None:
+        """Move the probe to the pointer, in the plane of the picture, along the axes of the sliders."""
+        eye, target = self._window.camera.eye_and_target()
+        point = on_plane(self.probe, np.subtract(eye, target), ray)
+        if point is None:
+            return
+        for number, slider in enumerate(self.lesson.settings.sliders):
+            if slider.path.startswith("probe."):
+                along = float(point[AXES.index(slider.path[-1])])
+                self.set_value(number, min(max(along, slider.low), slider.high))
 
     def _relax(self, recording: Recording) -> None:
         """Show the step that was asked for, or the last one that is known in time."""
@@ -276,7 +295,7 @@ class Lab:
         if not self.lesson.moves_probe:
             plotter.remove_actor("probe", render=False)
             return
-        ball = pv.Sphere(radius=PROBE_SIZE * self.lesson.size, center=self._probe)
+        ball = pv.Sphere(radius=PROBE_SIZE * self.lesson.size, center=self.probe)
         plotter.add_mesh(ball, name="probe", color="white", pickable=False, reset_camera=False, render=False)
 
 

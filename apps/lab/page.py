@@ -51,10 +51,14 @@ class LabPage(Page):
 
     def values(self) -> dict[str, Any]:
         """Return all values that the page shows, by their names there."""
-        values = {**super().values(), "in_lesson": self.sandbox.in_lesson}
-        if self.sandbox.in_lesson:
+        in_lesson = self.sandbox.in_lesson
+        moves_probe = in_lesson and self.lab.lesson.moves_probe
+        points = {"probe": (self.lab.probe, self.lab.move_probe)} if moves_probe else {}
+        self.sandbox.display.points = points
+        values = {**super().values(), "in_lesson": in_lesson}
+        if in_lesson:
             self.lab.refresh()
-            values |= {**self.lab.values(), "title": self.lab.lesson.settings.title}
+            values |= {**self.lab.values(), "title": self.lab.lesson.settings.title, "left_open": True}
         elif self._shown.get("in_lesson"):
             self.lab.leave()
         return values
@@ -112,7 +116,7 @@ class LabPage(Page):
             ):
                 vuetify3.VBtn("Plots", value="plots")
                 vuetify3.VBtn("Model", value="model")
-            with html.Div(v_if="in_lesson && lab_side === 'plots'", classes="px-2 pb-2"):
+            with html.Div(v_if="in_lesson && lab_side === 'plots'", classes="px-2 pb-2 plots"):
                 with html.Table(v_if="lab_values.length", classes="mb-2 text-caption", style="width: 100%"):  # noqa: SIM117  (one level of HTML a line)
                     with html.Tr(v_for="v in lab_values", key="v.label"):
                         html.Td("{{ v.label }}")

@@ -12,7 +12,7 @@ from decals.apps.sandbox.controls import STEPS, Control, exchanged
 from decals.apps.sandbox.cube import cube_cells
 from decals.apps.sandbox.decal_panel import brush_values
 from decals.editing.background import Job, Worker
-from decals.editing.gizmo import AXES
+from decals.editing.gizmo import AXES, Handle, Ray
 from decals.editing.overlays import MODES as SAMPLING_MODES
 from decals.editing.slicing import CHOICES as SLICES
 from decals.editing.slicing import MOVE, NONE, TILT, TILTED, SliceDrag, SlicePlane
@@ -53,11 +53,17 @@ class Display:
     ----------
     window
         The edited window.
+
+    Attributes
+    ----------
+    points
+        Further points with a handle, by name, each with what takes the ray under the pointer.
     """
 
     def __init__(self, window: EditWindow) -> None:
         self._window, self._worker = window, Worker()
         self.options = DisplayOptions()
+        self.points: dict[str, tuple[ArrayLike, Callable[[Ray], None]]] = {}
         self.bookmarks: list[tuple[str, Any]] = []
         self.message = ""
         self._key: tuple[object, ...] = ()
@@ -240,6 +246,7 @@ class Display:
         groups = [] if plane is None else [plane.handles(self._gizmo_length(plane.point))]
         if middle := trees.handles(1.0):
             groups.append(trees.handles(self._gizmo_length(middle[0].position)))
+        groups += [[Handle(name, np.asarray(point))] for name, (point, _) in self.points.items()]
         handles: list[dict[str, Any]] = []
         lines: list[list[float]] = []
         for group in groups:
@@ -305,6 +312,9 @@ class Display:
         right, down = (min(max(finite_number("place", part, InvalidEdit), 0.0), 1.0) for part in (x, y))
         ray = ray_through(self._window.subplot, right * width - 0.5, (1.0 - down) * height - 0.5)
         assert ray is not None  # the place lies in the view
+        if name in self.points:
+            self.points[name][1](ray)
+            return
         plane = self.options.slice
         if phase == "begin":
             self._slice_drag = None

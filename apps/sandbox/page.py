@@ -25,6 +25,11 @@ NARROW = 900
 """Width of a window, in pixels, below which the panels lie above the view."""
 
 NARROW_WINDOW = f"$vuetify.display.width < {NARROW}"
+UPRIGHT_TABLET = (
+    f"({NARROW_WINDOW} && $vuetify.display.width > 600 && $vuetify.display.height > $vuetify.display.width)"
+)
+"""True for a window in which the right panel lies below the view, and both panels beside it."""
+
 ONE_ROW = 1260
 """Width of a window, in pixels, from which on the toolbar is one row."""
 
@@ -92,9 +97,11 @@ def drawer(side: str, width: Any) -> Any:
     """Return the panel at a side of the page; in a narrow window it is closed at first, above the view."""
     return vuetify3.VNavigationDrawer(
         v_model=(f"{side}_open", None),
-        mobile_breakpoint=(str(NARROW),),
+        mobile_breakpoint=(f"{UPRIGHT_TABLET} ? 0 : {NARROW}",),
         width=width,
-        location=side,
+        location=side if side == "left" else (f"{UPRIGHT_TABLET} ? 'bottom' : 'right'",),
+        order="1" if side == "left" else "0",
+        scrim=False,
         raw_attrs=named(f"'{side} panel'"),
     )
 
@@ -224,7 +231,7 @@ class Page:
                     self.sandbox.schedule = self.view.update
                     html.Div(ABOVE_VIEW)
                 panels.build_start(self.sandbox)
-                with vuetify3.VFooter(app=True, height=28, classes="text-caption"):
+                with vuetify3.VFooter(app=True, order="2", height=28, classes="text-caption"):
                     html.Span("{{ status }}", raw_attrs=['role="status" :class="{status: true, refused}"'])
 
     def _build_left_side(self) -> None:

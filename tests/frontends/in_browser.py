@@ -554,6 +554,26 @@ async def lab(picture: str | None = None) -> None:
                 image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
                 image.resize((960, 600), Image.Resampling.LANCZOS).save(picture, quality=80, optimize=True)
         assert all("127.0.0.1" in url or url.startswith("data:") for url in requests)
+        await choose(browser, "lesson", lab_page.lab.values()["lab_titles"][0]["title"])
+        await until(partial(shows_lesson, lab_page, 0))
+        before, (x, y) = lab_page.lab.probe, await at_rest(browser, lab_page, "probe")
+        await browser.mouse.move(x, y)
+        await browser.mouse.down()
+        await browser.mouse.move(x + 40, y, steps=4)
+        await browser.mouse.up()
+        await until(lambda: lab_page.lab.probe[0] > before[0] + 0.05)
+        await browser.set_viewport_size({"width": 820, "height": 1180})  # a tablet
+        parts = [browser.locator(part) for part in (".lesson-side", "[role=application]", ".plots")]
+        async with asyncio.timeout(PATIENCE):
+            while True:
+                text, view, plots = [await part.bounding_box() for part in parts]
+                assert text is not None
+                assert view is not None
+                assert plots is not None
+                if view["x"] >= text["width"] > 300 and plots["y"] >= view["y"] + view["height"] > 600:
+                    break
+                await asyncio.sleep(0.1)
+        assert min(view["width"], plots["width"]) > 400
     window.close()
 
 

@@ -134,6 +134,14 @@ def test_each_session_has_its_own_file(folder: Path, monkeypatch: pytest.MonkeyP
     assert commands[3] == [*scattered, "--save", "knot-4.json", *ending]
 
 
+def test_a_session_of_the_lab_starts_again_in_the_lab(folder: Path) -> None:
+    command = sandbox_module._commands([], {"lab": True, "lessons": None}, None)
+    first = command(2)
+    assert first[4:] == ["--lab", "--save", "scene-2.json", "--port", "0", "--no-browser", "--session"]
+    (folder / "scene-2.recovery.json").touch()
+    assert command(2) == first
+
+
 def test_a_server_refuses_clients_without_its_token() -> None:
     pytest.importorskip("trame")
     from trame.app import get_server

@@ -88,6 +88,23 @@ def test_the_first_even_step_is_the_answer(lab: Lab) -> None:
     assert lab.experiment().relaxed != relaxed
 
 
+def test_the_probe_follows_the_pointer_where_its_slider_leads(lab: Lab, window: EditWindow) -> None:
+    lab.start(0)
+    wait(lab)
+    x, y, z = lab.probe
+    lab.move_probe(([0.7, 0.4, 5.0], [0.0, 0.0, -1.0]))
+    assert lab.probe == pytest.approx((0.7, y, z))
+    assert lab.values()["lab_sliders"][number_of(lab, "Probe")]["value"] == pytest.approx(0.7)
+    bounds = window.plotter.actors["probe"].bounds
+    assert (bounds[0] + bounds[1]) / 2 == pytest.approx(0.7, abs=0.01)
+    lab.move_probe(([0.7, 0.4, 5.0], [1.0, 0.0, 0.0]))  # beside the plane
+    assert lab.probe == pytest.approx((0.7, y, z))
+    lab.move_probe(([90.0, 0.0, 5.0], [0.0, 0.0, -1.0]))
+    assert lab.probe == (2.0, y, z)  # the end of the slider
+    lab.start(0)
+    assert wait(lab)["lab_sliders"][number_of(lab, "Probe")]["value"] == x
+
+
 @pytest.mark.parametrize("number", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (0, 2, 3, 4, 5))])
 def test_every_slider_moves_the_scene_and_undo_brings_it_back(
     lab: Lab, window: EditWindow, number: int
