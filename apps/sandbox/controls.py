@@ -1,10 +1,11 @@
 """Controls of a panel, from the parameters that classes of nodes declare."""
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from math import isfinite
-from typing import Any
+from typing import Any, Self
 
 from blobtree import Node
 from blobtree.colors import Rgb, Rgba
@@ -73,6 +74,11 @@ class Control:
     curve: str = ""
     label: str = ""
 
+    @classmethod
+    def choice(cls, name: str, value: str, choices: Iterable[str], doc: str) -> Self:
+        """Return the choice of one of several texts."""
+        return cls(name, "choice", value, doc, choices=tuple(choices))
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "label", self.label or re.sub("[_.]", " ", self.name))
 
@@ -100,7 +106,7 @@ def _control(parameter: Parameter, value: Any, size: float) -> Control:
         names, curve = tuple(FALLOFF_NAMES), _curve(value)
         return Control(parameter.name, "choice", _falloff_name(value), doc, choices=names, curve=curve)
     if quantity is Quantity.CHOICE:
-        return Control(parameter.name, "choice", value, doc, choices=parameter.choices)
+        return Control.choice(parameter.name, value, parameter.choices, doc)
     if quantity in NUMBERS and not isinstance(value, tuple):
         low, high = _ends(parameter, value, size)
         step = 1.0 if parameter.whole else (high - low) / STEPS

@@ -20,7 +20,6 @@ from decals.receivers import labels_of
 from decals.rendering.options import Drawing
 from decals.scattering.scatter import scatter
 from decals.scenes.material import DecalMaterial
-from decals.scenes.objects import bounds_of
 from decals.scenes.scene import DecalImage
 from decals.validation import describe, number_of, one_of
 
@@ -62,19 +61,16 @@ def decal_controls(document: Document, selection: tuple[int, ...]) -> list[dict[
     if not selection:
         return []
     last, options = document.decals[selection[-1]], options_of(Decals)
-    low, high = bounds_of(document.objects) if document.objects else (np.zeros(3), np.ones(3))
-    reach = 0.25 * float((high - low).max())
+    reach = 2.5 * default_radius(document)
     names, receivers = image_names(document), str(last.receivers[0])
     controls = []
     for name, array in COLUMNS.items():
         value = getattr(last, array)[0]
         if name == "image":
-            controls.append(
-                vars(Control(name, "choice", names[int(value) + 1], "image", choices=tuple(names)))
-            )
+            controls.append(vars(Control.choice(name, names[int(value) + 1], names, "image")))
         elif name == "receivers":
-            choices, doc = tuple(receiver_choices(document, receivers)), described(Decals)[array]
-            controls.append(vars(Control(name, "choice", receivers or ANY_OBJECT, doc, choices=choices)))
+            choices, doc = receiver_choices(document, receivers), described(Decals)[array]
+            controls.append(vars(Control.choice(name, receivers or ANY_OBJECT, choices, doc)))
         else:
             ends = (reach / STEPS, reach) if name == "radius" else ()
             controls.append(option_control(replace(options[array], name=name), value.tolist(), *ends))
@@ -127,8 +123,7 @@ def brush_values(document: Document, brush: BrushSettings) -> dict[str, Any]:
     """Return the brush and its controls; the sizes of brushes need the surface, which selecting does not."""
     if brush.brush in (Brush.SELECT, Brush.BOX, Brush.LASSO, Brush.PULL):
         return {"brush": str(brush.brush), "controls": []}
-    usual = default_radius(document) if document.objects else 1.0
-    decal = brush.decal_radius or (default_decal_radius(document) if document.objects else 0.1)
+    usual, decal = default_radius(document), brush.decal_radius or default_decal_radius(document)
     shown: dict[str, tuple[float, ...]] = {"radius": (brush.radius or usual, usual / STEPS, 4.0 * usual)}
     if brush.brush is Brush.SCATTER:
         shown |= {"decal_radius": (decal, usual / STEPS, usual), "density": (brush.density,)}

@@ -1,6 +1,6 @@
 """How the view shows the scene: its controls, handles and cameras."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -86,9 +86,7 @@ class Display:
         """Yield the controls of the view, each with the function that takes its checked value."""
         options, plane, length = self.options, self.options.slice, "model units"
         camera, state, view = self._window.camera, self._window.actions.state, self._window.actions.view
-
-        def choice(name: str, value: str, choices: Iterable[str], doc: str) -> Control:
-            return Control(name, "choice", value, doc, choices=tuple(choices))
+        choice = Control.choice
 
         def change(**changed: Any) -> None:
             self.options = replace(options, **changed)

@@ -344,8 +344,8 @@ def aligned(document: Document, numbers: Int64Array, direction: Float32Array) ->
 
 
 def default_radius(document: Document) -> float:
-    """Return the radius of a brush: a tenth of the size of the scene."""
-    low, high = bounds_of(document.objects)
+    """Return the radius of a brush: a tenth of the size of the scene, and of 1 without objects."""
+    low, high = bounds_of(document.objects) if document.objects else (np.zeros(3), np.ones(3))
     return 0.1 * float((high - low).max())
 
 

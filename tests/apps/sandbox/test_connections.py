@@ -80,7 +80,7 @@ class Browser:
         x, y = (at[0] + 0.5) / SIZE[0], (at[1] + 0.5) / SIZE[1]
         return await self.call("viewport.mouse.interaction", {**event, "x": x, "y": y})
 
-    async def ended(self, seconds: float = 10.0) -> None:
+    async def ended(self, seconds: float = 30.0) -> None:
         """Wait until the server has ended the connection; `TimeoutError` if it does not."""
         await asyncio.wait_for(asyncio.shield(self._listens), seconds)
 

@@ -147,7 +147,7 @@ def test_the_server_ends_while_a_page_is_open() -> None:
                 await leaving
                 return time.monotonic() - began
 
-    assert asyncio.run(run()) < 5.0
+    assert asyncio.run(run()) < 30.0  # a server that waits for its pages takes a minute
 
 
 def test_requests_of_other_pages_and_without_the_token_are_refused() -> None:
