@@ -5,7 +5,7 @@ import threading
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
-from functools import cached_property
+from functools import cached_property, partial
 from types import TracebackType
 from typing import Any, Self
 
@@ -13,6 +13,7 @@ import moderngl
 
 from blobtree.graphics import check_not_forked, hold_display, is_forked, mark_drawing, require_gl
 from decals.errors import NoGraphics
+from decals.rendering.background_compiler import BackgroundCompiler
 from decals.rendering.current_context import is_current, kept_current
 from decals.rendering.pixel_pass import (
     COMPUTE_VERSION,
@@ -125,6 +126,7 @@ class Context:
         self._owned = owned
         self._display_held = False
         self._programs: dict[tuple[str, ...], Program] = {}
+        self._compiler: BackgroundCompiler | None = None
         self._unused: list[Any] = []
         self.requested_backend = backend_named(gl, backend) if backend else None
         self._spare_textures: dict[tuple[tuple[int, int], str], list[moderngl.Texture]] = {}
@@ -224,6 +226,22 @@ class Context:
                 if stack:
                     stack[-1].__enter__()  # type: ignore[no-untyped-call]
 
+    @contextmanager
+    def compiling_in_thread(self, compiler: BackgroundCompiler) -> Iterator[None]:
+        """Within a ``with`` block, let `attempt` leave work undone that needs programs of the compiler."""
+        self._compiler = compiler
+        try:
+            yield
+        finally:
+            self._compiler = None
+
+    def attempt(self, work: Callable[[], object]) -> bool:
+        """Do work; return False if it is to be repeated, as a thread compiles programs for it."""
+        if self._compiler is not None:
+            return self._compiler.attempt(work)
+        work()
+        return True
+
     def program(self, vertex: Source, fragment: Source) -> moderngl.Program:
         """Compile two sources, or return the program that was compiled of them before.
 
@@ -233,7 +251,13 @@ class Context:
             If the driver refuses them.
         """
         key = vertex.text, fragment.text
-        return self._kept(key, lambda: compile_program(self.gl, vertex, fragment))
+        program = self._kept(key, lambda: compile_program(self.gl, vertex, fragment))
+        program.extra = partial(self._require_drawn, key)
+        return program
+
+    def _require_drawn(self, sources: tuple[str, ...], program: moderngl.Program) -> None:
+        if self._compiler is not None:
+            self._compiler.require_drawn(self.gl, program, sources)
 
     def compute_program(self, source: Source) -> moderngl.ComputeShader:
         """Compile a compute shader, or return the program that was compiled of it before.
@@ -250,6 +274,8 @@ class Context:
         self._release_programs()
         program: Any = self._programs.pop(key, None)
         if program is None:
+            if self._compiler is not None:
+                self._compiler.require_linked(key)
             program = compiled()
         self._programs[key] = program  # the last one now
         while self._text_length > MAX_PROGRAM_TEXT and len(self._programs) > 1:

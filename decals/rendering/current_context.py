@@ -30,11 +30,11 @@ def kept_current() -> Iterator[None]:
 
 def is_current() -> bool:
     """Return False if this thread has no current context of EGL, as after the end of its display."""
-    return not _library("libEGL.so.1") or _egl_context() is not None
+    return not system_library("libEGL.so.1") or _egl_context() is not None
 
 
 @cache
-def _library(name: str) -> Any:
+def system_library(name: str) -> Any:
     """Return a system library whose functions take and return pointers; None for a missing library."""
     if not sys.platform.startswith("linux"):
         return None
@@ -54,7 +54,7 @@ def _call(library: Any, function: str, *arguments: int | None) -> int | None:
 
 def _egl_context() -> Restore | None:
     """Return a function that makes the current context of EGL current; None if there is no such context."""
-    egl = _library("libEGL.so.1")
+    egl = system_library("libEGL.so.1")
     context = egl and _call(egl, "eglGetCurrentContext")
     if not context:
         return None

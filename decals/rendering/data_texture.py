@@ -47,6 +47,8 @@ class DataTexture:
                 f"{len(array):,} elements do not fit into one texture here; expected at most "
                 f"{context.max_texture_size * ROW_TEXELS:,}; take fewer decals or a smaller tree"
             )
+        if rows & (rows - 1) == 0 and rows < context.max_texture_size:
+            rows = max(rows + 1, 3)  # llvmpipe compiles programs anew where a side becomes a power of two
         self.count = len(array)
         self.texture = context.gl.texture(
             (ROW_TEXELS, rows), components, _rows(array, rows, components), dtype=dtype

@@ -158,6 +158,13 @@ def use_textures(program: Program, textures: Mapping[str, moderngl.Texture]) -> 
         set_uniform(program, name, unit)
 
 
+def draw(array: moderngl.VertexArray, vertices: int) -> None:
+    """Draw triangles, unless the program is to be compiled in a thread first, see `Context.attempt`."""
+    if array.program.extra is not None:
+        array.program.extra(array.program)
+    array.render(vertices=vertices)
+
+
 def read_floats(framebuffer: moderngl.Framebuffer, attachment: int, tile: Tile) -> Float32Array:
     """Read the inner part of a tile from a target, ``float32[h, w, 4]``, the lowest row first."""
     inner = tile.inner
@@ -199,7 +206,7 @@ class PixelPass:
         framebuffer.scissor = scissor_of(rectangle)
         framebuffer.use()
         self._gl.enable_only(moderngl.NOTHING)
-        triangle.render(vertices=3)
+        draw(triangle, 3)
 
     def release(self) -> None:
         """Release the memory, except targets and program."""
@@ -281,8 +288,8 @@ class ListedPass(PixelPass):
         set_uniform(self.programs[1], "listed_texels", LIST_UNIT)
         framebuffer.use()
         self._gl.enable_only(moderngl.NOTHING)
-        self._triangle.render(vertices=3)
         try:
+            draw(self._triangle, 3)
             yield framebuffer
         finally:
             framebuffer.release()

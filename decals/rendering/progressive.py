@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +26,12 @@ DRAWING = "picture"
 """Status of a frame whose warm-up is done."""
 
 
+def run(work: Callable[[], object]) -> bool:
+    """Run a function and return True."""
+    work()
+    return True
+
+
 class ProgressiveFrame:
     """A frame in progress; the result is the same, bit for bit, as of `Renderer.draw`.
 
@@ -40,6 +47,8 @@ class ProgressiveFrame:
         Function of the targets and their state at the beginning, called for every slice of time.
     finish
         Waits until the GPU is idle.
+    attempt
+        Runs a function; returns False if it is to be repeated later, as programs are being compiled.
     clock
         Returns seconds.
 
@@ -61,12 +70,13 @@ class ProgressiveFrame:
         plan: Callable[[Targets, TargetState | None], FramePlan],
         finish: Callable[[], None],
         *,
+        attempt: Callable[[Callable[[], object]], bool] = run,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self._warmup = targets
         self._targets: Targets | None = None
         self.done, self.seconds, self.work, self.status = False, 0.0, 1.0, ""
-        self._plan, self._finish, self._clock = plan, finish, clock
+        self._plan, self._finish, self._attempt, self._clock = plan, finish, attempt, clock
         self._previous: TargetState | None = None
         self._step, self._unit, self._part_units = 0, 0, FIRST_UNITS
 
@@ -139,7 +149,8 @@ class ProgressiveFrame:
         if self._step == len(steps):
             return
         end = min(self._unit + self._part_units, UNITS)
-        steps[self._step](Part(self._unit / UNITS, end / UNITS))
+        if not self._attempt(partial(steps[self._step], Part(self._unit / UNITS, end / UNITS))):
+            return
         self._finish()
         self._unit = end
         if end == UNITS:

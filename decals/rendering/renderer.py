@@ -287,7 +287,7 @@ class Renderer:
             return plan_frame(scene, uploaded, tile, options, targets, previous, depth=True)
 
         targets = chain(self._run_warmup(scene, options), self._targets.make(slot, options.sample_size))
-        return ProgressiveFrame(targets, plan, self.context.gl.finish)
+        return ProgressiveFrame(targets, plan, self.context.gl.finish, attempt=self.context.attempt)
 
     def remaining_work(
         self,
@@ -330,7 +330,8 @@ class Renderer:
         plan = self.warmup(scene, options)
         if plan.key not in self._warm:
             for task, status in with_status(plan.tasks):
-                task.run()
+                while not self.context.attempt(task.run):
+                    yield status
                 yield status
             self._warm.add(self.warmup(scene, options).key)  # it may know nested decals now
 

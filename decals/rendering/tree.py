@@ -11,7 +11,7 @@ from blobtree.tracing.tree_cells import TracingCells, tracing_cells
 from decals.rendering.context import Context
 from decals.rendering.data_texture import DataTexture
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.pixel_pass import GROUP, PassBackend, Program, attach_camera, set_uniform
+from decals.rendering.pixel_pass import GROUP, PassBackend, Program, attach_camera, draw, set_uniform
 from decals.rendering.tracing_shader import Kinds, tracing_shader
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile
 from decals.rendering.warmup import SHADERS, SHAPES, WarmupPlan, WarmupTask
@@ -112,9 +112,11 @@ def draw_box(gl: moderngl.Context, program: Program, box: moderngl.VertexArray, 
         set_uniform(program, name, tuple(np.asarray(corner).tolist()))
     gl.enable(moderngl.CULL_FACE)
     gl.cull_face = "front"
-    box.render(vertices=BOX_VERTICES)
-    gl.cull_face = "back"
-    gl.disable(moderngl.CULL_FACE)
+    try:
+        draw(box, BOX_VERTICES)
+    finally:
+        gl.cull_face = "back"
+        gl.disable(moderngl.CULL_FACE)
 
 
 def tracing_program(context: Context, kinds: Kinds) -> Program:

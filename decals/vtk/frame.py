@@ -9,6 +9,7 @@ import math
 from collections.abc import Hashable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Self
 
 import moderngl
@@ -16,6 +17,7 @@ from _moderngl import DefaultLoader  # type: ignore[import-untyped]
 
 from decals.errors import NoGraphics
 from decals.rendering import Renderer, RenderOptions, SceneLike, Size
+from decals.rendering.background_compiler import BackgroundCompiler
 from decals.rendering.context import Context
 from decals.rendering.dirty_regions import TargetState, decal_version, same_objects
 from decals.rendering.pixel_pass import CameraBuffer, set_uniform, use_textures
@@ -211,6 +213,12 @@ class Composite:
         self._arrays.clear()
 
 
+@cache
+def shared_compiler() -> BackgroundCompiler:
+    """Return the compiler of all windows."""
+    return BackgroundCompiler(Context.standalone)
+
+
 SPARE_SLOT = "spare"
 """Targets for a first frame while its own targets hold the shown one."""
 
@@ -323,7 +331,7 @@ class FrameRenderer:
         key = FrameKey.of(scene, options, viewpoint)
         frame = self._continue(key, scene, options, viewpoint, options.slot)
         if self.work_fraction(scene, options, viewpoint):
-            with self.context.current():
+            with self._in_slices():
                 if not frame.advance(seconds):
                     return None
         self._progressive = None
@@ -354,12 +362,18 @@ class FrameRenderer:
         shown = self._shown_targets
         free = shown is None or shown is not self.renderer.targets_of(options.slot)
         frame = self._continue(key, scene, options, viewpoint, options.slot if free else SPARE_SLOT)
-        with self.context.current():
+        with self._in_slices():
             if not frame.advance(seconds):
                 return frame.status
         self._progressive = None
         self._warm.add(self._warmup_plan(scene, options).key)  # it may know nested decals now
         return None
+
+    @contextmanager
+    def _in_slices(self) -> Iterator[None]:
+        """Make the context current within a ``with`` block, for work that waits for programs."""
+        with self.context.current(), self.context.compiling_in_thread(shared_compiler()):
+            yield
 
     def _continue(
         self, key: FrameKey, scene: SceneLike, options: FrameOptions, viewpoint: Projection, slot: str

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterator
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,12 @@ import pytest
 
 from decals.editing import EditSession, ScaleDecals
 from decals.errors import TooMuchData
+from decals.rendering.background_compiler import GL, BackgroundCompiler
+from decals.rendering.context import Context
+from decals.rendering.current_context import system_library
 from decals.rendering.decal_pass import decal_library
 from decals.rendering.options import RenderOptions
+from decals.rendering.pixel_pass import compile_program
 from decals.rendering.progressive import DRAWING
 from decals.rendering.warmup import with_status
 from decals.shaders import CompileError
@@ -97,7 +102,7 @@ def test_each_piece_is_a_chance_to_listen(waiting: Any, monkeypatch: pytest.Monk
     monkeypatch.setattr("decals.window.frames.SLICE_SECONDS", 0.0)
     window = waiting()
     pieces = window.subplot.renderer.warmup(window.document, _options(window)).tasks
-    heard = slices(window, 100_000)
+    heard = [news for news, _ in groupby(slices(window, 100_000))]  # a program may take several slices
     expected = [f"preparing: {news}" for _, news in with_status(pieces)]
     first = heard.index(expected[0])  # before that, what is made in a thread
     assert heard[first : first + len(expected)] == expected
@@ -190,6 +195,36 @@ def test_what_needs_no_graphics_is_made_in_a_thread_while_the_window_listens(
     assert where[0] is not threading.current_thread()
     go.set()
     slices(window, 100_000)
+    assert (pixels(window) != bare()).any()
+
+
+def test_programs_are_compiled_in_a_thread_while_the_window_listens(
+    waiting: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if system_library(GL) is None:
+        pytest.skip("without this library of Linux nothing is compiled in a thread")
+    go, linked = threading.Event(), []
+
+    def make() -> Context:
+        assert go.wait(60)
+        return Context.standalone()
+
+    def counted(*arguments: Any) -> Any:
+        linked.append(arguments)
+        return compile_program(*arguments)
+
+    compiler = BackgroundCompiler(make)
+    monkeypatch.setattr("decals.vtk.frame.shared_compiler", lambda: compiler)
+    monkeypatch.setattr("decals.rendering.context.compile_program", counted)
+    monkeypatch.setattr("decals.window.frames.SLICE_SECONDS", 0.0)
+    window = waiting()
+    for _ in range(20):
+        window.tick()
+        assert window.subplot.warming_up
+    assert not linked
+    go.set()
+    slices(window, 100_000)
+    assert linked
     assert (pixels(window) != bare()).any()
 
 
