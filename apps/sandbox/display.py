@@ -1,6 +1,6 @@
 """How the view shows the scene: its controls, handles and cameras."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -63,7 +63,7 @@ class Display:
     def __init__(self, window: EditWindow) -> None:
         self._window, self._worker = window, Worker()
         self.options = DisplayOptions()
-        self.points: dict[str, tuple[ArrayLike, Callable[[Ray], None]]] = {}
+        self.points: Mapping[str, tuple[ArrayLike, Callable[[Ray], None]]] = {}
         self.bookmarks: list[tuple[str, Any]] = []
         self.message = ""
         self._key: tuple[object, ...] = ()
