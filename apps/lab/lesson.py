@@ -4,7 +4,7 @@ import re
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from decals.errors import ImplicitDecalsError
 from decals.field.mapping import ImageMapping
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 from decals.scenes.files import load_scene
+from decals.scenes.objects import MeshObject
 from decals.scenes.scene import Scene
 from decals.validation import member, stiffness_number
 
@@ -231,7 +232,7 @@ def _parsed(source: str, folder: Path) -> Lesson:
     for place, text, variables in _formulas(settings):
         with _place(place):
             formulas[text] = parse(text, MEASURES, variables)
-    scene = load_scene(folder / settings.scene)
+    scene = _without_files(load_scene(folder / settings.scene))
     for i, slider in enumerate(settings.sliders):
         with _place(f"sliders[{i}]"):
             _check_slider(slider, scene)
@@ -242,6 +243,16 @@ def _parsed(source: str, folder: Path) -> Lesson:
     with _place("question.right"):
         right = _template(settings.question.right)
     return Lesson(settings, rest[1].strip(), scene, formulas, tuple(wrong), right)
+
+
+def _without_files(scene: Scene) -> Scene:
+    """Return a scene that names no files: what is saved of it in another folder has its images and meshes."""
+    return scene.replace(
+        images=[replace(image, source=Path(image.source).stem) for image in scene.images],
+        objects=[
+            replace(item, source=None) if isinstance(item, MeshObject) else item for item in scene.objects
+        ],
+    )
 
 
 def _check_ranges(settings: Settings) -> None:

@@ -38,6 +38,7 @@ from blobtree.files import write_atomically
 from blobtree.json_errors import json_reason
 from blobtree.progress import Progress, reporting
 from decals.errors import ImplicitDecalsError, InvalidScene
+from decals.images.builtin import is_builtin
 from decals.images.load import embedded_image, is_embedded, load_image
 from decals.model import Decals
 from decals.scenes.camera import Camera, Vector
@@ -253,7 +254,8 @@ def _image_record(image: DecalImage, folder: Path) -> str | MaterialRecord:
     """Return an image as a file has it."""
     if isinstance(image, DecalMaterial):
         return material_record(image)
-    return picture_source(image.source, folder) or embedded_image(image.pixels)
+    named = image.is_generated or not is_builtin(image.source)
+    return (picture_source(image.source, folder) if named else "") or embedded_image(image.pixels)
 
 
 def _images(sources: list[str | MaterialRecord], folder: Path, trust: bool) -> tuple[DecalImage, ...]:

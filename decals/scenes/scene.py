@@ -12,6 +12,7 @@ import decals
 from blobtree.progress import Progress
 from decals import rendering
 from decals.errors import ImplicitDecalsError, InvalidScene, NoGraphics
+from decals.images.builtin import generate_image, is_builtin
 from decals.images.load import AnyImage, each_image, image_pixels
 from decals.images.texels import Pixels
 from decals.model import LAYER_LIMIT, Decals
@@ -68,6 +69,13 @@ class DecalImage:
     def __post_init__(self) -> None:
         instance("an image's source", self.source, str, InvalidScene, "give a name or a path")
         require_rgba(f"image {self.source!r}", self.pixels, InvalidScene)
+
+    @property
+    def is_generated(self) -> bool:
+        """True if the image is what its source generates, and has no maps."""
+        if type(self) is not DecalImage or not is_builtin(self.source):
+            return False
+        return np.array_equal(self.pixels, generate_image(self.source))
 
     @classmethod
     def load(cls, source: AnyImage, *, folder: Path | None = None, name: str = "image") -> "DecalImage":

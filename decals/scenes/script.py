@@ -17,7 +17,6 @@ from blobtree.files import write_atomically
 from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.values import fields_of, left_out
 from decals.errors import InvalidScene
-from decals.images.builtin import is_builtin
 from decals.model import COLUMNS, Decals
 from decals.rendering.environment import Environment
 from decals.rendering.lights import Lighting
@@ -188,7 +187,7 @@ class _Script:
         return self._names[id(value)]
 
     def _image(self, image: DecalImage) -> str:
-        if is_builtin(image.source):
+        if image.is_generated:
             return repr(image.source)
         if isinstance(image, DecalMaterial):
             number = len(self.arrays)

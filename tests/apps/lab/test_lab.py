@@ -3,6 +3,7 @@
 import re
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -17,6 +18,8 @@ from decals.apps.lab.lesson import LESSONS, load_lesson, load_lessons, shown
 from decals.apps.lab.measures import MEASURES
 from decals.apps.lab.plots import LEFT, TOP
 from decals.errors import ImplicitDecalsError, InvalidEdit
+from decals.scenes.meshes import as_polydata
+from decals.scenes.objects import MeshObject
 from decals.window import EditWindow
 from tests.apps.lab.answers import ANSWERS, STEP
 from tests.decals.editing.scenes import digest
@@ -205,6 +208,28 @@ def test_the_plot_of_the_falloff_has_its_values(lab: Lab) -> None:
 
 
 # -- files ----------------------------------------------------------------------------------------------
+
+
+def test_scenes_of_lessons_are_saved_anywhere_with_their_images_and_meshes(tmp_path: Path) -> None:
+    lessons = tmp_path / "lessons"
+    lessons.mkdir()
+    for part in LESSONS.glob("4-many-decals.*"):
+        (lessons / part.name).write_bytes(part.read_bytes())
+    (lessons / "target.png").write_bytes((LESSONS / "target.png").read_bytes())
+    scene = decals.load_scene(lessons / "4-many-decals.json")
+    (plate,) = scene.objects
+    assert isinstance(plate, MeshObject)
+    as_polydata([plate]).save(lessons / "plate.ply")
+    scene.replace(objects=[replace(plate, source=str(lessons / "plate.ply"))]).save(
+        lessons / "4-many-decals.json"
+    )
+    (lesson,) = load_lessons(lessons)
+    (tmp_path / "work").mkdir()
+    lesson.scene.save(tmp_path / "work" / "kept.json")
+    again = decals.load_scene(tmp_path / "work" / "kept.json")  # in a folder without the files
+    for image, other in zip(scene.images, again.images, strict=True):
+        np.testing.assert_array_equal(image.pixels, other.pixels)
+    assert [image.source for image in lesson.scene.images] == ["target", "eye", "rock"]
 
 
 def test_a_lesson_of_the_docs_is_loaded_and_answered(tmp_path: Path) -> None:

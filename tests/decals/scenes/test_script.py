@@ -14,6 +14,7 @@ from decals.errors import InvalidScene
 from decals.model import COLUMNS
 from decals.rendering import Drawing
 from decals.scenes.camera import Camera
+from decals.scenes.material import DecalMaterial
 from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.scene import DecalImage, Scene
 from decals.scenes.script import write_script
@@ -92,6 +93,21 @@ def test_the_script_gives_the_same_scene(count: int, tmp_path: Path) -> None:
         assert image.source == other.source
     for name in COLUMNS:
         np.testing.assert_array_equal(getattr(scene.decals, name), getattr(again.decals, name))
+
+
+def test_images_with_the_name_of_a_generated_one_keep_their_pixels(tmp_path: Path) -> None:
+    red = np.full((2, 2, 4), (255, 0, 0, 255), np.uint8)
+    eye = DecalImage.load("eye")
+    matte = DecalMaterial("eye", eye.pixels, roughness=np.full((256, 256), 51, np.uint8))
+    images = [eye, DecalImage("eye", red), matte, DecalImage("eye", eye.pixels[:, ::-1])]
+    assert [image.is_generated for image in images] == [True, False, False, False]
+    assert not DecalImage("mine", red).is_generated
+    scene = Scene(objects=[], camera=Camera((0, 0, 8)), images=images)
+    scene.save(tmp_path / "scene.json")
+    for again in (rebuilt(scene, tmp_path / "scene.py"), decals.load_scene(tmp_path / "scene.json")):
+        for image, other in zip(images, again.images, strict=True):
+            np.testing.assert_array_equal(image.pixels, other.pixels)
+        np.testing.assert_array_equal(vars(again.images[2])["roughness"], matte.roughness)
 
 
 def test_a_script_of_a_tree_needs_no_other_file_and_uses_the_public_api(tmp_path: Path) -> None:
