@@ -1,4 +1,4 @@
-"""Files of the folder in which the sandbox was started: what the start page lists, and uploads."""
+"""A folder as the start page lists it, and files that a page sends."""
 
 import base64
 import os

@@ -6,8 +6,9 @@ from typing import Any
 
 from trame.widgets import html, vuetify3
 
+from decals.apps.sandbox.files import LIGHT
 from decals.apps.sandbox.folder import IMAGES, MODELS
-from decals.apps.sandbox.sandbox import LIGHT, Sandbox
+from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing.actions import KEYS
 from decals.editing.brushes import Brush
 from decals.editing.file_actions import Video

@@ -5,59 +5,34 @@ window's session and its actions.
 """
 
 import math
-import re
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial, wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
 from blobtree import Node
 from blobtree.custom.definition import custom_kinds
-from blobtree.progress import Cancel, Progress
-from decals import cover
-from decals.apps.models.samples import SAMPLES, axes_of, sample, sample_mesh
-from decals.apps.models.scenes import empty_scene, new_file
 from decals.apps.sandbox import decal_panel
 from decals.apps.sandbox.controls import controls_of, exchanged, parsed, parsed_option
 from decals.apps.sandbox.display import PHASES, Display
-from decals.apps.sandbox.folder import HDR, MODELS, keep_upload, listed, plain_name, read_upload
+from decals.apps.sandbox.files import SandboxFiles
 from decals.apps.sandbox.outline import outline
-from decals.apps.views import THREE_QUARTER
 from decals.editing import new_nodes
-from decals.editing.commands import AddImage, ReplaceImage
-from decals.editing.outline_actions import Part, image_on_layer
-from decals.editing.queries import SurfacePick
-from decals.editing.recovery import recovery_path
-from decals.editing.scatter_commands import AddObject
+from decals.editing.outline_actions import Part
 from decals.editing.session import UndoEntry
 from decals.editing.tree_actions import FollowedNode
 from decals.errors import InvalidEdit
 from decals.options import arguments_of
-from decals.rendering.environment import Environment
 from decals.scattering.scatter import scatter
-from decals.scenes.camera import DEFAULT_DIRECTION, UPRIGHT
-from decals.scenes.cover import fitting_camera
-from decals.scenes.files import is_scene_file, load_model, load_scene
-from decals.scenes.objects import MeshObject, SceneObject, TreeObject, bounds_of, unused_name
-from decals.scenes.scene import DecalImage, Scene
-from decals.validation import describe, finite_number, one_of, whole_number
+from decals.scenes.objects import TreeObject, bounds_of
+from decals.validation import finite_number, one_of, whole_number
 from decals.window import EditWindow
 from decals.window.host_plotter import show_background
 from decals.window.view_modes import DisplayOptions
 
 REST_SECONDS = 1.0
 """A slider that rests so long has ended its edit: keys that move it send no end."""
-
-FIRST_IMAGES = ("scale",)
-"""Images of a scene at the beginning."""
-
-LIGHT = "light"
-"""Key under which a page sends a panorama, which lights the scene."""
-
-PLACE, PLACE_STEPS = re.compile(r"view (\d{1,5})/(\d{1,5})"), 10_000
-"""Key of a place of the view, and steps across the view that it counts, from the lower left corner."""
 
 MAX_ZOOM = 4.0
 """Largest factor of one step of two fingers."""
@@ -110,6 +85,8 @@ class Sandbox:
         in another way, and replace it by its only operand; see `TreeActions`.
     go_to
         Event that goes to an entry of the history; see `Actions.go_to`.
+    show_start, new_model, open_sample, open_file, write_file, place_image, remove_light
+        Events of files; see `SandboxFiles`.
 
     Notes
     -----
@@ -127,8 +104,7 @@ class Sandbox:
         start_lesson: Callable[[int], None] = lambda _: None,
     ) -> None:
         self._window, actions = window, window.actions
-        self._state, self._trees, self._files = actions.state, actions.trees, actions.files
-        self._folder = (Path() if folder is None else folder).resolve()
+        self._state, self._trees = actions.state, actions.trees
         self.display = Display(window)
         self.add, self.wrap = self._event(self._trees.add_node), self._event(self._trees.wrap_node)
         self.combine = self._event(self._trees.combine_operands)
@@ -136,8 +112,12 @@ class Sandbox:
         window.overlay.hide_status()  # the page has its own, and handles
         window.handle.visible = False
         window.redraw(whole=True)
-        self._files.screenshot = lambda: window.plotter.screenshot(None, return_img=True)
-        self._files.folder, self._files.show_view = self._folder, self.display.show_from
+        actions.files.show_view = self.display.show_from
+        self._files = files = SandboxFiles(window, folder or Path(), lessons, self._begin_scene)
+        self.new_model, self.show_start = self._event(files.new_model), files.show_start
+        self.open_sample, self.open_file = self._event(files.open_sample), self._event(files.open_file)
+        self.place_image, self.write_file = self._event(files.place_image), self._event(files.write)
+        self.remove_light = self._event(files.remove_light)
         self._setters: dict[str, Callable[..., None]] = {
             "display": self.display.set_option,
             "decals": partial(decal_panel.set_decal_value, self._state),
@@ -146,10 +126,9 @@ class Sandbox:
             "drawing": partial(decal_panel.set_drawing, self._state),
             "scattering": self._set_scattering,
         }
-        self._lessons, self._start_lesson = list(lessons), start_lesson
+        self._lessons, self._start_lesson = len(lessons), start_lesson
         self.in_lesson = False
         self._before_lesson: tuple[UndoEntry | None, tuple[Any, ...]] | None = None
-        self._start: dict[str, Any] = {}
         self.show_start(start)
         self._last_step = math.inf
         self.schedule: Callable[[], None] = self.take_step
@@ -170,7 +149,7 @@ class Sandbox:
         window, state = self._window, self._state
         document, session = window.document, window.session
         return {
-            "title": self._files.title,
+            "title": window.actions.files.title,
             "status": self.status,
             "refusals": state.refusals,
             "refused": bool(state.refusal),
@@ -184,7 +163,7 @@ class Sandbox:
             "earlier": max(len(session.labels) - MAX_HISTORY, 0),
             "forgotten": session.forgotten,
             "undone": list(session.undone_labels[:MAX_HISTORY]),
-            "start": self._start,
+            "start": self._files.start,
             "display": self.display.values(),
             "cube": self.display.cube(),
             "gizmo": {**self.display.gizmo(), "line": self.display.selection_line()},
@@ -402,22 +381,17 @@ class Sandbox:
 
     # -- files ------------------------------------------------------------------------------------------
 
-    def show_start(self, shown: bool) -> None:
-        """Show or hide the start page."""
-        offered = {"open": bool(shown), "samples": list(SAMPLES), "lessons": self._lessons}
-        self._start = offered | listed(self._folder)
-
     @event
     def open_lesson(self, number: int) -> None:
         """Start one of the lessons."""
-        number = whole_number("lesson", number, 0, len(self._lessons) - 1, InvalidEdit)
+        number = whole_number("lesson", number, 0, self._lessons - 1, InvalidEdit)
         self._window.background.require_idle()
         if not self.in_lesson and self._window.document.objects:
             self._before_lesson = self._window.session.next_undo, self.display.kept_camera()
-            self._files.set_aside()
+            self._window.actions.files.set_aside()
         self.display.options = DisplayOptions()
         self._start_lesson(number)
-        self.in_lesson, self._start = True, {**self._start, "open": False}
+        self.in_lesson, self._files.start_open = True, False
 
     def close_lesson(self) -> None:
         """Leave the lesson and go back to the scene before it; without one, that of the lesson stays."""
@@ -432,166 +406,21 @@ class Sandbox:
             while session.labels and session.next_undo is not entry:
                 session.undo()
             self.display.restore_camera(camera)
-            self._files.take_back()
+            self._window.actions.files.take_back()
             self._state.show("")
 
         self.attempt(lambda: self._window.actions.when_idle(step))
 
-    @event
-    def new_model(self) -> None:
-        """Begin an empty scene."""
-        scene = empty_scene(FIRST_IMAGES, UPRIGHT["y"])
-        self._open(lambda *_: scene, "scene")
-
-    @event
-    def open_sample(self, name: str) -> None:
-        """Open a sample with scattered decals."""
-        one_of("sample", name, SAMPLES, InvalidEdit)
-        axes, (width, height) = axes_of(name), self._window.plotter.window_size
-        toward = axes.preset(THREE_QUARTER)
-
-        def load(progress: Progress, _cancel: Cancel) -> Scene:
-            scene = cover(sample(name), images=FIRST_IMAGES, view_direction=toward, progress=progress)
-            camera = fitting_camera(scene.objects, direction=toward, up=axes.up, aspect=width / height)
-            return scene.replace(camera=camera)
-
-        self._open(load, f"{name}-decals")
-
-    @event
-    def open_file(self, name: str) -> None:
-        """Open a file of the folder: a scene, or a model, to which decals can be added."""
-        if not isinstance(name, str) or Path(name).suffix.lower() not in MODELS:
-            raise InvalidEdit(f"file: expected a name that ends in {', '.join(MODELS)}, got {describe(name)}")
-        path = self._files.inside(name)
-        unsaved = self._files.inside(recovery_path(path))  # a link could lead elsewhere
-        if not path.exists() and not unsaved.is_file():
-            raise InvalidEdit(f"expected a file of the folder, found no {name!r}")
-
-        def load(_progress: Progress, _cancel: Cancel) -> Scene:
-            if not path.exists():  # the recovery file has everything
-                return empty_scene(FIRST_IMAGES, UPRIGHT["y"])
-            found = load_model(path, samples=sample_mesh)
-            if isinstance(found, Scene):
-                return found
-            camera = fitting_camera([found], direction=DEFAULT_DIRECTION, aspect=width / height)
-            return Scene(objects=[found], camera=camera, images=FIRST_IMAGES)
-
-        width, height = self._window.plotter.window_size
-        is_scene = path.suffix == ".json" and (not path.exists() or is_scene_file(path))
-        self._open(load, path if is_scene else f"{path.stem}-decals")
-
-    def upload(self, files: object, key: str = "") -> None:
-        """Take files that were dropped on the page: images and models are added, a scene is opened.
-
-        An image that was dropped on the row of a layer shows on its decals, on that of an image replaces it.
-        One that was dropped on a place of the view, see `surface_at`, shows on a new decal there.
-        One that was dropped on the key "light", and a Radiance file without a row, is the light.
-        """
-        for file in files if isinstance(files, list | tuple) else [files]:
-            self.attempt(partial(self._take_file, file, key))
-
-    def _take_file(self, file: object, key: str) -> None:
-        found, window = read_upload(file), self._window
-        file_name = str(file["name"])  # type: ignore[index]  # read_upload has checked it
-        name = plain_name(file_name)
-        if key == LIGHT or (not _row_of(key) and file_name.lower().endswith(HDR)):
-            self._take_light(found, file)
-        elif isinstance(found, Scene):
-            self._open(lambda *_: found, name)
-        elif isinstance(found, DecalImage):
-            self._take_image(found, key)
-        else:
-            taken = {item.name for item in window.document.objects}
-            renamed = replace(found, name=unused_name(name, taken, " "))
-            if isinstance(renamed, MeshObject):
-                renamed = replace(renamed, source=None)  # the file that was read exists no more
-            self._add_object(renamed)
-
-    def _take_image(self, image: DecalImage, key: str) -> None:
-        """Add an image that was dropped on a row or on the view, or replace that of the row."""
-        row, pick = _row_of(key), self.surface_at(key)
-        session, state = self._window.session, self._state
-        count, shown = len(session.document.images), ""
-        if row is not None and row.kind == "image":
-            state.run(ReplaceImage(row.number, image))
-            return
-        with session.stroke("add an image"):
-            session.do(AddImage(image))
-            if row is not None and row.kind == "layer":
-                session.do(image_on_layer(session.document, count, row.number))
-                shown = f" and shown on {session.document.layer_names.get(row.number, row.key)}"
-            elif pick is not None:
-                self._window.actions.decals.add_decal(lambda: pick, images=[count])
-                shown = " and a decal"
-        name = decal_panel.image_names(session.document)[-1]
-        state.show(f"added image {name}{shown or '; choose it for the selected decals'}")
-
-    @event
-    def place_image(self, key: str, place: str) -> None:
-        """Add a decal at a place of the view, see `surface_at`, that shows the image of a row."""
-        row = Part.named(key)
-        if row.kind != "image":
-            raise InvalidEdit("an image alone can be dropped on the view; drop other rows on rows")
-        self._window.actions.decals.add_decal(lambda: self.surface_at(place), images=[row.number])
-
-    def surface_at(self, place: object) -> SurfacePick | None:
-        """Return the surface point at a place of the view, or None.
-
-        "view 5000/0" is the middle of the lower edge, "view 10000/10000" the upper right corner.
-        """
-        found = PLACE.fullmatch(str(place))
-        if found is None:
-            return None
-        width, height = self._window.plotter.window_size
-        return self._window.tools.at(
-            int(found[1]) * width / PLACE_STEPS, int(found[2]) * height / PLACE_STEPS
-        )
-
-    def _take_light(self, picture: Any, file: object) -> None:
-        """Light the scene with a panorama, which is kept in the folder."""
-        present, up = self._window.document.drawing.environment, self._window.actions.view.axes.up
-        checked = Environment(picture, up=up) if present is None else replace(present, picture=picture)
-        changed = replace(checked, picture=checked.picture.kept_at(keep_upload(file, self._folder)))
-        self._state.draw_with("set environment", environment=changed)
-
-    @event
-    def remove_light(self) -> None:
-        """Light the scene as without a panorama."""
-        self._state.draw_with("remove environment", environment=None)
-
-    def _add_object(self, item: SceneObject) -> None:
-        first = not self._window.document.objects
-
-        def added() -> None:
-            if first:
-                self.move_camera("frame")
-
-        self._state.run(AddObject(item), added)
-        self._start = {**self._start, "open": False}
-
-    @event
-    def write_file(
-        self, name: str, replace_existing: bool = False, size: object = "", video: str = "turntable"
-    ) -> None:
-        """Write a file of the folder whose suffix is the format; see `FileActions.write`.
-
-        A picture without a size, such as "1920 x 1080", is what the view shows, with its mode and overlays.
-        """
-        if not isinstance(name, str) or not name.strip():
-            raise InvalidEdit(f"file: expected a name, such as model.json, got {describe(name)}")
-        numbers = [int(digits[:6]) for digits in re.findall(r"\d+", str(size))]
-        shown = (numbers[0], numbers[1]) if len(numbers) == 2 else None
-        self._files.write(name.strip(), bool(replace_existing), size=shown, video=video)
-
-    def _open(self, load: Callable[[Progress, Cancel], Scene], path: Path | str) -> None:
-        """Open a scene that belongs to a path, or to a new file of a name."""
-        self._files.recovery.keep()  # so that its name is taken
-        path = new_file(self._folder, path) if isinstance(path, str) else path
-        self._files.open(load, path, recover=partial(load_scene, samples=sample_mesh))
+    def _begin_scene(self) -> None:
+        """Leave the lesson, and show another scene as a whole."""
         self.in_lesson, self._before_lesson = False, None
-        self._start = {**self._start, "open": False}
         self.display.options = DisplayOptions()
         self.display.bookmarks.clear()
+
+    def upload(self, files: object, key: str = "") -> None:
+        """Take files that were dropped on the page; see `SandboxFiles.take`."""
+        for file in files if isinstance(files, list | tuple) else [files]:
+            self.attempt(partial(self._files.take, file, key))
 
     # -- view, decals and outline -----------------------------------------------------------------------
 
@@ -660,11 +489,6 @@ class Sandbox:
         self.take_step()
         self._state.attempt(request)
         self._window.redraw(whole=whole)
-
-
-def _row_of(key: str) -> Part | None:
-    """Return the part of the scene whose row a key names; None for no key and a place of the view."""
-    return Part.named(key) if key and PLACE.fullmatch(str(key)) is None else None
 
 
 def first_line(kind: type[Node]) -> str:

@@ -115,8 +115,8 @@ def test_a_sample_stands_upright(
     sandbox: Sandbox, window: EditWindow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     low = MeshObject("horse", *box((-1, -1, -1), (1, 1, 1)))
-    monkeypatch.setattr("decals.apps.sandbox.sandbox.sample", lambda _: low)
-    monkeypatch.setattr("decals.apps.sandbox.sandbox.cover", partial(decals.cover, count=3))
+    monkeypatch.setattr("decals.apps.sandbox.files.sample", lambda _: low)
+    monkeypatch.setattr("decals.apps.sandbox.files.cover", partial(decals.cover, count=3))
     sandbox.open_sample("horse")
     finish(window)
     assert window.document.camera.up == (0.0, 0.0, 1.0)

@@ -1,0 +1,232 @@
+"""Files of the folder in which the sandbox was started: the start page, opening, uploads, and writing."""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from blobtree.progress import Cancel, Progress
+from decals import cover
+from decals.apps.models.samples import SAMPLES, axes_of, sample, sample_mesh
+from decals.apps.models.scenes import empty_scene, new_file
+from decals.apps.sandbox.decal_panel import image_names
+from decals.apps.sandbox.folder import HDR, MODELS, keep_upload, listed, plain_name, read_upload
+from decals.apps.views import THREE_QUARTER
+from decals.editing.commands import AddImage, ReplaceImage
+from decals.editing.outline_actions import Part, image_on_layer
+from decals.editing.queries import SurfacePick
+from decals.editing.recovery import recovery_path
+from decals.editing.scatter_commands import AddObject
+from decals.errors import InvalidEdit
+from decals.rendering.environment import Environment
+from decals.scenes.camera import DEFAULT_DIRECTION, UPRIGHT
+from decals.scenes.cover import fitting_camera
+from decals.scenes.files import is_scene_file, load_model, load_scene
+from decals.scenes.objects import MeshObject, SceneObject, unused_name
+from decals.scenes.scene import DecalImage, Scene
+from decals.validation import describe, one_of
+from decals.window import EditWindow
+
+FIRST_IMAGES = ("scale",)
+"""Images of a scene at the beginning."""
+
+LIGHT = "light"
+"""Key under which a page sends a panorama, which lights the scene."""
+
+PLACE, PLACE_STEPS = re.compile(r"view (\d{1,5})/(\d{1,5})"), 10_000
+"""Key of a place of the view, and steps across the view that it counts, from the lower left corner."""
+
+
+class SandboxFiles:
+    """Opens files in an edit window, takes those that are dropped on its page, and writes files.
+
+    Parameters
+    ----------
+    window
+        The edited window.
+    folder
+        Files are read and written only inside this folder.
+    lessons
+        Titles of lessons that the start page lists.
+    opening
+        Called when another scene takes the place of the present one.
+
+    Attributes
+    ----------
+    start_open
+        True while the page shows the start page.
+    """
+
+    def __init__(
+        self, window: EditWindow, folder: Path, lessons: Sequence[str], opening: Callable[[], None]
+    ) -> None:
+        self._window, self._state, self._files = window, window.actions.state, window.actions.files
+        self._folder, self._lessons, self._opening = folder.resolve(), list(lessons), opening
+        self._files.folder = self._folder
+        self._files.screenshot = lambda: window.plotter.screenshot(None, return_img=True)
+        self.start_open, self._listed = False, dict[str, Any]()
+
+    def show_start(self, shown: bool) -> None:
+        """Show or hide the start page, with the files that are there now."""
+        self.start_open, self._listed = bool(shown), listed(self._folder)
+
+    @property
+    def start(self) -> dict[str, Any]:
+        """The start page as plain values."""
+        return {"open": self.start_open, "samples": list(SAMPLES), "lessons": self._lessons, **self._listed}
+
+    def new_model(self) -> None:
+        """Begin an empty scene."""
+        scene = empty_scene(FIRST_IMAGES, UPRIGHT["y"])
+        self._open(lambda *_: scene, "scene")
+
+    def open_sample(self, name: str) -> None:
+        """Open a sample with scattered decals."""
+        one_of("sample", name, SAMPLES, InvalidEdit)
+        axes, (width, height) = axes_of(name), self._window.plotter.window_size
+        toward = axes.preset(THREE_QUARTER)
+
+        def load(progress: Progress, _cancel: Cancel) -> Scene:
+            scene = cover(sample(name), images=FIRST_IMAGES, view_direction=toward, progress=progress)
+            camera = fitting_camera(scene.objects, direction=toward, up=axes.up, aspect=width / height)
+            return scene.replace(camera=camera)
+
+        self._open(load, f"{name}-decals")
+
+    def open_file(self, name: str) -> None:
+        """Open a file of the folder: a scene, or a model, to which decals can be added."""
+        if not isinstance(name, str) or Path(name).suffix.lower() not in MODELS:
+            raise InvalidEdit(f"file: expected a name that ends in {', '.join(MODELS)}, got {describe(name)}")
+        path = self._files.inside(name)
+        unsaved = self._files.inside(recovery_path(path))  # a link could lead elsewhere
+        if not path.exists() and not unsaved.is_file():
+            raise InvalidEdit(f"expected a file of the folder, found no {name!r}")
+
+        def load(_progress: Progress, _cancel: Cancel) -> Scene:
+            if not path.exists():  # the recovery file has everything
+                return empty_scene(FIRST_IMAGES, UPRIGHT["y"])
+            found = load_model(path, samples=sample_mesh)
+            if isinstance(found, Scene):
+                return found
+            camera = fitting_camera([found], direction=DEFAULT_DIRECTION, aspect=width / height)
+            return Scene(objects=[found], camera=camera, images=FIRST_IMAGES)
+
+        width, height = self._window.plotter.window_size
+        is_scene = path.suffix == ".json" and (not path.exists() or is_scene_file(path))
+        self._open(load, path if is_scene else f"{path.stem}-decals")
+
+    def take(self, file: object, key: str = "") -> None:
+        """Take a file that was dropped on the page: an image or a model is added, a scene is opened.
+
+        Parameters
+        ----------
+        file
+            A dictionary with the file's "name" and "content" (bytes).
+        key
+            The place of the drop. On the row of a layer, an image shows on its decals; on that of an image,
+            it replaces that one; on a place of the view, see `surface_at`, it shows on a new decal. On
+            `LIGHT`, an image is the light, and a Radiance file everywhere but on a row.
+        """
+        found, document = read_upload(file), self._window.document
+        file_name = str(file["name"])  # type: ignore[index]  # read_upload has checked it
+        name = plain_name(file_name)
+        if key == LIGHT or (not _row_of(key) and file_name.lower().endswith(HDR)):
+            self._take_light(found, file)
+        elif isinstance(found, Scene):
+            self._open(lambda *_: found, name)
+        elif isinstance(found, DecalImage):
+            self._take_image(found, key)
+        else:
+            taken = {item.name for item in document.objects}
+            renamed = replace(found, name=unused_name(name, taken, " "))
+            if isinstance(renamed, MeshObject):
+                renamed = replace(renamed, source=None)  # the file that was read exists no more
+            self._add_object(renamed)
+
+    def _take_image(self, image: DecalImage, key: str) -> None:
+        """Add an image that was dropped on a row or on the view, or replace that of the row."""
+        row, pick = _row_of(key), self.surface_at(key)
+        session, state = self._window.session, self._state
+        count, shown = len(session.document.images), ""
+        if row is not None and row.kind == "image":
+            state.run(ReplaceImage(row.number, image))
+            return
+        with session.stroke("add an image"):
+            session.do(AddImage(image))
+            if row is not None and row.kind == "layer":
+                session.do(image_on_layer(session.document, count, row.number))
+                shown = f" and shown on {session.document.layer_names.get(row.number, row.key)}"
+            elif pick is not None:
+                self._window.actions.decals.add_decal(lambda: pick, images=[count])
+                shown = " and a decal"
+        name = image_names(session.document)[-1]
+        state.show(f"added image {name}{shown or '; choose it for the selected decals'}")
+
+    def place_image(self, key: str, place: str) -> None:
+        """Add a decal at a place of the view, see `surface_at`, that shows the image of a row."""
+        row = Part.named(key)
+        if row.kind != "image":
+            raise InvalidEdit("an image alone can be dropped on the view; drop other rows on rows")
+        self._window.actions.decals.add_decal(lambda: self.surface_at(place), images=[row.number])
+
+    def surface_at(self, place: object) -> SurfacePick | None:
+        """Return the surface point at a place of the view, or None.
+
+        "view 5000/0" is the middle of the lower edge, "view 10000/10000" the upper right corner.
+        """
+        found = PLACE.fullmatch(str(place))
+        if found is None:
+            return None
+        width, height = self._window.plotter.window_size
+        return self._window.tools.at(
+            int(found[1]) * width / PLACE_STEPS, int(found[2]) * height / PLACE_STEPS
+        )
+
+    def _take_light(self, picture: Any, file: object) -> None:
+        """Light the scene with a panorama, which is kept in the folder."""
+        present, up = self._window.document.drawing.environment, self._window.actions.view.axes.up
+        checked = Environment(picture, up=up) if present is None else replace(present, picture=picture)
+        changed = replace(checked, picture=checked.picture.kept_at(keep_upload(file, self._folder)))
+        self._state.draw_with("set environment", environment=changed)
+
+    def remove_light(self) -> None:
+        """Light the scene as without a panorama."""
+        self._state.draw_with("remove environment", environment=None)
+
+    def _add_object(self, item: SceneObject) -> None:
+        first = not self._window.document.objects
+
+        def added() -> None:
+            if first:
+                self._window.actions.view.frame(lambda: None)
+
+        self._state.run(AddObject(item), added)
+        self.start_open = False
+
+    def write(
+        self, name: str, replace_existing: bool = False, size: object = "", video: str = "turntable"
+    ) -> None:
+        """Write a file of the folder whose suffix is the format; see `FileActions.write`.
+
+        A picture without a size, such as "1920 x 1080", is what the view shows, with its mode and overlays.
+        """
+        if not isinstance(name, str) or not name.strip():
+            raise InvalidEdit(f"file: expected a name, such as model.json, got {describe(name)}")
+        numbers = [int(digits[:6]) for digits in re.findall(r"\d+", str(size))]
+        shown = (numbers[0], numbers[1]) if len(numbers) == 2 else None
+        self._files.write(name.strip(), bool(replace_existing), size=shown, video=video)
+
+    def _open(self, load: Callable[[Progress, Cancel], Scene], path: Path | str) -> None:
+        """Open a scene that belongs to a path, or to a new file of a name."""
+        self._files.recovery.keep()  # so that its name is taken
+        path = new_file(self._folder, path) if isinstance(path, str) else path
+        self._files.open(load, path, recover=partial(load_scene, samples=sample_mesh))
+        self.start_open = False
+        self._opening()
+
+
+def _row_of(key: str) -> Part | None:
+    """Return the part of the scene whose row a key names; None for no key and a place of the view."""
+    return Part.named(key) if key and PLACE.fullmatch(str(key)) is None else None
