@@ -146,21 +146,14 @@ def sandbox(
             ready = server.controller.on_server_ready
             if done or session:
                 ready.add(lambda **_: print(_url(host, server.port, ""), flush=True))
-            query = _protect(server, host)
-            own_browser = browser and bool(query)  # trame opens it without the token
+            token = _protect(server, host)
             if session:
                 ready.add(lambda **_: threading.Thread(target=_end_with_input, daemon=True).start())
             else:
-                ready.add(lambda **_: _announce(host, server.port, query, open_browser=own_browser))
+                ready.add(lambda **_: _announce(host, server.port, token, open_browser=browser))
             keep_memory_low()
             with _port_in_use_reported(port):
-                server.start(
-                    host=host,
-                    port=port,
-                    open_browser=browser and not query,
-                    show_connection_info=False,
-                    timeout=0,
-                )
+                server.start(host=host, port=port, open_browser=False, show_connection_info=False, timeout=0)
     finally:
         report_unsaved(window, "sandbox")
     return 0
@@ -195,15 +188,13 @@ def _serve_sessions(
     except ImportError as error:
         raise _missing(error) from None
 
-    def ready(found: int) -> None:
-        query = f"?secret={token}" if token else ""
-        _announce(host, found, query, open_browser=browser)
-
     token = _token(host)
     allows_host = (lambda _: True) if token else _is_loopback
     served = Sessions(command, limit=limit, token=token, allows_host=allows_host)
     with suppress(KeyboardInterrupt), _port_in_use_reported(port):
-        return asyncio.run(served.serve(host, port, ready))
+        return asyncio.run(
+            served.serve(host, port, lambda found: _announce(host, found, token, open_browser=browser))
+        )
     return 0
 
 
@@ -295,11 +286,10 @@ def _missing(error: ImportError) -> MissingPackage:
 
 
 def _protect(server: Any, host: str) -> str:
-    """Ask every browser for a new token, unless only this machine is served; return the end of the URL."""
-    token = _token(host)
-    if token:
+    """Ask every browser for a new token, unless only this machine is served, and return the token."""
+    if token := _token(host):
         server.cli.set_defaults(authKey=token)
-    return f"?secret={token}" if token else ""
+    return token
 
 
 def _token(host: str) -> str:
@@ -314,14 +304,15 @@ def _is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
-def _url(host: str, port: int, query: str) -> str:
+def _url(host: str, port: int, token: str) -> str:
+    query = f"?secret={token}" if token else ""
     shown = socket.gethostname() if host in ANY_ADDRESS else f"[{host}]" if ":" in host else host
     return f"http://{shown}:{port}/{query}"
 
 
-def _announce(host: str, port: int, query: str, *, open_browser: bool) -> None:
-    """Print the URL of the page, and open it if trame does not."""
-    url = _url(host, port, query)
+def _announce(host: str, port: int, token: str, *, open_browser: bool) -> None:
+    """Print the URL of the page, and open it in the default browser."""
+    url = _url(host, port, token)
     Console(stderr=True, soft_wrap=True).print(
         f"sandbox at {url} (Ctrl + C ends it)", highlight=False, markup=False
     )

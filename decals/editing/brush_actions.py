@@ -1,8 +1,6 @@
 """Actions that choose the brush of a window."""
 
-from collections.abc import Callable
-
-from decals.editing.action_state import Cursor, WindowActions
+from decals.editing.action_state import WindowActions
 from decals.editing.brushes import Brush
 from decals.editing.key_bindings import Group
 
@@ -29,13 +27,8 @@ class BrushActions(WindowActions):
         self._state.brush.brush, self._state.message = brush, BRUSHES[brush][1]
 
 
-def _choosing(brush: Brush) -> Callable[[BrushActions, Cursor], None]:
-    def choose(actions: BrushActions, _cursor: Cursor) -> None:
-        actions.choose(brush)
-
-    return choose
-
-
 for _brush, (_key, _summary) in BRUSHES.items():
     _register = Group.BRUSHES.action(f"brush_{_brush}", _key, summary=_summary)
-    setattr(BrushActions, f"choose_{_brush}", _register(_choosing(_brush)))
+    setattr(
+        BrushActions, f"choose_{_brush}", _register(lambda actions, _, brush=_brush: actions.choose(brush))
+    )

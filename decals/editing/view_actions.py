@@ -1,7 +1,5 @@
 """Actions that move the camera of the view: sides, projection, and what it frames."""
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -98,13 +96,8 @@ class ViewActions(WindowActions):
         self._state.message = f"{'parallel' if camera.parallel else 'perspective'} projection"
 
 
-def _looking(side: str) -> Callable[[ViewActions, Cursor], None]:
-    def look(actions: ViewActions, _cursor: Cursor) -> None:
-        actions.look_from(side)
-
-    return look
-
-
 for _side, _key in SIDE_KEYS.items():
     _register = Group.CAMERA.action(f"view_{_side}", _key, summary=f"{_side} view")
-    setattr(ViewActions, f"look_from_{_side}", _register(_looking(_side)))
+    setattr(
+        ViewActions, f"look_from_{_side}", _register(lambda actions, _, side=_side: actions.look_from(side))
+    )
