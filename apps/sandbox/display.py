@@ -310,7 +310,7 @@ class Display:
         right, down = (min(max(finite_number("place", part, InvalidEdit), 0.0), 1.0) for part in (x, y))
         ray = ray_through(self._window.subplot, right * width - 0.5, (1.0 - down) * height - 0.5)
         assert ray is not None  # the place lies in the view
-        if name in self.points:
+        if str(name) in self.points:  # the page may send anything
             self.points[name][1](ray)
             return
         plane = self.options.slice

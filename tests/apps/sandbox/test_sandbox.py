@@ -231,6 +231,7 @@ def test_handles_move_turn_and_scale_the_selected_node(window: EditWindow) -> No
     assert larger.radius == pytest.approx(1.2, abs=0.03)
     sandbox.perform("undo")
     assert digest(window.document) == before
+    sandbox.drag_handle({}, "begin", 0.5, 0.5)  # type: ignore[arg-type]
     sandbox.drag_handle("spin", "begin", 0.5, 0.5)
     assert "handle: expected one of the selected node, move" in sandbox.status
     sandbox.drag_handle("move", "throw", 0.5, 0.5)
