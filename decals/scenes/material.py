@@ -198,13 +198,14 @@ class DecalMaterial(DecalImage):
         Both are float32[h, w, 4], without alpha.
         """
         first = np.empty((*self.pixels.shape[:2], 4), np.float32)
+        second = np.empty_like(first)
         first[..., :2] = (self.normal[..., :2].astype(np.float32) - 128.0) / 127.0
-        length = np.linalg.norm(first[..., :2], axis=-1, keepdims=True)
-        first[..., :2] /= np.maximum(length, 1.0)
+        first[..., :2] /= np.maximum(np.hypot(first[..., 0], first[..., 1]), 1.0)[..., None]
         first[..., 2] = np.maximum(self.roughness / np.float32(255), MIN_ROUGHNESS)
         first[..., 3] = self.metallic / np.float32(255)
-        light = decode_srgb(self.emission / np.float64(255))
-        return first, np.dstack([light, self.occlusion / 255.0]).astype(np.float32)
+        second[..., :3] = decode_srgb(np.arange(256) / 255.0).astype(np.float32)[self.emission]
+        second[..., 3] = self.occlusion / np.float32(255)
+        return first, second
 
     def relief_texels(self) -> Float32Array | None:
         """Return heights in radii, times alpha, as float32[h, w]; None without relief.
