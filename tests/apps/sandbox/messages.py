@@ -7,8 +7,8 @@ figures are printed as JSON: errors of the server, whether undoing all restores 
 and the growth of the memory once the first tenth has been sent and once the first half has.
 
 They also say for how long the server's loop did not return to its other tasks: time on the clock, which other
-work on the machine lengthens, and processor time of the loop's thread. The longest pauses are listed with the
-last message, the mode of the view, and the place in the program at which they were late.
+work on the machine lengthens, and processor time of the loop's thread. Those with most of that are listed
+with the last message, the mode of the view, and the place in the program at which they were late.
 """
 
 import argparse
@@ -168,7 +168,7 @@ class LoopWatch:
     clock, busy
         Numbers of pauses by their milliseconds on the clock, and by those of the thread's processor time.
     longest
-        The longest late pause of each cause and place.
+        The late pause of each cause and place with most processor time.
     """
 
     def __init__(self, cause: Callable[[], str]) -> None:
@@ -197,7 +197,7 @@ class LoopWatch:
         self.clock[pause.clock_ms] += 1
         self.busy[pause.busy_ms] += 1
         key = pause.cause, pause.place
-        if clock > LATE_MS and (key not in self.longest or clock > self.longest[key].clock_ms):
+        if clock > LATE_MS and (key not in self.longest or busy > self.longest[key].busy_ms):
             self.longest[key] = pause
 
     def _look(self, watched: int, ended: threading.Event) -> None:
@@ -282,7 +282,7 @@ class Messages:
 
     def figures(self) -> dict[str, Any]:
         """Return the figures so far."""
-        longest = sorted(self._watch.longest.values(), key=lambda pause: -pause.clock_ms)
+        longest = sorted(self._watch.longest.values(), key=lambda pause: -pause.busy_ms)
         return {
             "changed": self.changed,
             "restored": self.restored,
