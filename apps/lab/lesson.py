@@ -292,19 +292,17 @@ def _check_slider(slider: Slider, scene: Scene) -> None:
         raise InvalidLesson(f"{slider.path}: expected one number, got {value!r:.60}; add its index")
 
 
-def _formulas(settings: Settings) -> list[tuple[str, str, set[str]]]:
-    """Return place, text and variables of all formulas."""
-    found: list[tuple[str, str, set[str]]] = []
+def _formulas(settings: Settings) -> Iterator[tuple[str, str, set[str]]]:
+    """Yield place, text and variables of all formulas."""
     for i, value in enumerate(settings.values):
-        found.append((f"values[{i}]", value.formula, set()))
+        yield f"values[{i}]", value.formula, set()
     for i, plot in enumerate(settings.plots):
         names = ({"x", "y"} if plot.x else set()) if plot.map else {"x"}
         texts = [*(curve.formula for curve in plot.curves), *filter(None, (plot.map, plot.red))]
-        found += [(f"plots[{i}]", text, names) for text in texts]
-        found += [(f"plots[{i}].marks", text, set()) for mark in plot.marks for text in mark]
+        yield from ((f"plots[{i}]", text, names) for text in texts)
+        yield from ((f"plots[{i}].marks", text, set()) for mark in plot.marks for text in mark)
     for i, check in enumerate(settings.question.checks):
-        found.append((f"question.checks[{i}]", check.holds, set()))
-    return found
+        yield f"question.checks[{i}]", check.holds, set()
 
 
 def _template(text: str) -> Template:

@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import chain, count
 from pathlib import Path
 
 import numpy as np
 
 from decals import Camera, DecalImage, Scene
 from decals.apps.views import parse_view
-from decals.editing.recovery import recovery_path
+from decals.editing.recovery import numbered_paths, recovery_path
 from decals.scenes.camera import Axes
 
 
@@ -18,8 +17,7 @@ def new_file(folder: Path, name: str, *, recover: bool = False) -> Path:
 
     Unless ``recover`` is True, nor do unsaved changes of it exist.
     """
-    endings = chain([""], (f"-{number}" for number in count(2)))
-    paths = (folder / f"{name}{ending}.json" for ending in endings)
+    paths = numbered_paths(folder / f"{name}.json")
     return next(p for p in paths if not p.exists() and (recover or not recovery_path(p).exists()))
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from enum import StrEnum
-from itertools import chain, count
 from os import PathLike
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from decals.editing.action_state import ActionState, Cursor, WindowActions
 from decals.editing.commands import AddImage, ReplaceScene
 from decals.editing.key_bindings import Group
 from decals.editing.prompts import Question, TextPrompt
-from decals.editing.recovery import RecoveryFile
+from decals.editing.recovery import RecoveryFile, numbered_paths
 from decals.editing.session import Command
 from decals.errors import InvalidEdit
 from decals.images.builtin import BUILTIN_IMAGES, is_builtin
@@ -130,8 +129,7 @@ class FileActions(WindowActions):
 
         A file that a save of this scene is writing, or has just written, is its own.
         """
-        numbered = (Path(path).with_stem(f"{Path(path).stem}-{number}") for number in count(2))
-        names = chain([Path(path)], numbered)
+        names = numbered_paths(Path(path))
         return next(name for name in names if self._exists or name == self._begun or not name.exists())
 
     @Group.SCENE.action("save_as", "Ctrl+Shift+s", summary="save to another file")

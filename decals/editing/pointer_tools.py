@@ -135,16 +135,16 @@ class PointerTools:
         self._press_position, self._press, self._drag = _checked_pixel(x, y), Press.DOWN, None
         if ctrl:
             return True
-        self.selection_line = []
-        if self.actions.state.brush.brush in (Brush.BOX, Brush.LASSO) and not shift:
-            self.selection_line = [(x, y)]
+        brush = Brush.SELECT if shift else self.actions.state.brush.brush
+        self.selection_line = [(x, y)] if brush in (Brush.BOX, Brush.LASSO) else []
+        if self.selection_line:
             return True
-        if self.actions.state.brush.brush is Brush.PULL and not shift:
+        if brush is Brush.PULL:
             surface_pick, ray = self.at(x, y), self._ray(x, y)
             if surface_pick is not None and ray is not None:
                 self._drag = SurfaceDrag(self.actions, surface_pick, ray)
             return surface_pick is not None
-        if self.actions.state.brush.brush is not Brush.SELECT and not shift:
+        if brush is not Brush.SELECT:
             return self._begin_brush(x, y)
         selection = self.actions.state.selection
         surface_pick = None if shift or not selection else self.at(x, y)

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from datetime import datetime
+from itertools import count
 from os import PathLike
 from pathlib import Path
 
@@ -59,6 +60,13 @@ def recovery_path(path: str | PathLike[str], *, number: int = 1) -> Path:
     if not scene.name:
         raise InvalidScene(f"path: expected the path of a scene, got {str(path)!r}")
     return scene.with_name(f"{scene.stem}{ending}{SUFFIX}")
+
+
+def numbered_paths(path: Path) -> Iterator[Path]:
+    """Yield a path, then those with a number behind the name: NAME-2, NAME-3, ..."""
+    yield path
+    for number in count(2):
+        yield path.with_stem(f"{path.stem}-{number}")
 
 
 def in_use(path: Path) -> bool:

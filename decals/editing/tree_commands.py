@@ -35,7 +35,7 @@ from blobtree.validation import affine_matrix, truth
 from decals.editing.document import Document, Edit
 from decals.editing.followers import followers
 from decals.editing.queries import move_decals
-from decals.editing.visibility import rename_label
+from decals.editing.visibility import Renaming
 from decals.errors import InvalidEdit
 from decals.options import inherit_descriptions
 from decals.scenes.objects import SceneObject, TreeObject, check_names, flagged, with_tree
@@ -644,7 +644,7 @@ class GroupOperands(StructureCommand):
 
 
 @dataclass(frozen=True, eq=False)
-class RenameObject:
+class RenameObject(Renaming):
     """Give an object another name.
 
     Parameters
@@ -667,11 +667,6 @@ class RenameObject:
 
     number: int
     name: str
-
-    @property
-    def label(self) -> str:
-        """The new name."""
-        return rename_label(self.name)
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""

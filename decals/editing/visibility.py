@@ -193,8 +193,19 @@ class LockLayers:
         return document.compute_parts(locked_layers=as_layers("layers", self.layers, InvalidEdit))
 
 
+class Renaming:
+    """Base of commands that give a part of a scene a ``name``."""
+
+    name: str
+
+    @property
+    def label(self) -> str:
+        """The new name, as undo names the command."""
+        return f"rename to {describe(self.name)}" if str(self.name) else "remove a name"
+
+
 @dataclass(frozen=True, eq=False)
-class RenameNode:
+class RenameNode(Renaming):
     """Give a node of a BlobTree a name, which it keeps while the tree is edited.
 
     Parameters
@@ -222,11 +233,6 @@ class RenameNode:
     path: Path
     name: str
 
-    @property
-    def label(self) -> str:
-        """The new name."""
-        return rename_label(self.name)
-
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
         item = document.object(self.object)
@@ -239,7 +245,7 @@ class RenameNode:
 
 
 @dataclass(frozen=True, eq=False)
-class RenameLayer:
+class RenameLayer(Renaming):
     """Give a layer of decals a name.
 
     Parameters
@@ -263,21 +269,11 @@ class RenameLayer:
     layer: int
     name: str
 
-    @property
-    def label(self) -> str:
-        """The new name."""
-        return rename_label(self.name)
-
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
         (layer,) = as_layers("layer", (self.layer,), InvalidEdit)
         names = as_layer_names(_renamed(document.layer_names, layer, self.name))
         return Edit() if names == document.layer_names else document.compute_parts(layer_names=names)
-
-
-def rename_label(name: str) -> str:
-    """Return the label of the command that gives something a name."""
-    return f"rename to {describe(name)}" if str(name) else "remove a name"
 
 
 def _renamed(names: dict[Any, str], key: Any, name: str) -> dict[Any, str]:
