@@ -117,8 +117,27 @@
     next.focus();
   }, true);
 
+  // The page begins in the colours of the system, once its templates follow the state.
+  const dark = matchMedia("(prefers-color-scheme: dark)").matches;
+  setTimeout(() => dark && trame.state.set("theme", "dark"));
+
+  // A session that has ended opens again once the server answers.
+  const reopen = async () => {
+    const answer = await fetch("/").catch(() => null);
+    if (answer?.ok) location.reload();
+    else setTimeout(reopen, 2000);
+  };
+  const ENDED = "The session has ended. Unsaved changes are kept. This page opens them once the server answers.";
+  const explainEnd = () => {
+    const message = document.querySelector(".trame__message");
+    if (message?.textContent.trim() !== "Connection closed") return;
+    message.textContent = ENDED;
+    reopen();
+  };
+
   // The view shows an image without the text that screen readers ask for; new buttons join their group.
   const complete = () => {
+    explainEnd();
     document.querySelectorAll("img:not([alt])").forEach((image) => (image.alt = ""));
     document.querySelectorAll("[data-roving]").forEach((group) => rove(group));
   };

@@ -132,7 +132,7 @@ class Page:
         self._shown: dict[str, Any] = {}
         self._task: asyncio.Task[None] | None = None
         self._end: asyncio.Task[None] | None = None
-        server.state.client_only("left_open", "right_open")  # another browser has its own panels
+        server.state.client_only("left_open", "right_open", "theme")  # another browser has its own
         server.state.update({**self.values(), "catalog": self.sandbox.catalog(), "thumbnails": thumbnails()})
         server.state.update({"theme": "light", "dropped": None, "dropped_on": ""})
         server.state.renamed = {"key": "", "name": ""}

@@ -37,6 +37,7 @@ STOP_SECONDS = 20.0
 
 PAGE = (
     "<!doctype html><html lang='en'><meta charset='utf-8'><title>Sandbox</title>{refresh}"
+    "<meta name='color-scheme' content='light dark'>"
     "<body style='font: 16px sans-serif; margin: 4em'><p role='status'>{text}</p></body></html>"
 )
 
@@ -273,7 +274,7 @@ class Sessions:
         elif session.url:
             response = await self._file(session, request)
         else:
-            response = _page("The session starts.", refresh=True)
+            response = _page("The session starts. This takes some seconds.", refresh=True)
         response.set_cookie(self._cookie, key, max_age=COOKIE_SECONDS, httponly=True, samesite="Strict")
         return response
 

@@ -55,8 +55,8 @@ DIRECTIONS = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 NOT_OFFERED = ("transform", "volume", "press", "bulge", "rated_union")
 """Kinds that need data or are parts: the gizmo moves nodes, and `SolidContact` makes the last three."""
 
-NAMED_SHARES = {"low": -0.5, "high": 0.5, "thickness": 0.1}
-"""Lengths by the name of their parameter: the ends of a deformation, the thickness of a wall."""
+NAMED_SHARES = {"low": -0.5, "high": 0.5, "thickness": 0.1, "end_radius": 0.1}
+"""Lengths by the name of their parameter: ends of a deformation, thickness of a wall, end of a limb."""
 
 
 def built_in_kinds() -> dict[str, type[Node]]:

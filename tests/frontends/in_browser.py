@@ -635,14 +635,20 @@ async def choose(browser: Page, label: str, option: str) -> None:
 
 
 async def ended() -> None:
-    """Done saves the scene and ends the server of a notebook at once, while the page is still open."""
+    """Done saves the scene and ends the server of a notebook at once; the page opens when it comes back."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scene.json"
         decals.save_scene(empty_scene(["scale"], UPRIGHT["y"]), file)
         with notebook._served(file) as (process, url):
             async with opened(url) as browser:
+                await browser.emulate_media(color_scheme="dark")
+                await browser.reload()
+                await browser.locator(".v-theme--dark").first.wait_for()
                 await browser.get_by_role("button", name="Done").click()
                 await asyncio.to_thread(process.wait, notebook.STOP_SECONDS)
+                await browser.get_by_text("Unsaved changes are kept").wait_for()
+                await browser.route("**/*", lambda route: route.fulfill(body="is back"))
+                await browser.get_by_text("is back").wait_for()
 
 
 def main() -> None:

@@ -1,5 +1,7 @@
 """New nodes: every class gives one with a surface, or is left out for a stated reason."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,21 @@ def test_a_new_primitive_stands_where_it_is_wanted(name: str) -> None:
     low, high = new_nodes.new_node(name, center=center, size=3.0).bounds
     np.testing.assert_allclose((low + high) / 2, center, atol=1.0)
     assert 1.0 < (high - low).max() < 8.0
+
+
+def test_a_new_cone_tapers_and_a_new_segment_does_not() -> None:
+    shares = []
+    for name in ("Cone", "Segment"):
+        node: Any = new_nodes.new_node(name)
+        start, end = np.array(node.start), np.array(node.end)
+        along = (end - start) / np.linalg.norm(end - start)
+        across = np.cross(along, (0, 0, 1))
+        widths = [
+            [(node([place + t * across]) >= 0.5).sum() for t in np.linspace(0, 0.5, 101)]
+            for place in (start, end)
+        ]
+        shares.append(np.sum(widths[1]) / np.sum(widths[0]))
+    assert shares[0] < 0.7 < 0.9 < shares[1]
 
 
 def test_custom_kinds_are_offered() -> None:
