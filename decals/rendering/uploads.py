@@ -8,7 +8,6 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from decals.field.mapping import ImageMapping
-from decals.field.walks import Walks
 from decals.index.editor import DecalEditor
 from decals.receivers import object_mask
 from decals.rendering.context import Context
@@ -126,6 +125,7 @@ class Uploads:
         self._materials: GpuCache[MaterialArray] = GpuCache()
         self._reliefs: GpuCache[ReliefArray] = GpuCache()
         self._environments: GpuCache[EnvironmentTextures] = GpuCache()
+        self._walks: GpuCache[DataTexture] = GpuCache()
         self._caches: tuple[GpuCache[Any], ...] = (
             self._drawables,
             self._decals,
@@ -133,11 +133,11 @@ class Uploads:
             self._materials,
             self._reliefs,
             self._environments,
+            self._walks,
         )
         self._masks: tuple[tuple[int, ...], DataTexture] | None = None
         self._relief: tuple[ReliefArray, DecalData, int, Relief] | None = None
         self.walk_cache = WalkCache()
-        self._walks: tuple[Walks, DataTexture] | None = None
 
     def scene(self, scene: SceneLike, drawing: Drawing) -> UploadedScene:
         """Return a whole scene, with what a way of drawing needs; errors are those of `check_scene`."""
@@ -166,15 +166,7 @@ class Uploads:
         if mapping is not ImageMapping.WALKED or not len(scene.decals):
             return None
         walks = self.walk_cache.get(scene)
-        if self._walks is None or self._walks[0] is not walks:
-            self._release_walks()
-            self._walks = walks, DataTexture(self.context, walks.texels)
-        return self._walks[1]
-
-    def _release_walks(self) -> None:
-        if self._walks is not None:
-            self._walks[1].release()
-        self._walks = None
+        return self._walks.get(lambda: DataTexture(self.context, walks.texels), walks)
 
     def _materials_of(self, scene: SceneLike, images: ImageArray | None) -> MaterialArray | None:
         """Return the maps of a scene's images; None without any."""
@@ -188,6 +180,7 @@ class Uploads:
     def _relief_of(self, scene: SceneLike, images: ImageArray | None) -> Relief | None:
         """Return the relief of a scene's decals; None without any."""
         if images is None or not has_relief(scene):
+            self._relief = None
             return None
         heights, widths = zip(*(image.pixels.shape[:2] for image in scene.images), strict=True)
         shape = min(max(heights), images.height), min(max(widths), images.width)  # no texel is averaged
@@ -257,11 +250,11 @@ class Uploads:
         """Release everything that was not used since the last sweep."""
         for cache in self._caches:
             cache.sweep()
+        self.walk_cache.sweep()
 
     def release(self) -> None:
         """Release everything."""
         for cache in self._caches:
             cache.release()
         self._release_masks()
-        self._release_walks()
         self.walk_cache.release()

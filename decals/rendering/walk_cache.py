@@ -42,30 +42,20 @@ class _Job:
         self.key = key
         self.walks: Walks | None = None
         self.error: Exception | None = None
-        self._rows, self._previous = rows, previous
         self.cancelled = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="walks", daemon=True)
-        self._thread.start()
+        self.thread = threading.Thread(target=self._run, args=(rows, previous), name="walks", daemon=True)
+        self.thread.start()
 
-    def _run(self) -> None:
+    def _run(self, rows: Float32Array, previous: Walks | None) -> None:
         try:
             with core_left_free(), reporting(self._report):
-                self.walks = _walks_of(self.key, self._rows, self._previous)
+                self.walks = _walks_of(self.key, rows, previous)
         except Exception as error:  # raised by `WalkCache.get`
             self.error = error.with_traceback(None)  # its frames would keep meshes and relays
 
     def _report(self, stage: str, _fraction: float) -> None:
         if self.cancelled.is_set():
             raise Cancelled(f"cancelled while {stage}")
-
-    def is_for(self, key: Key) -> bool:
-        """Return True if the thread goes on to compute the walks of a state."""
-        return not self.cancelled.is_set() and _same(self.key, key)
-
-    def ended(self, seconds: float | None) -> bool:
-        """Wait at most so long, None for no limit; return True if the thread has ended."""
-        self._thread.join(seconds)
-        return not self._thread.is_alive()
 
 
 class WalkCache:
@@ -76,35 +66,38 @@ class WalkCache:
         self._walks: Walks | None = None
         self._error: Exception | None = None
         self._job: _Job | None = None
+        self._cancelled: threading.Thread | None = None
+        self._used = False
 
     def ready(self, scene: SceneLike) -> bool:
         """Return True if `get` takes no time; otherwise the walks are being computed in a thread.
 
         A new state of the scene cancels those of the state before.
         """
+        self._used = True
         key = _key(scene)
         if _same(self._key, key):
             return True
-        job = self._job
-        if job is not None and job.is_for(key):
-            return self._take(job, 0.0)
-        if job is not None:
-            job.cancelled.set()
-            if not job.ended(0.0):
-                return False
-        self._job = job = _Job(key, walk_rows(scene.decals), self._walks)
-        return self._take(job, FIRST_WAIT)
+        if self._job is not None and _same(self._job.key, key):
+            return self._take(self._job, 0.0)
+        self._cancel()
+        if not self._ended(0.0):
+            return False
+        self._job = _Job(key, walk_rows(scene.decals), self._walks)
+        return self._take(self._job, FIRST_WAIT)
 
     def get(self, scene: SceneLike) -> Walks:
         """Return the walks of a scene; compute them or wait for them if necessary."""
+        self._used = True
         key = _key(scene)
         if not _same(self._key, key):
-            if self._job is None or not self._job.is_for(key):
+            if self._job is not None and _same(self._job.key, key):
+                self._take(self._job, None)
+            else:
                 self._cancel()
+                self._ended(None)
                 self._walks = _walks_of(key, walk_rows(scene.decals), self._walks)
                 self._key, self._error = key, None
-            else:
-                self._take(self._job, None)
         if self._error is not None:
             raise self._error
         assert self._walks is not None
@@ -112,20 +105,39 @@ class WalkCache:
 
     def _take(self, job: _Job, wait: float | None) -> bool:
         """Wait at most so long for a thread, and take its result; return True if it has ended."""
-        if not job.ended(wait):
+        job.thread.join(wait)
+        if job.thread.is_alive():
             return False
         self._key, self._job, self._error = job.key, None, job.error
         self._walks = job.walks or self._walks
         return True
 
     def _cancel(self) -> None:
-        """Cancel the thread and wait for its end."""
+        """Cancel the thread; of its work, nothing is kept."""
         if self._job is not None:
             self._job.cancelled.set()
-            self._job.ended(None)
-        self._job = None
+            self._cancelled, self._job = self._job.thread, None
+
+    def _ended(self, wait: float | None) -> bool:
+        """Wait at most so long, None for no limit; return True if the cancelled thread has ended."""
+        if self._cancelled is not None:
+            self._cancelled.join(wait)
+            if self._cancelled.is_alive():
+                return False
+        self._cancelled = None
+        return True
+
+    def sweep(self) -> None:
+        """Forget all walks, and cancel the thread, if no walks were needed since the last sweep."""
+        if not self._used:
+            self._forget()
+        self._used = False
+
+    def _forget(self) -> None:
+        self._cancel()
+        self._key = self._walks = self._error = None
 
     def release(self) -> None:
         """Cancel the thread, wait for its end, and forget all walks."""
-        self._cancel()
-        self._key = self._walks = self._error = None
+        self._forget()
+        self._ended(None)

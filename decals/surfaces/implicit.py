@@ -1,6 +1,7 @@
 """`ImplicitSurface`: the iso surface of a BlobTree, on the host and on devices."""
 
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 import warp as wp
@@ -109,18 +110,22 @@ class ImplicitSurface(Immutable):
         return {}
 
     def triangulated(self, cell: float) -> MeshSurface:
-        """Return a mesh of the surface with creases and cells of at most this size, within MAX_RESOLUTION."""
+        """Return a mesh of the surface with creases and cells of at most this size, within MAX_RESOLUTION.
+
+        The mesh of a resolution stays the same as long as something holds it.
+        """
         low, high = self.tree.support
         cells = float((high - low).max()) / max(cell, 1e-30)
         resolution = RESOLUTION if cells <= RESOLUTION else MAX_RESOLUTION
-        if resolution not in self._meshes:
+        mesh = self._meshes.get(resolution)
+        if mesh is None:
             fine = polygonize(self.tree, resolution=resolution, creases=True, device=self.device)
-            self._meshes[resolution] = MeshSurface(fine.vertices, fine.faces, device=self.device)
-        return self._meshes[resolution]
+            mesh = MeshSurface(fine.vertices, fine.faces, device=self.device)
+        return self._meshes.setdefault(resolution, mesh)
 
     @Lazy
-    def _meshes(self) -> dict[int, MeshSurface]:
-        return {}
+    def _meshes(self) -> WeakValueDictionary[int, MeshSurface]:
+        return WeakValueDictionary()
 
     @property
     def area(self) -> float:

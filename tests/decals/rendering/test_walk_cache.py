@@ -2,6 +2,7 @@
 
 import threading
 import time
+import weakref
 from typing import Any
 
 import numpy as np
@@ -105,4 +106,35 @@ def test_a_failure_is_raised_by_the_picture_and_the_next_state_is_tried(
             cache.get(session.document)
     monkeypatch.setattr(walks, "_walk", gate)
     session.do(MoveDecals([0], (0.7, 0.1, 1), (0, 0, 1)))
+    compare(cache, session)
+
+
+def test_walks_that_no_picture_needs_are_forgotten(
+    session: EditSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gate, cache = Gate(monkeypatch), WalkCache()
+    gate.open.set()
+    kept = weakref.ref(cache.get(session.document))
+    cache.sweep()
+    assert cache.get(session.document) is kept()
+    cache.sweep()
+    cache.sweep()
+    assert kept() is None
+
+
+def test_a_sweep_cancels_walks_that_no_picture_needs(
+    session: EditSession, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gate, cache = Gate(monkeypatch), WalkCache()
+    assert not cache.ready(session.document)
+    assert cache._job is not None
+    job = weakref.ref(cache._job)
+    cache.sweep()
+    assert job() is cache._job
+    cache.sweep()
+    gate.open.set()
+    cache.release()
+    assert job() is None
+    assert gate.counts == [4]
+    wait_for(cache, session)
     compare(cache, session)

@@ -1,3 +1,4 @@
+import weakref
 from typing import Any
 
 import numpy as np
@@ -94,6 +95,16 @@ def test_it_contains_its_inside() -> None:
     assert surface.contains(0.99 * ways + [0, 5, 0]).all()
     assert not surface.contains(1.01 * ways + [0, 5, 0]).any()
     assert not surface.contains([[100, 0, 0]]).any()
+
+
+def test_a_mesh_of_the_surface_is_the_same_while_something_holds_it() -> None:
+    surface = ImplicitSurface(blob(), resolution=32)
+    mesh = surface.triangulated(0.5)
+    assert surface.triangulated(0.5) is mesh
+    assert surface.triangulated(0.001) is not mesh
+    gone = weakref.ref(mesh)
+    del mesh
+    assert gone() is None
 
 
 def test_a_tree_without_surface_is_refused() -> None:
