@@ -1,7 +1,8 @@
-"""Functions that keep their last results, bounded by bytes."""
+"""Values that are kept up to a size: those that were used last, and all that are still in use."""
 
 import threading
-from collections.abc import Callable
+import weakref
+from collections.abc import Callable, Hashable
 from typing import Generic, ParamSpec, Protocol, TypeVar
 
 
@@ -16,12 +17,56 @@ class Sized(Protocol):
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result", bound=Sized)
+Key = TypeVar("Key", bound=Hashable)
+Value = TypeVar("Value")
+
+
+class LastUsed(Generic[Key, Value]):
+    """Keeps the values that were used last; the very last one whatever its size.
+
+    Others are found as long as something else holds them. Threads may use it at once; each makes what is
+    missing.
+
+    Parameters
+    ----------
+    max_size
+        Size of all kept values, at most.
+    """
+
+    def __init__(self, max_size: int) -> None:
+        self._max_size, self._size = max_size, 0
+        self._kept: dict[Key, tuple[Value, int]] = {}
+        self._alive: weakref.WeakValueDictionary[Key, Value] = weakref.WeakValueDictionary()
+        self._lock = threading.Lock()
+
+    def get(self, key: Key, make: Callable[[], Value], size: Callable[[Value], int]) -> Value:
+        """Return the value of a key; make it if it is neither kept nor in use."""
+        with self._lock:
+            value = self._alive.get(key)
+        if value is None:
+            value = make()
+        with self._lock:
+            value = self._alive.setdefault(key, value)  # another thread may have made it too
+            self._size -= self._kept.pop(key, (value, 0))[1]
+            self._kept[key] = value, size(value)  # the last one now
+            self._size += self._kept[key][1]
+            while self._size > self._max_size and len(self._kept) > 1:
+                self._size -= self._kept.pop(next(iter(self._kept)))[1]
+        return value
+
+    def values(self) -> list[Value]:
+        """Return the values that are kept or in use."""
+        return list(self._alive.values())
+
+    def clear(self) -> None:
+        """Keep none of the values."""
+        with self._lock:
+            self._kept.clear()
+            self._size = 0
 
 
 class SizedCache(Generic[Arguments, Result]):
-    """A function that keeps the results that were asked for last; the very last one whatever its size.
-
-    Threads may call it at once; each computes what is missing.
+    """A function that keeps its last results.
 
     Parameters
     ----------
@@ -32,26 +77,13 @@ class SizedCache(Generic[Arguments, Result]):
     """
 
     def __init__(self, function: Callable[Arguments, Result], max_bytes: int) -> None:
-        self._function, self._max_bytes = function, max_bytes
-        self._results: dict[tuple[object, ...], Result] = {}
-        self._bytes = 0
-        self._lock = threading.Lock()
+        self._function = function
+        self._results: LastUsed[tuple[object, ...], Result] = LastUsed(max_bytes)
 
     def __call__(self, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
         """Return the kept result for these arguments, or compute it."""
         key = (*args, *sorted(kwargs.items()))
-        with self._lock:
-            if key in self._results:
-                result = self._results[key] = self._results.pop(key)  # the last one now
-                return result
-        result = self._function(*args, **kwargs)
-        with self._lock:
-            if key not in self._results:
-                self._results[key] = result
-                self._bytes += result.nbytes
-            while self._bytes > self._max_bytes and len(self._results) > 1:
-                self._bytes -= self._results.pop(next(iter(self._results))).nbytes
-        return result
+        return self._results.get(key, lambda: self._function(*args, **kwargs), lambda result: result.nbytes)
 
 
 def sized_cache(

@@ -198,7 +198,7 @@ class Display:
         return not self._worker.start(Job("view", work))
 
     def _clear(self) -> bool:
-        had, self._key = self._key != (), ()
+        had, self._key, self._meshes = self._key != (), (), ((), [])
         if had:
             self._install([], "", self.options)
         return had

@@ -27,8 +27,8 @@ BLOCKS_ALONG = 64
 MAX_LAYERS = 16
 """Most layers of empty blocks that a ray skips at once."""
 
-MAX_CELLS_BYTES = 1 << 25
-"""Bytes of cells that are kept for the next rays, at most; those of a model take 1 MB or more."""
+MAX_CELLS_BYTES = 1 << 24
+"""Bytes of the last cells, which are kept though no drawing uses them; those of a model take 1 MB or more."""
 
 Corner: TypeAlias = tuple[float, ...]
 

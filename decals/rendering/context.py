@@ -7,11 +7,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from functools import cached_property, partial
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, ClassVar, Self, cast
 
 import moderngl
 
 from blobtree.graphics import check_not_forked, hold_display, is_forked, mark_drawing, require_gl
+from blobtree.sized_cache import LastUsed
 from decals.errors import NoGraphics
 from decals.rendering.background_compiler import BackgroundCompiler
 from decals.rendering.current_context import is_current, kept_current
@@ -34,9 +35,6 @@ from decals.shaders import Source, compose
 
 MIN_VERSION = 330
 """Version of OpenGL that is enough for everything but compute shaders; macOS ends at 410."""
-
-MAX_PROGRAM_TEXT = 600_000
-"""Characters of the programs that are kept, used or not; the memory of a program grows with its text."""
 
 MAX_ANISOTROPY = 8.0
 """Greatest ratio of a pixel's footprint in an image at which the image is not blurred."""
@@ -120,12 +118,19 @@ class Context:
     fragment
     """
 
+    max_program_text: ClassVar[int] = 300_000
+    """Characters of the last programs, which are kept though no renderer uses them.
+
+    Without a graphics card, 100,000 take 6 to 18 MB. Most drivers keep compiled programs on disk too, from
+    which they return in milliseconds.
+    """
+
     def __init__(self, gl: moderngl.Context, *, owned: bool = False, backend: str | None = None) -> None:
         mark_drawing()
         self.gl = gl
         self._owned = owned
         self._display_held = False
-        self._programs: dict[tuple[str, ...], Program] = {}
+        self._programs: LastUsed[tuple[str, ...], Program] = LastUsed(self.max_program_text)
         self._compiler: BackgroundCompiler | None = None
         self._unused: list[Any] = []
         self.requested_backend = backend_named(gl, backend) if backend else None
@@ -183,7 +188,7 @@ class Context:
             return
         with self.current():
             self.clear_spare_textures()
-            self._release_programs()
+            self.release_unused()
         self.__dict__.pop("backend", None)  # the environment may name another one next time
         _idle.append(self)
 
@@ -270,24 +275,17 @@ class Context:
         return self._kept((source.text,), lambda: compile_compute(self.gl, source))
 
     def _kept(self, key: tuple[str, ...], compiled: Callable[[], Compiled]) -> Compiled:
-        """Return a program, compiled if it is not among those that were wanted last."""
-        self._release_programs()
-        program: Any = self._programs.pop(key, None)
-        if program is None:
+        """Return a program, compiled if it is neither among the last ones nor in use."""
+
+        def compiled_anew() -> Program:
             if self._compiler is not None:
                 self._compiler.require_linked(key)
-            program = compiled()
-        self._programs[key] = program  # the last one now
-        while self._text_length > MAX_PROGRAM_TEXT and len(self._programs) > 1:
-            oldest: Any = self._programs.pop(next(iter(self._programs)))
-            weakref.finalize(oldest, self._unused.append, oldest.mglo).atexit = False
-        kept: Compiled = program
-        return kept
+            program: Any = compiled()
+            weakref.finalize(program, self._unused.append, program.mglo).atexit = False
+            return cast(Program, program)
 
-    @property
-    def _text_length(self) -> int:
-        """Characters of the programs that are kept."""
-        return sum(len(text) for key in self._programs for text in key)
+        self.release_unused()
+        return cast(Compiled, self._programs.get(key, compiled_anew, lambda _: sum(map(len, key))))
 
     def pixel_program(
         self, body: str, targets: int, *, slots: Slots | None = None, defines: Defines | None = None
@@ -327,8 +325,8 @@ class Context:
             texture.release()
         self._spare_textures.clear()
 
-    def _release_programs(self) -> None:
-        """Release the programs that are not used any more."""
+    def release_unused(self) -> None:
+        """Release the programs that are neither kept nor in use any more. The context must be current."""
         while self._unused:
             self._unused.pop().release()
 
@@ -341,7 +339,7 @@ class Context:
             return
         with self.current():
             self.clear_spare_textures()
-            self._release_programs()
+            self.release_unused()
             for program in self._programs.values():
                 program.release()
         self._programs.clear()

@@ -160,6 +160,7 @@ class ProgressiveFrame:
         self.done = self._step == len(plan.steps)
         if self.done:
             self.targets.state = plan.state
+            self.targets.frame = self._previous = None
 
     def _adapt_part(self, seconds: float, target_seconds: float) -> None:
         """Choose the size of the next part; steps differ in speed, so each begins with a small part."""

@@ -335,6 +335,14 @@ class Renderer:
                 yield status
             self._warm.add(self.warmup(scene, options).key)  # it may know nested decals now
 
+    def release_targets(self, slot: str) -> None:
+        """Release the targets of a slot. The context must be current."""
+        self._targets.release(slot)
+
+    def forget_others(self, shown: Targets) -> None:
+        """Forget the pictures of other objects than the shown ones, and so the objects."""
+        self._targets.forget_others(shown)
+
     def targets_of(self, slot: str) -> Targets | None:
         """Return the targets of a slot's last frame; None before the first."""
         return self._targets.get(slot)
@@ -360,8 +368,9 @@ class Renderer:
             return self.context.backend
 
     def sweep(self) -> None:
-        """Release the uploads that were not used since the last sweep."""
+        """Release the uploads that were not used since the last sweep, and programs out of use."""
         self._uploads.sweep()
+        self.context.release_unused()
 
     def release(self) -> None:
         """Release everything. Calling twice is harmless. A forked child releases nothing of its parent."""

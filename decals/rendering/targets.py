@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from decals.rendering.context import DEPTH, Context
 from decals.rendering.decal_pass import DecalPass
-from decals.rendering.dirty_regions import TargetState
+from decals.rendering.dirty_regions import TargetState, same_objects
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.light_pass import LightPass, ResolvePass
 from decals.rendering.mesh import PosedMeshDrawable
@@ -24,7 +24,7 @@ class Targets:
     state
         Everything that the picture in the targets depends on; None while it is incomplete.
     frame
-        The frame that was drawn last, complete or not.
+        The frame that is being drawn; None if it is complete.
     """
 
     def __init__(self, context: Context, size: Size, *, buffers: bool) -> None:
@@ -100,8 +100,14 @@ class TargetPool:
         for targets in self._targets.values():
             targets.state = None
 
-    def release(self) -> None:
-        """Release the memory."""
+    def forget_others(self, shown: Targets) -> None:
+        """Forget the pictures of other objects than the shown ones; the next frames reuse nothing of them."""
         for targets in self._targets.values():
-            targets.release()
-        self._targets.clear()
+            if targets.state and shown.state and not same_objects(targets.state.objects, shown.state.objects):
+                targets.state = None
+
+    def release(self, *slots: str) -> None:
+        """Release the memory of slots, by default of all."""
+        for slot in slots or (*self._targets,):
+            if slot in self._targets:
+                self._targets.pop(slot).release()

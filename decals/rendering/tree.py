@@ -43,6 +43,7 @@ class TreeDrawable:
         tree = item.tree
         cells = tracing_cells(tree)
         self._tree, self._context, self.kinds = tree, context, Kinds.of(tree.tape)
+        self._cells = cells  # others that need them find them while they are drawn
         self._bounds = tree.support
         self._textures = (DataTexture(context, cells.tape), DataTexture(context, cells.blocks))
         self._uniforms = {**tracing_uniforms(cells), "tape": 0, "blocks": 1}

@@ -99,6 +99,8 @@ class WindowContext(Context):
         The window has no context yet, or one that cannot be shared.
     """
 
+    max_program_text = 100_000  # a window's renderers hold all programs of their frames
+
     def __init__(self, window: Any) -> None:
         self._window = window
         self._open = 0
@@ -317,6 +319,8 @@ class FrameRenderer:
                 frame.complete(max_samples=self.context.part_samples)
             finally:
                 self.renderer.sweep()
+            if not options.magnified:  # after small frames of a drag, it may be undone
+                self.renderer.forget_others(frame.targets)
             if wait and frame.work:
                 self.context.gl.finish()
         self.drawn_fraction = frame.work
@@ -365,7 +369,9 @@ class FrameRenderer:
         with self._in_slices():
             if not frame.advance(seconds):
                 return frame.status
+            self.renderer.release_targets(SPARE_SLOT)
         self._progressive = None
+        del self._warmup_threads[plan.key]
         self._warm.add(self._warmup_plan(scene, options).key)  # it may know nested decals now
         return None
 

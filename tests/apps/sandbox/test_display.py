@@ -85,6 +85,7 @@ def test_every_mode_and_overlay_changes_the_picture_and_all_go_back(
             least = 0.1 if value == "polygonized" else 0.3  # the mesh looks much like the surface
             assert all(np.abs(drawn - other).mean() > least for other in pictures), (name, value)
             pictures.append(drawn)
+    assert sandbox.display._meshes == ((), [])  # the view of the scene itself needs none
     sandbox.set_control("display", "overlay", "folds")
     settle(sandbox, shared)
     assert "triangles folded" in sandbox.status

@@ -74,7 +74,7 @@ def test_work_is_repeated_until_the_thread_has_linked_its_program(
         for _ in range(3):
             assert not context.attempt(work)
         assert not threads
-        assert (VERTEX.text, fragment.text) not in context._programs
+        assert (VERTEX.text, fragment.text) not in context._programs._kept
         go.set()
         repeated(lambda: context.attempt(work))
         assert [thread is threading.current_thread() for thread in threads] == [False]
@@ -106,7 +106,7 @@ def test_without_a_context_for_the_thread_the_window_compiles(context: Context) 
     fragment = Source.named("f", FRAGMENT + "// without a thread\n")
     with context.compiling_in_thread(BackgroundCompiler(refuse)):
         repeated(lambda: context.attempt(lambda: context.program(VERTEX, fragment)))
-    assert (VERTEX.text, fragment.text) in context._programs
+    assert (VERTEX.text, fragment.text) in context._programs._kept
 
 
 def test_the_state_of_a_draw_can_be_set_in_another_context(context: Context) -> None:

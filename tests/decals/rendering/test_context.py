@@ -89,7 +89,7 @@ def test_a_program_is_compiled_once(context: Context) -> None:
 def test_programs_that_were_not_wanted_for_long_are_released(
     context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("decals.rendering.context.MAX_PROGRAM_TEXT", 2000)
+    monkeypatch.setattr(context._programs, "_max_size", 2000)
 
     def program(number: int) -> moderngl.Program:
         text = f"#version 330 core\nout vec4 c; void main() {{ c = vec4({number}.0); }}"
@@ -105,14 +105,16 @@ def test_programs_that_were_not_wanted_for_long_are_released(
         used = program(0)
         for number in (1, 2, 3):
             program(number)
-        assert len(context._programs) == 2
+        assert len(context._programs._kept) == 2
         assert used.mglo not in context._unused  # still held here
+        assert program(0) is used
+        program(2), program(3)
         context.gl.vertex_array(used, []).render(vertices=3)
         assert context.gl.error == "GL_NO_ERROR"
         held = used.mglo
         del used
         assert held in context._unused
-        program(4)
+        context.release_unused()
         assert held not in context._unused
         assert program(0) is program(0)
 
@@ -148,21 +150,21 @@ def drawn(renderer: Renderer) -> np.ndarray:
 def test_a_renderer_takes_over_the_context_of_the_one_before() -> None:
     """With its programs, on any thread, and after a second release by the first one."""
     with Renderer() as first:
-        picture, programs = drawn(first), dict(first.context._programs)
+        picture, programs = drawn(first), first.context._programs.values()
     first.release()
     with ThreadPoolExecutor(1) as thread:
         second = thread.submit(Renderer).result()
         assert second.context is first.context
         first.release()
         np.testing.assert_array_equal(thread.submit(drawn, second).result(), picture)
-        assert second.context._programs == programs
+        assert second.context._programs.values() == programs
         thread.submit(second.release).result()
 
 
 def test_programs_of_former_options_are_released_unless_the_context_keeps_them(
     context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("decals.rendering.context.MAX_PROGRAM_TEXT", 1)
+    monkeypatch.setattr(context._programs, "_max_size", 1)
     shape = torus(rows=12, columns=6)
     normals = vertex_normals(shape.vertices, shape.faces)[::9]
     tangents = np.cross(normals, (0.1, 0.2, 1.0))

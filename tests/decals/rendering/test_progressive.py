@@ -90,6 +90,28 @@ def test_slots_keep_their_pictures(drawer: Renderer) -> None:
         assert bits(first.targets) == before
 
 
+def test_pictures_of_other_objects_are_forgotten(drawer: Renderer) -> None:
+    options, scene = RenderOptions(size=SIZE, samples=1), both()
+    with drawer.context.current():
+
+        def drawn(shown: Any, slot: str) -> Any:
+            frame = drawer.begin_frame(shown, options, slot=slot)
+            frame.complete()
+            assert (frame.targets.frame, frame._previous) == (None, None)
+            return frame.targets
+
+        first = drawn(scene, "parts")
+        before = bits(first)
+        drawer.forget_others(drawn(scene.replace(decals=scene.decals[:9]), "others"))
+        assert first.state is not None
+        drawer.forget_others(drawn(scene.replace(objects=scene.objects[:1]), "others"))
+        assert first.state is None
+        assert bits(drawn(scene, "parts")) == before
+        drawer.release_targets("parts")
+        assert drawer.targets_of("parts") is None
+        assert bits(drawn(scene, "parts")) == before
+
+
 @given(st.lists(st.integers(0, UNITS), max_size=20), st.integers(0, 5000))
 def test_parts_miss_nothing_and_take_nothing_twice(cuts: list[int], count: int) -> None:
     edges = [0, *sorted(cuts), UNITS]

@@ -1,9 +1,14 @@
 """Trees in the G-buffer through both entry points: the same pixels, and true depth among all objects."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from blobtree import Node, Point, Segment
+from blobtree.sized_cache import SizedCache
+from blobtree.tracing import tree_cells
+from blobtree.tracing.tree_cells import TracingCells, tracing_cells
 from decals.rendering.options import RenderOptions
 from decals.rendering.picture import Buffers
 from decals.rendering.renderer import Renderer
@@ -213,3 +218,21 @@ def test_a_tree_of_every_kind_compiles_as_compute_shader(compute: Renderer) -> N
     for tree in trees:
         view = View((TreeObject("tree", tree),), Camera.framing(tree.support))
         assert (compute.buffers(view, RenderOptions(size=(24, 18))).object_id == 0).any()
+
+
+def test_cells_of_drawn_trees_are_made_once(fragment: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[object] = []
+    build = tree_cells._tracing_cells._function
+
+    def counted(*args: Any) -> TracingCells:
+        made.append(args)
+        return build(*args)
+
+    monkeypatch.setattr(tree_cells, "_tracing_cells", SizedCache(counted, 1))
+    view = framed(objects(), (0.3, 0.5, 1.0))
+    fragment.render(view, RenderOptions(size=(40, 30), samples=1))
+    assert len(made) == 3
+    for item in view.objects:
+        if isinstance(item, TreeObject):
+            tracing_cells(item.tree)
+    assert len(made) == 3

@@ -1,6 +1,8 @@
 """The first frames of a window: what they take is made slice by slice, and what is seen then is the same."""
 
+import gc
 import threading
+import weakref
 from collections.abc import Iterator
 from itertools import groupby
 from typing import Any
@@ -8,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from decals.editing import EditSession, ScaleDecals
+from blobtree import Point
+from decals.editing import AddObject, EditSession, ScaleDecals
 from decals.errors import TooMuchData
 from decals.rendering.background_compiler import GL, BackgroundCompiler
 from decals.rendering.context import Context
@@ -18,7 +21,9 @@ from decals.rendering.options import RenderOptions
 from decals.rendering.pixel_pass import compile_program
 from decals.rendering.progressive import DRAWING
 from decals.rendering.warmup import with_status
+from decals.scenes.objects import TreeObject
 from decals.shaders import CompileError
+from decals.vtk.frame import SPARE_SLOT
 from decals.window import EditWindow
 from decals.window.frames import FrameState
 from tests.decals.editing.scenes import scene
@@ -131,9 +136,30 @@ def test_other_programs_leave_the_picture_before_until_they_are_there(waiting: A
     np.testing.assert_array_equal(pixels(window), before)
     while window.frames.state is FrameState.COARSE or window.subplot.warming_up:
         window.tick()
+    assert window.subplot.renderer.targets_of(SPARE_SLOT) is None
     whole = opened(window.session, samples=2)
     whole.window.overlay._status.SetInput("")
     np.testing.assert_array_equal(pixels(window), whole.shot())
+
+
+def test_a_frame_at_rest_holds_no_objects_of_earlier_ones(waiting: Any) -> None:
+    window = waiting()
+
+    def rest() -> None:
+        while window.frames.state is FrameState.COARSE or window.subplot.warming_up:
+            window.tick()
+
+    rest()
+    window.session.do(AddObject(TreeObject("ball", Point((0, 3, 0), radius=1.0))))
+    window.redraw(whole=True)
+    rest()
+    added = weakref.ref(window.document.objects[2])
+    window.session.undo()
+    window.session.forget_history()
+    window.redraw(whole=True)
+    rest()
+    gc.collect()
+    assert added() is None
 
 
 def test_what_is_known_is_not_waited_for(waiting: Any) -> None:
@@ -171,7 +197,7 @@ def test_a_window_closed_in_between_gives_everything_back(
     assert window.subplot.warming_up
     context = window.subplot.renderer.context
     window.close()
-    assert not context._programs
+    assert not context._programs._kept
     assert not any(context._spare_textures.values())
     window.tick()  # a timer that was on its way
 
