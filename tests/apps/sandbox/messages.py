@@ -131,6 +131,9 @@ LISTED_PAUSES = 12
 TURN_SECONDS = 0.001
 """Time for which the task that watches the loop sleeps."""
 
+WORKERS = frozenset({"walks", "warm-up"})
+"""Names of threads that end soon: each computes one result, or notices that nothing needs it any more."""
+
 PACKAGES = "blobtree", "decals"
 """Packages one of whose functions a pause is attributed to."""
 
@@ -323,9 +326,10 @@ class Messages:
             await self._wait_until(self._rests)
 
     def _rests(self) -> bool:
-        """Bring the page up to date, and return True if nothing is to be done."""
+        """Bring the page up to date; return True if nothing is to be done, and threads have ended."""
         self._page.refresh()
-        return not (self._window.busy or self._page.sandbox.display.values()["busy"])
+        works = {thread.name for thread in threading.enumerate()} & WORKERS
+        return not (works or self._window.busy or self._page.sandbox.display.values()["busy"])
 
     @staticmethod
     async def _wait_until(true: Callable[[], bool]) -> None:
