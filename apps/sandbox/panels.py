@@ -183,7 +183,7 @@ def build_start(sandbox: Sandbox) -> None:
     """Build the start page: new model, samples, recent files, recovered sessions and lessons."""
     with (
         vuetify3.VDialog(
-            model_value=("start.open",),
+            model_value=("start.open && driving.drives",),
             update_modelValue=(sandbox.show_start, "[$event]"),
             max_width=860,
             raw_attrs=['aria-label="start"'],

@@ -651,6 +651,28 @@ async def ended() -> None:
                 await browser.get_by_text("is back").wait_for()
 
 
+async def shared() -> None:
+    """A browser that watches can ask for control while the driver chooses a scene, and drives then."""
+    window = EditWindow(empty_scene(["scale"], UPRIGHT["y"]), plotter=pv.Plotter(off_screen=True))
+    window.show()
+    server = get_server("shared", client_type="vue3")
+    SandboxPage(server, window, folder=Path(tempfile.mkdtemp()), start=True, shared=True)
+    size = (1280, 800)
+    async with served(server, size=size) as driver:
+        await driver.get_by_label("New model").wait_for()
+        async with opened(f"http://127.0.0.1:{server.port}/", size=size) as watcher:
+            await watcher.get_by_role("button", name="Ask for control").click()
+            assert not await watcher.get_by_label("New model").is_visible()
+            await driver.keyboard.press("Escape")
+            await driver.get_by_role("button", name="Pass control").click()
+            await watcher.get_by_role("button", name="Add", exact=True).click()
+            await watcher.get_by_text("Torus", exact=True).click()
+            await until(lambda: len(window.document.objects) == 1)
+            await driver.get_by_role("button", name="Torus", exact=True).wait_for()
+            await driver.get_by_role("button", name="Ask for control").wait_for()
+    window.close()
+
+
 def main() -> None:
     """Run one of the functions above, by its name."""
     name, *arguments = sys.argv[1:]
@@ -664,6 +686,7 @@ def main() -> None:
         "lab": lab,
         "ended": ended,
         "panels": panels,
+        "shared": shared,
     }
     asyncio.run(checks[name](*arguments))
     print("done")

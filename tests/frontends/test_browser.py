@@ -32,7 +32,7 @@ def require(*modules: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "check", ["page", "user", "streamed", "sandbox", "start", "creature", "lab", "ended", "panels"]
+    "check", ["page", "user", "streamed", "sandbox", "start", "creature", "lab", "ended", "panels", "shared"]
 )
 def test_in_a_browser(check: str) -> None:
     require(*NEEDED)
