@@ -64,7 +64,7 @@ class SandboxFiles:
     ) -> None:
         self._window, self._state, self._files = window, window.actions.state, window.actions.files
         self._folder, self._lessons, self._opening = folder.resolve(), list(lessons), opening
-        self._files.folder = self._folder
+        self._files.folder, self._files.closable = self._folder, False
         self._files.screenshot = lambda: window.plotter.screenshot(None, return_img=True)
         self.start_open, self._listed = False, dict[str, Any]()
 

@@ -74,6 +74,8 @@ class FileActions(WindowActions):
         Returns the camera to save with the scene; None for the document's.
     leave
         Closes the window.
+    closable
+        False for a page, which is not closed by a key.
     show_view
         Shows the scene from its own camera, after another file was opened.
     screenshot
@@ -89,6 +91,7 @@ class FileActions(WindowActions):
         self.path = path
         self.camera: Callable[[], Camera | None] = lambda: None
         self.leave: Callable[[], None] = lambda: None
+        self.closable = True
         self.show_view: Callable[[Camera], None] = lambda camera: None
         self.screenshot: Callable[[], UInt8Array] | None = None
         self.folder: Path | None = None
@@ -336,6 +339,8 @@ class FileActions(WindowActions):
     @Group.SCENE.action("close", "q", summary="close the window; it asks if there are unsaved changes")
     def close(self, _cursor: Cursor) -> None:
         """Close the window, or ask if that would lose changes."""
+        if not self.closable:
+            raise InvalidEdit("a page stays open; close its tab, and unsaved changes are kept")
         if self.may_close():
             self.leave()
 

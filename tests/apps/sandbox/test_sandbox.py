@@ -393,6 +393,17 @@ def test_a_new_node_without_a_selection_is_an_object(vtk_display: None) -> None:
         assert [item.name for item in window.document.objects] == ["box 1", "point 1"]
 
 
+def test_a_key_closes_no_page(window: EditWindow) -> None:
+    sandbox = Sandbox(window)
+    sandbox.change_row("object 0", "rename", "snail")
+    for _ in range(2):
+        sandbox.perform("close")
+        assert "unsaved changes are kept" in sandbox.values()["status"]
+        assert sandbox.values()["refused"]
+    window.actions.files.finish()
+    assert not window.actions.state.prompt.open
+
+
 def test_the_help_is_a_list_of_the_page(window: EditWindow) -> None:
     sandbox = Sandbox(window)
     for show in (partial(sandbox.perform, "help"), partial(sandbox.show_help, True)):
