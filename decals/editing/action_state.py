@@ -138,7 +138,7 @@ class ActionState:
         self.brush = BrushSettings()
         self.snap = 0.0
         self.camera: ViewCamera = StillCamera(session)
-        self.background = BackgroundJobs(session, self.show, self.end_stroke, threaded=threaded)
+        self.background = BackgroundJobs(session, self.show, self.end_stroke, self.refuse, threaded=threaded)
         self._series: tuple[str, object] | None = None
         self._stroke = object()
         self._slow_steps = 0

@@ -246,6 +246,8 @@ class BackgroundJobs:
         Shows a message to the user.
     end_stroke
         Ends the open stroke; called before a background edit becomes an undo entry of its own.
+    refuse
+        Shows why a job failed.
     threaded
         If False, everything runs at once, in the caller's thread. If True, the owner calls `poll` regularly.
     """
@@ -255,10 +257,11 @@ class BackgroundJobs:
         session: EditSession,
         show: Callable[[str], None],
         end_stroke: Callable[[], None],
+        refuse: Callable[[Exception], None],
         *,
         threaded: bool,
     ) -> None:
-        self._session, self._show, self._end_stroke = session, show, end_stroke
+        self._session, self._show, self._end_stroke, self._refuse = session, show, end_stroke, refuse
         self.threaded = threaded
         self._edits, self._saves = Worker(), Worker(finish_at_exit=True)
         self._latest: _Request | None = None
@@ -373,7 +376,7 @@ class BackgroundJobs:
             try:
                 self._when_idle.pop(0)()
             except ImplicitDecalsError as error:
-                self._show(str(error))
+                self._refuse(error)
 
     def require_idle(self, *, computing: bool = True) -> None:
         """Refuse a new edit while another one runs.
@@ -560,7 +563,7 @@ class BackgroundJobs:
             completion = worker.poll(timeout)
             following = None if completion is None else completion()
         except ImplicitDecalsError as error:
-            self._show(str(error))
+            self._refuse(error)
         finally:
             if following is not None:
                 worker.start(following)

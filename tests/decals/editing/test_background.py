@@ -372,6 +372,7 @@ def test_scattered_decals_for_a_changed_object_are_refused() -> None:
     after = digest(actions.state.session.document)
     finish(actions)
     assert "scatter again" in actions.state.message
+    assert actions.state.refusal == actions.state.message  # a page shows it in red
     assert digest(actions.state.session.document) == after
 
 

@@ -98,7 +98,9 @@ def test_random_commands_in_the_background_while_hands_go_on(
     """Each comes after what user do until it is seen, whatever either of them is."""
     monkeypatch.setattr("decals.editing.session.MAX_REPLAYED_DECALS", few)
     session, shadow = EditSession(scene()), EditSession(scene())
-    background = BackgroundJobs(session, lambda _text: None, session.end_stroke, threaded=True)
+    background = BackgroundJobs(
+        session, lambda _text: None, session.end_stroke, lambda _error: None, threaded=True
+    )
     monkey = RandomCommands(seed, session.document, scene(200).decals)
     for _ in range(count):
         slow = monkey.command()
