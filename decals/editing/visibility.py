@@ -59,13 +59,14 @@ class FlagNodes:
             if not isinstance(flags, dict):
                 raise InvalidEdit(f"{name}: expected paths by the index of their object, got {flags!r:.60}")
             for number, paths in flags.items():
-                document.object(number)
-                objects[number] = flagged(objects[number], **{name: paths})
+                changed = flagged(document.object(number), **{name: paths})
+                if getattr(changed, name) != getattr(objects[number], name):
+                    objects[number] = flagged(objects[number], **{name: paths})
         for item in objects:
             if item.shown is None and () not in item.hidden:
                 raise InvalidEdit(f"no part of {item.name!r} would be left; hide the object instead")
-        changed = tuple(objects) != document.objects
-        return document.compute_parts(objects=tuple(objects)) if changed else Edit()
+        same = all(new is old for new, old in zip(objects, document.objects, strict=True))
+        return Edit() if same else document.compute_parts(objects=tuple(objects))
 
 
 def toggled(paths: Paths, path: Path) -> Paths:
@@ -173,6 +174,8 @@ class LockLayers:
     ----------
     layers
         All layers that are locked from now on.
+    label
+        Name of the undo entry.
 
     Examples
     --------
@@ -186,7 +189,7 @@ class LockLayers:
     """
 
     layers: Iterable[int]
-    label: ClassVar[str] = "lock layers"
+    label: str = "lock layers"
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""

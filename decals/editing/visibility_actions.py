@@ -85,7 +85,7 @@ class VisibilityActions(WindowActions):
         if flag == "locked":
             present = document.locked_layers
             locked = [n for n in present if n != layer] if layer in present else [*present, layer]
-            self._state.run(LockLayers(locked))
+            self._state.run(LockLayers(locked, "lock" if layer in locked else "unlock"))
         elif layer in document.hidden.decals.layers:
             self._state.run(ShowDecals([layer]))
         else:

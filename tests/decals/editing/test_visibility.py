@@ -219,6 +219,18 @@ def test_keys_hide_isolate_lock_and_show(tmp_path: Path) -> None:
     goes_back_and_forth(session)
 
 
+def test_flags_that_change_nothing_leave_no_entry() -> None:
+    session = EditSession(decals.cover(A + B, count=3, images=["eye"]))
+    actions = Actions(session)
+    session.do(FlagNodes({0: ()}, {0: ()}))
+    actions.perform("show_all", lambda: None)
+    actions.visibility.isolate_node(0, ())  # there is nothing else to hide
+    assert session.next_undo is None
+    actions.visibility.flag_layer("locked", 0)
+    actions.visibility.flag_layer("locked", 0)
+    assert session.labels == ("lock", "unlock")
+
+
 def test_decals_on_hidden_parts_are_not_selected() -> None:
     first, second = TreeObject("one", A + B), TreeObject("other", D)
     session = EditSession(decals.cover([first, second], count=60, images=["eye"]))
