@@ -8,13 +8,12 @@ from blobtree.nodes.paths import Path
 from decals.editing.action_state import ActionState, WindowActions
 from decals.editing.commands import DeleteDecals, RemoveImage, SetValues
 from decals.editing.document import Document
-from decals.editing.scatter_commands import AddObject, RemoveObject
+from decals.editing.scatter_commands import RemoveObject
 from decals.editing.tree_actions import TreeActions
 from decals.editing.tree_commands import RenameObject
 from decals.editing.visibility import RenameLayer, RenameNode
 from decals.editing.visibility_actions import VisibilityActions
 from decals.errors import InvalidEdit
-from decals.scenes.objects import flagged, unused_name
 from decals.validation import describe
 
 FLAGS = {"hide": "hidden", "lock": "locked"}
@@ -150,8 +149,6 @@ class OutlineActions(WindowActions):
             case "object", "remove":
                 run(RemoveObject(number))
             case "object", "duplicate":
-                item = document.object(number)
-                name = unused_name(item.name, {other.name for other in document.objects}, " ")
-                run(AddObject(flagged(item, name=name)))
+                self._trees.duplicate_object(number)
             case _:
                 raise InvalidEdit(f"change: expected one that {describe(key)} has, got {describe(change)}")

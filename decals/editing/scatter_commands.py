@@ -236,6 +236,8 @@ class AddObject:
     ----------
     object
         The object; its name must be new.
+    label
+        Name of the undo entry.
 
     Examples
     --------
@@ -249,7 +251,7 @@ class AddObject:
     """
 
     object: SceneObject
-    label: ClassVar[str] = "add an object"
+    label: str = "add an object"
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""

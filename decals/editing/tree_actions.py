@@ -43,7 +43,7 @@ from decals.editing.tree_commands import (
     TransformPrimitive,
 )
 from decals.errors import ImplicitDecalsError, InvalidEdit
-from decals.scenes.objects import SceneObject, TreeObject, bounds_of
+from decals.scenes.objects import SceneObject, TreeObject, bounds_of, displaced, unused_name
 from decals.surfaces.implicit import project_without_mesh
 from decals.surfaces.surface import unit_rows
 from decals.validation import describe
@@ -522,11 +522,16 @@ class TreeActions(WindowActions):
     def duplicate_selected(self) -> None:
         """Add a copy of the selected primitive, to the right of it as seen."""
         number, path, _ = self._selected()
+        distance = _thickness(node_in_world(self._tree(number), path))
+        self._restructure(DuplicatePrimitive(number, path, distance * self._aside()))
+
+    def _aside(self) -> Float64Array:
+        """Return a unit vector, shape (3,), that is parallel to the picture."""
         eye, target = (np.asarray(point, np.float64) for point in self._state.camera.eye_and_target())
         toward = eye - target
         aside = np.cross(toward, np.eye(3)[np.abs(toward).argmin()])
-        distance = _thickness(node_in_world(self._tree(number), path))
-        self._restructure(DuplicatePrimitive(number, path, distance * unit_rows(aside[None])[0]))
+        unit: Float64Array = unit_rows(aside[None])[0].astype(np.float64)
+        return unit
 
     @Group.SHAPE.action("mirror", "Shift+d", summary="add the mirror image of the same primitive, across x")
     def mirror(self, cursor: Cursor) -> None:
@@ -606,14 +611,27 @@ class TreeActions(WindowActions):
         document = self._state.session.document
         names, origin = {item.name for item in document.objects}, document.origin
         name = next(name for n in range(1, len(names) + 2) if (name := f"{kind} {n}") not in names)
+        self._add(f"add {name}", lambda: TreeObject(name, make(), origin), handle_offset)
+
+    def duplicate_object(self, number: int) -> None:
+        """Add a copy of an object beside it, as seen, and select it."""
+        document = self._state.session.document
+        item = document.object(number)
+        low, high = item.bounds
+        aside = self._aside()
+        offset = float(np.abs(aside) @ (high - low)) * aside
+        name = unused_name(item.name, {other.name for other in document.objects}, " ")
+        self._add(f"duplicate {item.name}", lambda: displaced(item, offset, name), np.zeros(3, np.float32))
+
+    def _add(self, label: str, make: Callable[[], SceneObject], handle_offset: Float32Array) -> None:
+        """Add what a function returns in the background, and select its tree."""
 
         def select() -> None:
-            last = len(self._state.session.document.objects) - 1
-            self._state.select_primitive(last, (), handle_offset)
+            objects = self._state.session.document.objects
+            if isinstance(objects[-1], TreeObject):
+                self._state.select_primitive(len(objects) - 1, (), handle_offset)
 
-        self._state.background.compute(
-            AddObject.label, lambda *_: AddObject(TreeObject(name, make(), origin)), select
-        )
+        self._state.background.compute(label, lambda *_: AddObject(make(), label), select)
 
     @Group.SHAPE.action(
         "remove_object", "Shift+Delete", summary="remove the object under the cursor, with its decals"

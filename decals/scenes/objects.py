@@ -17,7 +17,7 @@ from blobtree.colors import ColorLike, color_rgb
 from blobtree.errors import InvalidNode
 from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
-from blobtree.nodes.paths import Path, node_at
+from blobtree.nodes.paths import Path, moved, node_at
 from blobtree.validation import truth
 from decals.errors import InvalidScene
 from decals.receivers import label_names
@@ -325,6 +325,15 @@ def _paths_after(item: TreeObject, tree: Node) -> dict[str, Any]:
 def with_tree(item: TreeObject, tree: Node) -> TreeObject:
     """Return an object with another tree; nodes that stay are hidden, locked and named as before."""
     return replace(item, tree=tree, **_paths_after(item, tree))
+
+
+def displaced(item: SceneObject, offset: ArrayLike, name: str) -> SceneObject:
+    """Return a copy of an object at another place, under another name; ``offset`` has shape (3,)."""
+    if isinstance(item, TreeObject):
+        tree = moved(item.tree, np.asarray(offset, np.float64))
+        return flagged(with_tree(item, tree), name=name)
+    vertices = (item.vertices + np.asarray(offset, np.float64)).astype(np.float32)
+    return replace(item, name=name, vertices=vertices, source=None)
 
 
 def shown_objects(objects: Iterable[SceneObject]) -> list[SceneObject]:

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from decals.editing import Actions, EditSession
@@ -53,6 +54,27 @@ def test_changes_are_undone_exactly() -> None:
     assert isinstance(blob, TreeObject)
     assert (blob.names, blob.hidden, blob.locked) == ({(0,): "body"}, ((1,),), ((0,),))
     assert set(document.decals.decals.images.tolist()) == {1}
+    goes_back_and_forth(actions.state.session)
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_an_object_is_duplicated_beside_itself(number: int) -> None:
+    actions = Actions(EditSession(scene()))
+    document = actions.state.session.document
+    actions.visibility.flag_node("locked", number, ())
+    first = document.objects[number]
+    actions.outline.change(f"object {number}", "duplicate")
+    copy = document.objects[2]
+    assert (copy.name, copy.locked, type(copy)) == (f"{first.name} 2", ((),), type(first))
+    (low, high), (low_2, high_2) = first.bounds, copy.bounds
+    offset = low_2 - low
+    distance = np.linalg.norm(offset)
+    assert np.abs(offset / distance) @ (high - low) == pytest.approx(distance, rel=1e-3)  # just apart
+    eye, target = (np.asarray(point) for point in actions.state.camera.eye_and_target())
+    assert abs(offset @ (eye - target)) < 1e-2 * distance  # as seen
+    np.testing.assert_allclose(high_2 - low_2, high - low, atol=1e-3)
+    assert actions.state.session.labels[-1] == f"duplicate {first.name}"
+    assert actions.state.primitive == ((2, ()) if number == 0 else None)
     goes_back_and_forth(actions.state.session)
 
 
