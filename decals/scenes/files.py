@@ -255,7 +255,9 @@ def _image_record(image: DecalImage, folder: Path) -> str | MaterialRecord:
     if isinstance(image, DecalMaterial):
         return material_record(image)
     named = image.is_generated or not is_builtin(image.source)
-    return (picture_source(image.source, folder) if named else "") or embedded_image(image.pixels)
+    reference = picture_source(image.source, folder) if named else ""
+    # a name that is no path, which could be that of another picture where the file is read
+    return reference or MaterialRecord(Path(image.source).stem, embedded_image(image.pixels))
 
 
 def _images(sources: list[str | MaterialRecord], folder: Path, trust: bool) -> tuple[DecalImage, ...]:

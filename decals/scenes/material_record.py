@@ -10,6 +10,7 @@ from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.images.load import embedded_image, image_pixels, is_embedded
 from decals.images.texels import Pixels
 from decals.scenes.material import MAP_NAMES, DecalMaterial
+from decals.scenes.scene import DecalImage
 
 PICTURES = tuple(name for name in MAP_NAMES if name != "height")
 """Maps that are pictures; heights are numbers."""
@@ -36,8 +37,8 @@ def material_record(material: DecalMaterial) -> MaterialRecord:
     return MaterialRecord(material.source, **maps, height=heights, relief=material.relief)
 
 
-def material_of(record: MaterialRecord, folder: Path) -> DecalMaterial:
-    """Make a material that was described.
+def material_of(record: MaterialRecord, folder: Path) -> DecalImage:
+    """Make a material that was described; without maps, an image.
 
     Raises
     ------
@@ -53,6 +54,8 @@ def material_of(record: MaterialRecord, folder: Path) -> DecalMaterial:
         if record.height is not None:
             height, width = maps["pixels"].shape[:2]
             maps["height"] = np.frombuffer(record.height, "<f4").reshape(height, width).astype(np.float32)
+        if [*maps] == ["pixels"] and not record.relief:
+            return DecalImage(record.name, **maps)
         return DecalMaterial(record.name, **maps, relief=record.relief)
     except ValueError as error:
         raise InvalidScene(f"material {record.name!r}: expected a height for each pixel ({error})") from error

@@ -107,6 +107,7 @@ def test_images_with_the_name_of_a_generated_one_keep_their_pixels(tmp_path: Pat
     for again in (rebuilt(scene, tmp_path / "scene.py"), decals.load_scene(tmp_path / "scene.json")):
         for image, other in zip(images, again.images, strict=True):
             np.testing.assert_array_equal(image.pixels, other.pixels)
+            assert (image.source, type(image)) == (other.source, type(other))
         np.testing.assert_array_equal(vars(again.images[2])["roughness"], matte.roughness)
 
 
