@@ -27,7 +27,7 @@ from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of, ray_through
 from decals.window.view_modes import MODES, OVERLAYS, RESOLUTION, DisplayOptions, Shown, shown_data
 
-SCALE: dict[str, Any] = {"n_labels": 0, "title_font_size": 16, "width": 0.4}
+SCALE: dict[str, Any] = {"n_labels": 0, "title_font_size": 16, "width": 0.4, "render": False}
 SCALE |= {"position_x": 0.02, "position_y": 0.02, "color": "black", "background_color": "white", "fill": True}
 """How the scale of colours looks: its title has the numbers of its ends, so all text is on its background."""
 

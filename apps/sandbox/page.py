@@ -175,6 +175,7 @@ class Page:
 
     def _start(self, **_: Any) -> None:
         self._task = asyncio.get_running_loop().create_task(self._keep_fresh())
+        self._window.redraw(whole=True)  # from now on, frames are prepared in slices
 
     def _stop(self, **_: Any) -> None:
         if self._task is not None:

@@ -17,8 +17,7 @@ from typing import Any, Protocol, Self
 
 import moderngl
 
-from blobtree.graphics import hold_display
-from decals.rendering.current_context import kept_current, system_library
+from decals.rendering.current_context import system_library
 
 GL = "libGL.so.1"
 """The library whose functions are called directly; without it, nothing is compiled in a thread."""
@@ -161,8 +160,6 @@ class BackgroundCompiler:
         if not self._attempting:
             return
         if key not in self._jobs:
-            with kept_current():
-                hold_display()  # in the window's thread, as VTK makes one of its windows for it
             self._jobs[key] = self._executor.submit(self._run, work)
         job = self._jobs[key]
         try:

@@ -33,6 +33,11 @@ def is_current() -> bool:
     return not system_library("libEGL.so.1") or _egl_context() is not None
 
 
+def is_egl() -> bool:
+    """Return True if this thread's current context is one of EGL, as those of windows without a screen."""
+    return system_library("libEGL.so.1") is not None and _egl_context() is not None
+
+
 @cache
 def system_library(name: str) -> Any:
     """Return a system library whose functions take and return pointers; None for a missing library."""

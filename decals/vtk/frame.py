@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Self
@@ -15,10 +15,12 @@ from typing import Any, Self
 import moderngl
 from _moderngl import DefaultLoader  # type: ignore[import-untyped]
 
+from blobtree.graphics import hold_display
 from decals.errors import NoGraphics
 from decals.rendering import Renderer, RenderOptions, SceneLike, Size
 from decals.rendering.background_compiler import BackgroundCompiler
 from decals.rendering.context import Context
+from decals.rendering.current_context import is_egl, kept_current
 from decals.rendering.dirty_regions import TargetState, decal_version, same_objects
 from decals.rendering.pixel_pass import CameraBuffer, set_uniform, use_textures
 from decals.rendering.progressive import ProgressiveFrame
@@ -217,7 +219,9 @@ class Composite:
 
 @cache
 def shared_compiler() -> BackgroundCompiler:
-    """Return the compiler of all windows."""
+    """Return the compiler of all windows; the first call takes long, and VTK draws in it."""
+    with kept_current():
+        hold_display()  # VTK makes a window for it, so not in the compiler's thread
     return BackgroundCompiler(Context.standalone)
 
 
@@ -377,8 +381,10 @@ class FrameRenderer:
 
     @contextmanager
     def _in_slices(self) -> Iterator[None]:
-        """Make the context current within a ``with`` block, for work that waits for programs."""
-        with self.context.current(), self.context.compiling_in_thread(shared_compiler()):
+        """Make the context current within a ``with`` block; of EGL, work may wait for programs."""
+        with self.context.current(), ExitStack() as stack:
+            if is_egl():  # no thread can have a current context of both EGL and GLX
+                stack.enter_context(self.context.compiling_in_thread(shared_compiler()))
             yield
 
     def _continue(

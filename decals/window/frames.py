@@ -236,11 +236,14 @@ class FrameController:
         return self._drawn_version != self._version()
 
     def begin(self) -> None:
-        """Begin with a coarse frame, and keep it while shaders are compiled; walks run in a thread."""
-        self._subplot.keep_previous_frame = self._subplot.walks_in_thread = True
+        """Begin with a coarse frame."""
         self._subplot.draw_scale = FIRST_SCALE
         self._set_coarse()
         self._changed_at -= REFINE_DELAY
+
+    def prepare_aside(self, aside: bool) -> None:
+        """Choose if a frame stays while the next one's shaders and walks are made, else these come first."""
+        self._subplot.keep_previous_frame = self._subplot.walks_in_thread = aside
 
     def choose_for_edit(self) -> None:
         """Choose the best quality at which the changed part of the frame can be drawn in time."""

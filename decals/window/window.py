@@ -229,16 +229,16 @@ class EditWindow:
         if self._closed:
             return
         self.camera.keep_usable()
+        self.frames.prepare_aside(self.ticking)  # a server's loop begins after the first frame
         self.update_overlay()
-        if self.busy:
-            self._ticker.wake()
         if whole and not self.ticking:
             self.draw_whole_frame()
             return
         if not whole or self.frames.outdated:
             self.frames.choose_for_edit()
-            self._wake_if_coarse()
         self.plotter.render()
+        if self.busy:
+            self._ticker.wake()
 
     def begin_motion(self) -> None:
         """Draw the next frames at a quality that is in time for a moving camera."""
@@ -364,6 +364,7 @@ class EditWindow:
             )
         )
         self.update_overlay()
+        self.frames.prepare_aside(self.ticking)
         if self.ticking:
             self.frames.begin()
         self._host.start_timer(TICK_MILLISECONDS)

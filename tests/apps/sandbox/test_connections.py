@@ -113,19 +113,20 @@ def serve(check: Check, **options: Any) -> None:
 
     from decals.apps.sandbox.page import Page
 
-    async def run() -> None:
-        with EditWindow(covered(), off_screen=True, size=SIZE) as window:
-            window.show()
-            server = get_server(f"connections {id(window)}", client_type="vue3")
-            page = Page(server, window, **options)
-            network: dict[str, Any] = {"exec_mode": "task", "port": 0, "timeout": 0, "open_browser": False}
-            task = server.start(host="127.0.0.1", show_connection_info=False, **network)
-            await server.ready
-            await check(window, page, lambda *token: Browser(page, server).open(*token))
-            await server.stop()
-            await task
+    async def run(window: EditWindow) -> None:
+        server = get_server(f"connections {id(window)}", client_type="vue3")
+        page = Page(server, window, **options)
+        network: dict[str, Any] = {"exec_mode": "task", "port": 0, "timeout": 0, "open_browser": False}
+        task = server.start(host="127.0.0.1", show_connection_info=False, **network)
+        await server.ready
+        assert window.subplot.keep_previous_frame
+        await check(window, page, lambda *token: Browser(page, server).open(*token))
+        await server.stop()
+        await task
 
-    asyncio.run(run())
+    with EditWindow(covered(), off_screen=True, size=SIZE) as window:
+        window.show()  # before the loop begins, as the command does
+        asyncio.run(run(window))
 
 
 async def until(true: Callable[[], object]) -> None:

@@ -155,6 +155,21 @@ def test_overlays_follow_edits(sandbox: Sandbox, shared: EditWindow) -> None:
     assert "39 seeds" in sandbox.status
 
 
+def test_an_overlay_with_a_scale_is_added_without_a_frame(
+    sandbox: Sandbox, shared: EditWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frames = []
+    monkeypatch.setattr(shared.plotter, "render", lambda: frames.append(True))
+    sandbox.set_control("display", "overlay", "stretch")
+    display, end = sandbox.display, time.monotonic() + 60.0
+    frames.clear()
+    while not shared.plotter.scalar_bars:
+        display.update()
+        assert time.monotonic() < end
+        time.sleep(0.002)
+    assert not frames
+
+
 def test_cameras(sandbox: Sandbox, shared: EditWindow) -> None:
     camera = shared.subplot.vtk_renderer.camera
     sandbox.move_camera("keep")

@@ -12,7 +12,9 @@ import pytest
 from decals.editing.scatter_commands import decals_on
 from decals.field.mapping import ImageMapping
 from decals.field.walks import Walks
+from decals.record import Contact
 from decals.window import EditWindow
+from decals.window.frames import FrameState
 from tests.decals.editing.scenes import scene
 from tests.decals.vtk.conftest import Factory, plotter
 from tests.decals.window.driver import Driver
@@ -170,3 +172,24 @@ def test_input_is_answered_while_walks_are_computed(
         window.close()
 
     asyncio.run(play())
+
+
+def test_a_window_shown_before_its_loop_prepares_frames_in_slices(opened: Any) -> None:
+    """As that of a server: its loop begins once the window is shown."""
+    window = opened().window
+    assert not window.subplot.keep_previous_frame
+    assert not window.subplot.walks_in_thread
+
+    async def play() -> None:
+        window.subplot.contact = Contact.RADIAL
+        window.redraw(whole=True)
+        assert window.subplot.warming_up
+        assert window.subplot.walks_in_thread
+        assert len(tasks()) == 1
+        await rested(window)
+        assert window.frames.state is FrameState.WHOLE
+
+    asyncio.run(play())
+    window.subplot.contact = Contact.MIN
+    window.redraw(whole=True)
+    assert not window.subplot.warming_up
