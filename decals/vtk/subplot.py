@@ -30,6 +30,7 @@ from decals.rendering.options import Drawing, check_scene, drawing_of
 from decals.rendering.pixel_pass import CameraBuffer
 from decals.rendering.viewpoint import Projection
 from decals.scenes.objects import Box, SceneObject, as_crease_angle, bounds_of
+from decals.scenes.origin import WORLD
 from decals.scenes.scene import Scene
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import finite_number, member, whole_number
@@ -259,12 +260,12 @@ class SubplotRenderer(KnownAttributes):
         """Give the proxy actor the bounds of the scene's objects; return True if there are others now."""
         if self._scene is None:
             return False
+        # a window draws its document in the document's own coordinates, in which outlines and handles are
+        self._proxy_actor.place(self._scene.origin if isinstance(self._scene, Scene) else WORLD)
         objects = tuple(self._scene.objects)
         if same_objects(objects, self._enclosed) and self._proxy_actor.present:
             return False
         self._enclosed = objects
-        if isinstance(self._scene, Scene):  # a document stays in its own window, at its origin
-            self._proxy_actor.place(self._scene.origin)
         self._proxy_actor.enclose(box(cast(Sequence[SceneObject], objects)) if objects else None)
         return bool(objects)
 

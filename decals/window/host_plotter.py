@@ -148,6 +148,17 @@ def camera_of(subplot: SubplotRenderer) -> Camera | None:
     return Camera(tuple(camera.position), tuple(camera.focal_point), tuple(camera.up), camera.view_angle)
 
 
+def move_camera(subplot: SubplotRenderer, shift: ArrayLike) -> None:
+    """Move the camera of a subplot by a vector, shape (3,)."""
+    if not np.any(shift):
+        return
+    camera = subplot.vtk_renderer.camera
+    camera.position, camera.focal_point = (
+        tuple(np.add(point, shift).tolist()) for point in (camera.position, camera.focal_point)
+    )
+    subplot.vtk_renderer.reset_camera_clipping_range()
+
+
 VIEW_HEIGHTS = 1e-5, 1e4
 """Smallest and largest height of the view that zooming reaches, in diagonals of the scene."""
 

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyvista as pv
 
 import decals.vtk  # noqa: F401  (registers `plotter.decals`)
@@ -42,6 +43,7 @@ from decals.window.host_plotter import (
     checked_size,
     collected_interrupts,
     edits_at,
+    move_camera,
     pixels_of,
     ray_through,
 )
@@ -158,6 +160,7 @@ class EditWindow:
         self._host.add_scene(self.document.scene)
         modes = self.subplot.contact, self.subplot.mapping, self.subplot.stiffness
         self.subplot.scene = self.document
+        move_camera(self.subplot, np.negative(self.document.origin))
         self.frames = FrameController(self.subplot, samples, self.plotter.render, self._content_version)
         self.warmup = Warmup(self.subplot, weak_callback(self._show_status), self.frames.give_up)
         self._end_screenshots = before_screenshots(self.plotter, weak_callback(self._before_screenshot))
@@ -409,6 +412,7 @@ class EditWindow:
         self._host.stop_timer()
         self.frames.release()
         self._backup.restore(self.document)
+        move_camera(self.subplot, self.document.origin)
         self.plotter.render()
 
     def __enter__(self) -> "EditWindow":

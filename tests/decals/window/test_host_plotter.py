@@ -1,18 +1,34 @@
 """Editing in a host plotter: as in a window of its own; the plotter is restored afterwards."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 import pyvista as pv
 
+from blobtree import Point
 from decals.editing.scatter_commands import decals_on
 from decals.errors import InvalidScene
+from decals.scenes.cover import cover
+from decals.scenes.files import load_scene
+from decals.scenes.objects import TreeObject
+from decals.scenes.scene import Scene
 from decals.window import EditWindow
 from tests.decals.editing.scenes import scene
 from tests.decals.vtk.conftest import Factory, plotter
 from tests.decals.vtk.scenes import shot
+from tests.decals.window.conftest import opened
 from tests.decals.window.driver import Driver
 
-__all__ = ["plotter"]
+__all__ = ["opened", "plotter"]
+
+FAR = 2e6
+"""Distance from the origin at which float32 no longer tells the points of a ball of radius 1 apart."""
+
+
+def far_ball() -> Scene:
+    return cover(Point((FAR, 0, 0), radius=1.0), count=20, images=["eye"])
 
 
 def take_hold(driver: Driver) -> None:
@@ -215,3 +231,29 @@ def test_a_plotter_that_was_closed_first(plotter: Factory) -> None:
 def test_what_is_no_plotter_is_refused() -> None:
     with pytest.raises(InvalidScene, match="a pyvista plotter to edit in, got str"):
         EditWindow(scene(), plotter="window")  # type: ignore[arg-type]
+
+
+def test_a_far_scene_is_edited_and_saved_like_one_at_the_origin(opened: Any, tmp_path: Path) -> None:
+    path, scene = tmp_path / "far.json", far_ball()
+    ball = TreeObject("ball", Point((0, 0, 0), radius=1.0))
+    same = Scene(objects=[ball], camera=scene.camera, decals=scene.decals, images=scene.images)
+    near, far = opened(same), opened(scene, path=path)
+    for driver in (near, far):
+        driver.press("a", ctrl=True)  # outlines and handles are in the pictures too
+    np.testing.assert_array_equal(far.shot(), near.shot())
+    far.press("s", ctrl=True)
+    saved = load_scene(path)
+    assert saved.origin == (FAR, 0.0, 0.0)
+    np.testing.assert_allclose(saved.camera.position, scene.camera.position, atol=1e-6)
+
+
+def test_a_plotter_shows_a_far_scene_from_the_same_side_afterwards(plotter: Factory) -> None:
+    pl = plotter()
+    pl.decals.add_scene(far_ball(), camera=True)
+    pl.decals.subplot.samples = 1
+    first, position = shot(pl), pl.camera.position
+    with EditWindow(pl.decals.scene, plotter=pl) as window:
+        window.show()
+        assert np.abs(pl.camera.position).max() < 100.0
+    np.testing.assert_allclose(pl.camera.position, position, atol=1e-6)
+    np.testing.assert_array_equal(shot(pl), first)
