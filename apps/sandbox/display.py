@@ -195,6 +195,8 @@ class Display:
 
             return install
 
+        if options.slice is None:  # one that is dragged changes too often for a message
+            self.message = "preparing the view"
         return not self._worker.start(Job("view", work))
 
     def _clear(self) -> bool:

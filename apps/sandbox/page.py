@@ -389,7 +389,9 @@ class Page:
                 click=self.sandbox.unwrap,
             )
         html.P(
-            "{{ outline.length > 1 ? 'Select a node in the outline.' : 'Add a primitive or drop a model.' }}",
+            "{{ outline.some(row => row.kind === 'object') ? 'Select a node in the outline.' : "
+            "outline.some(row => row.kind === 'mesh') ? 'Scatter decals, or click on one.' : "
+            "'Add a primitive or drop a model.' }}",
             v_if="!panel.kind",
             classes="pa-3 text-caption",
         )

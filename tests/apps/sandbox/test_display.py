@@ -87,6 +87,8 @@ def test_every_mode_and_overlay_changes_the_picture_and_all_go_back(
             pictures.append(drawn)
     assert sandbox.display._meshes == ((), [])  # the view of the scene itself needs none
     sandbox.set_control("display", "overlay", "folds")
+    sandbox.settle()
+    assert "preparing the view" in sandbox.status
     settle(sandbox, shared)
     assert "triangles folded" in sandbox.status
 
