@@ -13,6 +13,7 @@ from blobtree.formulas.falloff import Falloff
 from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.nodes.parameters import UNITS, Parameter, Quantity, describe, parameters_of
 from blobtree.transpile.python import plain_python
+from decals.editing.new_nodes import alternatives
 from decals.errors import InvalidEdit
 from decals.options import Option, options_of
 from decals.validation import describe as described
@@ -26,6 +27,9 @@ CURVE_STEPS = 24
 
 STEPS = 200
 """Steps of a slider from end to end."""
+
+KIND = "kind"
+"""Name of the control of a node's class."""
 
 VECTORS = (Quantity.POINT, Quantity.DIRECTION, Quantity.EXTENTS, Quantity.SEMI_AXES)
 SIGNED = (Quantity.DISTANCE, Quantity.ANGLE, Quantity.FACTOR, Quantity.NUMBERS)
@@ -95,6 +99,13 @@ def controls_of(node: Node, size: float) -> list[dict[str, Any]]:
     """
     values = ((declared, getattr(node, name)) for name, declared in parameters_of(type(node)).items())
     return [vars(_control(declared, value, size)) for declared, value in values if value != {}]
+
+
+def kind_control(node: Node) -> list[dict[str, Any]]:
+    """Return the control of a node's class; none for a class that the menus do not offer."""
+    name, choices = type(node).__name__, alternatives(node)
+    doc = "class of the node: operands, colour and falloff stay"
+    return [vars(Control.choice(KIND, name, choices, doc))] if name in choices else []
 
 
 def _control(parameter: Parameter, value: Any, size: float) -> Control:

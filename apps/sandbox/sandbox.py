@@ -14,7 +14,7 @@ from typing import Any, Concatenate, ParamSpec
 from blobtree import Node
 from blobtree.custom.definition import custom_kinds
 from decals.apps.sandbox import decal_panel
-from decals.apps.sandbox.controls import controls_of, exchanged, parsed, parsed_option
+from decals.apps.sandbox.controls import KIND, controls_of, exchanged, kind_control, parsed, parsed_option
 from decals.apps.sandbox.display import PHASES, Display
 from decals.apps.sandbox.files import SandboxFiles
 from decals.apps.sandbox.outline import outline
@@ -239,7 +239,7 @@ class Sandbox:
             "kind": type(node).__name__,
             "name": item.names.get(path, ""),
             "doc": first_line(type(node)),
-            "controls": controls_of(node, self._size()),
+            "controls": [*kind_control(node), *controls_of(node, self._size())],
             "operands": len(node.children),
         }
 
@@ -316,6 +316,9 @@ class Sandbox:
         self, followed: FollowedNode, name: str, raw: Any, *, last: bool, index: object
     ) -> None:
         _, _, node = followed.find(self._window.document)
+        if name == KIND:
+            self._trees.exchange_node(followed, raw)
+            return
         value = exchanged(getattr(node, str(name), ()), index, raw)
         self._trees.set_parameter(followed, name, parsed(node, name, value), last=last)
 

@@ -5,6 +5,8 @@ Values follow from the declarations of the classes, so a new class can be added 
 
 import itertools
 import math
+from dataclasses import replace
+from functools import cache
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -15,6 +17,7 @@ from blobtree.custom.definition import custom_kinds
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.parameters import Parameter, Quantity, parameters_of
 from blobtree.nodes.primitives import Leaf
+from blobtree.nodes.tree import AssociativeCombination
 from blobtree.nodes.values import OPTIONAL, fields_of
 from decals.errors import InvalidEdit
 from decals.validation import one_of
@@ -55,6 +58,9 @@ DIRECTIONS = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 NOT_OFFERED = ("transform", "volume", "press", "bulge", "rated_union")
 """Kinds that need data or are parts: the gizmo moves nodes, and `SolidContact` makes the last three."""
 
+PLACED = {Quantity.POINT, Quantity.POINTS}
+"""Quantities of ends and control points."""
+
 NAMED_SHARES = {"low": -0.5, "high": 0.5, "thickness": 0.1, "end_radius": 0.1}
 """Lengths by the name of their parameter: ends of a deformation, thickness of a wall, end of a limb."""
 
@@ -78,15 +84,49 @@ def checked_kind(name: object) -> type[Node]:
 
 def operand_range(kind: type[Node]) -> tuple[int, float]:
     """Return the least and the largest number of operands: 0 for primitives, 1 for warps."""
-    several = _operand_fields(kind).values()
-    return len(several) + sum(several), math.inf if any(several) else len(several)
+    several = _operand_fields(kind).values()  # type: ignore[arg-type]  # classes are hashable
+    ordered = issubclass(kind, AssociativeCombination) and not kind.operator.commutes
+    return len(several) + sum(several), math.inf if any(several) and not ordered else len(several) + ordered
 
 
-def _operand_fields(kind: type[Node]) -> dict[str, bool]:
+@cache
+def _operand_fields(kind: Any) -> dict[str, bool]:
     """Return the fields that hold operands: True for several, False for one."""
     hints, declared = get_type_hints(kind), parameters_of(kind)
     names = [field.name for field in fields_of(kind) if field.name not in declared]
     return {name: hints[name] is not Node for name in names}
+
+
+def alternatives(node: Node) -> list[str]:
+    """Return the names of the classes whose nodes can take the place of a node, with the same operands."""
+    count = len(node.children)
+
+    def takes(kind: type[Node]) -> bool:
+        least, most = (0, 0) if issubclass(kind, Leaf) else operand_range(kind)
+        return least <= count <= most
+
+    return [name for name, kind in kinds().items() if takes(kind)]
+
+
+def exchanged_node(node: Any, name: str) -> Node:
+    """Return a node of another class with the same operands, in the place of a node.
+
+    Parameters that both classes declare alike keep their values; lengths do so if ends or control points do.
+    """
+    low, high = node.bounds
+    fresh: Any = new_node(name, node.children, (low + high).astype(np.float64) / 2, float((high - low).max()))
+    before = parameters_of(type(node))
+    alike = {
+        shared: after.quantity
+        for shared, after in parameters_of(type(fresh)).items()
+        if shared in before and before[shared].quantity is after.quantity
+    }
+    ends = {quantity for shared, quantity in alike.items() if shared != "center"} & PLACED
+    kept = {shared: getattr(node, shared) for shared, q in alike.items() if ends or q not in SHARES}
+    if "points" in kept and "radii" not in kept and hasattr(fresh, "radii"):  # one for each point
+        kept["radii"] = (getattr(node, "radius", fresh.radii[0]),) * len(kept["points"])
+    changed: Node = replace(fresh, **kept)
+    return changed
 
 
 def families() -> dict[str, list[str]]:
@@ -128,7 +168,7 @@ def new_node(
     least, most = operand_range(kind)
     if not least <= len(operands) <= most:
         raise InvalidEdit(f"{name}: expected {least} or more operands, at most {most:g}, got {len(operands)}")
-    declared, several = parameters_of(kind), _operand_fields(kind)
+    declared, several = parameters_of(kind), _operand_fields(kind)  # type: ignore[arg-type]
     values: dict[str, Any] = {}
     pending = list(operands)
     used: dict[Quantity, int] = {}

@@ -20,7 +20,7 @@ from decals.editing.decal_actions import TINTS
 from decals.editing.document import Document
 from decals.editing.gizmo import Handle, HandleDrag, Ray, handles_of, moved_point, snap_distance
 from decals.editing.key_bindings import Group
-from decals.editing.new_nodes import checked_kind, new_node
+from decals.editing.new_nodes import alternatives, checked_kind, exchanged_node, new_node
 from decals.editing.queries import SurfacePick
 from decals.editing.scatter_commands import AddObject, RemoveObject
 from decals.editing.session import EditSession
@@ -46,7 +46,7 @@ from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.objects import SceneObject, TreeObject, bounds_of, displaced, unused_name
 from decals.surfaces.implicit import project_without_mesh
 from decals.surfaces.surface import unit_rows
-from decals.validation import describe
+from decals.validation import describe, one_of
 
 RESIZE_STEP = 1.05
 """Factor of a primitive's radius by one key press."""
@@ -379,6 +379,17 @@ class TreeActions(WindowActions):
         if len(node.children) < 2:
             raise InvalidEdit(f"select a node with two or more operands; a {type(node).__name__} has fewer")
         self._replace_node(lambda node: new_node(kind, node.children), f"combine with {kind}")
+
+    def exchange_node(self, followed: FollowedNode, kind: str) -> None:
+        """Put a node of another kind in the place of a node, with the same operands, and select it."""
+        number, path, node = followed.find(self._state.session.document)
+        one_of("kind", kind, alternatives(node), InvalidEdit)
+        label = f"replace {type(node).__name__} by {kind}"
+
+        def command(tree: Node) -> tuple[StructureCommand, ...]:
+            return (ReplaceNode(number, path, exchanged_node(node_at(tree, path), kind), label),)
+
+        self._restructure_later(label, number, command, np.zeros(3, np.float32))
 
     def unwrap_node(self) -> None:
         """Replace the selected node by its only operand."""

@@ -512,6 +512,10 @@ async def panels(picture: str | None = None) -> None:
         assert np.abs(await shows(browser, plotter) - before).mean() > 5
         await choose(browser, "contact", "radial")
         await done("set contact")
+        await row("Point").click()
+        await choose(browser, "kind", "Torus")
+        await done("replace Point by Torus")
+        await row("Torus").wait_for()
         sandbox_page.sandbox.unwrap()  # is refused, in red
         await browser.locator(".refused").wait_for()
         await accessible(browser)

@@ -266,9 +266,9 @@ def test_a_slider_is_one_undo_entry_and_undo_restores_every_bit(window: EditWind
 def test_the_ends_of_a_slider_stay_while_it_moves(window: EditWindow) -> None:
     sandbox = Sandbox(window)
     sandbox.select("0/1")
-    before = sandbox.values()["panel"]["controls"][1]
+    before = sandbox.values()["panel"]["controls"][2]
     sandbox.set_control("node", "radius", 1.4, False)
-    after = sandbox.values()["panel"]["controls"][1]
+    after = sandbox.values()["panel"]["controls"][2]
     assert (after["value"], after["low"], after["high"]) == (1.4, before["low"], before["high"])
 
 
@@ -391,6 +391,26 @@ def test_a_new_node_without_a_selection_is_an_object(vtk_display: None) -> None:
             finish(window)
             sandbox.select("")
         assert [item.name for item in window.document.objects] == ["box 1", "point 1"]
+
+
+def test_a_node_is_replaced_by_one_of_another_kind(window: EditWindow) -> None:
+    sandbox, before = Sandbox(window), digest(window.document)
+    sandbox.select("0/1")
+    kind = sandbox.values()["panel"]["controls"][0]
+    assert (kind["name"], kind["value"]) == ("kind", "Point")
+    assert {"Torus", "Box"} <= {*kind["choices"]}
+    sandbox.set_control("node", "kind", "Torus")
+    finish(window)
+    sandbox.select("0")
+    sandbox.set_control("node", "kind", "Union")
+    finish(window)
+    assert shapes(window) == ["Union", "Point", "Torus"]
+    assert sandbox.values()["done"] == ["replace Point by Torus", "replace Sum by Union"]
+    for wrong in ("Twist", "No", None, 3):
+        sandbox.set_control("node", "kind", wrong)
+        assert "kind: expected one of" in sandbox.status
+    sandbox.go_to(0)
+    assert digest(window.document) == before
 
 
 def test_a_key_closes_no_page(window: EditWindow) -> None:

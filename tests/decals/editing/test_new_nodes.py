@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import InvalidNode, Node, Point
+from blobtree import Cone, InvalidNode, Node, Point, Polyline, Segment
 from blobtree.nodes.kinds import NODE_KINDS
+from blobtree.nodes.parameters import parameters_of
 from decals.editing import new_nodes
 from decals.errors import InvalidEdit
 from tests.blobtree.custom_kinds import Ring, Soft
@@ -52,6 +53,44 @@ def test_a_new_cone_tapers_and_a_new_segment_does_not() -> None:
         ]
         shares.append(np.sum(widths[1]) / np.sum(widths[0]))
     assert shares[0] < 0.7 < 0.9 < shares[1]
+
+
+def test_a_node_of_another_kind_takes_the_place_of_one() -> None:
+    limb = Segment((1, 2, 3), (2, 2, 4), radius=0.3, color="red", falloff="gaussian")
+    cone: Any = new_nodes.exchanged_node(limb, "Cone")
+    shared = [name for name in parameters_of(Segment) if name in parameters_of(Cone)]
+    assert {"start", "end", "radius", "color", "falloff"} <= {*shared}
+    assert [getattr(cone, name) for name in shared] == [getattr(limb, name) for name in shared]
+    ball = Point((1, 2, 3), radius=0.5, color="red", weight=0.7)
+    ring: Any = new_nodes.exchanged_node(ball, "Torus")
+    assert (ring.center, ring.color, ring.weight) == (ball.center, ball.color, 0.7)
+    assert ring.radius < ball.radius  # else it would have no hole
+    assert new_nodes.exchanged_node(OPERANDS[0] + OPERANDS[1], "Difference") == OPERANDS[0] - OPERANDS[1]
+    assert new_nodes.exchanged_node(ball.twist(30), "Taper").children == (ball,)
+    points = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 1, 0), (2, 2, 1))
+    stroke: Any = new_nodes.exchanged_node(Polyline(points, radius=0.2), "Stroke")
+    assert (stroke.points, stroke.radii) == (points, (0.2,) * 5)
+
+
+def test_other_kinds_have_as_many_operands() -> None:
+    ball, twist, three = OPERANDS[0], OPERANDS[0].twist(30), OPERANDS[0] + OPERANDS[1] + OPERANDS[2]
+    families = new_nodes.families()
+    assert new_nodes.alternatives(ball) == families["primitives"]
+    assert new_nodes.alternatives(twist) == families["modifiers"]
+    assert {"Sum", "Union"} <= {*new_nodes.alternatives(three)} <= {*families["combinations"]}
+    assert not {"Difference", "RUnion"} & {*new_nodes.alternatives(three)}
+    assert {"Difference", "RUnion"} <= {*new_nodes.alternatives(ball + ball)}
+    with pytest.raises(InvalidEdit, match="Twist: expected 1 or more operands"):
+        new_nodes.exchanged_node(ball, "Twist")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", new_nodes.built_in_kinds())
+def test_every_kind_takes_the_place_of_every_other_one(name: str) -> None:
+    count = new_nodes.operand_range(new_nodes.kinds()[name])[0]
+    node = new_nodes.new_node(name, OPERANDS[:count])
+    for other in new_nodes.alternatives(node):
+        assert type(new_nodes.exchanged_node(node, other)).__name__ == other
 
 
 def test_custom_kinds_are_offered() -> None:
