@@ -11,7 +11,7 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-from blobtree import Node
+from blobtree import InvalidNode, Node
 from blobtree._typing import Float64Array
 from blobtree.custom.definition import custom_kinds
 from blobtree.nodes.kinds import NODE_KINDS
@@ -58,6 +58,9 @@ DIRECTIONS = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 NOT_OFFERED = ("transform", "volume", "press", "bulge", "rated_union")
 """Kinds that need data or are parts: the gizmo moves nodes, and `SolidContact` makes the last three."""
 
+GENTLER = 1.0, 2.0, 4.0, 8.0, 16.0
+"""Factors of the size of an operand for which warps of it are tried: they bend less per unit."""
+
 PLACED = {Quantity.POINT, Quantity.POINTS}
 """Quantities of ends and control points."""
 
@@ -97,6 +100,18 @@ def _operand_fields(kind: Any) -> dict[str, bool]:
     return {name: hints[name] is not Node for name in names}
 
 
+def node_above(name: str, node: Node) -> Node:
+    """Return a node of a class above another one, gentler than usual if the node is too large for it."""
+    low, high = node.bounds
+    size = float((high - low).max())
+    for factor in GENTLER:
+        try:
+            return new_node(name, (node,), size=factor * size)
+        except InvalidNode:
+            continue
+    return new_node(name, (node,), size=size)
+
+
 def alternatives(node: Node) -> list[str]:
     """Return the names of the classes whose nodes can take the place of a node, with the same operands."""
     count = len(node.children)
@@ -114,7 +129,10 @@ def exchanged_node(node: Any, name: str) -> Node:
     Parameters that both classes declare alike keep their values; lengths do so if ends or control points do.
     """
     low, high = node.bounds
-    fresh: Any = new_node(name, node.children, (low + high).astype(np.float64) / 2, float((high - low).max()))
+    middle, size = (low + high).astype(np.float64) / 2, float((high - low).max())
+    operands: tuple[Node, ...] = node.children
+    single = len(operands) == 1
+    fresh: Any = node_above(name, operands[0]) if single else new_node(name, operands, middle, size)
     before = parameters_of(type(node))
     alike = {
         shared: after.quantity

@@ -20,7 +20,7 @@ from decals.editing.decal_actions import TINTS
 from decals.editing.document import Document
 from decals.editing.gizmo import Handle, HandleDrag, Ray, handles_of, moved_point, snap_distance
 from decals.editing.key_bindings import Group
-from decals.editing.new_nodes import alternatives, checked_kind, exchanged_node, new_node
+from decals.editing.new_nodes import alternatives, checked_kind, exchanged_node, new_node, node_above
 from decals.editing.queries import SurfacePick
 from decals.editing.scatter_commands import AddObject, RemoveObject
 from decals.editing.session import EditSession
@@ -366,12 +366,7 @@ class TreeActions(WindowActions):
     def wrap_node(self, kind: str) -> None:
         """Put the selected node under a new node of a kind with one operand, such as a warp."""
         kind = checked_kind(kind).__name__
-
-        def wrapped(node: Node) -> Node:
-            low, high = node.bounds
-            return new_node(kind, (node,), size=float((high - low).max()))
-
-        self._replace_node(wrapped, f"put {self._selected_label} under {kind}")
+        self._replace_node(lambda node: node_above(kind, node), f"put {self._selected_label} under {kind}")
 
     def combine_operands(self, kind: str) -> None:
         """Combine the operands of the selected node by a node of another kind."""

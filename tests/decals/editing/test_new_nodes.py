@@ -72,6 +72,16 @@ def test_a_node_of_another_kind_takes_the_place_of_one() -> None:
     assert (stroke.points, stroke.radii) == (points, (0.2,) * 5)
 
 
+@pytest.mark.parametrize("center", [(0, 0, 0), (1.2, 0.4, 0), (0, 5, 3)])
+@pytest.mark.parametrize("name", new_nodes.families()["modifiers"])
+def test_a_node_anywhere_goes_under_each_modifier(name: str, center: tuple[float, float, float]) -> None:
+    ball = Point(center, radius=0.6)
+    assert new_nodes.node_above(name, ball).children == (ball,)
+    assert new_nodes.exchanged_node(ball.twist(10), name).children == (ball,)
+    with pytest.raises(InvalidEdit, match="Sum: expected 2 or more operands"):
+        new_nodes.node_above("Sum", ball)
+
+
 def test_other_kinds_have_as_many_operands() -> None:
     ball, twist, three = OPERANDS[0], OPERANDS[0].twist(30), OPERANDS[0] + OPERANDS[1] + OPERANDS[2]
     families = new_nodes.families()
