@@ -25,7 +25,15 @@ from decals.validation import finite_number, number_of, one_of, whole_number
 from decals.vtk.subplot import FrameStatus
 from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of, ray_through
-from decals.window.view_modes import MODES, OVERLAYS, RESOLUTION, DisplayOptions, Shown, shown_data
+from decals.window.view_modes import (
+    MODES,
+    OVERLAYS,
+    RESOLUTION,
+    DisplayOptions,
+    Shown,
+    example_data,
+    shown_data,
+)
 
 SCALE: dict[str, Any] = {"n_labels": 0, "title_font_size": 16, "width": 0.4, "render": False}
 SCALE |= {"position_x": 0.02, "position_y": 0.02, "color": "black", "background_color": "white", "fill": True}
@@ -198,6 +206,12 @@ class Display:
         if options.slice is None:  # one that is dragged changes too often for a message
             self.message = "preparing the view"
         return not self._worker.start(Job("view", work))
+
+    def prepare(self) -> None:
+        """Draw once, before input comes, each kind of actor that may be shown."""
+        self._install(example_data(), "", self.options)
+        self._window.plotter.render_window.Render()
+        self._install([], "", self.options)
 
     def _clear(self) -> bool:
         had, self._key, self._meshes = self._key != (), (), ((), [])

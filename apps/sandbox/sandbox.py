@@ -111,6 +111,7 @@ class Sandbox:
         self.unwrap, self.go_to = self._event(self._trees.unwrap_node), self._event(actions.go_to)
         window.overlay.hide_status()  # the page has its own, and handles
         window.handle.visible = False
+        self.display.prepare()
         window.redraw(whole=True)
         actions.files.show_view = self.display.show_from
         self._files = files = SandboxFiles(window, folder or Path(), lessons, self._begin_scene)

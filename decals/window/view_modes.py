@@ -92,6 +92,32 @@ def shown_data(document: Document, parts: list[pv.PolyData], options: DisplayOpt
     return shown, message
 
 
+def example_data() -> Shown:
+    """Return a triangle in each way in which modes, overlays and slices draw, with a scale of colours.
+
+    Drivers compile VTK's programs for each way when it is drawn first.
+    """
+    triangle = pv.PolyData(np.eye(3), [3, 0, 1, 2])
+    triangle["level"], triangle["colour"] = np.zeros(3), np.zeros((3, 3), np.uint8)
+    triangle["Normals"] = np.eye(3)
+    triangle.point_data.active_normals_name = "Normals"
+    lines = pv.PolyData(np.eye(3), lines=[2, 0, 1])
+    scale, colors = (
+        {"scalars": "level", "cmap": "cividis", "clim": (0.0, 1.0)},
+        {"scalars": "colour", "rgb": True},
+    )
+    ways: list[tuple[pv.PolyData, dict[str, Any]]] = [
+        (triangle, scale),
+        (triangle, scale | {"lighting": False}),
+        (triangle, colors),
+        (triangle, colors | {"lighting": False}),
+        (triangle, {"style": "wireframe", "color": LINE_COLOR}),
+        (triangle, {"style": "points", "color": LINE_COLOR, "render_points_as_spheres": True}),
+        (lines, {"color": LINE_COLOR, "line_width": 3}),
+    ]
+    return [(f"{PREFIX}example {number}", data, given) for number, (data, given) in enumerate(ways)]
+
+
 def _moded(document: Document, mesh: pv.PolyData, parts: list[pv.PolyData], mode: str) -> Any:
     """Return the mesh of a mode with its name and options."""
     name = f"{PREFIX}mesh"

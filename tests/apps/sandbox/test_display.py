@@ -25,7 +25,7 @@ from decals.scenes.camera import PRESETS
 from decals.scenes.objects import MeshObject
 from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of
-from decals.window.view_modes import MODES, OVERLAYS
+from decals.window.view_modes import MODES, OVERLAYS, PREFIX, example_data
 from tests.apps.sandbox.test_sandbox import TREE, finish
 from tests.decals.editing.scenes import box, digest, tree_of
 
@@ -170,6 +170,20 @@ def test_an_overlay_with_a_scale_is_added_without_a_frame(
         assert time.monotonic() < end
         time.sleep(0.002)
     assert not frames
+
+
+def test_each_kind_of_actor_is_drawn_once_before_input_comes(shared: EditWindow) -> None:
+    drawn: list[int] = []
+
+    def shown(*_: object) -> int:
+        return sum(name.startswith(PREFIX) for name in shared.plotter.actors)
+
+    tag = shared.plotter.render_window.AddObserver("StartEvent", lambda *_: drawn.append(shown()))
+    Sandbox(shared)
+    shared.plotter.render_window.RemoveObserver(tag)
+    assert drawn[0] == len(example_data()) > 5
+    assert not shown()
+    assert not shared.plotter.scalar_bars
 
 
 def test_cameras(sandbox: Sandbox, shared: EditWindow) -> None:
