@@ -64,7 +64,7 @@ class LabPage(Page):
         return values
 
     def _build_left_side(self) -> None:
-        with drawer("left", (f"in_lesson ? {LESSON_WIDTH} : {PANEL_WIDTH}",)):
+        with drawer("left", f"(in_lesson ? {LESSON_WIDTH} : {PANEL_WIDTH})"):
             client.Style(STYLE)
             with html.Div(v_if="!in_lesson"):
                 self._build_outline()
@@ -105,7 +105,7 @@ class LabPage(Page):
             )
 
     def _build_right_side(self) -> None:
-        with drawer("right", (f"in_lesson ? {PLOTS_WIDTH} : {PANEL_WIDTH}",)):
+        with drawer("right", f"(in_lesson ? {PLOTS_WIDTH} : {PANEL_WIDTH})"):
             with vuetify3.VBtnToggle(
                 v_if="in_lesson",
                 v_model="lab_side",

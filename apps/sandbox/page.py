@@ -20,7 +20,9 @@ from decals.window import EditWindow, browser_keys
 REFRESH_SECONDS = 0.1
 """Time between two looks at the session, whose changes the page then shows."""
 
-PANEL_WIDTH = 290
+PANEL_WIDTH, LOWER_HEIGHT = 290, 400
+"""Width of a panel, and height of one below the view, in pixels."""
+
 NARROW = 900
 """Width of a window, in pixels, below which the panels lie above the view."""
 
@@ -93,13 +95,17 @@ SEND_NAME = "renamed = utils.sandbox.rename(renamed, row)"
 """Show the field of a row's name; send what stands there, and hide the field."""
 
 
-def drawer(side: str, width: Any) -> Any:
-    """Return the panel at a side of the page; in a narrow window it is closed at first, above the view."""
+def drawer(side: str, width: str = str(PANEL_WIDTH)) -> Any:
+    """Return the panel at a side of the page, with a width that is an expression of the page.
+
+    In a narrow window it is closed at first, above the view; on an upright tablet, both lie beside the view.
+    """
+    lower = UPRIGHT_TABLET if side == "right" else "false"
     return vuetify3.VNavigationDrawer(
         v_model=(f"{side}_open", None),
         mobile_breakpoint=(f"{UPRIGHT_TABLET} ? 0 : {NARROW}",),
-        width=width,
-        location=side if side == "left" else (f"{UPRIGHT_TABLET} ? 'bottom' : 'right'",),
+        width=(f"{lower} ? {LOWER_HEIGHT} : {width}",),
+        location=(f"{lower} ? 'bottom' : '{side}'",),
         order="1" if side == "left" else "0",
         scrim=False,
         raw_attrs=named(f"'{side} panel'"),
@@ -237,12 +243,12 @@ class Page:
 
     def _build_left_side(self) -> None:
         """Build what stands left of the view."""
-        with drawer("left", PANEL_WIDTH):
+        with drawer("left"):
             self._build_outline()
 
     def _build_right_side(self) -> None:
         """Build what stands right of the view."""
-        with drawer("right", PANEL_WIDTH):
+        with drawer("right"):
             self._build_panels()
 
     def _build_panels(self) -> None:
