@@ -212,7 +212,7 @@ class TreeActions(WindowActions):
             known = ", ".join(handle.name for handle in handles) or "none"
             raise InvalidEdit(f"handle: expected one of the selected node, {known}, got {describe(name)}")
         self._handle_drag = HandleDrag(handles, name, ray, length), selected
-        self._state.begin_stroke(name)
+        self._state.begin_stroke(name if name.startswith(("move", "turn", "scale")) else f"move {name}")
 
     def drag_handle(self, ray: Ray, *, snap: bool = False) -> None:
         """Drag the handle to the pointer's ray, while its node is selected and has it.
