@@ -38,7 +38,19 @@ from tests.decals.editing.scenes import digest, scene, tree_of
 from tests.decals.vtk.scenes import both
 from tests.decals.window.driver import Driver
 from tests.frontends import page as docs
-from tests.frontends.browsing import LOSS, PATIENCE, drag, drawn, opened, point, seen, served, shows, until
+from tests.frontends.browsing import (
+    LOSS,
+    PATIENCE,
+    PICTURE,
+    drag,
+    drawn,
+    opened,
+    point,
+    seen,
+    served,
+    shows,
+    until,
+)
 
 BLOB = Point((0, 0, 0), radius=1.0) + Point((1.2, 0.4, 0), radius=0.6)
 
@@ -205,11 +217,35 @@ async def sandbox(picture: str | None = None) -> None:
         await browser.mouse.move(box[0] + 32, box[1] - 28)
         await browser.mouse.up()
         await until(lambda: not np.allclose(normal(), before))
+        cut = sandbox_page.sandbox.display.options.slice
+        box = await at_rest(browser, sandbox_page, "slice")
+        await browser.mouse.move(*box)
+        await browser.mouse.down()
+        await browser.mouse.move(box[0] + 20, box[1] - 20)
+        await browser.mouse.up()
+        await until(lambda: sandbox_page.sandbox.display.options.slice != cut)
+        assert np.allclose(normal(), cut.normal if cut else 0.0)
+        distance = plotter.camera.distance
+        await pinch(browser, 40, 50, 60, 80)
+        await until(lambda: np.isclose(plotter.camera.distance, 0.5 * distance, rtol=0.02))
         await browser.get_by_text("Start", exact=True).click()
         await until(lambda: digest(window.document) == state)
         await until(lambda: window.session.undone_labels == (*slid, "add Torus", "set ring_radius"))
         assert all("127.0.0.1" in url for url in requests)
     window.close()
+
+
+async def pinch(browser: Page, *reaches: float) -> None:
+    """Put two fingers on the view and part them; their distances are twice the reaches, in pixels."""
+    box = await browser.locator(PICTURE).first.bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    touch = await browser.context.new_cdp_session(browser)
+    fingers = [[{"x": x + way * r, "y": y, "id": n} for n, way in enumerate((-1, 1))] for r in reaches]
+    steps = [("touchStart", fingers[0][:1]), ("touchStart", fingers[0])]
+    for kind, points in [*steps, *(("touchMove", pair) for pair in fingers[1:]), ("touchEnd", [])]:
+        await touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+        await asyncio.sleep(0.1)
 
 
 async def by_keys(browser: Page) -> None:
@@ -512,7 +548,14 @@ async def panels(picture: str | None = None) -> None:
         assert np.abs(await shows(browser, plotter) - before).mean() > 5
         await choose(browser, "contact", "radial")
         await done("set contact")
-        await row("Point").click()
+        await row("snail").click(button="right")
+        await browser.get_by_text("Duplicate", exact=True).click()
+        await done("duplicate snail")
+        await row("snail 2").wait_for()
+        await row("body").first.click(button="right")
+        await browser.get_by_text("Duplicate", exact=True).click()
+        await done("duplicate a primitive")
+        await row("Point").first.click()
         await choose(browser, "kind", "Torus")
         await done("replace Point by Torus")
         await row("Torus").wait_for()
