@@ -1,7 +1,8 @@
-"""Memory of long sessions: what ended edits used goes back to the system."""
+"""Memory of long sessions: what ended edits used goes back, what first edits need is there before them."""
 
 import ctypes
 import gc
+import importlib
 import sys
 import threading
 import time
@@ -22,6 +23,12 @@ TRIM_SECONDS = 10.0
 
 ACTIVE_SHARE = 0.1
 """Share of one core from which on a process has been active, so that memory may have become free."""
+
+FIRST_USED = "blobtree.derivatives.sensitivity_kernels"
+"""The module whose kernels the first drag of a surface needs; its import takes 0.2 s and 12 MB."""
+
+IMPORT_SECONDS = 10.0
+"""Time for the first pictures of a session."""
 
 
 def share_heap() -> None:
@@ -72,3 +79,10 @@ def _trim_for_ever(library: Any, seconds: float) -> None:
         time.sleep(seconds)
         if time.process_time() - before > ACTIVE_SHARE * seconds:
             library.malloc_trim(0)
+
+
+def import_ahead(seconds: float = IMPORT_SECONDS) -> None:
+    """Import in a thread, after some time, what the first drag of a surface would wait for."""
+    timer = threading.Timer(seconds, importlib.import_module, (FIRST_USED,))
+    timer.daemon = True
+    timer.start()

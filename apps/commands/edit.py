@@ -18,7 +18,7 @@ from decals.apps.commands.options import (
     UpAxis,
     parse_size,
 )
-from decals.apps.memory import keep_memory_low, share_heap
+from decals.apps.memory import import_ahead, keep_memory_low, share_heap
 from decals.apps.models.loading import import_definitions
 from decals.errors import InvalidInput
 from decals.validation import stiffness_number
@@ -87,6 +87,7 @@ def edit(
     try:
         with window:
             keep_memory_low()
+            import_ahead()
             window.show()
     finally:
         report_unsaved(window, "edit")

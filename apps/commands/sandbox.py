@@ -121,7 +121,7 @@ def sandbox(
             return _show_window(command(1))
         return _serve_sessions(command, sessions, host, port, browser=browser)
     from decals.apps.commands.opening import check_options, opened, report_unsaved
-    from decals.apps.memory import keep_memory_low, share_heap
+    from decals.apps.memory import import_ahead, keep_memory_low, share_heap
     from decals.apps.models.loading import import_definitions
     from decals.window import EditWindow
     from decals.window.host_plotter import new_plotter
@@ -152,6 +152,7 @@ def sandbox(
             else:
                 ready.add(lambda **_: _announce(host, server.port, token, open_browser=browser))
             keep_memory_low()
+            import_ahead()
             with _port_in_use_reported(port):
                 server.start(host=host, port=port, open_browser=False, show_connection_info=False, timeout=0)
     finally:

@@ -62,3 +62,23 @@ library.fflush(output)
 def test_all_threads_share_a_heap(kind: str) -> None:
     report = subprocess.check_output([sys.executable, "-c", HEAPS, kind], text=True)
     assert (report.count("<heap nr=") == 1) == (kind == "shared")
+
+
+AHEAD = """
+import sys, time
+import blobtree
+from decals.apps.memory import FIRST_USED, import_ahead
+
+import_ahead(0.1)
+assert FIRST_USED not in sys.modules
+end = time.monotonic() + 60.0
+while FIRST_USED not in sys.modules and time.monotonic() < end:
+    time.sleep(0.01)
+import importlib
+print(hasattr(importlib.import_module(FIRST_USED), "evaluate_sensitivities"))
+"""
+
+
+@pytest.mark.slow
+def test_kernels_of_the_first_drag_are_imported_ahead() -> None:
+    assert subprocess.check_output([sys.executable, "-c", AHEAD], text=True) == "True\n"

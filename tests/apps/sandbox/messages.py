@@ -33,7 +33,7 @@ from typing import Any
 
 import numpy as np
 
-from decals.apps.memory import keep_memory_low, share_heap
+from decals.apps.memory import import_ahead, keep_memory_low, share_heap
 from decals.editing.actions import KEYS
 from decals.window import EditWindow
 from tests.apps.sandbox.test_connections import CALLS, SIZE, Browser, Connect, serve
@@ -326,10 +326,11 @@ class Messages:
             await self._wait_until(self._rests)
 
     def _rests(self) -> bool:
-        """Bring the page up to date; return True if nothing is to be done, and threads have ended."""
+        """Bring the page up to date; return True if it shows the scene, and threads have ended."""
         self._page.refresh()
         works = {thread.name for thread in threading.enumerate()} & WORKERS
-        return not (works or self._window.busy or self._page.sandbox.display.values()["busy"])
+        drawing = self._window.busy or self._window.frames.outdated
+        return not (works or drawing or self._page.sandbox.display.values()["busy"])
 
     @staticmethod
     async def _wait_until(true: Callable[[], bool]) -> None:
@@ -454,6 +455,7 @@ def measure(
 
     async def check(window: EditWindow, page: Any, connect: Connect) -> None:
         keep_memory_low()
+        import_ahead()
         loop = asyncio.get_running_loop()
         loop.set_exception_handler(lambda _, context: errors.append(repr(context)))
         figures.update(await Messages(window, page, connect, seed).run(count, report))
