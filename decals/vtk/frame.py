@@ -271,8 +271,12 @@ class FrameKey:
     @classmethod
     def of(cls, scene: SceneLike, options: FrameOptions, viewpoint: Projection) -> Self:
         """Return the key of a picture."""
-        objects = (*scene.objects, scene.decals, *(image.pixels for image in scene.images))
-        return cls(objects, (options, viewpoint.matrix.tobytes(), decal_version(scene)))
+        return cls(cls.objects_of(scene), (options, viewpoint.matrix.tobytes(), decal_version(scene)))
+
+    @staticmethod
+    def objects_of(scene: SceneLike) -> tuple[object, ...]:
+        """Return what identifies the content of a picture."""
+        return (*scene.objects, scene.decals, *(image.pixels for image in scene.images))
 
     @classmethod
     def of_attempt(cls, scene: SceneLike, *values: object) -> Self:
@@ -324,13 +328,19 @@ class FrameRenderer:
             finally:
                 self.renderer.sweep()
             if not options.magnified:  # after small frames of a drag, it may be undone
-                self.renderer.forget_others(frame.targets)
+                self._forget_others(scene, frame.targets)
             if wait and frame.work:
                 self.context.gl.finish()
         self.drawn_fraction = frame.work
         if self.drawn_fraction:
             self._warm.add(self._warmup_plan(scene, options).key)
         return frame.targets
+
+    def _forget_others(self, scene: SceneLike, shown: Targets) -> None:
+        """Forget frames of other objects than the shown ones, drawn or in preparation."""
+        self.renderer.forget_others(shown)
+        if self._progressive and not same_objects(self._progressive[0].objects, FrameKey.objects_of(scene)):
+            self._progressive = None
 
     def prepare(
         self, scene: SceneLike, options: FrameOptions, viewpoint: Projection, seconds: float
