@@ -24,6 +24,8 @@ MAX_OUTLINES = 64
 
 OUTLINE_COLOR = (1.0, 0.75, 0.1)
 OUTLINE_WIDTH = 3
+LIFT_PIXELS = 3.0
+"""Distance of outlines before the surface, in pixels of its frame: its depth has steps of that size."""
 
 TEXT_BACKGROUND_OPACITY = 0.85
 
@@ -59,10 +61,13 @@ class Overlay:
     ----------
     plotter
         The plotter; its active subplot shows the overlay.
+    draw_scale
+        Returns the size of the surface's frame over that of the window.
     """
 
-    def __init__(self, plotter: pv.BasePlotter) -> None:
+    def __init__(self, plotter: pv.BasePlotter, draw_scale: Callable[[], float] = lambda: 1.0) -> None:
         self._plotter: Any = plotter
+        self._draw_scale = draw_scale
         self._renderer: Any = plotter.renderer
         self._lines = pv.PolyData()
         self._outlined: tuple[object, ...] = ()
@@ -79,6 +84,7 @@ class Overlay:
         self._actor.mapper.dataset = self._lines
         self._actor.use_bounds = False
         self._actor.ForceTranslucentOn()  # so that it writes no depth and occludes nothing
+        self._tag = self._renderer.AddObserver("StartEvent", weak_callback(self._lift))
         self.shows_status = True  # else a page around the plotter shows it
         self._text, self._help_lines = "", KEYS.help_lines()
         self._status: Any = plotter.add_text(
@@ -111,6 +117,18 @@ class Overlay:
         lines = list(outlines(document, last, contact=contact, mapping=mapping, angles=angles))
         self._lines.copy_from(_polylines(lines))
         self._actor.SetVisibility(bool(lines))
+
+    def _lift(self) -> None:
+        """Move the outlines towards the camera, which leaves them where they are in the picture."""
+        camera, matrix = self._renderer.camera, np.eye(4)
+        share = 2.0 * LIFT_PIXELS / (self._draw_scale() * self._plotter.window_size[1])
+        if camera.parallel_projection:
+            matrix[:3, 3] = -share * camera.parallel_scale * np.array(camera.direction)
+        else:
+            share *= np.tan(np.radians(camera.view_angle) / 2.0)
+            matrix[:3] *= 1.0 - share
+            matrix[:3, 3] = share * np.array(camera.position)
+        self._actor.user_matrix = matrix
 
     def show_status(self, text: str) -> None:
         """Show a text at the bottom, in several lines if it is too long."""
@@ -162,6 +180,7 @@ class Overlay:
 
     def release(self) -> None:
         """Remove everything from the plotter."""
+        self._renderer.RemoveObserver(self._tag)
         for actor in (self._actor, self._status, self._help):
             self._plotter.remove_actor(actor, render=False)
 

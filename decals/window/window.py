@@ -176,7 +176,7 @@ class EditWindow:
             self._is_occluded,
             lambda points: pixels_of(self.subplot, points),
         )
-        self.overlay = Overlay(self.plotter)
+        self.overlay = Overlay(self.plotter, lambda: self.subplot.draw_scale)
         self.handle = PrimitiveHandle(
             self.subplot.vtk_renderer, self.actions, lambda whole: self.redraw(whole=whole)
         )

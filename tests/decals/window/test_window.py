@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+import pyvista as pv
+from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
 from blobtree.nodes.paths import node_in_world
 from decals.editing.commands import ScaleDecals
@@ -18,6 +20,8 @@ from decals.scenes.camera import Camera
 from decals.scenes.files import load_scene
 from decals.scenes.scene import DecalImage, Scene
 from decals.window import EditWindow, press_key
+from decals.window.host_plotter import pixels_of
+from decals.window.overlay import OUTLINE_COLOR
 from tests.decals.window.driver import Driver
 
 
@@ -210,6 +214,33 @@ def test_what_is_selected_is_outlined(driver: Driver) -> None:
     assert driver.window.overlay.lines.n_lines == 2
     driver.key("Escape")
     assert driver.window.overlay.lines.n_points == 0
+
+
+@pytest.mark.parametrize("parallel", [False, True])
+def test_outlines_stay_whole_and_in_place_on_coarse_frames(driver: Driver, parallel: bool) -> None:
+    window, subplot = driver.window, driver.window.subplot
+    window.camera.parallel = parallel
+    driver.click(next(driver.visible())[1])
+    before = pixels_of(subplot, window.overlay.lines.points)
+
+    def outlined() -> int:
+        target = driver.plotter.render_window
+        picture = vtkWindowToImageFilter(input=target, read_front_buffer=False, should_rerender=False)
+        picture.Update()
+        pixels = pv.convert_array(picture.GetOutput().GetPointData().GetScalars()).astype(int)
+        return int((np.abs(pixels - 255 * np.array(OUTLINE_COLOR)).max(axis=1) < 60).sum())
+
+    window.redraw(whole=True)
+    whole = outlined()
+    assert whole > 20
+    subplot.draw_scale = 0.125
+    driver.plotter.render()
+    assert outlined() > 0.8 * whole
+    actor = driver.plotter.actors["decals-selection"]
+    moved = pv.PolyData(window.overlay.lines.points).transform(actor.user_matrix, inplace=False).points
+    np.testing.assert_allclose(pixels_of(subplot, moved), before, atol=0.1)
+    subplot.draw_scale = 1.0
+    window.camera.parallel = False
 
 
 def test_outlines_wait_until_a_drag_has_ended(driver: Driver) -> None:
