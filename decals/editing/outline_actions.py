@@ -150,5 +150,7 @@ class OutlineActions(WindowActions):
                 run(RemoveObject(number))
             case "object", "duplicate":
                 self._trees.duplicate_object(number)
+            case _, "move":
+                raise InvalidEdit(f"move: expected a node, or an image onto a layer, got {describe(key)}")
             case _:
                 raise InvalidEdit(f"change: expected one that {describe(key)} has, got {describe(change)}")

@@ -95,7 +95,11 @@ class VisibilityActions(WindowActions):
             self._state.run(HideDecals(numbers))
 
     def isolate_layer(self, layer: int) -> None:
-        """Hide the decals of all other layers; if none is visible, show them."""
-        document = self._state.session.document
+        """Hide the decals of all other layers and show those of the layer; if so already, show all."""
+        session = self._state.session
+        document = session.document
         others = np.setdiff1d(document.decals.numbers, document.decals_of_layer(layer))
-        self._state.run(HideDecals(others) if len(others) else ShowDecals())
+        hidden = layer in document.hidden.decals.layers
+        with session.stroke("isolate a layer" if len(others) or hidden else "show all"):
+            session.do(ShowDecals([layer] if len(others) or hidden else None))
+            session.do(HideDecals(others))

@@ -219,6 +219,23 @@ def test_keys_hide_isolate_lock_and_show(tmp_path: Path) -> None:
     goes_back_and_forth(session)
 
 
+def test_an_isolated_layer_is_shown_alone_and_then_all() -> None:
+    scene = decals.cover(A, count=9, images=["eye"])
+    layers = np.arange(9) % 3
+    session = EditSession(scene.replace(decals=scene.decals.replace(layers=layers)))
+    actions, document, before = Actions(session), session.document, digest(session.document)
+    actions.visibility.flag_layer("hidden", 1)
+    actions.visibility.isolate_layer(1)
+    assert document.decals.numbers.tolist() == [1, 4, 7]
+    actions.visibility.isolate_layer(2)
+    assert document.decals.numbers.tolist() == [2, 5, 8]
+    actions.visibility.isolate_layer(2)
+    assert document.decals.numbers.tolist() == [*range(9)]
+    assert session.labels == ("hide decals", "isolate a layer", "isolate a layer", "show all")
+    actions.go_to(0)
+    assert digest(document) == before
+
+
 def test_flags_that_change_nothing_leave_no_entry() -> None:
     session = EditSession(decals.cover(A + B, count=3, images=["eye"]))
     actions = Actions(session)
