@@ -337,10 +337,12 @@ class FrameRenderer:
         return frame.targets
 
     def _forget_others(self, scene: SceneLike, shown: Targets) -> None:
-        """Forget frames of other objects than the shown ones, drawn or in preparation."""
+        """Forget frames of other objects than the shown ones, drawn or in preparation, and spare targets."""
         self.renderer.forget_others(shown)
         if self._progressive and not same_objects(self._progressive[0].objects, FrameKey.objects_of(scene)):
             self._progressive = None
+        if self._progressive is None:
+            self.renderer.release_targets(SPARE_SLOT)
 
     def prepare(
         self, scene: SceneLike, options: FrameOptions, viewpoint: Projection, seconds: float
