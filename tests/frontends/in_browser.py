@@ -347,8 +347,9 @@ async def creature(picture: str | None = None) -> None:
         loaded.show()
         SandboxPage(get_server("again", client_type="vue3"), loaded, folder=folder)
         async with served(get_server("again"), size=(1280, 800)) as browser:
-            again = await shows(browser, fresh)
-            assert again.shape == last.shape
+            async with asyncio.timeout(PATIENCE):  # the first picture may come before the page has its layout
+                while (again := await shows(browser, fresh)).shape != last.shape:
+                    await asyncio.sleep(0.1)
             assert np.abs(again - last).mean() < 0.5
     fresh.close()
 
