@@ -170,9 +170,13 @@ class BackgroundCompiler:
     def _run(self, work: Callable[[moderngl.Context], None]) -> None:
         if self._context is None:
             self._context = self._make_context()
+        began = time.perf_counter()
         with self._context.current():
             work(self._context.gl)
-        time.sleep(STORE_SECONDS)
+        if (
+            time.perf_counter() - began > STORE_SECONDS
+        ):  # other results were found there, or are soon made anew
+            time.sleep(STORE_SECONDS)
 
 
 def _call(function: str, *arguments: Any) -> int:
