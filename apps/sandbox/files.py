@@ -15,6 +15,7 @@ from decals.apps.sandbox.decal_panel import image_names
 from decals.apps.sandbox.folder import HDR, MODELS, keep_upload, listed, plain_name, read_upload
 from decals.apps.views import THREE_QUARTER
 from decals.editing.commands import AddImage, ReplaceImage
+from decals.editing.file_actions import WRITTEN_SUFFIXES
 from decals.editing.outline_actions import Part, image_on_layer
 from decals.editing.queries import SurfacePick
 from decals.editing.recovery import recovery_path
@@ -26,7 +27,7 @@ from decals.scenes.cover import fitting_camera
 from decals.scenes.files import is_scene_file, load_model, load_scene
 from decals.scenes.objects import MeshObject, SceneObject, unused_name
 from decals.scenes.scene import DecalImage, Scene
-from decals.validation import describe, one_of
+from decals.validation import describe, one_of, whole_number
 from decals.window import EditWindow
 
 FIRST_IMAGES = ("scale",)
@@ -38,9 +39,12 @@ LIGHT = "light"
 PLACE, PLACE_STEPS = re.compile(r"view (\d{1,5})/(\d{1,5})"), 10_000
 """Key of a place of the view, and steps across the view that it counts, from the lower left corner."""
 
+PART_BYTES = 4_000_000
+"""Bytes of a file that are sent to a page at once."""
+
 
 class SandboxFiles:
-    """Opens files in an edit window, takes those that are dropped on its page, and writes files.
+    """Opens files in an edit window, takes those that are dropped on its page, writes files and sends them.
 
     Parameters
     ----------
@@ -212,11 +216,22 @@ class SandboxFiles:
 
         A picture without a size, such as "1920 x 1080", is what the view shows, with its mode and overlays.
         """
-        if not isinstance(name, str) or not name.strip():
-            raise InvalidEdit(f"file: expected a name, such as model.json, got {describe(name)}")
+        name = _checked_name(name)
         numbers = [int(digits[:6]) for digits in re.findall(r"\d+", str(size))]
         shown = (numbers[0], numbers[1]) if len(numbers) == 2 else None
-        self._files.write(name.strip(), bool(replace_existing), size=shown, video=video)
+        self._files.write(name, bool(replace_existing), size=shown, video=video)
+
+    def read(self, name: str, begin: int) -> bytes:
+        """Return the bytes of a written file from number `begin` on, `PART_BYTES` at most."""
+        path = self._files.inside(_checked_name(name))
+        if path.suffix.lower() not in WRITTEN_SUFFIXES or not path.is_file():
+            raise InvalidEdit(f"expected a file of the folder, found no {name!r}; write it first")
+        try:
+            with path.open("rb") as file:
+                file.seek(whole_number("begin", begin, 0, path.stat().st_size, InvalidEdit))
+                return file.read(PART_BYTES)
+        except OSError as error:
+            raise InvalidEdit(f"could not read {name} ({error.strerror})") from error
 
     def _open(self, load: Callable[[Progress, Cancel], Scene], path: Path | str) -> None:
         """Open a scene that belongs to a path, or to a new file of a name."""
@@ -225,6 +240,13 @@ class SandboxFiles:
         self._files.open(load, path, recover=partial(load_scene, samples=sample_mesh))
         self.start_open = False
         self._opening()
+
+
+def _checked_name(name: object) -> str:
+    """Return the name of a file without spaces around it, or raise `InvalidEdit`."""
+    if not isinstance(name, str) or not name.strip():
+        raise InvalidEdit(f"file: expected a name, such as model.json, got {describe(name)}")
+    return name.strip()
 
 
 def _row_of(key: str) -> Part | None:

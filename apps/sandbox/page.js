@@ -71,6 +71,19 @@
       }
     },
 
+    // Save a file of the server's folder, which comes in parts, as the browser saves files.
+    async download(name) {
+      const parts = [];
+      let size = 0;
+      for (;;) {
+        const part = await trame.trigger("read", [name, size]);
+        if (!part?.byteLength) break;
+        parts.push(part);
+        size += part.byteLength;
+      }
+      if (size) trame.utils.download(name.trim().split("/").pop(), new Blob(parts));
+    },
+
     // Send the name in the field of a row, unless it is as before, and return the hidden field.
     rename(field, row) {
       if (field.key && field.name !== row.label) trame.trigger("rename", [field.key, field.name]);

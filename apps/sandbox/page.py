@@ -149,6 +149,7 @@ class Page:
         trigger("pinch")(self.sandbox.pinch)
         trigger("look")(lambda side: self.sandbox.move_camera("look", side))
         trigger("rename")(lambda key, name: change_row(key, "rename", name))
+        trigger("read")(self.sandbox.read_file)
         trigger("place")(self.sandbox.place_image)
         trigger("move")(lambda key, target: change_row(key, "move", target))
         self._build()

@@ -244,6 +244,7 @@ def build_files(sandbox: Sandbox) -> None:
                 __events=[("enter", "keyup.enter")],
             )
             vuetify3.VBtn("Write", click=write)
+            icon_button("mdi-download", "download this file", "utils.sandbox.download(file_name)")
         vuetify3.VTextField(
             v_if="/(png|jpg|gif|mp4)$/i.test(file_name)",
             v_model=("file_size", ""),

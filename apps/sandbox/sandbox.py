@@ -479,6 +479,12 @@ class Sandbox:
         """Change what a row of the outline stands for; see `OutlineActions.change`."""
         self._window.actions.outline.change(key, change, value, self._marked)
 
+    def read_file(self, name: str, begin: int) -> bytes:
+        """Return a part of a written file, none of it if the request is refused; see `SandboxFiles.read`."""
+        parts: list[bytes] = []
+        self.attempt(lambda: parts.append(self._files.read(name, begin)))
+        return b"".join(parts)
+
     def _event(self, action: Callable[Arguments, None]) -> Callable[Arguments, None]:
         """Return an event that attempts an action of the window."""
 

@@ -458,6 +458,10 @@ async def sandbox_start(picture: str | None = None) -> None:
         await browser.get_by_label("file name").fill("mine.py")
         await browser.get_by_role("button", name="Write", exact=True).click()
         await until((folder / "mine.py").exists)
+        async with browser.expect_download() as download:
+            await browser.get_by_label("download this file").click()
+        downloaded = await (await download.value).path()
+        assert downloaded.read_bytes() == (folder / "mine.py").read_bytes()
         await browser.get_by_text("Open or new").click()
         Image.new("RGB", (8, 8), "red").save(folder / "dot.png")
         await browser.get_by_label("open from this computer").set_input_files(str(folder / "dot.png"))

@@ -104,6 +104,7 @@ EVENTS: dict[str, list[list[Any]]] = {
     "change_row": [KEYS_OF_ROWS, CHANGES, ["name", "0/1", "0"]],
     "drag_handle": [HANDLES, ["begin", "move", "end"], [0.1, 0.5, 0.8], [0.3, 0.6], [True, False]],
     "open_file": [["../x.json", "none.json", "a\0.json"]],
+    "read_file": [["../x.json", "scene.json", "mine.py"], [0, 5, -1]],
     "write_file": [["../x.py", "x.exe", "no/x.json"]],
     "place_image": [KEYS_OF_ROWS, ["view 5000/5000", "view 0/0", "view 1", "0"]],
     "upload": [[[{}], [{"name": "a.ply", "content": b"x"}], 3], [*KEYS_OF_ROWS, "light", "view 5000/5000"]],

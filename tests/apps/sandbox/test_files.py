@@ -270,6 +270,29 @@ def test_wrong_uploads_say_why(file: Any) -> None:
     assert tempfile.gettempdir() not in str(error.value)
 
 
+def test_written_files_are_read_in_parts(
+    sandbox: Sandbox, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("decals.apps.sandbox.files.PART_BYTES", 1000)
+    content = bytes(range(256)) * 10
+    for name in ("a.ply", "a.txt"):
+        (tmp_path / name).write_bytes(content)
+    parts = [sandbox.read_file(" a.ply", begin) for begin in (0, 1000, 2000, 2560)]
+    assert [len(part) for part in parts] == [1000, 1000, 560, 0]
+    assert b"".join(parts) == content
+    refused: list[Any] = [
+        ("a.ply", -1),
+        ("a.ply", 2561),
+        ("a.ply", "x"),
+        ("b.ply", 0),
+        ("a.txt", 0),
+        (None, 0),
+    ]
+    for name, begin in refused:
+        assert sandbox.read_file(name, begin) == b""
+        assert "expected a" in sandbox.status, name
+
+
 def test_files_outside_the_folder_are_neither_read_nor_written(
     sandbox: Sandbox, window: EditWindow, tmp_path: Path
 ) -> None:
@@ -304,6 +327,7 @@ def test_files_outside_the_folder_are_neither_read_nor_written(
         sandbox.write_file(name, True)
         finish(window)
         assert "inside" in sandbox.status, name
+        assert (sandbox.read_file(name, 0), "inside" in sandbox.status) == (b"", True), name
     assert (outside / "ball.json").read_bytes() == before
     assert {path.name for path in outside.iterdir()} == {"ball.json", "folder", "lost.recovery.json"}
     assert {path.name for path in folder.iterdir()} == {"ball.json", "link", "lost.recovery.json"}
