@@ -97,8 +97,10 @@ def example_data() -> Shown:
 
     Drivers compile VTK's programs for each way when it is drawn first.
     """
-    triangle = pv.PolyData(np.eye(3), [3, 0, 1, 2])
-    triangle["level"], triangle["colour"] = np.zeros(3), np.zeros((3, 3), np.uint8)
+    plain = pv.PolyData(np.eye(3), [3, 0, 1, 2])  # without normals
+    plain["level"], plain["colour"] = np.zeros(3), np.zeros((3, 3), np.uint8)
+    plain.cell_data["level of the cell"] = np.zeros(1)
+    triangle = plain.copy()
     triangle["Normals"] = np.eye(3)
     triangle.point_data.active_normals_name = "Normals"
     lines = pv.PolyData(np.eye(3), lines=[2, 0, 1])
@@ -108,8 +110,11 @@ def example_data() -> Shown:
     )
     ways: list[tuple[pv.PolyData, dict[str, Any]]] = [
         (triangle, scale),
-        (triangle, scale | {"lighting": False}),
+        (plain, scale | {"lighting": False}),
+        (plain, scale | {"lighting": False, "scalars": "level of the cell"}),
+        (plain, colors),
         (triangle, colors),
+        (triangle, colors | {"smooth_shading": True}),
         (triangle, colors | {"lighting": False}),
         (triangle, {"style": "wireframe", "color": LINE_COLOR}),
         (triangle, {"style": "points", "color": LINE_COLOR, "render_points_as_spheres": True}),
