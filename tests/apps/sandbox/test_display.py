@@ -138,6 +138,7 @@ def test_the_frame_budget_holds_for_the_polygonized_scene(sandbox: Sandbox, shar
 
 def test_near_and_far_planes_follow_a_growing_model(sandbox: Sandbox, shared: EditWindow) -> None:
     camera = shared.subplot.vtk_renderer.camera
+    shared.subplot.vtk_renderer.reset_camera_clipping_range()  # other tests may have moved the planes
     near, far = camera.clipping_range
     sandbox.select("0/1")
     sandbox.set_control("node", "center", -60.0, index=[2])
