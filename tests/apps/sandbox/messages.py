@@ -327,10 +327,10 @@ class Messages:
             await self._wait_until(self._rests)
 
     def _rests(self) -> bool:
-        """Bring the page up to date; return True if it shows the scene, and threads have ended."""
+        """Bring the page up to date; return True if it has sent the last picture, and threads have ended."""
         self._page.refresh()
         works = {thread.name for thread in threading.enumerate()} & WORKERS
-        drawing = self._window.busy or self._window.frames.outdated
+        drawing = self._window.busy or self._window.frames.outdated or self._page.view._task is not None
         return not (works or drawing or self._page.sandbox.display.values()["busy"])
 
     @staticmethod
