@@ -63,10 +63,10 @@ FIRST_OBJECT_RADIUS = 0.2
 FIRST_LIMB_RADIUS = 0.06
 """Radius of a limb that is the first object, likewise."""
 
-NEW_NODE_SIZE, NEW_OBJECT_SIZE = 1.2, 0.4
-"""Size of a new node of a panel, in sizes of the selected node, and of a new object, in sizes of the scene.
+NEW_NODE_EXTENT, NEW_OBJECT_SIZE = 0.6, 0.4
+"""Extent of a new node of a panel, in extents of the selected node; size of a new object, in scene sizes.
 
-A ball has a quarter of it as its radius: each is 0.6 times as large as the one that it grows from.
+So a model grows by less and less, whichever primitives are added one after another.
 """
 
 NEW_NODE_LIFT = 0.2
@@ -358,7 +358,7 @@ class TreeActions(WindowActions):
         number, path = state.primitive
 
         def command(tree: Node) -> tuple[StructureCommand, ...]:
-            node = new_node(kind, (), *_place_on(node_in_world(tree, path)))
+            node = new_node(kind, (), *_place_on(node_in_world(tree, path), kind))
             return (AddPrimitive(number, world_space_path(tree, path), node),)
 
         self._restructure_later(f"add {kind}", number, command, middle)
@@ -662,10 +662,10 @@ def _surface_check(number: int) -> Step:
     return step
 
 
-def _place_on(node: Node) -> tuple[Float64Array, float]:
-    """Return centre (3,) and size for a new node on top of another one."""
-    low, high = node.bounds
-    size = float((high - low).max()) * NEW_NODE_SIZE
+def _place_on(node: Node, kind: str) -> tuple[Float64Array, float]:
+    """Return centre (3,) and size for a new node of a kind on top of another one."""
+    (low, high), (kind_low, kind_high) = node.bounds, new_node(kind).bounds
+    size = float((high - low).max() / (kind_high - kind_low).max()) * NEW_NODE_EXTENT
     top = float(high[1]) + NEW_NODE_LIFT * size
     return _rounded(np.array([(low[0] + high[0]) / 2, top, (low[2] + high[2]) / 2], np.float64), size)
 

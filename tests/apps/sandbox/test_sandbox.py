@@ -511,3 +511,16 @@ def test_the_outline_lists_objects_nodes_and_images() -> None:
     ]
     many = TreeObject("many", Union(tuple(Point((3.0 * i, 0, 0), radius=1.0) for i in range(2500))))
     assert len(outline(Document.from_scene(Scene(objects=(many,), camera=CAMERA)))) == 2002
+
+
+def test_primitives_that_are_added_one_after_another_grow_by_less_and_less(vtk_display: None) -> None:
+    with EditWindow(Scene(objects=(), camera=CAMERA), off_screen=True, size=(80, 60)) as window:
+        window.show()
+        sandbox, extents = Sandbox(window), list[float]()
+        for kind in ("Point", "Box", "Torus", "Cylinder", "Polyline"):
+            sandbox.add(kind)
+            finish(window)
+            node: Any = tree_of(window.document)
+            low, high = (node.children[-1] if node.children else node).bounds
+            extents.append((high - low).max())
+    np.testing.assert_allclose(np.divide(extents[1:], extents[:-1]), 0.6, rtol=0.02)
