@@ -19,7 +19,10 @@ from blobtree.colors import Rgb, Rgba, color_rgb
 from blobtree.nodes.parameters import with_parameters
 from blobtree.validation import truth
 from decals.errors import InvalidInput
-from decals.validation import member, number_of, one_of
+from decals.validation import member, number_of, one_of, whole_number
+
+MAX_WHOLE = 1 << 53
+"""Largest whole number that pages and files hold exactly."""
 
 Source = Callable[..., Any]
 """A function, or a class whose fields are options."""
@@ -93,7 +96,9 @@ class Option:
         if self.kind in (Rgb, Rgba):
             return color_rgb(self.name, raw, error)
         number = number_of(self.name, raw, error)
-        return round(number) if self.kind is int else number
+        if self.kind is int:
+            return whole_number(self.name, round(number), -MAX_WHOLE, MAX_WHOLE, error)
+        return number
 
 
 def _is_enum(kind: Any) -> bool:

@@ -342,11 +342,12 @@ class SurfaceDrag:
 
     def __init__(self, actions: Actions, start: SurfacePick, ray: Ray) -> None:
         self._trees, self._start, self._toward = actions.trees, start, ray[1]
+        self._attempt = actions.state.attempt
         self.possible = True
 
     def begin(self) -> None:
-        """Begin an undo entry."""
-        self._trees.begin_surface_drag(self._start)
+        """Begin an undo entry; refused if the pressed object was removed meanwhile."""
+        self._attempt(lambda: self._trees.begin_surface_drag(self._start), waits=False)
 
     def move(self, ray: Ray, _occluded: Callable[[Float32Array], bool]) -> None:
         """Drag the point to a ray."""

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+import decals
 from blobtree import Node, Point, Polygon, Twist, define_falloff
 from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.nodes.parameters import parameters_of
-from decals.apps.sandbox.controls import controls_of, hex_color, parsed
+from decals.apps.sandbox.controls import controls_of, hex_color, parsed, parsed_option
 from decals.editing import new_nodes
 from decals.errors import InvalidEdit
 
@@ -112,3 +113,10 @@ def test_what_a_page_sends_is_parsed() -> None:
 def test_wrong_values_are_refused(node: Node, name: Any, raw: Any) -> None:
     with pytest.raises(InvalidEdit, match="expected"):
         parsed(node, name, raw)
+
+
+@pytest.mark.parametrize("raw", [1e308, "1e30", -(2**60), "many"])
+def test_numbers_that_a_page_cannot_hold_are_refused(raw: Any) -> None:
+    assert parsed_option(decals.scatter, "count", "12") == 12
+    with pytest.raises(InvalidEdit, match="count: expected"):
+        parsed_option(decals.scatter, "count", raw)

@@ -18,6 +18,7 @@ from decals.editing import (
     EditSession,
     MirrorPrimitive,
     PointerTools,
+    RemoveObject,
     TransformPrimitive,
 )
 from decals.editing.brushes import Brush
@@ -245,6 +246,23 @@ def test_the_pull_brush_drags_the_surface_under_the_pointer_as_one_entry() -> No
     while session.labels:
         session.undo()
     assert digest(session.document) == state
+
+
+def test_a_drag_of_an_object_that_was_removed_since_the_press_is_refused() -> None:
+    scene = decals.cover(TREE, count=12, images=["eye"])
+    rays = scene.camera.rays(100, 100)
+    session = EditSession(scene)
+    actions = Actions(session)
+    tools = PointerTools(actions, lambda x, y: (rays.origin, rays.directions(x, y)))
+    actions.state.brush.brush = Brush.PULL
+    start = next((x, y) for x in range(99, 0, -1) for y in range(0, 100, 3) if tools.at(x, y))
+    tools.press(*start)
+    session.do(RemoveObject(0))
+    for x in (4, 8):
+        tools.move(start[0] + x, start[1])
+    assert "object" in actions.state.refusal
+    tools.release(start[0] + 8, start[1])
+    assert session.labels == ("remove an object",)
 
 
 def test_the_surface_is_dragged_in_the_background_of_a_window() -> None:
