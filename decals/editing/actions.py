@@ -147,12 +147,13 @@ class Actions:
         self.state.message = f"{len(self.state.selection)} decals"
 
     @Group.SELECTION.action(
-        "deselect", "Escape", summary="deselect all; revert a drag; cancel a background edit"
+        "deselect", "Escape", summary="deselect all; revert a drag; cancel an edit or an export"
     )
     def deselect(self, _cursor: Cursor) -> None:
-        """Deselect all decals, revert the drag, and cancel the background edit."""
+        """Deselect all decals, revert the drag, and cancel the edit; without either, cancel exports."""
+        selected = bool(self.state.selection)
         self.state.selection, self.state.message = (), ""
-        self.state.background.cancel()
+        self.state.background.cancel(exports=not selected)
         self.state.session.cancel_stroke()
 
     @Group.SELECTION.action(

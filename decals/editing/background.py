@@ -9,6 +9,7 @@ import sys
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from os import PathLike
 from pathlib import Path
 
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree.device import core_left_free
-from blobtree.progress import Cancel, Progress
+from blobtree.progress import Cancel, Progress, reporting
 from decals.editing.commands import DecalCommand
 from decals.editing.scatter_commands import AddObject, RelaxDecals, RemoveObject, ReplaceDecals, ScatterDecals
 from decals.editing.session import Command, EditSession, SaveJob
@@ -236,7 +237,7 @@ class _Waiting:
 
 
 class BackgroundJobs:
-    """Runs at most one edit, and writes at most one file of a session, in threads.
+    """Runs at most one edit, one save and one export of a session, in threads.
 
     Parameters
     ----------
@@ -263,9 +264,10 @@ class BackgroundJobs:
     ) -> None:
         self._session, self._show, self._end_stroke, self._refuse = session, show, end_stroke, refuse
         self.threaded = threaded
-        self._edits, self._saves = Worker(), Worker(finish_at_exit=True)
+        self._edits = Worker()
+        self._saves, self._exports = Worker(finish_at_exit=True), Worker(finish_at_exit=True)
         self._latest: _Request | None = None
-        self._next_saves: list[Job] = []
+        self._next_files: dict[Worker, list[Job]] = {self._saves: [], self._exports: []}
         self._waiting: list[_Waiting] = []
         self._computing = self._following = False
         self._when_idle: list[Callable[[], None]] = []
@@ -439,10 +441,10 @@ class BackgroundJobs:
     def save(
         self, path: str | PathLike[str], camera: Camera | None, saved: Callable[[], None] = lambda: None
     ) -> None:
-        """Save the present state, then call ``saved``; if another file is being written, save after it."""
+        """Save the present state, then call ``saved``; if another save runs, save after it."""
         job = self._save_job(self._session.begin_save(path, camera=camera), path, saved)
-        self._next_saves = [other for other in self._next_saves if other.label != SAVE]
-        self._write_in_turn(job)
+        self._next_files[self._saves].clear()  # the present state is newer
+        self._write_in_turn(self._saves, job)
 
     def _save_job(self, save: SaveJob, path: str | PathLike[str], saved: Callable[[], None]) -> Job:
         def work(progress: Progress, _cancel: Cancel) -> Completion:
@@ -465,10 +467,12 @@ class BackgroundJobs:
             copy.write(progress)
             return written
 
-        self._start_writing(Job("autosave", work))
+        self._start_writing(self._saves, Job("autosave", work))
 
     def write(self, label: str, write: Callable[[Progress], None], message: str) -> None:
-        """Write a file of another format, then show a message; files are written in turn.
+        """Write a file of another format, then show a message; such files are written in turn.
+
+        `cancel` ends that at the next report of progress.
 
         Raises
         ------
@@ -476,44 +480,45 @@ class BackgroundJobs:
             Too many files wait already.
         """
 
-        def work(progress: Progress, _cancel: Cancel) -> Completion:
-            write(progress)
+        def work(progress: Progress, cancel: Cancel) -> Completion:
+            with reporting(progress, cancel) as report:
+                write(report)
             return lambda: self._show(message)
 
-        self._write_in_turn(Job(label, work))
+        self._write_in_turn(self._exports, Job(label, work))
 
-    def _write_in_turn(self, job: Job) -> None:
-        if self._start_writing(job):
+    def _write_in_turn(self, worker: Worker, job: Job) -> None:
+        if self._start_writing(worker, job):
             return
-        if len(self._next_saves) == MAX_WAITING:
+        if len(self._next_files[worker]) == MAX_WAITING:
             raise InvalidEdit("other files are being written; wait for them")
-        self._next_saves.append(job)
+        self._next_files[worker].append(job)
         self._show(f"another file is being written; the {job.label} follows")
 
-    def _start_writing(self, job: Job) -> bool:
-        """Start to write a file, and return True, or return False while another one is being written."""
+    def _start_writing(self, worker: Worker, job: Job) -> bool:
+        """Start to write a file, and return True, or return False while the worker writes another one."""
         if self.threaded:
-            return self._saves.start(job)
+            return worker.start(job)
         job.work(lambda _stage, _fraction: None, lambda: False)()
         return True
 
     @property
     def saving(self) -> bool:
-        """True while a save runs, or waits for another file."""
+        """True while a save runs, or waits for an autosave."""
         running = self._saves.busy and self._saves.label == SAVE
-        return running or any(job.label == SAVE for job in self._next_saves)
+        return running or bool(self._next_files[self._saves])
 
     @property
     def writing(self) -> bool:
-        """True while a file is being written."""
+        """True while a save or an autosave runs."""
         return self._saves.busy
 
     # -- state ------------------------------------------------------------------------------------------
 
     @property
     def busy(self) -> bool:
-        """True while an edit or a save runs, or waits for `poll`."""
-        return self.busy_editing or self._saves.busy
+        """True while an edit, a save or an export runs, or waits for `poll`."""
+        return self.busy_editing or any(worker.busy for worker in self._next_files)
 
     @property
     def busy_editing(self) -> bool:
@@ -528,12 +533,12 @@ class BackgroundJobs:
     @property
     def waiting(self) -> int:
         """Number of requests and files that follow the running jobs."""
-        return len(self._waiting) + len(self._next_saves)
+        return len(self._waiting) + sum(map(len, self._next_files.values()))
 
     @property
     def progress(self) -> str:
         """Running jobs and their progress, in plain words."""
-        stages = (worker.progress for worker in (self._edits, self._saves) if worker.busy)
+        stages = (worker.progress for worker in (self._edits, *self._next_files) if worker.busy)
         shown = [f"{stage}: {100 * part:.0f} %" if part else f"{stage} …" for stage, part in stages]
         return ", ".join([*shown, *([f"{self.waiting} more after it"] if self.waiting else [])])
 
@@ -545,14 +550,17 @@ class BackgroundJobs:
         dragging
             If True, only the steps of `edit_latest` are adopted; other edits wait for the end of the drag.
         timeout
-            Longest time to wait for the edit, and for the save, in seconds; None for no limit.
+            Longest time to wait for each of the edit and the files, in seconds; None for no limit.
         """
-        saved = self._complete(self._saves, timeout, self._start_next_save)
+        ended = [
+            self._complete(worker, timeout, partial(self._start_next_file, worker))
+            for worker in self._next_files
+        ]
         if dragging and not self._following:
-            return saved
+            return any(ended)
         for one in self._waiting:  # before the edit changes what is selected
             one.outdated |= one.context() != one.seen
-        return self._complete(self._edits, timeout, self._start_next_edit) or saved
+        return self._complete(self._edits, timeout, self._start_next_edit) or any(ended)
 
     def _complete(self, worker: Worker, timeout: float | None, start_next: Callable[[], None]) -> bool:
         """Complete the job of a worker, and start the next one even if this one failed."""
@@ -572,10 +580,10 @@ class BackgroundJobs:
                 start_next()
         return ended
 
-    def _start_next_save(self) -> None:
-        """Write the next file that was requested while another one was written."""
-        if self._next_saves:
-            self._saves.start(self._next_saves.pop(0))
+    def _start_next_file(self, worker: Worker) -> None:
+        """Write the next file that was requested while the worker wrote another one."""
+        if self._next_files[worker]:
+            worker.start(self._next_files[worker].pop(0))
 
     def _start_next_edit(self) -> None:
         """Start the latest queued step, or run the callbacks that wait for an empty queue, then requests."""
@@ -593,15 +601,19 @@ class BackgroundJobs:
             else:
                 one.repeat()
 
-    def cancel(self) -> None:
-        """Cancel the running edit; saves go on."""
+    def cancel(self, *, exports: bool = False) -> None:
+        """Cancel the running edit, else all exports if these are meant, too; saves go on."""
         if self._edits.busy:
             self._edits.cancel()
             self._latest, self._waiting = None, []
             self._show("cancelled")
+        elif exports and self._exports.busy:
+            self._exports.cancel()
+            self._next_files[self._exports].clear()
+            self._show("cancelled")
 
     def close(self) -> None:
-        """Cancel the running edit, and finish all saves.
+        """Cancel the running edit, and finish all files.
 
         Raises
         ------
@@ -610,15 +622,20 @@ class BackgroundJobs:
         """
         self.cancel()
         self._edits.poll(CLOSE_TIMEOUT)
+        failures = [self._finish(worker) for worker in self._next_files]
+        for failure in filter(None, failures):
+            raise failure
+
+    def _finish(self, worker: Worker) -> Exception | None:
+        """Write all files of a worker; return why the last one could not be written, else None."""
         failure: Exception | None = None
-        while self._saves.busy:
+        while worker.busy:
             try:
-                completion = self._saves.poll(None)
+                completion = worker.poll(None)
                 failure = None
                 if completion is not None:
                     completion()
-            except Exception as error:  # raised after the last save
+            except Exception as error:
                 failure = error
-            self._start_next_save()
-        if failure is not None:
-            raise failure
+            self._start_next_file(worker)
+        return failure

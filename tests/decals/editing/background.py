@@ -60,3 +60,19 @@ def hold_writing(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     monkeypatch.setattr(files, "write_atomically", slowly)
     return begun, go
+
+
+def hold_export(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Let exports of meshes wait until they are let go; the events that say that, as above."""
+    from decals.editing import file_actions
+
+    begun, go, write = threading.Event(), threading.Event(), vars(file_actions)["write_mesh"]
+
+    def slowly(objects: Any, path: Any, *, progress: Any) -> None:
+        begun.set()
+        while not go.wait(0.01):
+            progress("writing", 0.5)
+        write(objects, path, progress=progress)
+
+    monkeypatch.setattr(file_actions, "write_mesh", slowly)
+    return begun, go

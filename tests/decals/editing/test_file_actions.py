@@ -16,7 +16,7 @@ from decals.editing.background import MAX_WAITING
 from decals.editing.recovery import in_use
 from decals.errors import InvalidEdit
 from decals.scenes.files import load_scene, save_scene
-from tests.decals.editing.background import LONG, finish, hold_writing, press, threaded
+from tests.decals.editing.background import LONG, finish, hold_export, press, threaded
 from tests.decals.editing.scenes import scene
 
 
@@ -157,26 +157,53 @@ def test_an_image_that_does_not_exist_is_named(typist: Typist) -> None:
     assert typist.state.prompt.open
 
 
-def test_an_export_follows_a_save(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_export_follows_another_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     actions = threaded(path=tmp_path / "scene.json")
-    begun, go = hold_writing(monkeypatch)
-    press(actions, "save")
-    assert begun.wait(LONG)
+    begun, go = hold_export(monkeypatch)
     typist = Typist(actions)
     typist.key("e", ctrl=True)
     typist.enter(f"{tmp_path}/mesh.stl")
+    assert begun.wait(LONG)
     actions.files.write(f"{tmp_path}/scene.py", False)
     assert (
         f"another file is being written; the export to {tmp_path}/scene.py follows" in actions.state.message
     )
-    assert actions.state.background.waiting == 2
-    for number in range(MAX_WAITING - 2):
+    assert actions.state.background.waiting == 1
+    for number in range(MAX_WAITING - 1):
         actions.files.write(f"{tmp_path}/scene-{number}.py", False)
     with pytest.raises(InvalidEdit, match="other files are being written"):
         actions.files.write(f"{tmp_path}/one-more.py", False)
     go.set()
     finish(actions)
-    assert {"scene.json", "mesh.stl", "scene.py", "scene-5.py"} <= {path.name for path in tmp_path.iterdir()}
+    assert {"mesh.stl", "scene.py", "scene-6.py"} <= {path.name for path in tmp_path.iterdir()}
+
+
+def test_saves_do_not_wait_for_an_export_which_escape_cancels(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("decals.editing.recovery.AUTOSAVE_SECONDS", 0.0)
+    actions = threaded(path=tmp_path / "scene.json")
+    begun, _ = hold_export(monkeypatch)
+    actions.files.write(f"{tmp_path}/mesh.stl", False)
+    actions.files.write(f"{tmp_path}/mesh.ply", False)
+    assert begun.wait(LONG)
+    actions.state.session.do(ScaleDecals([1], 2.0))
+    background = actions.state.background
+    actions.files.update()
+    while background.writing:
+        background.poll(timeout=0.02)
+    assert [*tmp_path.glob("*.recovery.json")]
+    actions.state.selection = (1,)
+    press(actions, "save")
+    while background.writing:
+        background.poll(timeout=0.02)
+    assert [*tmp_path.glob("scene*.json")] == [tmp_path / "scene.json"]
+    press(actions, "deselect")
+    assert background.waiting == 1
+    press(actions, "deselect")
+    assert (background.waiting, actions.state.message) == (0, "cancelled")
+    finish(actions)
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.json"]
 
 
 def test_a_new_scene_never_replaces_a_file_of_another_window(tmp_path: Path) -> None:

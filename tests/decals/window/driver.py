@@ -76,7 +76,7 @@ class Driver:
     def finish(self) -> None:
         """Let the window see what goes on in the background come to its end."""
         while self.window.background.busy:
-            for worker in (self.window.background._edits, self.window.background._saves):
+            for worker in (self.window.background._edits, *self.window.background._next_files):
                 if worker._thread is not None:
                     worker._thread.join(30)
             self.window.tick()
