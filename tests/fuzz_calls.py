@@ -535,6 +535,7 @@ def _commands(whole: decals.Scene, number: int, path: tuple[int, ...]) -> Calls:
         "MoveBranch": {**node, "target": ()},
         "MoveDecals": {"numbers": [0], "position": point, "normal": normal},
         "MovePrimitive": {**node, "offset": (0.1, 0.0, 0.0), "quick": False},
+        "MoveToObject": {**node, "into": 1, "target": (), "label": "move"},
         "OrderDecals": {"numbers": [0], "front": True},
         "PaintPrimitive": {**node, "color": (1, 1, 1)},
         "PushDecals": {"point": point, "offset": (0.1, 0.0, 0.0), "radius": 0.3},

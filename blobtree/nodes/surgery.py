@@ -198,50 +198,72 @@ def move_branch(tree: Node, path: Path, target: Path) -> tuple[Node, Path]:
     InvalidNode
         The target lies in the branch, or nothing but the branch would be left.
     """
-    branch, parent = node_at(tree, path), node_at(tree, target)
+    branch, place = node_at(tree, path), _operand_place(tree, target)
     path, target = tuple(path), tuple(target)
     if target[: len(path)] == path:
         raise InvalidNode(f"target: expected a place outside the branch {path}, got {target}")
-    if not (parent.combines and not _cuts(parent)) and target:
-        above = node_at(tree, target[:-1])
-        if above.combines and not _cuts(above):
-            parent, step = above, target[-1] + 1
-            target = target[:-1]
-            return _inserted(tree, path, target, step, branch)
-    if parent.combines and not _cuts(parent):
-        return _inserted(tree, path, target, len(parent.children), branch)
-    placed = _placed(tree, path, target, branch)
-    extended = with_node(tree, target, combine(Join.BLEND, parent, placed))
-    shifted = (*path[: len(target)], 0, *path[len(target) :]) if path[: len(target)] == target else path
-    return _without(extended, shifted, placed)
-
-
-def _inserted(tree: Node, path: Path, parent_path: Path, step: int, branch: Node) -> tuple[Node, Path]:
-    """Insert the branch at a path as an operand of a combination, and remove it from its old place."""
-    parent: Any = node_at(tree, parent_path)
-    placed = _placed(tree, path, (*parent_path, step), branch)
-    operands = (*parent.children[:step], placed, *parent.children[step:])
-    extended = with_node(tree, parent_path, replace(parent, operands=operands))
-    depth = len(parent_path)
-    if path[:depth] == parent_path and len(path) > depth and path[depth] >= step:
-        path = (*path[:depth], path[depth] + 1, *path[depth + 1 :])
-    return _without(extended, path, placed)
-
-
-def _placed(tree: Node, path: Path, target: Path, branch: Node) -> Node:
-    """Return a branch as a node of another place, so that it stays where it is in the world."""
-    old, new = path[:-1], target[:-1]
-    common = next((i for i, pair in enumerate(zip(old, new, strict=False)) if pair[0] != pair[1]), None)
-    shared = 1 + (min(len(old), len(new)) if common is None else common)
-    maps = [common_transform(list(nodes_along(tree, each))[shared:], "place") for each in (new, old)]
-    change = np.linalg.solve(*maps)
-    return branch if np.allclose(change, np.eye(4)) else branch.transform(change)
-
-
-def _without(tree: Node, path: Path, placed: Node) -> tuple[Node, Path]:
-    """Remove the branch at a path, and return the path of another node in the rest."""
-    rest = remove_branch(tree, path)
+    placed = _placed(branch, _nodes_above(tree, path), _nodes_above(tree, place))
+    depth = len(place) - 1
+    if place == target and path[: len(target)] == target:
+        old = (*target, 0, *path[len(target) :])
+    elif place != target and path[:depth] == place[:depth] and len(path) > depth and path[depth] >= place[-1]:
+        old = (*path[:depth], path[depth] + 1, *path[depth + 1 :])
+    else:
+        old = path
+    rest = remove_branch(_inserted(tree, target, place, placed), old)
     return rest, path_of(rest, placed)
+
+
+def move_branch_into(source: Node, path: Path, tree: Node, target: Path) -> tuple[Node | None, Node, Path]:
+    """Move the branch at a path of one tree to a place in another one; see `move_branch`.
+
+    Returns
+    -------
+    tuple[Node | None, Node, Path]
+        What is left of the first tree, None for nothing; the second tree with the branch; and the path in it
+        that leads to the same node as before.
+    """
+    branch, place = node_at(source, path), _operand_place(tree, target)
+    path, target = tuple(path), tuple(target)
+    placed = _placed(branch, _nodes_above(source, path), _nodes_above(tree, place))
+    found = (*target, 1) if place == target else place
+    try:
+        rest: Node | None = remove_branch(source, path)
+    except InvalidNode:
+        rest = None
+    return rest, _inserted(tree, target, place, placed), found if placed is branch else (*found, 0)
+
+
+def _operand_place(tree: Node, target: Path) -> Path:
+    """Return the path of a new operand at a target; the target itself if the two are blended there."""
+    *above, node = nodes_along(tree, target)
+    if node.combines and not _cuts(node):
+        return (*target, len(node.children))
+    if above and above[-1].combines and not _cuts(above[-1]):
+        return (*target[:-1], target[-1] + 1)
+    return tuple(target)
+
+
+def _inserted(tree: Node, target: Path, place: Path, placed: Node) -> Node:
+    """Return a tree with another node at an operand's place, or blended with the node at the target."""
+    if place == target:
+        return with_node(tree, target, combine(Join.BLEND, node_at(tree, target), placed))
+    parent: Any = node_at(tree, place[:-1])
+    operands = (*parent.children[: place[-1]], placed, *parent.children[place[-1] :])
+    return with_node(tree, place[:-1], replace(parent, operands=operands))
+
+
+def _nodes_above(tree: Node, path: Path) -> list[Node]:
+    """Return the nodes above a place, the root first."""
+    return list(nodes_along(tree, path[:-1])) if path else []
+
+
+def _placed(branch: Node, old: Sequence[Node], new: Sequence[Node]) -> Node:
+    """Return a branch as a node below other nodes, so that it stays where it is in the world."""
+    differ = (i for i, pair in enumerate(zip(old, new, strict=False)) if pair[0] is not pair[1])
+    shared = next(differ, min(len(old), len(new)))
+    change = np.linalg.solve(*(common_transform(nodes[shared:], "place") for nodes in (new, old)))
+    return branch if np.allclose(change, np.eye(4)) else branch.transform(change)
 
 
 def path_of(tree: Node, wanted: Node) -> Path:

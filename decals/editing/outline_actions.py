@@ -95,7 +95,8 @@ class OutlineActions(WindowActions):
             "rename", "remove", "duplicate", "group", "move", "hide", "lock" or "isolate". "hide" shows a
             hidden part, and "lock" unlocks a locked one.
         value
-            New name; or the key of the part to which a part is moved: a node, or the layer of an image.
+            New name; or the key of the part to which a part is moved: a node of any object, or the layer of
+            an image.
         marked
             Keys of the marked nodes, of one object.
 
@@ -138,12 +139,9 @@ class OutlineActions(WindowActions):
             case "node", "duplicate":
                 self._trees.select_node(number, path)
                 self._trees.duplicate_selected()
-            case "node", "move":
+            case "object" | "node", "move":
                 target = Part.node(value)
-                if target.number != number:
-                    raise InvalidEdit(f"move: expected a row of the same object, got {describe(value)}")
-                self._trees.select_node(number, path)
-                self._trees.move_node(target.path)
+                self._trees.move_node(number, path, target.number, target.path)
             case "object", "rename":
                 run(RenameObject(number, value))
             case "object", "remove":

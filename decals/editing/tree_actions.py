@@ -33,6 +33,7 @@ from decals.editing.tree_commands import (
     MirrorPrimitive,
     MoveBranch,
     MovePrimitive,
+    MoveToObject,
     PaintPrimitive,
     PrimitiveCommand,
     RemovePrimitive,
@@ -74,6 +75,10 @@ NEW_NODE_LIFT = 0.2
 
 MAX_DECALS_IN_DRAG = 5_000
 """With more decals than this, dragging a primitive runs in the background."""
+
+
+TreeCommand = StructureCommand | MoveToObject
+"""Commands that name the place of their node after the edit."""
 
 
 @dataclass(eq=False)
@@ -413,10 +418,15 @@ class TreeActions(WindowActions):
 
         self._restructure_later(label, number, command, np.zeros(3, np.float32))
 
-    def move_node(self, target: Path) -> None:
-        """Move the selected node to another place in its tree, and keep it selected; see `MoveBranch`."""
-        number, path, _ = self._selected()
-        self._restructure(MoveBranch(number, path, target))
+    def move_node(self, number: int, path: Path, into: int, target: Path) -> None:
+        """Move a node to another place in its tree, or in that of another object, and select it."""
+        if number == into:
+            self._restructure(MoveBranch(number, path, target))
+            return
+        item, node = self._item(number), node_at(self._tree(number), path)
+        name = item.names.get(path, type(node).__name__ if path else item.name)
+        label = f"move {name} into {self._item(into).name}"
+        self._restructure(MoveToObject(number, path, into, target, label))
 
     def group_nodes(self, number: int, paths: Sequence[Path]) -> None:
         """Put operands of one combination of an object under a group, and select it; see `GroupOperands`."""
@@ -549,7 +559,7 @@ class TreeActions(WindowActions):
         number, path, _ = self._selected()
         self._restructure(RemovePrimitive(number, path))
 
-    def _restructure(self, *commands: StructureCommand, handle_offset: Float32Array | None = None) -> None:
+    def _restructure(self, *commands: TreeCommand, handle_offset: Float32Array | None = None) -> None:
         """Carry out the first command that leaves a visible surface, and select its primitive."""
         self._restructure_later(commands[0].label, commands[0].object, lambda _: commands, handle_offset)
 
@@ -557,7 +567,7 @@ class TreeActions(WindowActions):
         self,
         label: str,
         number: int,
-        commands: Callable[[Node], tuple[StructureCommand, ...]],
+        commands: Callable[[Node], tuple[TreeCommand, ...]],
         handle_offset: Float32Array | None,
     ) -> None:
         """Do the same for what a function returns for the tree of an object.
@@ -571,12 +581,12 @@ class TreeActions(WindowActions):
             tree = PrimitiveCommand(number, ()).tree(session.document)
             for command in commands(tree):
                 try:
-                    _, path = command.restructure(tree)
+                    place = command.place(session.document)
                     session.do(command)
                 except ImplicitDecalsError as error:
                     failure = failure or error
                     continue
-                result[:] = [] if path is None else [(command.object, path)]
+                result[:] = [] if place is None else [place]
                 return command.label
             assert failure is not None
             raise failure

@@ -33,8 +33,8 @@ from blobtree.nodes.places import Place
 from blobtree.nodes.surgery import Join
 from blobtree.validation import affine_matrix, truth
 from decals.editing.document import Document, Edit
-from decals.editing.followers import followers
-from decals.editing.queries import move_decals
+from decals.editing.followers import FIELD_TOLERANCE, followers
+from decals.editing.queries import move_decals, nearest_points
 from decals.editing.visibility import Renaming
 from decals.errors import InvalidEdit
 from decals.options import inherit_descriptions
@@ -424,6 +424,11 @@ class StructureCommand(PrimitiveCommand):
         """Return the edit; see `compute_restructured` for the decals."""
         return compute_restructured(document, self.object, self.restructure(self.tree(document))[0])
 
+    def place(self, document: Document) -> tuple[int, Path] | None:
+        """Return object and path of the command's node after the edit, if it still exists."""
+        path = self.restructure(self.tree(document))[1]
+        return None if path is None else (self.object, path)
+
 
 @dataclass(frozen=True, eq=False)
 class AddPrimitive(StructureCommand):
@@ -608,6 +613,103 @@ class MoveBranch(StructureCommand):
     def restructure(self, tree: Node) -> tuple[Node, Path]:
         """Return the new tree, and the path of the node in it."""
         return surgery.move_branch(tree, self.path, self.target)
+
+
+@dataclass(frozen=True, eq=False)
+class MoveToObject(PrimitiveCommand):
+    """Move a primitive, or branch, into the tree of another object; it stays where it is in the world.
+
+    Names and flags go along. If nothing is left of the object, the object is removed, and the node takes its
+    name. Decals stay where they are while a surface is there; see `compute_settled` for the others.
+
+    Parameters
+    ----------
+    into
+        Index of the other object.
+    target
+        Path of a node in its tree, as for `MoveBranch`.
+    label
+        Name of the undo entry.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, MoveToObject
+    >>> models = [Point((0, 0, 0), radius=1.0), Point((1.2, 0, 0), radius=0.6)]
+    >>> session = EditSession(decals.cover(models, count=3, images=["eye"]))
+    >>> edit = session.do(MoveToObject(1, (), 0, ()))
+    >>> [len(item.tree.children) for item in session.document.objects]
+    [2]
+    """
+
+    into: int
+    target: Path
+    label: str = "move to another object"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        return compute_settled(document, self.restructured(document)[0])
+
+    def restructured(self, document: Document) -> tuple[tuple[SceneObject, ...], tuple[int, Path]]:
+        """Return the new objects, and object and path of the moved node among them."""
+        item, other = self._item(document), PrimitiveCommand(self.into, ())._item(document)
+        if item is other:
+            raise InvalidEdit(f"into: expected another object than that of the node, got {self.into}")
+        rest, tree, found = surgery.move_branch_into(item.tree, self.path, other.tree, self.target)
+        path, grown = tuple(self.path), with_tree(other, tree)
+        marked = {*item.hidden, *item.locked, *item.names}
+        moved = {node: (*found, *node[len(path) :]) for node in marked if node[: len(path)] == path}
+        carried, kept = _marks(item, moved), _marks(item, {node: node for node in marked - moved.keys()})
+        names = {found: item.name} if rest is None else {}
+        marks = {flag: getattr(grown, flag) + carried[flag] for flag in ("hidden", "locked")}
+        objects: dict[int, SceneObject] = dict(enumerate(document.objects))
+        objects[self.into] = flagged(grown, names=grown.names | names | carried["names"], **marks)
+        if rest is None:
+            del objects[self.object]
+        else:
+            objects[self.object] = with_tree(replace(item, **kept), rest)
+        return tuple(objects.values()), (list(objects).index(self.into), found)
+
+    def place(self, document: Document) -> tuple[int, Path]:
+        """Return object and path of the moved node after the edit."""
+        return self.restructured(document)[1]
+
+
+def _marks(item: TreeObject, paths: dict[Path, Path]) -> dict[str, Any]:
+    """Return flags and names of some nodes of an object, under other paths."""
+    flags = {
+        flag: tuple(paths[node] for node in getattr(item, flag) if node in paths)
+        for flag in ("hidden", "locked")
+    }
+    return flags | {"names": {paths[node]: name for node, name in item.names.items() if node in paths}}
+
+
+def compute_settled(document: Document, objects: tuple[SceneObject, ...]) -> Edit:
+    """Return the edit that replaces objects whose trees exchanged nodes.
+
+    Decals on a changed tree stay while they lie on the surface of a new one. Others are treated as in
+    `compute_restructured`.
+    """
+    edit, positions = document.compute_parts(objects=objects), document.decals.decals.positions
+    before, after = (
+        [item for item in items if isinstance(item, TreeObject) and not any(item is o for o in others)]
+        for items, others in ((document.objects, objects), (objects, document.objects))
+    )
+    for item in after:
+        item.surface  # noqa: B018  # raises for a tree without a visible surface
+    old, new = (
+        np.min([np.abs(item.tree(positions) - ISO) for item in items], axis=0) for items in (before, after)
+    )
+    rows = np.flatnonzero(new > old + FIELD_TOLERANCE)
+    changed = [number for number, item in enumerate(document.objects) if any(item is o for o in before)]
+    rows = rows[np.isin(nearest_points(document.objects, positions[rows]).objects, changed)]
+    numbers, decals = document.decals.numbers[rows], document.decals.decals[rows]
+    points = nearest_points(after, decals.positions)
+    gaps = np.linalg.norm(points.positions.astype(np.float64) - decals.positions, axis=1)
+    outside = np.max([item.tree(decals.positions) for item in after], axis=0) < ISO
+    edit = edit.then(document.compute_replacement(numbers, move_decals(decals, points)))
+    return edit.then(document.compute_deletion(numbers[outside & (gaps > decals.radii)]))
 
 
 @dataclass(frozen=True, eq=False)

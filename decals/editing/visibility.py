@@ -299,18 +299,20 @@ def check_locks(document: Document, edit: Edit) -> None:
                 )
         return
     by_name = {item.name: item for item in after}
+    new = (item for item in after if not any(item is other for other in document.objects))
+    changed = [tree for item in new if (tree := _tree(item)) is not None]
     for number, item in enumerate(document.objects):
         other = after[number] if len(after) == len(document.objects) else by_name.get(item.name)
         if not item.locked or other is item:
             continue
         kept = other is not None and other.name == item.name and _tree(other) is _tree(item)
-        if other is None or (() in item.locked and not kept):
+        if () in item.locked and not kept:
             raise InvalidEdit(f"{item.name!r} is locked; unlock it in the outline")
-        before, tree = _tree(item), _tree(other)
-        if before is None or tree is None:
+        before = _tree(item)
+        if before is None:
             continue
         for node in (node_at(before, path) for path in item.locked if path):
-            if not _has(tree, node):
+            if not any(_has(tree, node) for tree in changed):
                 raise InvalidEdit(
                     f"a {type(node).__name__} of {item.name!r} is locked; unlock it in the outline"
                 )

@@ -557,6 +557,11 @@ async def panels(picture: str | None = None) -> None:
         await browser.get_by_text("Duplicate", exact=True).click()
         await done("duplicate snail")
         await row("snail 2").wait_for()
+        await row("snail 2").drag_to(row("snail"))
+        await done("move snail 2 into snail")
+        assert len(document.objects) == 1
+        await browser.keyboard.press("Control+z")
+        await row("snail 2").wait_for()
         await row("body").first.click(button="right")
         await browser.get_by_text("Duplicate", exact=True).click()
         await done("duplicate a primitive")
