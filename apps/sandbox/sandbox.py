@@ -256,11 +256,11 @@ class Sandbox:
 
     @event
     def mark(self, key: str) -> None:
-        """Mark the node of a row too, or no longer; marked nodes are grouped and removed together."""
+        """Mark the node of a row too, or no longer; marked nodes are changed together."""
         node = Part.node(key)
         self._trees.select_node(node.number, node.path)
         self._outline()  # forgets the marks of a former tree
-        others = [k for k in self._marked if k != node.key and Part.node(k).number == node.number]
+        others = [k for k in self._marked if k != node.key]
         self._marked = others + ([] if node.key in self._marked else [node.key])
 
     @event

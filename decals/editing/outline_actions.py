@@ -98,7 +98,7 @@ class OutlineActions(WindowActions):
             New name; or the key of the part to which a part is moved: a node of any object, or the layer of
             an image.
         marked
-            Keys of the marked nodes, of one object.
+            Keys of the marked nodes.
 
         Raises
         ------
@@ -107,7 +107,8 @@ class OutlineActions(WindowActions):
         """
         kind, number, path = Part.named(key)
         document, run = self._state.session.document, self._state.run
-        nodes = [path] if key not in marked else [Part.node(other).path for other in marked]
+        parts = map(Part.node, marked) if key in marked else [Part(kind, number, path)]
+        nodes = [(part.number, part.path) for part in parts]
         match kind, change:
             case "layer", "hide" | "lock":
                 self._visibility.flag_layer(FLAGS[str(change)], number)
@@ -126,16 +127,15 @@ class OutlineActions(WindowActions):
                     raise InvalidEdit(f"move: expected the row of a layer, got {describe(value)}")
                 run(image_on_layer(document, number, target.number))
             case "object" | "node", "hide" | "lock":
-                for node in nodes:
-                    self._visibility.flag_node(FLAGS[str(change)], number, node)
+                self._visibility.flag_node(FLAGS[str(change)], number, path, nodes)
             case "object" | "node", "isolate":
                 self._visibility.isolate_node(number, path)
             case "node", "rename":
                 run(RenameNode(number, path, value))
             case "node", "group":
-                self._trees.group_nodes(number, nodes)
+                self._trees.group_nodes(nodes)
             case "node", "remove":
-                self._trees.delete_nodes(number, nodes)
+                self._trees.delete_nodes(nodes)
             case "node", "duplicate":
                 self._trees.select_node(number, path)
                 self._trees.duplicate_selected()

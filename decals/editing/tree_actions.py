@@ -428,21 +428,24 @@ class TreeActions(WindowActions):
         label = f"move {name} into {self._item(into).name}"
         self._restructure(MoveToObject(number, path, into, target, label))
 
-    def group_nodes(self, number: int, paths: Sequence[Path]) -> None:
+    def group_nodes(self, places: Sequence[tuple[int, Path]]) -> None:
         """Put operands of one combination of an object under a group, and select it; see `GroupOperands`."""
-        parents = {path[:-1] for path in paths if path}
-        if len(parents) != 1 or len(paths) < 2 or () in paths:
+        parents = {(number, path[:-1]) for number, path in places}
+        if len(parents) != 1 or len(places) < 2 or not all(path for _, path in places):
             raise InvalidEdit("select two or more operands of one combination (with Ctrl), then group them")
-        self._restructure(GroupOperands(number, parents.pop(), tuple(path[-1] for path in paths)))
+        self._restructure(GroupOperands(*parents.pop(), tuple(path[-1] for _, path in places)))
 
-    def delete_nodes(self, number: int, paths: Sequence[Path]) -> None:
-        """Remove branches of an object's tree, as one entry."""
-        tops = [path for path in paths if not any(path[: len(o)] == o != path for o in paths)]
-        nodes = [node_at(self._tree(number), path) for path in tops]
+    def delete_nodes(self, places: Sequence[tuple[int, Path]]) -> None:
+        """Remove branches of objects' trees, as one entry."""
+        nodes = [
+            (number, node_at(self._tree(number), path))
+            for number, path in places
+            if not any(number == other and path[: len(top)] == top != path for other, top in places)
+        ]
 
         def step(session: EditSession) -> str:
             with session.stroke(RemovePrimitive.label):
-                for node in nodes:
+                for number, node in nodes:
                     tree = RemovePrimitive(number, ()).tree(session.document)
                     session.do(RemovePrimitive(number, path_of(tree, node)))
             return RemovePrimitive.label

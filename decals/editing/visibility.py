@@ -69,11 +69,6 @@ class FlagNodes:
         return Edit() if same else document.compute_parts(objects=tuple(objects))
 
 
-def toggled(paths: Paths, path: Path) -> Paths:
-    """Return paths with one more, or without it if they have it."""
-    return tuple(other for other in paths if other != path) if path in paths else (*paths, path)
-
-
 def isolating(document: Document, number: int, path: Path) -> FlagNodes:
     """Return the command that hides everything but a node and what is below it."""
     hidden: dict[int, Paths] = {other: ((),) for other in range(len(document.objects)) if other != number}

@@ -1,5 +1,7 @@
 """Actions that hide, show, isolate and lock nodes, objects, decals and layers."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from blobtree.nodes.paths import Path
@@ -11,7 +13,6 @@ from decals.editing.visibility import (
     LockLayers,
     ShowDecals,
     isolating,
-    toggled,
 )
 from decals.errors import InvalidEdit
 from decals.validation import describe
@@ -72,12 +73,17 @@ class VisibilityActions(WindowActions):
         done = all(set(item.hidden) == set(flags[n]) for n, item in enumerate(document.objects))
         self._state.run(FlagNodes(shown, label="show all") if done else command)
 
-    def flag_node(self, flag: str, number: int, path: Path) -> None:
-        """Hide or lock a node, or show or unlock it: ``flag`` is "hidden" or "locked"."""
-        item = self._state.session.document.object(number)
-        paths = toggled(getattr(item, flag), path)
-        verb = {"hidden": ("show", "hide"), "locked": ("unlock", "lock")}[flag][path in paths]
-        self._state.run(FlagNodes(**{flag: {number: paths}}, label=verb))
+    def flag_node(self, flag: str, number: int, path: Path, others: Sequence[tuple[int, Path]] = ()) -> None:
+        """Hide or lock a node, or show or unlock it: ``flag`` is "hidden" or "locked"; others likewise."""
+        object_at = self._state.session.document.object
+        off = path in getattr(object_at(number), flag)
+        places = {(number, path), *others}
+        flags = {each: {*getattr(object_at(each), flag)} for each, _ in places}
+        for each, node in places:
+            (flags[each].discard if off else flags[each].add)(node)
+        verb = {"hidden": ("hide", "show"), "locked": ("lock", "unlock")}[flag][off]
+        paths = {each: tuple(sorted(nodes)) for each, nodes in flags.items()}
+        self._state.run(FlagNodes(**{flag: paths}, label=verb))
 
     def flag_layer(self, flag: str, layer: int) -> None:
         """Hide or lock a layer of decals, or show or unlock it."""

@@ -141,6 +141,13 @@ def test_marked_nodes_are_grouped_and_removed_together(window: EditWindow) -> No
     assert digest(window.document) == at
     sandbox.mark("image 0")
     assert "row: expected" in sandbox.status
+    sandbox.change_row("object 0", "duplicate")
+    finish(window)
+    sandbox.values()
+    for key in ("0/1", "1/0/0"):
+        sandbox.mark(key)
+    sandbox.change_row("0/1", "hide")
+    assert [item.hidden for item in window.document.objects] == [((1,),), ((0, 0),)]
 
 
 def shapes(window: EditWindow) -> list[str]:

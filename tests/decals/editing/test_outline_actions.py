@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from blobtree import Point, Segment
 from decals.editing import Actions, EditSession
 from decals.editing.outline_actions import Part
 from decals.errors import InvalidEdit, InvalidInput
@@ -55,6 +56,38 @@ def test_changes_are_undone_exactly() -> None:
     assert (blob.names, blob.hidden, blob.locked) == ({(0,): "body"}, ((1,),), ((0,),))
     assert set(document.decals.decals.images.tolist()) == {1}
     goes_back_and_forth(actions.state.session)
+
+
+def test_marked_nodes_of_several_objects_change_together() -> None:
+    actions = Actions(EditSession(scene()))
+    change, session = actions.outline.change, actions.state.session
+    change("object 0", "duplicate")
+    marked = ["0/0/1", "2/0/1", "2/0/0/0"]
+
+    def flags(name: str) -> list[Any]:
+        return [getattr(item, name) for item in session.document.objects]
+
+    change("2/0/1", "hide")
+    change("0/0/1", "hide", None, marked)
+    assert flags("hidden") == [((0, 1),), (), ((0, 0, 0), (0, 1))]
+    change("2/0/1", "hide", None, marked)
+    assert flags("hidden") == [(), (), ()]
+    change("2/0/1", "lock", None, marked)
+    assert flags("locked") == [((0, 1),), (), ((0, 0, 0), (0, 1))]
+    assert session.labels[1:] == ("hide", "hide", "show", "lock")
+    before = digest(session.document)
+    for other, message in (("remove", "is locked"), ("group", "operands of one combination")):
+        with pytest.raises(InvalidEdit, match=message):
+            change("2/0/1", other, None, marked)
+    assert digest(session.document) == before
+    change("2/0/1", "lock", None, marked)
+    with pytest.raises(InvalidEdit, match="operands of one combination"):
+        change("2/0/0/1", "group", None, ["0/0/0", "2/0/0/1"])
+    change("0/0/1", "remove", None, marked)
+    first, second = (tree_of(session.document, number) for number in (0, 2))
+    assert (type(first.children[0]), type(second.children[0])) == (Point, Segment)
+    assert session.labels[5:] == ("unlock", "remove a primitive")
+    goes_back_and_forth(session)
 
 
 @pytest.mark.parametrize("number", [0, 1])
