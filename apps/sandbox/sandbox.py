@@ -256,17 +256,18 @@ class Sandbox:
 
     @event
     def mark(self, key: str) -> None:
-        """Mark the node of a row too, or no longer; marked nodes are changed together."""
-        node = Part.node(key)
-        self._trees.select_node(node.number, node.path)
+        """Mark a layer or the node of a row too, or no longer; marked ones are changed together."""
+        if (part := Part.named(key)).kind != "layer":
+            part = Part.node(key)
+            self._trees.select_node(part.number, part.path)
         self._outline()  # forgets the marks of a former tree
-        others = [k for k in self._marked if k != node.key]
-        self._marked = others + ([] if node.key in self._marked else [node.key])
+        others = [k for k in self._marked if k != part.key and Part.named(k).kind == part.kind]
+        self._marked = others + ([] if part.key in self._marked else [part.key])
 
     @event
     def select(self, key: str) -> None:
         """Select a node, the root of an object, the decals of a layer, or an image; "" selects nothing."""
-        self._marked, self._image = [], None
+        self._marked, self._image = [key] if key else [], None
         state, document = self._state, self._window.document
         if key == "":
             state.primitive = None

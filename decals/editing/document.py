@@ -351,9 +351,9 @@ class Document:
         """Return the objects with another one at an index."""
         return (*self.objects[:number], item, *self.objects[number + 1 :])
 
-    def decals_of_layer(self, layer: int) -> Int64Array:
-        """Return the numbers of the decals of a layer."""
-        numbers: Int64Array = self.decals.numbers[self.decals.column("layers") == layer]
+    def decals_of_layer(self, *layers: int) -> Int64Array:
+        """Return the numbers of the decals of a layer, or of several layers."""
+        numbers: Int64Array = self.decals.numbers[np.isin(self.decals.column("layers"), layers)]
         return numbers
 
     # -- forks ------------------------------------------------------------------------------------------

@@ -85,7 +85,7 @@ class OutlineActions(WindowActions):
         self._trees, self._visibility = trees, visibility
 
     def change(self, key: object, change: object, value: Any = None, marked: Sequence[str] = ()) -> None:
-        """Change a part of the scene; if it is one of several marked nodes, hide, lock, group or remove all.
+        """Change a part of the scene; if it is marked, hide, lock, group or remove all that are marked.
 
         Parameters
         ----------
@@ -98,7 +98,7 @@ class OutlineActions(WindowActions):
             New name; or the key of the part to which a part is moved: a node of any object, or the layer of
             an image.
         marked
-            Keys of the marked nodes.
+            Keys of the marked nodes, or layers.
 
         Raises
         ------
@@ -107,15 +107,16 @@ class OutlineActions(WindowActions):
         """
         kind, number, path = Part.named(key)
         document, run = self._state.session.document, self._state.run
-        parts = map(Part.node, marked) if key in marked else [Part(kind, number, path)]
-        nodes = [(part.number, part.path) for part in parts]
+        parts = map(Part.named, marked if key in marked else [str(key)])
+        nodes = [part[1:] for part in parts if (part.kind == "layer") == (kind == "layer")]
+        layers = [layer for layer, _ in nodes]
         match kind, change:
             case "layer", "hide" | "lock":
-                self._visibility.flag_layer(FLAGS[str(change)], number)
+                self._visibility.flag_layer(FLAGS[str(change)], number, layers)
             case "layer", "isolate":
                 self._visibility.isolate_layer(number)
             case "layer", "remove":
-                run(DeleteDecals(document.decals_of_layer(number)))
+                run(DeleteDecals(document.decals_of_layer(*layers)))
             case "layer", "rename":
                 run(RenameLayer(number, value))
             case "image", "remove":

@@ -85,20 +85,19 @@ class VisibilityActions(WindowActions):
         paths = {each: tuple(sorted(nodes)) for each, nodes in flags.items()}
         self._state.run(FlagNodes(**{flag: paths}, label=verb))
 
-    def flag_layer(self, flag: str, layer: int) -> None:
-        """Hide or lock a layer of decals, or show or unlock it."""
-        document = self._state.session.document
+    def flag_layer(self, flag: str, layer: int, others: Sequence[int] = ()) -> None:
+        """Hide or lock a layer of decals, or show or unlock it; others likewise."""
+        document, layers = self._state.session.document, {layer, *others}
         if flag == "locked":
-            present = document.locked_layers
-            locked = [n for n in present if n != layer] if layer in present else [*present, layer]
+            present = {*document.locked_layers}
+            locked = sorted(present - layers if layer in present else present | layers)
             self._state.run(LockLayers(locked, "lock" if layer in locked else "unlock"))
         elif layer in document.hidden.decals.layers:
-            self._state.run(ShowDecals([layer]))
+            self._state.run(ShowDecals(sorted(layers)))
         else:
-            numbers = document.decals_of_layer(layer)
-            if not len(numbers):
+            if not len(document.decals_of_layer(layer)):
                 raise InvalidEdit(f"layer: expected one with decals, got {describe(layer)}")
-            self._state.run(HideDecals(numbers))
+            self._state.run(HideDecals(document.decals_of_layer(*layers)))
 
     def isolate_layer(self, layer: int) -> None:
         """Hide the decals of all other layers and show those of the layer; if so already, show all."""

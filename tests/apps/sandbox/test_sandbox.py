@@ -148,6 +148,13 @@ def test_marked_nodes_are_grouped_and_removed_together(window: EditWindow) -> No
         sandbox.mark(key)
     sandbox.change_row("0/1", "hide")
     assert [item.hidden for item in window.document.objects] == [((1,),), ((0, 0),)]
+    for key in ("layer 0", "layer 1", "layer 1"):
+        sandbox.mark(key)
+    assert sandbox.values()["marked"] == ["layer 0"]
+    sandbox.select("layer 0")
+    assert sandbox.values()["marked"] == ["layer 0"]
+    sandbox.select("")
+    assert sandbox.values()["marked"] == []
 
 
 def shapes(window: EditWindow) -> list[str]:

@@ -7,6 +7,7 @@ import pytest
 
 from blobtree import Point, Segment
 from decals.editing import Actions, EditSession
+from decals.editing.commands import SetValues
 from decals.editing.outline_actions import Part
 from decals.errors import InvalidEdit, InvalidInput
 from decals.scenes.objects import TreeObject
@@ -87,6 +88,32 @@ def test_marked_nodes_of_several_objects_change_together() -> None:
     first, second = (tree_of(session.document, number) for number in (0, 2))
     assert (type(first.children[0]), type(second.children[0])) == (Point, Segment)
     assert session.labels[5:] == ("unlock", "remove a primitive")
+    goes_back_and_forth(session)
+
+
+def test_marked_layers_change_together() -> None:
+    actions = Actions(EditSession(scene()))
+    change, session = actions.outline.change, actions.state.session
+    document = session.document
+    numbers = document.decals.numbers
+    session.do(SetValues.each(numbers[:20], "raise", layers=1))
+    session.do(SetValues.each(numbers[20:30], "raise", layers=2))
+    marked = ["layer 1", "layer 2"]
+    np.testing.assert_array_equal(document.decals_of_layer(1, 2), numbers[:30])
+    change("layer 2", "hide")
+    change("layer 1", "hide", None, marked)
+    assert set(document.hidden.decals.layers.tolist()) == {1, 2}
+    change("layer 2", "hide", None, marked)
+    assert not len(document.hidden.numbers)
+    change("layer 0", "lock")
+    change("layer 2", "lock", None, marked)
+    assert sorted(document.locked_layers) == [0, 1, 2]
+    change("layer 1", "lock", None, marked)
+    assert document.locked_layers == (0,)
+    change("layer 0", "lock", None, marked)
+    change("layer 1", "remove", None, [*marked, "0/1"])
+    np.testing.assert_array_equal(document.decals.numbers, numbers[30:])
+    assert len(session.labels) == 10
     goes_back_and_forth(session)
 
 
