@@ -175,7 +175,7 @@ class BackgroundCompiler:
             work(self._context.gl)
         if (
             time.perf_counter() - began > STORE_SECONDS
-        ):  # other results were found there, or are soon made anew
+        ):  # else the cache had the result, or it is soon made anew
             time.sleep(STORE_SECONDS)
 
 
@@ -197,7 +197,8 @@ def _link(sources: tuple[str, ...]) -> int:
     kinds = (COMPUTE_SHADER,) if len(sources) == 1 else (VERTEX_SHADER, FRAGMENT_SHADER)
     for kind, source in zip(kinds, sources, strict=True):
         shader = _call("glCreateShader", kind)
-        text = ctypes.c_char_p(source.strip().encode())  # as moderngl does
+        sent = source if kind == COMPUTE_SHADER else source.strip()  # as moderngl does: caches go by the text
+        text = ctypes.c_char_p(sent.encode())
         _call("glShaderSource", shader, 1, ctypes.byref(text), None)
         _call("glCompileShader", shader)
         _call("glAttachShader", program, shader)

@@ -14,6 +14,7 @@ import moderngl
 import pytest
 
 from decals.errors import NoGraphics
+from decals.rendering import background_compiler
 from decals.rendering.background_compiler import GL, BackgroundCompiler, draw_nothing, draw_state
 from decals.rendering.context import Context
 from decals.rendering.current_context import system_library
@@ -80,6 +81,33 @@ def test_work_is_repeated_until_the_thread_has_linked_its_program(
         assert [thread is threading.current_thread() for thread in threads] == [False]
         assert context.attempt(work)
     assert len(done) == 2
+
+
+def shader_texts(program: int) -> list[bytes]:
+    """Return the texts of a program's shaders, as the driver has them."""
+    library, count = system_library(GL), ctypes.c_int()
+    shaders, text = (ctypes.c_uint * 2)(), ctypes.create_string_buffer(10_000)
+    library.glGetAttachedShaders(program, 2, ctypes.byref(count), shaders)
+    texts = []
+    for shader in shaders[: count.value]:
+        library.glGetShaderSource(shader, len(text), None, text)
+        texts.append(text.value)
+    return texts
+
+
+def test_the_driver_gets_the_texts_that_moderngl_sends(context: Context) -> None:
+    """Caches of drivers go by the text; moderngl strips it, but not that of compute shaders."""
+    compute = "\n#version 430 core\nlayout(local_size_x=1) in;\nvoid main() {}\n\n"
+    window = context.gl.program(vertex_shader=VERTEX.text, fragment_shader=FRAGMENT)
+    programs = [((VERTEX.text, FRAGMENT), window)]
+    if context.gl.version_code >= 430:
+        programs.append(((compute,), context.gl.compute_shader(compute)))
+    for sources, expected in programs:
+        own = background_compiler._link(sources)
+        assert len(shader_texts(own)) == len(sources)
+        assert shader_texts(own) == shader_texts(expected.glo)
+        background_compiler._delete(own)
+        expected.release()
 
 
 def test_outside_an_attempt_nothing_is_waited_for(
