@@ -185,7 +185,7 @@ class FrameController:
     render
         Draws a frame of the plotter.
     version
-        Returns a value that changes with the picture's content.
+        Returns a value that changes with the picture's content and its camera.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ class FrameController:
 
     @property
     def outdated(self) -> bool:
-        """True if the content changed since the last whole frame."""
+        """True if the content or the camera changed since the last whole frame."""
         return self._drawn_version != self._version()
 
     def begin(self) -> None:

@@ -161,7 +161,7 @@ class EditWindow:
         modes = self.subplot.contact, self.subplot.mapping, self.subplot.stiffness
         self.subplot.scene = self.document
         move_camera(self.subplot, np.negative(self.document.origin))
-        self.frames = FrameController(self.subplot, samples, self.plotter.render, self._content_version)
+        self.frames = FrameController(self.subplot, samples, self.plotter.render, self._shown_version)
         self.warmup = Warmup(self.subplot, weak_callback(self._show_status), self.frames.give_up)
         self._end_screenshots = before_screenshots(self.plotter, weak_callback(self._before_screenshot))
         self.actions.files.camera = lambda: camera_of(self.subplot) if self._host.open else None
@@ -214,10 +214,13 @@ class EditWindow:
         drawing = coarse or self.subplot.warming_up or self.subplot.walking
         return not self._closed and (self.background.busy or unsaved or drawing)
 
-    def _content_version(self) -> tuple[object, ...]:
+    def _shown_version(self) -> tuple[object, ...]:
         subplot, document = self.subplot, self.document
         drawing = subplot.drawing, subplot.shown_mapping, id(subplot.drawn_objects)
-        return id(document.objects), id(document.images), document.decals.version, *drawing
+        camera = subplot.vtk_renderer.camera
+        place = tuple(camera.position), tuple(camera.focal_point), tuple(camera.up)
+        lens = camera.view_angle, camera.parallel_projection, camera.parallel_scale
+        return id(document.objects), id(document.images), document.decals.version, *drawing, *place, *lens
 
     # -- frames -----------------------------------------------------------------------------------------
 

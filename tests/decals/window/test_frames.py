@@ -142,3 +142,18 @@ def test_what_rests_is_drawn_better_slice_by_slice(opened: Any, monkeypatch: pyt
     assert [look for *look, _ in frames[1:]] == [[1.0, 1], [1.0, 2]]
     assert not any(drawn for *_, drawn in frames[1:])
     np.testing.assert_array_equal(driver.shot(), whole)
+
+
+@pytest.mark.parametrize("whole_is_fast", [False, True])
+def test_another_view_is_drawn_in_time(
+    opened: Any, monkeypatch: pytest.MonkeyPatch, whole_is_fast: bool
+) -> None:
+    driver = opened()
+    window, subplot = driver.window, driver.window.subplot
+    driver.shot()
+    monkeypatch.setattr(type(window), "ticking", True)
+    for scale in (1.0, float(window.frames.samples)):
+        window.frames.budget.record(scale, 0.001 if whole_is_fast else 10.0 * scale)
+    driver.plotter.camera.Azimuth(90.0)
+    window.redraw(whole=True)
+    assert (subplot.draw_scale == 1.0) == whole_is_fast
