@@ -173,9 +173,8 @@ class BackgroundCompiler:
         began = time.perf_counter()
         with self._context.current():
             work(self._context.gl)
-        if (
-            time.perf_counter() - began > STORE_SECONDS
-        ):  # else the cache had the result, or it is soon made anew
+        # What took less was in the cache, or is soon made anew.
+        if time.perf_counter() - began > STORE_SECONDS:
             time.sleep(STORE_SECONDS)
 
 

@@ -99,7 +99,7 @@ def test_the_driver_gets_the_texts_that_moderngl_sends(context: Context) -> None
     """Caches of drivers go by the text; moderngl strips it, but not that of compute shaders."""
     compute = "\n#version 430 core\nlayout(local_size_x=1) in;\nvoid main() {}\n\n"
     window = context.gl.program(vertex_shader=VERTEX.text, fragment_shader=FRAGMENT)
-    programs = [((VERTEX.text, FRAGMENT), window)]
+    programs: list[tuple[tuple[str, ...], Any]] = [((VERTEX.text, FRAGMENT), window)]
     if context.gl.version_code >= 430:
         programs.append(((compute,), context.gl.compute_shader(compute)))
     for sources, expected in programs:
