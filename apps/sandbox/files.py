@@ -82,9 +82,11 @@ class SandboxFiles:
         return {"open": self.start_open, "samples": list(SAMPLES), "lessons": self._lessons, **self._listed}
 
     def new_model(self) -> None:
-        """Begin an empty scene."""
-        scene = empty_scene(FIRST_IMAGES, UPRIGHT["y"])
-        self._open(lambda *_: scene, "scene")
+        """Begin an empty scene; a file that was named for one, and has nothing yet, is its file."""
+        scene, session = empty_scene(FIRST_IMAGES, UPRIGHT["y"]), self._state.session
+        named = None if session.document.objects or session.labels else self._files.path
+        path = "scene" if named is None or Path(named).exists() else Path(named)
+        self._open(lambda *_: scene, path)
 
     def open_sample(self, name: str) -> None:
         """Open a sample with scattered decals."""

@@ -254,7 +254,8 @@ def _module_of(kind: type[Node]) -> str:
     found = [name for name, module in modules.items() if vars(module).get(kind.__name__) is kind]
     if not found:
         raise InvalidScene(
-            f"a script can import {kind.__name__} from no module; define it in a file that is imported"
+            f"a script can import {kind.__name__} from no module; define it in a file that is imported, "
+            f"as a variable of that name: {kind.__name__} = ..."
         )
     return min(found, key=len)
 

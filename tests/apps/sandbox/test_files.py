@@ -16,6 +16,7 @@ import blobtree
 import decals
 from blobtree import Point, Segment
 from decals.apps.models.samples import SAMPLES, sample
+from decals.apps.models.scenes import empty_scene
 from decals.apps.sandbox.folder import listed, read_upload, thumbnails
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing.commands import ScaleDecals
@@ -121,6 +122,20 @@ def test_a_sample_stands_upright(
     finish(window)
     assert window.document.camera.up == (0.0, 0.0, 1.0)
     assert window.actions.view.axes == UPRIGHT["z"]
+
+
+def test_a_new_model_takes_the_file_that_was_named_for_it(vtk_display: None, tmp_path: Path) -> None:
+    named = tmp_path / "mine.json"
+    with EditWindow(empty_scene(["scale"], UPRIGHT["y"]), off_screen=True, path=named) as window:
+        sandbox = Sandbox(window, folder=tmp_path, start=True)
+        sandbox.new_model()
+        finish(window)
+        assert window.actions.files.path == named
+        sandbox.add("Point")
+        finish(window)
+        sandbox.new_model()  # the file belongs to the edited scene
+        finish(window)
+        assert window.actions.files.path == tmp_path / "scene.json"
 
 
 def test_a_model_is_opened_changed_saved_and_opened_again(
