@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from msgspec import Struct
 
-from decals.errors import ImplicitDecalsError, InvalidScene
+from decals.errors import ImplicitDecalsError, InvalidImage, InvalidScene
 from decals.images.load import embedded_image, image_pixels, is_embedded
 from decals.images.texels import Pixels
 from decals.scenes.material import MAP_NAMES, DecalMaterial
@@ -42,8 +42,10 @@ def material_of(record: MaterialRecord, folder: Path) -> DecalImage:
 
     Raises
     ------
+    InvalidImage
+        If a picture is missing or broken.
     InvalidScene
-        If it cannot be.
+        If the material cannot be otherwise.
     """
     try:
         maps: dict[str, Any] = {
@@ -57,10 +59,12 @@ def material_of(record: MaterialRecord, folder: Path) -> DecalImage:
         if [*maps] == ["pixels"] and not record.relief:
             return DecalImage(record.name, **maps)
         return DecalMaterial(record.name, **maps, relief=record.relief)
-    except ValueError as error:
-        raise InvalidScene(f"material {record.name!r}: expected a height for each pixel ({error})") from error
+    except InvalidImage as error:
+        raise InvalidImage(f"image {record.name!r}: {error}") from error
     except ImplicitDecalsError as error:
         raise InvalidScene(f"material {record.name!r}: {error}") from error
+    except ValueError as error:
+        raise InvalidScene(f"material {record.name!r}: expected a height for each pixel ({error})") from error
 
 
 def sources_of(image: str | MaterialRecord) -> list[str]:

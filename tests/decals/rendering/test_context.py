@@ -161,15 +161,17 @@ def test_a_renderer_takes_over_the_context_of_the_one_before() -> None:
         thread.submit(second.release).result()
 
 
+@pytest.mark.usefixtures("no_idle")
 def test_programs_of_former_options_are_released_unless_the_context_keeps_them(
-    context: Context, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(context._programs, "_max_size", 1)
+    """In a context of its own, since renderers of other tests may use the same programs."""
     shape = torus(rows=12, columns=6)
     normals = vertex_normals(shape.vertices, shape.faces)[::9]
     tangents = np.cross(normals, (0.1, 0.2, 1.0))
     view = view_of(Decals(shape.vertices[::9], normals, tangents, 0.3), shape)
-    with Renderer(context) as renderer:
+    with Renderer() as renderer:
+        monkeypatch.setattr(renderer.context._programs, "_max_size", 1)
 
         def drawn_by(**drawing: Any) -> np.ndarray:
             return renderer.render(view, RenderOptions(size=(16, 12), samples=1, **drawing))
