@@ -13,7 +13,7 @@ from blobtree.validation import point_array
 from decals.editing.document import Document, Edit
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points
 from decals.errors import InvalidEdit
-from decals.model import Decals
+from decals.model import MAX_COORDINATE, Decals
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.polish import PUSHING_RADIUS, relax_near
 from decals.scattering.scatter import scatter
@@ -198,14 +198,17 @@ class RelaxDecals:
     def compute(self, document: Document) -> Edit:
         """Return the edit; radii stay."""
         center = point_array(finite_vector("point", self.point, InvalidEdit)[None])[0]
+        radius = self.radius
+        if radius is not None:  # no scene is larger than the largest coordinate
+            radius = min(finite_number("radius", radius, InvalidEdit), MAX_COORDINATE)
         numbers, decals = document.decals.numbers, document.decals.decals
         if not len(decals) or not document.objects:
             return Edit()
         distances = np.linalg.norm(decals.positions - center, axis=1)
         closest = int(distances.argmin())
         reach = RELAXED_DISTANCE * SPACING * decals.radii[closest]
-        if self.radius is not None:
-            reach += finite_number("radius", self.radius, InvalidEdit)
+        if radius is not None:
+            reach += radius
         near = distances < reach
         near &= ~np.isin(decals.layers, document.locked_layers)
         rows = np.flatnonzero(near & (decals.ranks == decals.ranks[closest]))
@@ -221,7 +224,7 @@ class RelaxDecals:
             np.ones(len(rows), np.bool_),
             (SPACING * decals.radii[rows]).astype(np.float32),
             center,
-            self.radius,
+            radius,
         )
         moved = np.flatnonzero((after.positions != before.positions).any(axis=1))
         points = SurfacePoints(after.positions[moved], after.normals[moved], after.surface_ids[moved])

@@ -168,5 +168,7 @@ def test_the_relax_brush_moves_decals_within_its_radius_alone() -> None:
         assert (np.linalg.norm(before[changed] - TOP, axis=1) < radius + 1e-6).all()
         moved.append(changed.sum())
     assert 0 < moved[0] < moved[1]
+    session.do(RelaxDecals(TOP, 1e308))  # all of them
+    assert session.labels[-1] == "relax"
     with pytest.raises(InvalidEdit, match="radius: expected"):
         session.do(RelaxDecals(TOP, float("nan")))
