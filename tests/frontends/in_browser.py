@@ -135,7 +135,7 @@ async def scattering(browser: Page, window: EditWindow, driver: Driver) -> None:
             await asyncio.sleep(0.1)
     await browser.keyboard.press("Shift+N")
     await until(lambda: len(window.document.objects) == 3)
-    assert driver.session.labels[-1] == "add an object"
+    assert driver.session.labels[-1] == f"add {window.document.objects[2].name}"
 
 
 async def streamed() -> None:
