@@ -82,7 +82,7 @@ class SandboxFiles:
         return {"open": self.start_open, "samples": list(SAMPLES), "lessons": self._lessons, **self._listed}
 
     def new_model(self) -> None:
-        """Begin an empty scene; a file that was named for one, and has nothing yet, is its file."""
+        """Begin an empty scene, in the file of the window if that does not exist and nothing was edited."""
         scene, session = empty_scene(FIRST_IMAGES, UPRIGHT["y"]), self._state.session
         named = None if session.document.objects or session.labels else self._files.path
         path = "scene" if named is None or Path(named).exists() else Path(named)

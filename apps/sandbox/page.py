@@ -387,8 +387,8 @@ class Page:
         with html.Div(v_if="panel.kind", classes="pa-3"):
             html.H2("{{ panel.name }}{{ panel.name ? ': ' : '' }}{{ panel.kind }}", classes="text-subtitle-1")
             html.P("{{ panel.doc }}", classes="text-caption mb-3")
-            who, key = "'node', c.name", "selected + c.name"
-            panels.build_controls("panel.controls", self.sandbox.set_control, who, key=key)
+            identifiers, key = "'node', c.name", "selected + c.name"
+            panels.build_controls("panel.controls", self.sandbox.set_control, identifiers, key=key)
             vuetify3.VBtn(
                 "Remove this modifier",
                 v_if="panel.operands === 1",

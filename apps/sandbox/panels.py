@@ -88,7 +88,7 @@ def build_list(source: str, title: str, subtitle: str, click: Any, chosen: str) 
         )
 
 
-def build_controls(source: str, event: Any, who: str, *, key: str = "c.name") -> None:
+def build_controls(source: str, event: Any, identifiers: str, *, key: str = "c.name") -> None:
     """Build labels and inputs of controls; see `decals.apps.sandbox.controls.Control`.
 
     Parameters
@@ -98,7 +98,7 @@ def build_controls(source: str, event: Any, who: str, *, key: str = "c.name") ->
     event
         Receives what identifies the control, its value, and False while a slider moves; then, for one number
         of a vector or a list, the indices of that number.
-    who
+    identifiers
         Arguments that identify the control ``c``, as expressions of the page.
     key
         Expression that distinguishes the control from those of another selection.
@@ -117,21 +117,21 @@ def build_controls(source: str, event: Any, who: str, *, key: str = "c.name") ->
                 max=("c.high",),
                 step=("c.step",),
                 name=("c.label",),
-                update_modelValue=(event, f"[{who}, $event, false]"),
-                end=(event, f"[{who}, $event, true]"),
+                update_modelValue=(event, f"[{identifiers}, $event, false]"),
+                end=(event, f"[{identifiers}, $event, true]"),
             )
             _number_field(
-                "c.value", "c.label", event, f"[{who}, $event.target.value, true]", "max-width: 84px"
+                "c.value", "c.label", event, f"[{identifiers}, $event.target.value, true]", "max-width: 84px"
             )
         with html.Div(v_if="c.kind === 'vector'", classes="d-flex ga-1"):
-            sent = f"[{who}, $event.target.value, true, [i]]"
+            sent = f"[{identifiers}, $event.target.value, true, [i]]"
             label = "`${c.label} ${i + 1}`"
             _number_field("number", label, event, sent, v_for="(number, i) in c.value", key="i")
         with (
             html.Div(v_if="c.kind === 'list'"),
             html.Div(v_for="(row, i) in c.value", key="i", classes="d-flex ga-1 mb-1"),
         ):
-            sent = f"[{who}, $event.target.value, true, Array.isArray(row) ? [i, j] : [i]]"
+            sent = f"[{identifiers}, $event.target.value, true, Array.isArray(row) ? [i, j] : [i]]"
             label = "`${c.label} ${i + 1} ${j + 1}`"
             _number_field("number", label, event, sent, v_for="(number, j) in [].concat(row)", key="j")
         html.Input(
@@ -140,7 +140,7 @@ def build_controls(source: str, event: Any, who: str, *, key: str = "c.name") ->
             value=("c.value",),
             raw_attrs=named("c.label"),
             style="width: 100%; height: 28px",
-            change=(event, f"[{who}, $event.target.value, true]"),
+            change=(event, f"[{identifiers}, $event.target.value, true]"),
         )
         vuetify3.VSelect(
             v_if="c.kind === 'choice' || c.kind === 'choices'",
@@ -148,14 +148,14 @@ def build_controls(source: str, event: Any, who: str, *, key: str = "c.name") ->
             model_value=("c.value",),
             items=("c.choices",),
             raw_attrs=named("c.label"),
-            update_modelValue=(event, f"[{who}, $event, true]"),
+            update_modelValue=(event, f"[{identifiers}, $event, true]"),
         )
         html.Div(CURVE, v_if="c.curve")
         vuetify3.VSwitch(
             v_if="c.kind === 'switch'",
             model_value=("c.value",),
             label=("c.label",),
-            update_modelValue=(event, f"[{who}, $event, true]"),
+            update_modelValue=(event, f"[{identifiers}, $event, true]"),
             color="primary",
         )
         html.Div("{{ c.value }}", v_if="c.kind === 'text'", classes="text-caption")

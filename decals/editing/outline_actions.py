@@ -17,7 +17,7 @@ from decals.errors import InvalidEdit
 from decals.validation import describe
 
 FLAGS = {"hide": "hidden", "lock": "locked"}
-"""What two of the changes set."""
+"""Flags of two of the changes."""
 
 
 class Part(NamedTuple):
@@ -70,7 +70,7 @@ def image_on_layer(document: Document, image: int, layer: int) -> SetValues:
 
 
 class OutlineActions(WindowActions):
-    """Actions on parts of the scene, whatever is selected.
+    """Actions on parts of the scene, independent of the selection.
 
     Parameters
     ----------

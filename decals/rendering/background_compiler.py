@@ -59,8 +59,8 @@ WAIT_SECONDS = 0.01
 """Time to wait for the thread before other work goes on."""
 
 
-class NotCompiled(Exception):
-    """A program is being compiled in the thread."""
+class ProgramPending(Exception):
+    """A program that is needed now is still being compiled in the thread."""
 
 
 class CurrentContext(Protocol):
@@ -82,7 +82,7 @@ class SampledTexture:
     target, internal_format, parameters
         What OpenGL calls so; the parameters are `PARAMETERS`.
     size
-        Width, height and depth, each smaller in place of a large one; powers of two are told apart.
+        Width, height and depth. A large one is replaced by 3, or by 4 if it is a power of two.
     """
 
     name: str
@@ -94,7 +94,7 @@ class SampledTexture:
 
 @dataclass(frozen=True)
 class DrawState:
-    """Everything besides a program's text on which machine code of a driver depends.
+    """State of a draw; it and the program's text decide which machine code a driver makes.
 
     Attributes
     ----------
@@ -138,20 +138,20 @@ class BackgroundCompiler:
         self._attempting = system_library(GL) is not None
         try:
             work()
-        except NotCompiled:
+        except ProgramPending:
             return False
         finally:
             self._attempting = False
         return True
 
     def require_linked(self, sources: tuple[str, ...]) -> None:
-        """Raise `NotCompiled` within `attempt` until the thread has linked a program of these sources."""
+        """Raise `ProgramPending` within `attempt` until the thread has linked a program of these sources."""
         self._require(hash(sources), lambda _: _delete(_link(sources)))
 
     def require_drawn(
         self, gl: moderngl.Context, program: moderngl.Program, sources: tuple[str, ...]
     ) -> None:
-        """Raise `NotCompiled` within `attempt` until the thread has drawn a program in the present state."""
+        """Raise `ProgramPending` within `attempt` until the thread has drawn a program in this state."""
         if self._attempting:
             state = draw_state(gl, program)
             self._require((hash(sources), state), lambda own: draw_nothing(own, sources, state))
@@ -165,7 +165,7 @@ class BackgroundCompiler:
         try:
             job.exception(WAIT_SECONDS)  # an error is raised where the window compiles
         except TimeoutError:
-            raise NotCompiled from None
+            raise ProgramPending from None
 
     def _run(self, work: Callable[[moderngl.Context], None]) -> None:
         if self._context is None:
@@ -173,7 +173,7 @@ class BackgroundCompiler:
         began = time.perf_counter()
         with self._context.current():
             work(self._context.gl)
-        # What took less was in the cache, or is soon made anew.
+        # A shorter job has found its result in the cache, or is repeated quickly.
         if time.perf_counter() - began > STORE_SECONDS:
             time.sleep(STORE_SECONDS)
 
@@ -252,7 +252,7 @@ def _sampled_textures(program: int) -> list[SampledTexture]:
 
 
 def _small(side: int) -> int:
-    """Return a small side of a texture for a large one, a power of two for such a one."""
+    """Return a side of a texture; a large one is replaced by 3, or by 4 if it is a power of two."""
     return min(side, 4 if side & (side - 1) == 0 else 3)
 
 
