@@ -42,7 +42,7 @@ def polygonize(
     output
         The mesh file: ply (with colours), vtp (with colours and normals), obj or stl.
     resolution
-        Cells along the longest side. Default: 64.
+        Cells along the longest side. Default: 64, and smaller cells where parts are thin.
     cell_size
         Side of a cell in the model's units, instead of --resolution.
     chord_error

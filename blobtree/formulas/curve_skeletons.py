@@ -8,7 +8,7 @@ bracket the minima. No start value can lead to the wrong one of two minima.
 
 import warp as wp
 
-from blobtree.formulas.skeletons import JOINT_YIELD, Skeleton, min_influence_of_one
+from blobtree.formulas.skeletons import JOINT_YIELD, TUBE_CELLS, Skeleton, min_influence_of_one
 from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
@@ -289,8 +289,9 @@ JOINED_SEGMENT = Skeleton(
     min_influence_of_joined_segment,
     parameters=2,
     convex=True,
+    cells=TUBE_CELLS,
 )
-ARC = Skeleton("arc", closest_on_arc, min_influence_of_one, parameters=3)
-CURVE = Skeleton("curve", closest_on_curve, min_influence_of_curve, parameters=4)
+ARC = Skeleton("arc", closest_on_arc, min_influence_of_one, parameters=3, cells=TUBE_CELLS)
+CURVE = Skeleton("curve", closest_on_curve, min_influence_of_curve, parameters=4, cells=TUBE_CELLS)
 
 CURVE_SKELETONS = (JOINED_SEGMENT, ARC, CURVE)

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from blobtree.formulas.skeletons import JOINT_YIELD, Skeleton, min_influence_of_one
+from blobtree.formulas.skeletons import JOINT_YIELD, PLATE_CELLS, Skeleton, min_influence_of_one
 from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
@@ -94,7 +94,11 @@ def min_influence_of_triangle(tape: Texels, at: wp.int32) -> wp.float32:
     return tape[at][3] * (1.0 - JOINT_YIELD)
 
 
-RECTANGLE = Skeleton("rectangle", closest_on_rectangle, min_influence_of_one, parameters=3, convex=True)
-TRIANGLE = Skeleton("triangle", closest_on_triangle, min_influence_of_triangle, parameters=4, convex=True)
+RECTANGLE = Skeleton(
+    "rectangle", closest_on_rectangle, min_influence_of_one, parameters=3, convex=True, cells=PLATE_CELLS
+)
+TRIANGLE = Skeleton(
+    "triangle", closest_on_triangle, min_influence_of_triangle, parameters=4, convex=True, cells=PLATE_CELLS
+)
 
 FLAT_SKELETONS = (RECTANGLE, TRIANGLE)

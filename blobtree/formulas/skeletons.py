@@ -157,6 +157,10 @@ def box_to_point(center: wp.vec3, half: wp.float32, tape: Texels, at: wp.int32) 
     return wp.vec2(nearest, farthest) / (point[3] * point[3])
 
 
+BALL_CELLS, TUBE_CELLS, PLATE_CELLS = 1.5, 1.2, 1.0
+"""Cells along the radius with which a mesh shows a thin ball, tube or plate: the less it bends the fewer."""
+
+
 @dataclass(frozen=True, eq=False)
 class Skeleton:
     """One row of the table: a kind's name, functions and size on the tape."""
@@ -170,6 +174,8 @@ class Skeleton:
     """True if similarity maps fold into its parameters; otherwise each primitive carries its map."""
     convex: bool = False
     """True for a convex set with one influence radius: distances along a ray are then convex."""
+    cells: float = BALL_CELLS
+    """Cells along the radius with which a mesh shows a thin primitive of this kind."""
     digest: str = ""
     """Digest of the sources of a custom kind."""
 
@@ -180,10 +186,12 @@ class Skeleton:
 
 
 POINT = Skeleton("point", closest_on_point, min_influence_of_one, parameters=1, convex=True)
-SEGMENT = Skeleton("segment", closest_on_segment, min_influence_of_one, parameters=2, convex=True)
-CONE = Skeleton("cone", closest_on_cone, min_influence_of_cone, parameters=2)
-CIRCLE = Skeleton("circle", closest_on_circle, min_influence_of_one, parameters=2)
-DISC = Skeleton("disc", closest_on_disc, min_influence_of_one, parameters=2, convex=True)
+SEGMENT = Skeleton(
+    "segment", closest_on_segment, min_influence_of_one, parameters=2, convex=True, cells=TUBE_CELLS
+)
+CONE = Skeleton("cone", closest_on_cone, min_influence_of_cone, parameters=2, cells=TUBE_CELLS)
+CIRCLE = Skeleton("circle", closest_on_circle, min_influence_of_one, parameters=2, cells=TUBE_CELLS)
+DISC = Skeleton("disc", closest_on_disc, min_influence_of_one, parameters=2, convex=True, cells=PLATE_CELLS)
 BOX = Skeleton("box", closest_on_box, min_influence_of_one, parameters=2, folds_maps=False, convex=True)
 
 SKELETONS = (POINT, SEGMENT, CONE, CIRCLE, DISC, BOX)

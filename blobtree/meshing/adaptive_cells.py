@@ -236,6 +236,12 @@ class AdaptiveCells:
             self.links[listed] = np.maximum(self.tree.children[listed], -1)
         return changed
 
+    def replace(self, blocks: IndexArray, divided: BoolArray) -> None:
+        """Let blocks replace the cells that they refine; where not `divided`, their octants are merged."""
+        self._extend()
+        self.links[self.tree.parents[blocks]] = blocks
+        self.divided[blocks[divided]] = True
+
     def divide_pierced(self, cells: IndexArray) -> bool:
         """Divide empty leaves, given by cells of theirs, at whose faces the surface shows."""
         blocks, slots = cells // CHILDREN, cells % CHILDREN

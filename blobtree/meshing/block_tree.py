@@ -150,6 +150,12 @@ class BlockTree:
         """The tapes of all blocks."""
         return self._level_rows[3].all
 
+    def level_arrays(self) -> Any:
+        """Return all blocks and their tapes as an argument of kernels."""
+        arrays: Any = LevelBlocks()
+        arrays.blocks, arrays.keys, arrays.spans, arrays.tape = (array.all for array in self._level_rows)
+        return arrays
+
     def refine(self, cells: IndexArray) -> int:
         """Refine cells that the surface may cross, and return the number of new blocks.
 
@@ -187,7 +193,7 @@ class BlockTree:
         children = on_device(of_parents[parents].ravel(), wp.int32, device)
         flags, texels = (wp.zeros(count + 1, dtype=wp.int32, device=device) for _ in range(2))
         inputs = [on_device(np.arange(len(parents)), wp.int32, device), above, lattice]
-        outputs = [children, flags, texels, self._level_arrays()]
+        outputs = [children, flags, texels, self.level_arrays()]
         launch(self._kernel(refine_children), count, [*inputs, False], outputs, device)
         wanted = np.zeros(count + 1, np.int32)
         wanted[local] = 1
@@ -203,7 +209,7 @@ class BlockTree:
             demand_memory(TEXEL_BYTES * total, device, f"the tapes of {blocks:,} blocks")
             for array, length in zip(self._level_rows, (blocks,) * 3 + (total,), strict=True):
                 array.extend(length - len(array.all))
-            outputs = [children, slots, starts, self._level_arrays()]
+            outputs = [children, slots, starts, self.level_arrays()]
             launch(self._kernel(refine_children), count, [*inputs, True], outputs, device)
         of_parents[parents] = children.numpy().reshape(-1, CHILDREN)
         if blocks > old:
@@ -214,18 +220,12 @@ class BlockTree:
             self._coordinates.append(self._level_rows[0].all[old:].numpy().reshape(-1, 3))
             self._values.append(self._sample(level + 1, old, blocks))
 
-    def _level_arrays(self) -> Any:
-        """Return all blocks and their tapes as an argument of kernels."""
-        arrays: Any = LevelBlocks()
-        arrays.blocks, arrays.keys, arrays.spans, arrays.tape = (array.all for array in self._level_rows)
-        return arrays
-
     def _sample(self, level: int, first: int, end: int) -> Float32Array:
         """Return the field at the corners of the cells of blocks of one level (n, 5, 5, 5)."""
         grid, count = self.grid(level), end - first
         listed = on_device(np.arange(first, end), wp.int32, self._device)
         values: DeviceArray = wp.empty(count * SAMPLES, dtype=wp.float32, device=self._device)
-        arrays = self._level_arrays()
+        arrays = self.level_arrays()
         inputs: list[Any] = [listed, arrays.blocks, arrays.spans, arrays.tape]
         inputs += [wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner), grid.cell_size]
         launch(self._kernel(sample_blocks), count * SAMPLES, inputs, [values], self._device)

@@ -23,6 +23,7 @@ from blobtree.cells.grid import Grid, aligned_grid
 from blobtree.cells.sparse_cells import CELL_KERNELS, build_cells
 from blobtree.device import known_device, launch
 from blobtree.errors import InvalidResolution
+from blobtree.formulas.skeletons import BALL_CELLS
 from blobtree.kernels import load_together
 from blobtree.meshing.creases import sharpened
 from blobtree.meshing.crumbs import without_crumbs
@@ -31,6 +32,7 @@ from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import ImplicitModel, checked_tree
+from blobtree.tape.part_sizes import fitting_scale, has_small_parts, sized_tape
 from blobtree.validation import LARGEST_NUMBER, is_whole, real_number, shown, truth
 
 DEFAULT_RESOLUTION = 64
@@ -98,14 +100,16 @@ def polygonize(
 ) -> Mesh:
     """Return the surface of `tree` as closed, consistently oriented triangles.
 
-    Give at most one of `resolution`, `cell_size` and `chord_error`.
+    Give at most one of `resolution`, `cell_size` and `chord_error`. Without any of them, the cells are those
+    of resolution 64, and smaller where primitives are thin. If these do not fit into memory, the log names
+    the part.
 
     Parameters
     ----------
     tree : Node
         The model.
     resolution : int, optional
-        Cells along the longest side of the tree's support; 64 by default.
+        Cells along the longest side of the tree's support, all of one size.
     cell_size : float, optional
         Side of a cell, in the model's units. Features thinner than a cell may be lost.
     chord_error : float, optional
@@ -162,6 +166,8 @@ def polygonize(
     True
     """
     checked_tree(tree)
+    if resolution is None and cell_size is None and chord_error is None:
+        return polygonize_parts(tree, creases=creases, device=device, progress=progress, cancel=cancel)
     if chord_error is None:
         return Polygonizer(
             tree,
@@ -184,6 +190,40 @@ def polygonize(
     within = _adaptive_within_chord_error if adaptive else _within_chord_error
     with reporting(progress, cancel) as report:
         return within(tree, chord_error, int(max_triangles), creases, device, report)
+
+
+def polygonize_parts(
+    tree: ImplicitModel,
+    *,
+    resolution: int = DEFAULT_RESOLUTION,
+    creases: bool = False,
+    device: str | None = None,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> Mesh:
+    """Return the mesh with cells of `resolution`, and smaller ones where parts are thin, see `polygonize`."""
+    truth("creases", creases, InvalidResolution)
+    size = _cell_size(tree, resolution, None)
+    if has_small_parts(tree, BALL_CELLS * size):
+        with reporting(progress, cancel) as report:
+            mesh = _mesh_of_thin_parts(tree, size, creases, device, report)
+        if mesh is not None:
+            return mesh
+    return Polygonizer(
+        tree, resolution=resolution, creases=creases, device=device, progress=progress, cancel=cancel
+    ).mesh
+
+
+def _mesh_of_thin_parts(
+    tree: ImplicitModel, size: float, creases: bool, device: str | None, report: Progress
+) -> Mesh | None:
+    """Return a mesh of cells that are smaller where parts are thin; None if cells of `size` resolve all."""
+    from blobtree.meshing.parts import PART_KERNELS, mesh_of_parts  # imported here, as above
+
+    _load_kernels(tree, device, creases, *PART_KERNELS)
+    size *= fitting_scale(tree, size)
+    cells = build_cells(sized_tape(tree), _grid(tree, size), device=device, report=report)
+    return mesh_of_parts(tree, cells, creases, report)
 
 
 def _load_kernels(tree: ImplicitModel, device: str | None, creases: bool, *kernels: wp.Kernel) -> None:

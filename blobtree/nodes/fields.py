@@ -81,6 +81,13 @@ class FieldPrimitive(Leaf, ProgramField):
         return lower - margin, upper + margin
 
     @classmethod
+    def inradii(cls, leaves: Sequence[Any]) -> Float64Array:
+        """Return half the shortest sides of boxes that are as much smaller than the supports as balls are."""
+        lower, upper = cls.boxes(leaves)
+        inradii: Float64Array = 0.5 * RIM * (upper - lower).min(axis=1)
+        return inradii
+
+    @classmethod
     def packed_fields(cls, leaves: Sequence[Any]) -> Float64Array:
         """Return the parameters (n, ·, 4) on the tape of n leaves of this kind."""
         return cls.texels(cls._columns(leaves))

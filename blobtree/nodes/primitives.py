@@ -420,6 +420,12 @@ class Box(Primitive):
         corners: Float64Array = columns["center"][:, None] + 0.5 * columns["size"][:, None] * CORNERS
         return corners
 
+    @classmethod
+    def inradii(cls, leaves: Sequence[Any]) -> Float64Array:
+        """Return half the shortest lengths."""
+        inradii: Float64Array = 0.5 * np.array([leaf.size for leaf in leaves]).min(axis=1)
+        return inradii
+
 
 def beside(vectors: Float64Array, numbers: Float64Array) -> Float64Array:
     """Return `vectors` (n, 3) and `numbers` (n,) as texels (n, 4)."""

@@ -1,7 +1,8 @@
 """Solid shapes: the cylinder, the half-space, and the ellipsoid as a ball under a map."""
 
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -113,6 +114,14 @@ class Cylinder(Primitive):
         return np.stack(
             [beside(columns["start"], influences[:, 0]), beside(axes, columns["cylinder_radius"])], axis=1
         )
+
+    @classmethod
+    def inradii(cls, leaves: Sequence[Any]) -> Float64Array:
+        """Return the radii of the cylinders, or half their lengths where that is less."""
+        axes = np.array([leaf.end for leaf in leaves]) - [leaf.start for leaf in leaves]
+        radii = [leaf.cylinder_radius for leaf in leaves]
+        inradii: Float64Array = np.minimum(radii, 0.5 * np.linalg.norm(axes, axis=1))
+        return inradii
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -462,8 +462,8 @@ class Node(ImplicitModel):
         """Lower and upper corner of the surface, float32[3] each; `support` is the larger box of the field.
 
         The box of the vertices of ``polygonize(self)``, which lie on the surface. It may be too small by a
-        cell at most, a 64th of the longest side of the support. Parts thinner than a cell may be missed. A
-        tree without a surface raises `InvalidNode`.
+        cell at most, a 64th of the longest side of the support. A tree without a surface raises
+        `InvalidNode`.
 
         Examples
         --------
@@ -823,7 +823,7 @@ class Node(ImplicitModel):
         Parameters
         ----------
         resolution : int, optional
-            Cells along the longest side of the support; 64 by default.
+            Cells along the longest side of the support; see `polygonize` for the default.
         options
             Arguments of ``pyvista.PolyData.plot``, such as ``color`` and ``screenshot``.
 

@@ -172,6 +172,11 @@ class ProgramLeaf(ProgramNode):
         """Numbers for the tape's data region, None for none; see `blobtree.tape.tape`."""
         return None
 
+    @classmethod
+    def inradii(cls, leaves: Sequence[Any]) -> Float64Array:
+        """Return the radii (n,) of the largest balls that the skeletons, or the fields, of n leaves hold."""
+        return np.zeros(len(leaves))
+
 
 class ProgramPrimitive(ProgramLeaf):
     """A leaf around a skeleton."""

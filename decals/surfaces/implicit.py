@@ -13,9 +13,12 @@ from blobtree.device import known_device, launch
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, UNION
 from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
+from blobtree.meshing.polygonize import polygonize_parts
+from blobtree.tape.part_sizes import has_small_parts
 from blobtree.tracing.trace import trace
 from blobtree.validation import point_array
 from decals.errors import InvalidMesh, InvalidScattering
+from decals.surfaces.curved import CurvedMesh
 from decals.surfaces.mesh import DeviceMeshSurface, MeshSurface
 from decals.surfaces.surface import (
     Scalars,
@@ -38,6 +41,9 @@ RESOLUTION = 64
 MAX_RESOLUTION = 128
 """Largest number of cells along the longest side of the tree's support in `ImplicitSurface.triangulated`."""
 
+SMALL_PART = 2.5
+"""Radius in cells below which the area of a part's triangles is not that of its surface."""
+
 MAX_STEP = 0.5
 """Longest step of Newton's method, in cells."""
 
@@ -53,15 +59,16 @@ class ImplicitSurface(Immutable):
 
     Points are projected by Newton's method along the exact field gradient. Where the field is flat, or the
     distance too large, they start at the closest point of a coarse mesh, which has the creases of unions,
-    intersections and differences. Area and bounds are those of the coarse mesh.
+    intersections and differences. Its cells are smaller where parts are thin. Bounds are those of the coarse
+    mesh, and so is the area, but for parts that are small beside the model.
 
     Parameters
     ----------
     tree : blobtree.Node
         The model.
     resolution : int, optional
-        Cells of the coarse mesh along the longest side of the tree's support. Parts thinner than a cell may
-        get no samples. Default 64.
+        Cells of the coarse mesh along the longest side of the tree's support, all of one size: parts thinner
+        than a cell may get no samples. By default 64, and smaller cells where parts are thin.
     device : str, optional
         Warp device for queries of the host, except `raycast`. Default "cpu".
 
@@ -87,20 +94,27 @@ class ImplicitSurface(Immutable):
     array([ True, False])
     """
 
-    def __init__(self, tree: Node, *, resolution: int = RESOLUTION, device: str = "cpu") -> None:
+    def __init__(self, tree: Node, *, resolution: int | None = None, device: str = "cpu") -> None:
         if not isinstance(tree, Node):
             raise InvalidMesh(f"tree: expected a BlobTree, got {describe(tree)}; meshes go into MeshSurface")
-        whole_number("resolution", resolution, 1, None, InvalidScattering)
+        if resolution is not None:
+            whole_number("resolution", resolution, 1, None, InvalidScattering)
         self.tree, self.device = tree, known_device(device)
         creases = not CREASED.isdisjoint(tree.tape.operators)
         coarse = polygonize(tree, resolution=resolution, creases=creases, device=device)
+        cells = RESOLUTION if resolution is None else resolution
         if len(coarse.faces) == 0:
             raise InvalidMesh(
-                f"expected a tree with a surface, got none in {resolution} cells; "
+                f"expected a tree with a surface, got none in {cells} cells; "
                 "its parts may be too small, or cut each other away"
             )
-        self._coarse = MeshSurface(coarse.vertices, coarse.faces, device=device)
-        self._max_step = _max_step(tree, resolution)
+        self._by_parts = resolution is None and has_small_parts(tree, SMALL_PART * _cell_size(tree, cells))
+        self._coarse = (
+            CurvedMesh(coarse, device=device)
+            if self._by_parts
+            else MeshSurface(coarse.vertices, coarse.faces, device=device)
+        )
+        self._max_step = MAX_STEP * _cell_size(tree, cells)
 
     def __repr__(self) -> str:
         return f"ImplicitSurface({self.tree!r})"
@@ -119,7 +133,8 @@ class ImplicitSurface(Immutable):
         resolution = RESOLUTION if cells <= RESOLUTION else MAX_RESOLUTION
         mesh = self._meshes.get(resolution)
         if mesh is None:
-            fine = polygonize(self.tree, resolution=resolution, creases=True, device=self.device)
+            refine = polygonize_parts if self._by_parts else polygonize
+            fine = refine(self.tree, resolution=resolution, creases=True, device=self.device)
             mesh = MeshSurface(fine.vertices, fine.faces, device=self.device)
         return self._meshes.setdefault(resolution, mesh)
 
@@ -207,9 +222,10 @@ class DeviceImplicitSurface:
         launch(self._mark_above, len(points), inputs, [flags], device=self.device)
 
 
-def _max_step(tree: Node, resolution: int) -> float:
+def _cell_size(tree: Node, resolution: int) -> float:
+    """Return the size of the cells of a uniform mesh."""
     low, high = tree.support
-    return MAX_STEP * float((high - low).max()) / resolution
+    return float((high - low).max()) / resolution
 
 
 def project_without_mesh(
@@ -243,7 +259,7 @@ def _approach(tree: Node, points: Float32Array, device: str) -> tuple[Float32Arr
     inputs = [
         tape.data,
         tape.span,
-        _max_step(tree, RESOLUTION),
+        MAX_STEP * _cell_size(tree, RESOLUTION),
         FIELD_TOLERANCE * ISO,
         vectors(points, device),
     ]

@@ -1,0 +1,191 @@
+"""Thin parts: cells that are as small as the primitives that act in them.
+
+A part thinner than a cell falls between the samples of a uniform grid. The tree knows how thin its primitives
+are: a ball, a tube or a plate by its radius, a box by its shortest side too, all of them less under maps and
+warps that shrink them. So the blocks in which a thin primitive acts are refined until their cells resolve it,
+and all others keep their size. The result is a mesh of adaptive cells, which is closed where sizes meet.
+
+The thickness of walls that differences and intersections leave is not that of any primitive; see
+`docs/meshing.md`.
+"""
+
+import logging
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray
+from blobtree.cells.grid import CHILDREN, Grid
+from blobtree.cells.sparse_cells import SparseCells
+from blobtree.device import launch
+from blobtree.formulas.skeletons import BALL_CELLS
+from blobtree.meshing.adaptive_cell_kernels import write_polygons
+from blobtree.meshing.adaptive_cells import AdaptiveCells
+from blobtree.meshing.adaptive_kernels import place_on_surface
+from blobtree.meshing.adaptive_mesh import AdaptiveMesher
+from blobtree.meshing.block_tree import BlockTree
+from blobtree.meshing.dual_kernels import sample_blocks
+from blobtree.meshing.mesh import Mesh
+from blobtree.meshing.part_kernels import measure_parts
+from blobtree.progress import Progress
+from blobtree.tape.model import ImplicitModel
+from blobtree.tape.part_sizes import leaf_boxes, part_sizes
+from blobtree.tape.program import PROGRAM_CHILDREN, ProgramNode, Run, postorder
+
+MAX_PART_BLOCKS = 1 << 16
+"""Most blocks that thin parts take; the mesh has a million triangles then."""
+
+SPARE_SHARE = 1 / 16
+"""Part of these blocks that small parts take in any case, once larger ones have taken all."""
+
+LEAST_CELL = 1e-5
+"""Smallest cells, over the longest side of the support."""
+
+SHEET_GROWTH = 16.0
+"""Blocks of the next level in each block that a plate crosses; a tube crosses fewer."""
+
+PART_KERNELS = (measure_parts, place_on_surface, write_polygons, sample_blocks)
+"""Kernels of every mesh with thin parts, for `load_together`."""
+
+_logger = logging.getLogger(__name__)
+
+
+def needed_sizes(cells: SparseCells, grid: Grid, level: Any, begin: int, end: int) -> Float32Array:
+    """Return the sizes of cells that the parts in blocks of one level need, from number `begin` to `end`."""
+    sizes = wp.empty(end - begin, dtype=wp.float32, device=cells.device)
+    inputs = [begin, level, wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner), 4 * grid.cell_size]
+    kernel = cells.tape.instruction_set.kernel_for(measure_parts)
+    launch(kernel, end - begin, inputs, [sizes], cells.device)
+    result: Float32Array = sizes.numpy() / np.float32(BALL_CELLS)
+    return result
+
+
+def has_thin_parts(cells: SparseCells) -> bool:
+    """Return True if a part is too thin for the cells; their tape is a `sized_tape`."""
+    sizes = needed_sizes(cells, cells.grid, cells.leaves.arrays, 0, len(cells.leaves))
+    return bool((sizes < cells.grid.cell_size).any())
+
+
+class PartCells(AdaptiveCells):
+    """Adaptive cells that are small where parts are thin."""
+
+    def __init__(self, tree: BlockTree, tolerance: float, least: float) -> None:
+        super().__init__(tree, tolerance)
+        self._least = least
+        self.unresolved: list[tuple[float, Float64Array]] = []
+        """Sizes of the cells that parts need for which there is no room, and a place in each part."""
+        self._divide_thin_parts()
+
+    def _divide_thin_parts(self) -> None:
+        """Divide the leaves that are too large for the parts in them."""
+        tree, level, growth = self.tree, 0, SHEET_GROWTH
+        blocks, needed = np.arange(len(tree)), self._needed(0)
+        while True:
+            size = tree.grid(level).cell_size
+            deep = np.flatnonzero(needed < size)
+            deep = deep[self._affordable(blocks[deep], needed[deep], growth)]
+            if not len(deep):
+                return
+            first, level = len(tree), level + 1
+            tree.refine((blocks[deep, None] * CHILDREN + np.arange(CHILDREN)).ravel())
+            growth = max(1.0, (len(tree) - first) / len(deep))
+            blocks, needed = np.arange(first, len(tree)), self._needed(first)
+            small = needed < size
+            blocks, needed = blocks[small], needed[small]
+            self.replace(blocks, 2.0 * tree.grid(level).cell_size > needed)
+
+    def _needed(self, first: int) -> Float32Array:
+        """Return the sizes of cells that the blocks of the finest level need, from number `first` on."""
+        tree, count = self.tree, len(self.tree)
+        if first == count:
+            return np.empty(0, np.float32)
+        grid = tree.grid(int(tree.levels[first]))
+        return np.maximum(needed_sizes(tree.cells, grid, tree.level_arrays(), first, count), self._least)
+
+    def _affordable(self, blocks: IndexArray, needed: Float32Array, growth: float) -> BoolArray:
+        """Return True for the blocks to refine, without the parts with most blocks if there are too many."""
+        tree = self.tree
+        if not len(blocks) or tree.levels[blocks[0]] >= tree.max_level:
+            room = 0.0
+        else:
+            refined = len(tree) - len(tree.cells.leaves)
+            room = max(MAX_PART_BLOCKS - refined, SPARE_SHARE * MAX_PART_BLOCKS) / growth
+        parts = np.round(4.0 * np.log2(needed)).astype(np.int64)
+        _, part, counts = np.unique(parts, return_inverse=True, return_counts=True)
+        order = np.argsort(counts, kind="stable")
+        fits = np.empty(len(counts), bool)
+        fits[order] = np.cumsum(counts[order]) <= room
+        for number in np.flatnonzero(~fits):
+            dropped = np.flatnonzero(part == number)
+            self.unresolved.append((float(needed[dropped].min()), self._middle(blocks[dropped])))
+        return np.asarray(fits[part], bool)
+
+    def _middle(self, blocks: IndexArray) -> Float64Array:
+        """Return the centre of the middle one of blocks."""
+        tree, block = self.tree, blocks[len(blocks) // 2]
+        grid = tree.grid(int(tree.levels[block]))
+        middle: Float64Array = grid.origin + (tree.coordinates[block] + 0.5) * 4 * grid.cell_size
+        return middle
+
+
+def mesh_of_parts(tree: ImplicitModel, cells: SparseCells, creases: bool, report: Progress) -> Mesh | None:
+    """Return a mesh of `cells`, which are divided where parts are thin; None if no part is too thin for them.
+
+    The tape of the cells is the `sized_tape` of the tree.
+    """
+    if not has_thin_parts(cells):
+        return None
+    lower, upper = tree.support
+    smallest = LEAST_CELL * float((upper - lower).max())
+    parts = PartCells(BlockTree(cells), 0.0, smallest)
+    mesh = AdaptiveMesher(parts, creases).mesh(report)
+    warn_of_thin_parts(tree, parts.unresolved + _too_thin(tree, smallest))
+    return mesh.mesh(creases)
+
+
+def _too_thin(tree: ImplicitModel, smallest: float) -> list[tuple[float, Float64Array]]:
+    """Return the sizes of the cells that leaves need, where they are below `smallest`, and places in these.
+
+    Tips of cones are left out: only their end is missing.
+    """
+    needed = part_sizes(tree)[1] / BALL_CELLS
+    lower, upper = leaf_boxes(tree)
+    return [(float(needed[i]), 0.5 * (lower[i] + upper[i])) for i in np.flatnonzero(needed < smallest)]
+
+
+def warn_of_thin_parts(tree: ImplicitModel, unresolved: list[tuple[float, Float64Array]]) -> None:
+    """Log a warning that names the thinnest part that is not resolved."""
+    if not unresolved:
+        return
+    size, place = min(unresolved, key=lambda part: part[0])
+    lower, upper = tree.support
+    resolution = float((upper - lower).max()) / size
+    more = f" (and {len(unresolved) - 1} more)" if len(unresolved) > 1 else ""
+    _logger.warning(
+        "%s near (%s) is too thin for the cells that memory allows: its mesh is not complete%s; it needs "
+        "cells of %.2g, a resolution of %s; make it thicker, or mesh it alone",
+        _name_of_part(tree, size, place),
+        ", ".join(f"{x:.4g}" for x in place),
+        more,
+        size,
+        f"{resolution:,.0f}",
+    )
+
+
+def _name_of_part(tree: ImplicitModel, size: float, place: Float64Array) -> str:
+    """Return the class and the path of the leaf near `place` that needs cells of this size."""
+    least, most = np.log(part_sizes(tree)) - np.log(BALL_CELLS * size)
+    misfit = np.round(np.maximum(least, -most).clip(0.0), 1)
+    lower, upper = leaf_boxes(tree)
+    gaps = np.linalg.norm(np.maximum(lower - place, place - upper).clip(0.0), axis=1)
+    number = np.lexsort([gaps, misfit])[0]
+    leaves = [placed.primitive for run in tree._program if isinstance(run, Run) for placed in run.primitives]
+    pending: list[tuple[tuple[int, ...], ProgramNode]] = [((), tree)]
+    while pending:
+        path, node = pending.pop()
+        pending.extend(((*path, step), child) for step, child in enumerate(node.children))
+        below = [] if node.children else postorder(node, below=PROGRAM_CHILDREN)
+        if any(leaf is leaves[number] for leaf in below):
+            return f"the {type(node).__name__} at path {path}"
+    return f"a {type(leaves[number]).__name__}"

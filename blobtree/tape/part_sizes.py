@@ -1,0 +1,121 @@
+"""Sizes of parts: how thin the primitives of a tree are.
+
+The size of a primitive is half its least thickness: the radius of a ball, a tube or a plate, and for a box
+half its shortest side too. Maps shrink it. Warps do so by an amount that depends on the place; the kernels of
+`meshing.part_kernels` know it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from blobtree._typing import Box, Float64Array
+from blobtree.formulas.falloff import RIM
+from blobtree.formulas.skeletons import BALL_CELLS, PLATE_CELLS, TUBE_CELLS, Skeleton
+from blobtree.tape.bounds import field_boxes, primitive_boxes
+from blobtree.tape.model import ImplicitModel
+from blobtree.tape.program import EnterWarp, Run, distinct_placements, influence_radii
+from blobtree.tape.tape import Tape
+
+WARP_MARGIN = 8.0
+"""How much thinner warps make a part, up to which blocks of cells are looked at."""
+
+
+CELL_SCALES = (1.0, 2.0**-0.25, 2.0**-0.5, 2.0**-0.75)
+"""Sizes of cells to choose from, over the first one: each division halves them."""
+
+_DIMENSIONS = {TUBE_CELLS: 1.0, PLATE_CELLS: 2.0}
+"""By `Skeleton.cells`, the power of its length with which the area of a thin primitive grows."""
+
+
+def part_sizes(tree: ImplicitModel) -> tuple[Float64Array, Float64Array]:
+    """Return the least and the largest radius (n,) of each leaf, as `size` of the kernel, without warps."""
+    runs = [step for step in tree._program if isinstance(step, Run)]
+    both = [_sizes_of_run(run) for run in runs]
+    return np.concatenate([least for least, _ in both]), np.concatenate([most for _, most in both])
+
+
+def _sizes_of_run(run: Run) -> tuple[Float64Array, Float64Array]:
+    """Return the least and the largest sizes of the primitives of one run, in the space around their maps."""
+    placements, placed_by = distinct_placements(run.primitives)
+    linear = np.array([placement.matrix[:3, :3] for placement in placements])
+    scales = np.linalg.svd(linear, compute_uv=False)[placed_by, -1]
+    breadths = _breadths(run)
+    if not isinstance(run.kind, Skeleton):
+        return breadths * scales, breadths * scales
+    radii = RIM * influence_radii(run.primitives)
+    return (breadths + radii.min(axis=1)) * scales, (breadths + radii.max(axis=1)) * scales
+
+
+def _breadths(run: Run) -> Float64Array:
+    """Return what to add to the radii of primitives for the size that cells must resolve, in their own space.
+
+    Solids are thicker than their radii. Tubes and plates take fewer cells than balls, which counts as if they
+    were thicker.
+    """
+    leaves = [placed.primitive for placed in run.primitives]
+    breadths = leaves[0].inradii(leaves)
+    if not isinstance(run.kind, Skeleton) or run.kind.cells == BALL_CELLS:
+        return breadths
+    breadths += (BALL_CELLS / run.kind.cells - 1.0) * RIM * influence_radii(run.primitives).min(axis=1)
+    return breadths
+
+
+def leaf_boxes(tree: ImplicitModel) -> Box:
+    """Return boxes (n, 3), (n, 3) around the supports of the leaves, without warps."""
+    runs = [step for step in tree._program if isinstance(step, Run)]
+    boxes = [
+        primitive_boxes(run.primitives) if isinstance(run.kind, Skeleton) else field_boxes(run.primitives)
+        for run in runs
+    ]
+    return np.concatenate([lower for lower, _ in boxes]), np.concatenate([upper for _, upper in boxes])
+
+
+def has_small_parts(tree: ImplicitModel, size: float) -> bool:
+    """Return True if a leaf may be thinner than `size`, where radii tell it."""
+    warped = any(isinstance(step, EnterWarp) for step in tree._program)
+    least, _ = part_sizes(tree)
+    return bool(least.min() < size * (WARP_MARGIN if warped else 1.0))
+
+
+def fitting_scale(tree: ImplicitModel, size: float) -> float:
+    """Return the factor of `size`, one of CELL_SCALES, with which thin parts take the fewest cells.
+
+    Cells are halved until they are small enough. So a part may take four times the triangles that it needs.
+    """
+    sizes = part_sizes(tree)[0] / BALL_CELLS
+    lower, upper = leaf_boxes(tree)
+    lengths = np.linalg.norm(upper - lower, axis=1) / sizes
+    runs = [step for step in tree._program if isinstance(step, Run)]
+    powers = np.repeat(
+        [_DIMENSIONS.get(getattr(run.kind, "cells", 0.0), 0.0) for run in runs],
+        [len(run.primitives) for run in runs],
+    )
+    whole = (float((tree.support[1] - tree.support[0]).max()) / size) ** 2
+    costs = []
+    for scale in CELL_SCALES:
+        halvings = np.ceil(np.log2(np.maximum(scale * size / sizes, 1.0)))
+        fineness = sizes / (scale * size) * 2.0**halvings
+        costs.append(whole / scale**2 + (lengths**powers * fineness**2)[halvings > 0].sum())
+    return CELL_SCALES[int(np.argmin(costs))]
+
+
+def sized_tape(tree: ImplicitModel) -> Tape:
+    """Return the tree's tape with the breadths of its leaves behind their colours, for `part_kernels`."""
+    tape, program = tree.tape, tree._program
+    data = tape.data.copy()
+    ends = [*tape.headers[1:].tolist(), len(data)]
+    for step, header, end in zip(program, tape.headers.tolist(), ends, strict=True):
+        if isinstance(step, Run):
+            count = len(step.primitives)
+            stride = (end - header - 1) // count
+            data[header + stride * np.arange(1, count + 1), 3] = _breadths(step) * _folded_scales(step)
+    return replace(tape, data=data)
+
+
+def _folded_scales(run: Run) -> Float64Array:
+    """Return the factors (n,) of the maps that fold into the parameters of a run's primitives."""
+    placements, placed_by = distinct_placements(run.primitives)
+    folds = isinstance(run.kind, Skeleton) and not run.stretched
+    scales = [placement.uniform_scale or 1.0 if folds else 1.0 for placement in placements]
+    return np.array(scales)[placed_by]
