@@ -22,13 +22,13 @@ from blobtree.validation import truth
 from decals.errors import InvalidScene
 from decals.receivers import label_names
 from decals.scenes.origin import Origin, as_origin, check_distance, local_tree, local_vertices
+from decals.surfaces.base_color import CLAY, Color
 from decals.surfaces.convert import as_shape
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import describe, instance, is_unicode, real_number
 
-Color = tuple[float, float, float]
 Paths = tuple[Path, ...]
 """Paths of nodes in a tree; ``()`` is the path of its root."""
 
@@ -37,9 +37,6 @@ Names = dict[Path, str]
 
 Box = tuple[Float32Array, Float32Array]
 """Lower and upper corner, ``float32[3]`` each."""
-
-CLAY: Color = (0.72, 0.68, 0.62)
-"""Default colour of a mesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -376,7 +373,9 @@ def as_object(
     shape = as_shape(model, name=name, error=InvalidScene)
     name = name if source is None else FilePath(source).stem
     return (
-        TreeObject(name, shape) if isinstance(shape, Node) else MeshObject(name, *shape, color, source, angle)
+        TreeObject(name, shape)
+        if isinstance(shape, Node)
+        else MeshObject(name, *shape.arrays, color, source, angle)
     )
 
 

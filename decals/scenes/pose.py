@@ -24,10 +24,12 @@ from decals.model import Decals
 from decals.rendering.options import Drawing
 from decals.rendering.picture import Picture
 from decals.scenes.camera import Camera
-from decals.scenes.objects import Box, Color, MeshObject, SceneObject, TreeObject
+from decals.scenes.objects import Box, MeshObject, SceneObject, TreeObject
 from decals.scenes.origin import Origin
 from decals.scenes.scene import DecalImage, Scene
+from decals.surfaces.base_color import Color
 from decals.surfaces.convert import as_shape, is_model
+from decals.surfaces.mesh_data import MeshData
 from decals.validation import describe, instance, whole_number
 
 if TYPE_CHECKING:
@@ -326,7 +328,7 @@ def _posed_mesh(rest: MeshObject, given: "ArrayLike | MeshObject | pv.PolyData")
     advice = "a pose has the vertices of the rest pose"
     faces = None
     if is_model(given) and not isinstance(given, str | os.PathLike | tuple | list):
-        vertices, faces = cast(Any, as_shape(given, name=name, error=InvalidScene))
+        vertices, faces = cast(MeshData, as_shape(given, name=name, error=InvalidScene)).arrays
         if isinstance(given, MeshObject):
             vertices = np.add(vertices, given.origin, dtype=np.float64)
     positions = _numbers(name, vertices, rest.vertices.shape, advice)

@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeGuard, Union, runtime_checkable
 
@@ -10,14 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import blobtree
-from blobtree import Node
+from blobtree import Mesh, Node
 from blobtree.validation import point_array
 from decals.errors import ImplicitDecalsError, InvalidMesh
 from decals.model import MAX_COORDINATE
+from decals.surfaces.base_color import BaseColor, checked_color, linear_colors
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.mesh_file import MeshArrays, dataset_triangles, polygon_triangles, read_mesh
+from decals.surfaces.mesh_data import MeshData, joined
+from decals.surfaces.mesh_file import dataset_mesh, polygon_triangles, read_mesh_data
 from decals.surfaces.surface import Surface
+from decals.surfaces.trimesh_colors import trimesh_color
 from decals.validation import describe, is_file
 
 if TYPE_CHECKING:
@@ -61,8 +65,8 @@ Model: TypeAlias = Union[
 
 def as_shape(
     model: object, *, name: str = "model", error: type[ImplicitDecalsError] = InvalidMesh
-) -> Node | MeshArrays:
-    """Return the tree of a model, or its vertices and triangles.
+) -> Node | MeshData:
+    """Return the tree of a model, or its triangles with their base colour.
 
     Parameters
     ----------
@@ -78,7 +82,8 @@ def as_shape(
 
     Returns
     -------
-    Node or (float32[n, 3], int32[m, 3])
+    Node or MeshData
+        A tree; or vertices, faces and the base colour that the model has.
 
     Raises
     ------
@@ -92,13 +97,18 @@ def as_shape(
             raise error(f"{name}: expected a model, found no file {os.fspath(model)!r}; check the path")
         return read_shape(model)
     if _is_dataset(model):
-        return dataset_triangles(model, name=name)
+        return dataset_mesh(model, name=name)
     if _is_trimesh_scene(model):
-        model = model.to_geometry()  # all parts as one mesh, or points or curves, which have no faces
+        parts = [part for part in model.dump() if hasattr(part, "faces") and len(part.faces)]
+        if parts:
+            return joined([_mesh_data(part, name) for part in parts])
+        model = model.to_geometry()  # points or curves, which have no faces
+    if isinstance(model, MeshData):
+        return model
     if isinstance(model, MeshLike) and not isinstance(model, type):
-        return _array_triangles(model.vertices, model.faces, name)
+        return _mesh_data(model, name)
     if _is_array_pair(model):
-        return _array_triangles(*model, name)
+        return _array_mesh(*model, name)
     raise error(f"{name}: expected a model, got {describe(model)}; {MODEL_ADVICE}")
 
 
@@ -122,7 +132,7 @@ def as_surface(
     if is_surface(own := getattr(model, "surface", None)):
         return own
     shape = as_shape(model, name=name, error=error)
-    return ImplicitSurface(shape) if isinstance(shape, Node) else MeshSurface(*shape)
+    return ImplicitSurface(shape) if isinstance(shape, Node) else MeshSurface(*shape.arrays)
 
 
 def is_surface(value: object) -> TypeGuard[Surface]:
@@ -143,13 +153,19 @@ def _is_dataset(value: object) -> "TypeGuard[pv.DataSet | pv.MultiBlock]":
     return pyvista is not None and isinstance(value, pyvista.DataSet | pyvista.MultiBlock)
 
 
+def _is_trimesh(value: object) -> bool:
+    """Return True for a mesh of trimesh, which is not imported for that."""
+    trimesh = sys.modules.get("trimesh")
+    return trimesh is not None and isinstance(value, trimesh.Trimesh)
+
+
 def _is_trimesh_scene(value: object) -> TypeGuard[Any]:
     """Return True for a scene of trimesh, which is not imported for that."""
     trimesh = sys.modules.get("trimesh")
     return trimesh is not None and isinstance(value, trimesh.Scene)
 
 
-def read_shape(path: str | os.PathLike[str]) -> Node | MeshArrays:
+def read_shape(path: str | os.PathLike[str]) -> Node | MeshData:
     """Read a mesh file, or a tree from a JSON file.
 
     Raises
@@ -159,7 +175,7 @@ def read_shape(path: str | os.PathLike[str]) -> Node | MeshArrays:
     """
     path = Path(path)
     if path.suffix.lower() != ".json":
-        return read_mesh(path)
+        return read_mesh_data(path)
     try:
         return blobtree.load(path)
     except OSError as error:
@@ -173,9 +189,24 @@ def _is_array_pair(model: object) -> TypeGuard[tuple[ArrayLike, ArrayLike]]:
     return isinstance(model, tuple) and len(model) == 2 and all(isinstance(part, arrays) for part in model)
 
 
-def _array_triangles(vertices: ArrayLike, faces: ArrayLike | Sequence[Any], name: str) -> MeshArrays:
+def _mesh_data(mesh: MeshLike, name: str) -> MeshData:
+    """Return a mesh of any library with the colours that it has."""
+    data = _array_mesh(mesh.vertices, mesh.faces, name)
+    color = checked_color(lambda: _color(mesh), name, len(data.vertices), len(data.faces))
+    return data if color is None else replace(data, color=color)
+
+
+def _color(mesh: MeshLike) -> BaseColor | None:
+    """Return the colours of a mesh of trimesh or of `blobtree.polygonize`."""
+    if isinstance(mesh, Mesh):
+        return BaseColor(linear_colors(mesh.colors))
+    return trimesh_color(mesh) if _is_trimesh(mesh) else None
+
+
+def _array_mesh(vertices: ArrayLike, faces: ArrayLike | Sequence[Any], name: str) -> MeshData:
     point_array(vertices, f"{name}: vertices", InvalidMesh, MAX_COORDINATE)
-    return polygon_triangles(np.asarray(vertices).reshape(-1, 3), _polygons(faces, name), name=name)
+    arrays = polygon_triangles(np.asarray(vertices).reshape(-1, 3), _polygons(faces, name), name=name)
+    return MeshData(*arrays)
 
 
 def _polygons(faces: ArrayLike | Sequence[Any], name: str) -> Any:

@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree._typing import Float32Array, Int32Array
+from blobtree._typing import Float32Array, Int32Array, Int64Array
 from decals.errors import InvalidMesh
+from decals.surfaces.base_color import checked_color
+from decals.surfaces.dataset_colors import dataset_color, has_colors
+from decals.surfaces.mesh_data import MeshData, joined
 from decals.surfaces.ply import Polygons, read_ply
 from decals.surfaces.vtk_process import can_isolate, read_isolated
 from decals.validation import describe, is_file
@@ -63,20 +66,30 @@ def read_mesh(path: str | PathLike[str]) -> MeshArrays:
     >>> vertices.shape, faces.shape
     ((8, 3), (12, 3))
     """
+    return read_mesh_data(path).arrays
+
+
+def read_mesh_data(path: str | PathLike[str]) -> MeshData:
+    """Read a mesh file with its colours; see `read_mesh`."""
     path = Path(path)
     if not is_file(path):
         raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
     if path.suffix.lower() == ".ply":
-        return polygon_triangles(*read_ply(path), name=str(path))
+        return MeshData(*polygon_triangles(*read_ply(path), name=str(path)))
     from pyvista.core.utilities.reader import CLASS_READERS
 
     if path.suffix.lower() not in CLASS_READERS or path.suffix.lower() in _ROBUST or not can_isolate():
-        return dataset_triangles(read_dataset(path), name=str(path))
-    return read_isolated(path)
+        return dataset_mesh(read_dataset(path), name=str(path))
+    return MeshData(*read_isolated(path))
 
 
 def dataset_triangles(dataset: "pv.DataSet | pv.MultiBlock", *, name: str) -> MeshArrays:
-    """Return the vertices and triangles of a pyvista dataset's surface.
+    """Return the vertices and triangles of a pyvista dataset's surface; see `dataset_mesh`."""
+    return dataset_mesh(dataset, name=name).arrays
+
+
+def dataset_mesh(dataset: "pv.DataSet | pv.MultiBlock", *, name: str) -> MeshData:
+    """Return the triangles and the base colour of a pyvista dataset's surface.
 
     Messages call the dataset by ``name``.
     """
@@ -85,15 +98,19 @@ def dataset_triangles(dataset: "pv.DataSet | pv.MultiBlock", *, name: str) -> Me
     if isinstance(dataset, pv.MultiBlock) and _is_empty(dataset):
         raise InvalidMesh(f"{name!r} has no block with faces; give a surface mesh")
     _check_cells(dataset, name)
+    if isinstance(dataset, pv.MultiBlock) and has_colors(dataset):  # joined blocks keep what all of them have
+        return joined([dataset_mesh(block, name=name) for block in dataset if not _is_empty(block)])
     surface = (
         dataset if isinstance(dataset, pv.PolyData) else dataset.extract_surface(algorithm="dataset_surface")
     )
     if surface.n_strips:
         surface = surface.triangulate()
     sizes = np.diff(surface.face_offsets)
-    if len(sizes) and (sizes == sizes[0]).all():
-        return polygon_triangles(surface.points, surface.regular_faces, name=name)
-    return polygon_triangles(surface.points, list(surface.irregular_faces), name=name)
+    alike = len(sizes) and (sizes == sizes[0]).all()
+    polygons = surface.regular_faces if alike else list(surface.irregular_faces)
+    vertices, faces, origins = traced_triangles(surface.points, polygons, name=name)
+    color = checked_color(lambda: dataset_color(surface, origins, name=name), name, len(vertices), len(faces))
+    return MeshData(vertices, faces, color)
 
 
 def precise_points(points: ArrayLike) -> Any:
@@ -108,22 +125,31 @@ def precise_points(points: ArrayLike) -> Any:
 
 def polygon_triangles(points: ArrayLike, polygons: Polygons, *, name: str) -> MeshArrays:
     """Divide polygons into triangles, concave ones too, after a check of their indices."""
+    return traced_triangles(points, polygons, name=name)[:2]
+
+
+def traced_triangles(
+    points: ArrayLike, polygons: Polygons, *, name: str
+) -> tuple[Float32Array, Int32Array, Int64Array]:
+    """Return vertices and triangles as `polygon_triangles` does, and the polygon of each triangle."""
     with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinity, refused by surfaces
         vertices: Any = precise_points(points)
     if len(polygons) == 0:
         raise InvalidMesh(f"{name!r} has {len(vertices)} points but no faces; give a surface mesh")
     if isinstance(polygons, np.ndarray) and polygons.shape[1] == 3:
         _check_indices(polygons, len(vertices), name)
-        return vertices, polygons.astype(np.int32)
+        return vertices, polygons.astype(np.int32), np.arange(len(polygons))
     corners = np.concatenate(list(polygons))
     _check_indices(corners, len(vertices), name)
-    areal = [polygon for polygon in polygons if len(polygon) > 2]
+    areal = [number for number, polygon in enumerate(polygons) if len(polygon) > 2]
     if not areal:
         raise InvalidMesh(f"{name!r} has no face of three or more corners; give a surface mesh")
     import pyvista as pv
 
-    surface = pv.PolyData.from_irregular_faces(vertices, areal)
-    return vertices, surface.triangulate().regular_faces.astype(np.int32)
+    surface = pv.PolyData.from_irregular_faces(vertices, [polygons[number] for number in areal])
+    surface.cell_data["polygon"] = np.array(areal)
+    triangles = surface.triangulate()
+    return vertices, triangles.regular_faces.astype(np.int32), np.asarray(triangles.cell_data["polygon"])
 
 
 def _is_empty(dataset: Any) -> bool:

@@ -22,8 +22,9 @@ from decals.model import NO_IMAGE, Decals
 from decals.rendering import Environment, SceneLike
 from decals.scenes.camera import Camera
 from decals.scenes.cover import as_scene
-from decals.scenes.objects import CLAY, MeshObject, SceneObject, TreeObject
+from decals.scenes.objects import MeshObject, SceneObject, TreeObject
 from decals.scenes.scene import Scene, as_images
+from decals.surfaces.base_color import CLAY
 from decals.surfaces.convert import Model, as_shape
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import describe, instance
@@ -147,7 +148,7 @@ class DecalsComponent(KnownAttributes):
             shape = as_shape(mesh, name=label, error=InvalidScene)
             if isinstance(shape, Node):
                 raise InvalidScene(f"{label}: expected a mesh, got a BlobTree; `add_implicit` adds it")
-            item = MeshObject(label, *shape, color, crease_angle=crease_angle)
+            item = MeshObject(label, *shape.arrays, color, crease_angle=crease_angle)
         self._add_object(item)
         return item
 

@@ -34,7 +34,10 @@ OF_PACKAGES = {
         "Creases", "Cylindrical", "ImageChoice", "Jitter", "Orientation", "PaintedImage", "Planar",
         "Spherical", "TextureCoordinates", "gradient_of", "region_mask", "remeshed_points", "vertex_density",
     ],
-    "surfaces": ["ImplicitSurface", "MeshSurface", "Model", "Surface", "as_surface", "read_mesh"],
+    "surfaces": [
+        "BaseColor", "BaseTexture", "ImplicitSurface", "MeshSurface", "Model", "Surface", "Wrap",
+        "as_surface", "linear_colors", "read_mesh",
+    ],
 }  # fmt: skip
 
 
