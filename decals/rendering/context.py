@@ -42,6 +42,9 @@ MAX_ANISOTROPY = 8.0
 DEPTH = "depth"
 """Kind of textures that hold depths."""
 
+LOST = "GL_UNKNOWN_ERROR"
+"""moderngl's text for GL_CONTEXT_LOST, the only error of OpenGL 3.3 to 4.6 that it has no name for."""
+
 SOFTWARE_LOOP_ITERATIONS = 65_535
 """Iterations after which Mesa's software rasteriser ends all loops of a pixel, without an error
 (LP_MAX_TGSI_LOOP_ITERATIONS)."""
@@ -130,6 +133,7 @@ class Context:
         self.gl = gl
         self._owned = owned
         self._display_held = False
+        self._lost = False
         self._programs: LastUsed[tuple[str, ...], Program] = LastUsed(self.max_program_text)
         self._compiler: BackgroundCompiler | None = None
         self._unused: list[Any] = []
@@ -181,9 +185,21 @@ class Context:
         with self.current():
             return is_current()
 
+    def check_not_lost(self) -> None:
+        """Raise `NoGraphics` if the driver has reset the graphics card: pictures would stay black.
+
+        The context must be current. It is not used again; the next renderer makes another one.
+        """
+        if self.gl.error == LOST:
+            self._lost = True
+            raise NoGraphics(
+                "the graphics driver was reset while a picture was drawn; draw it again, and if that fails "
+                "too, with fewer decals or a smaller picture"
+            )
+
     def leave(self) -> None:
-        """Keep this standalone context for `reused`; release it if another one is kept."""
-        if _idle or is_forked():
+        """Keep this standalone context for `reused`; release it if it is lost, or another one is kept."""
+        if _idle or self._lost or is_forked():
             self.release()
             return
         with self.current():

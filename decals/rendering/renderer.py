@@ -145,6 +145,8 @@ class Renderer:
             If the scene holds an object of unknown kind, or an argument is of another type.
         TooMuchData
             If the scene does not fit on the GPU.
+        NoGraphics
+            If the graphics driver was reset meanwhile.
         """
         check_options(options)
         picture = TiledArray(options.size, 4, np.uint8)
@@ -235,6 +237,7 @@ class Renderer:
             for tile in tiles(view, options.samples, limit=self._max_tile):
                 self._draw_tile(scene, uploaded, tile, targets, options)
                 yield tile, targets
+            self.context.check_not_lost()
             self.sweep()
 
     def _draw_tile(

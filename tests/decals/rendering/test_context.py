@@ -208,6 +208,20 @@ def test_a_context_is_not_used_again_if_vtk_was_imported_after_it_was_made() -> 
 
 
 @pytest.mark.usefixtures("no_idle")
+def test_a_reset_of_the_graphics_driver_is_an_error_and_its_context_is_not_used_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """moderngl has no name for GL_CONTEXT_LOST. No driver is reset here: the test sets the error."""
+    with Renderer() as first, monkeypatch.context() as reset:
+        reset.setattr(moderngl.Context, "error", "GL_UNKNOWN_ERROR")
+        with pytest.raises(NoGraphics, match="driver was reset while a picture was drawn; draw it again"):
+            drawn(first)
+    with Renderer() as second:
+        assert second.context is not first.context
+        assert drawn(second).any()
+
+
+@pytest.mark.usefixtures("no_idle")
 def test_the_environment_names_the_backend_of_a_context_that_is_used_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
