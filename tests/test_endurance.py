@@ -16,10 +16,10 @@ def test_threads_and_windows_find_nothing() -> None:
 
 
 def test_a_result_that_differs_and_an_exception_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    turns = itertools.count()
+    turns, tries = itertools.count(), itertools.count()
 
     def failing() -> tuple[Any, ...]:
-        if next(turns) > 0:
+        if next(tries) > 0:
             raise LookupError("of Python")
         return (np.zeros(1),)
 
