@@ -15,7 +15,7 @@ from decals.images import read_image
 from decals.scenes.objects import SceneObject, unused_name
 from decals.validation import describe
 
-MODELS = (".json", ".ply", ".obj", ".stl", ".vtp", ".vtk", ".glb", ".gltf", ".off")
+MODELS = (".json", ".ply", ".obj", ".stl", ".vtp", ".vtk", ".glb", ".gltf", ".3mf", ".off")
 HDR = ".hdr"
 IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".gif", ".tif", ".tiff", HDR)
 

@@ -15,6 +15,8 @@ from blobtree._typing import Float32Array, Int32Array, Int64Array
 from decals.errors import InvalidMesh
 from decals.surfaces.base_color import checked_color
 from decals.surfaces.dataset_colors import dataset_color, has_colors
+from decals.surfaces.files.gltf import read_gltf
+from decals.surfaces.files.threemf import read_3mf
 from decals.surfaces.mesh_data import MeshData, joined
 from decals.surfaces.ply import Polygons, read_ply
 from decals.surfaces.vtk_process import can_isolate, read_isolated
@@ -28,6 +30,9 @@ MeshArrays = tuple[Float32Array, Int32Array]
 
 MIN_PRECISE_RATIO = 500.0
 """Least ratio of coordinates to the extent of a mesh at which float64 is kept."""
+
+_SCENE_READERS = {".3mf": read_3mf, ".glb": read_gltf, ".gltf": read_gltf}
+"""Our own readers of files that place meshes in space, by suffix."""
 
 _ROBUST = (".obj", ".stl")
 """Suffixes of formats whose readers in VTK neither crash nor hang on damaged files; see `tests.fuzz`."""
@@ -74,6 +79,8 @@ def read_mesh_data(path: str | PathLike[str]) -> MeshData:
     path = Path(path)
     if not is_file(path):
         raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
+    if reader := _SCENE_READERS.get(path.suffix.lower()):
+        return MeshData(*polygon_triangles(*reader(path), name=str(path)))
     if path.suffix.lower() == ".ply":
         return MeshData(*polygon_triangles(*read_ply(path), name=str(path)))
     from pyvista.core.utilities.reader import CLASS_READERS

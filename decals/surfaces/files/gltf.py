@@ -1,0 +1,80 @@
+"""Reader of glTF 2.0 and GLB files (Khronos 2021): the default scene as one mesh in its rest pose."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from blobtree._typing import Float64Array, Int64Array
+from decals.surfaces.files.faults import Notes, reading
+from decals.surfaces.files.gltf_accessors import Accessors
+from decals.surfaces.files.gltf_buffers import Buffers
+from decals.surfaces.files.gltf_document import Document, parse
+from decals.surfaces.files.gltf_nodes import Placement, placements
+from decals.surfaces.files.gltf_primitives import Skinned, posed, read_primitive
+from decals.surfaces.files.pieces import Budget, Piece, joined, placed
+
+
+def read_gltf(path: Path) -> tuple[Float64Array, Int64Array]:
+    """Read the default scene of a glTF or GLB file, at rest: morph targets and skins as the file has them.
+
+    Returns
+    -------
+    points : float64[n, 3]
+    faces : int64[m, 3]
+
+    Raises
+    ------
+    InvalidMesh
+        If the file is damaged, refers to what it does not have, or is compressed.
+    """
+    with reading(path, "glTF") as notes:
+        document, binary = parse(path.read_bytes(), notes)
+        budget = Budget()
+        accessors = Accessors(document, Buffers(document.buffers, binary, path.parent), budget)
+        scene = _Scene(document, accessors, budget, notes)
+        mesh = joined(
+            [piece for place in placements(document, accessors, notes) for piece in scene.pieces(place)]
+        )
+    return mesh.points, mesh.faces
+
+
+_Key = tuple[int, tuple[float, ...], bool]
+"""A mesh, the weights of its morph targets, and whether a skin moves it."""
+
+
+class _Scene:
+    """Reads each mesh once, and places it as often as the scene does."""
+
+    def __init__(self, document: Document, accessors: Accessors, budget: Budget, notes: Notes) -> None:
+        self._document = document
+        self._accessors = accessors
+        self._budget = budget
+        self._notes = notes
+        self._meshes: dict[_Key, list[tuple[Piece, Skinned | None]]] = {}
+
+    def pieces(self, place: Placement) -> list[Piece]:
+        """Return the pieces of a mesh at a node, in the scene."""
+        self._budget.spend(len(place.matrices), 0, place.name)
+        found = []
+        for piece, skinned in self._mesh(place):
+            if place.joints is not None and skinned is not None:
+                self._budget.spend(len(piece.points), len(piece.faces), place.name)
+                found.append(posed(piece, skinned, place.joints, f"mesh {place.mesh}"))
+            else:
+                copies = len(place.matrices)
+                self._budget.spend(copies * len(piece.points), copies * len(piece.faces), place.name)
+                found.append(placed(piece, place.matrices))
+        return found
+
+    def _mesh(self, place: Placement) -> list[tuple[Piece, Skinned | None]]:
+        """Return the pieces of a mesh at the origin, with their skins."""
+        key = place.mesh, place.weights, place.joints is not None
+        if key not in self._meshes:
+            self._meshes[key] = list(self._read(place))
+        return self._meshes[key]
+
+    def _read(self, place: Placement) -> Iterator[tuple[Piece, Skinned | None]]:
+        for index, primitive in enumerate(self._document.meshes[place.mesh].primitives):
+            name = f"mesh {place.mesh} primitive {index}"
+            part = read_primitive(primitive, place.weights, self._accessors, self._notes, name)
+            if part is not None:
+                yield part

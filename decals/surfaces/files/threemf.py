@@ -1,0 +1,114 @@
+"""Reader of 3MF files (3MF Consortium, core specification 1.3): all objects that are built, as one mesh."""
+
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from blobtree._typing import Float64Array, Int64Array
+from decals.surfaces.files.faults import Notes, Unreadable, reading
+from decals.surfaces.files.pieces import Budget, Piece, joined, placed
+from decals.surfaces.files.threemf_model import Model, Object, Use, parse_model
+from decals.surfaces.files.threemf_package import Package
+
+_logger = logging.getLogger(__name__)
+
+MAX_PLACES = 1 << 20
+"""Most objects that a file places; components of components may be very many."""
+
+_Key = tuple[str, int]
+"""The part of a package and the number of an object in it."""
+
+
+def read_3mf(path: Path) -> tuple[Float64Array, Int64Array]:
+    """Read the objects that a 3MF file builds. The unit of the file stays, and the log names it.
+
+    Returns
+    -------
+    points : float64[n, 3]
+    faces : int64[m, 3]
+
+    Raises
+    ------
+    InvalidMesh
+        If the file is damaged, or refers to what it does not have.
+    """
+    with reading(path, "3MF") as notes:
+        mesh = _mesh(path, notes)
+    return mesh.points, mesh.faces
+
+
+def _mesh(path: Path, notes: Notes) -> Piece:
+    """Return the mesh of a file."""
+    with Package(path) as package:
+        build = _Build(package, notes)
+        _logger.info("%s: the unit is 1 %s", path, build.unit)
+        budget, pieces = Budget(), []
+        for key, matrices in build.places().items():
+            mesh = build.object(key).mesh
+            if mesh is not None:
+                budget.spend(
+                    len(matrices) * len(mesh.points), len(matrices) * len(mesh.faces), f"object {key[1]}"
+                )
+                pieces.append(placed(mesh, np.array(matrices)))
+        return joined(pieces)
+
+
+class _Build:
+    """The objects of a package, and where they are built."""
+
+    def __init__(self, package: Package, notes: Notes) -> None:
+        self._package = package
+        self._notes = notes
+        self._models: dict[str, Model] = {}
+
+    def object(self, key: _Key) -> Object:
+        """Return an object."""
+        part, number = key
+        model = self._model(part)
+        if number not in model.objects:
+            raise Unreadable(f"object {number} of {part!r} is missing")
+        return model.objects[number]
+
+    @property
+    def unit(self) -> str:
+        """Unit of the numbers."""
+        return self._model(self._package.model_part).unit
+
+    def places(self) -> dict[_Key, list[Float64Array]]:
+        """Return the maps of each object's copies to the build."""
+        found: dict[_Key, list[Float64Array]] = {}
+        rest = [(use, self._package.model_part, np.eye(4), 0) for use in self._uses()]
+        count = 0
+        while rest:
+            use, part, parent, depth = rest.pop()
+            key = use.part or part, use.number
+            count += 1
+            item = self.object(key)
+            if depth > sum(len(model.objects) for model in self._models.values()):
+                raise Unreadable(f"object {use.number} is a component of itself")
+            if count > MAX_PLACES:
+                raise Unreadable(f"it places more than {MAX_PLACES:,} objects")
+            with np.errstate(over="ignore", invalid="ignore"):
+                matrix = parent @ use.matrix
+            if not np.isfinite(matrix).all():
+                raise Unreadable(f"object {use.number} lies at a place that is no finite number")
+            if item.mesh is None and not item.components:
+                self._notes.add("objects without triangles are left out", f"object {use.number}")
+            found.setdefault(key, []).append(matrix)
+            rest.extend((component, key[0], matrix, depth + 1) for component in reversed(item.components))
+        return found
+
+    def _uses(self) -> Iterator[Use]:
+        """Yield what is built, the last first; all objects that are no components if that is nothing."""
+        model = self._model(self._package.model_part)
+        if model.items:
+            return reversed(model.items)
+        parts = {use.number for item in model.objects.values() for use in item.components if not use.part}
+        return (Use(number, None, np.eye(4)) for number in reversed(model.objects) if number not in parts)
+
+    def _model(self, part: str) -> Model:
+        if part not in self._models:
+            self._models[part] = parse_model(self._package.chunks(part), self._notes)
+        return self._models[part]

@@ -1,0 +1,90 @@
+"""The ZIP package of a 3MF file: its parts, read in pieces and within limits."""
+
+import lzma
+import struct
+import zipfile
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Self
+from urllib.parse import unquote
+
+from decals.surfaces.files.faults import Unreadable
+from decals.surfaces.files.xml_events import Attributes, parse_xml
+
+RELATIONSHIPS = "http://schemas.openxmlformats.org/package/2006/relationships"
+
+MAX_PART = 1 << 31
+"""Most bytes of a part of the package."""
+
+MAX_RATIO = 250
+"""Most bytes that a byte of the package may stand for, in parts above `SMALL_PART`."""
+
+SMALL_PART = 1 << 20
+
+CHUNK = 1 << 16
+"""Bytes that are unpacked at once."""
+
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+
+_FAULTS = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, NotImplementedError, RuntimeError,
+           EOFError, OSError, ValueError, OverflowError)  # fmt: skip
+"""What `zipfile` raises for damaged archives."""
+
+
+class Package:
+    """A 3MF file that is open for reading."""
+
+    def __init__(self, path: Path) -> None:
+        try:
+            self._zip = zipfile.ZipFile(path)
+        except _FAULTS as error:
+            raise Unreadable(f"it is no ZIP archive: {error}") from error
+        self._parts = {_normal(entry.filename): entry for entry in self._zip.infolist()}
+        self.model_part = self._start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._zip.close()
+
+    def chunks(self, part: str) -> Iterator[bytes]:
+        """Yield the bytes of a part, in order."""
+        entry = self._parts.get(_normal(part))
+        if entry is None:
+            raise Unreadable(f"the part {part[:80]!r} is missing")
+        packed, size = entry.compress_size, entry.file_size
+        if size > MAX_PART or size > max(SMALL_PART, MAX_RATIO * packed):
+            raise Unreadable(
+                f"the part {part[:80]!r} unpacks {packed:,} bytes to {size:,}, which are too many"
+            )
+        if entry.flag_bits & 1 or entry.compress_type not in _METHODS:
+            raise Unreadable(f"the part {part[:80]!r} is encrypted or packed by another method than deflate")
+        try:
+            with self._zip.open(entry) as content:
+                while chunk := content.read(CHUNK):
+                    yield chunk
+        except _FAULTS as error:
+            raise Unreadable(f"the part {part[:80]!r} is damaged: {error}") from error
+
+    def _start(self) -> str:
+        """Return the part that holds the model: the package's relationships name it."""
+        targets: list[str] = []
+
+        def relationship(attributes: Attributes) -> None:
+            if attributes.get("Type", "").endswith("/3dmodel"):
+                targets.append(attributes.get("Target", ""))
+
+        if "_rels/.rels" in self._parts:
+            parse_xml(self.chunks("_rels/.rels"), {RELATIONSHIPS: ""}, {"Relationship": relationship}, {})
+        named = [target for target in targets if _normal(target) in self._parts]
+        others = sorted(part for part in self._parts if part.endswith(".model"))
+        if not named + others:
+            raise Unreadable("it holds no 3D model")
+        return (named + others)[0]
+
+
+def _normal(part: str) -> str:
+    """Return the name of a part as it is compared: names ignore case, and may begin at the root."""
+    return unquote(part).replace("\\", "/").lstrip("/").lower()

@@ -1,0 +1,165 @@
+"""3MF files: what they build, in float64, and what is refused or left out by name."""
+
+import io
+import logging
+import random
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from decals.errors import InvalidMesh
+from decals.surfaces import read_mesh
+from decals.surfaces.files import threemf
+from tests.decals.meshes import icosphere
+from tests.decals.surfaces.test_gltf import check, shapes
+from tests.scene_files import CORE, broken_3mf, mesh_xml, package, random_3mf, relationships, transform_text
+
+TETRAHEDRON = mesh_xml(
+    np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+)
+
+
+def model(resources: str, build: str = '<item objectid="1"/>', head: str = "") -> str:
+    return f'{head}<model xmlns="{CORE}"><resources>{resources}</resources><build>{build}</build></model>'
+
+
+def saved(folder: Path, text: str | bytes, **parts: str | bytes) -> Path:
+    path = folder / "model.3mf"
+    path.write_bytes(package({"_rels/.rels": relationships("/3D/a.model"), "3D/a.model": text, **parts}))
+    return path
+
+
+@pytest.mark.parametrize("block", range(6))
+def test_random_forms_build_the_triangles_of_the_specification(tmp_path: Path, block: int) -> None:
+    for number in range(block * 10, block * 10 + 10):
+        file = random_3mf(random.Random(f"3mf:{number}"))
+        check(file.write(tmp_path), file.triangles)
+
+
+def test_broken_forms_are_one_error_or_a_mesh(tmp_path: Path) -> None:
+    messages = []
+    for number in range(60):
+        path = broken_3mf(random.Random(f"broken:{number}")).write(tmp_path)
+        try:
+            read_mesh(path)
+        except InvalidMesh as error:
+            messages.append((str(path), str(error)))
+    assert 30 < len(messages) < 60
+    assert all(path in message and "\n" not in message for path, message in messages)
+
+
+def test_mirrored_components_keep_their_outward_normals(tmp_path: Path) -> None:
+    """A ball that its component mirrors, and one that component and item mirror, so not at all."""
+    points, faces = icosphere(2)
+    mirror, shift = np.diag([-1.0, 1, 1, 1]), np.eye(4)
+    shift[0, 3] = 5.0
+    ball = f'<object id="1">{mesh_xml(points, faces)}</object>'
+    uses = f'<component objectid="1" transform="{transform_text(mirror)}"/>'
+    pair = f'<object id="2"><components>{uses}</components></object>'
+    items = [
+        f'<item objectid="2" transform="{transform_text(matrix)}"/>' for matrix in (shift, shift @ mirror)
+    ]
+    vertices, triangles = read_mesh(saved(tmp_path, model(ball + pair, "".join(items))))
+    found = shapes(vertices[triangles])
+    assert len(found) == 2 * len(faces)
+    assert (((found[:, :3] - (5.0, 0.0, 0.0)) * found[:, 3:]).sum(axis=1) > 0.0).all()
+
+
+def test_without_build_items_all_objects_that_are_no_components_are_read(tmp_path: Path) -> None:
+    inner = f'<object id="1">{TETRAHEDRON}</object>'
+    outer = '<object id="2"><components><component objectid="1"/></components></object>'
+    path = saved(tmp_path, model(inner + outer + f'<object id="3">{TETRAHEDRON}</object>', build=""))
+    assert len(read_mesh(path)[1]) == 8
+
+
+def test_what_has_no_triangles_is_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    lattice = 'xmlns="http://schemas.microsoft.com/3dmanufacturing/beamlattice/2017/02"'
+    beams = f'<beamlattice {lattice}><beams><beam v1="0" v2="1"/><beam v1="1" v2="2"/></beams></beamlattice>'
+    mesh = TETRAHEDRON.replace("</mesh>", f"{beams}</mesh>")
+    text = model(
+        f'<object id="1">{mesh}</object><object id="2"/>', '<item objectid="1"/><item objectid="2"/>'
+    )
+    with caplog.at_level(logging.INFO):
+        read_mesh(saved(tmp_path, text.replace("<model ", '<model unit="inch" ')))
+    assert "beams are left out: object 1" in caplog.text
+    assert "objects without triangles are left out: object 2" in caplog.text
+    assert "the unit is 1 inch" in caplog.text
+
+
+def test_a_vertex_of_another_namespace_is_no_point(tmp_path: Path) -> None:
+    """Slices have vertices of two coordinates beside those of meshes."""
+    space = "http://schemas.microsoft.com/3dmanufacturing/slice/2015/07"
+    slices = f'<s:slice xmlns:s="{space}"><s:vertex x="1" y="2"/></s:slice>'
+    path = saved(tmp_path, model(slices + f'<object id="1">{TETRAHEDRON}</object>'))
+    assert read_mesh(path)[0].shape == (4, 3)
+
+
+OBJECT = f'<object id="1">{TETRAHEDRON}</object>'
+DTD = '<!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]>'
+BROKEN: dict[str, tuple[str, str]] = {
+    "document type": (model(OBJECT, head=DTD), "declares a document type"),
+    "no object": (model(""), "object 1 of '/3D/a.model' is missing"),
+    "cycle": (model('<object id="1"><components><component objectid="1"/></components></object>'),
+              "object 1 is a component of itself"),
+    "index": (model(OBJECT.replace('v3="3"', 'v3="4"')), "4 points but a face asks for number 4"),
+    "negative index": (model(OBJECT.replace('v3="3"', 'v3="-1"')), "asks for number -1"),
+    "huge index": (model(OBJECT.replace('v3="3"', f'v3="{10**30}"')), "should have a triangle"),
+    "no index": (model(OBJECT.replace('v3="3"', "")), "should have a triangle with three vertices"),
+    "no coordinate": (model(OBJECT.replace('z="1"', "")), "should have a vertex with three numbers"),
+    "nan": (model(OBJECT.replace('z="1"', 'z="nan"')), "no finite numbers"),
+    "transform": (model(OBJECT, '<item objectid="1" transform="1 0 0"/>'), "'1 0 0', not 12 numbers"),
+    "infinite transform": (model(OBJECT, f'<item objectid="1" transform="{"inf " * 12}"/>'), "not finite"),
+    "two objects": (model(OBJECT * 2), "object 1 is there twice"),
+    "no number": (model(OBJECT, '<item objectid="x"/>'), "the build has 'x' in place of a number 'objectid'"),
+    "other XML": ("<html/>", "a part of it holds no model"),
+    "cut": (model(OBJECT)[:-9], "its XML is wrong"),
+    "faceless": (model('<object id="1"><mesh><vertices/></mesh></object>'), "0 points but no faces"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", BROKEN)
+def test_each_fault_is_named(tmp_path: Path, fault: str) -> None:
+    text, message = BROKEN[fault]
+    with pytest.raises(InvalidMesh, match=rf"model\.3mf.*{message}"):
+        read_mesh(saved(tmp_path, text))
+
+
+def test_components_of_components_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(threemf, "MAX_PLACES", 5_000)
+    twice = '<object id="{}"><components>{}</components></object>'
+    objects = [twice.format(k, f'<component objectid="{k - 1}"/>' * 2) for k in range(2, 60)]
+    with pytest.raises(InvalidMesh, match="it places more than 5,000 objects"):
+        read_mesh(saved(tmp_path, model(OBJECT + "".join(objects), '<item objectid="59"/>')))
+
+
+def test_a_part_that_unpacks_to_very_much_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidMesh, match=r"unpacks .* bytes to 20,000,.* which are too many"):
+        read_mesh(saved(tmp_path, model(OBJECT + " " * 20_000_000)))
+
+
+def test_a_part_that_is_encrypted_or_packed_otherwise_is_refused(tmp_path: Path) -> None:
+    content: Any = {"_rels/.rels": relationships("/3D/a.model"), "3D/a.model": model(OBJECT)}
+    (tmp_path / "model.3mf").write_bytes(package(content, zipfile.ZIP_BZIP2))
+    with pytest.raises(InvalidMesh, match="packed by another method than deflate"):
+        read_mesh(tmp_path / "model.3mf")
+
+
+def test_a_package_without_relationships_has_its_model_where_it_should_be(tmp_path: Path) -> None:
+    (tmp_path / "model.3mf").write_bytes(package({"3D/3dmodel.model": model(OBJECT)}))
+    assert len(read_mesh(tmp_path / "model.3mf")[1]) == 4
+    (tmp_path / "model.3mf").write_bytes(package({"a.txt": "a"}))
+    with pytest.raises(InvalidMesh, match="it holds no 3D model"):
+        read_mesh(tmp_path / "model.3mf")
+
+
+def test_a_package_that_is_cut_is_refused(tmp_path: Path) -> None:
+    path = saved(tmp_path, model(OBJECT))
+    whole = path.read_bytes()
+    assert zipfile.is_zipfile(io.BytesIO(whole))
+    for end in range(0, len(whole), 37):
+        path.write_bytes(whole[:end])
+        with pytest.raises(InvalidMesh, match=r"model\.3mf"):
+            read_mesh(path)
