@@ -1,14 +1,16 @@
 """``implicit-decals sandbox``: modelling and decals in the browser."""
 
 import asyncio
+import atexit
 import errno
-import ipaddress
+import html
 import os
 import secrets
+import shutil
 import signal
-import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import webbrowser
 from collections.abc import Callable, Collection, Iterator
@@ -37,8 +39,8 @@ from decals.errors import InvalidInput, MissingPackage
 HOST = "127.0.0.1"
 """By default, the page is served to this machine only."""
 
-ANY_ADDRESS = ("0.0.0.0", "::")
-"""Hosts that stand for all addresses of this machine."""
+TOKEN = "IMPLICIT_DECALS_TOKEN"
+"""Variable of the environment with the token, for a program that starts the server; default: a new token."""
 
 TITLE = "Implicit Decals sandbox"
 
@@ -63,6 +65,7 @@ def sandbox(
     define: Definitions = None,
     port: Whole = 8080,
     host: str = HOST,
+    allow_host: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
     share: Annotated[bool, Parameter(negative=())] = False,
     sessions: Whole = 8,
     browser: bool = True,
@@ -75,8 +78,9 @@ def sandbox(
 ) -> int:
     """Open models or a scene in the sandbox, a page in the browser.
 
-    The page is served to this machine only, unless --host is given. Each browser has a session of its own,
-    unless --share is given. Ctrl + C in the terminal ends all; unsaved changes are kept.
+    The page is served to this machine only, unless --host is given. It opens with the URL that the terminal
+    shows. Each browser has a session of its own, unless --share is given. Ctrl + C in the terminal ends all;
+    unsaved changes are kept.
 
     Parameters
     ----------
@@ -90,8 +94,9 @@ def sandbox(
     port
         Port of the page; 0 takes a free one.
     host
-        Address to serve the page at, such as 0.0.0.0 for all networks. Its URL then has a token, without
-        which the page does not work. Default: this machine only.
+        Address to serve the page at, such as 0.0.0.0 for all networks. Default: this machine only.
+    allow_host
+        A further name of this machine that browsers use, for example behind a proxy.
     share
         All browsers show one session: the driver edits it, the others watch and can ask for control.
     sessions
@@ -107,7 +112,8 @@ def sandbox(
     done
         Show a button that saves and ends, and print the URL alone, as notebooks need it.
     session
-        Serve one session, print the URL alone, and end with the standard input.
+        Serve one session with the token that the standard input begins with, print the URL without it, and
+        end with the standard input.
     """
     check_count("--port", port, 0, MAX_PORT)
     check_count("--sessions", sessions, 1, MAX_SESSIONS)
@@ -119,7 +125,8 @@ def sandbox(
         command = _commands(model, options, save)
         if desktop:
             return _show_window(command(1))
-        return _serve_sessions(command, sessions, host, port, browser=browser)
+        guard = _guard(host, allow_host, os.environ.pop(TOKEN, ""))
+        return _serve_sessions(command, sessions, guard, host, port, browser=browser)
     from decals.apps.commands.opening import check_options, opened, report_unsaved
     from decals.apps.memory import import_ahead, keep_memory_low, share_heap
     from decals.apps.models.loading import import_definitions
@@ -129,6 +136,8 @@ def sandbox(
     share_heap()
     check_options(decals, seed, save)
     serve, page = _toolkit(lessons)
+    given = _read_token() if session else os.environ.pop(TOKEN, "")
+    guard = _guard(host, allow_host, given, framed=done)
     import_definitions(define)
     opening = opened(
         model, decals=decals, image=image, up=up, pixels=FIRST_SIZE, seed=seed, save=save, trust=trust
@@ -142,15 +151,15 @@ def sandbox(
             server = serve(f"sandbox {id(window)}", client_type="vue3")
             in_lesson = lab or lessons is not None
             start = not model and not in_lesson and not window.session.modified  # nothing was recovered
-            page(server, window, in_lesson=in_lesson, start=start, done=done, shared=share)
+            page(server, window, guard=guard, in_lesson=in_lesson, start=start, done=done, shared=share)
             ready = server.controller.on_server_ready
-            if done or session:
-                ready.add(lambda **_: print(_url(host, server.port, ""), flush=True))
-            token = _protect(server, host)
             if session:
+                ready.add(lambda **_: print(guard.address(server.port), flush=True))
                 ready.add(lambda **_: threading.Thread(target=_end_with_input, daemon=True).start())
-            else:
-                ready.add(lambda **_: _announce(host, server.port, token, open_browser=browser))
+            elif done:
+                ready.add(lambda **_: print(guard.url(server.port), flush=True))
+            if not session:
+                ready.add(lambda **_: _announce(guard, server.port, open_browser=browser))
             keep_memory_low()
             import_ahead()
             with _port_in_use_reported(port):
@@ -181,20 +190,15 @@ def _commands(
 
 
 def _serve_sessions(
-    command: Callable[[int], list[str]], limit: int, host: str, port: int, *, browser: bool
+    command: Callable[[int], list[str]], limit: int, guard: Any, host: str, port: int, *, browser: bool
 ) -> int:
     """Serve a session to each browser, and return the exit code."""
-    try:
-        from decals.apps.sandbox.sessions import Sessions
-    except ImportError as error:
-        raise _missing(error) from None
+    from decals.apps.sandbox.sessions import Sessions
 
-    token = _token(host)
-    allows_host = (lambda _: True) if token else _is_loopback
-    served = Sessions(command, limit=limit, token=token, allows_host=allows_host)
+    served = Sessions(command, limit=limit, guard=guard)
     with suppress(KeyboardInterrupt), _port_in_use_reported(port):
         return asyncio.run(
-            served.serve(host, port, lambda found: _announce(host, found, token, open_browser=browser))
+            served.serve(host, port, lambda found: _announce(guard, found, open_browser=browser))
         )
     return 0
 
@@ -218,10 +222,16 @@ def _show_window(command: list[str]) -> int:
         webview: Any = import_module("webview")
     except ImportError:
         raise _missing_window("pywebview") from None
+    token = secrets.token_urlsafe(24)
     with subprocess.Popen(command, stdin=PIPE, stdout=PIPE, text=True) as process:
+        assert process.stdin is not None
         assert process.stdout is not None
+        with suppress(BrokenPipeError):  # it has ended already
+            process.stdin.write(f"{token}\n")
+            process.stdin.flush()
         url = next((line.strip() for line in process.stdout if line.startswith("http://")), "")
         if url:
+            url = f"{url}?token={token}"
             webview.create_window(TITLE, url, width=WINDOW_SIZE[0], height=WINDOW_SIZE[1])
             try:
                 webview.start(gui="qt" if sys.platform == "linux" else None)
@@ -260,6 +270,14 @@ def _as_arguments(options: dict[str, Any]) -> list[str]:
     return arguments
 
 
+def _read_token() -> str:
+    """Return the first line of the standard input, and read no more of it."""
+    line = b""
+    while (byte := os.read(sys.stdin.fileno(), 1)) not in (b"", b"\n"):
+        line += byte
+    return line.decode("ascii", "replace").strip()
+
+
 def _end_with_input() -> None:
     """End this process as Ctrl + C does, once the server of sessions closes its standard input."""
     while os.read(sys.stdin.fileno(), 4096):  # Python cannot end while a thread is in its buffered reader
@@ -286,36 +304,41 @@ def _missing(error: ImportError) -> MissingPackage:
     )
 
 
-def _protect(server: Any, host: str) -> str:
-    """Ask every browser for a new token, unless only this machine is served, and return the token."""
-    if token := _token(host):
-        server.cli.set_defaults(authKey=token)
-    return token
-
-
-def _token(host: str) -> str:
-    """Return a new token, or nothing if only this machine is served."""
-    return "" if _is_loopback(host) else f"t{secrets.token_urlsafe(24)}"  # digits alone are read as a number
-
-
-def _is_loopback(host: str) -> bool:
+def _guard(host: str, allow_hosts: list[str] | None, token: str, *, framed: bool = False) -> Any:
+    """Return the guard of the server; a token may come from the program that started it."""
     try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:  # a name
-        return host == "localhost"
+        from decals.apps.sandbox.guard import HOST_NAME, TOKEN_TEXT, Guard
+    except ImportError as error:
+        raise _missing(error) from None
+    for name in allow_hosts or ():
+        if HOST_NAME.fullmatch(name) is None:
+            raise InvalidInput(f"--allow-host: expected a name such as example.org, got {name!r}")
+    if token and TOKEN_TEXT.fullmatch(token) is None:
+        raise InvalidInput(
+            f"{TOKEN}: expected at least 16 letters, digits, - and _; leave it out for a new token"
+        )
+    return Guard(host, allow_hosts=allow_hosts or (), token=token, framed=framed)
 
 
-def _url(host: str, port: int, token: str) -> str:
-    query = f"?secret={token}" if token else ""
-    shown = socket.gethostname() if host in ANY_ADDRESS else f"[{host}]" if ":" in host else host
-    return f"http://{shown}:{port}/{query}"
-
-
-def _announce(host: str, port: int, token: str, *, open_browser: bool) -> None:
+def _announce(guard: Any, port: int, *, open_browser: bool) -> None:
     """Print the URL of the page, and open it in the default browser."""
-    url = _url(host, port, token)
+    shown = guard.url(port) if guard.own_token else guard.address(port)
     Console(stderr=True, soft_wrap=True).print(
-        f"sandbox at {url} (Ctrl + C ends it)", highlight=False, markup=False
+        f"sandbox at {shown} (Ctrl + C ends it)", highlight=False, markup=False
     )
     if open_browser:
-        webbrowser.open(url)
+        webbrowser.open(_link_file(guard.url(port)).as_uri())
+
+
+def _link_file(url: str) -> Path:
+    """Return a file that leads a browser to a URL: other accounts see the arguments of its process."""
+    folder = Path(tempfile.mkdtemp(prefix="implicit-decals-"))  # for this account only
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    file = folder / "open.html"
+    file.write_text(
+        "<!doctype html><meta charset='utf-8'><meta name='referrer' content='no-referrer'>"
+        f"<meta http-equiv='refresh' content='0;url={html.escape(url)}'>"
+        f"<p><a href='{html.escape(url)}'>Open the sandbox</a></p>",
+        encoding="utf-8",
+    )
+    return file

@@ -9,23 +9,48 @@ from typing import Any
 from aiohttp import WSCloseCode, web
 from wslink.websocket import LinkProtocol
 
+from decals.apps.sandbox.guard import ASKING, Guard
+
 MOUSE = "viewport.mouse.interaction"
 TRIGGER = "trame.trigger"
 STATE = "trame.state.get"
 UPDATE = "trame.state.update"
+SIZE = "viewport.image.push.original.size"
+"""Message with the size of a browser's view."""
+
 LIFECYCLE = "trame.lifecycle.update"
-LOOKS = frozenset(
+ERROR = "trame.error.client"
+WATCHES = frozenset(
     {
         STATE,
         LIFECYCLE,
-        "trame.error.client",
         "viewport.image.push",
         "viewport.image.push.observer.add",
         "viewport.image.push.quality.get",
     }
 )
-"""Messages of browsers that only watch."""
+"""Messages of browsers that only watch, which change nothing; all others of theirs are left out."""
 
+DRIVES = WATCHES | {
+    ERROR,
+    MOUSE,
+    SIZE,
+    TRIGGER,
+    UPDATE,
+    "viewport.image.animation.fps.get",
+    "viewport.image.animation.fps.max",
+    "viewport.image.animation.start",
+    "viewport.image.animation.stop",
+    "viewport.image.push.enabled",
+    "viewport.image.push.invalidate.cache",
+    "viewport.image.push.observer.remove",
+    "viewport.image.push.quality",
+    "viewport.mouse.zoom.wheel",
+}
+"""Messages of browsers that edit; trame and VTK have more, such as one that ends the server."""
+
+LIFE = frozenset({"client_connected", "client_exited", "client_unmounted"})
+"""What a page says of itself."""
 
 OURS = frozenset({TRIGGER, UPDATE, LIFECYCLE})
 """Messages that call functions of the page, whose errors are shown."""
@@ -35,10 +60,16 @@ OF_SERVER = "driving", "trame__template"
 
 
 MAX_MESSAGE_BYTES = 250_000_000
-"""Longest message: the server reserves as much as its first part announces."""
+"""Longest messages whose parts may be under way: the server reserves as much as a first part announces."""
 
-SIZE = "viewport.image.push.original.size"
-"""Message with the size of a browser's view."""
+MAX_WATCHER_BYTES = 20_000
+"""Likewise for a browser that only watches."""
+
+MAX_ERROR_LENGTH = 1000
+"""Characters of an error of a page that are shown."""
+
+HELLO_SECONDS = 15.0
+"""Time in which a browser must have shown that it may connect."""
 
 RANGES = {
     "viewport.image.animation.fps.max": ((1, 240),),
@@ -52,6 +83,11 @@ MAX_WAITING_BYTES = 32_000_000
 
 PICTURES, HEAD_BYTES = b"viewport.image.push.subscription", 256
 """Name that messages with pictures have among their first bytes."""
+
+
+def shown_error(message: object) -> str:
+    """Return an error of a page as a line of a terminal: a page may send control characters."""
+    return repr(message)[:MAX_ERROR_LENGTH]
 
 
 class Outbox:
@@ -128,15 +164,21 @@ async def _compressed(
     return response
 
 
-def _closing(handler: Any, receive: Callable[..., Awaitable[None]]) -> Callable[..., Awaitable[None]]:
-    """Return a receiver of messages that ends connections whose bytes are no message."""
+def _closing(
+    handler: Any, receive: Callable[..., Awaitable[None]], limit_of: Callable[[str], int]
+) -> Callable[..., Awaitable[None]]:
+    """Return a receiver of messages that ends connections whose bytes are no message, or too many."""
 
     async def received(binary: bool, message: Any, client: str) -> None:
-        chunks = handler.unchunkers[client]
+        chunks, limit = handler.unchunkers[client], limit_of(client)
         chunks.max_message_size = min(chunks.max_message_size, MAX_MESSAGE_BYTES)
+        if client in handler.authentified_client_ids:
+            chunks.max_message_size = limit
         try:
             assert binary
             await receive(binary, message, client)
+            waiting = chunks.pending_messages.values()
+            assert sum(len(part["content"]) for part in waiting) <= limit
         except Exception:  # unpacking raises anything; errors of calls have been answered
             await handler.connections[client].close(code=WSCloseCode.INVALID_TEXT)
 
@@ -146,23 +188,27 @@ def _closing(handler: Any, receive: Callable[..., Awaitable[None]]) -> Callable[
 class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
     """Checks the messages of all browsers of a server before its functions are called.
 
-    Malformed messages are refused without an exception. If the page is shared, only the messages of the
-    browser that drives change something; the others see what it does. The driver passes control to the
-    browser that asked first. If the driver leaves, the next browser drives.
+    Malformed messages are refused without an exception, and those that no page sends are left out. If the
+    page is shared, only the messages of the browser that drives change something; the others see what it
+    does. The driver passes control to the browser that asked first. If the driver leaves, the next browser
+    drives.
 
     Parameters
     ----------
     server
         The trame server, before its start.
+    guard
+        Checks the requests of the server. A browser without a cookie sends the token first.
     shared
         One browser drives. Otherwise, all may change everything.
     end_input
         Called after a browser has left that held a button or moved a slider.
     """
 
-    def __init__(self, server: Any, *, shared: bool, end_input: Callable[[], None]) -> None:
+    def __init__(self, server: Any, *, guard: Guard, shared: bool, end_input: Callable[[], None]) -> None:
         super().__init__()
-        self._server, self._shared, self._end_input = server, shared, end_input
+        self._server, self._guard, self._shared, self._end_input = server, guard, shared, end_input
+        self._strangers: dict[str, tuple[bool, asyncio.Task[None]]] = {}
         self._web: Any = None
         self._numbers: dict[str, int] = {}
         self._outboxes: dict[str, Outbox] = {}
@@ -183,8 +229,9 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         self._web = bound
         bound.config["ws_compress"] = False
         bound.app.middlewares.append(_compressed)
+        self._guard.protect(bound.app)
         for handler in bound._ws_handlers:
-            handler.onMessage = _closing(handler, handler.onMessage)
+            handler.onMessage = _closing(handler, handler.onMessage, self._limit_of)
             for name, (part, call) in handler.functionMap.items():
                 handler.functionMap[name] = part, self._checked(name, call)
 
@@ -194,7 +241,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
             allowed = self._allows(client, name, arguments)
             if not allowed and name != SIZE:
                 return None
-            if allowed and name not in LOOKS:
+            if allowed and name not in WATCHES:
                 self._last_input = client
             try:
                 bound = inspect.signature(call).bind(part, *arguments, **options)
@@ -206,6 +253,8 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
                     return None
             except (TypeError, KeyError, ValueError, AttributeError) as error:
                 return {"error": f"refused: {error}"}
+            if name == ERROR:
+                arguments, options = (shown_error(*bound.args[1:]),), {}
             try:
                 result = call(part, *arguments, **options)
                 result = await result if inspect.isawaitable(result) else result
@@ -231,7 +280,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
             for change in first:
                 if change["key"].startswith(OF_SERVER):
                     raise KeyError(change["key"])
-        elif name == LIFECYCLE and not first.startswith("client"):
+        elif name == LIFECYCLE and first not in LIFE:
             raise ValueError(first)
         for value, limits in zip((first, *others), RANGES.get(name, ()), strict=False):
             if limits is not None and not limits[0] <= value <= limits[1]:
@@ -257,7 +306,29 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
     # -- browsers ---------------------------------------------------------------------------------------
 
     def onConnect(self, _request: Any, client: str) -> None:  # noqa: N802  (wslink's name)
-        """Give a new browser its number, and an outbox."""
+        """Wait for the first message of a new browser."""
+        ending = asyncio.get_running_loop().create_task(self._end_stranger(client), name="first message")
+        self._strangers[client] = ASKING.get().trusted, ending
+
+    async def _end_stranger(self, client: str) -> None:
+        await asyncio.sleep(HELLO_SECONDS)
+        for handler in self._web._ws_handlers:
+            if client in handler.connections:
+                await handler.connections[client].close(code=WSCloseCode.POLICY_VIOLATION)
+
+    async def validateToken(self, token: object, client: str) -> bool:  # noqa: N802  (wslink's name)
+        """Return True if a browser may connect: it has a cookie, or its first message brings the token."""
+        if client in self._strangers:
+            trusted, ending = self._strangers[client]
+            if not (trusted or self._guard.is_token(token)):
+                return False
+            del self._strangers[client]
+            ending.cancel()
+            self._welcome(client)
+        return True
+
+    def _welcome(self, client: str) -> None:
+        """Give a browser its number, and an outbox."""
         for handler in self._web._ws_handlers:
             if client in handler.connections:
                 handler.connections[client] = self._outboxes[client] = Outbox(handler.connections[client])
@@ -269,6 +340,9 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
 
     def onClose(self, client: str) -> None:  # noqa: N802  (wslink's name)
         """End what the browser was doing, and pass control on."""
+        if client in self._strangers:
+            self._strangers.pop(client)[1].cancel()
+            return
         del self._numbers[client]
         self._outboxes.pop(client, None)
         self._resizes.pop(client, None)
@@ -287,15 +361,23 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
 
     # -- the driver -------------------------------------------------------------------------------------
 
+    def _drives(self, client: str) -> bool:
+        return not self._shared or client == self._driver
+
+    def _limit_of(self, client: str) -> int:
+        """Return the number of bytes that a browser may send at once."""
+        return MAX_MESSAGE_BYTES if self._drives(client) else MAX_WATCHER_BYTES
+
     def _allows(self, client: str, name: str, arguments: tuple[Any, ...]) -> bool:
-        asks = name == TRIGGER and arguments[:1] == ("ask_to_drive",)
-        return not self._shared or client == self._driver or name in LOOKS or asks
+        if self._drives(client):
+            return name in DRIVES
+        return name in WATCHES or (name == TRIGGER and arguments == ("ask_to_drive", [], {}))
 
     def driving(self, client: str) -> dict[str, Any]:
         """Return what a browser shows of the driver."""
         return {
             "shared": self._shared,
-            "drives": not self._shared or client == self._driver,
+            "drives": self._drives(client),
             "driver": self._numbers.get(self._driver, 0),
             "number": self._numbers.get(client, 0),
             "browsers": len(self._numbers),

@@ -135,17 +135,19 @@
   setTimeout(() => dark && trame.state.set("theme", "dark"));
 
   // A session that has ended opens again once the server answers.
-  const reopen = async () => {
-    const answer = await fetch("/").catch(() => null);
+  const reopen = async (message) => {
+    const answer = await fetch("./").catch(() => null);
     if (answer?.ok) location.reload();
-    else setTimeout(reopen, 2000);
+    else setTimeout(reopen, 2000, message);
+    if (answer?.status === 403) message.textContent = CLOSED;
   };
+  const CLOSED = "The server has started anew. Open the address that the terminal shows.";
   const ENDED = "The session has ended. Unsaved changes are kept. This page opens them once the server answers.";
   const explainEnd = () => {
     const message = document.querySelector(".trame__message");
     if (message?.textContent.trim() !== "Connection closed") return;
     message.textContent = ENDED;
-    reopen();
+    reopen(message);
   };
 
   // The view shows an image without the text that screen readers ask for; new buttons join their group.

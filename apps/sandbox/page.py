@@ -11,6 +11,7 @@ from trame.widgets import client, html, vuetify3
 from decals.apps.sandbox import panels
 from decals.apps.sandbox.connections import Connections
 from decals.apps.sandbox.folder import thumbnails
+from decals.apps.sandbox.guard import Guard
 from decals.apps.sandbox.panels import DEFAULTS, named
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.apps.sandbox.view import StreamedView
@@ -121,20 +122,37 @@ class Page:
         The trame server.
     window
         The edited window; its plotter is drawn off screen.
+    guard
+        Checks the requests of the server. Default: one for this machine only, with a new token.
     done
         Show a button that saves and ends the server.
     shared
         One browser is the driver, the others watch.
     options
         Options of the `Sandbox`.
+
+    Attributes
+    ----------
+    guard
+        Its URL opens the page.
     """
 
     def __init__(
-        self, server: Any, window: EditWindow, *, done: bool = False, shared: bool = False, **options: Any
+        self,
+        server: Any,
+        window: EditWindow,
+        *,
+        guard: Guard | None = None,
+        done: bool = False,
+        shared: bool = False,
+        **options: Any,
     ) -> None:
         self._server, self._window, self._ends = server, window, done
         self.sandbox = Sandbox(window, **options)
-        self._connections = Connections(server, shared=shared, end_input=self.sandbox.end_input)
+        self.guard = guard or Guard()
+        self._connections = Connections(
+            server, guard=self.guard, shared=shared, end_input=self.sandbox.end_input
+        )
         self._shown: dict[str, Any] = {}
         self._task: asyncio.Task[None] | None = None
         self._end: asyncio.Task[None] | None = None

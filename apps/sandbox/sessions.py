@@ -5,17 +5,15 @@ passes requests and messages on, and ends processes without a browser.
 """
 
 import asyncio
-import hmac
-import secrets
 import time
 from asyncio.subprocess import PIPE, Process
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from html import escape
 from pathlib import Path
-from urllib.parse import urlsplit
 
 from aiohttp import ClientError, ClientSession, ClientWebSocketResponse, WSMsgType, web
+
+from decals.apps.sandbox.guard import ASKING, Guard, new_token, page_of
 
 IDLE_SECONDS = 30 * 60.0
 """A session without a browser is saved and ended after this time."""
@@ -29,17 +27,13 @@ MAX_MEGABYTES = 4000.0
 CHECK_SECONDS = 5.0
 """Time between two looks at idle sessions and their memory."""
 
-COOKIE_SECONDS = 30 * 24 * 3600
-"""Time for which a browser that was closed finds its session again."""
-
 STOP_SECONDS = 20.0
 """Time in which a session must have kept its changes."""
 
-PAGE = (
-    "<!doctype html><html lang='en'><meta charset='utf-8'><title>Sandbox</title>{refresh}"
-    "<meta name='color-scheme' content='light dark'>"
-    "<body style='font: 16px sans-serif; margin: 4em'><p role='status'>{text}</p></body></html>"
-)
+MAX_PART_BYTES = 5_000_000
+"""Longest part of a message of a browser; trame sends longer messages in parts of 4 MiB."""
+
+AGAIN = "The session has ended. Load this page again."
 
 
 class Session:
@@ -50,17 +44,23 @@ class Session:
     number
         Number of the session, from 1.
     process
-        Prints the URL of its page first, and ends when its standard input is closed.
+        Reads a key first, and prints the URL of its page. It ends when its standard input is closed.
 
     Attributes
     ----------
     url
         URL of its page on this machine; empty until it is known.
+    headers
+        Headers with the key, without which the process answers no request.
     """
 
     def __init__(self, number: int, process: Process) -> None:
         self.number, self.url = number, ""
         self._process = process
+        key = new_token()
+        assert process.stdin is not None
+        process.stdin.write(f"{key}\n".encode())  # other accounts see arguments, but no input
+        self.headers = {"Authorization": f"Bearer {key}"}
         self._connections = 0
         self._left_at = time.monotonic()
         self._output = asyncio.get_running_loop().create_task(self._read())
@@ -93,11 +93,11 @@ class Session:
 
     async def relay(self, http: ClientSession, request: web.Request) -> web.WebSocketResponse:
         """Pass messages between a browser and the process until one of them leaves."""
-        browser = web.WebSocketResponse(max_msg_size=0, compress=False)
+        browser = web.WebSocketResponse(max_msg_size=MAX_PART_BYTES, compress=False)
         await browser.prepare(request)
         self._connections += 1
         try:
-            async with http.ws_connect(f"{self.url}ws", max_msg_size=0) as page:
+            async with http.ws_connect(f"{self.url}ws", headers=self.headers, max_msg_size=0) as page:
                 ways = [asyncio.create_task(_pass(*way)) for way in ((browser, page), (page, browser))]
                 await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
                 for way in ways:
@@ -143,27 +143,16 @@ class Sessions:
         Returns the command of a session from its number.
     limit
         Most sessions at the same time.
-    token
-        Part of the URL that browsers must have; empty for none.
-    allows_host
-        Returns False for a name of this machine that no browser uses: a page of another server could have
-        sent the request.
+    guard
+        Checks all requests.
     """
 
-    def __init__(
-        self,
-        command: Callable[[int], Sequence[str]],
-        *,
-        limit: int,
-        token: str = "",
-        allows_host: Callable[[str], bool] = lambda _: True,
-    ) -> None:
-        self._command, self._limit, self._token, self._allows_host = command, limit, token, allows_host
+    def __init__(self, command: Callable[[int], Sequence[str]], *, limit: int, guard: Guard) -> None:
+        self._command, self._limit, self._guard = command, limit, guard
         self._sessions: dict[str, Session] = {}
         self._numbers: dict[str, int] = {}
         self._waiting: Session | None = None
         self._ending: set[Session] = set()
-        self._port = 0
         self._opening = asyncio.Lock()
 
     async def serve(self, host: str, port: int, ready: Callable[[int], None]) -> int:
@@ -172,7 +161,8 @@ class Sessions:
         ``ready`` is called with the port once the address can be opened. The first session starts at once.
         """
         self._waiting = first = await self._start(1)
-        app = web.Application(middlewares=[self._check])
+        app = web.Application()
+        self._guard.protect(app)
         app.router.add_get("/ws", self._socket)
         app.router.add_get("/{path:.*}", self._get)
         runner = web.AppRunner(app)
@@ -180,11 +170,10 @@ class Sessions:
         async with ClientSession(auto_decompress=False) as self._http:
             try:
                 await web.TCPSite(runner, host, port).start()
-                self._port = runner.addresses[0][1]
                 while not first.url and first.exit_code is None:
                     await asyncio.sleep(0.02)
                 if first.url:
-                    ready(self._port)
+                    ready(runner.addresses[0][1])
                     await self._watch()
                 return first.exit_code or 0
             finally:
@@ -223,60 +212,32 @@ class Sessions:
 
     # -- requests ---------------------------------------------------------------------------------------
 
-    @web.middleware
-    async def _check(
-        self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
-    ) -> web.StreamResponse:
-        """Refuse requests that other pages have sent, and browsers without the token."""
-        origin = request.headers.get("Origin")
-        if origin is not None and urlsplit(origin).netloc != request.host:
-            raise web.HTTPForbidden(text="expected a request of the page itself")
-        if not self._allows_host(urlsplit(f"//{request.host}").hostname or ""):
-            raise web.HTTPForbidden(text="expected the address of this machine")
-        known = request.cookies.get(self._cookie, "") in self._numbers
-        if self._token and not known and not self._has_token(request):
-            raise web.HTTPForbidden(text="expected the address with the token that the terminal shows")
-        return await handler(request)
-
-    def _has_token(self, request: web.Request) -> bool:
-        return hmac.compare_digest(request.query.get("secret", "").encode(), self._token.encode())
-
-    @property
-    def _cookie(self) -> str:
-        return f"implicit-decals-{self._port}"
-
     async def _socket(self, request: web.Request) -> web.StreamResponse:
-        session = self._sessions.get(request.cookies.get(self._cookie, ""))
+        session = self._sessions.get(ASKING.get().browser)
         if session is None or not session.url:
             raise web.HTTPServiceUnavailable(text="expected an open session; load the page again")
         return await session.relay(self._http, request)
 
     async def _get(self, request: web.Request) -> web.StreamResponse:
-        """Return a file of the browser's session; the page itself starts one."""
-        key = request.cookies.get(self._cookie, "")
-        is_page = request.path in ("/", "/index.html")
-        if key not in self._numbers:
-            key = secrets.token_urlsafe(24)
-        async with self._opening:  # a browser may ask twice at once
-            opened = not is_page or await self._open(key)
-        if not opened:
-            return _page(
-                f"{self._limit} sessions are open already. Close one, and load this page again.", 503
-            )
-        session = self._sessions.get(key)
+        """Return a file of the browser's session; a user that opens the page starts one."""
+        asking = ASKING.get()
+        browser = asking.browser
+        if asking.visits and request.method == "GET" and request.path in ("/", "/index.html"):
+            async with self._opening:  # a browser may ask twice at once
+                if not await self._open(browser):
+                    limit = f"{self._limit} sessions are open already"
+                    return page_of(f"{limit}. Close one, and load this page again.", 503)
+        session = self._sessions.get(browser)
         if session is None:
-            raise web.HTTPNotFound
+            return page_of(AGAIN, 200 if request.path == "/" else 404)
         if session.exit_code is not None:
-            del self._sessions[key]
-            return _page("The session has ended. Load this page again.", 503)
-        if session.url and request.path == "/":
-            response = web.Response(status=302, headers={"Location": "/index.html"})  # without the token
-        elif session.url:
-            response = await self._file(session, request)
-        else:
-            response = _page("The session starts. This takes some seconds.", refresh=True)
-        response.set_cookie(self._cookie, key, max_age=COOKIE_SECONDS, httponly=True, samesite="Strict")
-        return response
+            del self._sessions[browser]
+            return page_of(AGAIN, 503)
+        if not session.url:
+            return page_of("The session starts. This takes some seconds.", refresh=".", seconds=1)
+        if request.path == "/":
+            return web.Response(status=302, headers={"Location": "index.html"})
+        return await self._file(session, request)
 
     async def _open(self, key: str) -> bool:
         """Start the session of a browser, or return False if there is no place for it."""
@@ -297,18 +258,11 @@ class Sessions:
 
     async def _file(self, session: Session, request: web.Request) -> web.Response:
         """Return a file of a session, in the encoding in which it comes."""
-        encoding = {"Accept-Encoding": request.headers.get("Accept-Encoding", "identity")}
+        headers = {**session.headers, "Accept-Encoding": request.headers.get("Accept-Encoding", "identity")}
         try:
-            async with self._http.get(f"{session.url.rstrip('/')}{request.path}", headers=encoding) as answer:
+            async with self._http.get(f"{session.url.rstrip('/')}{request.path}", headers=headers) as answer:
                 names = ("Content-Type", "Content-Encoding")
                 kept = {name: answer.headers[name] for name in names if name in answer.headers}
                 return web.Response(body=await answer.read(), status=answer.status, headers=kept)
         except ClientError:
-            return _page("The session has ended. Load this page again.", 503)
-
-
-def _page(text: str, status: int = 200, *, refresh: bool = False) -> web.Response:
-    again = "<meta http-equiv='refresh' content='1'>" if refresh else ""
-    return web.Response(
-        text=PAGE.format(text=escape(text), refresh=again), status=status, content_type="text/html"
-    )
+            return page_of(AGAIN, 503)

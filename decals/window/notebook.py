@@ -1,11 +1,15 @@
 """Editing in a notebook: the page of the sandbox, served by a process of its own, below the cell."""
 
+import json
+import secrets
 import signal
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import reduce
+from html import escape
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -21,6 +25,30 @@ OPTIONS = ("--port", "0", "--no-browser", "--trust", "--done")
 
 HEIGHT = 720
 """Height of the page below the cell, in pixels."""
+
+SCRIPT = """
+(async () => {
+  const place = document.getElementById($name), link = place.querySelector("a");
+  let url = new URL($url);
+  const data = document.getElementById("jupyter-config-data");
+  if (data) {  // a proxy of Jupyter reaches the page from other machines, too
+    const near = new URL(`${JSON.parse(data.textContent).baseUrl}proxy/${url.port}/`, location.href);
+    const answer = await fetch(near, {method: "HEAD"}).catch(() => null);
+    if (answer && answer.status !== 404) {
+      near.search = url.search;
+      url = near;
+    }
+  }
+  link.href = url.href;
+  const origins = [location.origin, ...(location.ancestorOrigins || [])];
+  url.searchParams.set("frame", origins.filter((one) => one !== "null").join(" "));
+  const frame = document.createElement("iframe");
+  Object.assign(frame, {src: url.href, width: "100%", height: $height});
+  frame.style.border = "0";
+  place.prepend(frame);
+})();
+"""
+"""Shows the page in a frame; without scripts, the link alone shows."""
 
 STOP_SECONDS = 15.0
 """Time in which an interrupted page must have kept its changes."""
@@ -82,4 +110,13 @@ def _served(file: Path) -> Iterator[tuple[Any, str]]:
 def _display(url: str) -> Any:
     """Show the page, and return the handle by which something else takes its place."""
     shown: Any = import_module("IPython.display")  # a notebook has it
-    return shown.display(shown.IFrame(url, "100%", HEIGHT), display_id=True)
+    return shown.display(shown.HTML(frame_html(url)), display_id=True)
+
+
+def frame_html(url: str) -> str:
+    """Return HTML that shows the page of a URL with a token in a frame, which gets the notebook's origin."""
+    name = f"decals-{secrets.token_hex(8)}"
+    values = {"name": json.dumps(name), "url": json.dumps(url).replace("<", "\\u003c"), "height": str(HEIGHT)}
+    script = reduce(lambda text, item: text.replace(f"${item[0]}", item[1]), values.items(), SCRIPT)
+    link = f'<a href="{escape(url)}" target="_blank" rel="noopener noreferrer">Open the page in a tab</a>'
+    return f'<div id="{name}">{link}</div><script>{script}</script>'

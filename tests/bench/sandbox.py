@@ -96,7 +96,7 @@ async def _in_browser(
     from tests.frontends.browsing import PICTURE, served, until
 
     on_server = _clock(page, window)
-    async with served(server, size=SIZE) as browser:
+    async with served(server, size=SIZE, guard=page.guard) as browser:
         await until(lambda: not window.subplot.warming_up)
         figures = {"first_picture_warm_s": time.perf_counter() - began}
         await browser.wait_for_selector(IMAGE, state="attached")

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from PIL import Image
-from playwright.async_api import Page, async_playwright
+from playwright.async_api import ConsoleMessage, Page, async_playwright
+
+from decals.apps.sandbox.guard import Guard
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 SIZE = (500, 380)
@@ -23,6 +25,9 @@ ABOVE = "svg, .brush { visibility: hidden !important }"
 ERRORS = """window.pageErrors = [];
 window.addEventListener('error', event => window.pageErrors.push(event.message));"""
 """Collects the errors that a page shows in its console, also those of observers."""
+WORDS = "error", "warning"
+"""What no page may write to its console."""
+REFUSED = "net::ERR_CONNECTION_REFUSED"
 LOSS = 2.0
 """Levels of 255 in the mean that JPEG may take away."""
 
@@ -33,26 +38,37 @@ def browser_path() -> str | None:
 
 
 @asynccontextmanager
-async def opened(url: str, *, size: tuple[int, int] = SIZE) -> AsyncIterator[Page]:
-    """A page in a browser without a screen, which must end without an error."""
+async def opened(url: str, *, size: tuple[int, int] = SIZE, ends: bool = False) -> AsyncIterator[Page]:
+    """A page in a browser without a screen, which must end without an error; its server may end before."""
     async with async_playwright() as player:
         browser = await player.chromium.launch(
             executable_path=browser_path(), args=["--no-sandbox", "--disable-gpu"]
         )
         page = await browser.new_page(viewport={"width": size[0], "height": size[1]})
         page.set_default_timeout(1000 * PATIENCE)
+        written: list[str] = []
+        page.on("console", lambda message: written.extend(lines_of(message)))
         await page.add_init_script(ERRORS)
         await page.goto(url)
         await page.wait_for_selector(PICTURE)
         yield page
         errors = await page.evaluate("window.pageErrors")
         assert errors == [], errors
+        assert [line for line in written if not (ends and REFUSED in line)] == []
         await browser.close()
 
 
+def lines_of(message: ConsoleMessage) -> list[str]:
+    """What a page writes to its console, and where, if it is an error or a warning."""
+    place = message.location.get("url")
+    return [f"{message.type}: {message.text} ({place})"] if message.type in WORDS else []
+
+
 @asynccontextmanager
-async def served(server: Any, *, size: tuple[int, int] = SIZE) -> AsyncIterator[Page]:
-    """The page of a trame server of this process."""
+async def served(
+    server: Any, *, size: tuple[int, int] = SIZE, guard: Guard | None = None
+) -> AsyncIterator[Page]:
+    """The page of a trame server of this process, which may have a guard."""
     task = server.start(
         exec_mode="task",
         host="127.0.0.1",
@@ -62,7 +78,8 @@ async def served(server: Any, *, size: tuple[int, int] = SIZE) -> AsyncIterator[
         show_connection_info=False,
     )
     await server.ready
-    async with opened(f"http://127.0.0.1:{server.port}/", size=size) as page:
+    url = guard.url(server.port) if guard else f"http://127.0.0.1:{server.port}/"
+    async with opened(url, size=size) as page:
         yield page
     await server.stop()
     await task

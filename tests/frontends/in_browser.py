@@ -171,7 +171,7 @@ async def sandbox(picture: str | None = None) -> None:
         plane = sandbox_page.sandbox.display.options.slice
         return plane and plane.normal
 
-    async with served(server, size=(1280, 800)) as browser:
+    async with served(server, size=(1280, 800), guard=sandbox_page.guard) as browser:
         browser.on("request", lambda request: requests.append(request.url))
         first = await shows(browser, plotter)
         await browser.get_by_text("Point").nth(1).click()
@@ -276,7 +276,7 @@ async def creature(picture: str | None = None) -> None:
     window = EditWindow(empty_scene(["scale"], UPRIGHT["y"]), path=folder / "scene.json", plotter=plotter)
     window.show()
     sandbox_page = SandboxPage(server, window, folder=folder, start=True)
-    async with served(server, size=(1280, 800)) as browser:
+    async with served(server, size=(1280, 800), guard=sandbox_page.guard) as browser:
         user = Builder(browser, window)
         await accessible(browser)
         await browser.get_by_label("New model").click()
@@ -345,8 +345,8 @@ async def creature(picture: str | None = None) -> None:
     fresh = pv.Plotter(off_screen=True, window_size=plotter.window_size)
     with EditWindow(decals.load_scene(file), plotter=fresh) as loaded:
         loaded.show()
-        SandboxPage(get_server("again", client_type="vue3"), loaded, folder=folder)
-        async with served(get_server("again"), size=(1280, 800)) as browser:
+        guard = SandboxPage(get_server("again", client_type="vue3"), loaded, folder=folder).guard
+        async with served(get_server("again"), size=(1280, 800), guard=guard) as browser:
             async with asyncio.timeout(PATIENCE):  # the first picture may come before the page has its layout
                 while (again := await shows(browser, fresh)).shape != last.shape:
                     await asyncio.sleep(0.1)
@@ -428,7 +428,7 @@ async def sandbox_start(picture: str | None = None) -> None:
     window = EditWindow(empty_scene(["scale"], UPRIGHT["y"]), path=folder / "scene.json", plotter=plotter)
     window.show()
     sandbox_page = SandboxPage(server, window, folder=folder, start=True)
-    async with served(server, size=(1280, 800)) as browser:
+    async with served(server, size=(1280, 800), guard=sandbox_page.guard) as browser:
         await browser.get_by_label("sample creature").click()
         await until(lambda: len(window.document.decals) == 500)
         await shows(browser, plotter)
@@ -503,7 +503,7 @@ async def panels(picture: str | None = None) -> None:
     async def done(label: str) -> None:
         await until(lambda: window.session.labels[-1:] == (label,) and not window.background.busy)
 
-    async with served(server, size=(1280, 800)) as browser:
+    async with served(server, size=(1280, 800), guard=sandbox_page.guard) as browser:
         await rename("Point", "body")
         await rename("layer 0", "armour")
         await rename("model 1", "snail")
@@ -589,7 +589,7 @@ async def lab(picture: str | None = None) -> None:
     window.show()
     lab_page = LabPage(server, window, load_lessons(LESSONS))
     requests: list[str] = []
-    async with served(server, size=(1280, 800)) as browser:
+    async with served(server, size=(1280, 800), guard=lab_page.guard) as browser:
         browser.on("request", lambda request: requests.append(request.url))
         for number, attempts in enumerate(ANSWERS):
             await choose(browser, "lesson", lab_page.lab.values()["lab_titles"][number]["title"])
@@ -697,7 +697,8 @@ async def ended() -> None:
         file = Path(folder) / "scene.json"
         decals.save_scene(empty_scene(["scale"], UPRIGHT["y"]), file)
         with notebook._served(file) as (process, url):
-            async with opened(url) as browser:
+            async with opened(url, ends=True) as browser:
+                assert "token" not in browser.url
                 await browser.emulate_media(color_scheme="dark")
                 await browser.reload()
                 await browser.locator(".v-theme--dark").first.wait_for()
@@ -713,11 +714,11 @@ async def shared() -> None:
     window = EditWindow(empty_scene(["scale"], UPRIGHT["y"]), plotter=pv.Plotter(off_screen=True))
     window.show()
     server = get_server("shared", client_type="vue3")
-    SandboxPage(server, window, folder=Path(tempfile.mkdtemp()), start=True, shared=True)
+    guard = SandboxPage(server, window, folder=Path(tempfile.mkdtemp()), start=True, shared=True).guard
     size = (1280, 800)
-    async with served(server, size=size) as driver:
+    async with served(server, size=size, guard=guard) as driver:
         await driver.get_by_label("New model").wait_for()
-        async with opened(f"http://127.0.0.1:{server.port}/", size=size) as watcher:
+        async with opened(guard.url(server.port), size=size) as watcher:
             await watcher.get_by_role("button", name="Ask for control").click()
             assert not await watcher.get_by_label("New model").is_visible()
             await driver.keyboard.press("Escape")

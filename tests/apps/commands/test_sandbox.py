@@ -1,15 +1,17 @@
 """``implicit-decals sandbox`` without a browser: what it opens, and what it says."""
 
-import argparse
-import asyncio
 import errno
+import os
+import re
+import socket
 import subprocess
 import sys
-import unittest.mock
 import webbrowser
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import pytest
 
@@ -31,7 +33,6 @@ class Server:
     port = 8123
 
     def __init__(self) -> None:
-        self.cli = argparse.ArgumentParser()
         self.controller = self
         self.on_server_ready = self
         self.ready: list[Any] = []
@@ -41,7 +42,7 @@ class Server:
         self.ready.append(call)
 
     def start(self, **options: Any) -> None:
-        self.options = options
+        self.options |= options
         for call in self.ready:
             call()
 
@@ -50,9 +51,22 @@ class Server:
 def opened(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Server, EditWindow]]:
     """Return the list of servers and windows that `sandbox` opens."""
     pages: list[tuple[Server, EditWindow]] = []
-    toolkit = (lambda *_, **__: Server()), lambda server, window, **_: pages.append((server, window))
+
+    def page(server: Server, window: EditWindow, **options: Any) -> None:
+        server.options = options
+        pages.append((server, window))
+
+    toolkit = (lambda *_, **__: Server()), page
     monkeypatch.setattr(sandbox_module, "_toolkit", lambda _: toolkit)
     return pages
+
+
+@pytest.fixture
+def urls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Return the list of addresses that a browser opens."""
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    return opened
 
 
 def test_the_sandbox_opens_models_and_serves_this_machine_only(
@@ -71,38 +85,50 @@ def test_the_sandbox_opens_models_and_serves_this_machine_only(
 @pytest.mark.parametrize(
     ("host", "shown"),
     [
-        ("127.0.0.1", None),
-        ("localhost", None),
-        ("::1", None),
+        ("127.0.0.1", "127.0.0.1"),
+        ("localhost", "localhost"),
+        ("::1", "[::1]"),
         ("0.0.0.0", ""),
         ("192.168.0.9", "192.168.0.9"),
     ],
 )
-def test_other_machines_need_a_token(
+def test_the_url_has_a_token_that_no_argument_of_a_process_shows(
     host: str,
-    shown: str | None,
+    shown: str,
+    folder: Path,
+    opened: list[tuple[Server, EditWindow]],
+    capsys: Capture,
+    urls: list[str],
+) -> None:
+    assert run(["sandbox", "--host", host, "--port", "0", "--share"]) == 0
+    server = opened[0][0]
+    assert (server.options["host"], server.options["open_browser"]) == (host, False)
+    (file,) = urls
+    assert file.startswith("file://")
+    path = Path(url2pathname(urlsplit(file).path))
+    (address,) = re.findall(r"url=(http[^']*)", path.read_text(encoding="utf-8"))
+    assert address in capsys.readouterr().err
+    token = address.removeprefix(f"http://{shown or socket.gethostname()}:8123/?token=")
+    assert len(token) > 30
+    assert not token.isdigit()
+    if os.name == "posix":
+        assert path.parent.stat().st_mode & 0o77 == 0
+
+
+def test_a_program_that_starts_the_server_may_give_the_token(
     folder: Path,
     opened: list[tuple[Server, EditWindow]],
     capsys: Capture,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    urls: list[str] = []
-    monkeypatch.setattr(webbrowser, "open", urls.append)
-    assert run(["sandbox", "--host", host, "--port", "0", "--share"]) == 0
-    server = opened[0][0]
-    assert server.options["host"] == host
-    token = server.cli.get_default("authKey")
-    assert server.options["open_browser"] is False
-    (url,) = urls
-    assert url in capsys.readouterr().err
-    if shown is None:
-        assert token is None
-        assert url == f"http://{f'[{host}]' if ':' in host else host}:8123/"
-        return
-    assert len(token) > 30
-    assert not token.isdigit()
-    assert url.endswith(f":8123/?secret={token}")
-    assert shown in url
+    monkeypatch.setenv(sandbox_module.TOKEN, "0123456789abcdef")
+    assert run(["sandbox", "--share", "--no-browser"]) == 0
+    assert opened[0][0].options["guard"].token == "0123456789abcdef"
+    assert sandbox_module.TOKEN not in os.environ
+    assert "0123456789abcdef" not in capsys.readouterr().err  # a log may be read by others
+    monkeypatch.setenv(sandbox_module.TOKEN, "short")
+    assert run(["sandbox", "--share", "--no-browser"]) == 2
+    assert "expected at least 16 letters, digits, - and _" in capsys.readouterr().err
 
 
 def test_each_session_has_its_own_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -112,9 +138,9 @@ def test_each_session_has_its_own_file(folder: Path, monkeypatch: pytest.MonkeyP
     class Sessions:
         """Stands for the server: it asks for the commands of sessions."""
 
-        def __init__(self, command: Any, *, limit: int, token: str, allows_host: Any) -> None:
-            assert (limit, token) == (3, "")
-            assert [allows_host(host) for host in ("localhost", "::1", "a.example")] == [True, True, False]
+        def __init__(self, command: Any, *, limit: int, guard: Any) -> None:
+            assert limit == 3
+            assert guard.url(8080).startswith("http://127.0.0.1:8080/?token=")
             self.command = command
 
         async def serve(self, host: str, port: int, _ready: Any) -> int:
@@ -144,39 +170,6 @@ def test_a_session_of_the_lab_starts_again_in_the_lab(folder: Path) -> None:
     assert command(2) == first
 
 
-def test_a_server_refuses_clients_without_its_token() -> None:
-    pytest.importorskip("trame")
-    from trame.app import get_server
-    from trame_server.client import Client, ConnectionStatus
-
-    async def connected(url: str, **config: Any) -> bool:
-        client = Client(url)
-        task = asyncio.create_task(client.connect(**config))
-        while not task.done():
-            await asyncio.sleep(0.01)
-            if client.connected == ConnectionStatus.CONNECTED:  # not already CONNECTING
-                await client.disconnect()
-                await task
-                return True
-        return task.exception() is None
-
-    async def serve() -> list[bool]:
-        server = get_server("token", client_type="vue3")
-        token = sandbox_module._protect(server, "10.0.0.9")
-        task = server.start(
-            exec_mode="task", host="127.0.0.1", port=0, timeout=0, open_browser=False, disable_logging=True
-        )
-        await server.ready
-        url = f"ws://127.0.0.1:{server.port}/ws"
-        results = [await connected(url, secret=secret) for secret in ("wslink-secret", "", token)]
-        await server.stop()
-        await task
-        return results
-
-    with unittest.mock.patch.object(sys, "argv", ["implicit-decals"]):
-        assert asyncio.run(serve()) == [False, False, True]
-
-
 def test_a_window_of_its_own_shows_a_session(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
 ) -> None:
@@ -190,10 +183,16 @@ def test_a_window_of_its_own_shows_a_session(
         WebViewException=LookupError,
     )
     monkeypatch.setitem(sys.modules, "webview", window)
-    program = "import sys; print('log\\nhttp://127.0.0.1:1/', flush=True); sys.stdin.read(); sys.exit(3)"
+    program = (
+        "import sys; token = input(); print(f'log\\nhttp://127.0.0.1:{len(token)}/', flush=True); "
+        "sys.stdin.read(); sys.exit(3)"
+    )
     monkeypatch.setattr(sandbox_module, "_commands", lambda *_: lambda _: [sys.executable, "-c", program])
     assert run(["sandbox", "--desktop"]) == 3
-    assert shown == [(sandbox_module.TITLE, "http://127.0.0.1:1/"), "start"]
+    title, url = shown[0]
+    address, token = url.split("?token=")
+    assert (title, address, shown[1]) == (sandbox_module.TITLE, f"http://127.0.0.1:{len(token)}/", "start")
+    assert len(token) > 30
     window.start = lambda gui: [][0]  # pywebview alone draws no window on Linux
     assert run(["sandbox", "--desktop"]) == 2
     assert "needs Qt; install it with: pip install 'pywebview[qt]'" in capsys.readouterr().err
@@ -223,7 +222,7 @@ def test_without_trame_a_line_says_what_to_install(
 ) -> None:
     monkeypatch.setitem(sys.modules, "trame.app", None)
     monkeypatch.setitem(sys.modules, "aiohttp", None)
-    monkeypatch.delitem(sys.modules, "decals.apps.sandbox.sessions", raising=False)
+    monkeypatch.delitem(sys.modules, "decals.apps.sandbox.guard", raising=False)
     for options in ([], ["--share"]):
         assert run(["sandbox", *options]) == 2
     assert "pip install 'implicit-decals[browser]'" in capsys.readouterr().err

@@ -47,15 +47,17 @@ class Browser:
     def __init__(self, page: Any, server: Any) -> None:
         self._page, self._server = page, server
 
-    async def open(self, token: object = "wslink-secret") -> "Browser":
+    async def open(self, token: object = None) -> "Browser":
+        """Connect as a page in the frame of a notebook does: the first message brings the token."""
         import aiohttp
         from trame_server.client import WsLinkSession
 
         self._http = aiohttp.ClientSession()
-        self.socket = await self._http.ws_connect(f"ws://127.0.0.1:{self._server.port}/ws", autoping=True)
+        own = f"127.0.0.1:{self._server.port}"
+        self.socket = await self._http.ws_connect(f"ws://{own}/ws", origin=f"http://{own}", autoping=True)
         self._session = WsLinkSession(self.socket)
         self._listens = asyncio.create_task(self._session.listen())
-        answer = await self._session.auth(secret=token)
+        answer = await self._session.auth(secret=self._page.guard.token if token is None else token)
         await asyncio.wait((answer, self._listens), return_when=asyncio.FIRST_COMPLETED)
         if not answer.done() or answer.exception() is not None:
             await self.close()
@@ -111,14 +113,17 @@ def serve(check: Check, **options: Any) -> None:
     """Serve a page with options to a check."""
     from trame.app import get_server
 
+    from decals.apps.sandbox.guard import Guard
     from decals.apps.sandbox.page import Page
 
     async def run(window: EditWindow) -> None:
         server = get_server(f"connections {id(window)}", client_type="vue3")
-        page = Page(server, window, **options)
+        guard = Guard(framed=True)
+        page = Page(server, window, guard=guard, **options)
         network: dict[str, Any] = {"exec_mode": "task", "port": 0, "timeout": 0, "open_browser": False}
         task = server.start(host="127.0.0.1", show_connection_info=False, **network)
         await server.ready
+        await show_in_frame(guard, server.port)
         assert window.subplot.keep_previous_frame
         await check(window, page, lambda *token: Browser(page, server).open(*token))
         await server.stop()
@@ -127,6 +132,18 @@ def serve(check: Check, **options: Any) -> None:
     with EditWindow(covered(), off_screen=True, size=SIZE) as window:
         window.show()  # before the loop begins, as the command does
         asyncio.run(run(window))
+
+
+async def show_in_frame(guard: Any, port: int) -> None:
+    """Ask for the page as the frame of a notebook does."""
+    import aiohttp
+
+    visit = {"Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "iframe", "Sec-Fetch-Site": "cross-site"}
+    url = f"{guard.url(port)}&frame=http://notebook.example"
+    async with aiohttp.ClientSession(headers=visit) as http, http.get(url) as answer:
+        assert answer.status == 200
+        policy = answer.headers["Content-Security-Policy"]
+        assert policy.endswith("frame-ancestors http://notebook.example")
 
 
 async def until(true: Callable[[], object]) -> None:
@@ -255,7 +272,8 @@ def test_the_page_is_small_and_names_no_other_server(vtk_display: None) -> None:
 
         state, base = page._server.state, f"http://127.0.0.1:{page._server.port}/"
         names = ["index.html", "vue.global.js", *state.trame__scripts, *state.trame__styles]
-        async with aiohttp.ClientSession(auto_decompress=False) as client:
+        bearer = {"Authorization": f"Bearer {page.guard.token}"}
+        async with aiohttp.ClientSession(auto_decompress=False, headers=bearer) as client:
             sent = 0
             while names:
                 name = names.pop()

@@ -15,17 +15,23 @@ import aiohttp
 from aiohttp import ClientSession as Client
 
 from decals.apps.sandbox import sessions as module
+from decals.apps.sandbox.guard import Guard
 from decals.apps.sandbox.sessions import Sessions
+
+TOKEN = "0123456789abcdef"
 
 PROGRAM = """
 import asyncio, pathlib, sys
 from aiohttp import web
 async def echo(request):
+    if request.headers.get("Authorization") != "Bearer " + key: raise web.HTTPForbidden
     socket = web.WebSocketResponse(); await socket.prepare(request)
     async for message in socket: await socket.send_bytes(sys.argv[1].encode() + message.data)
     return socket
 async def page(request):
+    if request.headers.get("Authorization") != "Bearer " + key: raise web.HTTPForbidden
     return web.Response(text=f"session {sys.argv[1]} {request.path}", content_type="text/x")
+key = sys.stdin.readline().strip()
 async def main():
     app = web.Application(); app.router.add_get("/ws", echo); app.router.add_get("/{path:.*}", page)
     runner = web.AppRunner(app); await runner.setup(); await web.TCPSite(runner, "127.0.0.1", 0).start()
@@ -39,7 +45,8 @@ asyncio.run(main())
 
 async def started(**options: Any) -> tuple[Sessions, asyncio.Task[int], str]:
     """Start a server of sessions; return also its task and its URL."""
-    sessions = Sessions(lambda number: [sys.executable, "-c", PROGRAM, str(number)], **options)
+    guard = Guard(token=TOKEN)
+    sessions = Sessions(lambda number: [sys.executable, "-c", PROGRAM, str(number)], guard=guard, **options)
     port: asyncio.Future[int] = asyncio.get_running_loop().create_future()
     task = asyncio.create_task(sessions.serve("127.0.0.1", 0, port.set_result))
     return sessions, task, f"http://127.0.0.1:{await port}"
@@ -64,7 +71,13 @@ def serve(check: Callable[[Sessions, str], Awaitable[None]], **options: Any) -> 
 
 
 def browser() -> Client:
-    return Client(cookie_jar=aiohttp.CookieJar(unsafe=True))  # cookies of a numeric address, too
+    """Return a client that opens pages as a user does, and keeps the cookies of a numeric address too."""
+    visit = {"Sec-Fetch-Mode": "navigate", "Sec-Fetch-Site": "none", "Sec-Fetch-Dest": "document"}
+    return Client(cookie_jar=aiohttp.CookieJar(unsafe=True), headers=visit)
+
+
+async def connected(client: Client, url: str) -> aiohttp.ClientWebSocketResponse:
+    return await client.ws_connect(f"{url}/ws", origin=url)
 
 
 async def text(client: Client, url: str, **options: Any) -> tuple[int, str]:
@@ -75,7 +88,7 @@ async def text(client: Client, url: str, **options: Any) -> tuple[int, str]:
 async def opened(client: Client, url: str) -> str:
     """Return the page once its session has started."""
     async with asyncio.timeout(60):
-        while "starts" in (page := (await text(client, url))[1]):
+        while "starts" in (page := (await text(client, f"{url}/?token={TOKEN}"))[1]):
             await asyncio.sleep(0.02)
     return page
 
@@ -91,11 +104,13 @@ def test_each_browser_has_a_session_of_its_own(folder: Path) -> None:
         async with browser() as one, browser() as two:
             for client, number in ((one, "1"), (two, "2"), (one, "1")):
                 assert await opened(client, url) == f"session {number} /index.html"
-                async with client.get(url) as answer:  # also a browser that was closed meanwhile
+                async with client.get(
+                    f"{url}/index.html"
+                ) as answer:  # also a browser that was closed meanwhile
                     (cookie,) = answer.cookies.values()
                     assert int(cookie["max-age"]) > 7 * 24 * 3600
                 assert (await text(client, f"{url}/a.js"))[1] == f"session {number} /a.js"
-                async with client.ws_connect(f"{url}/ws") as socket:
+                async with await connected(client, url) as socket:
                     await socket.send_bytes(b"x" * 300_000)
                     assert await socket.receive_bytes() == number.encode() + b"x" * 300_000
             assert [path.name for path in folder.iterdir()] == []
@@ -113,9 +128,9 @@ def test_idle_sessions_are_saved_and_ended_and_their_number_is_limited(
         async with browser() as one, browser() as two, browser() as three:
             assert await opened(one, url)
             assert await opened(two, url)
-            status, page = await text(three, url)
+            status, page = await text(three, f"{url}/?token={TOKEN}")
             assert (status, "2 sessions are open" in page) == (503, True)
-            async with two.ws_connect(f"{url}/ws") as socket:  # it is not idle
+            async with await connected(two, url) as socket:  # it is not idle
                 monkeypatch.setattr(module, "IDLE_SECONDS", 0.1)
                 async with asyncio.timeout(30):
                     while not (folder / "saved 1").exists():
@@ -140,7 +155,7 @@ def test_the_server_ends_while_a_page_is_open() -> None:
         _, task, url = await started(limit=1)
         async with browser() as client:
             assert await opened(client, url)
-            async with client.ws_connect(f"{url}/ws") as socket:
+            async with await connected(client, url) as socket:
                 leaving = asyncio.create_task(socket.receive())  # a browser answers the close
                 began = time.monotonic()
                 await ended(task)
@@ -150,27 +165,31 @@ def test_the_server_ends_while_a_page_is_open() -> None:
     assert asyncio.run(run()) < 30.0  # a server that waits for its pages takes a minute
 
 
-def test_requests_of_other_pages_and_without_the_token_are_refused() -> None:
-    async def check(_: Sessions, url: str) -> None:
+def test_a_page_starts_a_session_and_nothing_else_does(folder: Path) -> None:
+    async def check(sessions: Sessions, url: str) -> None:
+        image = {"Sec-Fetch-Mode": "no-cors", "Sec-Fetch-Dest": "image", "Sec-Fetch-Site": "same-origin"}
         async with browser() as one, browser() as two:
-            assert (await text(one, url))[0] == 403
-            assert (await text(one, f"{url}/?secret=no"))[0] == 403
-            await text(one, f"{url}/?secret=key")
             assert await opened(one, url) == "session 1 /index.html"
-            for headers in ({"Origin": "http://other.example"}, {"Host": "other.example"}):
-                assert (await text(one, url, headers=headers))[0] == 403
+            async with two.get(f"{url}/?token={TOKEN}", allow_redirects=False) as answer:
+                assert (answer.status, answer.headers["Location"]) == (303, "./")  # the token is gone
+            for path in ("/", "/index.html", "/a.js"):
+                await text(two, f"{url}{path}", headers=image)
+            await two.head(url)
             with pytest.raises(aiohttp.WSServerHandshakeError):
-                await one.ws_connect(f"{url}/ws", headers={"Origin": "http://other.example"})
-            with pytest.raises(aiohttp.WSServerHandshakeError):
-                await two.ws_connect(f"{url}/ws")
+                await connected(two, url)
+            assert len(sessions._sessions) == 1
+            assert await opened(two, url) == "session 2 /index.html"
+            for path in ("/", "/index.html"):  # a bookmark, a second tab
+                assert await text(one, f"{url}{path}") == (200, "session 1 /index.html")
 
-    serve(check, limit=2, token="key", allows_host=lambda host: host == "127.0.0.1")
+    serve(check, limit=2)
 
 
 def test_a_session_that_cannot_start_ends_the_server() -> None:
     sessions_of_errors = [sys.executable, "-c", "raise SystemExit(2)"]
 
     async def run() -> int:
-        return await Sessions(lambda _: sessions_of_errors, limit=1).serve("127.0.0.1", 0, lambda _: None)
+        sessions = Sessions(lambda _: sessions_of_errors, limit=1, guard=Guard())
+        return await sessions.serve("127.0.0.1", 0, lambda _: None)
 
     assert asyncio.run(run()) == 2

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 from typing import Any
-from urllib.request import urlopen
+from urllib.request import HTTPCookieProcessor, build_opener
 
 import pytest
 
@@ -23,7 +23,9 @@ def test_an_interrupt_of_the_kernel_returns_the_scene(
     pages: list[bytes] = []
 
     def interrupted(url: str) -> None:
-        pages.append(urlopen(url, timeout=20).read())
+        browser = build_opener(HTTPCookieProcessor())
+        browser.addheaders = [("Sec-Fetch-Mode", "navigate"), ("Sec-Fetch-Site", "none")]
+        pages.append(browser.open(url, timeout=20).read())
         raise KeyboardInterrupt
 
     monkeypatch.setattr(window_module, "in_notebook", lambda: True)
