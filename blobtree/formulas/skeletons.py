@@ -157,7 +157,7 @@ def box_to_point(center: wp.vec3, half: wp.float32, tape: Texels, at: wp.int32) 
     return wp.vec2(nearest, farthest) / (point[3] * point[3])
 
 
-BALL_CELLS, TUBE_CELLS, PLATE_CELLS = 1.5, 1.2, 1.0
+BALL_CELLS, TUBE_CELLS, PLATE_CELLS = 1.5, 1.0, 0.9
 """Cells along the radius with which a mesh shows a thin ball, tube or plate: the less it bends the fewer."""
 
 

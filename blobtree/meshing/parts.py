@@ -45,6 +45,9 @@ LEAST_CELL = 1e-5
 SHEET_GROWTH = 16.0
 """Blocks of the next level in each block that a plate crosses; a tube crosses fewer."""
 
+MAX_NAMED_PARTS = 3
+"""Parts that a warning names."""
+
 PART_KERNELS = (measure_parts, place_on_surface, write_polygons, sample_blocks)
 """Kernels of every mesh with thin parts, for `load_together`."""
 
@@ -155,21 +158,23 @@ def _too_thin(tree: ImplicitModel, smallest: float) -> list[tuple[float, Float64
 
 
 def warn_of_thin_parts(tree: ImplicitModel, unresolved: list[tuple[float, Float64Array]]) -> None:
-    """Log a warning that names the thinnest part that is not resolved."""
+    """Log one warning that names the parts that are not resolved, the thinnest first."""
     if not unresolved:
         return
-    size, place = min(unresolved, key=lambda part: part[0])
     lower, upper = tree.support
-    resolution = float((upper - lower).max()) / size
-    more = f" (and {len(unresolved) - 1} more)" if len(unresolved) > 1 else ""
+    longest = float((upper - lower).max())
+    texts: dict[str, str] = {}
+    for size, place in sorted(unresolved, key=lambda part: part[0]):
+        at = ", ".join(f"{x:.4g}" for x in place)
+        wish = f"near ({at}), which needs a resolution of {longest / size:,.0f}"
+        texts.setdefault(_name_of_part(tree, size, place), wish)
+    named = [f"{name} {wish}" for name, wish in list(texts.items())[:MAX_NAMED_PARTS]]
+    more = len(texts) - len(named)
     _logger.warning(
-        "%s near (%s) is too thin for the cells that memory allows: its mesh is not complete%s; it needs "
-        "cells of %.2g, a resolution of %s; make it thicker, or mesh it alone",
-        _name_of_part(tree, size, place),
-        ", ".join(f"{x:.4g}" for x in place),
-        more,
-        size,
-        f"{resolution:,.0f}",
+        "parts are too thin for the cells that memory allows, so their meshes are not complete: %s%s; make "
+        "them thicker, or mesh them alone",
+        ", and ".join(named),
+        f", and {more} more" if more else "",
     )
 
 

@@ -117,8 +117,8 @@ def test_a_part_too_thin_for_memory_is_named_once(caplog: pytest.LogCaptureFixtu
         mesh = polygonize(BALL | Segment((0, 0, 0), (3, 0, 0), radius=0.05) | sheet)
     assert is_closed(mesh.faces)
     (record,) = caplog.records
-    assert "Disc at path (2,)" in record.message
-    assert "resolution of" in record.message
+    assert "Disc at path (2,)" in record.getMessage()
+    assert "resolution of" in record.getMessage()
 
 
 def random_points(seed: int) -> Float64Array:

@@ -1,0 +1,140 @@
+"""Thin parts of trees: parts without mesh or without their share of decals, and what they cost.
+
+Costs are processor times of mesh and scattering together, over those with cells of one size, in which thin
+parts are lost. Parts whose cells do not fit into memory are counted apart, where the log names them.
+"""
+
+import logging
+import time
+
+import numpy as np
+
+from blobtree import Node, Point, Segment, polygonize
+from blobtree._typing import Float64Array
+from decals import scatter
+from decals.errors import InvalidMesh
+from decals.surfaces import ImplicitSurface
+from tests.thin_trees import ThinTree, is_closed, mesh_areas, random_tree
+
+TARGETS = {"thin_parts_lost": "0", "thin_cost": "≤ 3", "plain_cost": "≤ 1.05"}
+
+LEAST_RADIUS = 5e-5
+"""Radius of the thinnest part that counts, over the longest side of the tree's box: half a ten-thousandth."""
+
+LEAST_AREA = 0.85
+"""Area of a part's triangles over that of its surface, below which the part counts as lost."""
+
+SHARE_ERROR, LEAST_DECALS = 0.05, 20.0
+"""Allowed error of a part's number of decals, beside one decal, and the number from which on it counts."""
+
+RESOLUTION = 64
+"""Cells of one size, with which costs are compared."""
+
+
+class _Messages(logging.Handler):
+    """The warnings about thin parts."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.texts: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep the text."""
+        self.texts.append(record.getMessage())
+
+
+def measure(*, quick: bool) -> dict[str, float]:
+    """Measure random trees with thin parts, and trees without."""
+    trees, count, repeats = (6, 400, 2) if quick else (200, 2000, 5)
+    keys = ("thin_parts_lost", "thin_parts", "thin_cases", "thin_parts_over_memory", "thin_shares")
+    figures = dict.fromkeys(keys, 0.0)
+    new = old = 0.0
+    for model in map(random_tree, range(trees)):
+        before, _ = _scattered(model.tree, RESOLUTION, count)
+        messages = _Messages()
+        logger = logging.getLogger("blobtree.meshing.parts")
+        logger.addHandler(messages)
+        seconds, positions = _scattered(model.tree, None, count)
+        logger.removeHandler(messages)
+        bare, shares = _bare_parts(model, positions)
+        lost, over = bare | _parts_without_mesh(model), _named_parts(model, messages.texts)
+        figures["thin_cases"] += 1
+        figures["thin_parts"] += len(_counted_parts(model))
+        figures["thin_shares"] += shares
+        figures["thin_parts_over_memory"] += len(over)
+        figures["thin_parts_lost"] += 0 if over else len(lost)
+        if before > 0.0:
+            new, old = new + seconds, old + before
+    figures["thin_cost"] = new / old
+    figures["plain_cost"] = _plain_cost(count, repeats)
+    return figures
+
+
+def _scattered(tree: Node, resolution: int | None, count: int) -> tuple[float, Float64Array]:
+    """Return the processor time of mesh and scattering, 0 where there is no mesh, and the decals' centres."""
+    start = time.process_time()
+    try:
+        layout = scatter(ImplicitSurface(tree, resolution=resolution), count=count, seed=1)
+    except InvalidMesh:
+        return 0.0, np.empty((0, 3))
+    return time.process_time() - start, layout.positions.astype(np.float64)
+
+
+def _counted_parts(model: ThinTree) -> set[int]:
+    """Return the parts that are thick enough to count, and have surface of their own."""
+    size = float((model.tree.support[1] - model.tree.support[0]).max())
+    return {
+        number
+        for number, part in enumerate(model.parts)
+        if part.radius >= LEAST_RADIUS * size and part.area > 0.0
+    }
+
+
+def _parts_without_mesh(model: ThinTree) -> set[int]:
+    """Return the counted parts without mesh; all of them if the mesh is not closed."""
+    mesh = polygonize(model.tree)
+    counted = _counted_parts(model)
+    if not is_closed(mesh.faces):
+        return counted
+    centers, areas = mesh_areas(mesh)
+    return {
+        number
+        for number in counted
+        if areas[model.parts[number].owns(centers)].sum() < LEAST_AREA * model.parts[number].area
+    }
+
+
+def _bare_parts(model: ThinTree, positions: Float64Array) -> tuple[set[int], int]:
+    """Return the counted parts without their share of the decals, and how many were checked."""
+    areas = np.array([part.area for part in model.parts])
+    found = np.array([part.owns(positions).sum() for part in model.parts])
+    expected = found.sum() * areas / areas.sum()
+    wrong = np.abs(found - expected) > SHARE_ERROR * expected + 1.0
+    checked = {number for number in _counted_parts(model) if expected[number] >= LEAST_DECALS}
+    return {number for number in checked if wrong[number]}, len(checked)
+
+
+def _named_parts(model: ThinTree, messages: list[str]) -> set[int]:
+    """Return the counted parts that warnings name by their paths."""
+    alone = len(model.parts) == 1
+    return {
+        number
+        for number in _counted_parts(model)
+        if any(alone or f"at path ({number}," in text for text in messages)
+    }
+
+
+def _plain_cost(count: int, repeats: int) -> float:
+    """Return the cost of trees without thin parts, the smaller of several times each."""
+    ratios = []
+    for bumps in (1, 8, 32):
+        tree: Node = Point((0, 0, 0), radius=1.0) + Segment((0, 0, 0), (2, 0.5, 0), radius=0.4)
+        for number in range(bumps):
+            angle = 2.0 * np.pi * number / bumps
+            tree = tree + Point((float(np.cos(angle)), float(np.sin(angle)), 0.3), radius=0.3)
+        times = np.array(
+            [[_scattered(tree, wish, count)[0] for wish in (None, RESOLUTION)] for _ in range(repeats)]
+        )
+        new, old = times.min(axis=0)
+        ratios.append(new / old)
+    return float(np.mean(ratios))
