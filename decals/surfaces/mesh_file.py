@@ -1,24 +1,30 @@
-"""Meshes from files and from pyvista datasets: PLY by our own reader, every other format by pyvista's.
+"""Meshes from files and from pyvista datasets: common formats by our own readers, the others by pyvista's.
 
-VTK's readers of most formats crash or hang on some damaged files, so they run in a process of their own.
+VTK's readers crash or hang on some damaged files, so they run in a process of their own.
 """
 
+import logging
 import re
+from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from blobtree._typing import Float32Array, Int32Array, Int64Array
+from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
 from decals.errors import InvalidMesh
 from decals.surfaces.base_color import checked_color
 from decals.surfaces.dataset_colors import dataset_color, has_colors
 from decals.surfaces.files.gltf import read_gltf
+from decals.surfaces.files.obj import read_obj
+from decals.surfaces.files.off import read_off
+from decals.surfaces.files.ply import read_ply, strip_triangles
+from decals.surfaces.files.stl import read_stl
 from decals.surfaces.files.threemf import read_3mf
 from decals.surfaces.mesh_data import MeshData, joined
-from decals.surfaces.ply import Polygons, read_ply
+from decals.surfaces.triangulate import Polygons, triangulate
 from decals.surfaces.vtk_process import can_isolate, read_isolated
 from decals.validation import describe, is_file
 
@@ -31,11 +37,18 @@ MeshArrays = tuple[Float32Array, Int32Array]
 MIN_PRECISE_RATIO = 500.0
 """Least ratio of coordinates to the extent of a mesh at which float64 is kept."""
 
-_SCENE_READERS = {".3mf": read_3mf, ".glb": read_gltf, ".gltf": read_gltf}
-"""Our own readers of files that place meshes in space, by suffix."""
+_READERS: dict[str, Callable[[Path], tuple[Float64Array, Polygons | Int64Array]]] = {
+    ".3mf": read_3mf,
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
+    ".obj": read_obj,
+    ".off": read_off,
+    ".ply": read_ply,
+    ".stl": read_stl,
+}
+"""Our own readers, by suffix: they return points and polygons."""
 
-_ROBUST = (".obj", ".stl")
-"""Suffixes of formats whose readers in VTK neither crash nor hang on damaged files; see `tests.fuzz`."""
+_logger = logging.getLogger(__name__)
 
 
 def read_mesh(path: str | PathLike[str]) -> MeshArrays:
@@ -79,15 +92,11 @@ def read_mesh_data(path: str | PathLike[str]) -> MeshData:
     path = Path(path)
     if not is_file(path):
         raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
-    if reader := _SCENE_READERS.get(path.suffix.lower()):
+    if reader := _READERS.get(path.suffix.lower()):
         return MeshData(*polygon_triangles(*reader(path), name=str(path)))
-    if path.suffix.lower() == ".ply":
-        return MeshData(*polygon_triangles(*read_ply(path), name=str(path)))
-    from pyvista.core.utilities.reader import CLASS_READERS
-
-    if path.suffix.lower() not in CLASS_READERS or path.suffix.lower() in _ROBUST or not can_isolate():
-        return dataset_mesh(read_dataset(path), name=str(path))
-    return MeshData(*read_isolated(path))
+    if can_isolate():
+        return MeshData(*read_isolated(path))
+    return dataset_mesh(read_dataset(path), name=str(path))
 
 
 def dataset_triangles(dataset: "pv.DataSet | pv.MultiBlock", *, name: str) -> MeshArrays:
@@ -110,14 +119,35 @@ def dataset_mesh(dataset: "pv.DataSet | pv.MultiBlock", *, name: str) -> MeshDat
     surface = (
         dataset if isinstance(dataset, pv.PolyData) else dataset.extract_surface(algorithm="dataset_surface")
     )
-    if surface.n_strips:
-        surface = surface.triangulate()
-    sizes = np.diff(surface.face_offsets)
-    alike = len(sizes) and (sizes == sizes[0]).all()
-    polygons = surface.regular_faces if alike else list(surface.irregular_faces)
+    polygons, cells = _surface_polygons(surface)
     vertices, faces, origins = traced_triangles(surface.points, polygons, name=name)
-    color = checked_color(lambda: dataset_color(surface, origins, name=name), name, len(vertices), len(faces))
+    color = checked_color(
+        lambda: dataset_color(surface, cells[origins], name=name), name, len(vertices), len(faces)
+    )
     return MeshData(vertices, faces, color)
+
+
+def _surface_polygons(surface: "pv.PolyData") -> tuple[Polygons, Int64Array]:
+    """Return the polygons of a surface and the triangles of its strips, and the cell of each of them."""
+    polygons, strips = _cells(surface.GetPolys()), _cells(surface.GetStrips())
+    triangles = [
+        Polygons.of(strip_triangles(strip))
+        for strip in np.split(strips.corners, np.cumsum(strips.sizes)[:-1])[: len(strips)]
+    ]
+    own = np.repeat(np.arange(len(strips)), [len(part) for part in triangles])
+    cells = np.concatenate([np.arange(len(polygons)), len(polygons) + own])
+    return Polygons.joined([polygons, *triangles]), cells
+
+
+def _cells(cells: Any) -> Polygons:
+    """Return cells of VTK as polygons."""
+    import pyvista as pv
+
+    corners, offsets = (
+        pv.convert_array(array).astype(np.int64)
+        for array in (cells.GetConnectivityArray(), cells.GetOffsetsArray())
+    )
+    return Polygons(corners, np.diff(offsets))
 
 
 def precise_points(points: ArrayLike) -> Any:
@@ -130,33 +160,33 @@ def precise_points(points: ArrayLike) -> Any:
     return given.astype(np.float32)
 
 
-def polygon_triangles(points: ArrayLike, polygons: Polygons, *, name: str) -> MeshArrays:
+def polygon_triangles(
+    points: ArrayLike, polygons: Polygons | NDArray[Any] | Sequence[NDArray[Any]], *, name: str
+) -> MeshArrays:
     """Divide polygons into triangles, concave ones too, after a check of their indices."""
     return traced_triangles(points, polygons, name=name)[:2]
 
 
 def traced_triangles(
-    points: ArrayLike, polygons: Polygons, *, name: str
+    points: ArrayLike, polygons: Polygons | NDArray[Any] | Sequence[NDArray[Any]], *, name: str
 ) -> tuple[Float32Array, Int32Array, Int64Array]:
     """Return vertices and triangles as `polygon_triangles` does, and the polygon of each triangle."""
     with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinity, refused by surfaces
         vertices: Any = precise_points(points)
+    polygons = Polygons.of(polygons)
     if len(polygons) == 0:
         raise InvalidMesh(f"{name!r} has {len(vertices)} points but no faces; give a surface mesh")
-    if isinstance(polygons, np.ndarray) and polygons.shape[1] == 3:
-        _check_indices(polygons, len(vertices), name)
-        return vertices, polygons.astype(np.int32), np.arange(len(polygons))
-    corners = np.concatenate(list(polygons))
-    _check_indices(corners, len(vertices), name)
-    areal = [number for number, polygon in enumerate(polygons) if len(polygon) > 2]
-    if not areal:
+    _check_indices(polygons.corners, len(vertices), name)
+    if (polygons.sizes < 3).all():
         raise InvalidMesh(f"{name!r} has no face of three or more corners; give a surface mesh")
-    import pyvista as pv
-
-    surface = pv.PolyData.from_irregular_faces(vertices, [polygons[number] for number in areal])
-    surface.cell_data["polygon"] = np.array(areal)
-    triangles = surface.triangulate()
-    return vertices, triangles.regular_faces.astype(np.int32), np.asarray(triangles.cell_data["polygon"])
+    if short := int((polygons.sizes < 3).sum()):
+        _logger.warning("%s: left out %d faces of fewer than three corners", name, short)
+    triangles = triangulate(vertices, polygons)
+    if triangles.crossing:
+        _logger.warning(
+            "%s: %d faces cross themselves; some of their triangles lie on others", name, triangles.crossing
+        )
+    return vertices, polygons.corners[triangles.places].astype(np.int32), triangles.polygons
 
 
 def _is_empty(dataset: Any) -> bool:

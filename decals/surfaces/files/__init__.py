@@ -1,1 +1,4 @@
-"""Readers of files that place meshes in space: glTF 2.0 and 3MF, over `json`, XML and NumPy alone."""
+"""Readers of mesh files: a module for each format, and one for what their contents have in common.
+
+Each reader checks all that it reads. A declared face is returned, or named in an error or in the log.
+"""

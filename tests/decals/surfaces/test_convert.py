@@ -16,8 +16,8 @@ from blobtree import Point, polygonize
 from decals.errors import ImplicitDecalsError, InvalidInput, InvalidMesh, InvalidScene
 from decals.scenes.objects import as_object, as_objects
 from decals.surfaces.convert import as_shape, as_surface
+from decals.surfaces.files.ply import strip_triangles
 from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.ply import strip_triangles
 
 CORNERS = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 TRIANGLES = [[0, 1, 2], [0, 2, 3]]

@@ -1,0 +1,276 @@
+"""Reader of PLY files (Turk 1994).
+
+VTK's own reader crashes on truncated files and wrong indices, and does not read triangle strips.
+"""
+
+import re
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blobtree._typing import Float64Array, Int64Array
+from decals.surfaces.files.content import decimal_numbers, encoding_of, file_bytes, refusal, without_mark
+from decals.surfaces.triangulate import Polygons
+
+_TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
+    "short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2",
+    "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
+    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+}  # fmt: skip
+_ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
+_CORNERS = ("vertex_indices", "vertex_index")
+
+MAX_LIST_LENGTH = 1 << 27
+"""Longest list that is read; a longer one is a sign of a damaged file."""
+
+STRIP_END = -1
+"""Index that ends a triangle strip within a list of strips."""
+
+
+@dataclass(frozen=True)
+class _Lists:
+    """The lists of one property: their lengths, and the entries of all of them."""
+
+    lengths: Int64Array
+    entries: NDArray[np.generic]
+
+
+@dataclass(frozen=True)
+class _Table:
+    """The rows of an element: its properties of one number each, and those that are lists."""
+
+    name: str
+    scalars: dict[str, NDArray[np.generic]]
+    lists: dict[str, _Lists]
+
+
+@dataclass(frozen=True)
+class _Property:
+    name: str
+    kind: str
+    count_kind: str | None = None
+
+
+@dataclass(frozen=True)
+class _Element:
+    name: str
+    count: int
+    properties: tuple[_Property, ...]
+
+
+def read_ply(path: Path) -> tuple[Float64Array, Polygons]:
+    """Read the vertices and faces of a PLY file, ASCII or binary, of any polygon size.
+
+    Triangle strips (elements ``tristrips``) are divided into triangles.
+
+    Raises
+    ------
+    InvalidMesh
+        If the file is not PLY, has no faces, or ends too early.
+    """
+    try:
+        with np.errstate(invalid="ignore", over="ignore"):  # the checks of values come later
+            return _read(file_bytes(path))
+    except (ValueError, LookupError, OverflowError, TypeError, MemoryError) as error:
+        raise refusal(path, "PLY", error) from error
+
+
+def _read(content: bytes) -> tuple[Float64Array, Polygons]:
+    tables = list(_tables(*_header(content)))
+    vertices = [table for table in tables if table.name == "vertex"]
+    if len(vertices) != 1 or not {"x", "y", "z"} <= vertices[0].scalars.keys():
+        raise ValueError("it has no element of vertices with x, y and z")
+    points = np.stack([np.asarray(vertices[0].scalars[axis], np.float64) for axis in "xyz"], axis=-1)
+    faces = [_corners(table) for table in tables if table.name == "face"]
+    strips = [_corners(table) for table in tables if table.name == "tristrips"]
+    if not faces and not strips:
+        raise ValueError("it has no faces")
+    triangles = [
+        strip_triangles(strip)
+        for part in strips
+        for strip in np.split(part.corners, np.cumsum(part.sizes)[:-1])
+    ]
+    return points, Polygons.joined([*faces, *map(Polygons.of, triangles)])
+
+
+def _corners(table: _Table) -> Polygons:
+    """Return the polygons or strips of an element."""
+    found = next((table.lists[name] for name in _CORNERS if name in table.lists), None)
+    if found is None:
+        raise ValueError(f"its element {table.name!r} has no list of vertices")
+    corners = found.entries.astype(np.int64)
+    if (corners != found.entries).any():
+        raise ValueError("a face asks for a vertex by a number that is not whole")
+    return Polygons(corners, found.lengths)
+
+
+def strip_triangles(corners: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the triangles, ``int64[m, 3]``, of strips; every second one is reversed."""
+    parts = np.split(corners, np.flatnonzero(corners == STRIP_END))
+    strips = [part[part != STRIP_END] for part in parts]
+    windows = [
+        np.lib.stride_tricks.sliding_window_view(strip, 3).copy() for strip in strips if len(strip) > 2
+    ]
+    for triangles in windows:
+        triangles[1::2, :2] = triangles[1::2, 1::-1]
+    return np.concatenate(windows) if windows else np.zeros((0, 3), np.int64)
+
+
+def _header(content: bytes) -> tuple[str, list[_Element], bytes]:
+    """Return the byte order (nothing for ASCII), the elements, and what follows the header."""
+    data = without_mark(content)
+    if not data.startswith(b"ply"):
+        raise ValueError("it does not start with 'ply'")
+    line_end = next((mark for mark in (b"\r\n", b"\n", b"\r") if data.startswith(mark, 3)), b"\n")
+    end = re.search(rb"[\r\n]end_header[ \t]*" + line_end, data)
+    if end is None:
+        raise ValueError("its header does not end")
+    order, elements = None, []
+    for line in data[: end.start()].decode("ascii", "replace").splitlines()[1:]:
+        match line.split():
+            case ["format", name, _]:
+                order = _ORDERS[name]
+            case ["element", name, count]:
+                elements.append(_Element(name, _row_count(count), ()))
+            case ["property", "list", count_kind, kind, name]:
+                elements.append(_extended(elements.pop(), _Property(name, _TYPES[kind], _TYPES[count_kind])))
+            case ["property", kind, name]:
+                elements.append(_extended(elements.pop(), _Property(name, _TYPES[kind])))
+    if order is None:
+        raise ValueError("its header names no format")
+    if order and encoding_of(content) not in (None, "utf-8"):
+        raise ValueError(f"it is binary, but starts with the mark of {encoding_of(content)}")
+    return order, elements, data[end.end() :]
+
+
+def _row_count(text: str) -> int:
+    count = int(text)
+    if not 0 <= count <= np.iinfo(np.int64).max:
+        raise ValueError(f"an element claims {text[:40]} rows")
+    return count
+
+
+def _extended(element: _Element, prop: _Property) -> _Element:
+    if any(other.name == prop.name for other in element.properties):
+        raise ValueError(f"its element {element.name!r} has two properties {prop.name!r}")
+    return _Element(element.name, element.count, (*element.properties, prop))
+
+
+def _tables(order: str, elements: list[_Element], body: bytes) -> Iterator[_Table]:
+    """Decode the elements in turn; ASCII becomes rows of float64, which hold every index exactly."""
+    if not order:
+        body, order = decimal_numbers(body.split()).tobytes(), "="
+        elements = [_as_doubles(element) for element in elements]
+    position = 0
+    for element in elements:
+        table, position = _decode(order, element, body, position)
+        yield table
+
+
+def _as_doubles(element: _Element) -> _Element:
+    doubles = tuple(_Property(p.name, "f8", p.count_kind and "f8") for p in element.properties)
+    return _Element(element.name, element.count, doubles)
+
+
+def _decode(order: str, element: _Element, body: bytes, position: int) -> tuple[_Table, int]:
+    """Decode all rows at once if their lists are as long as the first row's, else with a look at each row."""
+    row, lengths = _first_row(order, element, body, position)
+    if len(body) - position >= row.itemsize * element.count:
+        rows = np.frombuffer(body, row, element.count, position)
+        if all((rows["#" + name] == length).all() for name, length in lengths.items()):
+            lists = {
+                name: _Lists(np.full(element.count, length, np.int64), rows[name].reshape(-1))
+                for name, length in lengths.items()
+            }
+            scalars = {p.name: rows[p.name] for p in element.properties if p.name not in lists}
+            return _Table(element.name, scalars, lists), position + rows.nbytes
+    if not lengths:
+        raise _ends_within(element)
+    return _decode_uneven(order, element, body, position)
+
+
+def _first_row(
+    order: str, element: _Element, body: bytes, position: int
+) -> tuple[np.dtype[np.void], dict[str, int]]:
+    """Return the layout of the row at a position, and the lengths of its lists; none if there is no row."""
+    fields: list[tuple[str, str, tuple[int, ...]]] = []
+    lengths: dict[str, int] = {}
+    for p in element.properties:
+        shape: tuple[int, ...] = ()
+        if p.count_kind:
+            lengths[p.name] = 0
+            if element.count:
+                place = position + np.dtype(fields).itemsize
+                lengths[p.name] = _list_length(_reader(order, p.count_kind), element, body, place)
+            fields.append(("#" + p.name, order + p.count_kind, ()))
+            shape = (lengths[p.name],)
+        fields.append((p.name, order + p.kind, shape))
+    return np.dtype(fields), lengths
+
+
+def _decode_uneven(order: str, element: _Element, body: bytes, position: int) -> tuple[_Table, int]:
+    """Walk over the rows to find where each list starts, then gather each property of all rows."""
+    kinds = {p.name: np.dtype(order + p.kind) for p in element.properties}
+    counts = {p.name: _reader(order, p.count_kind) for p in element.properties if p.count_kind}
+    places: dict[str, list[int]] = {name: [] for name in kinds}
+    lengths: dict[str, list[int]] = {name: [] for name in counts}
+    steps = [(name, kind.itemsize, counts.get(name)) for name, kind in kinds.items()]
+    for _ in range(element.count):
+        for name, size, count in steps:
+            entries = 1
+            if count is not None:
+                entries = _list_length(count, element, body, position)
+                lengths[name].append(entries)
+                position += count.size
+            places[name].append(position)
+            position += entries * size
+    if position > len(body):
+        raise _ends_within(element)
+    numbers = {name: np.array(of, np.int64) for name, of in lengths.items()}
+    lists = {
+        name: _Lists(count, _gathered(body, kinds[name], np.array(places[name]), count))
+        for name, count in numbers.items()
+    }
+    ones = np.ones(element.count, np.int64)
+    scalars = {
+        name: _gathered(body, kind, np.array(places[name]), ones)
+        for name, kind in kinds.items()
+        if name not in lists
+    }
+    return _Table(element.name, scalars, lists), position
+
+
+def _gathered(
+    body: bytes, kind: np.dtype[Any], places: Int64Array, lengths: Int64Array
+) -> NDArray[np.generic]:
+    """Return runs of numbers that start at places of the body, one after the other."""
+    within = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    starts = np.repeat(places, lengths) + within * kind.itemsize
+    values = np.frombuffer(body, np.uint8)[starts[:, None] + np.arange(kind.itemsize)]
+    gathered: NDArray[np.generic] = values.reshape(-1).view(kind)
+    return gathered
+
+
+def _reader(order: str, kind: str) -> struct.Struct:
+    """Return the reader of one number of a NumPy type."""
+    return struct.Struct(order + np.dtype(kind).char)
+
+
+def _list_length(count: struct.Struct, element: _Element, body: bytes, position: int) -> int:
+    """Return the length of the list at a position; ValueError if it is absurd."""
+    if position + count.size > len(body):
+        raise _ends_within(element)
+    (value,) = count.unpack_from(body, position)
+    if not 0 <= value <= MAX_LIST_LENGTH or value != int(value):
+        raise ValueError(f"one of its lists claims {value} entries")
+    return int(value)
+
+
+def _ends_within(element: _Element) -> ValueError:
+    return ValueError(f"it ends within its {element.count} rows of {element.name!r}")

@@ -1,0 +1,127 @@
+"""Reader of STL files, ASCII and binary, of one or several solids."""
+
+from pathlib import Path
+
+import numpy as np
+
+from blobtree._typing import Float64Array
+from decals.surfaces.files.content import (
+    Line,
+    encoding_of,
+    file_bytes,
+    finite_numbers,
+    parsed,
+    refusal,
+    text_lines,
+    without_mark,
+)
+from decals.surfaces.triangulate import Polygons
+
+_HEADER = 84
+"""Bytes before the first facet of a binary file; the last four hold the number of facets."""
+
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+_WORDS = b"facet normal 0 0 0 outer loop vertex 0 0 0 vertex 0 0 0 vertex 0 0 0 endloop endfacet".split()
+"""Words of a facet in an ASCII file; zeros stand for numbers."""
+
+_KEYWORDS = [k for k, word in enumerate(_WORDS) if word != b"0"]
+_NUMBERS = [k for k, word in enumerate(_WORDS) if word == b"0"][3:]
+"""Places of the keywords, and of the coordinates, among the words of a facet."""
+
+
+def read_stl(path: Path) -> tuple[Float64Array, Polygons]:
+    """Read the facets of an STL file; equal corners become one vertex.
+
+    Raises
+    ------
+    InvalidMesh
+        If the file ends too early, or a line of it is wrong. The message names the line.
+    """
+    try:
+        content = file_bytes(path)
+        corners = _text_corners(content) if _is_text(content) else _binary_corners(content)
+    except (ValueError, MemoryError) as error:
+        raise refusal(path, "STL", error) from error
+    return _merged(corners)
+
+
+def _is_text(content: bytes) -> bool:
+    """Return True for an ASCII file: it starts with "solid", as some binary files also do."""
+    if encoding_of(content) not in (None, "utf-8"):
+        return True
+    body = without_mark(content)
+    if _declared_size(body) == len(body):
+        return False
+    start = body[:4096].lower()
+    words = start.replace(b"\0", b"")  # UTF-16 without a mark is refused as text
+    return words.lstrip().startswith(b"solid") and (b"facet" in words or b"\0" not in start)
+
+
+def _declared_size(body: bytes) -> int:
+    """Return the size of a binary file by the number of its facets."""
+    if len(body) < _HEADER:
+        return -1
+    return _HEADER + _FACET.itemsize * int.from_bytes(body[_HEADER - 4 : _HEADER], "little")
+
+
+def _binary_corners(content: bytes) -> Float64Array:
+    body = without_mark(content)
+    size = _declared_size(body)
+    if size < 0:
+        raise ValueError("it is neither text that starts with 'solid' nor long enough for a binary file")
+    if len(body) < size:
+        there = (len(body) - _HEADER) // _FACET.itemsize
+        declared = (size - _HEADER) // _FACET.itemsize
+        raise ValueError(f"it declares {declared} facets and holds {there}")
+    facets = np.frombuffer(body, _FACET, (size - _HEADER) // _FACET.itemsize, _HEADER)
+    corners: Float64Array = facets["corners"].reshape(-1, 3).astype(np.float64)
+    wrong = ~np.isfinite(corners).all(axis=1)
+    if wrong.any():
+        raise ValueError(f"facet {int(np.argmax(wrong)) // 3 + 1} has a corner that is not finite")
+    return corners
+
+
+def _text_corners(content: bytes) -> Float64Array:
+    lines = [Line(number, text) for number, text in enumerate(text_lines(content), 1) if text.strip()]
+    if _first_word(lines[-1]) != b"endsolid":
+        raise ValueError("it ends without 'endsolid', so it is cut off")
+    within = [line for line in lines if _first_word(line) not in (b"solid", b"endsolid")]
+    words = b" ".join([line.text for line in within]).split()
+    try:
+        return _corners(words)
+    except ValueError:
+        numbers = [line.number for line in within for _ in line.text.split()]
+        size = len(_WORDS)
+        facets = [Line(numbers[k], b" ".join(words[k : k + size])) for k in range(0, len(words), size)]
+        return parsed(facets, _corners_of, "a facet with a normal and a loop of three vertices")
+
+
+def _corners_of(facets: list[Line]) -> Float64Array:
+    return _corners([word for facet in facets for word in facet.text.split()])
+
+
+def _first_word(line: Line) -> bytes:
+    return line.text.split(None, 1)[0].lower()
+
+
+def _corners(words: list[bytes]) -> Float64Array:
+    """Return the corners of facets, ``float64[k, 3]``; ValueError if the words are no facets."""
+    size = len(_WORDS)
+    if len(words) % size:
+        raise ValueError
+    if any(word.lower() != _WORDS[place] for place in _KEYWORDS for word in set(words[place::size])):
+        raise ValueError
+    columns = [finite_numbers(words[place::size]) for place in _NUMBERS]
+    return np.stack(columns, axis=1).reshape(-1, 3)
+
+
+def _merged(corners: Float64Array) -> tuple[Float64Array, Polygons]:
+    """Return equal corners as one vertex each, in the order of their first use."""
+    order = np.lexsort(corners.T)  # a stable sort: the first of equal corners stays in front
+    starts = np.ones(len(order), np.bool_)
+    starts[1:] = (corners[order[1:]] != corners[order[:-1]]).any(axis=1)
+    first = np.empty_like(order)
+    first[order] = order[starts][np.cumsum(starts) - 1]
+    kept = np.flatnonzero(first == np.arange(len(first)))
+    return corners[kept], Polygons(np.searchsorted(kept, first), np.full(len(corners) // 3, 3, np.int64))

@@ -1,0 +1,292 @@
+"""Files of other programs: all forms of OBJ, STL, OFF and PLY, and what is wrong in some of them."""
+
+import logging
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from decals.errors import InvalidMesh
+from decals.surfaces import read_mesh
+
+V = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+VT = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+VN = "vn 0 0 1\n"
+FACET = "facet normal 0 0 1\nouter loop\nvertex {}\nvertex {}\nvertex {}\nendloop\nendfacet\n"
+STL = (
+    "solid a b c\n"
+    + FACET.format("0 0 0", "1 0 0", "1 1 0")
+    + FACET.format("0 0 0", "1 1 0", "0 1 0")
+    + "endsolid a b c\n"
+)
+OFF = "OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n"
+PLY = (
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n"
+)
+
+
+def area(path: Path) -> float:
+    vertices, faces = read_mesh(path)
+    a, b, c = np.moveaxis(vertices[faces].astype(np.float64), 1, 0)
+    return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+def written(folder: Path, name: str, content: str | bytes) -> Path:
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+OBJ_SQUARES: dict[str, str | bytes] = {
+    "plain": V + "f 1 2 3 4\n",
+    "texture": V + VT + "f 1/1 2/2 3/3 4/4\n",
+    "normals": V + VN + "f 1//1 2//1 3//1 4//1\n",
+    "all": V + VT + VN + "f 1/1/1 2/2/1 3/3/1 4/4/1\n",
+    "mixed forms": V + VT + VN + "f 1/1/1 2//1 3/3 4\n",
+    "empty parts": V + VT + "f 1/ 2/2/ 3// 4/4/\n",
+    "relative": V + VT + VN + "f -4/-4/-1 -3/-3/-1 -2/-2/-1 -1/-1/-1\n",
+    "relative between": "v 0 0 0\nv 1 0 0\nv 1 1 0\nf -3 -2 -1\nv 0 1 0\nf 1 3 -1\n",
+    "faces first": "f 1 2 3 4\n" + V,
+    "continued": V.replace("v 1 1 0", "v 1 \\\n1 0") + "f 1 2 \\\n3 4\n",
+    "comments": "# a \\\n" + V.replace("\n", " # corner\n") + "f 1 2 3 4 # and all\n",
+    "numbers": "v 0e0 -0 0.\nv +1 .0 0\nv 1e+0 1E-0 0.0\nv 0 1.00e0 0\nf +1 +2 +3 +4\n",
+    "names": "o a name with spaces\ng\nusemtl\nmtllib no file.mtl\n" + V + "s off\nf 1 2 3 4\nxyzzy 1 2\n",
+    "colours": "".join(line + " 0.5 0.5 0.5\n" for line in V.splitlines()) + "f 1 2 3 4\n",
+    "tabs": (V + "f 1 2 3 4\n").replace(" ", "\t"),
+    "spaces": "  " + (V + "f 1 2 3 4  \n").replace(" ", "   "),
+    "no last line end": V + "f 1 2 3 4",
+    "latin-1": (V + "o caf\xe9\nf 1 2 3 4\n").encode("latin-1"),
+    "old face": V + "fo 1 2 3 4\n",
+}
+
+
+@pytest.mark.parametrize("name", OBJ_SQUARES)
+def test_every_form_of_obj_is_the_same_square(tmp_path: Path, name: str) -> None:
+    assert area(written(tmp_path, "a.obj", OBJ_SQUARES[name])) == pytest.approx(1.0)
+
+
+OBJ_FAULTS = {
+    "no texture": (V + "f 1/1 2/2 3/3\n", 5, "texture coordinate 1"),
+    "no normals": (V + VT + "f 1/1/1 2/2/1 3/3/1\n", 9, "normal 1"),
+    "far texture": (V + VT + "f 1/1 2/2 3/1000000\n", 9, "texture coordinate 1000000"),
+    "far normal": (V + VN + "f 1//1 2//1 3//1000000\n", 6, "normal 1000000"),
+    "past the last": (V + VT + "f 1/1 2/2 5/3\n", 9, "vertex 5"),
+    "far past": (V + "f 1 2 3\nf 1 2 99999999999\n", 6, "vertex 99999999999"),
+    "more than 64 bits": (V + "f 1 2 99999999999999999999\n", 5, "expected corners"),
+    "zero": (V + "f 0 1 2\n", 5, "vertex 0"),
+    "relative before the first": (V + "f -5 -4 -3\n", 5, "vertex -5"),
+    "relative before its vertices": ("f -3 -2 -1\n" + V, 1, "vertex -3"),
+    "relative texture": (V + "f 1/-1 2/-1 3/-1\n", 5, "texture coordinate -1"),
+    "continued": (V + "f 1 \\\n2 \\\n9\n", 5, "vertex 9"),
+    "four parts": (V + VT + VN + "f 1/1/1/1 2/2/1/1 3/3/1/1\n", 10, "expected corners"),
+    "word": (V + "f 1 2 three\n", 5, "'1 2 three'"),
+    "underscore": (V + "f 1 2 0_3\n", 5, "expected corners"),
+    "half": (V + "f 1 2 2.5\n", 5, "expected corners"),
+    "no first part": (V + VT + "f /1 /2 /3\n", 9, "expected corners"),
+    "two numbers": ("v 0 0\n" + V + "f 1 2 3\n", 1, "three finite numbers"),
+    "nan": (V + "v nan 0 0\nf 1 2 3\n", 5, "three finite numbers"),
+    "huge": (V + "v 1e400 0 0\nf 1 2 3\n", 5, "three finite numbers"),
+    "comma": (V + "v 0,5 0 0\nf 1 2 3\n", 5, "three finite numbers"),
+    "cut face": (V + "f 1 2 3\nf 1 2", 6, "ends within a face"),
+}
+
+
+@pytest.mark.parametrize("name", OBJ_FAULTS)
+def test_a_wrong_line_of_obj_is_named(tmp_path: Path, name: str) -> None:
+    content, line, reason = OBJ_FAULTS[name]
+    path = written(tmp_path, "a.obj", content)
+    with pytest.raises(InvalidMesh, match=r"a\.obj") as caught:
+        read_mesh(path)
+    assert f"line {line}:" in str(caught.value)
+    assert reason in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_polygon_round_a_hole_keeps_its_area_in_any_order(tmp_path: Path) -> None:
+    """A square of 0.5 with a round hole, 66 corners: the outline, a bridge to the hole, and back."""
+    around = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+    outer = 0.3 * np.stack([np.cos(around), np.sin(around)], axis=1)
+    inner = 0.1 * np.stack([np.cos(around), -np.sin(around)], axis=1)
+    points = "".join(f"v {x} 0 {y}\n" for x, y in np.concatenate([outer, inner]).tolist())
+    polygon = [*range(1, 33), 1, *range(33, 65), 33]
+    expected = 16.0 * np.sin(np.pi / 16) * (0.3**2 - 0.1**2)
+    for start in range(0, 66, 5):
+        for step in (1, -1):
+            corners = " ".join(str(k) for k in (polygon[start:] + polygon[:start])[::step])
+            path = written(tmp_path, "a.obj", f"{points}f {corners}\n")
+            assert len(read_mesh(path)[1]) == 64
+            assert area(path) == pytest.approx(expected, rel=1e-5)
+
+
+ENCODINGS = ["utf-8-sig", "utf-16", "utf-16-be", "utf-32", "utf-32-be"]
+MARKS = {"utf-16-be": b"\xfe\xff", "utf-32-be": b"\0\0\xfe\xff"}
+
+
+@pytest.mark.parametrize("suffix", ["obj", "stl", "off", "ply"])
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_marks_of_encodings_and_line_ends(tmp_path: Path, suffix: str, encoding: str, end: str) -> None:
+    text = {"obj": OBJ_SQUARES["all"], "stl": STL, "off": OFF, "ply": PLY}[suffix]
+    content = MARKS.get(encoding, b"") + str(text).replace("\n", end).encode(encoding)
+    assert area(written(tmp_path, f"a.{suffix}", content)) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("suffix", ["obj", "stl", "off"])
+def test_null_bytes_are_named(tmp_path: Path, suffix: str) -> None:
+    text = {"obj": OBJ_SQUARES["all"], "stl": STL, "off": OFF}[suffix]
+    for content in (str(text).encode("utf-16-le"), str(text).encode() + b"\0" * 9):
+        with pytest.raises(InvalidMesh, match="null bytes"):
+            read_mesh(written(tmp_path, f"a.{suffix}", content))
+    with pytest.raises(InvalidMesh, match="mark of UTF-16"):
+        read_mesh(written(tmp_path, f"a.{suffix}", str(text).encode("utf-16") + b"\xd8"))
+
+
+STL_SQUARES = {
+    "upper case": STL.upper(),
+    "two solids": STL.replace("endfacet\nfacet", "endfacet\nendsolid a\nsolid b\nfacet"),
+    "no name": STL.replace(" a b c", ""),
+    "name of keywords": STL.replace("a b c", "facet normal vertex"),
+    "one facet a line": STL.replace("\n", " ")
+    .replace("facet n", "\nfacet n")
+    .replace("endsolid", "\nendsolid"),
+    "tabs": STL.replace(" 0 0 1\n", "\t0\t0\t1\n").replace("vertex", "  vertex"),
+    "normal of nothing": STL.replace("0 0 1", "nan nan nan"),
+}
+
+
+@pytest.mark.parametrize("name", STL_SQUARES)
+def test_every_form_of_stl_is_the_same_square(tmp_path: Path, name: str) -> None:
+    path = written(tmp_path, "a.STL", STL_SQUARES[name])
+    assert area(path) == pytest.approx(1.0)
+    assert len(read_mesh(path)[0]) == 4
+
+
+def binary_stl(facets: int, declared: int, header: bytes = b"solid of no text") -> bytes:
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0)]
+    row = struct.pack("<12fH", 0, 0, 1, *np.ravel(corners).tolist(), 0)
+    return header.ljust(80, b" ") + struct.pack("<I", declared) + row * facets
+
+
+def test_binary_stl(tmp_path: Path) -> None:
+    assert area(written(tmp_path, "a.stl", binary_stl(2, 2))) == pytest.approx(1.0)
+    assert area(written(tmp_path, "a.stl", b"\xef\xbb\xbf" + binary_stl(2, 2))) == pytest.approx(1.0)
+    assert area(written(tmp_path, "a.stl", binary_stl(3, 2, b"\0"))) == pytest.approx(1.0)
+    with pytest.raises(InvalidMesh, match="declares 3 facets and holds 2"):
+        read_mesh(written(tmp_path, "a.stl", binary_stl(2, 3, b"\0")))
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (STL.replace("endsolid a b c\n", ""), "without 'endsolid'"),
+        (STL.replace("vertex 1 1 0\nendloop", "endloop", 1), "line 2: expected a facet"),
+        (STL.replace("vertex 0 1 0", "vertex 0 x 0"), "line 9: expected a facet"),
+        (STL.replace("vertex 0 1 0", "vertex 0 inf 0"), "line 9: expected a facet"),
+    ],
+)
+def test_a_wrong_stl_is_named(tmp_path: Path, content: str, reason: str) -> None:
+    with pytest.raises(InvalidMesh, match=reason):
+        read_mesh(written(tmp_path, "a.stl", content))
+
+
+OFF_ROWS = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+OFF_SQUARES = {
+    "counts beside the keyword": OFF.replace("OFF\n", "OFF "),
+    "counts at the keyword": OFF.replace("OFF\n", "OFF"),
+    "no edges": OFF.replace("4 1 0", "4 1"),
+    "no keyword": OFF.replace("OFF\n", ""),
+    "comments": OFF.replace("\n", " # more\n\n# x\n"),
+    "face colours": OFF.replace("4 0 1 2 3", "4 0 1 2 3 255 0 0"),
+    "vertex colours": "COFF\n4 1 0\n" + OFF_ROWS.replace("\n", " 255 0 0 255\n") + "4 0 1 2 3\n",
+    "normals": "NOFF\n4 1 0\n" + OFF_ROWS.replace("\n", " 0 0 1\n") + "4 0 1 2 3\n",
+    "texture": "STOFF\n4 1 0\n" + OFF_ROWS.replace("\n", " 0.5 0.5\n") + "4 0 1 2 3\n",
+    "all": "STCNOFF\n4 1 0\n" + OFF_ROWS.replace("\n", " 0 0 1 1 1 1 1 0 0\n") + "4 0 1 2 3\n",
+}
+
+
+@pytest.mark.parametrize("name", OFF_SQUARES)
+def test_every_form_of_off_is_the_same_square(tmp_path: Path, name: str) -> None:
+    assert area(written(tmp_path, "a.off", OFF_SQUARES[name])) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (OFF.replace("4 1 0", "353535235358 1 0"), "declares 353535235358 vertices"),
+        (OFF.replace("4 0 1 2 3", "4 0 1 2 4"), "line 7: .*vertices from 0 to 3"),
+        (OFF.replace("4 0 1 2 3", "5 0 1 2 3"), "line 7: "),
+        (OFF.replace("4 0 1 2 3", "-4 0 1 2 3"), "line 7: "),
+        (OFF.replace("1 1 0", "1 1"), "line 5: expected three finite"),
+        (OFF + "3 0 1 2\n", "line 8: expected nothing behind the last of 1 faces"),
+        (OFF.replace("OFF", "OFF BINARY"), "binary OFF"),
+        (OFF.replace("OFF", "4OFF"), "other than 3 numbers"),
+        (OFF.replace("4 1 0", "4 -1 0"), "line 2: "),
+        ("", "ends before"),
+        ("OFF\n", "ends before"),
+    ],
+)
+def test_a_wrong_off_is_named(tmp_path: Path, content: str, reason: str) -> None:
+    with pytest.raises(InvalidMesh, match=reason):
+        read_mesh(written(tmp_path, "a.off", content))
+
+
+@pytest.mark.parametrize("order", ["", "<", ">"])
+@pytest.mark.parametrize("second", [6, 8, None])
+def test_ply_faces_with_a_second_list_are_all_read(tmp_path: Path, order: str, second: int | None) -> None:
+    """As MeshLab writes texture coordinates of corners; None: as many as the face needs."""
+    rng = np.random.default_rng(0)
+    sizes = rng.integers(3, 5, 1000) if second is None else np.full(1000, (second or 6) // 2)
+    form = {"": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[order]
+    head = (
+        f"ply\nformat {form} 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 1000\nproperty uchar flags\nproperty list uchar int vertex_indices\n"
+        "property list uchar float texcoord\nproperty uchar red\nend_header\n"
+    )
+    corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    if order:
+        body = np.array(corners, order + "f4").tobytes()
+        for size in sizes.tolist():
+            body += struct.pack(f"{order}BB{size}i", 7, size, *range(size))
+            body += struct.pack(f"{order}B{2 * size}fB", 2 * size, *[0.5] * (2 * size), 9)
+    else:
+        rows = [" ".join(map(str, row)) for row in corners]
+        rows += [
+            " ".join(map(str, [7, size, *range(size), 2 * size, *[0.5] * (2 * size), 9]))
+            for size in sizes.tolist()
+        ]
+        body = "\n".join(rows).encode()
+    path = written(tmp_path, "a.ply", head.encode() + body)
+    assert len(read_mesh(path)[1]) == (sizes - 2).sum()
+    assert area(path) == pytest.approx(((sizes - 2) * 0.5).sum())
+
+
+def test_ply_of_odd_headers(tmp_path: Path) -> None:
+    for content in (
+        PLY.replace("\n", "\r"),
+        PLY.replace("end_header\n", "comment end_header is not here\nobj_info x\nend_header  \n"),
+        PLY.replace("element face", "element odd 0\nproperty list uchar int x\nelement face"),
+        PLY.replace("vertex_indices", "vertex_index"),
+        PLY.replace("property float z", "property float z\nproperty float quality").replace(
+            " 0\n", " 0 nan\n"
+        ),
+    ):
+        assert area(written(tmp_path, "a.ply", content)) == pytest.approx(1.0)
+    for content, reason in (
+        (PLY.replace("element face 1", "element face 2"), "ends within its 2 rows of 'face'"),
+        (PLY.replace("4 0 1 2 3", "4 0 1 2 2.5"), "not whole"),
+        (PLY.replace("property float z", "property float x"), "two properties 'x'"),
+        (PLY.replace("element face", "element edges"), "no faces"),
+    ):
+        with pytest.raises(InvalidMesh, match=reason):
+            read_mesh(written(tmp_path, "a.ply", content))
+
+
+def test_what_is_left_out_is_logged(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING):
+        read_mesh(written(tmp_path, "a.obj", V + "f 1 2 3\nf 1 2\nsurf 0 1 0 1 1 2 3\nf 1 3 2 4\n"))
+    messages = "\n".join(record.getMessage() for record in caplog.records)
+    for part in ("1 faces of fewer than three", "1 free-form", "1 faces cross themselves"):
+        assert part in messages
