@@ -317,6 +317,11 @@ def read_image(path: Path, *, advice: str = _ADVICE) -> Pixels:
     return _wide_colors(path, pixels) if wide else pixels
 
 
+def picture_pixels(content: bytes, name: str) -> Pixels:
+    """Return the pixels of a picture file's bytes, as `read_image` does; messages call it by a name."""
+    return _read_picture(io.BytesIO(content), name)
+
+
 def _wide_colors(path: Path, narrow: Pixels) -> Pixels:
     """Return the 16-bit colours of a PNG file, of which Pillow reads 8 bits."""
     import pyvista as pv

@@ -38,15 +38,15 @@ MIN_PRECISE_RATIO = 500.0
 """Least ratio of coordinates to the extent of a mesh at which float64 is kept."""
 
 _READERS: dict[str, Callable[[Path], tuple[Float64Array, Polygons | Int64Array]]] = {
-    ".3mf": read_3mf,
-    ".glb": read_gltf,
-    ".gltf": read_gltf,
     ".obj": read_obj,
     ".off": read_off,
     ".ply": read_ply,
     ".stl": read_stl,
 }
 """Our own readers, by suffix: they return points and polygons."""
+
+_PLACED_READERS = {".3mf": read_3mf, ".glb": read_gltf, ".gltf": read_gltf}
+"""Those of files that place meshes in space; they return a mesh with its colours."""
 
 _logger = logging.getLogger(__name__)
 
@@ -92,6 +92,9 @@ def read_mesh_data(path: str | PathLike[str]) -> MeshData:
     path = Path(path)
     if not is_file(path):
         raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
+    if placed := _PLACED_READERS.get(path.suffix.lower()):
+        data = placed(path)
+        return MeshData(*polygon_triangles(*data.arrays, name=str(path)), data.color)
     if reader := _READERS.get(path.suffix.lower()):
         return MeshData(*polygon_triangles(*reader(path), name=str(path)))
     if can_isolate():

@@ -3,23 +3,21 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from blobtree._typing import Float64Array, Int64Array
 from decals.surfaces.files.faults import Notes, reading
 from decals.surfaces.files.gltf_accessors import Accessors
 from decals.surfaces.files.gltf_buffers import Buffers
 from decals.surfaces.files.gltf_document import Document, parse
+from decals.surfaces.files.gltf_materials import Materials
 from decals.surfaces.files.gltf_nodes import Placement, placements
 from decals.surfaces.files.gltf_primitives import Skinned, posed, read_primitive
-from decals.surfaces.files.pieces import Budget, Piece, joined, placed
+from decals.surfaces.files.pieces import Budget, Piece, mesh_of, placed
+from decals.surfaces.mesh_data import MeshData
 
 
-def read_gltf(path: Path) -> tuple[Float64Array, Int64Array]:
+def read_gltf(path: Path) -> MeshData:
     """Read the default scene of a glTF or GLB file, at rest: morph targets and skins as the file has them.
 
-    Returns
-    -------
-    points : float64[n, 3]
-    faces : int64[m, 3]
+    Vertices are float64. The colours are those of the vertices and of the materials' base colours.
 
     Raises
     ------
@@ -28,13 +26,13 @@ def read_gltf(path: Path) -> tuple[Float64Array, Int64Array]:
     """
     with reading(path, "glTF") as notes:
         document, binary = parse(path.read_bytes(), notes)
-        budget = Budget()
-        accessors = Accessors(document, Buffers(document.buffers, binary, path.parent), budget)
-        scene = _Scene(document, accessors, budget, notes)
-        mesh = joined(
+        budget, buffers = Budget(), Buffers(document.buffers, binary, path.parent)
+        accessors = Accessors(document, buffers, budget)
+        materials = Materials(document, buffers, path.parent, notes)
+        scene = _Scene(document, accessors, materials, budget, notes)
+        return mesh_of(
             [piece for place in placements(document, accessors, notes) for piece in scene.pieces(place)]
         )
-    return mesh.points, mesh.faces
 
 
 _Key = tuple[int, tuple[float, ...], bool]
@@ -44,9 +42,12 @@ _Key = tuple[int, tuple[float, ...], bool]
 class _Scene:
     """Reads each mesh once, and places it as often as the scene does."""
 
-    def __init__(self, document: Document, accessors: Accessors, budget: Budget, notes: Notes) -> None:
+    def __init__(
+        self, document: Document, accessors: Accessors, materials: Materials, budget: Budget, notes: Notes
+    ) -> None:
         self._document = document
         self._accessors = accessors
+        self._materials = materials
         self._budget = budget
         self._notes = notes
         self._meshes: dict[_Key, list[tuple[Piece, Skinned | None]]] = {}
@@ -75,6 +76,8 @@ class _Scene:
     def _read(self, place: Placement) -> Iterator[tuple[Piece, Skinned | None]]:
         for index, primitive in enumerate(self._document.meshes[place.mesh].primitives):
             name = f"mesh {place.mesh} primitive {index}"
-            part = read_primitive(primitive, place.weights, self._accessors, self._notes, name)
+            part = read_primitive(
+                primitive, place.weights, self._accessors, self._materials, self._notes, name
+            )
             if part is not None:
                 yield part

@@ -33,43 +33,43 @@ Triple = tuple[float, float, float]
 _Kind = TypeVar("_Kind", bound=Struct)
 
 
-class _Record(Struct, rename="camel", frozen=True):
+class Record(Struct, rename="camel", frozen=True):
     """A record of the file; names that it does not declare are skipped."""
 
 
-class _Asset(_Record, frozen=True):
+class _Asset(Record, frozen=True):
     version: str | float = ""
     min_version: str | float = ""
 
 
-class _Head(_Record, frozen=True):
+class _Head(Record, frozen=True):
     asset: _Asset = _Asset()
 
 
-class Scene(_Record, frozen=True):
+class Scene(Record, frozen=True):
     """The roots of a scene."""
 
     nodes: tuple[Index, ...] = ()
 
 
-class Instancing(_Record, frozen=True):
+class Instancing(Record, frozen=True):
     """Accessors of the places of copies (EXT_mesh_gpu_instancing)."""
 
     attributes: dict[str, Index] = {}
 
 
-class _Visibility(_Record, frozen=True):
+class _Visibility(Record, frozen=True):
     visible: bool = True
 
 
-class NodeExtensions(_Record, frozen=True):
+class NodeExtensions(Record, frozen=True):
     """Extensions of a node that have an effect on the mesh."""
 
     instancing: Instancing | None = field(name="EXT_mesh_gpu_instancing", default=None)
     visibility: _Visibility = field(name="KHR_node_visibility", default=_Visibility())
 
 
-class Node(_Record, frozen=True):
+class Node(Record, frozen=True):
     """A node: its place in its parent, and what it shows there."""
 
     children: tuple[Index, ...] = ()
@@ -83,11 +83,11 @@ class Node(_Record, frozen=True):
     extensions: NodeExtensions = NodeExtensions()
 
 
-class _PrimitiveExtensions(_Record, frozen=True):
+class _PrimitiveExtensions(Record, frozen=True):
     draco: Raw = field(name=DRACO, default=Raw())
 
 
-class Primitive(_Record, frozen=True):
+class Primitive(Record, frozen=True):
     """Accessors of the vertices and corners of a part of a mesh."""
 
     attributes: dict[str, Index] = {}
@@ -98,32 +98,32 @@ class Primitive(_Record, frozen=True):
     extensions: _PrimitiveExtensions = _PrimitiveExtensions()
 
 
-class Mesh(_Record, frozen=True):
+class Mesh(Record, frozen=True):
     """Primitives, and the weights of their morph targets."""
 
     primitives: tuple[Primitive, ...] = ()
     weights: tuple[float, ...] = ()
 
 
-class Skin(_Record, frozen=True):
+class Skin(Record, frozen=True):
     """Nodes that move the vertices of a mesh."""
 
     joints: tuple[Index, ...] = ()
     inverse_bind_matrices: Index | None = None
 
 
-class _SparseIndices(_Record, frozen=True):
+class _SparseIndices(Record, frozen=True):
     buffer_view: Index
     component_type: int
     byte_offset: Index = 0
 
 
-class _SparseValues(_Record, frozen=True):
+class _SparseValues(Record, frozen=True):
     buffer_view: Index
     byte_offset: Index = 0
 
 
-class Sparse(_Record, frozen=True):
+class Sparse(Record, frozen=True):
     """Elements of an accessor that replace others."""
 
     count: Index
@@ -131,7 +131,7 @@ class Sparse(_Record, frozen=True):
     values: _SparseValues
 
 
-class Accessor(_Record, frozen=True):
+class Accessor(Record, frozen=True):
     """Elements of equal type within a buffer view."""
 
     component_type: int
@@ -143,12 +143,12 @@ class Accessor(_Record, frozen=True):
     sparse: Sparse | None = None
 
 
-class _ViewExtensions(_Record, frozen=True):
+class _ViewExtensions(Record, frozen=True):
     meshopt: Raw = field(name=MESHOPT[0], default=Raw())
     meshopt_khr: Raw = field(name=MESHOPT[1], default=Raw())
 
 
-class BufferView(_Record, frozen=True):
+class BufferView(Record, frozen=True):
     """A part of a buffer."""
 
     buffer: Index
@@ -158,14 +158,14 @@ class BufferView(_Record, frozen=True):
     extensions: _ViewExtensions = _ViewExtensions()
 
 
-class Buffer(_Record, frozen=True):
+class Buffer(Record, frozen=True):
     """Bytes beside the JSON."""
 
     uri: str | None = None
 
 
-class Document(_Record, frozen=True):
-    """All records of a file."""
+class Document(Record, frozen=True):
+    """All records of a file; what has an effect on colours alone stays undecoded."""
 
     scene: Index | None = None
     scenes: tuple[Scene, ...] = ()
@@ -175,6 +175,10 @@ class Document(_Record, frozen=True):
     accessors: tuple[Accessor, ...] = ()
     buffer_views: tuple[BufferView, ...] = ()
     buffers: tuple[Buffer, ...] = ()
+    materials: Raw = Raw()
+    textures: Raw = Raw()
+    images: Raw = Raw()
+    samplers: Raw = Raw()
     extensions_required: tuple[str, ...] = ()
 
 

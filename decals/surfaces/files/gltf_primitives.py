@@ -1,13 +1,16 @@
 """The primitives of a glTF mesh as triangles: corners of every mode, morph targets and skins."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from blobtree._typing import Float64Array, Int64Array
+from decals.errors import InvalidMesh
+from decals.surfaces.base_color import WHITE, BaseColor, BaseTexture
 from decals.surfaces.files.faults import Notes, Unreadable
 from decals.surfaces.files.gltf_accessors import Accessors, compressed
 from decals.surfaces.files.gltf_document import DRACO, Primitive
+from decals.surfaces.files.gltf_materials import Materials
 from decals.surfaces.files.pieces import Piece, mirrors, turned
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
@@ -16,7 +19,7 @@ TRIANGLES, STRIP, FAN = 4, 5, 6
 CHUNK = 1 << 18
 """Weights of joints that are used at once."""
 
-_VECTOR = ("VEC3",)
+_VECTOR, _COLORS, _COORDINATES = ("VEC3",), ("VEC3", "VEC4"), ("VEC2",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +34,12 @@ class Skinned:
 
 
 def read_primitive(
-    primitive: Primitive, weights: tuple[float, ...], accessors: Accessors, notes: Notes, place: str
+    primitive: Primitive,
+    weights: tuple[float, ...],
+    accessors: Accessors,
+    materials: Materials,
+    notes: Notes,
+    place: str,
 ) -> tuple[Piece, Skinned | None] | None:
     """Return the triangles of a primitive, moved by its morph targets, and its skin; None without faces."""
     position = primitive.attributes.get("POSITION")
@@ -50,7 +58,8 @@ def read_primitive(
     points = _morphed("POSITION", _VECTOR, primitive, weights, accessors, rows, place)
     if not np.isfinite(points).all():
         raise Unreadable(f"{place} has positions that are no finite numbers")
-    return Piece(points, faces), _skinned(primitive, accessors, rows, place)
+    color = _color(primitive, accessors, materials, notes, rows, place)
+    return Piece(points, faces, color), _skinned(primitive, accessors, rows, place)
 
 
 def _check_compression(primitive: Primitive, accessors: Accessors, place: str) -> None:
@@ -109,6 +118,37 @@ def _morphed(
     return values
 
 
+def _color(
+    primitive: Primitive,
+    accessors: Accessors,
+    materials: Materials,
+    notes: Notes,
+    rows: Int64Array,
+    place: str,
+) -> BaseColor | None:
+    """Return the base colour of rows by the material and the colours of vertices; None without either."""
+    material = materials.of(primitive.material, place)
+    if material is None and "COLOR_0" not in primitive.attributes:
+        return None
+    colors = np.tile(WHITE if material is None else material.factor, (len(rows), 1))
+    coordinates = None
+    textures: list[BaseTexture] = []
+    try:
+        if "COLOR_0" in primitive.attributes:
+            colors *= accessors.floats(primitive.attributes["COLOR_0"], _COLORS, place, rows)[:, :3]
+        if material is not None and material.texture is not None:
+            index = primitive.attributes.get(f"TEXCOORD_{material.texcoord}")
+            if index is None:
+                notes.add("textures without coordinates are left out", place)
+            else:
+                coordinates = material.placed(accessors.floats(index, _COORDINATES, place, rows))
+                textures.append(material.texture)
+        return BaseColor(np.clip(colors, 0.0, 1.0), coordinates, textures)
+    except (InvalidMesh, Unreadable) as fault:
+        notes.add("colours are left out", f"{place} ({fault})")
+        return None
+
+
 def _skinned(primitive: Primitive, accessors: Accessors, rows: Int64Array, place: str) -> Skinned | None:
     """Return the joints of the rows and their weights; None for a primitive that no skin moves."""
     names = primitive.attributes
@@ -136,4 +176,4 @@ def posed(piece: Piece, skinned: Skinned, joints: Float64Array, place: str) -> P
         maps = np.einsum("nk,nkij->nij", skinned.weights[part], joints[skinned.joints[part], :3])
         points[part] = (maps[:, :, :3] @ piece.points[part, :, None])[..., 0] + maps[:, :, 3]
         mirrored[part] = mirrors(maps)
-    return Piece(points, turned(piece.faces, mirrored[piece.faces].sum(axis=1) > 1))
+    return replace(piece, points=points, faces=turned(piece.faces, mirrored[piece.faces].sum(axis=1) > 1))

@@ -1,12 +1,15 @@
 """Pieces of a mesh: triangles that files place one or several times, joined to one mesh."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
-from blobtree._typing import BoolArray, Float64Array, Int64Array
+from blobtree._typing import BoolArray, Float64Array, Int32Array, Int64Array
+from decals.surfaces.base_color import BaseColor
 from decals.surfaces.files.faults import Unreadable
+from decals.surfaces.mesh_data import MeshData, joined
 
 MAX_ELEMENTS = 1 << 25
 """Most vertices, and most triangles, of a file's mesh with all copies that the file places."""
@@ -24,6 +27,11 @@ class Piece:
 
     faces: Int64Array
     """Corners, ``[m, 3]``, as indices into the points."""
+
+    color: BaseColor | None = None
+
+
+IntArray = TypeVar("IntArray", Int32Array, Int64Array)
 
 
 class Budget:
@@ -57,7 +65,7 @@ def mirrors(matrices: Float64Array) -> BoolArray:
     return flags
 
 
-def turned(faces: Int64Array, flags: BoolArray) -> Int64Array:
+def turned(faces: IntArray, flags: BoolArray) -> IntArray:
     """Return faces whose winding is reversed where the flags say so."""
     return np.where(flags[..., None], faces[..., ::-1], faces)
 
@@ -71,13 +79,29 @@ def placed(piece: Piece, matrices: Float64Array) -> Piece:
     points = piece.points @ matrices[:, :3, :3].swapaxes(1, 2) + matrices[:, None, :3, 3]
     faces = turned(np.broadcast_to(piece.faces, (copies, *piece.faces.shape)), mirrors(matrices)[:, None])
     starts = np.arange(copies)[:, None, None] * count
-    return Piece(points.reshape(-1, 3), (faces + starts).reshape(-1, 3))
+    color = None if piece.color is None else _copied(piece.color, mirrors(matrices))
+    return Piece(points.reshape(-1, 3), (faces + starts).reshape(-1, 3), color)
 
 
-def joined(pieces: Sequence[Piece]) -> Piece:
-    """Return all pieces as one."""
+def _copied(color: BaseColor, mirrored: BoolArray) -> BaseColor:
+    """Return the base colour of as many copies of a piece as there are flags; true ones are mirrored."""
+    copies, corners = len(mirrored), color.corners
+    if corners is not None:
+        starts = np.arange(copies)[:, None, None] * len(color)
+        shape = copies, *corners.shape
+        corners = (turned(np.broadcast_to(corners, shape), mirrored[:, None]) + starts).reshape(-1, 3)
+    return replace(
+        color,
+        colors=None if color.colors is None else np.tile(color.colors, (copies, 1)),
+        coordinates=None if color.coordinates is None else np.tile(color.coordinates, (copies, 1)),
+        texture_of_face=None if color.texture_of_face is None else np.tile(color.texture_of_face, copies),
+        corners=corners,
+    )
+
+
+def mesh_of(pieces: Sequence[Piece]) -> MeshData:
+    """Return all pieces as one mesh, whose vertices are float64."""
     if not pieces:
-        return Piece(np.zeros((0, 3)), np.zeros((0, 3), np.int64))
-    starts = np.cumsum([0] + [len(piece.points) for piece in pieces[:-1]])
-    faces = [piece.faces + start for piece, start in zip(pieces, starts, strict=True)]
-    return Piece(np.concatenate([piece.points for piece in pieces]), np.concatenate(faces))
+        return MeshData(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
+    parts: list[Any] = [(piece.points, piece.faces, piece.color) for piece in pieces]
+    return joined([MeshData(*part) for part in parts])

@@ -2,15 +2,18 @@
 
 import logging
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from blobtree._typing import Float64Array, Int64Array
+from blobtree._typing import Float64Array
 from decals.surfaces.files.faults import Notes, Unreadable, reading
-from decals.surfaces.files.pieces import Budget, Piece, joined, placed
+from decals.surfaces.files.pieces import Budget, Piece, mesh_of, placed
+from decals.surfaces.files.threemf_colors import Colors
 from decals.surfaces.files.threemf_model import Model, Object, Use, parse_model
 from decals.surfaces.files.threemf_package import Package
+from decals.surfaces.mesh_data import MeshData
 
 _logger = logging.getLogger(__name__)
 
@@ -21,13 +24,10 @@ _Key = tuple[str, int]
 """The part of a package and the number of an object in it."""
 
 
-def read_3mf(path: Path) -> tuple[Float64Array, Int64Array]:
+def read_3mf(path: Path) -> MeshData:
     """Read the objects that a 3MF file builds. The unit of the file stays, and the log names it.
 
-    Returns
-    -------
-    points : float64[n, 3]
-    faces : int64[m, 3]
+    Vertices are float64.
 
     Raises
     ------
@@ -35,24 +35,23 @@ def read_3mf(path: Path) -> tuple[Float64Array, Int64Array]:
         If the file is damaged, or refers to what it does not have.
     """
     with reading(path, "3MF") as notes:
-        mesh = _mesh(path, notes)
-    return mesh.points, mesh.faces
+        return _mesh(path, notes)
 
 
-def _mesh(path: Path, notes: Notes) -> Piece:
+def _mesh(path: Path, notes: Notes) -> MeshData:
     """Return the mesh of a file."""
     with Package(path) as package:
         build = _Build(package, notes)
         _logger.info("%s: the unit is 1 %s", path, build.unit)
         budget, pieces = Budget(), []
         for key, matrices in build.places().items():
-            mesh = build.object(key).mesh
+            mesh = build.mesh(key)
             if mesh is not None:
                 budget.spend(
                     len(matrices) * len(mesh.points), len(matrices) * len(mesh.faces), f"object {key[1]}"
                 )
                 pieces.append(placed(mesh, np.array(matrices)))
-        return joined(pieces)
+        return mesh_of(pieces)
 
 
 class _Build:
@@ -62,6 +61,7 @@ class _Build:
         self._package = package
         self._notes = notes
         self._models: dict[str, Model] = {}
+        self._colors = Colors(package, notes)
 
     def object(self, key: _Key) -> Object:
         """Return an object."""
@@ -75,6 +75,14 @@ class _Build:
     def unit(self) -> str:
         """Unit of the numbers."""
         return self._model(self._package.model_part).unit
+
+    def mesh(self, key: _Key) -> Piece | None:
+        """Return the mesh of an object with its colours; None if it has none."""
+        item = self.object(key)
+        if item.mesh is None or item.properties is None:
+            return item.mesh
+        color = self._colors.of(self._model(key[0]), item.properties, f"object {key[1]}")
+        return replace(item.mesh, color=color)
 
     def places(self) -> dict[_Key, list[Float64Array]]:
         """Return the maps of each object's copies to the build."""

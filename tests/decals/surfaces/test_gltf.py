@@ -1,9 +1,12 @@
 """glTF files: what the specification says they show, in float64, and what is refused or left out by name."""
 
+import base64
+import io
 import json
 import logging
 import math
 import random
+import re
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -11,11 +14,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 from scipy.spatial import cKDTree
 
 from decals.errors import InvalidMesh
 from decals.surfaces import read_mesh
+from decals.surfaces.base_color import CLAY
 from decals.surfaces.files import gltf, pieces
+from decals.surfaces.mesh_file import read_mesh_data
 from tests.decals.meshes import icosphere
 from tests.scene_files import GltfWriter, SceneFile, broken_gltf, glb, random_gltf
 
@@ -306,6 +312,130 @@ def test_links_do_not_lead_out_of_the_folder(tmp_path: Path) -> None:
     binary.symlink_to(outside)
     with pytest.raises(InvalidMesh, match="outside of the model's folder"):
         read_mesh(path)
+
+
+def picture(pixels: Any) -> str:
+    """Return a picture as a data URI."""
+    buffer = io.BytesIO()
+    Image.fromarray(np.asarray(pixels, np.uint8)).save(buffer, "PNG")
+    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
+
+
+def linear(levels: Any) -> Any:
+    """Return linear light of sRGB bytes, by the formula of IEC 61966-2-1."""
+    part = np.asarray(levels) / 255.0
+    return np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
+
+
+PIXELS = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [200, 100, 50]]])
+"""Upper left, upper right; lower left, lower right."""
+
+
+def textured(writer: GltfWriter, coordinates: Any, **material: Any) -> dict[str, Any]:
+    """Return a square with coordinates, whose material has a texture of four pixels."""
+    primitive = square(writer, material=0)
+    primitive["attributes"]["TEXCOORD_0"] = writer.accessor(np.asarray(coordinates, "<f4"))
+    writer.add("nodes", mesh=writer.add("meshes", primitives=[primitive]))
+    info = {"index": 0, **material.pop("info", {})}
+    writer.document["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": info, **material}}]
+    writer.document["textures"] = [{"source": 0, "sampler": 0}]
+    writer.document["images"] = [{"uri": picture(PIXELS)}]
+    writer.document["samplers"] = [{"wrapS": 33071, "wrapT": 33648}]
+    return primitive
+
+
+def light_at_corners(path: Path) -> tuple[Any, Any]:
+    """Return the positions of a file's corners and the linear light there."""
+    data = read_mesh_data(path)
+    assert data.color is not None
+    numbers = np.repeat(np.arange(len(data.faces)), 3)
+    light = data.color.light_at(data.faces, numbers, np.tile(np.eye(3), (len(data.faces), 1)))
+    return data.vertices[data.faces].reshape(-1, 3), light
+
+
+CENTRES = [(0.25, 0.25), (0.75, 0.25), (0.25, 0.75), (0.75, 0.75)]
+"""Centres of the four pixels, in the order of `PIXELS`; v points downward in glTF."""
+
+
+@pytest.mark.parametrize("form", ["plain", "transform", "wrapped", "view"])
+def test_factor_vertex_colours_and_texture_are_multiplied_in_linear_light(tmp_path: Path, form: str) -> None:
+    writer = GltfWriter()
+    coordinates, info = np.array(CENTRES), {}
+    if form == "transform":
+        turn, scale, offset = 0.3, np.array([2.0, 0.5]), np.array([0.1, 0.2])
+        transform = {"rotation": turn, "scale": scale.tolist(), "offset": offset.tolist()}
+        info = {"extensions": {"KHR_texture_transform": transform}}
+        # The coordinates that an image turned clockwise, scaled and moved takes back to the pixels' centres.
+        cos, sin = math.cos(turn), math.sin(turn)
+        coordinates = (coordinates - offset) @ np.array([[cos, sin], [-sin, cos]]) / scale
+    if form == "wrapped":
+        coordinates = coordinates * [1, -1] + [
+            [-9, 0],
+            [9, 0],
+            [-9, 0],
+            [9, 0],
+        ]  # clamp along u, mirror along v
+    primitive = textured(writer, coordinates, baseColorFactor=[0.5, 1.0, 0.25, 0.3], info=info)
+    shades = np.array([[255, 255, 255, 0], [51, 255, 0, 9], [255, 102, 255, 0], [0, 255, 255, 0]], np.uint8)
+    primitive["attributes"]["COLOR_0"] = writer.accessor(shades, normalized=True)
+    if form == "view":
+        content = base64.b64decode(picture(PIXELS).partition(",")[2])
+        writer.document["images"] = [{"bufferView": writer.view(content), "mimeType": "image/png"}]
+    positions, light = light_at_corners(saved(tmp_path, writer))
+    corners = (positions[:, 0] + 2 * positions[:, 1]).astype(int)
+    expected = linear(PIXELS.reshape(4, 3)) * [0.5, 1.0, 0.25] * (shades[:, :3] / 255.0)
+    assert light == pytest.approx(expected[corners], abs=1e-5)
+
+
+def attributes(document: dict[str, Any]) -> Any:
+    """Return the attributes of a document's first primitive."""
+    return document["meshes"][0]["primitives"][0]["attributes"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda d: d["images"][0].update(uri="nothing.png"), "image 0, 'nothing.png', is missing"),
+        (lambda d: d["images"][0].update(uri="../a.png"), "textures are left out: image 0, .*outside"),
+        (lambda d: d["images"][0].update(uri="data:,text"), "textures are left out: .*image 0"),
+        (lambda d: d["images"][0].update(uri=[]), "textures are left out: image 0 is wrong: Expected"),
+        (lambda d: d["textures"][0].update(source=7), "textures are left out: texture 0 asks for image 7"),
+        (lambda d: d["textures"][0].update(sampler=7), "textures are left out: texture 0 asks for sampler 7"),
+        (lambda d: d["textures"].__setitem__(0, {"extensions": {"KHR_texture_basisu": {"source": 0}}}),
+         "texture 0 has no image of a kind that is read"),
+        (lambda d: d.update(textures={}), "textures are left out: texture 0 is wrong: Expected `array`"),
+        (lambda d: d.update(materials=[]), "materials are left out: mesh 0 primitive 0 asks for material 0"),
+        (lambda d: d.update(materials=[3]), "materials are left out: material 0 is wrong"),
+        (lambda d: attributes(d).pop("TEXCOORD_0"), "textures without coordinates"),
+        (lambda d: attributes(d).update(TEXCOORD_0=0), "colours are left out: mesh 0"),
+        (lambda d: attributes(d).update(COLOR_0=9), "colours are left out: mesh 0"),
+    ],
+)  # fmt: skip
+def test_a_fault_in_colours_costs_no_face(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, change: Callable[[dict[str, Any]], Any], message: str
+) -> None:
+    writer = GltfWriter()
+    textured(writer, CENTRES)
+    change(writer.document)
+    assert len(read_mesh(saved(tmp_path, writer))[1]) == 2
+    assert re.search(message, caplog.text)
+
+
+def test_colours_of_copies_and_of_parts_without_any(tmp_path: Path) -> None:
+    """Two mirrored copies keep their colours at their corners; a part without material becomes clay."""
+    writer = GltfWriter()
+    primitive = square(writer)
+    shades = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0]], "<f4")
+    primitive["attributes"]["COLOR_0"] = writer.accessor(shades)
+    scales = writer.accessor(np.array([[-1, 1, 1], [1, 1, 1]], "<f4"))
+    extension = {"EXT_mesh_gpu_instancing": {"attributes": {"SCALE": scales}}}
+    writer.add("nodes", mesh=writer.add("meshes", primitives=[primitive]), extensions=extension)
+    plain = writer.add("meshes", primitives=[square(writer)])
+    writer.add("nodes", mesh=plain, translation=[0, 0, 9])
+    positions, light = light_at_corners(saved(tmp_path, writer))
+    corners = (np.abs(positions[:, 0]) + 2 * positions[:, 1]).astype(int)
+    clay = linear(np.array(CLAY) * 255.0)
+    assert light == pytest.approx(np.where(positions[:, 2:] == 9, clay, shades[corners]), abs=1e-6)
 
 
 def test_it_agrees_with_trimesh(tmp_path: Path) -> None:

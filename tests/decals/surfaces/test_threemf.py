@@ -9,12 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from decals.errors import InvalidMesh
 from decals.surfaces import read_mesh
+from decals.surfaces.base_color import CLAY
 from decals.surfaces.files import threemf
+from decals.surfaces.mesh_file import read_mesh_data
 from tests.decals.meshes import icosphere
-from tests.decals.surfaces.test_gltf import check, shapes
+from tests.decals.surfaces.test_gltf import PIXELS, check, light_at_corners, linear, shapes
 from tests.scene_files import CORE, broken_3mf, mesh_xml, package, random_3mf, relationships, transform_text
 
 TETRAHEDRON = mesh_xml(
@@ -163,3 +166,55 @@ def test_a_package_that_is_cut_is_refused(tmp_path: Path) -> None:
         path.write_bytes(whole[:end])
         with pytest.raises(InvalidMesh, match=r"model\.3mf"):
             read_mesh(path)
+
+
+MATERIALS = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02"
+PALETTES = f"""<m:colorgroup xmlns:m="{MATERIALS}" id="10">
+<m:color color="#FF0000"/><m:color color="#00FF0080"/><m:color color="#0000FF"/></m:colorgroup>
+<basematerials id="11"><base name="a" displaycolor="#808080FF"/>
+<base name="b" displaycolor="none"/></basematerials>
+<m:texture2d xmlns:m="{MATERIALS}" id="12" path="/3D/a%20b.png" contenttype="image/png" tilestyleu="clamp"/>
+<m:texture2dgroup xmlns:m="{MATERIALS}" id="13" texid="12"><m:tex2coord u="0.25" v="0.75"/>
+<m:tex2coord u="9" v="0.25"/><m:tex2coord u="-9" v="0.25"/></m:texture2dgroup>
+<m:multiproperties xmlns:m="{MATERIALS}" id="14" pids="10 11"/>"""
+
+
+def test_colours_of_corners_objects_and_textures(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Each triangle of a mirrored tetrahedron has colours of another kind; the last one's are not read."""
+    extras = [' pid="10" p1="0" p2="1" p3="2"', "", ' pid="13" p1="0" p2="1" p3="2"', ' pid="14" p1="0"']
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    mesh = mesh_xml(points, faces, extra=extras.__getitem__)
+    text = model(
+        PALETTES + f'<object id="1" pid="11" pindex="0">{mesh}</object>',
+        '<item objectid="1" transform="-1 0 0 0 1 0 0 0 1 0 0 0"/>',
+    )
+    pixels = io.BytesIO()
+    Image.fromarray(PIXELS.astype(np.uint8)).save(pixels, "PNG")
+    path = saved(tmp_path, text, **{"3D/a b.png": pixels.getvalue()})
+    positions, light = light_at_corners(path)
+    expected = {
+        (0, 0): (255, 0, 0), (0, 2): (0, 255, 0), (0, 1): (0, 0, 255),
+        (1, 0): (128, 128, 128), (1, 1): (128, 128, 128), (1, 3): (128, 128, 128),
+        (2, 0): PIXELS[0, 0], (2, 3): PIXELS[1, 1], (2, 2): PIXELS[1, 0],
+        **{(3, corner): np.array(CLAY) * 255.0 for corner in (1, 2, 3)},
+    }  # fmt: skip
+    mirrored = points * (-1, 1, 1)
+    for index, (position, shade) in enumerate(zip(positions, light, strict=True)):
+        corner = int(np.flatnonzero((mirrored == position).all(axis=1))[0])
+        assert shade == pytest.approx(linear(expected[index // 3, corner]), abs=1e-5)
+    assert "colours of other kinds are left out: palette 14 of object 1" in caplog.text
+    assert "colours that are no colours become white: palette 11 ('none')" in caplog.text
+
+
+def test_a_fault_in_colours_costs_no_face(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    extras = [' pid="10" p1="7"', ' pid="13" p1="0"', ' pid="99" p1="0"', ' pid="x" p1="y"']
+    mesh = mesh_xml(np.eye(4, 3), [[0, 1, 2], [0, 1, 3], [0, 3, 2], [1, 2, 3]], extra=extras.__getitem__)
+    data = read_mesh_data(saved(tmp_path, model(PALETTES + f'<object id="1">{mesh}</object>')))
+    assert len(data.faces) == 4
+    for message in (
+        "colours that palettes do not have are left out: object 1",
+        "textures are left out: the part '/3D/a%20b.png' is missing",
+        "colours of other kinds are left out: palette 99 of object 1",
+    ):
+        assert message in caplog.text
