@@ -8,9 +8,13 @@ struct Surface {
     vec4 color;     // rgb: linear light; w: 1, and 0 in the background
 };
 
-Surface surface_at(vec3 position, vec3 normal, vec3 srgb, bool outside) {
+Surface surface_in_light(vec3 position, vec3 normal, vec3 linear, bool outside) {
     return Surface(
         vec4(position, float(object_id + 1)),
         vec4(normal / max(length(normal), 1e-30), outside ? 1.0 : -1.0),
-        vec4(to_linear(srgb), 1.0));
+        vec4(linear, 1.0));
+}
+
+Surface surface_at(vec3 position, vec3 normal, vec3 srgb, bool outside) {
+    return surface_in_light(position, normal, to_linear(srgb), outside);
 }

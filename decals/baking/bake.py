@@ -189,14 +189,28 @@ class SurfaceColors:
         self._images = [DecalImage(f"image {i}", image.pixels) for i, image in enumerate(images)]
         self._options = evaluation_options(drawing, decals, objects)
 
+    def at_vertices(self, number: int, rows: slice = slice(None)) -> Float64Array:
+        """Return linear colours of vertices of mesh ``number``, ``float64[n, 3]``."""
+        mesh = self._meshes[number]
+        base = None if mesh.vertex_light is None else mesh.vertex_light[rows]
+        return self.at(number, mesh.places[rows], mesh.facings[rows], base=base)
+
     def at(
-        self, number: int, points: Float32Array, normals: Float32Array, tangents: Float32Array | None = None
+        self,
+        number: int,
+        points: Float32Array,
+        normals: Float32Array,
+        tangents: Float32Array | None = None,
+        base: Float64Array | None = None,
     ) -> Float64Array:
         """Return linear colours ``float64[n, 3]`` of mesh ``number`` at points with unit normals.
 
-        With tangents, they are the values of all maps, see `decals.baking.materials.surface_values`.
+        With tangents, they are the values of all maps, see `decals.baking.materials.surface_values`. The base
+        colours at the points are linear too; by default those of `BakeMesh.base_colors`.
         """
-        base = decode_srgb(np.asarray(self._meshes[number].base_colors(points), np.float64))
+        if base is None:
+            srgb = np.asarray(self._meshes[number].base_colors(points), np.float64)
+            base = decode_srgb(srgb).astype(np.float64, copy=False)
         samples = evaluate(
             self._decals,
             points,
@@ -237,7 +251,7 @@ def _colored_nodes(meshes: Sequence[BakeMesh], colors: SurfaceColors, report: Pr
         for first in range(0, len(mesh.vertices), BLOCK_SAMPLES):
             report("colouring vertices", (number + first / len(mesh.vertices)) / len(meshes))
             rows = slice(first, first + BLOCK_SAMPLES)
-            parts.append(colors.at(number, mesh.places[rows], mesh.facings[rows]))
+            parts.append(colors.at_vertices(number, rows))
         linear = np.clip(np.concatenate(parts), 0.0, 1.0).astype(np.float32)
         nodes.append(Node(mesh.name, mesh.vertices, mesh.faces, mesh.normals, colors=linear))
     return nodes

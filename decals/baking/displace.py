@@ -28,6 +28,7 @@ from decals.scenes.objects import MeshObject, SceneObject, TreeObject
 from decals.scenes.pose import PosedMesh, PosedScene
 from decals.scenes.scene import Scene
 from decals.surfaces import subdivide
+from decals.surfaces.base_color import BaseColor
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.normals import split_at_creases
 from decals.surfaces.subdivide import means, subdivided
@@ -66,7 +67,7 @@ class DisplacedScene(PosedScene):
                     mesh.vertices,
                     mesh.faces,
                     mesh.normals,
-                    encode_srgb(colors.at(number, mesh.places, mesh.facings)).astype(np.float32),
+                    encode_srgb(colors.at_vertices(number)).astype(np.float32),
                 )
             )
             for number, mesh in enumerate(meshes)
@@ -277,10 +278,40 @@ def _fine_mesh(item: MeshObject, are_long: Callable[..., BoolArray]) -> FineMesh
     same = welded(rows[:, :3].astype(np.float32))
     kept, number = np.unique(same, return_inverse=True)
     sums: Float64Array = np.stack([np.bincount(number, axis, len(kept)) for axis in rows[:, 3:].T], axis=1)
-    rest = replace(
-        item, vertices=rows[kept, :3].astype(np.float32), faces=_int32(number.reshape(-1)[faces]), source=None
-    )
+    vertices, joined = rows[kept, :3].astype(np.float32), _int32(number.reshape(-1)[faces])
+    color = item.color
+    if isinstance(color, BaseColor):
+        color = _carried(color, item, vertices[joined])
+    rest = replace(item, vertices=vertices, faces=joined, color=color, source=None)
     return rest, unit_rows(sums), None
+
+
+def _carried(color: BaseColor, item: MeshObject, corners: Float32Array) -> BaseColor:
+    """Return the base colour of a mesh on parts of its faces, whose corners ``[m, 3, 3]`` lie on it."""
+    points = corners.astype(np.float64)
+    numbers, _ = item.surface.locate(points.mean(axis=1))
+    a, b, c = np.moveaxis(item.vertices[item.faces[numbers]].astype(np.float64), 1, 0)
+    sides = np.stack([b - a, c - a], axis=2)
+    second_third = np.einsum("nij,nkj->nki", np.linalg.pinv(sides), points - a[:, None])
+    weights = np.concatenate([1.0 - second_third.sum(axis=2, keepdims=True), second_third], axis=2)
+    weights = np.clip(weights, 0.0, 1.0)
+    weights /= weights.sum(axis=2, keepdims=True)
+    rows = color.rows_of(item.faces)[numbers]
+
+    def at_corners(values: Float32Array | None) -> Float64Array | None:
+        return (
+            None
+            if values is None
+            else np.einsum("nkc,nci->nki", weights, values[rows]).reshape(-1, values.shape[1])
+        )
+
+    return BaseColor(
+        at_corners(color.colors),
+        at_corners(color.coordinates),
+        color.textures,
+        None if color.texture_of_face is None else color.texture_of_face[numbers],
+        np.arange(3 * len(points)).reshape(-1, 3),
+    )
 
 
 def _fine_tree(

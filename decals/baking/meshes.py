@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from blobtree import Node
-from blobtree._typing import Float32Array, Int32Array
+from blobtree._typing import Float32Array, Float64Array, Int32Array
+from blobtree.lazy import Lazy
 from blobtree.meshing.creases import split_creases
 from blobtree.meshing.polygonize import polygonize
 from blobtree.progress import Progress
@@ -14,8 +15,9 @@ from decals.errors import InvalidMesh, InvalidScene
 from decals.rendering.mesh import split_mesh
 from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.pose import PosedMesh
+from decals.surfaces.base_color import WHITE, BaseColor, Color
 from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.normals import vertex_normals
+from decals.surfaces.normals import SplitMesh, split_at_colors, vertex_normals
 from decals.validation import describe
 
 
@@ -35,6 +37,8 @@ class BakeMesh:
         Unit normals, those with which the renderer draws the object.
     base_colors : callable
         Function from points ``float32[k, 3]`` to sRGB colours without decals, ``float32[k, 3]``.
+    base : BaseColor, optional
+        Base colour whose rows are the vertices, in place of that function.
     places, facings : float32[n, 3]
         Positions and normals at which the decals are evaluated: those of the rest pose.
     """
@@ -46,6 +50,12 @@ class BakeMesh:
     base_colors: Callable[[Float32Array], Float32Array]
     places: Float32Array
     facings: Float32Array
+    base: BaseColor | None = None
+
+    @Lazy
+    def vertex_light(self) -> Float64Array | None:
+        """Return the linear base colour of each vertex; None if a function has them."""
+        return None if self.base is None else self.base.at_vertices(self.faces, len(self.vertices))
 
 
 def bake_mesh(item: object, *, resolution: int | None, creases: bool, report: Progress) -> BakeMesh:
@@ -65,14 +75,20 @@ def bake_mesh(item: object, *, resolution: int | None, creases: bool, report: Pr
     if isinstance(item, MeshObject):
         split = split_mesh(item)
         surface = MeshSurface(item.vertices[split.rows], split.faces)
-        return _used_parts(item.name, surface, split.normals, _constant(item.color))
+        return _used_parts(item.name, surface, split.normals, _constant(item.color), split.color)
     if isinstance(item, TreeObject):
         return _tree_mesh(item.name, item.tree, resolution, creases, report)
     if isinstance(item, PosedMesh):
         normals, facings = (vertex_normals(at, item.faces) for at in (item.vertices, item.rest.vertices))
         colors = _constant(item.rest.color) if item.colors is None else _nearest(item)
-        places = item.rest.vertices
-        return BakeMesh(item.name, item.vertices, item.faces, normals, colors, places, facings)
+        split = SplitMesh(np.arange(len(item.vertices)), item.faces, normals)
+        if isinstance(item.color, BaseColor):
+            split = split_at_colors(split, item.color)
+        rows, places = split.rows, item.rest.vertices[split.rows]
+        posed = item.vertices[rows]
+        return BakeMesh(
+            item.name, posed, split.faces, split.normals, colors, places, facings[rows], split.color
+        )
     raise InvalidScene(f"expected an object of a scene, got {describe(item)}; wrap it in a MeshObject")
 
 
@@ -92,17 +108,21 @@ def _used_parts(
     surface: MeshSurface,
     normals: Float32Array,
     base_colors: Callable[[Float32Array], Float32Array],
+    base: BaseColor | None = None,
 ) -> BakeMesh:
     """Return the faces with area, and the vertices that they use."""
     rows, faces = np.unique(surface.faces[surface.sound], return_inverse=True)
     corners: Int32Array = faces.reshape(-1, 3).astype(np.int32)
     vertices, facings = surface.vertices[rows], normals[rows]
-    return BakeMesh(name, vertices, corners, facings, base_colors, vertices, facings)
+    if base is not None:
+        base = base.of_part(surface.sound).of_rows(rows)
+    return BakeMesh(name, vertices, corners, facings, base_colors, vertices, facings, base)
 
 
-def _constant(color: tuple[float, float, float]) -> Callable[[Float32Array], Float32Array]:
-    """Return a function that gives every point the same colour."""
-    return lambda points: np.broadcast_to(np.asarray(color, np.float32), points.shape)
+def _constant(color: Color | BaseColor) -> Callable[[Float32Array], Float32Array]:
+    """Return a function that gives every point the same colour; white where a base colour has them."""
+    shade = WHITE if isinstance(color, BaseColor) else color
+    return lambda points: np.broadcast_to(np.asarray(shade, np.float32), points.shape)
 
 
 def _nearest(item: PosedMesh) -> Callable[[Float32Array], Float32Array]:

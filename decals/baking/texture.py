@@ -21,9 +21,11 @@ GUTTER_SHARE = 1 / 256
 ROUNDING = 1e-2
 """Distance in texels below which a texel counts as inside a chart."""
 
-ColorFunction = Callable[[int, Float32Array, Float32Array, Float32Array | None], Float64Array]
+ColorFunction = Callable[
+    [int, Float32Array, Float32Array, Float32Array | None, Float64Array | None], Float64Array
+]
 """Linear colours ``float64[n, 3]`` of the surface of the mesh with a number, at points with unit normals; or
-other values, of as many channels, which need the tangents there."""
+other values, of as many channels, which need the tangents there. At last base colours, linear."""
 
 
 def color_bytes(colors: Float64Array) -> UInt8Array:
@@ -95,6 +97,9 @@ class _Sheet:
         self._vertices = np.concatenate([mesh.places[part.rows] for mesh, part in pairs])
         self._normals = np.concatenate([mesh.facings[part.rows] for mesh, part in pairs])
         self._tangents = None if tangents is None else np.concatenate(tangents)
+        self._rows = np.concatenate([part.rows for part in unwrapped])
+        self._bases = [mesh.base for mesh in meshes]
+        self._first_faces = np.cumsum([0, *(len(part.faces) for part in unwrapped[:-1])])
         self._mesh_of_face = np.repeat(np.arange(len(meshes)), [len(part.faces) for part in unwrapped])
 
     def distances(self, points: Float64Array) -> Float64Array:
@@ -119,9 +124,19 @@ class _Sheet:
         order = [np.nonzero(meshes == number)[0] for number in np.unique(meshes)]
         for rows in order:
             along = None if tangents is None else tangents[rows]
-            parts.append(color_at(int(meshes[rows[0]]), positions[rows], units[rows], along))
+            number = int(meshes[rows[0]])
+            light = self._base_light(number, faces[rows], weights[rows])
+            parts.append(color_at(number, positions[rows], units[rows], along, light))
         colors: Float64Array = np.concatenate(parts)[np.argsort(np.concatenate(order))]
         return colors
+
+    def _base_light(self, number: int, faces: Int64Array, weights: Float64Array) -> Float64Array | None:
+        """Return the linear base colours of a mesh at points of faces; None for a mesh without any."""
+        base = self._bases[number]
+        if base is None:
+            return None
+        corners = self._rows[self._flat.faces[faces]]
+        return base.light_of(corners, faces - self._first_faces[number], weights)
 
     def _locate(self, points: Float64Array) -> tuple[Int64Array, Float64Array]:
         return self._flat.locate(np.column_stack([points, np.zeros(len(points))]))

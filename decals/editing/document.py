@@ -25,6 +25,7 @@ from decals.scenes.origin import WORLD, Origin
 from decals.scenes.pose import require_scene
 from decals.scenes.recipe import Recipe
 from decals.scenes.scene import DecalImage, Scene
+from decals.surfaces.base_color import BaseColor
 from decals.validation import instance, whole_number
 
 
@@ -191,7 +192,8 @@ def _parts_bytes(parts: SceneParts, known: set[int]) -> dict[int, int]:
     held = _arrays(array for image in parts.images or () for array in vars(image).values())
     for item in parts.objects or ():
         if isinstance(item, MeshObject):
-            held |= _arrays([item.vertices, item.faces])
+            colors = item.color.held_arrays if isinstance(item.color, BaseColor) else []
+            held |= _arrays([item.vertices, item.faces, *colors])
             continue
         if id(item) in known:
             continue

@@ -1,6 +1,6 @@
 """Triangle meshes in the G-buffer: rasterised, with normals that are smooth up to the crease angle."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 from weakref import WeakKeyDictionary
 
@@ -8,7 +8,8 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree._typing import Float32Array
+from blobtree._typing import Float32Array, Int32Array
+from decals.rendering.base_textures import WHITE_TEXTURE, SharedTexture, shared_texture
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.pixel_pass import attach_camera, set_uniform
@@ -16,13 +17,21 @@ from decals.rendering.rest_buffer import RestBuffer
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
 from decals.rendering.warmup import SHADERS, WarmupPlan, WarmupTask
 from decals.shaders import compose
-from decals.surfaces.normals import CREASE_ANGLE, SplitMesh, split_at_creases, vertex_normals
+from decals.surfaces.base_color import NO_TEXTURE, BaseColor
+from decals.surfaces.normals import (
+    CREASE_ANGLE,
+    SplitMesh,
+    split_at_colors,
+    split_at_creases,
+    vertex_normals,
+)
 
 
 @runtime_checkable
 class ColoredMesh(Protocol):
     """A mesh object: ``float[n, 3]`` vertices, ``int[m, 3]`` faces, one sRGB colour or one per vertex.
 
+    Its colour may also be a `decals.surfaces.BaseColor`.
     It may have a ``crease_angle`` in degrees; the default is `CREASE_ANGLE`.
     """
 
@@ -31,7 +40,7 @@ class ColoredMesh(Protocol):
     @property
     def faces(self) -> ArrayLike: ...  # noqa: D102
     @property
-    def color(self) -> ArrayLike: ...  # noqa: D102
+    def color(self) -> ArrayLike | BaseColor: ...  # noqa: D102
 
 
 @runtime_checkable
@@ -48,18 +57,25 @@ class MeshDrawable:
     def __init__(self, context: Context, mesh: ColoredMesh, split: SplitMesh | None = None) -> None:
         split = split or split_mesh(mesh)
         rows, faces = mesh_rows(mesh, split), np.ascontiguousarray(split.faces, np.int32)
+        base = _base_color(mesh, split)
+        self._textures: list[_TexturedFaces] = []
+        if base is not None and base.textures:
+            faces, self._textures = _by_texture(context, faces, base)
         self._faces = len(faces)
         self._bounds = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
-        self._program = _program(context)
+        self._program = _program(context, mesh)
         self._vertices = context.gl.buffer(rows.tobytes())
+        self._row_length = rows.shape[1]
         self._indices = context.gl.buffer(faces.tobytes())
-        layout = [(self._vertices, "3f 3f 3f", "vertex_position", "vertex_normal", "vertex_color")]
+        names = ["vertex_position", "vertex_normal", "vertex_color" if base is None else "vertex_light"]
+        names += ["vertex_coordinates"] * bool(self._textures)
+        layout = [(self._vertices, "3f 3f 3f 2f" if self._textures else "3f 3f 3f", *names)]
         self._array = context.gl.vertex_array(self._program, layout, self._indices)
 
     @staticmethod
-    def warmup(context: Context, _mesh: ColoredMesh) -> WarmupPlan:
+    def warmup(context: Context, mesh: ColoredMesh) -> WarmupPlan:
         """Return the slow first-time work of a drawable."""
-        return WarmupPlan("mesh", (WarmupTask(SHADERS, lambda: _program(context)),))
+        return WarmupPlan(f"mesh {_variant(mesh)}", (WarmupTask(SHADERS, lambda: _program(context, mesh)),))
 
     @property
     def bounds(self) -> Bounds:
@@ -76,13 +92,22 @@ class MeshDrawable:
         gbuffer.use(tile.width, tile.height)
         set_uniform(self._program, "object_id", object_id)
         first, last = part.of(self._faces)
-        if last > first:
+        if not self._textures and last > first:
             self._array.render(first=3 * first, vertices=3 * (last - first))
+        for part_faces in self._textures:
+            start, end = max(first, part_faces.first), min(last, part_faces.last)
+            if end > start:
+                part_faces.image.texture.use(0)
+                set_uniform(self._program, "base_texture", 0)
+                set_uniform(self._program, "mirrored", part_faces.image.mirrored)
+                self._array.render(first=3 * start, vertices=3 * (end - start))
 
     def release(self) -> None:
         """Release the memory."""
         for resource in (self._array, self._vertices, self._indices):
             resource.release()
+        for part_faces in self._textures:
+            part_faces.image.release()
 
 
 class PosedMeshDrawable(MeshDrawable):
@@ -101,19 +126,19 @@ class PosedMeshDrawable(MeshDrawable):
         self._rest_rows = context.gl.buffer(np.hstack([rest_rows, rest_split.normals]).tobytes())
         self._rest_program = _rest_program(context)
         layout = [
-            (self._vertices, "3f 6x4", "vertex_position"),
+            (self._vertices, f"3f {self._row_length - 3}x4", "vertex_position"),
             (self._rest_rows, "3f 3f", "vertex_rest_position", "vertex_rest_normal"),
         ]
         self._rest_array = context.gl.vertex_array(self._rest_program, layout, self._indices)
 
     @staticmethod
-    def warmup(context: Context, _mesh: ColoredMesh) -> WarmupPlan:
+    def warmup(context: Context, mesh: ColoredMesh) -> WarmupPlan:
         """Return the slow first-time work of a drawable."""
         tasks = (
-            WarmupTask(SHADERS, lambda: _program(context)),
+            WarmupTask(SHADERS, lambda: _program(context, mesh)),
             WarmupTask(SHADERS, lambda: _rest_program(context)),
         )
-        return WarmupPlan("posed mesh", tasks)
+        return WarmupPlan(f"posed mesh {_variant(mesh)}", tasks)
 
     def draw_rest(self, object_id: int, tile: Tile, rest: RestBuffer, part: Part = WHOLE) -> None:
         """Rasterise the rest pose of the faces, or a part of them, where they are visible."""
@@ -145,22 +170,76 @@ def _rest_program(context: Context) -> moderngl.Program:
     return attach_camera(context.program(compose("rest.vert"), compose("rest.frag")))
 
 
-def _program(context: Context) -> moderngl.Program:
-    return attach_camera(context.program(compose("mesh.vert"), compose("mesh.frag")))
+def _variant(mesh: ColoredMesh) -> str:
+    """Return the name of the program that draws a mesh: plain, or with base colours or textures."""
+    if not isinstance(mesh.color, BaseColor):
+        return "plain"
+    return "textured" if mesh.color.textures else "base"
+
+
+def _program(context: Context, mesh: ColoredMesh) -> moderngl.Program:
+    variant = _variant(mesh)
+    if variant == "plain":
+        return attach_camera(context.program(compose("mesh.vert"), compose("mesh.frag")))
+    defines = {"TEXTURED": 1} if variant == "textured" else {}
+    texts = (compose(name, defines=defines) for name in ("base_mesh.vert", "base_mesh.frag"))
+    return attach_camera(context.program(*texts))
+
+
+@dataclass(frozen=True)
+class _TexturedFaces:
+    """Faces from the first to before the last one, and their texture."""
+
+    first: int
+    last: int
+    image: SharedTexture
+
+
+def _by_texture(
+    context: Context, faces: Int32Array, color: BaseColor
+) -> tuple[Int32Array, list[_TexturedFaces]]:
+    """Return faces in the order of their textures, and those of each texture."""
+    of_face = np.zeros(len(faces), np.int32) if color.texture_of_face is None else color.texture_of_face
+    order = np.argsort(of_face, kind="stable")
+    numbers, starts = np.unique(of_face[order], return_index=True)
+    parts = [
+        _TexturedFaces(
+            int(start),
+            int(end),
+            shared_texture(context, WHITE_TEXTURE if number == NO_TEXTURE else color.textures[number]),
+        )
+        for number, start, end in zip(numbers, starts, [*starts[1:], len(faces)], strict=True)
+    ]
+    return faces[order], parts
+
+
+def _base_color(mesh: ColoredMesh, split: SplitMesh) -> BaseColor | None:
+    """Return the base colour of split vertices; None for a mesh of one colour, or with sRGB per vertex."""
+    return split.color if isinstance(mesh.color, BaseColor) else None
 
 
 def split_mesh(mesh: ColoredMesh) -> SplitMesh:
-    """Return the mesh as it is drawn: split at its creases."""
+    """Return the mesh as it is drawn: split at its creases, and where its base colour jumps."""
     angle: float = getattr(mesh, "crease_angle", CREASE_ANGLE)
     faces = np.ascontiguousarray(mesh.faces, np.int32)
-    return split_at_creases(np.asarray(mesh.vertices, np.float32), faces, angle)
+    split = split_at_creases(np.asarray(mesh.vertices, np.float32), faces, angle)
+    return split_at_colors(split, mesh.color) if isinstance(mesh.color, BaseColor) else split
 
 
 def mesh_rows(mesh: ColoredMesh, split: SplitMesh) -> Float32Array:
-    """Return position, normal and sRGB colour of every split vertex, ``float32[n, 9]``."""
-    rows = np.empty((len(split.rows), 9), np.float32)
+    """Return position, normal and sRGB colour of every split vertex, ``float32[n, 9]``.
+
+    Base colours are linear, and places in textures follow: ``float32[n, 11]``.
+    """
+    base = _base_color(mesh, split)
+    rows = np.empty((len(split.rows), 11 if base is not None and base.textures else 9), np.float32)
     rows[:, :3] = np.asarray(mesh.vertices, np.float32)[split.rows]
     rows[:, 3:6] = split.normals
+    if base is not None:
+        rows[:, 6:9] = 1.0 if base.colors is None else base.colors
+        if base.textures:
+            rows[:, 9:] = base.coordinates
+        return rows
     colors = np.asarray(mesh.color, np.float32)
     rows[:, 6:] = colors if colors.ndim == 1 else colors[split.rows]
     return rows

@@ -13,9 +13,11 @@ from blobtree.meshing.polygonize import MAX_TRIANGLES
 from blobtree.progress import Progress
 from blobtree.pyvista_views import to_polydata, write_polydata
 from decals.errors import InvalidMesh, InvalidScene
+from decals.images.texels import encode_srgb
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject, shown_objects
+from decals.surfaces.base_color import BaseColor
 from decals.surfaces.implicit import ImplicitSurface
-from decals.surfaces.normals import split_at_creases, vertex_normals
+from decals.surfaces.normals import SplitMesh, split_at_colors, split_at_creases, vertex_normals
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -82,14 +84,19 @@ def as_polydata(
 
 
 def _mesh_polydata(item: MeshObject, split_normals: bool) -> "pv.PolyData":
-    vertices, faces = item.vertices, item.faces
-    if split_normals:
-        split = split_at_creases(vertices, faces, item.crease_angle)
-        vertices, faces, normals = vertices[split.rows], split.faces, split.normals
+    split = (
+        split_at_creases(item.vertices, item.faces, item.crease_angle)
+        if split_normals
+        else SplitMesh(np.arange(len(item.vertices)), item.faces, vertex_normals(item.vertices, item.faces))
+    )
+    if isinstance(item.color, BaseColor):
+        split = split_at_colors(split, item.color)
+    vertices = item.vertices[split.rows]
+    if split.color is None:
+        colors = np.tile(np.asarray(item.color, np.float32), (len(vertices), 1))
     else:
-        normals = vertex_normals(vertices, faces)
-    colors = np.tile(np.asarray(item.color, np.float32), (len(vertices), 1))
-    return to_polydata(Mesh(vertices, faces, normals, colors))
+        colors = encode_srgb(split.color.at_vertices(split.faces, len(vertices))).astype(np.float32)
+    return to_polydata(Mesh(vertices, split.faces, split.normals, colors))
 
 
 @dataclass(frozen=True, eq=False)

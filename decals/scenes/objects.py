@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from blobtree import Node
 from blobtree._typing import Float32Array, Int32Array
@@ -19,13 +19,15 @@ from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
 from blobtree.nodes.paths import Path, moved, node_at
 from blobtree.validation import truth
-from decals.errors import InvalidScene
+from decals.errors import InvalidMesh, InvalidScene
+from decals.images.load import AnyImage
 from decals.receivers import label_names
 from decals.scenes.origin import Origin, as_origin, check_distance, local_tree, local_vertices
-from decals.surfaces.base_color import CLAY, Color
+from decals.surfaces.base_color import CLAY, BaseColor, BaseTexture, Color, as_texture
 from decals.surfaces.convert import as_shape
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
+from decals.surfaces.mesh_data import MeshData
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import describe, instance, is_unicode, real_number
 
@@ -51,8 +53,9 @@ class MeshObject(Immutable):
         Positions in the scene's units.
     faces : int32[m, 3]
         Corner indices, counter-clockwise seen from outside.
-    color : (red, green, blue) or str
-        sRGB colour between the decals, each channel in [0, 1]; or the name of a colour.
+    color : (red, green, blue), str or BaseColor
+        sRGB colour between the decals, each channel in [0, 1]; or the name of a colour; or colours of
+        vertices, faces or textures, see `decals.surfaces.BaseColor`.
     source : str, optional
         Where the mesh came from, so that a scene file need not repeat it: a path, or ``"sample:NAME"``.
     crease_angle : float
@@ -89,7 +92,7 @@ class MeshObject(Immutable):
     name: str
     vertices: Float32Array
     faces: Int32Array
-    color: Color = CLAY
+    color: Color | BaseColor = CLAY
     source: str | None = None
     crease_angle: float = CREASE_ANGLE
     origin: Origin = None  # type: ignore[assignment]  # filled in by __post_init__
@@ -106,7 +109,7 @@ class MeshObject(Immutable):
             name: str,
             vertices: ArrayLike,
             faces: ArrayLike,
-            color: ColorLike = CLAY,
+            color: ColorLike | BaseColor = CLAY,
             source: str | None = None,
             crease_angle: float = CREASE_ANGLE,
             origin: ArrayLike | None = None,
@@ -122,7 +125,7 @@ class MeshObject(Immutable):
         surface = MeshSurface(vertices, self.faces)
         checked = {
             "name": checked_name("an object's name", self.name),
-            "color": color_rgb(f"object {self.name!r}, colour", self.color, InvalidScene),
+            "color": _mesh_color(self.name, self.color, np.asarray(self.faces), surface),
             "source": _source(self.name, self.source),
             "crease_angle": as_crease_angle(self.crease_angle),
             "origin": origin,
@@ -346,7 +349,12 @@ def as_crease_angle(angle: object) -> float:
 
 
 def as_object(
-    model: object, name: str, *, color: ColorLike = CLAY, crease_angle: float = CREASE_ANGLE
+    model: object,
+    name: str,
+    *,
+    color: ColorLike | BaseColor | None = None,
+    texture: AnyImage | BaseTexture | None = None,
+    crease_angle: float = CREASE_ANGLE,
 ) -> SceneObject:
     """Return a model as an object of a scene.
 
@@ -356,8 +364,10 @@ def as_object(
         An object of a scene is returned as it is; `decals.surfaces.convert.as_shape` lists all other kinds.
     name : str
         Name of the object; the model of a file is named after the file.
-    color : (red, green, blue) or str
-        Colour of a mesh.
+    color : (red, green, blue), str or BaseColor, optional
+        Colour of a mesh, in place of the colours and textures that it has.
+    texture : image, pyvista.Texture or BaseTexture, optional
+        Texture of a mesh with texture coordinates, in place of its colours.
     crease_angle : float
         Crease angle of a mesh, in degrees; see `MeshObject`.
 
@@ -372,11 +382,35 @@ def as_object(
     source = os.fspath(model) if isinstance(model, str | os.PathLike) else None
     shape = as_shape(model, name=name, error=InvalidScene)
     name = name if source is None else FilePath(source).stem
-    return (
-        TreeObject(name, shape)
-        if isinstance(shape, Node)
-        else MeshObject(name, *shape.arrays, color, source, angle)
-    )
+    if isinstance(shape, Node):
+        return TreeObject(name, shape)
+    if color is None:
+        color = shape_color(shape, texture, source)
+    return MeshObject(name, *shape.arrays, color, source, angle)
+
+
+def shape_color(
+    shape: MeshData, texture: AnyImage | BaseTexture | None, source: str | None
+) -> Color | BaseColor:
+    """Return the colours of a mesh, or a texture on its coordinates; clay for a mesh without.
+
+    Raises
+    ------
+    InvalidMesh
+        A texture is given, but the mesh has no texture coordinates.
+    """
+    base = shape.color
+    if texture is not None:
+        if base is None or base.coordinates is None:
+            raise InvalidMesh(
+                "texture: expected a mesh with texture coordinates, got one without; "
+                "for pyvista, mesh.texture_map_to_plane() adds some"
+            )
+        return base.with_texture(as_texture(texture))
+    color = None if base is None else base.simplified
+    if isinstance(color, BaseColor):
+        return color if source is None else replace(color, source=source)
+    return CLAY if color is None else color
 
 
 def relative_to(item: SceneObject, origin: Origin) -> SceneObject:
@@ -456,6 +490,14 @@ def checked_name(what: str, name: Any) -> str:
         raise InvalidScene(f"expected {what} of Unicode characters, got {name!r}; rename it")
     checked: str = name
     return checked
+
+
+def _mesh_color(name: str, color: object, faces: NDArray[Any], surface: MeshSurface) -> Color | BaseColor:
+    """Return the checked colour of a mesh, whose surface may have turned some of the given faces."""
+    if not isinstance(color, BaseColor):
+        return color_rgb(f"object {name!r}, colour", color, InvalidScene)
+    color.check_mesh(f"object {name!r}", len(surface.vertices), len(surface.faces))
+    return color.turned(faces, surface.faces)
 
 
 def _source(name: str, source: object) -> str | None:

@@ -27,7 +27,7 @@ from decals.scenes.camera import Camera
 from decals.scenes.objects import Box, MeshObject, SceneObject, TreeObject
 from decals.scenes.origin import Origin
 from decals.scenes.scene import DecalImage, Scene
-from decals.surfaces.base_color import Color
+from decals.surfaces.base_color import BaseColor, Color
 from decals.surfaces.convert import as_shape, is_model
 from decals.surfaces.mesh_data import MeshData
 from decals.validation import describe, instance, whole_number
@@ -77,7 +77,7 @@ class PosedMesh:
         return self.rest.faces
 
     @property
-    def color(self) -> Color | Float32Array:
+    def color(self) -> Color | BaseColor | Float32Array:
         """Colour between the decals, or one colour for each vertex."""
         return self.rest.color if self.colors is None else self.colors
 

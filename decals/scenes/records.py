@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from blobtree.io import TreeFile, from_tree_file, to_tree_file
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.images.builtin import is_builtin
-from decals.images.load import is_embedded
+from decals.images.load import embedded_image, is_embedded, load_image, opaque
 from decals.model import NO_IMAGE, Decals, Interaction
 from decals.scenes.camera import Vector
-from decals.scenes.objects import MeshObject, Paths, SceneObject, TreeObject
+from decals.scenes.objects import MeshObject, Paths, SceneObject, TreeObject, shape_color
 from decals.scenes.origin import WORLD
-from decals.surfaces.mesh_file import MeshArrays, read_mesh
+from decals.surfaces.base_color import COLOR_ARRAYS, BaseColor, BaseTexture, Color
+from decals.surfaces.mesh_data import MeshData
+from decals.surfaces.mesh_file import MeshArrays, read_mesh_data
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import is_file
 
@@ -41,11 +43,40 @@ class _InlineMesh(Struct, forbid_unknown_fields=True):
     faces: bytes
 
 
+class _TextureRecord(Struct, forbid_unknown_fields=True):
+    """A texture of a base colour, embedded as PNG."""
+
+    pixels: str
+    wrap: tuple[str, str]
+
+
+class ColorRecord(Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """A base colour: little-endian rows of float32 and int32, and textures."""
+
+    colors: bytes | None = None
+    coordinates: bytes | None = None
+    texture_of_face: bytes | None = None
+    corners: bytes | None = None
+    textures: list[_TextureRecord] = []
+
+
+_ROWS = {
+    "colors": ("<f4", 3),
+    "coordinates": ("<f4", 2),
+    "texture_of_face": ("<i4", 0),
+    "corners": ("<i4", 3),
+}
+"""Type and width of the arrays of a base colour; 0 for numbers without rows."""
+
+OF_SOURCE: Literal["source"] = "source"
+"""Colour of a mesh that has those of its source."""
+
+
 class MeshRecord(Struct, tag="mesh", tag_field="type", forbid_unknown_fields=True, omit_defaults=True):
     """A mesh: where its triangles come from, or the triangles."""
 
     name: str
-    color: Vector
+    color: Vector | Literal["source"] | ColorRecord
     source: str | None = None
     data: _InlineMesh | None = None
     crease_angle: float = CREASE_ANGLE
@@ -78,9 +109,10 @@ def record_of(item: SceneObject, folder: Path) -> MeshRecord | TreeRecord:
     if item.crease_angle != CREASE_ANGLE:
         kept["crease_angle"] = item.crease_angle
     if item.source is not None:
-        return MeshRecord(item.name, item.color, source=relative(item.source, folder), **kept)
+        color = _color_record(item.color, item.source)
+        return MeshRecord(item.name, color, source=relative(item.source, folder), **kept)
     data = _InlineMesh(_packed(item.vertices, "<f4"), _packed(item.faces, "<i4"))
-    return MeshRecord(item.name, item.color, data=data, **kept)
+    return MeshRecord(item.name, _color_record(item.color, None), data=data, **kept)
 
 
 def object_of(record: MeshRecord | TreeRecord, folder: Path, samples: SampleLoader | None) -> SceneObject:
@@ -100,19 +132,66 @@ def object_of(record: MeshRecord | TreeRecord, folder: Path, samples: SampleLoad
     origin, angle = record.origin or WORLD, record.crease_angle
     if record.data is not None:
         vertices, faces = _unpacked(record.name, record.data)
-        return MeshObject(record.name, vertices, faces, record.color, None, angle, origin, **kept)
-    vertices, faces = _mesh(str(record.source), folder, samples)
+        color = _color_of(record, None, None)
+        return MeshObject(record.name, vertices, faces, color, None, angle, origin, **kept)
+    mesh = _mesh(str(record.source), folder, samples)
     source = absolute(str(record.source), folder)
-    local = vertices - np.array(origin)
-    return MeshObject(record.name, local, faces, record.color, source, angle, origin, **kept)
+    local = mesh.vertices - np.array(origin)
+    color = _color_of(record, mesh, source)
+    return MeshObject(record.name, local, mesh.faces, color, source, angle, origin, **kept)
 
 
-def _mesh(source: str, folder: Path, samples: SampleLoader | None) -> MeshArrays:
+def _color_record(color: Color | BaseColor, source: str | None) -> Vector | Literal["source"] | ColorRecord:
+    """Describe the colour of a mesh; a word is enough for the colours of its source."""
+    if not isinstance(color, BaseColor):
+        return color
+    if source is not None and color.source == source:
+        return OF_SOURCE
+    arrays = {name: getattr(color, name) for name in COLOR_ARRAYS}
+    packed = {
+        name: None if array is None else _packed(array, _ROWS[name][0]) for name, array in arrays.items()
+    }
+    textures = [
+        _TextureRecord(embedded_image(opaque(texture.pixels)), (texture.wrap[0].value, texture.wrap[1].value))
+        for texture in color.textures
+    ]
+    return ColorRecord(**packed, textures=textures)
+
+
+def _color_of(record: MeshRecord, mesh: MeshData | None, source: str | None) -> Color | BaseColor:
+    """Make the colour of a mesh that was described, or take that of its source."""
+    color = record.color
+    if isinstance(color, tuple):
+        return color
+    if not isinstance(color, ColorRecord):
+        if mesh is None:
+            raise InvalidScene(
+                f"mesh {record.name!r}: expected a 'source' with its colours; give the colours"
+            )
+        return shape_color(mesh, None, source)
+    try:
+        arrays: dict[str, Any] = {
+            name: None
+            if (data := getattr(color, name)) is None
+            else np.frombuffer(data, kind).reshape((-1, width) if width else (-1,))
+            for name, (kind, width) in _ROWS.items()
+        }
+    except ValueError as error:
+        raise InvalidScene(
+            f"mesh {record.name!r}, colour: expected rows of 4-byte numbers ({error})"
+        ) from error
+    if not all(is_embedded(texture.pixels) for texture in color.textures):
+        raise InvalidScene(f"mesh {record.name!r}, texture: expected embedded pictures, got other text")
+    textures = [BaseTexture(load_image(texture.pixels), texture.wrap) for texture in color.textures]
+    return BaseColor(**arrays, textures=textures)
+
+
+def _mesh(source: str, folder: Path, samples: SampleLoader | None) -> MeshData:
     if not source.startswith(SAMPLE):
-        return read_mesh(folder / source)
+        return read_mesh_data(folder / source)
     if samples is None:
         raise InvalidScene(f"the mesh {source!r} is a sample; pass samples=, or use the command line")
-    return samples(source.removeprefix(SAMPLE))
+    return MeshData(*samples(source.removeprefix(SAMPLE)))
 
 
 def _packed(array: NDArray[Any], kind: str) -> bytes:

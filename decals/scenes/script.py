@@ -26,6 +26,7 @@ from decals.scenes.objects import MeshObject, SceneObject
 from decals.scenes.origin import WORLD
 from decals.scenes.pose import require_scene
 from decals.scenes.scene import DecalImage, Scene
+from decals.surfaces.base_color import COLOR_ARRAYS, BaseColor
 
 MAX_ROWS = 2000
 """Decals that a script lists as text; more stand in the file of arrays."""
@@ -143,10 +144,31 @@ class _Script:
             faces = self._array(f"faces_{number}_{item.name}", item.faces)
             self._names[id(item)] = item.name
             return (
-                f"decals.MeshObject({item.name!r}, {vertices}, {faces}, {item.color!r}, "
+                f"decals.MeshObject({item.name!r}, {vertices}, {faces}, {self._color(item)}, "
                 f"source={item.source!r}, crease_angle={item.crease_angle!r}{_more(item)})"
             )
         return f"decals.TreeObject({item.name!r}, {self._tree(item.tree)}{_more(item)})"
+
+    def _color(self, item: MeshObject) -> str:
+        """Return the expression of a mesh's colour; arrays of colours go into the file of arrays."""
+        color = item.color
+        if not isinstance(color, BaseColor):
+            return repr(color)
+        number = len(self.arrays)
+        values = {name: getattr(color, name) for name in COLOR_ARRAYS}
+        given = [
+            f"{name}={self._array(f'{name}_{number}_{item.name}', values[name])}"
+            for name in COLOR_ARRAYS
+            if values[name] is not None
+        ]
+        textures = [
+            f"decals.surfaces.BaseTexture({self._array(f'texture_{number}_{place}', texture.pixels)}, "
+            f"{tuple(mode.value for mode in texture.wrap)!r})"
+            for place, texture in enumerate(color.textures)
+        ]
+        given += [f"textures=[{', '.join(textures)}]"] * bool(textures)
+        given += [f"source={color.source!r}"] * (color.source is not None)
+        return f"decals.surfaces.BaseColor({', '.join(given)})"
 
     def _tree(self, tree: Node) -> str:
         """Write one line for each node, operands first, and return the name of the last one."""

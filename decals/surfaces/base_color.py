@@ -31,6 +31,9 @@ WHITE: Color = (1.0, 1.0, 1.0)
 NO_TEXTURE = -1
 """Index of the texture of a face that has none."""
 
+COLOR_ARRAYS = ("colors", "coordinates", "texture_of_face", "corners")
+"""Arrays of a `BaseColor`, by which files keep it."""
+
 ROUNDING = 1e-3
 """Distance from [0, 1] up to which a number is a rounded colour; those farther away are an error."""
 
@@ -42,7 +45,14 @@ _LEVELS = decode_srgb(np.arange(256, dtype=np.float64) / 255.0)
 
 
 class Wrap(Enum):
-    """How a texture goes on where a coordinate is below 0 or above 1."""
+    """How a texture goes on where a coordinate is below 0 or above 1.
+
+    Examples
+    --------
+    >>> from decals.surfaces import BaseTexture, Wrap
+    >>> BaseTexture("tile", Wrap.MIRROR).wrap[0] is Wrap.MIRROR
+    True
+    """
 
     REPEAT = "repeat"
     MIRROR = "mirror"
@@ -76,6 +86,12 @@ class BaseTexture(Immutable):
         The pixels are no image.
     InvalidMesh
         The wrap mode is another.
+
+    Examples
+    --------
+    >>> from decals.surfaces import BaseTexture
+    >>> BaseTexture("tile", wrap=("repeat", "clamp")).pixels.shape
+    (256, 256, 3)
     """
 
     pixels: UInt8Array = field(repr=False)
@@ -316,13 +332,36 @@ class BaseColor(Immutable):
         corners[changed] = np.take_along_axis(corners[changed], places, axis=1)
         return replace(self, corners=corners)
 
-    def selected(self, faces: NDArray[np.integer[Any]]) -> Self:
-        """Return the base colour of a mesh with some of the faces, by their numbers, and all vertices."""
+    def of_rows(self, rows: NDArray[np.integer[Any]]) -> Self:
+        """Return the base colour of a mesh with the same faces, whose vertices take these rows."""
+        return replace(
+            self,
+            colors=None if self.colors is None else self.colors[rows],
+            coordinates=None if self.coordinates is None else self.coordinates[rows],
+            corners=None,
+        )
+
+    def of_part(self, faces: NDArray[np.integer[Any]]) -> Self:
+        """Return the base colour of some of the faces, by their numbers; all rows stay."""
         return replace(
             self,
             texture_of_face=None if self.texture_of_face is None else self.texture_of_face[faces],
             corners=None if self.corners is None else self.corners[faces],
         )
+
+    @property
+    def held_arrays(self) -> list[NDArray[Any] | None]:
+        """All arrays, by which memory is counted."""
+        own = (getattr(self, name) for name in COLOR_ARRAYS)
+        return [*own, *(texture.pixels for texture in self.textures)]
+
+    def at_vertices(self, faces: Int32Array, vertex_count: int) -> Float64Array:
+        """Return a linear colour of each vertex, ``float64[n, 3]``: that of one of its faces."""
+        numbers, weights = np.zeros(vertex_count, np.int64), np.zeros((vertex_count, 3))
+        for corner in range(3):
+            numbers[faces[:, corner]] = np.arange(len(faces))
+            weights[faces[:, corner]] = np.eye(3)[corner]
+        return self.light_at(faces, numbers, weights)
 
     def light_at(self, faces: Int32Array, numbers: ArrayLike, weights: ArrayLike) -> Float64Array:
         """Return linear colours ``float64[n, 3]`` at points of a mesh.
@@ -336,16 +375,21 @@ class BaseColor(Immutable):
         weights : float[n, 3]
             Its barycentric weights.
         """
-        numbers, weights = np.asarray(numbers), np.asarray(weights, np.float64)
-        corners = self.rows_of(faces)[numbers]
+        numbers = np.asarray(numbers)
+        return self.light_of(self.rows_of(faces)[numbers], numbers, np.asarray(weights, np.float64))
+
+    def light_of(
+        self, corners: NDArray[np.integer[Any]], numbers: NDArray[np.integer[Any]], weights: Float64Array
+    ) -> Float64Array:
+        """Return linear colours at points, by the rows ``int[n, 3]`` of their corners; see `light_at`."""
         light = np.ones((len(numbers), 3))
         if self.colors is not None:
             light = np.einsum("nc,nci->ni", weights, self.colors.astype(np.float64)[corners])
-        if self.coordinates is None:
+        if self.coordinates is None or not self.textures:
             return light
         places = np.einsum("nc,nci->ni", weights, self.coordinates.astype(np.float64)[corners])
-        textures = np.zeros(len(numbers), np.int32) if self.texture_of_face is None else self.texture_of_face
-        of_point = textures if self.texture_of_face is None else textures[numbers]
+        of_face = self.texture_of_face
+        of_point = np.zeros(len(numbers), np.int32) if of_face is None else of_face[numbers]
         for number, texture in enumerate(self.textures):
             rows = np.flatnonzero(of_point == number)
             light[rows] *= texture.light_at(places[rows])
@@ -389,6 +433,15 @@ def linear_colors(colors: ArrayLike, *, levels: float | None = None, name: str =
     elif array.dtype.kind != "f":
         raise InvalidMesh(f"{name}: expected bytes or floats from 0 to 1, got {array.dtype}; convert them")
     return decode_srgb(_unit_range(name, _rows(name, channels, 3)).astype(np.float64)).astype(np.float32)
+
+
+def as_texture(texture: AnyImage | BaseTexture) -> BaseTexture:
+    """Return an image of any kind as a base texture; one of pyvista keeps its wrap mode."""
+    if isinstance(texture, BaseTexture):
+        return texture
+    name = getattr(getattr(texture, "wrap", None), "name", "")
+    wrap = next((mode for mode in (Wrap.MIRROR, Wrap.CLAMP) if mode.name in name), Wrap.REPEAT)
+    return BaseTexture(texture, wrap)
 
 
 def checked_color(

@@ -98,7 +98,7 @@ def read_mesh_data(path: str | PathLike[str]) -> MeshData:
     if reader := _READERS.get(path.suffix.lower()):
         return MeshData(*polygon_triangles(*reader(path), name=str(path)))
     if can_isolate():
-        return MeshData(*read_isolated(path))
+        return read_isolated(path)
     return dataset_mesh(read_dataset(path), name=str(path))
 
 

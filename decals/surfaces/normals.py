@@ -1,10 +1,11 @@
 """Normals of a triangle mesh for drawing: smooth within a crease angle, and split at creases."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
+from decals.surfaces.base_color import BaseColor
 from decals.surfaces.topology import components
 
 CREASE_ANGLE = 35.0
@@ -26,11 +27,14 @@ class SplitMesh:
         The same triangles, as indices of split vertices.
     normals : float32[n, 3]
         Unit normal of each split vertex.
+    color : BaseColor, optional
+        Base colour whose rows are the split vertices.
     """
 
     rows: Int64Array
     faces: Int32Array
     normals: Float32Array
+    color: BaseColor | None = None
 
 
 def split_at_creases(
@@ -85,6 +89,24 @@ def split_at_creases(
     rows = np.concatenate([rows, distinct[~first, 0]])
     split_faces: Int32Array = split.reshape(-1, 3).astype(np.int32)
     return SplitMesh(rows, split_faces, _weighted_normals(normals, split_faces, len(rows)))
+
+
+def split_at_colors(split: SplitMesh, color: BaseColor) -> SplitMesh:
+    """Split a mesh further where its base colour jumps: each vertex has one row of it and one texture.
+
+    Vertices that no face uses are left out, unless nothing is split.
+    """
+    if color.corners is None and color.texture_of_face is None:
+        return replace(split, color=color.of_rows(split.rows))
+    of_face = color.texture_of_face
+    textures = np.zeros(len(split.faces), np.int64) if of_face is None else of_face + 1
+    rows = split.rows[split.faces] if color.corners is None else color.corners.astype(np.int64)
+    kinds, keys = len(color.textures) + 1, len(color) * (len(color.textures) + 1)
+    pairs = split.faces * np.int64(keys) + rows * kinds + textures[:, None]
+    distinct, faces = np.unique(pairs, return_inverse=True)
+    own, row = distinct // keys, distinct % keys // kinds
+    corners: Int32Array = faces.reshape(-1, 3).astype(np.int32)
+    return SplitMesh(split.rows[own], corners, split.normals[own], color.of_rows(row))
 
 
 def vertex_normals(vertices: Float32Array, faces: Int32Array) -> Float32Array:

@@ -17,7 +17,9 @@ import pyvista  # noqa: F401  # here, because every fork would import it again
 
 import blobtree.vtk_errors  # noqa: F401
 from decals.errors import ImplicitDecalsError
-from decals.surfaces.mesh_file import MeshArrays, dataset_triangles, read_dataset
+from decals.surfaces.base_color import COLOR_ARRAYS
+from decals.surfaces.mesh_data import MeshData
+from decals.surfaces.mesh_file import dataset_mesh, read_dataset
 
 STATM = Path("/proc/self/statm")
 """The size of this process, to which the memory for reading is added; macOS has no such file."""
@@ -77,7 +79,7 @@ def _limit(request: dict[str, Any]) -> None:
 
 def _answer(request: dict[str, Any], answers: BinaryIO) -> None:
     try:
-        vertices, faces = read(Path(os.fsdecode(bytes.fromhex(request["path"]))))
+        mesh = read(Path(os.fsdecode(bytes.fromhex(request["path"]))))
     except ImplicitDecalsError as error:
         _send(answers, {"error": str(error), "whole": True})
     except MemoryError:
@@ -85,13 +87,20 @@ def _answer(request: dict[str, Any], answers: BinaryIO) -> None:
     except Exception as error:
         _send(answers, {"error": f"{type(error).__name__}: {error}"})
     else:
-        arrays = [np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(faces, np.int32)]
-        _send(answers, {"vertices": len(vertices), "faces": len(faces)}, *(array.data for array in arrays))
+        arrays = {
+            "vertices": np.ascontiguousarray(mesh.vertices, np.float32),
+            "faces": np.ascontiguousarray(mesh.faces, np.int32),
+        }
+        for name in COLOR_ARRAYS if mesh.color is not None else ():
+            if (array := getattr(mesh.color, name)) is not None:
+                arrays[name] = np.ascontiguousarray(array)
+        shapes = {name: [array.dtype.str, *array.shape] for name, array in arrays.items()}
+        _send(answers, {"arrays": shapes}, *(array.data.cast("B") for array in arrays.values() if array.size))
 
 
-def read(path: Path) -> MeshArrays:
-    """Read a mesh file by pyvista, as vertices and triangles."""
-    return dataset_triangles(read_dataset(path), name=str(path))
+def read(path: Path) -> MeshData:
+    """Read a mesh file by pyvista, as triangles with colours."""
+    return dataset_mesh(read_dataset(path), name=str(path))
 
 
 def _send(answers: BinaryIO, header: dict[str, Any], *contents: memoryview) -> None:

@@ -18,8 +18,9 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blobtree._typing import Float32Array, Int32Array
 from decals.errors import InvalidMesh
+from decals.surfaces.base_color import BaseColor
+from decals.surfaces.mesh_data import MeshData
 
 START_SECONDS = 120.0
 """Seconds until the process must be ready; imports from a slow disk take long."""
@@ -36,13 +37,13 @@ def can_isolate() -> bool:
     return bool(sys.executable) and not getattr(sys, "frozen", False)
 
 
-def read_isolated(path: Path) -> tuple[Float32Array, Int32Array]:
+def read_isolated(path: Path) -> MeshData:
     """Read a mesh file by pyvista in the process of its own.
 
     Returns
     -------
-    vertices : float32[n, 3]
-    faces : int32[m, 3]
+    MeshData
+        Triangles, and colours of points or faces.
 
     Raises
     ------
@@ -59,7 +60,7 @@ class _ReaderProcess:
         self._lock = threading.Lock()
         self._child: subprocess.Popen[bytes] | None = None
 
-    def read(self, path: Path) -> tuple[Float32Array, Int32Array]:
+    def read(self, path: Path) -> MeshData:
         """Read a file; see `read_isolated`."""
         size = path.stat().st_size
         seconds = SECONDS + SECONDS_PER_BYTE * size
@@ -79,10 +80,12 @@ class _ReaderProcess:
         header, arrays = answer
         if "error" in header:
             raise InvalidMesh(header["error"] if "whole" in header else _failure(path, header["error"]))
-        vertices, faces = arrays
-        return vertices, faces
+        mesh = arrays.pop("vertices"), arrays.pop("faces")
+        return MeshData(*mesh, BaseColor(**arrays) if arrays else None)
 
-    def _answer(self, request: dict[str, Any], seconds: float) -> tuple[dict[str, Any], list[Any]] | None:
+    def _answer(
+        self, request: dict[str, Any], seconds: float
+    ) -> tuple[dict[str, Any], dict[str, Any]] | None:
         """Return the header and the arrays of an answer; None if the process ended or took too long."""
         child = self._started()
         assert child.stdin is not None
@@ -92,11 +95,9 @@ class _ReaderProcess:
                 child.stdin.write(json.dumps(request).encode() + b"\n")
                 child.stdin.flush()
                 header = json.loads(child.stdout.readline())
-                arrays: list[Any] = []
-                if "error" not in header:
-                    arrays.append(np.empty((header["vertices"], 3), np.float32))
-                    arrays.append(np.empty((header["faces"], 3), np.int32))
-                whole = all(_fill(child.stdout, array) for array in arrays)
+                shapes = header.get("arrays", {}).items()
+                arrays = {name: np.empty(shape, kind) for name, (kind, *shape) in shapes}
+                whole = all(_fill(child.stdout, array) for array in arrays.values())
             except (OSError, ValueError):  # the pipe is broken, or ends within a line
                 return None
             return (header, arrays) if whole else None

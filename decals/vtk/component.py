@@ -22,9 +22,9 @@ from decals.model import NO_IMAGE, Decals
 from decals.rendering import Environment, SceneLike
 from decals.scenes.camera import Camera
 from decals.scenes.cover import as_scene
-from decals.scenes.objects import MeshObject, SceneObject, TreeObject
+from decals.scenes.objects import MeshObject, SceneObject, TreeObject, shape_color
 from decals.scenes.scene import Scene, as_images
-from decals.surfaces.base_color import CLAY
+from decals.surfaces.base_color import BaseColor, BaseTexture
 from decals.surfaces.convert import Model, as_shape
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.validation import describe, instance
@@ -121,7 +121,8 @@ class DecalsComponent(KnownAttributes):
         self,
         mesh: Model | MeshObject,
         *,
-        color: ColorLike = CLAY,
+        color: ColorLike | BaseColor | None = None,
+        texture: AnyImage | BaseTexture | None = None,
         name: str | None = None,
         crease_angle: float = CREASE_ANGLE,
     ) -> MeshObject:
@@ -135,7 +136,10 @@ class DecalsComponent(KnownAttributes):
             A pyvista dataset with a surface, any mesh with ``vertices`` and ``faces``, a tuple of such
             arrays, the path of a mesh file, or an object of a scene.
         color
-            sRGB, each channel in [0, 1]; or the name of a colour.
+            sRGB, each channel in [0, 1]; or the name of a colour. By default the colours or textures that the
+            mesh has.
+        texture
+            Texture of a mesh with texture coordinates, such as a `pyvista.Texture`, in place of its colours.
         name
             Its name, unique in the subplot.
         crease_angle
@@ -148,6 +152,8 @@ class DecalsComponent(KnownAttributes):
             shape = as_shape(mesh, name=label, error=InvalidScene)
             if isinstance(shape, Node):
                 raise InvalidScene(f"{label}: expected a mesh, got a BlobTree; `add_implicit` adds it")
+            if color is None:
+                color = shape_color(shape, texture, None)
             item = MeshObject(label, *shape.arrays, color, crease_angle=crease_angle)
         self._add_object(item)
         return item
