@@ -34,6 +34,7 @@ from decals.surfaces.normals import split_at_creases
 from decals.surfaces.subdivide import means, subdivided
 from decals.surfaces.surface import Surface, unit_rows
 from decals.surfaces.topology import welded
+from decals.surfaces.windings import MeshOrientation
 from decals.validation import checked_path, real_number
 
 if TYPE_CHECKING:
@@ -282,7 +283,9 @@ def _fine_mesh(item: MeshObject, are_long: Callable[..., BoolArray]) -> FineMesh
     color = item.color
     if isinstance(color, BaseColor):
         color = _carried(color, item, vertices[joined])
-    rest = replace(item, vertices=vertices, faces=joined, color=color, source=None)
+    rest = replace(
+        item, vertices=vertices, faces=joined, color=color, source=None, orientation=MeshOrientation.KEEP
+    )
     return rest, unit_rows(sums), None
 
 
@@ -344,6 +347,7 @@ def _fine_tree(
     whole: dict[str, Any] = {
         name: ((),) if () in getattr(item, name) else () for name in ("hidden", "locked")
     }
+    options["orientation"] = MeshOrientation.KEEP
     rest = MeshObject(item.name, rows[:, :3].astype(np.float32), _int32(faces), **options, **whole)
     return rest, rows[:, 3:].astype(np.float32), item.tree.colors(rest.vertices)
 

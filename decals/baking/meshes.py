@@ -18,6 +18,7 @@ from decals.scenes.pose import PosedMesh
 from decals.surfaces.base_color import WHITE, BaseColor, Color
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.normals import SplitMesh, split_at_colors, vertex_normals
+from decals.surfaces.windings import MeshOrientation
 from decals.validation import describe
 
 
@@ -74,7 +75,7 @@ def bake_mesh(item: object, *, resolution: int | None, creases: bool, report: Pr
     """
     if isinstance(item, MeshObject):
         split = split_mesh(item)
-        surface = MeshSurface(item.vertices[split.rows], split.faces)
+        surface = MeshSurface(item.vertices[split.rows], split.faces, orientation=MeshOrientation.KEEP)
         return _used_parts(item.name, surface, split.normals, _constant(item.color), split.color)
     if isinstance(item, TreeObject):
         return _tree_mesh(item.name, item.tree, resolution, creases, report)
@@ -100,7 +101,12 @@ def _tree_mesh(name: str, tree: Node, resolution: int | None, creases: bool, rep
             "increase the resolution"
         )
     shown = split_creases(tree, mesh)
-    return _used_parts(name, MeshSurface(shown.vertices, shown.faces), shown.normals, tree.colors)
+    return _used_parts(
+        name,
+        MeshSurface(shown.vertices, shown.faces, orientation=MeshOrientation.KEEP),
+        shown.normals,
+        tree.colors,
+    )
 
 
 def _used_parts(

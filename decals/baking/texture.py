@@ -10,6 +10,7 @@ from decals.baking.atlas import Unwrapped
 from decals.baking.meshes import BakeMesh
 from decals.images.texels import encode_srgb
 from decals.surfaces.mesh import MeshSurface
+from decals.surfaces.windings import MeshOrientation
 
 BLOCK_SAMPLES = 1 << 19
 """Points that are coloured at once, which bounds the memory besides that of the texture."""
@@ -92,7 +93,9 @@ class _Sheet:
         starts = np.cumsum([0, *counts[:-1]])
         places = np.concatenate([part.places for part in unwrapped])
         faces = np.concatenate([part.faces + start for part, start in zip(unwrapped, starts, strict=True)])
-        self._flat = MeshSurface(np.column_stack([places, np.zeros(len(places))]), faces)
+        self._flat = MeshSurface(
+            np.column_stack([places, np.zeros(len(places))]), faces, orientation=MeshOrientation.KEEP
+        )
         pairs = list(zip(meshes, unwrapped, strict=True))
         self._vertices = np.concatenate([mesh.places[part.rows] for mesh, part in pairs])
         self._normals = np.concatenate([mesh.facings[part.rows] for mesh, part in pairs])

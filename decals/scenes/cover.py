@@ -21,6 +21,7 @@ from decals.scenes.recipe import Recipe
 from decals.scenes.scene import Scene, as_images
 from decals.surfaces.convert import Model
 from decals.surfaces.normals import CREASE_ANGLE
+from decals.surfaces.windings import MeshOrientation
 from decals.validation import describe, instance, member
 
 FRAMING_SAMPLES = 2000
@@ -40,6 +41,7 @@ def cover(
     view_direction: Vector | None = None,
     up: str = "y",
     crease_angle: float = CREASE_ANGLE,
+    orientation: MeshOrientation | str = MeshOrientation.OUTWARD,
     progress: Progress | None = None,
 ) -> Scene:
     """Cover models with decals that lie evenly, also across the places where models touch.
@@ -67,6 +69,10 @@ def cover(
     crease_angle : float
         Angle between two faces of a mesh, in degrees, from which their edge is drawn sharp. Objects of a
         scene keep their own.
+    orientation : MeshOrientation or str
+        ``"outward"`` (default): closed parts of meshes that wind inward are turned, with what lies inside
+        them. ``"keep"``: all parts stay as they are. ``"flip"``: all faces are turned. Objects of a scene
+        keep their own.
     progress : callable, optional
         Called with the name of a stage and the fraction done.
 
@@ -95,10 +101,11 @@ def cover(
     axes = UPRIGHT[up]
     toward = axes.preset("three-quarter") if view_direction is None else view_direction
     rule = member("sizing", sizing, Sizing, InvalidScattering)
+    rule_of_meshes = member("orientation", orientation, MeshOrientation, InvalidScene)
     with reporting(progress) as report:
         report("reading models and images", 0.0)
         listed = models[0] if len(models) == 1 and isinstance(models[0], list) else models
-        objects = as_objects(listed, crease_angle=crease_angle)
+        objects = as_objects(listed, crease_angle=crease_angle, orientation=rule_of_meshes)
         pictures = as_images(images)
         if not objects:
             raise InvalidScene("expected at least one model, got none")
@@ -128,6 +135,7 @@ def cover(
         view_direction=toward,
         up=up,
         crease_angle=crease_angle,
+        orientation=rule_of_meshes,
     )
     return Scene(objects=tuple(objects), camera=camera, decals=decals, images=pictures, recipe=recipe)
 

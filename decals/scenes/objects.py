@@ -29,7 +29,8 @@ from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.mesh_data import MeshData
 from decals.surfaces.normals import CREASE_ANGLE
-from decals.validation import describe, instance, is_unicode, real_number
+from decals.surfaces.windings import MeshOrientation
+from decals.validation import describe, instance, is_unicode, member, real_number
 
 Paths = tuple[Path, ...]
 """Paths of nodes in a tree; ``()`` is the path of its root."""
@@ -68,6 +69,10 @@ class MeshObject(Immutable):
         Labels besides the name, by which decals choose the objects that they lie on (`Decals.receivers`).
     named_only : bool
         True if only decals lie on the object that name it, or one of its labels.
+    orientation : MeshOrientation or str
+        ``"outward"`` (default): closed parts that wind inward are turned, with what lies inside them.
+        ``"keep"``: all parts stay as they are. ``"flip"``: all faces are turned once; the object then keeps
+        them, and has no source.
 
     hidden, locked : tuple of paths
         ``((),)`` for an object that is not drawn, and for one that the editor does not change; ``()`` else.
@@ -100,6 +105,7 @@ class MeshObject(Immutable):
     locked: Paths = field(default=(), repr=False)
     labels: tuple[str, ...] = ()
     named_only: bool = False
+    orientation: MeshOrientation = MeshOrientation.OUTWARD
     surface: MeshSurface = field(init=False, repr=False)
 
     if TYPE_CHECKING:  # lists of numbers and names of colours are converted
@@ -117,16 +123,19 @@ class MeshObject(Immutable):
             locked: Paths = (),
             labels: str | Iterable[str] = (),
             named_only: bool = False,
+            orientation: MeshOrientation | str = MeshOrientation.OUTWARD,
         ) -> None: ...
 
     def __post_init__(self) -> None:
         given = (self.vertices, as_origin(self.origin)) if self.origin is not None else None
         vertices, origin = given or local_vertices(self.vertices)
-        surface = MeshSurface(vertices, self.faces)
+        rule = member("orientation", self.orientation, MeshOrientation, InvalidScene)
+        flipped = rule is MeshOrientation.FLIP
+        surface = MeshSurface(vertices, self.faces, orientation=rule)
         checked = {
             "name": checked_name("an object's name", self.name),
             "color": _mesh_color(self.name, self.color, np.asarray(self.faces), surface),
-            "source": _source(self.name, self.source),
+            "source": None if flipped else _source(self.name, self.source),
             "crease_angle": as_crease_angle(self.crease_angle),
             "origin": origin,
             **_by_paths(self),
@@ -134,6 +143,7 @@ class MeshObject(Immutable):
             "surface": surface,
             "vertices": surface.vertices,
             "faces": surface.faces,
+            "orientation": MeshOrientation.KEEP if flipped else rule,
         }
         for key, value in checked.items():
             object.__setattr__(self, key, value)
@@ -355,6 +365,7 @@ def as_object(
     color: ColorLike | BaseColor | None = None,
     texture: AnyImage | BaseTexture | None = None,
     crease_angle: float = CREASE_ANGLE,
+    orientation: MeshOrientation | str = MeshOrientation.OUTWARD,
 ) -> SceneObject:
     """Return a model as an object of a scene.
 
@@ -370,6 +381,8 @@ def as_object(
         Texture of a mesh with texture coordinates, in place of its colours.
     crease_angle : float
         Crease angle of a mesh, in degrees; see `MeshObject`.
+    orientation : MeshOrientation or str
+        Which way the faces of a mesh wind; see `MeshObject`.
 
     Raises
     ------
@@ -377,6 +390,7 @@ def as_object(
         If the model is of another kind, or cannot be used.
     """
     angle = as_crease_angle(crease_angle)
+    orientation = member("orientation", orientation, MeshOrientation, InvalidScene)
     if isinstance(model, MeshObject | TreeObject):
         return model
     source = os.fspath(model) if isinstance(model, str | os.PathLike) else None
@@ -386,7 +400,7 @@ def as_object(
         return TreeObject(name, shape)
     if color is None:
         color = shape_color(shape, texture, source)
-    return MeshObject(name, *shape.arrays, color, source, angle)
+    return MeshObject(name, *shape.arrays, color, source, angle, orientation=orientation)
 
 
 def shape_color(
@@ -438,15 +452,20 @@ def with_common_origin(objects: Sequence[SceneObject]) -> tuple[SceneObject, ...
     return tuple(relative_to(item, objects[0].origin) for item in objects)
 
 
-def as_objects(models: Iterable[object], *, crease_angle: float = CREASE_ANGLE) -> list[SceneObject]:
+def as_objects(
+    models: Iterable[object],
+    *,
+    crease_angle: float = CREASE_ANGLE,
+    orientation: MeshOrientation | str = MeshOrientation.OUTWARD,
+) -> list[SceneObject]:
     """Return models as objects with different names: the second object of a name becomes ``name-2``.
 
-    Kinds of models, the crease angle of meshes and errors are those of `as_object`. All get the origin of the
+    Kinds of models, the options of meshes and errors are those of `as_object`. All get the origin of the
     first.
     """
     objects: list[SceneObject] = []
     for number, model in enumerate(models, 1):
-        item = as_object(model, f"model {number}", crease_angle=crease_angle)
+        item = as_object(model, f"model {number}", crease_angle=crease_angle, orientation=orientation)
         name = unused_name(item.name, {other.name for other in objects}, "-")
         objects.append(item if name == item.name else replace(item, name=name))
     return list(with_common_origin(objects))

@@ -30,6 +30,7 @@ from decals.scenes.scene import DecalImage, Scene
 from decals.surfaces.base_color import BaseColor, Color
 from decals.surfaces.convert import as_shape, is_model
 from decals.surfaces.mesh_data import MeshData
+from decals.surfaces.windings import MeshOrientation
 from decals.validation import describe, instance, whole_number
 
 if TYPE_CHECKING:
@@ -319,6 +320,7 @@ def _posed_tree(item: TreeObject, tree: Node, resolution: int) -> PosedMesh:
         origin=item.origin,
         labels=item.labels,
         named_only=item.named_only,
+        orientation=MeshOrientation.KEEP,
     )
     return PosedMesh(rest, mesh.vertices, moved.tree.colors(mesh.vertices), moved)
 

@@ -85,6 +85,7 @@ class MeshRecord(Struct, tag="mesh", tag_field="type", forbid_unknown_fields=Tru
     locked: Paths = ()
     labels: tuple[str, ...] = ()
     named_only: bool = False
+    orientation: Literal["outward", "keep"] = "keep"
 
 
 class TreeRecord(Struct, tag="tree", tag_field="type", forbid_unknown_fields=True, omit_defaults=True):
@@ -109,6 +110,7 @@ def record_of(item: SceneObject, folder: Path) -> MeshRecord | TreeRecord:
     if item.crease_angle != CREASE_ANGLE:
         kept["crease_angle"] = item.crease_angle
     if item.source is not None:
+        kept["orientation"] = item.orientation.value
         color = _color_record(item.color, item.source)
         return MeshRecord(item.name, color, source=relative(item.source, folder), **kept)
     data = _InlineMesh(_packed(item.vertices, "<f4"), _packed(item.faces, "<i4"))
@@ -130,6 +132,7 @@ def object_of(record: MeshRecord | TreeRecord, folder: Path, samples: SampleLoad
     if (record.source is None) == (record.data is None):
         raise InvalidScene(f"mesh {record.name!r}: expected either 'source' or 'data'; give one of them")
     origin, angle = record.origin or WORLD, record.crease_angle
+    kept["orientation"] = record.orientation
     if record.data is not None:
         vertices, faces = _unpacked(record.name, record.data)
         color = _color_of(record, None, None)

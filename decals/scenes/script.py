@@ -27,6 +27,7 @@ from decals.scenes.origin import WORLD
 from decals.scenes.pose import require_scene
 from decals.scenes.scene import DecalImage, Scene
 from decals.surfaces.base_color import COLOR_ARRAYS, BaseColor
+from decals.surfaces.windings import MeshOrientation
 
 MAX_ROWS = 2000
 """Decals that a script lists as text; more stand in the file of arrays."""
@@ -298,5 +299,12 @@ def _number_text(values: Any) -> str:
 def _more(item: SceneObject) -> str:
     """Return the arguments of an object's origin, flags, labels and names of nodes, unless default."""
     standard = {"origin": WORLD, "hidden": (), "locked": (), "labels": (), "named_only": False, "names": {}}
+    if getattr(item, "orientation", None) is MeshOrientation.KEEP:
+        return _given(item, standard) + ', orientation="keep"'
+    return _given(item, standard)
+
+
+def _given(item: SceneObject, standard: dict[str, Any]) -> str:
+    """Return the arguments that differ from the standard ones."""
     given = {name: getattr(item, name, standard[name]) for name in standard}
     return "".join(f", {name}={value!r}" for name, value in given.items() if value != standard[name])

@@ -5,6 +5,7 @@ import numpy as np
 from blobtree import Mesh
 from blobtree._typing import Float64Array
 from decals.surfaces.mesh import MeshSurface
+from decals.surfaces.windings import MeshOrientation
 
 LEAST_COSINE = 0.5
 """Cosine of the angle between a face and the normal of a corner, below which there is a crease between."""
@@ -17,7 +18,7 @@ class CurvedMesh(MeshSurface):
     """
 
     def __init__(self, mesh: Mesh, *, device: str) -> None:
-        super().__init__(mesh.vertices, mesh.faces, device=device)
+        super().__init__(mesh.vertices, mesh.faces, device=device, orientation=MeshOrientation.KEEP)
         self._cumulative = np.cumsum(_curved_areas(mesh)[self.sound])
 
 

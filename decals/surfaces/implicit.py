@@ -29,6 +29,7 @@ from decals.surfaces.surface import (
     vectors,
 )
 from decals.surfaces.tree_kernels import mark_above, project, project_with_mesh
+from decals.surfaces.windings import MeshOrientation
 from decals.validation import describe, whole_number
 
 FIELD_TOLERANCE = 1e-4
@@ -112,7 +113,7 @@ class ImplicitSurface(Immutable):
         self._coarse = (
             CurvedMesh(coarse, device=device)
             if self._by_parts
-            else MeshSurface(coarse.vertices, coarse.faces, device=device)
+            else MeshSurface(coarse.vertices, coarse.faces, device=device, orientation=MeshOrientation.KEEP)
         )
         self._max_step = MAX_STEP * _cell_size(tree, cells)
 
@@ -135,7 +136,9 @@ class ImplicitSurface(Immutable):
         if mesh is None:
             refine = polygonize_parts if self._by_parts else polygonize
             fine = refine(self.tree, resolution=resolution, creases=True, device=self.device)
-            mesh = MeshSurface(fine.vertices, fine.faces, device=self.device)
+            mesh = MeshSurface(
+                fine.vertices, fine.faces, device=self.device, orientation=MeshOrientation.KEEP
+            )
         return self._meshes.setdefault(resolution, mesh)
 
     @Lazy

@@ -1,6 +1,5 @@
 """`MeshSurface`: a triangle mesh, on the host and on devices, and its edges."""
 
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -28,17 +27,9 @@ from decals.surfaces.surface import (
     unit_rows,
     vectors,
 )
-from decals.surfaces.topology import (
-    consistent_winding,
-    edge_twins,
-    first_copies,
-    parts_of,
-    shared_edges,
-    welded,
-)
-from decals.validation import whole_number
-
-_logger = logging.getLogger(__name__)
+from decals.surfaces.topology import edge_twins, parts_of, welded
+from decals.surfaces.windings import MeshOrientation, Triangles, wind
+from decals.validation import member, whole_number
 
 MIN_FACE_QUALITY = 1e-6
 """Smallest ratio of a face's doubled area to its squared edges; faces below it have no usable normal.
@@ -60,8 +51,9 @@ class MeshSurface(Immutable):
     """Triangle mesh as a `Surface`, with a bounding volume hierarchy for all queries.
 
     Degenerate faces and copies of other faces are allowed, but get no samples and no projected points. Faces
-    that wind differently from their neighbours are turned, and the log says so. A mesh contains points only
-    if it is closed: with equal vertices welded, every edge is used equally often in both directions.
+    that wind differently from their neighbours are turned, and the log says so. Closed parts that wind inward
+    are turned too, with the parts inside them. A mesh contains points only if it is closed: with equal
+    vertices welded, every edge is used equally often in both directions.
 
     Parameters
     ----------
@@ -71,6 +63,9 @@ class MeshSurface(Immutable):
         Indices into the vertices, counter-clockwise seen from outside.
     device : str, optional
         Warp device for queries of the host. Default "cpu".
+    orientation : MeshOrientation or str
+        ``"outward"`` (default): closed parts turn outward, with what lies inside them. ``"keep"``: parts keep
+        their winding. ``"flip"``: all faces are turned.
 
     Raises
     ------
@@ -94,14 +89,27 @@ class MeshSurface(Immutable):
     array([2.], dtype=float32)
     """
 
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike, *, device: str = "cpu") -> None:
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        *,
+        device: str = "cpu",
+        orientation: MeshOrientation | str = MeshOrientation.OUTWARD,
+    ) -> None:
         self.device = known_device(device)
+        rule = member("orientation", orientation, MeshOrientation, InvalidMesh)
         self.vertices = _as_vertices(vertices)
         self.faces = _as_faces(faces, len(self.vertices))
         self._welded = welded(self.vertices)
-        copies, one_sided = _wind_alike(self.vertices, self.faces, self._welded)
-        self.sound, normals, areas = _sound_faces(self.vertices, self.faces, copies)
-        self._one_sided = one_sided[self.sound]
+        triangles = Triangles.of(self.vertices, self.faces)
+        windings = wind(self.faces, self._welded, triangles, rule)
+        if rule is not MeshOrientation.KEEP:  # else they were reported when they were read
+            windings.report()
+        turned = np.flatnonzero(windings.turned)
+        self.faces[turned] = self.faces[turned][:, ::-1]
+        self.sound, normals, areas = _sound_faces(triangles.turned(turned), windings.copies)
+        self._one_sided = windings.one_sided[self.sound]
         self._corners = corners = np.ascontiguousarray(self.faces[self.sound])
         self._cumulative = np.cumsum(areas)
         self._normals = normals
@@ -156,7 +164,12 @@ class MeshSurface(Immutable):
             )
             if meet.sum() > 1:
                 rows, corners = np.unique(self._corners[parts == number], return_inverse=True)
-                part = MeshSurface(self.vertices[rows], corners.reshape(-1, 3), device=self.device)
+                part = MeshSurface(
+                    self.vertices[rows],
+                    corners.reshape(-1, 3),
+                    device=self.device,
+                    orientation=MeshOrientation.KEEP,
+                )
                 found += [part] if part.closed else []
         return tuple(found)
 
@@ -309,50 +322,17 @@ def _as_faces(faces: ArrayLike, vertex_count: int) -> Int32Array:
     return np.array(indices, dtype=np.int32, order="C")
 
 
-def _wind_alike(vertices: Float32Array, faces: Int32Array, same: Int64Array) -> tuple[BoolArray, BoolArray]:
-    """Turn faces that wind differently from their neighbours.
-
-    Return True for copies of other faces, and for faces of parts that have one side only.
-    """
-    corners = same[faces]
-    edges = shared_edges(corners)
-    if not edges.differ.any() and not edges.branching:
-        return np.zeros(len(faces), np.bool_), np.zeros(len(faces), np.bool_)
-    first = first_copies(corners)
-    rows = np.flatnonzero(first)
-    edges = shared_edges(corners[rows])
-    a, b, c = np.moveaxis(vertices.astype(np.float64)[faces[rows]], 1, 0)
-    winding = consistent_winding(edges, np.linalg.norm(np.cross(b - a, c - a), axis=1))
-    turned = rows[winding.turned]
-    if len(turned):
-        faces[turned] = faces[turned][:, ::-1]
-        _logger.warning(
-            "Turned %d of %d faces that wound differently from their neighbours", len(turned), len(faces)
-        )
-    if winding.inconsistent:
-        _logger.warning(
-            "The mesh has one side only: %d edges join faces that wind differently; decals show on all of it",
-            winding.inconsistent,
-        )
-    one_sided = np.zeros(len(faces), np.bool_)
-    one_sided[rows] = winding.one_sided
-    return ~first, one_sided
-
-
-def _sound_faces(
-    vertices: Float32Array, faces: Int32Array, copies: BoolArray
-) -> tuple[Int64Array, Float32Array, Float64Array]:
+def _sound_faces(triangles: Triangles, copies: BoolArray) -> tuple[Int64Array, Float32Array, Float64Array]:
     """Return the rows of the faces that have a normal and are no copies, their unit normals and areas."""
-    a, b, c = np.moveaxis(vertices.astype(np.float64)[faces], 1, 0)
-    crosses = np.cross(b - a, c - a)
-    doubled = np.linalg.norm(crosses, axis=1)
+    a, b, c = np.moveaxis(triangles.corners, 1, 0)
+    doubled = np.linalg.norm(triangles.crosses, axis=1)
     edges = sum(np.einsum("ij,ij->i", edge, edge) for edge in (b - a, c - a, c - b))
     sound = (doubled > MIN_FACE_QUALITY * edges) & ~copies
     if not sound.any():
         raise InvalidMesh(
-            f"expected a mesh with area, got {len(faces)} degenerate faces; check its units and its indices"
+            f"expected a mesh with area, got {len(copies)} degenerate faces; check its units and its indices"
         )
-    normals = (crosses[sound] / doubled[sound, None]).astype(np.float32)
+    normals = (triangles.crosses[sound] / doubled[sound, None]).astype(np.float32)
     return np.flatnonzero(sound), normals, 0.5 * doubled[sound]
 
 

@@ -90,3 +90,24 @@ def mark_inside(
         query = wp.mesh_query_point_sign_winding_number(mesh, p, 2.0 * wp.length(high - low))
         if query.result and query.sign < 0.0:
             flags[i] = 1
+
+
+@wp.kernel
+def mark_within(
+    first: wp.int32,
+    mesh: wp.uint64,
+    points: wp.array(dtype=wp.vec3),
+    reach: wp.float32,
+    margin: wp.float32,
+    sides: wp.array(dtype=wp.int32),
+) -> None:
+    """Write 1 for points that the mesh winds around, −1 for others, and leave those closer than a margin."""
+    i = first + wp.tid()
+    query = wp.mesh_query_point_sign_winding_number(mesh, points[i], reach)
+    if query.result:
+        closest = wp.mesh_eval_position(mesh, query.face, query.u, query.v)
+        if wp.length(closest - points[i]) > margin:
+            if query.sign < 0.0:
+                sides[i] = 1
+            else:
+                sides[i] = -1

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 
@@ -31,41 +32,52 @@ class SharedEdges:
         The two faces at each edge.
     differ : bool[k]
         True where both go along the edge in the same direction, so one of them winds the wrong way.
-    branching : int
-        Number of edges of more than two faces.
+    other_sides : int64[l]
+        Sides ``3 f + k`` of faces at edges of one face, or of more than two.
+    branching : bool
+        True if there are edges of more than two faces.
     """
 
     faces: Int64Array
     differ: BoolArray
-    branching: int
+    other_sides: Int64Array
+    branching: bool
+
+    def of(self, rows: Int64Array) -> "SharedEdges":
+        """Return the same edges for faces that are some rows of another array."""
+        sides = 3 * rows[self.other_sides // 3] + self.other_sides % 3
+        return SharedEdges(rows[self.faces], self.differ, sides, self.branching)
 
 
-def shared_edges(corners: Int64Array) -> SharedEdges:
-    """Return the edges of two faces, for welded corners ``int64[m, 3]``."""
-    starts = corners.reshape(-1)
-    ends = np.roll(corners, -1, axis=1).reshape(-1)
-    size = int(starts.max()) + 1
+def shared_edges(corners: NDArray[np.integer]) -> SharedEdges:
+    """Return the edges of two faces, for welded corners ``int[m, 3]``; sides without length have no edge."""
+    starts = corners.reshape(-1).astype(np.int64)
+    ends = np.roll(corners, -1, axis=1).reshape(-1).astype(np.int64)
+    size = int(starts.max(initial=0)) + 1
     forward = starts < ends
     keys = np.where(forward, starts * size + ends, ends * size + starts)
     keys[starts == ends] = -1
     order = np.argsort(keys, kind="stable")
     ordered = keys[order]
-    first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]]))
+    first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]])[: len(ordered)])
     counts = np.diff(np.append(first, len(ordered)))
     counts[ordered[first] < 0] = 0
     pairs = first[counts == 2]
+    odd = np.flatnonzero((counts == 1) | (counts > 2))
+    starts_of_odd = np.repeat(first[odd] - np.cumsum(counts[odd]) + counts[odd], counts[odd])
+    others = order[starts_of_odd + np.arange(len(starts_of_odd))]
     one, other = order[pairs], order[pairs + 1]
     faces = np.stack([one, other], axis=1) // 3
-    return SharedEdges(faces, forward[one] == forward[other], int((counts > 2).sum()))
+    return SharedEdges(faces, forward[one] == forward[other], others, bool((counts > 2).any()))
 
 
-def first_copies(corners: Int64Array) -> BoolArray:
-    """Return True for faces that are no copies of an earlier face with the same winding, ``bool[m]``."""
+def first_copies(corners: NDArray[np.integer]) -> Int64Array:
+    """Return for each face the first face with the same corners and winding, ``int64[m]``."""
     lowest = corners.argmin(axis=1)
     turned = np.take_along_axis(corners, (lowest[:, None] + np.arange(3)) % 3, axis=1)
-    first = np.zeros(len(corners), np.bool_)
-    first[np.unique(turned, axis=0, return_index=True)[1]] = True
-    return first
+    _, first, which = np.unique(turned, axis=0, return_index=True, return_inverse=True)
+    same: Int64Array = first[which.reshape(-1)]
+    return same
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,14 +141,16 @@ def parts_of(corners: Int64Array) -> Int64Array:
 def components(links: Int64Array, count: int) -> Int64Array:
     """Return the component of each of `count` nodes that pairs ``int64[m, 2]`` link, ``int64[count]``.
 
-    Components are numbered by their first nodes. Smaller numbers of nodes pass along the links. A call takes
-    less time than the import of SciPy's function.
+    Components are numbered by their first nodes. In each round, a node that has a smaller neighbour joins
+    one of them. A call takes less time than the import of SciPy's function.
     """
     labels: Int64Array = np.arange(count)
-    while len(links):
-        ends = labels[links]
-        links, ends = links[ends[:, 0] != ends[:, 1]], ends[ends[:, 0] != ends[:, 1]]
-        np.minimum.at(labels, ends.max(axis=1), ends.min(axis=1))
+    first, second = links.T
+    while len(first):
+        ends = labels[first], labels[second]
+        apart = np.flatnonzero(ends[0] != ends[1])
+        first, second = ends[0][apart], ends[1][apart]
+        labels[np.maximum(first, second)] = np.minimum(first, second)
         while not np.array_equal(labels, shorter := labels[labels]):
             labels = shorter
     return np.unique(labels, return_inverse=True)[1]

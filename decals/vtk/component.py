@@ -27,6 +27,7 @@ from decals.scenes.scene import Scene, as_images
 from decals.surfaces.base_color import BaseColor, BaseTexture
 from decals.surfaces.convert import Model, as_shape
 from decals.surfaces.normals import CREASE_ANGLE
+from decals.surfaces.windings import MeshOrientation
 from decals.validation import describe, instance
 from decals.vtk.adapters import Lights
 from decals.vtk.attributes import KnownAttributes
@@ -125,6 +126,7 @@ class DecalsComponent(KnownAttributes):
         texture: AnyImage | BaseTexture | None = None,
         name: str | None = None,
         crease_angle: float = CREASE_ANGLE,
+        orientation: MeshOrientation | str = MeshOrientation.OUTWARD,
     ) -> MeshObject:
         """Add a mesh, lit like the other objects.
 
@@ -144,6 +146,8 @@ class DecalsComponent(KnownAttributes):
             Its name, unique in the subplot.
         crease_angle
             Angle between two faces, in degrees, from which their edge is drawn sharp.
+        orientation
+            Which way the faces wind; see `decals.MeshObject`.
         """
         if isinstance(mesh, MeshObject):
             item = mesh
@@ -154,7 +158,7 @@ class DecalsComponent(KnownAttributes):
                 raise InvalidScene(f"{label}: expected a mesh, got a BlobTree; `add_implicit` adds it")
             if color is None:
                 color = shape_color(shape, texture, None)
-            item = MeshObject(label, *shape.arrays, color, crease_angle=crease_angle)
+            item = MeshObject(label, *shape.arrays, color, crease_angle=crease_angle, orientation=orientation)
         self._add_object(item)
         return item
 
@@ -196,6 +200,7 @@ class DecalsComponent(KnownAttributes):
         follow: bool = False,
         crease_angle: float = CREASE_ANGLE,
         labels: str | Iterable[str] | None = None,
+        orientation: MeshOrientation | str = MeshOrientation.OUTWARD,
     ) -> pv.Actor:
         """Show the subplot's decals on an actor of pyvista, whose lights, scalars and edges stay.
 
@@ -212,6 +217,9 @@ class DecalsComponent(KnownAttributes):
         labels
             Labels of the actor: decals with other `Decals.receivers` do not lie on it. By default all lie on
             it. A subplot with objects takes only receivers of its objects.
+        orientation
+            Which way the actor's faces wind for decals; see `decals.MeshObject`. VTK draws them as they are.
+            Two subplots that show one actor share the orientation of the first.
 
         Raises
         ------
@@ -219,7 +227,9 @@ class DecalsComponent(KnownAttributes):
             VTK does not draw the actor as polygons, the crease angle is out of range, the labels are no
             texts, or the image mapping is WALKED, which needs an object of the scene.
         """
-        self.subplot.apply(actor, follow=follow, crease_angle=crease_angle, labels=labels)
+        self.subplot.apply(
+            actor, follow=follow, crease_angle=crease_angle, labels=labels, orientation=orientation
+        )
         return actor
 
     def remove(self, actor: pv.Actor) -> None:

@@ -25,6 +25,7 @@ from decals.rendering.pixel_pass import CameraBuffer
 from decals.rendering.viewpoint import PictureView, Rectangle
 from decals.shaders import compose
 from decals.surfaces.normals import CREASE_ANGLE
+from decals.surfaces.windings import MeshOrientation
 from decals.validation import describe
 from decals.vtk.adapters import matrix_of, vtk_projection
 from decals.vtk.mapper import NORMALS, ShaderAdditions, ShaderTag, SmoothNormals, polygon_mapper
@@ -102,6 +103,8 @@ class Injection:
         Labels of the actor, for receivers of decals; None if all decals lie on it.
     crease_angle
         Angle in degrees from which edges are sharp.
+    orientation
+        Which way the faces wind for decals.
     paint
         GLSL that changes VTK's colours. Default: PAINT; tests use others.
     """
@@ -114,11 +117,12 @@ class Injection:
         follow: bool = False,
         labels: tuple[str, ...] | None = None,
         crease_angle: float = CREASE_ANGLE,
+        orientation: MeshOrientation = MeshOrientation.OUTWARD,
         paint: str = PAINT,
     ) -> None:
         self.actor, self._follow, self._labels, self._paint = actor, follow, labels, paint
         self._mapper = polygon_mapper(actor)
-        self._normals = SmoothNormals(crease_angle)
+        self._normals = SmoothNormals(crease_angle, orientation)
         self._add_normals()
         self._mapper.SetVBOShiftScaleMethod(NO_SHIFT_SCALE)
         self._subplot = weakref.ref(subplot)
@@ -275,14 +279,27 @@ class InjectedDecals:
         self.in_frame = False
 
     def apply(
-        self, actor: Any, *, follow: bool, crease_angle: float, labels: tuple[str, ...] | None = None
+        self,
+        actor: Any,
+        *,
+        follow: bool,
+        crease_angle: float,
+        labels: tuple[str, ...] | None = None,
+        orientation: MeshOrientation = MeshOrientation.OUTWARD,
     ) -> None:
         """Show the decals on an actor."""
         if self._subplot.mapping is ImageMapping.WALKED:
             raise InvalidScene(NOT_WALKED)
         self._release(self._of(actor))
         self._injections.append(
-            Injection(self._subplot, actor, follow=follow, labels=labels, crease_angle=crease_angle)
+            Injection(
+                self._subplot,
+                actor,
+                follow=follow,
+                labels=labels,
+                crease_angle=crease_angle,
+                orientation=orientation,
+            )
         )
 
     def refuse(self, mapping: ImageMapping) -> bool:

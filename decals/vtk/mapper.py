@@ -16,6 +16,7 @@ from vtkmodules.vtkRenderingOpenGL2 import vtkGenericOpenGLRenderWindow
 
 from decals.errors import InvalidScene
 from decals.surfaces.normals import CREASE_ANGLE, split_at_creases, vertex_normals
+from decals.surfaces.windings import MeshOrientation, turned_faces
 
 ShaderTag = tuple[str, str]
 """A shader stage (Vertex, Geometry or Fragment), and a tag of VTK's template for it."""
@@ -86,6 +87,9 @@ POLYGON_MAPPER = "vtkOpenGLPolyDataMapper"
 NORMALS = "decal normals"
 """Name of the point data with unit normals, smooth between creases, as the renderer computes them."""
 
+CELLS = "cells of triangles"
+"""Name of the cell data with the cell that each triangle is a part of."""
+
 KEPT_NORMALS = "normals before the split at creases"
 """Name of the point data with a mesh's own normals, while VTK splits it."""
 
@@ -140,11 +144,17 @@ class SmoothNormals(_Filter):  # type: ignore[misc]
     ----------
     crease_angle
         Angle in degrees from which edges are sharp.
+    orientation
+        Which way the faces wind for the normals; the mesh keeps its own winding.
     """
 
-    def __init__(self, crease_angle: float = CREASE_ANGLE) -> None:
+    def __init__(
+        self,
+        crease_angle: float = CREASE_ANGLE,
+        orientation: MeshOrientation = MeshOrientation.OUTWARD,
+    ) -> None:
         super().__init__(nInputPorts=1, inputType="vtkDataSet", nOutputPorts=1, outputType="vtkDataSet")
-        self._crease_angle = crease_angle
+        self._crease_angle, self._orientation = crease_angle, orientation
         self._output: pv.DataSet | None = None
 
     def insert_before(self, mapper: Any) -> bool:
@@ -175,27 +185,45 @@ class SmoothNormals(_Filter):  # type: ignore[misc]
 
     def RequestData(self, _request: Any, inputs: Any, outputs: Any) -> int:  # noqa: N802
         """Copy the input, split polygons at creases, and add the normals."""
-        out = pv.wrap(self.GetOutputData(outputs, 0))
-        out.ShallowCopy(split_polygons(pv.wrap(self.GetInputData(inputs, 0, 0)), self._crease_angle))
+        out, given = pv.wrap(self.GetOutputData(outputs, 0)), pv.wrap(self.GetInputData(inputs, 0, 0))
+        turned = turned_cells(given, self._orientation)
+        out.ShallowCopy(split_polygons(given, self._crease_angle, turned))
         if isinstance(out, vtkPointSet) and out.GetPoints() is not None:
             points = vtkPoints()
             points.DeepCopy(out.GetPoints())
             out.SetPoints(points)
-        normals: Any = smooth_normals(out)
+        normals: Any = smooth_normals(out, turned)
         array = pv.convert_array(normals, name=NORMALS)
         out.GetPointData().AddArray(array)
         return 1
 
 
-def split_polygons(dataset: pv.DataSet, crease_angle: float = CREASE_ANGLE) -> pv.DataSet:
-    """Return polygons with a point for each side of a crease; any other dataset as it is."""
+def turned_cells(dataset: pv.DataSet, orientation: MeshOrientation) -> NDArray[np.bool_]:
+    """Return the cells of a dataset's surface to turn for an orientation, ``bool[n]``; see `wind`."""
+    surface, _ = _surface(dataset)
+    turned = np.zeros(surface.n_cells, np.bool_)
+    triangles, cells = _triangles(surface)
+    if len(triangles):
+        turned[cells[turned_faces(np.asarray(surface.points, np.float32), triangles, orientation)]] = True
+    return turned
+
+
+def split_polygons(
+    dataset: pv.DataSet, crease_angle: float = CREASE_ANGLE, turned: NDArray[np.bool_] | None = None
+) -> pv.DataSet:
+    """Return polygons with a point for each side of a crease; any other dataset as it is.
+
+    Some polygons may wind in the opposite direction of the others; they are ``turned``.
+    """
     if not isinstance(dataset, pv.PolyData) or dataset.GetNumberOfPolys() == 0:
         return dataset
-    triangles = np.ascontiguousarray(dataset.triangulate().regular_faces, np.int32)
+    mixed = turned is not None and turned.any() and not turned.all() and not dataset.n_strips
+    alike = _with_turned_polygons(dataset, turned) if turned is not None and mixed else dataset
+    triangles, _ = _triangles(alike)
     split = split_at_creases(np.asarray(dataset.points, np.float32), triangles, crease_angle)
     if len(split.rows) == dataset.n_points:
         return dataset
-    copy = dataset.copy(deep=False)
+    copy = alike.copy(deep=False)
     normals = copy.GetPointData().GetNormals()
     if normals is not None:  # VTK's filter would replace them
         kept = normals.NewInstance()
@@ -215,17 +243,46 @@ def split_polygons(dataset: pv.DataSet, crease_angle: float = CREASE_ANGLE) -> p
         kept = out.GetPointData().GetArray(KEPT_NORMALS)
         kept.SetName(normals.GetName())
         out.GetPointData().SetNormals(kept)
-    return out
+    return _with_turned_polygons(out, turned) if turned is not None and mixed else out
 
 
-def smooth_normals(dataset: pv.DataSet) -> NDArray[np.float32]:
-    """Return smooth normals at the points of a dataset, float32, shape (n, 3); zero inside a solid."""
+def _with_turned_polygons(surface: pv.PolyData, turned: NDArray[np.bool_]) -> pv.PolyData:
+    """Return polygons of which some wind in the opposite direction."""
+    offsets, corners = np.asarray(surface.face_offsets), np.array(surface.face_connectivity)
+    first = surface.n_verts + surface.n_lines
+    for polygon in np.flatnonzero(turned[first : first + len(offsets) - 1]):
+        start, end = offsets[polygon : polygon + 2]
+        corners[start:end] = corners[start:end][::-1]
+    copy = surface.copy(deep=False)
+    cells = pv.CellArray.from_arrays(offsets, corners)
+    copy.SetPolys(cells)
+    return copy
+
+
+def smooth_normals(dataset: pv.DataSet, turned: NDArray[np.bool_] | None = None) -> NDArray[np.float32]:
+    """Return smooth normals at the points of a dataset, float32, shape (n, 3); zero inside a solid.
+
+    Cells that are ``turned`` wind in the opposite direction for that.
+    """
     normals = np.zeros((dataset.n_points, 3), np.float32)
     surface, where = _surface(dataset)
-    triangles = np.ascontiguousarray(surface.triangulate().regular_faces, np.int32)
+    triangles, cells = _triangles(surface)
     if len(triangles):
+        if turned is not None:
+            triangles = np.where(turned[cells][:, None], triangles[:, ::-1], triangles)
         normals[where] = vertex_normals(np.asarray(surface.points, np.float32), triangles)
     return normals
+
+
+def _triangles(surface: pv.PolyData) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Return the triangles of the polygons of a surface, and the cell of each."""
+    numbered = pv.PolyData()
+    numbered.CopyStructure(surface)
+    numbered.cell_data[CELLS] = np.arange(surface.n_cells)
+    triangulated = numbered.triangulate()
+    triangles = np.ascontiguousarray(triangulated.regular_faces, np.int32)
+    cells = np.asarray(triangulated.cell_data[CELLS])
+    return triangles, cells[len(cells) - len(triangles) :]
 
 
 def _surface(dataset: pv.DataSet) -> tuple[pv.PolyData, Any]:

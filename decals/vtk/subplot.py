@@ -33,6 +33,7 @@ from decals.scenes.objects import Box, SceneObject, as_crease_angle, bounds_of
 from decals.scenes.origin import WORLD
 from decals.scenes.scene import Scene
 from decals.surfaces.normals import CREASE_ANGLE
+from decals.surfaces.windings import MeshOrientation
 from decals.validation import finite_number, member, whole_number
 from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
 from decals.vtk.attributes import KnownAttributes
@@ -276,11 +277,13 @@ class SubplotRenderer(KnownAttributes):
         follow: bool = False,
         crease_angle: float = CREASE_ANGLE,
         labels: str | Iterable[str] | None = None,
+        orientation: MeshOrientation | str = MeshOrientation.OUTWARD,
     ) -> None:
         """Show the decals on an actor of VTK; see `DecalsComponent.apply`."""
         names = None if labels is None else label_names("labels", labels, InvalidScene)
         angle = as_crease_angle(crease_angle)
-        self.applied.apply(actor, follow=follow, crease_angle=angle, labels=names)
+        rule = member("orientation", orientation, MeshOrientation, InvalidScene)
+        self.applied.apply(actor, follow=follow, crease_angle=angle, labels=names, orientation=rule)
 
     def remove(self, actor: Any) -> None:
         """Remove the decals from an actor; see `DecalsComponent.remove`."""
