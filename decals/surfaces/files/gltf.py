@@ -30,9 +30,9 @@ def read_gltf(path: Path) -> MeshData:
         accessors = Accessors(document, buffers, budget)
         materials = Materials(document, buffers, path.parent, notes)
         scene = _Scene(document, accessors, materials, budget, notes)
-        return mesh_of(
-            [piece for place in placements(document, accessors, notes) for piece in scene.pieces(place)]
-        )
+        pieces = [piece for place in placements(document, accessors, notes) for piece in scene.pieces(place)]
+        scene.note_others()
+        return mesh_of(pieces)
 
 
 _Key = tuple[int, tuple[float, ...], bool]
@@ -65,6 +65,13 @@ class _Scene:
                 self._budget.spend(copies * len(piece.points), copies * len(piece.faces), place.name)
                 found.append(placed(piece, place.matrices))
         return found
+
+    def note_others(self) -> None:
+        """Note the meshes that the scene does not show."""
+        shown = {mesh for mesh, _, _ in self._meshes}
+        for index, mesh in enumerate(self._document.meshes):
+            if mesh.primitives and index not in shown:
+                self._notes.add("meshes that the scene does not show are left out", f"mesh {index}")
 
     def _mesh(self, place: Placement) -> list[tuple[Piece, Skinned | None]]:
         """Return the pieces of a mesh at the origin, with their skins."""

@@ -54,7 +54,7 @@ def read_primitive(
     _check_compression(primitive, accessors, place)
     corners = _corners(primitive, position, accessors, place)
     triangles = _triangles(corners, primitive.mode, notes, place)
-    rows, faces = _used(triangles)
+    rows, faces = _used(triangles, accessors.of(position, place).count)
     points = _morphed("POSITION", _VECTOR, primitive, weights, accessors, rows, place)
     if not np.isfinite(points).all():
         raise Unreadable(f"{place} has positions that are no finite numbers")
@@ -100,10 +100,14 @@ def _triangles(corners: Int64Array, mode: int, notes: Notes, place: str) -> Int6
     return corners[steps]
 
 
-def _used(triangles: Int64Array) -> tuple[Int64Array, Int64Array]:
-    """Return the vertices that triangles use, in their order, and the triangles as indices into these."""
-    rows, faces = np.unique(triangles, return_inverse=True)
-    return rows, faces.reshape(-1, 3)
+def _used(triangles: Int64Array, count: int) -> tuple[Int64Array, Int64Array]:
+    """Return which of the points triangles use, in order, and the triangles as indices into these."""
+    if count > triangles.size:  # few corners of many points, which other primitives use
+        rows, faces = np.unique(triangles, return_inverse=True)
+        return rows, faces.reshape(-1, 3)
+    flags = np.zeros(count, np.bool_)
+    flags[triangles] = True
+    return np.flatnonzero(flags), (np.cumsum(flags) - 1)[triangles]
 
 
 def _morphed(

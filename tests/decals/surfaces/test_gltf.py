@@ -160,8 +160,9 @@ def test_what_has_no_faces_is_named(tmp_path: Path, caplog: pytest.LogCaptureFix
     writer.add(
         "meshes", primitives=[*shapes_of_modes, square(writer), square(writer, mode=4), {"attributes": {}}]
     )
+    writer.add("meshes", primitives=[square(writer)])
     writer.add("nodes", mesh=0)
-    writer.add("nodes", mesh=0, extensions={"KHR_node_visibility": {"visible": False}})
+    writer.add("nodes", mesh=1, extensions={"KHR_node_visibility": {"visible": False}})
     with caplog.at_level(logging.WARNING):
         assert len(read_mesh(saved(tmp_path, writer))[1]) == 3
     text = caplog.text
@@ -172,6 +173,7 @@ def test_what_has_no_faces_is_named(tmp_path: Path, caplog: pytest.LogCaptureFix
     assert "fewer than three corners are left out: mesh 0 primitive 5" in text
     assert "without positions are left out: mesh 0 primitive 6" in text
     assert "hidden nodes are left out: node 1" in text
+    assert "meshes that the scene does not show are left out: mesh 1" in text
 
 
 @pytest.mark.parametrize(
@@ -267,6 +269,19 @@ def test_indices_beyond_the_points_are_refused(tmp_path: Path) -> None:
     writer.add("nodes", mesh=writer.add("meshes", primitives=[square(writer, mode=4, indices=indices)]))
     with pytest.raises(InvalidMesh, match="4 points but a face asks for number 4"):
         read_mesh(saved(tmp_path, writer))
+
+
+def test_primitives_share_points_of_which_each_uses_some(tmp_path: Path) -> None:
+    writer = GltfWriter()
+    points = np.random.default_rng(0).normal(size=(100, 3)).astype("<f4")
+    position = {"POSITION": writer.accessor(points)}
+    faces = [np.array(rows, "<u2") for rows in ([[7, 3, 99]], [[0, 1, 2], [98, 97, 96]])]
+    indices = [writer.accessor(rows.reshape(-1, 1)) for rows in faces]
+    primitives = [{"attributes": position, "indices": index} for index in indices]
+    writer.add("nodes", mesh=writer.add("meshes", primitives=primitives))
+    vertices, found = read_mesh(saved(tmp_path, writer))
+    assert len(vertices) == 9
+    assert np.array_equal(vertices[found], points[np.concatenate(faces)])
 
 
 def test_copies_of_copies_are_counted_before_memory_is_taken(
