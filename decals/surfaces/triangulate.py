@@ -83,6 +83,9 @@ class Triangulation:
 def triangulate(points: NDArray[Any], polygons: Polygons) -> Triangulation:
     """Divide polygons into triangles; those of fewer than three corners give none."""
     sizes = polygons.sizes
+    if (sizes == 3).all():
+        places = np.arange(3 * len(sizes)).reshape(-1, 3)
+        return Triangulation(places, np.arange(len(sizes)), 0)
     counts = np.maximum(sizes - 2, 0)
     starts, firsts = np.cumsum(sizes) - sizes, np.cumsum(counts) - counts
     places = np.empty((counts.sum(), 3), np.int64)
