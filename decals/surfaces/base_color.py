@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from blobtree._typing import Float32Array, Float64Array, Int32Array, UInt8Array
 from blobtree.immutable import Immutable
 from blobtree.validation import real
-from decals.errors import InvalidInput, InvalidMesh
+from decals.errors import InvalidMesh
 from decals.images.load import AnyImage, image_pixels
 from decals.images.texels import as_bytes, decode_srgb, encode_srgb, unit_levels
 from decals.validation import describe, member
@@ -452,7 +452,7 @@ def checked_color(
         color = make()
         if color is not None:
             color.check_mesh(name, vertex_count, face_count)
-    except InvalidInput as error:
+    except ValueError as error:  # of ours, or of a text that is no number
         _logger.warning("Left out the colours of %s: %s", name, error)
         return None
     return color

@@ -24,7 +24,7 @@ from decals.surfaces.files.ply import read_ply, strip_triangles
 from decals.surfaces.files.stl import read_stl
 from decals.surfaces.files.threemf import read_3mf
 from decals.surfaces.mesh_data import MeshData, joined
-from decals.surfaces.triangulate import Polygons, triangulate
+from decals.surfaces.triangulate import Polygons, Triangulation, triangulate
 from decals.surfaces.vtk_process import can_isolate, read_isolated
 from decals.validation import describe, is_file
 
@@ -38,12 +38,13 @@ MIN_PRECISE_RATIO = 500.0
 """Least ratio of coordinates to the extent of a mesh at which float64 is kept."""
 
 _READERS: dict[str, Callable[[Path], tuple[Float64Array, Polygons | Int64Array]]] = {
-    ".obj": read_obj,
     ".off": read_off,
-    ".ply": read_ply,
     ".stl": read_stl,
 }
 """Our own readers, by suffix: they return points and polygons."""
+
+_PAINTED_READERS = {".obj": read_obj, ".ply": read_ply}
+"""Those that return points, polygons and their colours."""
 
 _PLACED_READERS = {".3mf": read_3mf, ".glb": read_gltf, ".gltf": read_gltf}
 """Those of files that place meshes in space; they return a mesh with its colours."""
@@ -95,6 +96,11 @@ def read_mesh_data(path: str | PathLike[str]) -> MeshData:
     if placed := _PLACED_READERS.get(path.suffix.lower()):
         data = placed(path)
         return MeshData(*polygon_triangles(*data.arrays, name=str(path)), data.color)
+    if painted := _PAINTED_READERS.get(path.suffix.lower()):
+        points, polygons, paint = painted(path)
+        vertices, faces, triangles = traced_triangles(points, polygons, name=str(path))
+        color = checked_color(lambda: paint(triangles), str(path), len(vertices), len(faces))
+        return MeshData(vertices, faces, color)
     if reader := _READERS.get(path.suffix.lower()):
         return MeshData(*polygon_triangles(*reader(path), name=str(path)))
     if can_isolate():
@@ -123,9 +129,9 @@ def dataset_mesh(dataset: "pv.DataSet | pv.MultiBlock", *, name: str) -> MeshDat
         dataset if isinstance(dataset, pv.PolyData) else dataset.extract_surface(algorithm="dataset_surface")
     )
     polygons, cells = _surface_polygons(surface)
-    vertices, faces, origins = traced_triangles(surface.points, polygons, name=name)
+    vertices, faces, triangles = traced_triangles(surface.points, polygons, name=name)
     color = checked_color(
-        lambda: dataset_color(surface, cells[origins], name=name), name, len(vertices), len(faces)
+        lambda: dataset_color(surface, cells[triangles.polygons], name=name), name, len(vertices), len(faces)
     )
     return MeshData(vertices, faces, color)
 
@@ -172,8 +178,8 @@ def polygon_triangles(
 
 def traced_triangles(
     points: ArrayLike, polygons: Polygons | NDArray[Any] | Sequence[NDArray[Any]], *, name: str
-) -> tuple[Float32Array, Int32Array, Int64Array]:
-    """Return vertices and triangles as `polygon_triangles` does, and the polygon of each triangle."""
+) -> tuple[Float32Array, Int32Array, Triangulation]:
+    """Return vertices and triangles as `polygon_triangles` does, and which corners the triangles have."""
     with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinity, refused by surfaces
         vertices: Any = precise_points(points)
     polygons = Polygons.of(polygons)
@@ -189,7 +195,7 @@ def traced_triangles(
         _logger.warning(
             "%s: %d faces cross themselves; some of their triangles lie on others", name, triangles.crossing
         )
-    return vertices, polygons.corners[triangles.places].astype(np.int32), triangles.polygons
+    return vertices, polygons.corners[triangles.places].astype(np.int32), triangles
 
 
 def _is_empty(dataset: Any) -> bool:

@@ -16,6 +16,8 @@ from decals.surfaces.files.content import (
     text_lines,
     whole_numbers,
 )
+from decals.surfaces.files.obj_colors import ObjColors
+from decals.surfaces.files.paint import Paint
 from decals.surfaces.triangulate import Polygons
 
 _logger = logging.getLogger(__name__)
@@ -26,12 +28,15 @@ ABSENT = np.iinfo(np.int64).min
 _REFERRED = {b"v": "vertex", b"vt": "texture coordinate", b"vn": "normal"}
 """What the references of a corner name, in turn."""
 
+_MATERIAL = (b"mtllib", b"usemtl")
+"""Keywords of materials."""
+
 _FREE_FORM = (b"surf", b"curv", b"curv2")
 """Keywords of curves and surfaces that are not polygons."""
 
 
-def read_obj(path: Path) -> tuple[Float64Array, Polygons]:
-    """Read the vertices and polygons of an OBJ file.
+def read_obj(path: Path) -> tuple[Float64Array, Polygons, Paint]:
+    """Read the vertices and polygons of an OBJ file, and how to colour them.
 
     Free-form curves and surfaces are left out with a line in the log.
 
@@ -41,12 +46,12 @@ def read_obj(path: Path) -> tuple[Float64Array, Polygons]:
         If a line is wrong, or asks for what the file does not have. The message names the line.
     """
     try:
-        return _read(file_bytes(path), str(path))
+        return _read(file_bytes(path), path)
     except (ValueError, MemoryError) as error:
         raise refusal(path, "OBJ", error) from error
 
 
-def _read(content: bytes, name: str) -> tuple[Float64Array, Polygons]:
+def _read(content: bytes, path: Path) -> tuple[Float64Array, Polygons, Paint]:
     texts = text_lines(content)
     lines = _lines_by_keyword(texts)
     faces = lines[b"f"]
@@ -59,13 +64,14 @@ def _read(content: bytes, name: str) -> tuple[Float64Array, Polygons]:
         for column, (keyword, noun) in enumerate(_REFERRED.items())
     ]
     if others := sum(len(lines[keyword]) for keyword in _FREE_FORM):
-        _logger.warning("%s: left out %d free-form curves and surfaces; only polygons are read", name, others)
-    return points_of(lines[b"v"]), Polygons(corners[0], sizes)
+        _logger.warning("%s: left out %d free-form curves and surfaces; only polygons are read", path, others)
+    paint = ObjColors(path, lines, corners[0], corners[1])
+    return points_of(lines[b"v"]), Polygons(corners[0], sizes), paint
 
 
 def _lines_by_keyword(texts: Sequence[bytes]) -> dict[bytes, list[Line]]:
     """Return the lines of the keywords that are read, without the keywords and without comments."""
-    lines: dict[bytes, list[Line]] = {keyword: [] for keyword in (*_REFERRED, b"f", *_FREE_FORM)}
+    lines: dict[bytes, list[Line]] = {keyword: [] for keyword in (*_REFERRED, b"f", *_MATERIAL, *_FREE_FORM)}
     known = {**lines, b"fo": lines[b"f"]}  # the old name of a face
     for number, text in _whole_lines(texts):
         keyword, _, rest = text.strip().replace(b"\t", b" ").partition(b" ")

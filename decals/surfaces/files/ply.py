@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from blobtree._typing import Float64Array, Int64Array
 from decals.surfaces.files.content import decimal_numbers, encoding_of, file_bytes, refusal, without_mark
+from decals.surfaces.files.paint import Paint
+from decals.surfaces.files.ply_colors import PlyColors
 from decals.surfaces.triangulate import Polygons
 
 _TYPES = {
@@ -25,6 +27,11 @@ _TYPES = {
 }  # fmt: skip
 _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
 _CORNERS = ("vertex_indices", "vertex_index")
+
+_PLACES = ("texcoord", "texcoords")
+"""Lists of faces with the texture coordinates of their corners."""
+
+_TEXTURE_FILE = re.compile(r"^comment\s+TextureFile\s+(.+?)\s*$", re.IGNORECASE | re.MULTILINE)
 
 MAX_LIST_LENGTH = 1 << 27
 """Longest list that is read; a longer one is a sign of a damaged file."""
@@ -64,8 +71,8 @@ class _Element:
     properties: tuple[_Property, ...]
 
 
-def read_ply(path: Path) -> tuple[Float64Array, Polygons]:
-    """Read the vertices and faces of a PLY file, ASCII or binary, of any polygon size.
+def read_ply(path: Path) -> tuple[Float64Array, Polygons, Paint]:
+    """Read the vertices and faces of a PLY file, ASCII or binary, of any polygon size, and their colours.
 
     Triangle strips (elements ``tristrips``) are divided into triangles.
 
@@ -76,13 +83,14 @@ def read_ply(path: Path) -> tuple[Float64Array, Polygons]:
     """
     try:
         with np.errstate(invalid="ignore", over="ignore"):  # the checks of values come later
-            return _read(file_bytes(path))
+            return _read(file_bytes(path), path)
     except (ValueError, LookupError, OverflowError, TypeError, MemoryError) as error:
         raise refusal(path, "PLY", error) from error
 
 
-def _read(content: bytes) -> tuple[Float64Array, Polygons]:
-    tables = list(_tables(*_header(content)))
+def _read(content: bytes, path: Path) -> tuple[Float64Array, Polygons, Paint]:
+    order, elements, body = _header(content)
+    tables = list(_tables(order, elements, body))
     vertices = [table for table in tables if table.name == "vertex"]
     if len(vertices) != 1 or not {"x", "y", "z"} <= vertices[0].scalars.keys():
         raise ValueError("it has no element of vertices with x, y and z")
@@ -96,7 +104,29 @@ def _read(content: bytes) -> tuple[Float64Array, Polygons]:
         for part in strips
         for strip in np.split(part.corners, np.cumsum(part.sizes)[:-1])
     ]
-    return points, Polygons.joined([*faces, *map(Polygons.of, triangles)])
+    polygons = Polygons.joined([*faces, *map(Polygons.of, triangles)])
+    face = next((table for table in tables if table.name == "face" and not triangles), None)
+    paint = PlyColors(
+        path,
+        _TEXTURE_FILE.findall(content[: len(content) - len(body)].decode("utf-8", "replace")),
+        _typed(vertices[0], elements),
+        {} if face is None else _typed(face, elements),
+        polygons,
+        next(
+            ((face.lists[name].lengths, face.lists[name].entries) for name in _PLACES if name in face.lists),
+            None,
+        )
+        if face is not None
+        else None,
+    )
+    return points, polygons, paint
+
+
+def _typed(table: _Table, elements: list[_Element]) -> dict[str, NDArray[np.generic]]:
+    """Return the numbers of a table in the types that the header names; ASCII has them as float64."""
+    properties = next(element.properties for element in elements if element.name == table.name)
+    kinds = {one.name: one.kind for one in properties}
+    return {name: values.astype(kinds[name]) for name, values in table.scalars.items()}
 
 
 def _corners(table: _Table) -> Polygons:

@@ -1,0 +1,117 @@
+"""Base colours of an OBJ file: colours behind the coordinates of vertices, and its materials."""
+
+from pathlib import Path
+
+import numpy as np
+
+from blobtree._typing import Float32Array, Int64Array
+from decals.images.texels import decode_srgb
+from decals.surfaces.base_color import CLAY, WHITE, BaseColor, linear_colors
+from decals.surfaces.files.content import Line, finite_numbers
+from decals.surfaces.files.faults import Notes, Unreadable
+from decals.surfaces.files.gltf_buffers import read_uri
+from decals.surfaces.files.mtl import Material, read_materials
+from decals.surfaces.files.paint import TextureFiles
+from decals.surfaces.triangulate import Triangulation
+
+
+class ObjColors:
+    """The colours of the polygons of an OBJ file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    lines : dict
+        Its lines by keyword.
+    vertices, places : int64[k]
+        Vertex and texture coordinate of each corner of each polygon; negative for none.
+    """
+
+    def __init__(
+        self, path: Path, lines: dict[bytes, list[Line]], vertices: Int64Array, places: Int64Array
+    ) -> None:
+        self._path = path
+        self._lines = lines
+        self._vertices = vertices
+        self._places = places
+
+    def __call__(self, triangles: Triangulation) -> BaseColor | None:
+        """Return the base colour of triangles; None if the file has none."""
+        notes = Notes()
+        materials, of_polygon = self._materials(notes)
+        notes.report(self._path)
+        colors, coordinates, mapped = self._vertex_colors(), self._coordinates(), self._places >= 0
+        if colors is None and coordinates is None and not materials:
+            return None
+        count = 0 if coordinates is None else len(coordinates)
+        keys = self._vertices * (count + 1) + (0 if coordinates is None else np.maximum(self._places, -1) + 1)
+        distinct, rows = np.unique(keys, return_inverse=True)
+        if coordinates is not None:
+            padded = np.concatenate([np.zeros((1, 2), np.float32), coordinates])
+            coordinates = padded[distinct % (count + 1)]
+        if colors is not None:
+            colors = colors[distinct // (count + 1)]
+        corners = rows.reshape(-1)[triangles.places].astype(np.int32)
+        if not materials:
+            return BaseColor(colors, coordinates, corners=corners)
+        shade = np.array(WHITE) if colors is not None else decode_srgb(np.array(CLAY, np.float64))
+        plain = Material(shade.astype(np.float64))
+        known = [*materials, plain]
+        # Faces without coordinates have the factor of their material alone.
+        bare = [Material(material.factor) for material in known]
+        of_face = of_polygon[triangles.polygons] % len(known)
+        of_face = of_face + len(known) * ~mapped[triangles.places].all(axis=1)
+        return BaseColor.of_materials(
+            [material.factor for material in known + bare],
+            [material.texture for material in known + bare],
+            of_face.astype(np.int32),
+            corners,
+            coordinates=coordinates,
+            colors=colors,
+        )
+
+    def _vertex_colors(self) -> Float32Array | None:
+        """Return the colours of vertices, which follow their coordinates; None if some have none."""
+        words = [line.text.split() for line in self._lines[b"v"]]
+        if not words or any(len(of_line) < 6 for of_line in words):
+            return None
+        numbers = finite_numbers(word for of_line in words for word in of_line[-3:]).reshape(-1, 3)
+        return linear_colors(numbers, name="colours of vertices")
+
+    def _coordinates(self) -> Float32Array | None:
+        """Return the texture coordinates of the file; None if no corner has any."""
+        lines = self._lines[b"vt"]
+        if not lines or (self._places < 0).all():
+            return None
+        words = [[*line.text.split(), b"0", b"0"][:2] for line in lines]
+        return finite_numbers(word for of_line in words for word in of_line).reshape(-1, 2).astype(np.float32)
+
+    def _materials(self, notes: Notes) -> tuple[list[Material], Int64Array]:
+        """Return the materials that polygons use, and the one of each polygon; -1 for none."""
+        uses, faces = self._lines[b"usemtl"], self._lines[b"f"]
+        names = [line.text.strip() for line in uses]
+        known = self._library(notes) if names else {}
+        for name in names:
+            if name and name not in known and known:
+                notes.add("materials are missing", repr(name.decode("utf-8", "replace")))
+        used = sorted({name for name in names if name in known})
+        numbers = np.array([*(used.index(name) if name in known else -1 for name in names), -1], np.int64)
+        before = np.searchsorted([line.number for line in uses], [line.number for line in faces]) - 1
+        return [known[name] for name in used], numbers[before]
+
+    def _library(self, notes: Notes) -> dict[bytes, Material]:
+        """Return the materials of all material files that the file names."""
+        found: dict[bytes, Material] = {}
+        folder = self._path.parent
+        textures = TextureFiles(folder, notes)
+        for line in self._lines[b"mtllib"]:
+            file = line.text.strip().decode("utf-8", "replace")
+            names = [file] if (folder / file).is_file() else file.split()
+            for name in names:
+                try:
+                    content = read_uri(name, folder, "a material file")
+                    found |= read_materials(content, textures, notes, name)
+                except (Unreadable, ValueError) as fault:
+                    notes.add("materials are left out", str(fault))
+        return found
