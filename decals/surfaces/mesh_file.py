@@ -190,6 +190,10 @@ def traced_triangles(
         raise InvalidMesh(f"{name!r} has no face of three or more corners; give a surface mesh")
     if short := int((polygons.sizes < 3).sum()):
         _logger.warning("%s: left out %d faces of fewer than three corners", name, short)
+    wrong = ~np.isfinite(vertices[polygons.corners]).all(axis=1)
+    if wrong.any():
+        bad = int(polygons.corners[np.argmax(wrong)])
+        raise InvalidMesh(f"{name!r} has a face at point {bad}, whose coordinates are not finite; correct them")
     triangles = triangulate(vertices, polygons)
     if triangles.crossing:
         _logger.warning(

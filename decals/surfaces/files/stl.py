@@ -75,7 +75,8 @@ def _binary_corners(content: bytes) -> Float64Array:
         declared = (size - _HEADER) // _FACET.itemsize
         raise ValueError(f"it declares {declared} facets and holds {there}")
     facets = np.frombuffer(body, _FACET, (size - _HEADER) // _FACET.itemsize, _HEADER)
-    corners: Float64Array = facets["corners"].reshape(-1, 3).astype(np.float64)
+    with np.errstate(invalid="ignore"):  # refused below
+        corners: Float64Array = facets["corners"].reshape(-1, 3).astype(np.float64)
     wrong = ~np.isfinite(corners).all(axis=1)
     if wrong.any():
         raise ValueError(f"facet {int(np.argmax(wrong)) // 3 + 1} has a corner that is not finite")
