@@ -8,6 +8,7 @@ seed and its number.
 
 import argparse
 import json
+import logging
 import os
 import random
 import re
@@ -40,10 +41,12 @@ from decals.rendering import Picture
 from tests.decals.editing.fuzz import RandomCommands
 from tests.decals.editing.scenes import digest, scene
 from tests.fuzz_calls import call_table, not_called
+from tests.structured.formats import FORMATS
+from tests.structured.model import check
 from tests.test_hostile_calls import CALLS, HUGE, PLY
 
-HANG_SECONDS = 10.0
-"""Seconds after which a case counts as hung."""
+HANG_SECONDS = 60.0
+"""Seconds after which a case counts as hung; a process that reads by VTK has its own limits before."""
 
 START_SECONDS = 300.0
 """The same for the first case of a child, which may compile kernels."""
@@ -160,6 +163,18 @@ def file_case(folder: Path, files: Sequence[Path], seed: int) -> Case:
         for read in readers:
             with suppress(ImplicitDecalsError):
                 read(path)
+
+    return run
+
+
+def structured_case(folder: Path, seed: int) -> Case:
+    """Return the stage of generated files of all formats in turn; a misread one raises MisreadError."""
+    names = list(FORMATS)
+    logging.disable(logging.WARNING)  # of faces that are left out
+
+    def run(number: int) -> None:
+        name = names[number % len(names)]
+        check(FORMATS[name](random.Random(f"{seed}:{name}:{number}")), folder)
 
     return run
 
@@ -295,12 +310,11 @@ MESHES = ("ply", "obj", "stl", "vtp")
 # -- stages ---------------------------------------------------------------------------------------------
 
 
-def run_stage(make: Callable[[Path], Case], count: int, folder: Path) -> Outcome:
-    """Run the cases below ``count`` in children, each of which ends at a crash or a hang."""
+def run_stage(make: Callable[[Path], Case], count: int, folder: Path, first: int = 0) -> Outcome:
+    """Run the cases from ``first`` to below ``count`` in children, which end at a crash or a hang."""
     outcome = Outcome()
     state, report = folder / "state", folder / "report"
     report.touch()
-    first = 0
     while first < count:
         state.write_text("-1", encoding="ascii")
         child = os.fork()
@@ -365,15 +379,20 @@ def _watch(child: int, state: Path, first: int, outcome: Outcome) -> int:
         time.sleep(0.02)
 
 
-def fuzz(*, files: int, calls: int, commands: int, kills: int, seed: int) -> dict[str, Any]:
+def fuzz(
+    *, files: int, calls: int, commands: int, kills: int, seed: int, structured: int = 0
+) -> dict[str, Any]:
     """Run all stages; return the number of failures of each kind, and their descriptions."""
     stages: dict[str, Outcome] = {}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for stage in ("corpus", "files", "calls", "commands", "kills"):
+        for stage in ("corpus", "files", "structured", "calls", "commands", "kills"):
             (folder / stage).mkdir()
         paths = corpus(folder / "corpus")
         stages["files"] = run_stage(lambda work: file_case(work, paths, seed), files, folder / "files")
+        stages["structured"] = run_stage(
+            lambda work: structured_case(work, seed), structured, folder / "structured"
+        )
         stages["calls"] = run_stage(lambda _: call_case(seed), calls, folder / "calls")
         stages["commands"] = run_stage(lambda _: command_case(seed), commands, folder / "commands")
         torn = torn_files(folder / "kills", kills, seed) if kills else []
@@ -383,7 +402,13 @@ def fuzz(*, files: int, calls: int, commands: int, kills: int, seed: int) -> dic
         "fuzz_foreign": sum(len(outcome.foreign) for outcome in stages.values()),
         "fuzz_torn": len(torn),
         "seeded": seed,
-        "cases": {"files": files, "calls": calls, "commands": commands, "kills": kills},
+        "cases": {
+            "files": files,
+            "structured": structured,
+            "calls": calls,
+            "commands": commands,
+            "kills": kills,
+        },
         "not_called": not_called() if calls else [],
         "failures": {name: vars(outcome) for name, outcome in stages.items()} | {"torn": torn},
     }
@@ -392,12 +417,14 @@ def fuzz(*, files: int, calls: int, commands: int, kills: int, seed: int) -> dic
 def main() -> int:
     """Run the fuzzer with the budget of the command line; the exit code is 1 after a failure."""
     parser = argparse.ArgumentParser(description=__doc__)
-    for name, count in (("files", 2000), ("calls", 2000), ("commands", 500), ("kills", 20), ("seed", 0)):
+    budget = {"files": 2000, "structured": 2000, "calls": 2000, "commands": 500, "kills": 20, "seed": 0}
+    for name, count in budget.items():
         parser.add_argument(f"--{name}", type=int, default=count)
     parser.add_argument("--json", action="store_true", help="print the figures and failures as JSON")
     options = parser.parse_args()
     figures = fuzz(
         files=options.files,
+        structured=options.structured,
         calls=options.calls,
         commands=options.commands,
         kills=options.kills,

@@ -17,6 +17,7 @@ from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
 from decals.errors import InvalidMesh
 from decals.surfaces.base_color import checked_color
 from decals.surfaces.dataset_colors import dataset_color, has_colors
+from decals.surfaces.files.content import encoding_of, without_mark
 from decals.surfaces.files.gltf import read_gltf
 from decals.surfaces.files.obj import read_obj
 from decals.surfaces.files.off import read_off
@@ -193,7 +194,9 @@ def traced_triangles(
     wrong = ~np.isfinite(vertices[polygons.corners]).all(axis=1)
     if wrong.any():
         bad = int(polygons.corners[np.argmax(wrong)])
-        raise InvalidMesh(f"{name!r} has a face at point {bad}, whose coordinates are not finite; correct them")
+        raise InvalidMesh(
+            f"{name!r} has a face at point {bad}, whose coordinates are not finite; correct them"
+        )
     triangles = triangulate(vertices, polygons)
     if triangles.crossing:
         _logger.warning(
@@ -243,6 +246,7 @@ def read_dataset(path: Path) -> "pv.DataSet | pv.MultiBlock":
 
     from blobtree.vtk_errors import vtk_errors
 
+    _check_mark(path)
     cause = None
     try:
         with vtk_errors() as errors:
@@ -257,6 +261,14 @@ def read_dataset(path: Path) -> "pv.DataSet | pv.MultiBlock":
     return dataset
 
 
+def _check_mark(path: Path) -> None:
+    """Refuse a text in UTF-16 or UTF-32 that VTK would misread."""
+    with path.open("rb") as file:
+        encoding = encoding_of(file.read(4))
+    if encoding not in (None, "utf-8") and path.suffix.lower() != ".vtk":
+        raise InvalidMesh(f"{str(path)!r} starts with the mark of {encoding}; VTK needs UTF-8, so convert it")
+
+
 def _read_legacy(path: Path) -> "pv.DataSet | pv.MultiBlock":
     """Read a file of VTK's legacy format, with a line end added to it.
 
@@ -264,7 +276,7 @@ def _read_legacy(path: Path) -> "pv.DataSet | pv.MultiBlock":
     """
     import pyvista as pv
 
-    content = path.read_bytes() + b"\n"
+    content = without_mark(path.read_bytes()) + b"\n"
     reader: Any = pv.get_reader(path)  # type: ignore[no-untyped-call]
     reader.reader.SetBinaryInputString(content, len(content))
     reader.reader.ReadFromInputStringOn()

@@ -6,9 +6,12 @@ file. Where the system has no fork it reads by itself, and is started again afte
 
 import contextlib
 import json
+import math
 import os
 import select
+import signal
 import sys
+import time
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -60,11 +63,12 @@ def _answer_in_fork(request: dict[str, Any], answers: BinaryIO) -> None:
             os._exit(1)
     _, status = os.waitpid(child, 0)
     if status != 0:  # it sends its answer last
-        _send(answers, {"error": "VTK's reader crashed"})
+        limited = os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGXCPU
+        _send(answers, {"limit": "time"} if limited else {"error": "VTK's reader crashed"})
 
 
 def _limit(request: dict[str, Any]) -> None:
-    """Limit the processor time of this process, and on Linux its memory."""
+    """Limit the memory of this process on Linux, and let it write no core file."""
     import resource
 
     if STATM.exists():
@@ -72,14 +76,20 @@ def _limit(request: dict[str, Any]) -> None:
         memory = pages * resource.getpagesize() + int(request["bytes"])
         resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    # Readers may use several threads, so processor time is more than the seconds that pass.
-    processor = int(request["seconds"] * (os.cpu_count() or 1)) + 1
-    resource.setrlimit(resource.RLIMIT_CPU, (processor, processor))
+
+
+def _limit_step(seconds: float) -> None:
+    """Limit the processor time of this process from now on; Windows has no such limit."""
+    if sys.platform != "win32":
+        import resource
+
+        most = resource.getrlimit(resource.RLIMIT_CPU)[1]
+        resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(time.process_time() + seconds), most))
 
 
 def _answer(request: dict[str, Any], answers: BinaryIO) -> None:
     try:
-        mesh = read(Path(os.fsdecode(bytes.fromhex(request["path"]))))
+        mesh = _read(Path(os.fsdecode(bytes.fromhex(request["path"]))), request["seconds"])
     except ImplicitDecalsError as error:
         _send(answers, {"error": str(error), "whole": True})
     except MemoryError:
@@ -88,7 +98,7 @@ def _answer(request: dict[str, Any], answers: BinaryIO) -> None:
         _send(answers, {"error": f"{type(error).__name__}: {error}"})
     else:
         arrays = {
-            "vertices": np.ascontiguousarray(mesh.vertices, np.float32),
+            "vertices": np.ascontiguousarray(mesh.vertices),
             "faces": np.ascontiguousarray(mesh.faces, np.int32),
         }
         for name in COLOR_ARRAYS if mesh.color is not None else ():
@@ -98,9 +108,12 @@ def _answer(request: dict[str, Any], answers: BinaryIO) -> None:
         _send(answers, {"arrays": shapes}, *(array.data.cast("B") for array in arrays.values() if array.size))
 
 
-def read(path: Path) -> MeshData:
-    """Read a mesh file by pyvista, as triangles with colours."""
-    return dataset_mesh(read_dataset(path), name=str(path))
+def _read(path: Path, seconds: float) -> MeshData:
+    """Read a mesh file by pyvista, as triangles with colours; each step has its limit of processor time."""
+    _limit_step(seconds)
+    dataset = read_dataset(path)
+    _limit_step(seconds)
+    return dataset_mesh(dataset, name=str(path))
 
 
 def _send(answers: BinaryIO, header: dict[str, Any], *contents: memoryview) -> None:

@@ -5,6 +5,7 @@
 
 import atexit
 import json
+import math
 import os
 import signal
 import subprocess
@@ -25,8 +26,11 @@ from decals.surfaces.mesh_data import MeshData
 START_SECONDS = 120.0
 """Seconds until the process must be ready; imports from a slow disk take long."""
 
-SECONDS, SECONDS_PER_BYTE = 6.0, 2e-6
-"""Time in which a file must be read: for any file, and per byte of it."""
+SECONDS, SECONDS_PER_BYTE = 6.0, 2e-5
+"""Seconds of a processor for each step of reading: for any file, and per byte. Busy cores do not count."""
+
+PATIENCE = 50.0
+"""Seconds on the clock, for each second of that time, after which a reader counts as stuck."""
 
 MEMORY, MEMORY_PER_BYTE = 2 << 30, 64
 """Bytes of memory for reading: for any file, and per byte of it."""
@@ -63,21 +67,28 @@ class _ReaderProcess:
     def read(self, path: Path) -> MeshData:
         """Read a file; see `read_isolated`."""
         size = path.stat().st_size
-        seconds = SECONDS + SECONDS_PER_BYTE * size
+        seconds = math.ceil(SECONDS + SECONDS_PER_BYTE * size)
         memory = MEMORY + MEMORY_PER_BYTE * size
         request = {"path": os.fsencode(path.absolute()).hex(), "seconds": seconds, "bytes": memory}
         with self._lock:
             try:
-                answer = self._answer(request, seconds)
+                answer = self._answer(request, PATIENCE * seconds)
                 if answer is None and self._has_left():
-                    answer = self._answer(request, seconds)
+                    answer = self._answer(request, PATIENCE * seconds)
             except BaseException:
                 self.stop()  # half of an answer may be in the pipe
                 raise
             if answer is None:
                 self.stop()
-                raise InvalidMesh(_failure(path, f"VTK's reader crashed, or took more than {seconds:.0f} s"))
+                raise InvalidMesh(
+                    _failure(path, f"VTK's reader crashed, or was stuck for {PATIENCE * seconds:.0f} s")
+                )
         header, arrays = answer
+        if "limit" in header:
+            raise InvalidMesh(
+                f"could not read {str(path)!r} within the limits for {size:,} bytes, {seconds} s of "
+                "processor time for each step; if it is not damaged, convert it to .ply, .obj or .stl"
+            )
         if "error" in header:
             raise InvalidMesh(header["error"] if "whole" in header else _failure(path, header["error"]))
         mesh = arrays.pop("vertices"), arrays.pop("faces")

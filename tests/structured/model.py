@@ -96,7 +96,8 @@ def check(file: StructuredFile, folder: Path) -> None:
 def _compare(vertices: NDArray[np.float64], faces: NDArray[Any], mesh: PolygonMesh) -> None:
     corners = vertices[faces]
     area = float(
-        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+        / 2
     )
     bounds = np.stack([corners.min(axis=(0, 1)), corners.max(axis=(0, 1))])
     size = np.linalg.norm(mesh.bounds[1] - mesh.bounds[0])

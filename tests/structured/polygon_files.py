@@ -26,7 +26,9 @@ def obj(chance: random.Random) -> StructuredFile:
     number = chance.choice(NUMBERS)
     points = [["v", *map(number, point)] for point in mesh.points.tolist()]
     if (extra := chance.random()) < 0.3:
-        points = [[*words, *(number(chance.random()) for _ in range(1 if extra < 0.1 else 3))] for words in points]
+        points = [
+            [*words, *(number(chance.random()) for _ in range(1 if extra < 0.1 else 3))] for words in points
+        ]
     textures, normals = chance.choice([(0, 0), (5, 0), (0, 5), (5, 5)])
     head = [["vt", number(k / 5), "0.5"] for k in range(textures)]
     head += [["vn", "0", "0", number(1.0)] for _ in range(normals)]
@@ -77,7 +79,12 @@ def _obj_break(rows: list[list[str]], mesh: PolygonMesh, chance: random.Random) 
     place = chance.randrange(1, len(words))
     first = words[place].split("/")[0]
     words[place] = chance.choice(
-        [str(chance.choice(wrong)), f"{first}/{chance.choice([9, 0, -9, 10**6])}", f"{first}//{10**6}", f"{first}/1/1/1"]
+        [
+            str(chance.choice(wrong)),
+            f"{first}/{chance.choice([9, 0, -9, 10**6])}",
+            f"{first}//{10**6}",
+            f"{first}/1/1/1",
+        ]
     )
     return True
 
@@ -86,8 +93,8 @@ def _obj_noise(rows: list[list[str]], chance: random.Random) -> list[list[str]]:
     """Return the rows with lines between them that mean nothing for the shape."""
     noise = [
         ["#", "comment", "f 1 2 3"], ["o", chance.choice(WORDS)], ["g", "a", "b"], ["g"], ["usemtl"], [""],
-        ["usemtl", chance.choice(WORDS)], ["mtllib", "none here.mtl"], ["s", "off"], ["s", "1"], ["unknown", "1"],
-        ["l", "1", "2"], ["p", "1"],
+        ["usemtl", chance.choice(WORDS)], ["mtllib", "none here.mtl"], ["s", "off"], ["s", "1"],
+        ["unknown", "1"], ["l", "1", "2"], ["p", "1"],
     ]  # fmt: skip
     found: list[list[str]] = []
     for words in rows:
@@ -109,9 +116,12 @@ def _obj_line(words: list[str], chance: random.Random) -> str:
 
 # -- PLY ------------------------------------------------------------------------------------------------
 
-_CODES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d"}
-_ALIASES = {"char": "int8", "uchar": "uint8", "short": "int16", "ushort": "uint16", "int": "int32", "uint": "uint32",
-            "float": "float32", "double": "float64"}  # fmt: skip
+_KINDS = [
+    ("char", "int8", "b"), ("uchar", "uint8", "B"), ("short", "int16", "h"), ("ushort", "uint16", "H"),
+    ("int", "int32", "i"), ("uint", "uint32", "I"), ("float", "float32", "f"), ("double", "float64", "d"),
+]  # fmt: skip
+_CODES = {name: code for name, _, code in _KINDS}
+_ALIASES = {name: alias for name, alias, _ in _KINDS}
 
 
 def ply(chance: random.Random) -> StructuredFile:
@@ -121,7 +131,10 @@ def ply(chance: random.Random) -> StructuredFile:
     number = chance.choice(NUMBERS)
     axis = chance.choice(["float", "double"])
     before, after = _extras(chance), _extras(chance)
-    index, count = chance.choice(["int", "uint", "short", "ushort"]), chance.choice(["uchar", "int", "ushort", "uint"])
+    index, count = (
+        chance.choice(["int", "uint", "short", "ushort"]),
+        chance.choice(["uchar", "int", "ushort", "uint"]),
+    )
     lists = chance.sample(["texcoord", "weights"], chance.choice([0, 0, 1, 2]))
     tables: list[tuple[str, list[tuple[str, ...]], list[list[object]]]] = []
     vertices = [[1] * len(before) + point + [1] * len(after) for point in mesh.points.tolist()]
@@ -170,8 +183,8 @@ def _ply_content(
         lines += ["property " + " ".join(aliases.get(word, word) for word in prop) for prop in properties]
     text = "\n".join([*lines, "end_header", ""])
     if not order:
-        rows = [_ply_words(row, number) for _, _, rows in tables for row in rows]
-        return encoded(text + "".join(spaced(words, chance) + "\n" for words in rows), chance)
+        words = [_ply_words(row, number) for _, _, rows in tables for row in rows]
+        return encoded(text + "".join(spaced(line, chance) + "\n" for line in words), chance)
     end = chance.choice(["\n", "\n", "\r\n"])
     body = b"".join(
         _ply_bytes(value, prop, order)
@@ -208,7 +221,9 @@ def stl(chance: random.Random) -> StructuredFile:
     rounded = PolygonMesh(mesh.points.astype(np.float32).astype(np.float64), mesh.polygons)
     facets = [rounded.points[list(loop)] for loop in rounded.polygons]
     if chance.random() < 0.4:
-        header = chance.choice([b"binary", b"solid of a binary file", b"", b"\0\1\2"]).ljust(80, chance.choice([b" ", b"\0"]))
+        header = chance.choice([b"binary", b"solid of a binary file", b"", b"\0\1\2"]).ljust(
+            80, chance.choice([b" ", b"\0"])
+        )
         rows = b"".join(struct.pack("<12fH", 0, 0, 1, *facet.ravel().tolist(), 7) for facet in facets)
         content = header + struct.pack("<I", len(facets)) + rows
         if chance.random() < BROKEN / 2:
@@ -224,8 +239,8 @@ def stl(chance: random.Random) -> StructuredFile:
         if row == split:
             lines += [f"endsolid {name}", "", "solid another"]
         normal = chance.choice(["0 0 1", "0.0 -0.0 1e0", "nan nan nan"])
-        rows = [f"vertex {' '.join(map(number, corner))}" for corner in facet.tolist()]
-        lines += [f"facet normal {normal}", "outer loop", *rows, "endloop", "endfacet"]
+        loop = [f"vertex {' '.join(map(number, corner))}" for corner in facet.tolist()]
+        lines += [f"facet normal {normal}", "outer loop", *loop, "endloop", "endfacet"]
     lines.append(chance.choice([f"endsolid {name}", "endsolid"]))
     text = "\n".join(spaced(line.split(" "), chance) for line in lines) + chance.choice(["", "\n", "\n\n"])
     if chance.random() < 0.3:
@@ -250,7 +265,9 @@ def off(chance: random.Random) -> StructuredFile:
     faces = [[*words, *paint] for words in faces]
     if broken := chance.random() < BROKEN / 2:
         words = chance.choice(faces)
-        words[chance.randrange(len(words) - len(paint))] = str(chance.choice([len(mesh.points), -1, 99, 10**12]))
+        words[chance.randrange(len(words) - len(paint))] = str(
+            chance.choice([len(mesh.points), -1, 99, 10**12])
+        )
     head = chance.choice([[keyword, counts], [keyword, "# comment", "", counts], [f"{keyword} {counts}"]])
     if keyword == "OFF" and chance.random() < 0.1:
         head = chance.choice([[counts], [f"OFF{counts}"]])

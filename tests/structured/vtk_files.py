@@ -1,4 +1,4 @@
-"""VTK's own files, legacy and XML, of surfaces and grids; references, counts and offsets are broken in some."""
+"""VTK's own files, legacy and XML, of surfaces and grids; some have broken references or counts."""
 
 import random
 import re
@@ -59,13 +59,17 @@ def vtk(chance: random.Random) -> StructuredFile:
 
 
 def _surface(mesh: PolygonMesh) -> pv.PolyData:
-    return pv.PolyData.from_irregular_faces(mesh.points, [np.array(loop) for loop in mesh.polygons])
+    loops = [np.array(loop) for loop in mesh.polygons]
+    surface: pv.PolyData = pv.PolyData.from_irregular_faces(mesh.points, loops)
+    return surface
 
 
 def _structured(chance: random.Random) -> tuple[PolygonMesh, pv.StructuredGrid]:
     """Return a flat grid of quadrilaterals, scaled and moved."""
     columns, rows = chance.randint(2, 5), chance.randint(2, 5)
-    x, y = np.meshgrid(np.arange(columns) * chance.uniform(0.1, 9.0), np.arange(rows) + chance.uniform(-9.0, 9.0))
+    x, y = np.meshgrid(
+        np.arange(columns) * chance.uniform(0.1, 9.0), np.arange(rows) + chance.uniform(-9.0, 9.0)
+    )
     points = np.stack([x.ravel(), y.ravel(), x.ravel() * chance.uniform(-1.0, 1.0)], axis=1)
     grid = pv.StructuredGrid()
     grid.points = points

@@ -43,7 +43,7 @@ def test_a_file_that_breaks_the_reader_is_refused(
     if name == "hang.vtp":
         monkeypatch.setattr(vtk_process, "SECONDS", 1.0)
     begun = time.perf_counter()
-    with pytest.raises(InvalidMesh, match=rf"{name}.*export it again"):
+    with pytest.raises(InvalidMesh, match=rf"{name}.*(export it again|within the limits .* processor time)"):
         read_mesh(DAMAGED / name)
     assert time.perf_counter() - begun < vtk_process.SECONDS + 30.0
     monkeypatch.undo()

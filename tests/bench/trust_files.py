@@ -1,0 +1,87 @@
+"""Generated files of all formats: crashes, hangs, foreign exceptions, and valid files that are misread.
+
+    python -m tests.bench.trust_files [--cases 200000] [--workers 16] [--seed 1] [--json FILE]
+
+Each worker reads ranges of the cases in forked children; see `tests.fuzz`. A case follows from the seed and
+its number, so a failed one can be read again with ``--first NUMBER --cases 1``.
+"""
+
+import argparse
+import json
+import multiprocessing
+import os
+import re
+import sys
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from tests.fuzz import Outcome, run_stage, structured_case
+
+TARGETS = {"file_faults": "0", "file_misread": "0"}
+"""Targets of the issue's figures."""
+
+CHUNK = 2000
+"""Cases that one run of a worker reads."""
+
+_MISREAD = re.compile(r"\d+: MisreadError:")
+
+
+def measure(*, quick: bool) -> dict[str, float]:
+    """Read generated files, few of them if the run is to be quick."""
+    figures, _ = campaign(400 if quick else 200_000, workers=os.cpu_count() or 1)
+    return figures
+
+
+def campaign(
+    cases: int, *, workers: int, seed: int = 1, first: int = 0
+) -> tuple[dict[str, float], list[str]]:
+    """Return the figures of a number of cases, and a line for each failure."""
+    size = min(CHUNK, -(-cases // workers))
+    ranges = [(start, min(start + size, first + cases)) for start in range(first, first + cases, size)]
+    spawn = multiprocessing.get_context("spawn")
+    with tempfile.TemporaryDirectory() as name, ProcessPoolExecutor(workers, spawn) as pool:
+        outcomes = list(pool.map(partial(_read, Path(name), seed), ranges))
+    crashes = [f"{number}: crash" for outcome in outcomes for number in outcome.crashes]
+    hangs = [f"{number}: hang" for outcome in outcomes for number in outcome.hangs]
+    lines = [line for outcome in outcomes for line in outcome.foreign]
+    misread = [line for line in lines if _MISREAD.match(line)]
+    figures: dict[str, float] = {
+        "file_cases": cases,
+        "file_faults": len(crashes) + len(hangs) + len(lines) - len(misread),
+        "file_misread": len(misread),
+    }
+    return figures, [*crashes, *hangs, *lines]
+
+
+def _read(folder: Path, seed: int, bounds: tuple[int, int]) -> Outcome:
+    """Read a range of cases in a folder of its own."""
+    first, end = bounds
+    own = folder / str(first)
+    own.mkdir()
+    return run_stage(lambda work: structured_case(work, seed), end, own, first)
+
+
+def main() -> int:
+    """Run the campaign that the command line asks for; the exit code is 1 after a failure."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=2000)
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="number of the first case")
+    parser.add_argument("--json", type=Path, help="also write the figures and failures to this file")
+    options = parser.parse_args()
+    figures, failures = campaign(
+        options.cases, workers=options.workers, seed=options.seed, first=options.first
+    )
+    print("\n".join([*(f"{key:14} {value:g}" for key, value in figures.items()), *failures]))
+    if options.json:
+        report: dict[str, Any] = {**figures, "failures": failures}
+        options.json.write_text(json.dumps(report, indent=1), encoding="utf-8")
+    return int(bool(failures))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
