@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from blobtree.errors import InvalidDevice, InvalidResolution
 from blobtree.kernels import loaded, unusable_cache
+from blobtree.progress import check_cancelled
 
 wp.config.log_level = wp.LOG_WARNING  # no banner when Warp starts, no line per compiled module
 
@@ -40,6 +41,9 @@ MIN_SLICE = 256
 
 MIN_SLICE_SECONDS = 2.5e-4
 """Least processor time of a slice; its start takes about a fifth of that, and only one starts at a time."""
+
+CHECKED_SLICE_SECONDS = 0.02
+"""Processor time of a slice from which on a launch without reports looks after it whether it is cancelled."""
 
 PAGE_BYTES = 4096
 """Size of a page of memory on most machines."""
@@ -214,9 +218,15 @@ def launch(
 
     The first parameter of the kernel is the first index of the slice; `inputs` and `outputs` follow. `step`
     is called with the fraction done. An exception in `step` ends the launch once the running slices are done.
+
+    Raises
+    ------
+    Cancelled
+        The work that launches the kernel is to stop.
     """
     if count == 0:
         return
+    check_cancelled()
     start_warp()
     loaded(kernel, device)
     if not wp.get_device(device).is_cpu:
@@ -238,6 +248,8 @@ def launch(
         seconds += taken
         if step is not None:
             step(number / slices)
+        elif taken > CHECKED_SLICE_SECONDS:
+            check_cancelled()
     _note_cost(kernel, seconds / count)
 
 

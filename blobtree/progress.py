@@ -9,6 +9,9 @@ Long functions do their work within `reporting`. Their reports go to the first o
    elapsed seconds.
 
 Reports of functions that the work calls, and of kernels that it compiles, go the same way.
+
+A ``cancel`` function of any work around counts as well. It is called at each report and at each
+`check_cancelled`, which loops without reports call. Every launch of kernels does.
 """
 
 import logging
@@ -38,6 +41,9 @@ LINE_SECONDS, UPDATE_SECONDS = 1.5, 0.5
 TICK = 0.25
 """Seconds between two looks at the work."""
 
+CANCEL_TICK = 0.05
+"""Seconds between two looks whether work that waits is cancelled."""
+
 PAUSE = 1.5
 """Work that begins so many seconds after other work goes on with its silence."""
 
@@ -56,6 +62,9 @@ _PACKAGE_LOGGER = logging.getLogger("blobtree")
 _outer: ContextVar["Progress | _Work | None"] = ContextVar("outer", default=None)
 """Where reports of the present work go; each thread has its own."""
 
+_cancels: ContextVar[tuple[Cancel, ...]] = ContextVar("cancels", default=())
+"""The ``cancel`` functions of the present work and of all work that called it."""
+
 _displays: list[tuple[Progress, bool]] = []
 """Displays, and whether each is the only place that shows reports."""
 
@@ -69,7 +78,8 @@ def reporting(progress: Progress | None = None, cancel: Cancel | None = None) ->
     progress
         Receives the reports. Default: the work that called this one, or a display.
     cancel
-        Called at each report, which raises `Cancelled` once it returns True.
+        Called at each report and at each `check_cancelled` of the work, which raise `Cancelled` once it
+        returns True.
 
     Examples
     --------
@@ -85,11 +95,11 @@ def reporting(progress: Progress | None = None, cancel: Cancel | None = None) ->
     target = progress or _outer.get() or _Work()
 
     def report(stage: str, fraction: float) -> None:
-        if cancel is not None and cancel():
-            raise Cancelled(f"cancelled while {stage}")
+        check_cancelled(stage)
         target(stage, fraction)
 
     token = _outer.set(target)
+    cancels = _cancels.set(_cancels.get() + (() if cancel is None else (cancel,)))
     try:
         if isinstance(target, _Work):
             with target.nested():
@@ -97,7 +107,61 @@ def reporting(progress: Progress | None = None, cancel: Cancel | None = None) ->
         else:
             yield report
     finally:
+        _cancels.reset(cancels)
         _outer.reset(token)
+
+
+def check_cancelled(stage: str = "computing") -> None:
+    """Raise `Cancelled` if this work, or work that called it, is to stop; call this in long loops.
+
+    Parameters
+    ----------
+    stage
+        What is being done, in plain words.
+
+    Examples
+    --------
+    >>> with reporting(cancel=lambda: False):
+    ...     check_cancelled("placing vertices")
+    """
+    for cancel in _cancels.get():
+        if cancel():
+            raise Cancelled(f"cancelled while {stage}")
+
+
+@contextmanager
+def ended_by_cancel(end: Callable[[], None]) -> Iterator[None]:
+    """Within a ``with`` block that waits, call `end` from a thread once the work is to stop.
+
+    The block itself then ends and calls `check_cancelled`.
+
+    Parameters
+    ----------
+    end
+        Ends what the block waits for, such as a child process; it may be called when that has ended.
+
+    Examples
+    --------
+    >>> import threading
+    >>> ended = threading.Event()
+    >>> with reporting(cancel=lambda: True), ended_by_cancel(ended.set):
+    ...     ended.wait()
+    True
+    """
+    cancels, done = _cancels.get(), threading.Event()
+
+    def watch() -> None:
+        while not done.wait(CANCEL_TICK):
+            if any(cancel() for cancel in cancels):
+                end()
+                return
+
+    if cancels:
+        threading.Thread(target=watch, name="blobtree cancel", daemon=True).start()
+    try:
+        yield
+    finally:
+        done.set()
 
 
 @contextmanager
@@ -234,6 +298,7 @@ def _renew() -> None:
     _watcher = _Watcher()
     _displays.clear()
     _outer.set(None)
+    _cancels.set(())
 
 
 if hasattr(os, "register_at_fork"):  # not on Windows, which has no fork

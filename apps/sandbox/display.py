@@ -177,9 +177,12 @@ class Display:
             self.message = str(error)
             return False
         window = self._window
+        options, document = self.options, window.document
+        if self._worker.busy and (options == DisplayOptions() or not document.objects):
+            self._worker.cancel()
+            self.message = ""
         if self._worker.busy or window.tools.dragging or window.background.following:
             return False
-        options, document = self.options, window.document
         if options == DisplayOptions() or not document.objects:
             return self._clear()
         modes = [getattr(document.drawing, name) for name in SAMPLING_MODES]

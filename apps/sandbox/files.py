@@ -54,8 +54,8 @@ class SandboxFiles:
         Files are read and written only inside this folder.
     lessons
         Titles of lessons that the start page lists.
-    opening
-        Called when another scene takes the place of the present one.
+    opened
+        Called once another scene has taken the place of the present one.
 
     Attributes
     ----------
@@ -64,10 +64,10 @@ class SandboxFiles:
     """
 
     def __init__(
-        self, window: EditWindow, folder: Path, lessons: Sequence[str], opening: Callable[[], None]
+        self, window: EditWindow, folder: Path, lessons: Sequence[str], opened: Callable[[], None]
     ) -> None:
         self._window, self._state, self._files = window, window.actions.state, window.actions.files
-        self._folder, self._lessons, self._opening = folder.resolve(), list(lessons), opening
+        self._folder, self._lessons, self._opened = folder.resolve(), list(lessons), opened
         self._files.folder, self._files.closable = self._folder, False
         self._files.screenshot = lambda: window.plotter.screenshot(None, return_img=True)
         self.start_open, self._listed = False, dict[str, Any]()
@@ -239,9 +239,9 @@ class SandboxFiles:
         """Open a scene that belongs to a path, or to a new file of a name."""
         self._files.recovery.keep()  # so that its name is taken
         path = new_file(self._folder, path) if isinstance(path, str) else path
-        self._files.open(load, path, recover=partial(load_scene, samples=sample_mesh))
+        recover = partial(load_scene, samples=sample_mesh)
+        self._files.open(load, path, recover=recover, opened=self._opened)
         self.start_open = False
-        self._opening()
 
 
 def _checked_name(name: object) -> str:

@@ -167,6 +167,7 @@ class Page:
         trigger("pinch")(self.sandbox.pinch)
         trigger("look")(lambda side: self.sandbox.move_camera("look", side))
         trigger("rename")(lambda key, name: change_row(key, "rename", name))
+        trigger("drop_work")(self.sandbox.drop_work)
         trigger("read")(self.sandbox.read_file)
         trigger("place")(self.sandbox.place_image)
         trigger("move")(lambda key, target: change_row(key, "move", target))
@@ -259,6 +260,7 @@ class Page:
                 panels.build_start(self.sandbox)
                 with vuetify3.VFooter(app=True, order="2", height=28, classes="text-caption"):
                     html.Span("{{ status }}", raw_attrs=['role="status" :class="{status: true, refused}"'])
+                    panels.build_queue(self.sandbox)
 
     def _build_left_side(self) -> None:
         """Build what stands left of the view."""

@@ -383,6 +383,21 @@ def build_pick() -> None:
         html.Div("{{ name }}: {{ text }}", v_for="(text, name) in pick", key="name")
 
 
+def build_queue(sandbox: Sandbox) -> None:
+    """Build the list of the work that runs and waits, each with a button that cancels or removes it."""
+    with html.Div(classes="queue", raw_attrs=['role="list" aria-label="work that runs and waits"']):
+        vuetify3.VChip(
+            "{{ w.label }}",
+            v_for="w in queue",
+            key="w.number",
+            size="x-small",
+            variant=("w.running ? 'flat' : 'outlined'",),
+            closable=True,
+            close_label=("`${w.running ? 'cancel' : 'remove'}: ${w.label}`",),
+            raw_attrs=['role="listitem"', '@click:close.prevent="trigger(\'drop_work\', [w.number])"'],
+        )
+
+
 def build_actions(sandbox: Sandbox) -> None:
     """Build the menu of all actions, with their keys, by group."""
     shown = {"model_value": ("help && driving.drives",), "update_modelValue": (sandbox.show_help, "[$event]")}

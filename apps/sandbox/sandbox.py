@@ -114,6 +114,7 @@ class Sandbox:
         self.display.prepare()
         window.redraw(whole=True)
         actions.files.show_view = self.display.show_from
+        actions.deselect_rows = self._deselect_rows
         self._files = files = SandboxFiles(window, folder or Path(), lessons, self._begin_scene)
         self.new_model, self.show_start = self._event(files.new_model), files.show_start
         self.open_sample, self.open_file = self._event(files.open_sample), self._event(files.open_file)
@@ -156,6 +157,7 @@ class Sandbox:
             "refused": bool(state.refusal),
             "help": window.actions.help_visible,
             "busy": window.busy,
+            "queue": [vars(work) for work in state.background.queue],
             "outline": self._outline(),
             "selected": self._selected(),
             "marked": self._marked,
@@ -282,6 +284,12 @@ class Sandbox:
             self._trees.select_node(number, path)
             self._marked = [Part("node", number, path).key]
 
+    def _deselect_rows(self) -> bool:
+        """Deselect the image and all marked rows; return True if there were any."""
+        selected = bool(self._marked) or self._shown_image is not None
+        self._marked, self._image = [], None
+        return selected
+
     @property
     def _shown_image(self) -> int | None:
         """The selected image, unless something else has been selected since, or it was removed."""
@@ -384,13 +392,18 @@ class Sandbox:
         width, height = self._window.plotter.window_size
         self._window.actions.perform(action, lambda: self._window.tools.at(width / 2, height / 2))
 
+    @event
+    def drop_work(self, number: int) -> None:
+        """Cancel the running edit or export of a number in the queue, or leave out what waits there."""
+        self._state.background.drop(number)
+
     # -- files ------------------------------------------------------------------------------------------
 
     @event
     def open_lesson(self, number: int) -> None:
         """Start one of the lessons."""
         number = whole_number("lesson", number, 0, self._lessons - 1, InvalidEdit)
-        self._window.background.require_idle()
+        self._window.background.require_idle("open a lesson")
         if not self.in_lesson and self._window.document.objects:
             self._before_lesson = self._window.session.next_undo, self.display.kept_camera()
             self._window.actions.files.set_aside()
@@ -414,7 +427,7 @@ class Sandbox:
             self._window.actions.files.take_back()
             self._state.show("")
 
-        self.attempt(lambda: self._window.actions.when_idle(step))
+        self.attempt(lambda: self._window.actions.when_idle("close the lesson", step))
 
     def _begin_scene(self) -> None:
         """Leave the lesson, and show another scene as a whole."""

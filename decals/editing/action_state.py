@@ -175,7 +175,7 @@ class ActionState:
             request()
         except Busy as error:
             follows = waits and self.background.wait(
-                lambda: self.attempt(request), lambda: (self.selection, self.primitive)
+                error.label, lambda: self.attempt(request), lambda: (self.selection, self.primitive)
             )
             if not follows:
                 self.refuse(error)
@@ -318,7 +318,7 @@ class ActionState:
         The last one raises `Busy` if it has to wait, so `attempt` lets it follow the running edit.
         """
         if last and long and not self.background.following:
-            self.background.require_idle()  # before a stroke begins, which the running edit would notice
+            self.background.require_idle(label)  # before a stroke begins, which the running edit would notice
         self.begin_series(series, label)
         try:
             self.run_latest_step(label, step, long=long, waits=last)

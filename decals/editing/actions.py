@@ -10,6 +10,7 @@ from os import PathLike
 from decals.editing.action_state import ActionState, Cursor
 from decals.editing.background import are_many
 from decals.editing.brush_actions import BrushActions
+from decals.editing.brushes import Brush
 from decals.editing.commands import DeleteDecals, DuplicateDecals
 from decals.editing.decal_actions import DecalActions
 from decals.editing.file_actions import FileActions
@@ -62,6 +63,10 @@ class Actions:
         Page of the help that the window shows, from 1; 0 for none.
     help_pages
         Number of pages, which depends on the window's size.
+    forget_press
+        Forgets what a press of the pointer has begun; returns True if that was a drag.
+    deselect_rows
+        Deselects the rows of an outline; returns True if some were selected.
 
     Examples
     --------
@@ -91,6 +96,8 @@ class Actions:
         self.outline = OutlineActions(self.state, self.trees, self.visibility)
         self.view, self.brush = ViewActions(self.state), BrushActions(self.state)
         self.help_page, self.help_pages = 0, 1
+        self.forget_press: Callable[[], bool] = lambda: False
+        self.deselect_rows: Callable[[], bool] = lambda: False
         self._actions = {
             name: (binding, method.__get__(owner))
             for owner in (self, self.files, self.decals, self.brush, self.trees, self.visibility, self.view)
@@ -147,14 +154,37 @@ class Actions:
         self.state.message = f"{len(self.state.selection)} decals"
 
     @Group.SELECTION.action(
-        "deselect", "Escape", summary="deselect all; revert a drag; cancel an edit or an export"
+        "deselect", "Escape", summary="end the first of: help, brush, drag, selection, edit, export"
     )
     def deselect(self, _cursor: Cursor) -> None:
-        """Deselect all decals, revert the drag, and cancel the edit; without either, cancel exports."""
-        selected = bool(self.state.selection)
-        self.state.selection, self.state.message = (), ""
-        self.state.background.cancel(exports=not selected)
-        self.state.session.cancel_stroke()
+        """End the help, else the brush, else the drag, else the selection, else the edit, else all exports.
+
+        A brush ends with its stroke, which is reverted.
+        """
+        state = self.state
+        state.message = ""
+        if self.help_visible:
+            self.help_page = 0
+        elif state.brush.brush is not Brush.SELECT:
+            state.brush.brush = Brush.SELECT
+            self._revert_drag()
+        elif not self._revert_drag() and not self._deselect_all():
+            state.background.cancel(exports=True)
+
+    def _revert_drag(self) -> bool:
+        """Revert the drag; return False if there is none."""
+        background = self.state.background
+        dragged = self.forget_press() or self.state.session.stroke_open or background.following
+        if dragged:
+            background.revert_drag()
+        return dragged
+
+    def _deselect_all(self) -> bool:
+        """Deselect decals, primitive and rows; return False if nothing was selected."""
+        state = self.state
+        selected = self.deselect_rows() or bool(state.selection) or state.primitive is not None
+        state.selection, state.primitive = (), None
+        return selected
 
     @Group.SELECTION.action(
         "duplicate", "d", summary="duplicate the selected decals, else the selected primitive"
@@ -206,6 +236,8 @@ class Actions:
 
         def step_once() -> None:
             entry = next_entry()
+            if entry is not None and entry.edit.parts_after.objects is not None:
+                state.background.require_idle(name)  # the running edit is computed for the present objects
             if entry is None:
                 state.message = f"nothing to {name}"
             elif are_many(entry.edit.after.numbers):
@@ -213,14 +245,14 @@ class Actions:
             else:
                 state.message = step(state.session, entry)
 
-        self.when_idle(step_once)
+        self.when_idle(name, step_once)
 
-    def when_idle(self, step: Callable[[], None]) -> None:
+    def when_idle(self, label: str, step: Callable[[], None]) -> None:
         """End a drag, and take a step once its edits are adopted; `Busy` while another edit runs."""
         background = self.state.background
 
         def followed() -> None:
-            background.require_idle(computing=False)
+            background.require_idle(label, computing=False)
             step()
 
         if self.state.session.stroke_open:
@@ -246,7 +278,7 @@ class Actions:
                 pass
             self.state.show(f"history: after {session.labels[-1]}" if number else "history: at the start")
 
-        self.when_idle(step)
+        self.when_idle("go through the history", step)
 
     @Group.SCENE.action("next_contact", "p", summary="contact mode: product, min, radial, elastic")
     def next_contact(self, _cursor: Cursor) -> None:

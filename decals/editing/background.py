@@ -7,9 +7,11 @@ the session was edited meanwhile, the long edit is repeated on a new fork, so no
 
 import sys
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import partial
+from itertools import count
 from os import PathLike
 from pathlib import Path
 
@@ -24,9 +26,13 @@ from decals.editing.session import Command, EditSession, SaveJob
 from decals.editing.tree_commands import PrimitiveCommand
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.camera import Camera
+from decals.validation import describe
 
 Completion = Callable[[], "Job | None"]
 """Applies the result of a job, in the thread of the window. It may return a job to run next."""
+
+_next_number = count(1).__next__
+"""Returns the next number of work."""
 
 Work = Callable[[Progress, Cancel], Completion]
 """A long computation, ``work(progress, cancel) -> completion``, in the background thread."""
@@ -42,14 +48,78 @@ class Job:
         What the job does, in a few words.
     work
         The computation.
+    number
+        Tells it from other jobs.
     """
 
     label: str
     work: Work
+    number: int = field(default_factory=_next_number)
+
+
+MAX_ENDING = 2
+"""Threads of cancelled jobs beside which the next job begins; it waits for the others."""
+
+
+class _Run:
+    """One job in a thread of its own.
+
+    Parameters
+    ----------
+    job
+        The job.
+    after
+        The thread begins once all but `MAX_ENDING` of these have ended.
+    daemon
+        If False, Python waits for the thread before it exits.
+
+    Attributes
+    ----------
+    cancelled
+        Set once the job is to stop.
+    progress
+        Stage and finished fraction.
+    """
+
+    def __init__(self, job: Job, after: "Sequence[_Run]", *, daemon: bool) -> None:
+        self.label, self.number, self.progress = job.label, job.number, (job.label, 0.0)
+        self.cancelled = threading.Event()
+        self._completion: Completion | None = None
+        self._error: Exception | None = None
+        self._thread = threading.Thread(
+            target=self._work, args=(job.work, tuple(after)), name=job.label, daemon=daemon
+        )
+        self._thread.start()
+
+    def _work(self, work: Work, after: "Sequence[_Run]") -> None:
+        for one in after[: max(len(after) - MAX_ENDING, 0)]:
+            one.ended(None)
+        try:
+            with core_left_free(), SHORT_SWITCH_INTERVAL, reporting(self._report, self.cancelled.is_set):
+                self._completion = work(self._report, self.cancelled.is_set)
+        except Exception as error:  # `result` raises it
+            self._error = error
+
+    def _report(self, stage: str, fraction: float) -> None:
+        self.progress = stage or self.label, fraction
+
+    def ended(self, timeout: float | None = 0.0) -> bool:
+        """Return True if the thread has ended, or ends within so many seconds; None is no limit."""
+        self._thread.join(timeout)
+        return not self._thread.is_alive()
+
+    def result(self) -> Completion | None:
+        """Return the completion of the ended job, or raise its error."""
+        if self._error is not None:
+            raise self._error
+        return self._completion
 
 
 class Worker:
     """Runs one job at a time in a thread of its own; the owner calls `poll` for the completion.
+
+    A cancelled job is dropped at once, and the next one can start. Its thread ends at the next report of
+    progress, or the next launch of a kernel.
 
     Parameters
     ----------
@@ -59,21 +129,25 @@ class Worker:
 
     def __init__(self, *, finish_at_exit: bool = False) -> None:
         self._finish_at_exit = finish_at_exit
-        self._thread: threading.Thread | None = None
-        self._cancelled = threading.Event()
-        self._label, self._stage, self._fraction = "", "", 0.0
-        self._completion: Completion | None = None
-        self._error: Exception | None = None
+        self._run: _Run | None = None
+        self._ending: list[_Run] = []
+        self._label = ""
+
+    @property
+    def number(self) -> int | None:
+        """Number of the job that runs; None without one."""
+        return None if self._run is None else self._run.number
 
     @property
     def busy(self) -> bool:
-        """True from `start` until `poll` has returned the completion."""
-        return self._thread is not None
+        """True from `start` until `poll` has returned the completion, or until `cancel`."""
+        return self._run is not None
 
     @property
-    def cancelling(self) -> bool:
-        """True from `cancel` until `poll` has noticed the end of the job."""
-        return self.busy and self._cancelled.is_set()
+    def stopping(self) -> bool:
+        """True while the thread of a cancelled job has not ended."""
+        self._ending = [run for run in self._ending if not run.ended()]
+        return bool(self._ending)
 
     @property
     def label(self) -> str:
@@ -83,34 +157,23 @@ class Worker:
     @property
     def progress(self) -> tuple[str, float]:
         """Present stage, in plain words, and its finished fraction from 0 to 1."""
-        return self._stage or self._label, self._fraction
+        return (self._label, 0.0) if self._run is None else self._run.progress
 
     def start(self, job: Job) -> bool:
         """Start a job and return True, or return False while another one runs."""
         if self.busy:
             return False
-        self._cancelled.clear()
-        self._label, self._stage, self._fraction = job.label, "", 0.0
-        self._completion = self._error = None
-        self._thread = threading.Thread(
-            target=self._run, args=(job,), name=job.label, daemon=not self._finish_at_exit
-        )
-        self._thread.start()
+        self._label = job.label
+        after = self._ending if self.stopping else ()
+        self._run = _Run(job, after, daemon=not self._finish_at_exit)
         return True
 
-    def _run(self, job: Job) -> None:
-        try:
-            with core_left_free(), SHORT_SWITCH_INTERVAL:
-                self._completion = job.work(self._report, self._cancelled.is_set)
-        except Exception as error:  # `poll` raises it
-            self._error = error
-
-    def _report(self, stage: str, fraction: float) -> None:
-        self._stage, self._fraction = stage, fraction
-
     def cancel(self) -> None:
-        """Ask the job to stop, and drop its completion."""
-        self._cancelled.set()
+        """Drop the job, and let its thread end."""
+        if self._run is not None:
+            self._run.cancelled.set()
+            self._ending.append(self._run)
+            self._run = None
 
     def poll(self, timeout: float | None = 0.0) -> Completion | None:
         """Return the completion of a finished job, else None; raise an error of the job.
@@ -120,19 +183,17 @@ class Worker:
         timeout
             Longest time to wait for the job, in seconds; None for no limit.
         """
-        if self._thread is None:
+        run = self._run
+        if run is None or not run.ended(timeout):
             return None
-        self._thread.join(timeout)
-        if self._thread.is_alive():
-            return None
-        self._thread = None
-        completion, error = self._completion, self._error
-        self._completion = self._error = None
-        if self._cancelled.is_set():
-            return None
-        if error is not None:
-            raise error
-        return completion
+        self._run = None
+        return run.result()
+
+    def stop(self, timeout: float) -> bool:
+        """Cancel the job, and return True if all threads end within so many seconds."""
+        self.cancel()
+        last = time.monotonic() + timeout
+        return all(run.ended(max(last - time.monotonic(), 0.0)) for run in self._ending)
 
 
 SWITCH_INTERVAL = 0.0005
@@ -176,7 +237,7 @@ LONG_COMMANDS = (AddObject, PrimitiveCommand, RelaxDecals, RemoveObject, Replace
 """Commands that query surfaces at many points, or build surfaces."""
 
 CLOSE_TIMEOUT = 5.0
-"""Seconds for which `BackgroundJobs.close` waits for a cancelled edit."""
+"""Seconds for which `BackgroundJobs.close` waits for cancelled edits."""
 
 SAVE = "save"
 """Label of a save."""
@@ -188,7 +249,17 @@ MAX_WAITING = 8
 
 
 class Busy(InvalidEdit):
-    """The request has to wait for another edit."""
+    """The request has to wait for another edit.
+
+    Attributes
+    ----------
+    label
+        What the request does, in a few words.
+    """
+
+    def __init__(self, label: str) -> None:
+        super().__init__(BUSY)
+        self.label = label
 
 
 Step = Callable[[EditSession], str]
@@ -226,14 +297,35 @@ class _Request:
     done: Callable[[], None] | None = None
 
 
+@dataclass(frozen=True)
+class QueuedWork:
+    """Work that runs or waits.
+
+    Attributes
+    ----------
+    number
+        Tells it from other work, for `BackgroundJobs.drop`.
+    label
+        What it does, in a few words.
+    running
+        True if it runs, False if it waits.
+    """
+
+    number: int
+    label: str
+    running: bool
+
+
 @dataclass(eq=False)
 class _Waiting:
     """A request of the user that waits for the running edit, and what it depends on, then and now."""
 
+    label: str
     repeat: Callable[[], None]
     context: Callable[[], object]
     seen: object
     outdated: bool = False
+    number: int = field(default_factory=_next_number)
 
 
 class BackgroundJobs:
@@ -294,7 +386,7 @@ class BackgroundJobs:
         if not self.threaded:
             self._adopted(step(self._session), done)
             return
-        self.require_idle()
+        self.require_idle(label)
         self._edits.start(self._fork_job(_Request(label, step, done)))
 
     def _adopted(self, message: str, done: Callable[[], None] | None) -> None:
@@ -331,7 +423,7 @@ class BackgroundJobs:
 
             return complete
 
-        self.require_idle()
+        self.require_idle(label)
         self._computing = self._edits.start(Job(label, run))
 
     def edit_latest(self, label: str, step: Step) -> None:
@@ -344,10 +436,10 @@ class BackgroundJobs:
         """
         if not self.threaded:
             self.edit(label, step)
-        elif self._following and self._edits.busy and not self._edits.cancelling:
+        elif self._following and self._edits.busy:
             self._latest = _Request(label, step)
         else:
-            self.require_idle()
+            self.require_idle(label)
             self._following = True
             self.edit(label, step)
 
@@ -380,11 +472,13 @@ class BackgroundJobs:
             except ImplicitDecalsError as error:
                 self._refuse(error)
 
-    def require_idle(self, *, computing: bool = True) -> None:
+    def require_idle(self, label: str, *, computing: bool = True) -> None:
         """Refuse a new edit while another one runs.
 
         Parameters
         ----------
+        label
+            What the new edit does, in a few words.
         computing
             If False, an edit that is still being computed without the session does not count.
 
@@ -394,16 +488,16 @@ class BackgroundJobs:
             Another edit is running.
         """
         if self._edits.busy and (computing or not self._computing):
-            raise Busy(BUSY)
+            raise Busy(label)
 
-    def wait(self, repeat: Callable[[], None], context: Callable[[], object]) -> bool:
+    def wait(self, label: str, repeat: Callable[[], None], context: Callable[[], object]) -> bool:
         """Call a function once no edit runs, unless ``context`` then returns something else than now.
 
         What the running edit itself changes does not count. Return False if too many wait already.
         """
         if len(self._waiting) == MAX_WAITING:
             return False
-        self._waiting.append(_Waiting(repeat, context, context()))
+        self._waiting.append(_Waiting(label, repeat, context, context()))
         return True
 
     def _fork_job(self, request: _Request) -> Job:
@@ -521,6 +615,11 @@ class BackgroundJobs:
         return self.busy_editing or any(worker.busy for worker in self._next_files)
 
     @property
+    def stopping(self) -> bool:
+        """True while the thread of a cancelled edit or export has not ended."""
+        return self._edits.stopping or self._exports.stopping
+
+    @property
     def busy_editing(self) -> bool:
         """True while an edit runs, or waits for `poll`."""
         return self._edits.busy
@@ -601,16 +700,62 @@ class BackgroundJobs:
             else:
                 one.repeat()
 
+    @property
+    def queue(self) -> list[QueuedWork]:
+        """The running edit and what follows it, then the running export and those that follow."""
+        waiting = {self._edits: self._waiting, self._exports: self._next_files[self._exports]}
+        work: list[QueuedWork] = []
+        for worker, others in waiting.items():
+            if worker.number is not None:
+                work.append(QueuedWork(worker.number, worker.label, running=True))
+            work += [QueuedWork(one.number, one.label, running=False) for one in others]
+        return work
+
+    def drop(self, number: int) -> None:
+        """Cancel the running edit or export of a number, or leave out what waits; the others follow.
+
+        Raises
+        ------
+        InvalidEdit
+            No work has this number any more.
+        """
+        label = next((work.label for work in self.queue if work.number == number), None)
+        if label is None:
+            raise InvalidEdit(f"expected work of the queue, got number {describe(number)}; it has ended")
+        exports = self._next_files[self._exports]
+        self._waiting = [one for one in self._waiting if one.number != number]
+        exports[:] = [job for job in exports if job.number != number]
+        if self._edits.number == number:
+            self._cancel_edit()
+        elif self._exports.number == number:
+            self._exports.cancel()
+            self._start_next_file(self._exports)
+        self._show(f"cancelled: {label}")
+
     def cancel(self, *, exports: bool = False) -> None:
-        """Cancel the running edit, else all exports if these are meant, too; saves go on."""
+        """Cancel the edit and what follows it, else all exports if these are meant, too; saves go on."""
         if self._edits.busy:
-            self._edits.cancel()
-            self._latest, self._waiting = None, []
+            self._waiting = []
+            self._cancel_edit()
             self._show("cancelled")
         elif exports and self._exports.busy:
-            self._exports.cancel()
             self._next_files[self._exports].clear()
+            self._exports.cancel()
             self._show("cancelled")
+
+    def _cancel_edit(self) -> None:
+        self._latest = None
+        self._edits.cancel()
+        self._start_next_edit()
+
+    def revert_drag(self) -> None:
+        """Drop the steps of `edit_latest` that are not adopted, and revert the open stroke."""
+        self._latest = None
+        if self._following:
+            self._edits.cancel()
+        self._session.cancel_stroke()
+        if self._following:
+            self._start_next_edit()
 
     def close(self) -> None:
         """Cancel the running edit, and finish all files.
@@ -621,7 +766,7 @@ class BackgroundJobs:
             The file could not be written.
         """
         self.cancel()
-        self._edits.poll(CLOSE_TIMEOUT)
+        self._edits.stop(CLOSE_TIMEOUT)
         failures = [self._finish(worker) for worker in self._next_files]
         for failure in filter(None, failures):
             raise failure

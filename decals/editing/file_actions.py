@@ -237,6 +237,7 @@ class FileActions(WindowActions):
         load: Callable[[Progress, Cancel], Scene],
         path: str | PathLike[str],
         recover: Callable[[Path], Scene] = load_scene,
+        opened: Callable[[], None] = lambda: None,
     ) -> None:
         """Open another scene in the place of the present one, whose unsaved changes are kept for recovery.
 
@@ -250,10 +251,12 @@ class FileActions(WindowActions):
             File to save to, which has to be inside `folder`.
         recover
             Reads the unsaved changes that an earlier window of this file left, which are taken over.
+        opened
+            Called once the scene is there; never if the work is cancelled or fails.
         """
         path = self.inside(path)
         state, session = self._state, self._state.session
-        state.background.require_idle()
+        state.background.require_idle(f"open {path.name}")
         state.end_stroke()
         entries = len(session.labels)
 
@@ -263,15 +266,16 @@ class FileActions(WindowActions):
         def done() -> None:
             if len(session.labels) == entries + 1:
                 session.forget_history()
+            self.recovery.release()
+            self._leave_aside()
             self.path, self._exists = path, path.exists()
             self.recovery = self._recovery_beside(path)
             self.recover(recover)
             self.show_view(session.document.camera)
+            opened()
 
         if session.modified:
             self.recovery.keep()
-        self.recovery.release()
-        self._leave_aside()
         state.background.compute(f"open {path.name}", compute, done)
 
     def set_aside(self) -> None:

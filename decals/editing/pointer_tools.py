@@ -89,6 +89,7 @@ class PointerTools:
         self._drag: DecalDrag | SurfaceDrag | None = None
         self._brush: BrushStroke | None = None
         self._brush_start: object = None
+        self.actions.forget_press = self.forget_press
 
     @property
     def dragging(self) -> bool:
@@ -229,9 +230,15 @@ class PointerTools:
 
     def cancel(self) -> None:
         """Forget the press of the button, and revert what its drag has changed."""
-        self._press, self.selection_line, self._drag, self._brush = Press.UP, [], None, None
-        self.actions.state.background.cancel()
-        self.actions.state.session.cancel_stroke()
+        self.forget_press()
+        self._press = Press.UP
+        self.actions.state.background.revert_drag()
+
+    def forget_press(self) -> bool:
+        """Forget what the press of the button has begun; return True if that was a drag, a box or a lasso."""
+        dragged = self.dragging or bool(self.selection_line)
+        self.selection_line, self._drag, self._brush = [], None, None
+        return dragged
 
     def _also_select(self, numbers: Int64Array) -> None:
         """Add decals to the selection."""
@@ -261,13 +268,12 @@ class PointerTools:
         action = KEYS.action_of(name, ctrl=ctrl, shift=shift)
         if action is None:
             return False
-        if action == "deselect":
-            self.selection_line = []
-            self._drag = self._brush = None
-        if self.dragging:
+        reverts = action == "deselect"
+        if self.dragging and not reverts:
             self.actions.state.end_stroke()
         self.actions.perform(action, lambda: self.at(x, y))
-        self._continue_drag()
+        if not reverts:
+            self._continue_drag()
         return True
 
     def _continue_drag(self) -> None:

@@ -17,7 +17,14 @@ from decals.model import MAX_COORDINATE, Decals
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.polish import PUSHING_RADIUS, relax_near
 from decals.scattering.scatter import scatter
-from decals.scenes.objects import MeshObject, SceneObject, TreeObject, check_names, relative_to
+from decals.scenes.objects import (
+    MeshObject,
+    SceneObject,
+    TreeObject,
+    check_names,
+    relative_to,
+    same_shape,
+)
 from decals.scenes.recipe import Recipe
 from decals.validation import describe, finite_number, finite_vector, instance, one_of, whole_number
 
@@ -57,7 +64,7 @@ class ReplaceDecals:
     decals
         The new decals.
     expected_objects
-        The objects for which the decals were made. The command is refused if they changed meanwhile.
+        The objects for which the decals were made. The command is refused if their shapes changed meanwhile.
     recipe
         How they were made. Default: the scene keeps its recipe.
 
@@ -82,7 +89,7 @@ class ReplaceDecals:
         """Return the edit."""
         objects = [document.object(number) for number in object_indices(self.objects)]
         pairs = zip(objects, self.expected_objects, strict=False)
-        if any(item is not expected for item, expected in pairs):
+        if not all(same_shape(item, expected) for item, expected in pairs):
             raise InvalidEdit("an object changed while its new decals were computed; scatter again")
         deletion = document.compute_deletion(decals_on(document, self.objects))
         edit = deletion.then(document.compute_addition(self.decals))

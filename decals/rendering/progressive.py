@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from blobtree.progress import check_cancelled
 from decals.rendering.dirty_regions import TargetState
 from decals.rendering.frame_plan import FramePlan
 from decals.rendering.targets import Targets
@@ -121,6 +122,7 @@ class ProgressiveFrame:
         for step in plan.steps[self._step :]:
             ends = np.linspace(self._unit / UNITS, 1.0, parts + 1)
             for begin, end in pairwise(ends.tolist()):
+                check_cancelled("drawing")
                 step(Part(begin, end))
                 if parts > 1:
                     self._finish()

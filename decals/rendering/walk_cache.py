@@ -4,7 +4,6 @@ import threading
 
 from blobtree._typing import Float32Array
 from blobtree.device import core_left_free
-from blobtree.errors import Cancelled
 from blobtree.progress import reporting
 from decals.field.walks import Walks, walk_rows, with_surface
 from decals.index.editor import DecalEditor
@@ -48,14 +47,10 @@ class _Job:
 
     def _run(self, rows: Float32Array, previous: Walks | None) -> None:
         try:
-            with core_left_free(), reporting(self._report):
+            with core_left_free(), reporting(lambda *_: None, self.cancelled.is_set):
                 self.walks = _walks_of(self.key, rows, previous)
         except Exception as error:  # raised by `WalkCache.get`
             self.error = error.with_traceback(None)  # its frames would keep meshes and relays
-
-    def _report(self, stage: str, _fraction: float) -> None:
-        if self.cancelled.is_set():
-            raise Cancelled(f"cancelled while {stage}")
 
 
 class WalkCache:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.device import launch
+from blobtree.progress import check_cancelled
 from decals.model import FACING_LIMIT
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.repulsion import make_grid, neighbor_search, particle_struct
@@ -181,6 +182,7 @@ class FacingTree:
                 break
             columns = slice(0, min(count, width))
             for first in range(0, len(open_rows), ROWS_AT_ONCE):
+                check_cancelled("searching for neighbours")
                 rows = open_rows[first : first + ROWS_AT_ONCE]
                 own = rows if skip_self else None
                 found = self._nearest_among(points[rows], normals[rows], width, own)

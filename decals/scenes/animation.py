@@ -123,8 +123,8 @@ def animate(
     progress : callable, optional
         Called with a stage and the fraction done.
     cancel : callable, optional
-        Called before each frame; once it returns True, `blobtree.errors.Cancelled` is raised. Pictures that
-        are drawn stay, a video is not written.
+        Called often; once it returns True, `blobtree.errors.Cancelled` is raised. Pictures that are drawn
+        stay, a video is not written.
 
     Returns
     -------

@@ -264,6 +264,21 @@ class TreeObject(Immutable):
 SceneObject = MeshObject | TreeObject
 
 
+def same_shape(item: SceneObject, other: SceneObject) -> bool:
+    """Return True if two objects have the same surface in the same place, whatever their names and flags."""
+    if item is other:
+        return True
+    if item.origin != other.origin:
+        return False
+    if isinstance(item, TreeObject):
+        return isinstance(other, TreeObject) and item.tree == other.tree
+    return (
+        isinstance(other, MeshObject)
+        and np.array_equal(item.vertices, other.vertices)
+        and np.array_equal(item.faces, other.faces)
+    )
+
+
 def forget_surface(item: SceneObject) -> None:
     """Drop what was computed for a tree's surface, some megabytes; it is computed again when needed."""
     if isinstance(item, TreeObject):

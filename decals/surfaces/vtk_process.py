@@ -13,12 +13,14 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from blobtree.progress import check_cancelled, ended_by_cancel
 from decals.errors import InvalidMesh
 from decals.surfaces.base_color import BaseColor
 from decals.surfaces.mesh_data import MeshData
@@ -53,6 +55,8 @@ def read_isolated(path: Path) -> MeshData:
     ------
     InvalidMesh
         The file is no surface mesh, or the reader crashed, took too long or took too much memory.
+    Cancelled
+        The work that reads the file is to stop; the process has ended.
     """
     return _process.read(path)
 
@@ -73,6 +77,7 @@ class _ReaderProcess:
         with self._lock:
             try:
                 answer = self._answer(request, PATIENCE * seconds)
+                check_cancelled("reading the file")
                 if answer is None and self._has_left():
                     answer = self._answer(request, PATIENCE * seconds)
             except BaseException:
@@ -101,7 +106,7 @@ class _ReaderProcess:
         child = self._started()
         assert child.stdin is not None
         assert child.stdout is not None
-        with _time_limit(child, seconds):
+        with _time_limit(child, seconds), ended_by_cancel(partial(_kill, child)):
             try:
                 child.stdin.write(json.dumps(request).encode() + b"\n")
                 child.stdin.flush()
@@ -128,8 +133,9 @@ class _ReaderProcess:
             start_new_session=True,  # Control-C is for the parent, and `_kill` reaches the forks of the child
         )
         assert child.stdout is not None
-        with _time_limit(child, START_SECONDS):
+        with _time_limit(child, START_SECONDS), ended_by_cancel(partial(_kill, child)):
             ready = child.stdout.readline()
+        check_cancelled("starting the process that reads meshes")
         if not ready:
             raise InvalidMesh(
                 "could not start the process that reads meshes by VTK; run `implicit-decals doctor`"

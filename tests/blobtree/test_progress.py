@@ -5,15 +5,16 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 import blobtree.progress as progress
+from blobtree.cells.scan import arange
 from blobtree.errors import Cancelled, ImplicitDecalsError
-from blobtree.progress import displayed, reporting
+from blobtree.progress import check_cancelled, displayed, ended_by_cancel, reporting
 
 Reports = list[tuple[str, float]]
 
@@ -121,6 +122,41 @@ def test_a_display_that_is_not_alone_leaves_the_line(alone: bool, capsys: pytest
         time.sleep(0.05)
         assert bool(until_shown(capsys, "Finding") if not alone else capsys.readouterr().err) is not alone
     assert seen[0] == ("finding", 0.0)
+
+
+def test_the_cancel_of_outer_work_ends_inner_work_and_launches_too() -> None:
+    calls = 0
+
+    def cancel() -> bool:
+        nonlocal calls
+        calls += 1
+        return calls > 2
+
+    with reporting(cancel=cancel), reporting(lambda *_: None) as inner:
+        inner("placing", 0.5)
+        check_cancelled()
+        ends: list[Callable[[], None]] = [lambda: inner("placing", 0.5), check_cancelled, launch_once]
+        for end in ends:
+            with pytest.raises(Cancelled):
+                end()
+    launch_once()
+    check_cancelled()
+
+
+def launch_once() -> None:
+    arange(8, "cpu")
+
+
+def test_what_work_waits_for_ends_with_a_cancel() -> None:
+    cancelled, ended = threading.Event(), threading.Event()
+    with reporting(cancel=cancelled.is_set), ended_by_cancel(ended.set):
+        assert not ended.wait(0.1)
+        cancelled.set()
+        assert ended.wait(10.0)
+    ended.clear()
+    with reporting(cancel=cancelled.is_set), ended_by_cancel(ended.set):
+        pass
+    assert not ended.wait(0.1)
 
 
 def test_cancelled_work_ends_at_its_next_report() -> None:

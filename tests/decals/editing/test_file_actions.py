@@ -297,8 +297,8 @@ def test_a_second_save_writes_the_file_of_the_first(tmp_path: Path) -> None:
     actions = threaded(path=tmp_path / "scene.json")
     actions.files.save(lambda: None)
     worker = actions.state.background._saves
-    assert worker._thread is not None
-    worker._thread.join(LONG)
+    assert worker._run is not None
+    assert worker._run.ended(LONG)
     assert (tmp_path / "scene.json").exists()
     actions.state.session.do(ScaleDecals([1], 2.0))
     actions.files.save(lambda: None)

@@ -171,7 +171,7 @@ def test_a_step_ends_a_drag() -> None:
     before, steps = tree_of(actions.state.session.document), list[bool]()
     actions.trees.begin_drag()
     actions.trees.drag((0.1, 0, 0))
-    actions.when_idle(lambda: steps.append(True))
+    actions.when_idle("step", lambda: steps.append(True))
     assert (steps, actions.state.session.stroke_open) == ([True], False)
     actions.go_to(0)
     assert tree_of(actions.state.session.document) == before

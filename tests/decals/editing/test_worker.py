@@ -6,7 +6,9 @@ from typing import Any, NoReturn
 import pytest
 
 from blobtree import device as launch
-from decals.editing.background import Job, Worker
+from blobtree.errors import Cancelled
+from blobtree.progress import check_cancelled, reporting
+from decals.editing.background import MAX_ENDING, Job, Worker
 from tests.decals.editing.background import LONG
 
 
@@ -35,23 +37,72 @@ def test_a_job_gives_its_outcome_and_tells_how_far_it_is() -> None:
     assert not worker.busy
 
 
-def test_a_cancelled_job_comes_to_nothing() -> None:
-    worker, begun = Worker(), threading.Event()
+def test_a_cancelled_job_comes_to_nothing_and_the_next_one_does_not_wait() -> None:
+    worker, begun, go = Worker(), threading.Event(), threading.Event()
 
     def work(tell: Any, stop: Any) -> Any:
         begun.set()
-        while not stop():
-            pass
+        assert go.wait(LONG)  # as a compilation, it looks at nothing
+        assert stop()
         return nothing
 
     worker.start(Job("endless", work))
     assert begun.wait(LONG)
-    assert not worker.cancelling
+    assert not worker.stopping
     worker.cancel()
-    assert worker.cancelling
-    assert worker.poll(timeout=LONG) is None
-    assert not worker.busy
-    assert not worker.cancelling
+    assert (worker.busy, worker.stopping, worker.poll(timeout=LONG)) == (False, True, None)
+    assert worker.start(Job("next", lambda tell, stop: nothing))
+    assert worker.poll(timeout=LONG) is nothing
+    assert worker.stopping
+    go.set()
+    assert worker.stop(LONG)
+    assert not worker.stopping
+
+
+def test_no_more_than_a_few_cancelled_jobs_go_on_beside_the_next_one() -> None:
+    worker, go, running = Worker(), threading.Event(), threading.Semaphore(0)
+
+    def work(tell: Any, stop: Any) -> Any:
+        running.release()
+        assert go.wait(LONG)
+        return nothing
+
+    for number in range(MAX_ENDING + 3):
+        assert worker.start(Job(f"stubborn {number}", work))
+        if number <= MAX_ENDING:
+            assert running.acquire(timeout=LONG)
+        worker.cancel()
+    assert not running.acquire(timeout=0.05)  # the others have not begun
+    assert worker.start(Job("last", work))
+    assert not worker.stop(0.0)
+    go.set()
+    assert worker.stop(LONG)
+
+
+def test_a_cancelled_job_ends_at_its_next_launch_or_report() -> None:
+    worker = Worker()
+    for check in (lambda tell: check_cancelled(), lambda tell: loops()):
+        begun, ended = threading.Event(), threading.Event()
+
+        def work(tell: Any, stop: Any, check: Any = check, begun: Any = begun, ended: Any = ended) -> Any:
+            begun.set()
+            try:
+                while True:
+                    check(tell)
+            except Cancelled:
+                ended.set()
+                raise
+
+        worker.start(Job("endless", work))
+        assert begun.wait(LONG)
+        worker.cancel()
+        assert ended.wait(LONG)
+
+
+def loops() -> None:
+    """Report as a library function does whose caller passed no callback."""
+    with reporting() as report:
+        report("looping", 0.5)
 
 
 def test_what_a_job_raises_is_raised_where_it_is_asked_for() -> None:

@@ -3,6 +3,7 @@
 import json
 import multiprocessing
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -13,6 +14,8 @@ import numpy as np
 import pytest
 import pyvista as pv
 
+from blobtree.errors import Cancelled
+from blobtree.progress import reporting
 from decals.errors import InvalidMesh
 from decals.surfaces import read_mesh, vtk_process
 from decals.surfaces.vtk_process import _process
@@ -78,6 +81,21 @@ def test_the_process_is_kept_and_started_again(sphere: Path) -> None:
     child.wait()
     check_sphere(sphere)
     assert _process._child is not child
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows cannot stop a process for a while")
+def test_a_cancelled_reader_ends_and_the_next_file_is_read(sphere: Path) -> None:
+    check_sphere(sphere)
+    child = _process._child
+    assert child is not None
+    os.kill(child.pid, signal.SIGSTOP)  # as a reader that takes long
+    cancelled = threading.Event()
+    timer = threading.Timer(0.1, cancelled.set)
+    timer.start()
+    with reporting(cancel=cancelled.is_set), pytest.raises(Cancelled):
+        read_mesh(sphere)
+    assert child.poll() is not None
+    check_sphere(sphere)
 
 
 def test_threads_read_in_turn(sphere: Path) -> None:

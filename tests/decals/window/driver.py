@@ -77,8 +77,8 @@ class Driver:
         """Let the window see what goes on in the background come to its end."""
         while self.window.background.busy:
             for worker in (self.window.background._edits, *self.window.background._next_files):
-                if worker._thread is not None:
-                    worker._thread.join(30)
+                if worker._run is not None:
+                    worker._run.ended(30)
             self.window.tick()
 
     def shot(self) -> Any:
