@@ -394,7 +394,7 @@ def build_queue(sandbox: Sandbox) -> None:
             variant=("w.running ? 'flat' : 'outlined'",),
             closable=True,
             close_label=("`${w.running ? 'cancel' : 'remove'}: ${w.label}`",),
-            raw_attrs=['role="listitem"', '@click:close.prevent="trigger(\'drop_work\', [w.number])"'],
+            raw_attrs=['role="listitem"', "@click:close.prevent=\"trigger('drop_work', [w.number])\""],
         )
 
 

@@ -703,9 +703,12 @@ class BackgroundJobs:
     @property
     def queue(self) -> list[QueuedWork]:
         """The running edit and what follows it, then the running export and those that follow."""
-        waiting = {self._edits: self._waiting, self._exports: self._next_files[self._exports]}
+        waiting: list[tuple[Worker, Sequence[_Waiting | Job]]] = [
+            (self._edits, self._waiting),
+            (self._exports, self._next_files[self._exports]),
+        ]
         work: list[QueuedWork] = []
-        for worker, others in waiting.items():
+        for worker, others in waiting:
             if worker.number is not None:
                 work.append(QueuedWork(worker.number, worker.label, running=True))
             work += [QueuedWork(one.number, one.label, running=False) for one in others]

@@ -108,6 +108,7 @@ def test_lessons_are_started_and_left(window: EditWindow) -> None:
     assert len(sandbox.values()["undone"]) == 2
     sandbox.open_lesson(0)
     sandbox.new_model()
+    finish(window)
     assert not sandbox.in_lesson
 
 
@@ -538,3 +539,40 @@ def test_primitives_that_are_added_one_after_another_grow_by_less_and_less(vtk_d
             low, high = (node.children[-1] if node.children else node).bounds
             extents.append((high - low).max())
     np.testing.assert_allclose(np.divide(extents[1:], extents[:-1]), 0.6, rtol=0.02)
+
+
+def test_the_queue_lists_work_and_each_entry_can_be_removed(window: EditWindow) -> None:
+    sandbox = Sandbox(window)
+    sandbox.set_control("scattering", "count", 60)
+    sandbox.scatter()
+    sandbox.add("Torus")
+    sandbox.add("Box")
+    queue = sandbox.values()["queue"]
+    assert [(work["label"], work["running"]) for work in queue] == [
+        ("scatter", True),
+        ("add torus 1", False),
+        ("add box 1", False),
+    ]
+    sandbox.drop_work(queue[1]["number"])
+    sandbox.drop_work(queue[0]["number"])
+    odd: list[Any] = [queue[0]["number"], None, "x"]
+    for number in odd:
+        sandbox.drop_work(number)
+        assert "it has ended" in sandbox.status
+    finish(window)
+    assert window.session.labels == ("add box 1",)
+    assert sandbox.values()["queue"] == []
+
+
+def test_escape_deselects_rows_before_it_cancels_work(window: EditWindow) -> None:
+    sandbox = Sandbox(window)
+    sandbox.mark("layer 0")
+    sandbox.select("image 0")
+    sandbox.scatter()
+    sandbox.perform("deselect")
+    assert (sandbox.values()["selected"], sandbox.values()["marked"]) == ("", [])
+    assert window.background.busy_editing
+    sandbox.perform("deselect")
+    assert not window.background.busy_editing
+    finish(window)
+    assert window.session.labels == ()

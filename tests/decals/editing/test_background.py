@@ -11,13 +11,16 @@ from decals.editing import (
     Actions,
     DeleteDecals,
     EditSession,
+    FlagNodes,
     MovePrimitive,
     RemoveObject,
+    RenameObject,
     ScaleDecals,
     TurnDecals,
 )
 from decals.editing.action_state import COMPILING
 from decals.editing.background import BUSY, MAX_WAITING, step_of
+from decals.editing.brushes import Brush
 from decals.editing.document import Document, Edit
 from decals.errors import InvalidEdit
 from tests.decals.editing.background import LONG, Held, finish, press, threaded
@@ -363,6 +366,93 @@ def test_edits_continue_while_decals_are_scattered(monkeypatch: pytest.MonkeyPat
     press(actions, "undo")
     finish(actions)
     assert digest(session.document) == digest(EditSession(scene()).document)
+
+
+def test_flags_and_names_of_an_object_do_not_refuse_its_new_decals() -> None:
+    actions = threaded()
+    press(actions, "scatter")
+    session = actions.state.session
+    session.do(FlagNodes(locked={0: ((0,),)}))
+    session.do(RenameObject(1, "stone"))
+    finish(actions)
+    assert session.labels[-1] == "scatter"
+
+
+def test_an_undo_that_changes_a_shape_waits_for_scattered_decals() -> None:
+    actions = threaded()
+    session = actions.state.session
+    session.do(MovePrimitive(0, (0, 0), (0.05, 0, 0)))
+    press(actions, "scatter")
+    press(actions, "undo")
+    assert [(work.label, work.running) for work in actions.state.background.queue] == [
+        ("scatter", True),
+        ("undo", False),
+    ]
+    finish(actions)
+    assert (len(session.labels), session.undone_labels) == (1, ("scatter",))
+
+
+def test_work_is_dropped_by_its_number_and_the_rest_goes_on() -> None:
+    actions = threaded()
+    background, session = actions.state.background, actions.state.session
+    held = held_edit(actions)
+    for action in ("relax", "scatter", "undo"):
+        press(actions, action)
+    labels = [work.label for work in background.queue]
+    assert labels == ["scale", "relax", "scatter", "undo"]
+    numbers = {work.label: work.number for work in background.queue}
+    background.drop(numbers["relax"])
+    assert actions.state.message == "cancelled: relax"
+    background.drop(numbers["scale"])  # the next one runs, though the thread of this one goes on
+    with pytest.raises(InvalidEdit, match="it has ended"):
+        background.drop(numbers["scale"])
+    held.go.set()
+    finish(actions)
+    assert (session.labels, session.undone_labels) == ((), ("scatter",))
+    assert background.queue == []
+
+
+def test_escape_ends_one_thing_with_each_press() -> None:
+    actions = threaded()
+    state, session = actions.state, actions.state.session
+    before = digest(session.document)
+    held = held_edit(actions)
+    state.begin_stroke("turn")
+    session.do(TurnDecals([1], 10.0))
+    state.selection, state.primitive = (1,), (0, (0,))
+    state.brush.brush, actions.help_page = Brush.PUSH, 1
+
+    def left() -> list[bool]:
+        return [
+            actions.help_visible,
+            state.brush.brush is not Brush.SELECT,
+            session.stroke_open,
+            bool(state.selection) or state.primitive is not None,
+            state.background.busy,
+        ]
+
+    assert all(left())
+    press(actions, "deselect")
+    assert left() == [False, True, True, True, True]
+    state.brush.brush = Brush.SELECT
+    for ended in (3, 4, 5):
+        press(actions, "deselect")
+        assert left() == [False] * ended + [True] * (5 - ended)
+    assert (state.message, digest(session.document)) == ("cancelled", before)
+    held.go.set()
+    assert state.background._edits.stop(LONG)
+    assert digest(session.document) == before
+
+
+def test_a_brush_ends_with_its_stroke() -> None:
+    actions = threaded()
+    state, before = actions.state, digest(actions.state.session.document)
+    state.brush.brush = Brush.PUSH
+    state.begin_stroke("push brush")
+    state.session.do(TurnDecals([1], 10.0))
+    press(actions, "deselect")
+    assert (state.brush.brush, state.session.stroke_open) == (Brush.SELECT, False)
+    assert digest(state.session.document) == before
 
 
 def test_scattered_decals_for_a_changed_object_are_refused() -> None:
