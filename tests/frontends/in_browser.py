@@ -192,6 +192,7 @@ async def sandbox(picture: str | None = None) -> None:
         await field.fill("0.6")
         await field.press("Enter")
         await until(lambda: window.session.labels[-1:] == ("set ring_radius",))
+        await browser.get_by_text("set ring_radius", exact=True).wait_for()  # the field has its value back
         if picture is not None:
             window.subplot.vtk_renderer.ResetCamera()
             window.redraw(whole=True)
@@ -566,6 +567,7 @@ async def panels(picture: str | None = None) -> None:
         await browser.get_by_text("Duplicate", exact=True).click()
         await done("duplicate a primitive")
         await row("Point").first.click()
+        await browser.get_by_role("heading", name="Point", exact=True).wait_for()  # the panel has changed
         await choose(browser, "kind", "Torus")
         await done("replace Point by Torus")
         await row("Torus").wait_for()
