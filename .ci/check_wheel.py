@@ -20,7 +20,8 @@ IMPORT_ALL = """
 import importlib, pathlib, pkgutil, sys
 for package in map(importlib.import_module, sys.argv[2:]):
     names = [found.name for found in pkgutil.walk_packages(package.__path__, package.__name__ + ".")]
-    browser = "lab.page", *(f"sandbox.{n}" for n in ("connections", "guard", "page", "panels", "sessions", "view"))
+    sandbox = "connections", "guard", "page", "panels", "sessions", "view"
+    browser = "lab.page", *(f"sandbox.{name}" for name in sandbox)
     needed = [name for name in names if not name.endswith(browser)]  # those need the extra `browser`
     for module in [package, *map(importlib.import_module, needed)]:
         file = pathlib.Path(module.__file__).resolve()
