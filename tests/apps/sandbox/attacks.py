@@ -31,7 +31,7 @@ FOREIGN = "http://foreign.example"
 NOTEBOOK = "http://notebook.example"
 NAVIGATE = {"Sec-Fetch-Mode": "navigate", "Sec-Fetch-Dest": "document", "Sec-Fetch-Site": "none"}
 IMAGE = {"Sec-Fetch-Mode": "no-cors", "Sec-Fetch-Dest": "image", "Accept": "image/*"}
-WRONG = ["wslink-secret", "", None, True, 0, [], {}, "t" * 33]
+WRONG: list[object] = ["wslink-secret", "", None, True, 0, [], {}, "t" * 33]
 """Tokens that are none."""
 
 # A window of its own without a screen: it prints the address, and waits as a window does.
@@ -185,7 +185,7 @@ async def _sent(call: Any) -> Any:
 
 
 async def get(
-    server: Server, path: str = "", cookies: dict[str, str] | None = None, **headers: str
+    server: Server, path: str = "", cookies: dict[str, str] | None = None, /, **headers: str
 ) -> tuple[int, str, Any]:
     """Return status, text and headers of an answer."""
     sent = {name.replace("_", "-"): text for name, text in headers.items()}
@@ -612,7 +612,7 @@ def applies(attack: str, way: str) -> bool:
     return attack != "watcher" or way in SHARED
 
 
-LEFT_OUT = {
+LEFT_OUT: dict[str, Callable[[], str]] = {
     "account": lambda: "" if hasattr(os, "geteuid") and os.geteuid() == 0 else "needs the rights of root",
     "processes": lambda: "" if Path("/proc/self/cmdline").exists() else "needs /proc",
     "parts": lambda: "" if Path("/proc/self/statm").exists() else "needs /proc",

@@ -25,7 +25,7 @@ class Site:
     """An application behind a guard, and requests to it."""
 
     def __init__(self, guard: Guard) -> None:
-        self.guard = guard
+        self.guard, self.port = guard, 0
 
     async def get(self, path: str = "/", cookies: Any = None, **options: Any) -> tuple[int, str, Any]:
         """Return status, text and headers, with the header of the application: what the guard knows."""
@@ -72,7 +72,7 @@ def serve(check: Callable[[Site], Awaitable[None]], **options: Any) -> None:
         runner = web.AppRunner(app)
         await runner.setup()
         await web.TCPSite(runner, "127.0.0.1", 0).start()
-        site.port = runner.addresses[0][1]  # type: ignore[attr-defined]
+        site.port = runner.addresses[0][1]
         try:
             await check(site)
         finally:
