@@ -21,8 +21,10 @@ _Numbers = wp.types.vector(length=WARP_REGISTERS, dtype=wp.float32)
 
 
 @wp.func
-def smallest_part(center: wp.vec3, half: wp.float32, tape: Texels, span: wp.vec2i) -> wp.float32:
-    """Return half the least thickness of the primitives on a tape, near the cube center ± half.
+def smallest_part(
+    center: wp.vec3, half: wp.float32, tape: Texels, span: wp.vec2i, least: wp.float32
+) -> wp.float32:
+    """Return half the least thickness, from `least` on, of the primitives on a tape near a cube.
 
     The last number of a primitive's colour is what its skeleton adds to its radius (`parts.sized_tape`). Maps
     and warps that stretch the space of a primitive make it thinner.
@@ -58,7 +60,9 @@ def smallest_part(center: wp.vec3, half: wp.float32, tape: Texels, span: wp.vec2
                     c = closest(code, point, tape, at)
                     size = RIM * c[3] + tape[last][3]
                     at = last + 1
-                result = wp.min(result, size / stretch)
+                size /= stretch
+                if size >= least:
+                    result = wp.min(result, size)
         elif code == WARP:
             points[count] = point
             balls[count] = ball
@@ -86,10 +90,11 @@ def measure_parts(
     base: wp.vec3i,
     corner: wp.vec3,
     size: wp.float32,
+    least: wp.float32,
     sizes: wp.array(dtype=wp.float32),
 ) -> None:
     """Write `smallest_part` for blocks of one level, of side `size`, from number `begin` on."""
     i = first + wp.tid()
     block = begin + i
     center = block_center(base + level.blocks[block], corner, size)
-    sizes[i] = smallest_part(center, 0.5 * size, level.tape, level.spans[block])
+    sizes[i] = smallest_part(center, 0.5 * size, level.tape, level.spans[block], least)

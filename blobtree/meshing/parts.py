@@ -33,14 +33,14 @@ from blobtree.tape.model import ImplicitModel
 from blobtree.tape.part_sizes import leaf_boxes, part_sizes
 from blobtree.tape.program import PROGRAM_CHILDREN, ProgramNode, Run, postorder
 
-MAX_PART_BLOCKS = 1 << 16
-"""Most blocks that thin parts take; the mesh has a million triangles then."""
+MAX_PART_BLOCKS = 1 << 15
+"""Most blocks that thin parts take; the mesh has up to a million triangles then."""
 
 SPARE_SHARE = 1 / 16
 """Part of these blocks that small parts take in any case, once larger ones have taken all."""
 
-LEAST_CELL = 1e-5
-"""Smallest cells, over the longest side of the support."""
+LEAST_CELL = 3e-5
+"""Smallest cells, over the longest side of the support; parts that need smaller ones are left out."""
 
 SHEET_GROWTH = 16.0
 """Blocks of the next level in each block that a plate crosses; a tube crosses fewer."""
@@ -54,19 +54,25 @@ PART_KERNELS = (measure_parts, place_on_surface, write_polygons, sample_blocks)
 _logger = logging.getLogger(__name__)
 
 
-def needed_sizes(cells: SparseCells, grid: Grid, level: Any, begin: int, end: int) -> Float32Array:
-    """Return the sizes of cells that the parts in blocks of one level need, from number `begin` to `end`."""
+def needed_sizes(
+    cells: SparseCells, grid: Grid, level: Any, begin: int, end: int, least: float
+) -> Float32Array:
+    """Return the sizes of cells that the parts in blocks of one level need, from number `begin` to `end`.
+
+    Parts that need cells smaller than `least` are left out.
+    """
     sizes = wp.empty(end - begin, dtype=wp.float32, device=cells.device)
     inputs = [begin, level, wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner), 4 * grid.cell_size]
+    inputs += [BALL_CELLS * least]
     kernel = cells.tape.instruction_set.kernel_for(measure_parts)
     launch(kernel, end - begin, inputs, [sizes], cells.device)
     result: Float32Array = sizes.numpy() / np.float32(BALL_CELLS)
     return result
 
 
-def has_thin_parts(cells: SparseCells) -> bool:
+def has_thin_parts(cells: SparseCells, least: float) -> bool:
     """Return True if a part is too thin for the cells; their tape is a `sized_tape`."""
-    sizes = needed_sizes(cells, cells.grid, cells.leaves.arrays, 0, len(cells.leaves))
+    sizes = needed_sizes(cells, cells.grid, cells.leaves.arrays, 0, len(cells.leaves), least)
     return bool((sizes < cells.grid.cell_size).any())
 
 
@@ -104,7 +110,7 @@ class PartCells(AdaptiveCells):
         if first == count:
             return np.empty(0, np.float32)
         grid = tree.grid(int(tree.levels[first]))
-        return np.maximum(needed_sizes(tree.cells, grid, tree.level_arrays(), first, count), self._least)
+        return needed_sizes(tree.cells, grid, tree.level_arrays(), first, count, self._least)
 
     def _affordable(self, blocks: IndexArray, needed: Float32Array, growth: float) -> BoolArray:
         """Return True for the blocks to refine, without the parts with most blocks if there are too many."""
@@ -137,10 +143,11 @@ def mesh_of_parts(tree: ImplicitModel, cells: SparseCells, creases: bool, report
 
     The tape of the cells is the `sized_tape` of the tree.
     """
-    if not has_thin_parts(cells):
-        return None
     lower, upper = tree.support
     smallest = LEAST_CELL * float((upper - lower).max())
+    if not has_thin_parts(cells, smallest):
+        warn_of_thin_parts(tree, _too_thin(tree, smallest))
+        return None
     parts = PartCells(BlockTree(cells), 0.0, smallest)
     mesh = AdaptiveMesher(parts, creases).mesh(report)
     warn_of_thin_parts(tree, parts.unresolved + _too_thin(tree, smallest))

@@ -26,6 +26,12 @@ SAMPLES_PER_DECAL = 64
 MIN_SAMPLES = 4096
 """Least number of samples, so that the radii of few decals are accurate as well."""
 
+LARGEST_ON_THIN_PARTS = 6.0
+"""Largest covering radius over the expected one where parts may be thinner than decals lie apart.
+
+On a hair, a decal has its area in a piece that is far longer than its radius.
+"""
+
 EXPECTED_RADIUS = 0.6
 """Radius of a decal before it is measured, in spacings: that of a hexagonal tiling without gaps."""
 
@@ -186,7 +192,14 @@ class Appearance:
         decals = center_outsized(domain, centers, movable, spacings, samples, aim) if even else aim(centers)
         trials = _stream(seed, _TRIAL_STREAM)
         radii = covering_radii(
-            decals, samples, project, trials, shade=domain.shaded, even=even, nearest=nearest
+            decals,
+            samples,
+            project,
+            trials,
+            shade=domain.shaded,
+            even=even,
+            nearest=nearest,
+            bounds=LARGEST_ON_THIN_PARTS * expected if domain.has_thin_parts else None,
         )
         return decals, radii
 

@@ -77,6 +77,7 @@ def covering_radii(
     shade: Shade | None = None,
     even: bool = False,
     nearest: NearestFacing | None = None,
+    bounds: Float64Array | None = None,
 ) -> Float64Array:
     """Return the least radii, up to a small margin, at which decals cover the surfaces they lie on.
 
@@ -113,6 +114,8 @@ def covering_radii(
         True if the decals should be of about equal size: before one becomes outsized, others grow.
     nearest
         Finds the decals nearest to the samples; a new one if None.
+    bounds
+        Radii, ``float64[n]``, beyond which decals do not grow, whatever stays bare.
 
     Returns
     -------
@@ -123,6 +126,8 @@ def covering_radii(
         nearest = NearestFacing(samples.positions, samples.normals)
     distances, owners = nearest.of(decals.positions, decals.normals)
     limits = _max_radii(distances, owners, len(decals))
+    if bounds is not None:
+        limits = np.minimum(limits, bounds)
     if even:  # no other decal is so large that it may own points near the middle of a cell
         farthest = np.zeros(len(decals))
         np.maximum.at(farthest, owners[owners >= 0], distances[owners >= 0])
@@ -170,7 +175,9 @@ def covering_radii(
             if speck > 0.0 and not (owned.shares(radii) > 1.0 + speck).any():
                 break
             largest_radii = (1.0 + RADIUS_MARGIN) * limits
-            growth = _Growth(largest_radii, speck, project_reporting, shade, sample_distance, rng)
+            growth = _Growth(
+                largest_radii, speck, project_reporting, shade, sample_distance, rng, bounds is not None
+            )
             owned = growth.close_gaps(radii, owned)
     return radii
 
@@ -216,6 +223,8 @@ class _Growth:
         Mean distance of the samples.
     rng
         Draws the random points.
+    drops_far_points
+        True if points beyond the limits of all their decals are not searched around.
     """
 
     limits: Float64Array
@@ -224,6 +233,7 @@ class _Growth:
     shade: Shade | None
     sample_distance: float
     rng: np.random.Generator
+    drops_far_points: bool
 
     def close_gaps(self, radii: Float64Array, owned: OwnedPoints) -> OwnedPoints:
         """Grow radii until searches find no bare point; return all searched points.
@@ -258,6 +268,8 @@ class _Growth:
             spread, share, count = SEARCHES[min(turn, finest)]
             reach = spread * self.sample_distance
             owned = owned.risky(radii, share, CUBE * self.sample_distance)
+            if self.drops_far_points:
+                owned = owned[np.flatnonzero(owned.within(self.limits))]
             latest = np.where(owned.decals >= 0, changed[owned.decals], 0).max(axis=1, initial=0)
             settled = turn - latest >= CLEAN_SEARCHES
             done.append(owned[np.flatnonzero(settled)])

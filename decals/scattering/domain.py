@@ -14,6 +14,7 @@ from blobtree.validation import items, point_array
 from decals.errors import InvalidScattering
 from decals.scattering.boundary import Boundary
 from decals.scattering.projection import SurfaceProjection, spans_of
+from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import Surface, vectors
 from decals.validation import function_or_none, function_values, real_number, whole_number
@@ -126,6 +127,13 @@ class Domain:
         if len(others) != len(self.surfaces):
             raise InvalidScattering(f"expected {len(self.surfaces)} surfaces as before, got {len(others)}")
         return Domain(others, self._seed, density=self._density, mask=self._mask, device=self.device)
+
+    @property
+    def has_thin_parts(self) -> bool:
+        """True if a part of a tree may be thinner than decals lie apart."""
+        return any(
+            isinstance(surface, ImplicitSurface) and surface.has_small_parts for surface in self.surfaces
+        )
 
     @property
     def area(self) -> float:

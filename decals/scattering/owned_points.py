@@ -83,6 +83,11 @@ class OwnedPoints:
     doubts: Float32Array
     centers: Centers
 
+    def within(self, limits: Float64Array) -> BoolArray:
+        """Return True for points that a decal reaches at its largest radius."""
+        reached = (self.decals >= 0) & (self.lengths <= limits[self.decals])
+        return np.asarray(reached.any(axis=1))
+
     def __getitem__(self, rows: Int64Array) -> "OwnedPoints":
         return replace(
             self,

@@ -304,7 +304,12 @@ class Relaxation:
         movers = crowded_particles(state)
         if len(movers):
             self._restore_density(state)
-            moved = relocate(state, movers, *self._candidates.next_batch(len(movers), self.count))
+            candidates, sizes = self._candidates.next_batch(len(movers), self.count)
+            if self.domain.has_thin_parts:
+                thick = np.flatnonzero(~self._candidates.on_thin_parts(candidates.positions, self.count))
+                candidates, sizes = candidates[thick], sizes[thick]
+                movers = movers[~self._candidates.on_thin_parts(state.positions.numpy()[movers], self.count)]
+            moved = relocate(state, movers, candidates, sizes)
             self._anchors.set(state, moved)
 
     def _repel(self) -> None:

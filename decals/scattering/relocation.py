@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from blobtree._typing import Float32Array, Int64Array
+from blobtree._typing import BoolArray, Float32Array, Int64Array
 from decals.scattering.domain import Domain, OrientedPoints, apportion, crosses_density_step
 from decals.scattering.neighbors import NeighborQuery, index_array, local_maxima
 from decals.scattering.particle_state import ParticleState
@@ -31,6 +31,9 @@ GAP_REACH = 1.5
 CANDIDATES_PER_MOVER, CANDIDATES_PER_PARTICLE = 200, 4
 """Candidate points for each particle that moves, and at most for each particle."""
 
+THIN_REACH, THIN_SHARE = 2.0, 0.25
+"""Distance in spacings within which a thin part has less than this share of the area of a disc."""
+
 _CANDIDATE_STREAM = 1000
 
 
@@ -49,6 +52,7 @@ class CandidatePoints:
         self._domain, self._sizes_at = domain, sizes_at
         self._points: OrientedPoints | None = None
         self._sizes: Float32Array | None = None
+        self._thin: BoolArray | None = None
         self._next = 0
 
     def next_batch(self, mover_count: int, count: int) -> tuple[OrientedPoints, Float32Array]:
@@ -65,6 +69,22 @@ class CandidatePoints:
             self._points = points[np.random.default_rng(_CANDIDATE_STREAM).permutation(count)]
             self._sizes = self._sizes_at(self._points.positions)
         return self._points, self._sizes
+
+    def on_thin_parts(self, positions: Float32Array, count: int) -> BoolArray:
+        """Return True for positions on parts thinner than `count` particles lie apart.
+
+        Particles neither come nor leave there. Their distances say nothing: those of the right number of
+        particles on a hair are far larger than a spacing.
+        """
+        from scipy.spatial import cKDTree  # most domains have no thin parts
+
+        points, sizes = self._drawn(CANDIDATES_PER_PARTICLE * count)
+        tree = cKDTree(points.positions)
+        if self._thin is None:
+            nearby = tree.query_ball_point(points.positions, THIN_REACH * sizes, return_length=True)
+            flat = CANDIDATES_PER_PARTICLE * np.pi * THIN_REACH**2 / (0.5 * np.sqrt(3.0))
+            self._thin = nearby < THIN_SHARE * flat
+        return np.asarray(self._thin[tree.query(positions)[1]], np.bool_)
 
 
 class DensityAnchors:

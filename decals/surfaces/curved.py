@@ -3,23 +3,28 @@
 import numpy as np
 
 from blobtree import Mesh
-from blobtree._typing import Float64Array
+from blobtree._typing import Float64Array, Int64Array
 from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.windings import MeshOrientation
+from decals.surfaces.windings import MeshOrientation, Triangles, Windings
 
 LEAST_COSINE = 0.5
 """Cosine of the angle between a face and the normal of a corner, below which there is a crease between."""
 
 
 class CurvedMesh(MeshSurface):
-    """Mesh of a smooth surface whose vertices lie on it, with normals; samples are uniform on the surface.
+    """Mesh that `polygonize` made, with the area of the surface on which its vertices lie.
 
-    Small round parts lose some of their area to the chords of few triangles.
+    Samples are uniform by that area. Small round parts lose some of it to the chords of few triangles.
     """
 
     def __init__(self, mesh: Mesh, *, device: str) -> None:
         super().__init__(mesh.vertices, mesh.faces, device=device, orientation=MeshOrientation.KEEP)
         self._cumulative = np.cumsum(_curved_areas(mesh)[self.sound])
+
+    def _connected(self, _triangles: Triangles, _rule: MeshOrientation) -> tuple[Int64Array, Windings]:
+        """Return each vertex as its own, and no faces to turn: the mesh is closed and winds alike."""
+        none = np.zeros(len(self.faces), np.bool_)
+        return np.arange(len(self.vertices)), Windings(none, none, none, 0, 0)
 
 
 def _curved_areas(mesh: Mesh) -> Float64Array:
@@ -28,24 +33,37 @@ def _curved_areas(mesh: Mesh) -> Float64Array:
     Four triangles between the corners and the middles of curved edges (Vlachos et al. 2001, *Curved PN
     triangles*) have a quarter of a face's error, and the rest is extrapolated (Richardson 1911).
     """
-    corners = mesh.vertices.astype(np.float64)[mesh.faces]
-    normals = mesh.normals.astype(np.float64)[mesh.faces]
-    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    doubled = np.linalg.norm(crosses, axis=1)
-    own = crosses / np.maximum(doubled, 1e-300)[:, None]
-    creased = np.einsum("nij,nj->ni", normals, own) < LEAST_COSINE
-    if mesh.sheet_counts is not None:
-        creased |= mesh.sheet_counts[mesh.faces] != 1
-    normals = np.where(creased[:, :, None], own[:, None], normals)
-    following = np.roll(corners, -1, axis=1)
-    edges = following - corners
-    rise = np.einsum("nij,nij->ni", edges, normals)[:, :, None] * normals
-    next_normals = np.roll(normals, -1, axis=1)
-    fall = np.einsum("nij,nij->ni", edges, next_normals)[:, :, None] * next_normals
-    middles = 0.5 * (corners + following) + 0.125 * (fall - rise)
-    before = np.roll(middles, 1, axis=1)
-    outer = np.linalg.norm(np.cross(middles - corners, before - corners), axis=2).sum(axis=1)
-    inner = np.linalg.norm(np.cross(middles[:, 1] - middles[:, 0], middles[:, 2] - middles[:, 0]), axis=1)
-    divided = 0.5 * (outer + inner)
-    areas: Float64Array = divided + (divided - 0.5 * doubled) / 3.0
+    corners = [mesh.vertices[column].astype(np.float64) for column in mesh.faces.T]
+    flat = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    area = 0.5 * np.sqrt(_dot(flat, flat))
+    flat /= np.maximum(2.0 * area, 1e-300)[:, None]
+    normals = []
+    for column in mesh.faces.T:
+        own = mesh.normals[column].astype(np.float64)
+        creased = _dot(own, flat) < LEAST_COSINE
+        if mesh.sheet_counts is not None:
+            creased |= mesh.sheet_counts[column] != 1
+        normals.append(np.where(creased[:, None], flat, own))
+    middles = []
+    for a in range(3):
+        b = (a + 1) % 3
+        edge = corners[b] - corners[a]
+        bulge = _dot(edge, normals[b])[:, None] * normals[b] - _dot(edge, normals[a])[:, None] * normals[a]
+        middles.append(0.5 * (corners[a] + corners[b]) + 0.125 * bulge)
+    divided = _area(*middles)
+    for a in range(3):
+        divided += _area(corners[a], middles[a], middles[a - 1])
+    areas: Float64Array = divided + (divided - area) / 3.0
     return areas
+
+
+def _dot(first: Float64Array, second: Float64Array) -> Float64Array:
+    product: Float64Array = np.einsum("ij,ij->i", first, second)
+    return product
+
+
+def _area(a: Float64Array, b: Float64Array, c: Float64Array) -> Float64Array:
+    """Return the areas of triangles with corners (n, 3)."""
+    normal = np.cross(b - a, c - a)
+    area: Float64Array = 0.5 * np.sqrt(_dot(normal, normal))
+    return area

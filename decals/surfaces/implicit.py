@@ -109,10 +109,13 @@ class ImplicitSurface(Immutable):
                 f"expected a tree with a surface, got none in {cells} cells; "
                 "its parts may be too small, or cut each other away"
             )
-        self._by_parts = resolution is None and has_small_parts(tree, SMALL_PART * _cell_size(tree, cells))
+        self.has_small_parts = resolution is None and has_small_parts(
+            tree, SMALL_PART * _cell_size(tree, cells)
+        )
+        """True if parts of the tree are small beside it, and the mesh has smaller cells for them."""
         self._coarse = (
             CurvedMesh(coarse, device=device)
-            if self._by_parts
+            if self.has_small_parts
             else MeshSurface(coarse.vertices, coarse.faces, device=device, orientation=MeshOrientation.KEEP)
         )
         self._max_step = MAX_STEP * _cell_size(tree, cells)
@@ -134,7 +137,7 @@ class ImplicitSurface(Immutable):
         resolution = RESOLUTION if cells <= RESOLUTION else MAX_RESOLUTION
         mesh = self._meshes.get(resolution)
         if mesh is None:
-            refine = polygonize_parts if self._by_parts else polygonize
+            refine = polygonize_parts if self.has_small_parts else polygonize
             fine = refine(self.tree, resolution=resolution, creases=True, device=self.device)
             mesh = MeshSurface(
                 fine.vertices, fine.faces, device=self.device, orientation=MeshOrientation.KEEP

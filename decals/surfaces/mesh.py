@@ -28,7 +28,7 @@ from decals.surfaces.surface import (
     vectors,
 )
 from decals.surfaces.topology import edge_twins, parts_of, welded
-from decals.surfaces.windings import MeshOrientation, Triangles, wind
+from decals.surfaces.windings import MeshOrientation, Triangles, Windings, wind
 from decals.validation import member, whole_number
 
 MIN_FACE_QUALITY = 1e-6
@@ -101,9 +101,8 @@ class MeshSurface(Immutable):
         rule = member("orientation", orientation, MeshOrientation, InvalidMesh)
         self.vertices = _as_vertices(vertices)
         self.faces = _as_faces(faces, len(self.vertices))
-        self._welded = welded(self.vertices)
         triangles = Triangles.of(self.vertices, self.faces)
-        windings = wind(self.faces, self._welded, triangles, rule)
+        self._welded, windings = self._connected(triangles, rule)
         if rule is not MeshOrientation.KEEP:  # else they were reported when they were read
             windings.report()
         turned = np.flatnonzero(windings.turned)
@@ -117,6 +116,11 @@ class MeshSurface(Immutable):
         self._bounds = used.min(axis=(0, 1)), used.max(axis=(0, 1))
         for array in (self.vertices, self.faces, *self._bounds):
             make_read_only(array)
+
+    def _connected(self, triangles: Triangles, rule: MeshOrientation) -> tuple[Int64Array, Windings]:
+        """Return the first vertex at the position of each, and how faces are to wind."""
+        same = welded(self.vertices)
+        return same, wind(self.faces, same, triangles, rule)
 
     def __repr__(self) -> str:
         return f"MeshSurface({len(self.vertices)} vertices, {len(self.faces)} faces)"
