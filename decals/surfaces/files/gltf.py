@@ -25,8 +25,11 @@ def read_gltf(path: Path) -> MeshData:
         If the file is damaged, refers to what it does not have, or is compressed.
     """
     with reading(path, "glTF") as notes:
-        document, binary = parse(path.read_bytes(), notes)
-        budget, buffers = Budget(), Buffers(document.buffers, binary, path.parent)
+        content = path.read_bytes()
+        budget = Budget()
+        budget.grow(len(content))
+        document, binary = parse(content, notes)
+        buffers = Buffers(document.buffers, binary, path.parent, budget)
         accessors = Accessors(document, buffers, budget)
         materials = Materials(document, buffers, path.parent, notes)
         scene = _Scene(document, accessors, materials, budget, notes)
@@ -54,15 +57,14 @@ class _Scene:
 
     def pieces(self, place: Placement) -> list[Piece]:
         """Return the pieces of a mesh at a node, in the scene."""
-        self._budget.spend(len(place.matrices), 0, place.name)
+        self._budget.work(len(place.matrices), place.name)
         found = []
         for piece, skinned in self._mesh(place):
             if place.joints is not None and skinned is not None:
-                self._budget.spend(len(piece.points), len(piece.faces), place.name)
+                self._budget.place(1, piece, place.name)
                 found.append(posed(piece, skinned, place.joints, f"mesh {place.mesh}"))
             else:
-                copies = len(place.matrices)
-                self._budget.spend(copies * len(piece.points), copies * len(piece.faces), place.name)
+                self._budget.place(len(place.matrices), piece, place.name)
                 found.append(placed(piece, place.matrices))
         return found
 

@@ -26,7 +26,7 @@ class Accessors:
     def __init__(self, document: Document, buffers: Buffers, budget: Budget) -> None:
         self._document = document
         self._buffers = buffers
-        self._budget = budget
+        self.budget = budget
 
     def of(self, index: int, place: str) -> Accessor:
         """Return the record of an accessor that a place of the file names."""
@@ -62,14 +62,14 @@ class Accessors:
     def _replaced(self, accessor: Accessor, values: NDArray[Any], rows: Rows, name: str) -> NDArray[Any]:
         """Return the rows of the values, with those that the accessor's sparse part replaces."""
         sparse = accessor.sparse
-        self._budget.work(len(values) if isinstance(rows, slice) else len(rows), name)
+        self.budget.work(len(values) if isinstance(rows, slice) else len(rows), name)
         picked = values[rows]
         if sparse is None or sparse.count == 0:
             return picked
         kind = _component(sparse.indices.component_type, name)
         place = sparse.indices.buffer_view, sparse.indices.byte_offset
         positions = self._elements(*place, kind, (sparse.count, 1), name)[:, 0].astype(np.int64)
-        self._budget.work(sparse.count, name)
+        self.budget.work(sparse.count, name)
         if positions.min() < 0 or positions.max() >= accessor.count:
             raise Unreadable(f"{name} replaces elements beyond its {accessor.count}")
         shape = sparse.count, values.shape[1]

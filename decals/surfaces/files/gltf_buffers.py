@@ -7,6 +7,7 @@ from urllib.parse import unquote, unquote_to_bytes
 
 from decals.surfaces.files.faults import Unreadable, item
 from decals.surfaces.files.gltf_document import Buffer
+from decals.surfaces.files.pieces import Budget
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")  # two letters or more, for one is a drive of Windows
 
@@ -14,10 +15,13 @@ _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")  # two letters or more, for on
 class Buffers:
     """Buffers of a file, each read when it is first used."""
 
-    def __init__(self, buffers: tuple[Buffer, ...], binary: bytes | None, folder: Path) -> None:
+    def __init__(
+        self, buffers: tuple[Buffer, ...], binary: bytes | None, folder: Path, budget: Budget
+    ) -> None:
         self._buffers = buffers
         self._binary = binary
         self._folder = folder
+        self._budget = budget
         self._contents: dict[int, bytes] = {}
 
     def has_bytes(self, index: int) -> bool:
@@ -34,7 +38,9 @@ class Buffers:
 
     def _read(self, buffer: Buffer, name: str) -> bytes:
         if buffer.uri is not None:
-            return read_uri(buffer.uri, self._folder, name)
+            content = read_uri(buffer.uri, self._folder, name)
+            self._budget.grow(len(content))
+            return content
         if self._binary is None or name != "buffer 0":
             raise Unreadable(f"{name} has neither a URI nor a binary chunk")
         return self._binary

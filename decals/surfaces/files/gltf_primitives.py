@@ -1,8 +1,10 @@
 """The primitives of a glTF mesh as triangles: corners of every mode, morph targets and skins."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blobtree._typing import Float64Array, Int64Array
 from decals.errors import InvalidMesh
@@ -74,12 +76,16 @@ def _check_compression(primitive: Primitive, accessors: Accessors, place: str) -
 def _corners(primitive: Primitive, position: int, accessors: Accessors, place: str) -> Int64Array:
     """Return the vertices that a primitive names in turn."""
     count = len(accessors.stored(position, _VECTOR, place))
-    if primitive.indices is None:
+    corners: NDArray[Any] | None = None
+    if primitive.indices is not None:
+        corners = accessors.stored(primitive.indices, ("SCALAR",), place)[:, 0]
+    length = count if corners is None else len(corners)
+    accessors.budget.read(min(count, length), length // 3 if primitive.mode == TRIANGLES else length, place)
+    if corners is None:
         return np.arange(count)
-    corners = accessors.stored(primitive.indices, ("SCALAR",), place)[:, 0]
     if corners.dtype.kind != "u":
         raise Unreadable(f"{place} has indices that are no unsigned integers")
-    if len(corners) and corners.max() >= count:
+    if length and corners.max() >= count:
         raise Unreadable(f"{place} has {count} points but a face asks for number {corners.max()}")
     return corners.astype(np.int64)
 

@@ -1,5 +1,6 @@
 """Pieces of a mesh: triangles that files place one or several times, joined to one mesh."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
@@ -11,11 +12,13 @@ from decals.surfaces.base_color import BaseColor
 from decals.surfaces.files.faults import Unreadable
 from decals.surfaces.mesh_data import MeshData, joined
 
-MAX_ELEMENTS = 1 << 25
-"""Most vertices, and most triangles, of a file's mesh with all copies that the file places."""
+MAX_ELEMENTS = 1 << 24
+"""Most vertices, and most triangles, of a mesh with all its copies, beside one for each byte of the file."""
 
-MAX_WORK = 1 << 29
-"""Most elements that are read or computed for it; a small file may ask for the same ones many times."""
+MAX_WORK = 1 << 26
+"""Most elements, beside `WORK_PER_BYTE`, that are read: a small file may ask for the same ones many times."""
+
+WORK_PER_BYTE = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,28 +38,38 @@ IntArray = TypeVar("IntArray", Int32Array, Int64Array)
 
 
 class Budget:
-    """Counts the elements of a mesh before memory and time are taken for them."""
+    """Counts the elements of a file before memory and time are taken for them."""
 
     def __init__(self) -> None:
-        self._vertices = self._triangles = self._work = 0
+        self._bytes = 0
+        self._spent: Counter[str] = Counter()
 
-    def spend(self, vertices: int, triangles: int, place: str) -> None:
-        """Count elements of the mesh; `Unreadable` if there are too many in all."""
-        self._vertices += vertices
-        self._triangles += triangles
-        if max(self._vertices, self._triangles) > MAX_ELEMENTS:
-            raise self._too_large(f"{MAX_ELEMENTS:,} vertices or triangles", place)
+    def grow(self, size: int) -> None:
+        """Add what some bytes of the file may hold."""
+        self._bytes += size
 
-    def work(self, elements: int, place: str) -> None:
+    def work(self, count: int, place: str) -> None:
         """Count elements that are read; `Unreadable` if there are too many in all."""
-        self._work += elements
-        if self._work > MAX_WORK:
-            raise self._too_large(f"{MAX_WORK:,} elements to read", place)
+        self._spend("elements to read", count, MAX_WORK + WORK_PER_BYTE * self._bytes, place)
 
-    def _too_large(self, limit: str, place: str) -> Unreadable:
-        return Unreadable(
-            f"it has more than {limit}, counted up to {place}", "reduce it, or divide it into several files"
-        )
+    def read(self, vertices: int, triangles: int, place: str) -> None:
+        """Count elements of a piece; `Unreadable` if there are too many in all."""
+        self._spend("vertices", vertices, MAX_ELEMENTS + self._bytes, place)
+        self._spend("triangles", triangles, MAX_ELEMENTS + self._bytes, place)
+
+    def place(self, copies: int, piece: Piece, place: str) -> None:
+        """Count the copies of a piece; `Unreadable` if they have too many elements in all."""
+        limit = MAX_ELEMENTS + self._bytes
+        self._spend("vertices with all copies", copies * len(piece.points), limit, place)
+        self._spend("triangles with all copies", copies * len(piece.faces), limit, place)
+
+    def _spend(self, kind: str, count: int, limit: int, place: str) -> None:
+        self._spent[kind] += count
+        if self._spent[kind] > limit:
+            raise Unreadable(
+                f"it has more than {limit:,} {kind}, counted up to {place}",
+                "reduce it, or divide it into several files",
+            )
 
 
 def mirrors(matrices: Float64Array) -> BoolArray:

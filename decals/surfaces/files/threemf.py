@@ -44,12 +44,11 @@ def _mesh(path: Path, notes: Notes) -> MeshData:
         build = _Build(package, notes)
         _logger.info("%s: the unit is 1 %s", path, build.unit)
         budget, pieces = Budget(), []
+        budget.grow(path.stat().st_size)
         for key, matrices in build.places().items():
             mesh = build.mesh(key)
             if mesh is not None:
-                budget.spend(
-                    len(matrices) * len(mesh.points), len(matrices) * len(mesh.faces), f"object {key[1]}"
-                )
+                budget.place(len(matrices), mesh, f"object {key[1]}")
                 pieces.append(placed(mesh, np.array(matrices)))
         return mesh_of(pieces)
 

@@ -14,13 +14,11 @@ from decals.surfaces.files.xml_events import Attributes, parse_xml
 
 RELATIONSHIPS = "http://schemas.openxmlformats.org/package/2006/relationships"
 
-MAX_PART = 1 << 31
-"""Most bytes of a part of the package."""
+MAX_UNPACKED = 1 << 24
+"""Most bytes that are unpacked, beside `UNPACKED_PER_BYTE`."""
 
-MAX_RATIO = 250
-"""Most bytes that a byte of the package may stand for, in parts above `SMALL_PART`."""
-
-SMALL_PART = 1 << 20
+UNPACKED_PER_BYTE = 100
+"""Bytes that are unpacked for each byte of the package; meshes unpack to twenty or fewer."""
 
 CHUNK = 1 << 16
 """Bytes that are unpacked at once."""
@@ -40,6 +38,7 @@ class Package:
             self._zip = zipfile.ZipFile(path)
         except _FAULTS as error:
             raise Unreadable(f"it is no ZIP archive: {error}") from error
+        self._unpacked, self._limit = 0, MAX_UNPACKED + UNPACKED_PER_BYTE * path.stat().st_size
         self._parts = {_normal(entry.filename): entry for entry in self._zip.infolist()}
         self.model_part = self._start()
 
@@ -54,11 +53,9 @@ class Package:
         entry = self._parts.get(_normal(part))
         if entry is None:
             raise Unreadable(f"the part {part[:80]!r} is missing")
-        packed, size = entry.compress_size, entry.file_size
-        if size > MAX_PART or size > max(SMALL_PART, MAX_RATIO * packed):
-            raise Unreadable(
-                f"the part {part[:80]!r} unpacks {packed:,} bytes to {size:,}, which are too many"
-            )
+        self._unpacked += entry.file_size
+        if self._unpacked > self._limit:
+            raise Unreadable(f"it unpacks to more than {self._limit:,} bytes with {part[:80]!r}")
         if entry.flag_bits & 1 or entry.compress_type not in _METHODS:
             raise Unreadable(f"the part {part[:80]!r} is encrypted or packed by another method than deflate")
         try:

@@ -284,17 +284,41 @@ def test_primitives_share_points_of_which_each_uses_some(tmp_path: Path) -> None
     assert np.array_equal(vertices[found], points[np.concatenate(faces)])
 
 
-def test_copies_of_copies_are_counted_before_memory_is_taken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def limited(monkeypatch: pytest.MonkeyPatch, elements: int, work: int) -> None:
+    monkeypatch.setattr(pieces, "MAX_ELEMENTS", elements)
+    monkeypatch.setattr(pieces, "MAX_WORK", work)
+
+
+def test_copies_are_counted_before_memory_is_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    writer = GltfWriter()
+    shifts = writer.accessor(np.zeros((400, 3), "<f4"))
+    extension = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": shifts}}}
+    writer.add("nodes", mesh=ball(writer), extensions=extension)
+    path = saved(tmp_path, writer)
+    assert len(read_mesh(path)[1]) == 400 * 320
+    limited(monkeypatch, 30_000, 10_000)
+    with pytest.raises(
+        InvalidMesh, match=r"more than 3\d,\d+ vertices with all copies, counted up to node 0"
+    ):
+        read_mesh(path)
+
+
+@pytest.mark.parametrize(
+    ("elements", "work", "message"),
+    [
+        (50_000, 10**6, "triangles, counted up to mesh 0 primitive"),
+        (10**6, 50_000, "elements to read, counted up to"),
+    ],
+)
+def test_parts_that_share_points_are_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, elements: int, work: int, message: str
 ) -> None:
     writer = GltfWriter()
     mesh = ball(writer)
-    shifts = writer.accessor(np.zeros((100, 3), "<f4"))
-    extension = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": shifts}}}
-    writer.add("nodes", mesh=mesh, extensions=extension)
-    assert len(read_mesh(saved(tmp_path, writer))[1]) == 100 * 320
-    monkeypatch.setattr(pieces, "MAX_ELEMENTS", 30_000)
-    with pytest.raises(InvalidMesh, match="more than 30,000 vertices or triangles, counted up to node 0"):
+    writer.document["meshes"][mesh]["primitives"] *= 2_000
+    writer.add("nodes", mesh=mesh)
+    limited(monkeypatch, elements, work)
+    with pytest.raises(InvalidMesh, match=message):
         read_mesh(saved(tmp_path, writer))
 
 
