@@ -223,7 +223,24 @@ def _polygons(faces: ArrayLike | Sequence[Any], name: str) -> Any:
         raise InvalidMesh(f"{name}: expected faces as rows of corner indices, got {describe(faces)}")
     if any(row.shape[-1] < 3 for row in listed) and isinstance(polygons, np.ndarray):
         raise InvalidMesh(f"{name}: expected faces of 3 or more corners, got {polygons.shape[1]}")
+    _refuse_counts(listed, name)
     return polygons
+
+
+COUNTED_ROWS = 8
+"""Rows of faces up to which the same first number in all of them may be by chance."""
+
+
+def _refuse_counts(listed: list[Any], name: str) -> None:
+    """Refuse rows that all begin with the number of the corners behind it, as pyvista writes faces."""
+    rows = listed if len(listed) > 1 else listed[0]
+    if len(rows) > COUNTED_ROWS and all(len(row) > 3 and row[0] == len(row) - 1 for row in rows):
+        one = isinstance(listed[0], np.ndarray) and listed[0].ndim == 2
+        advice = "faces[:, 1:]" if one else "[row[1:] for row in faces]"
+        raise InvalidMesh(
+            f"{name}: expected faces as rows of corner indices, got rows that begin with the number of their "
+            f"corners; give {advice}"
+        )
 
 
 def _ragged(faces: Any) -> list[Any]:

@@ -123,6 +123,8 @@ def dataset_mesh(dataset: "pv.DataSet | pv.MultiBlock", *, name: str) -> MeshDat
 
     if isinstance(dataset, pv.MultiBlock) and _is_empty(dataset):
         raise InvalidMesh(f"{name!r} has no block with faces; give a surface mesh")
+    if isinstance(dataset, pv.PointSet):  # its methods of surfaces raise errors of pyvista
+        raise InvalidMesh(f"{name!r} has {dataset.n_points} points but no faces; give a surface mesh")
     _check_cells(dataset, name)
     if isinstance(dataset, pv.MultiBlock) and has_colors(dataset):  # joined blocks keep what all of them have
         return joined([dataset_mesh(block, name=name) for block in dataset if not _is_empty(block)])

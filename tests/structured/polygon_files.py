@@ -183,7 +183,8 @@ def _ply_content(
         lines += ["property " + " ".join(aliases.get(word, word) for word in prop) for prop in properties]
     text = "\n".join([*lines, "end_header", ""])
     if not order:
-        words = [_ply_words(row, number) for _, _, rows in tables for row in rows]
+        more = ["9", "1", "1"] if chance.random() < 0.2 else []  # beyond what the header declares
+        words = [[*_ply_words(row, number), *more] for _, _, rows in tables for row in rows]
         return encoded(text + "".join(spaced(line, chance) + "\n" for line in words), chance)
     end = chance.choice(["\n", "\n", "\r\n"])
     body = b"".join(

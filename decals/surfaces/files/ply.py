@@ -5,8 +5,8 @@ VTK's own reader crashes on truncated files and wrong indices, and does not read
 
 import re
 import struct
-from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -157,7 +157,7 @@ def _header(content: bytes) -> tuple[str, list[_Element], bytes]:
     data = without_mark(content)
     if not data.startswith(b"ply"):
         raise ValueError("it does not start with 'ply'")
-    line_end = next((mark for mark in (b"\r\n", b"\n", b"\r") if data.startswith(mark, 3)), b"\n")
+    line_end = rb"\r" if data.startswith(b"ply\r") and not data.startswith(b"ply\r\n") else rb"\r?\n"
     end = re.search(rb"[\r\n]end_header[ \t]*" + line_end, data)
     if end is None:
         raise ValueError("its header does not end")
@@ -192,15 +192,52 @@ def _extended(element: _Element, prop: _Property) -> _Element:
     return _Element(element.name, element.count, (*element.properties, prop))
 
 
-def _tables(order: str, elements: list[_Element], body: bytes) -> Iterator[_Table]:
+def _tables(order: str, elements: list[_Element], body: bytes) -> list[_Table]:
     """Decode the elements in turn; ASCII becomes rows of float64, which hold every index exactly."""
-    if not order:
-        body, order = decimal_numbers(body.split()).tobytes(), "="
-        elements = [_as_doubles(element) for element in elements]
-    position = 0
+    if order:
+        return _decoded(order, elements, body)[0]
+    doubles = [_as_doubles(element) for element in elements]
+    try:
+        tables, rest = _decoded("=", doubles, decimal_numbers(body.split()).tobytes())
+    except ValueError:
+        words = _rows_of_lines(elements, body)
+        if words is None:
+            raise
+    else:
+        words = _rows_of_lines(elements, body) if rest else None
+        if words is None:
+            return tables
+    return _decoded("=", doubles, decimal_numbers(words).tobytes())[0]
+
+
+def _decoded(order: str, elements: list[_Element], body: bytes) -> tuple[list[_Table], int]:
+    """Return the tables of elements, and the number of bytes behind them."""
+    tables, position = [], 0
     for element in elements:
         table, position = _decode(order, element, body, position)
-        yield table
+        tables.append(table)
+    return tables, len(body) - position
+
+
+def _rows_of_lines(elements: list[_Element], body: bytes) -> list[bytes] | None:
+    """Return the words that rows of one line each need; None if the rows are not the lines.
+
+    Some programs write more at the end of each line than the header declares.
+    """
+    lines = [words for line in body.replace(b"\r", b"\n").split(b"\n") if (words := line.split())]
+    if len(lines) != sum(element.count for element in elements):
+        return None
+    kept: list[bytes] = []
+    numbered = iter(lines)
+    for element in elements:
+        for words in islice(numbered, element.count):
+            end = 0
+            for p in element.properties:
+                if end >= len(words):
+                    return None
+                end += 1 + (int(words[end]) if p.count_kind else 0)
+            kept += words[:end]
+    return kept
 
 
 def _as_doubles(element: _Element) -> _Element:

@@ -104,6 +104,7 @@ HOSTILE = [
     square(vertices=[[0, 0, np.nan]] * 4), square(vertices="x"), square(vertices=[[0, 0, 0]] * 4),
     square(faces=[[0, 1, 2], [0, "x", 3]]), pv.PolyData(), pv.PolyData(np.array(CORNERS, np.float32)),
     pv.Line(), (CORNERS, TRIANGLES, 3), np.zeros((3, 3)), pv.MultiBlock(),
+    pv.PointSet(np.array(CORNERS, np.float32)), pv.MultiBlock([pv.PointSet(np.zeros((3, 3), np.float32))]),
     pv.MultiBlock([None]), pv.MultiBlock([pv.MultiBlock([pv.PolyData()])]),
 ]  # fmt: skip
 
@@ -115,6 +116,34 @@ def test_all_other_values_are_refused_in_one_line(wrong: Any) -> None:
             call(wrong)
         assert isinstance(caught.value, InvalidInput)
         assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("size", [3, 4, 5])
+def test_rows_that_begin_with_their_number_of_corners_are_refused(size: int) -> None:
+    """As a user takes ``mesh.faces.reshape(-1, 4)`` from pyvista."""
+    ball = pv.Sphere(theta_resolution=8, phi_resolution=6)
+    points = np.asarray(ball.points)
+    rows = np.array([[size, *range(k, k + size)] for k in range(9)])
+    with pytest.raises(InvalidMesh, match=r"give faces\[:, 1:\]"):
+        as_surface((points, rows))
+    with pytest.raises(InvalidMesh, match=r"give faces\[:, 1:\]"):
+        as_surface((points, rows.tolist()))
+    mixed = [*rows.tolist(), [size + 1, *range(size + 1)]]
+    with pytest.raises(InvalidMesh, match=r"give \[row\[1:\] for row in faces\]"):
+        as_surface((points, mixed))
+    assert len(as_shape((points, rows[:, 1:])).faces) == 9 * (size - 2)  # type: ignore[union-attr]
+    rows[3, 0] = 0
+    assert len(as_shape((points, rows)).faces) == 9 * (size - 1)  # type: ignore[union-attr]
+    assert len(as_shape((points, rows[:8])).faces) == 8 * (size - 1)  # type: ignore[union-attr]
+
+
+def test_pyvista_faces_with_their_counts() -> None:
+    ball = pv.Sphere()
+    with pytest.raises(InvalidMesh, match=r"give faces\[:, 1:\]"):
+        as_surface((ball.points, ball.faces.reshape(-1, 4)))
+    assert as_surface((ball.points, ball.faces.reshape(-1, 4)[:, 1:])).area == pytest.approx(
+        ball.area, rel=1e-4
+    )
 
 
 def test_messages_name_the_model() -> None:

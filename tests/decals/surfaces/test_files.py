@@ -274,6 +274,14 @@ def test_ply_of_odd_headers(tmp_path: Path) -> None:
         ),
     ):
         assert area(written(tmp_path, "a.ply", content)) == pytest.approx(1.0)
+    more = PLY.replace("4 0 1 2 3", "3 0 1 2 9 1 1 1\n3 0 2 3 9 2 2 2").replace("face 1", "face 2")
+    assert area(written(tmp_path, "a.ply", more)) == pytest.approx(1.0), "more words than the header declares"
+    binary = PLY.replace("ascii", "binary_little_endian").partition("end_header\n")[0].encode()
+    body = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "<f4").tobytes()
+    body += struct.pack("<B4i", 4, 0, 1, 2, 3)
+    for end in (b"\n", b"\r\n"):
+        path = written(tmp_path, "a.ply", binary + b"end_header" + end + body)
+        assert area(path) == pytest.approx(1.0)
     for content, reason in (
         (PLY.replace("element face 1", "element face 2"), "ends within its 2 rows of 'face'"),
         (PLY.replace("4 0 1 2 3", "4 0 1 2 2.5"), "not whole"),
