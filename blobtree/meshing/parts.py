@@ -70,10 +70,10 @@ def needed_sizes(
     return result
 
 
-def has_thin_parts(cells: SparseCells, least: float) -> bool:
-    """Return True if a part is too thin for the cells; their tape is a `sized_tape`."""
-    sizes = needed_sizes(cells, cells.grid, cells.leaves.arrays, 0, len(cells.leaves), least)
-    return bool((sizes < cells.grid.cell_size).any())
+def least_size(cells: SparseCells, least: float) -> float:
+    """Return the size of the thinnest part, at least `least`, in the cells; their tape is a `sized_tape`."""
+    needed = needed_sizes(cells, cells.grid, cells.leaves.arrays, 0, len(cells.leaves), least)
+    return BALL_CELLS * float(needed.min(initial=np.inf))
 
 
 class PartCells(AdaptiveCells):
@@ -145,7 +145,7 @@ def mesh_of_parts(tree: ImplicitModel, cells: SparseCells, creases: bool, report
     """
     lower, upper = tree.support
     smallest = LEAST_CELL * float((upper - lower).max())
-    if not has_thin_parts(cells, smallest):
+    if least_size(cells, smallest) >= BALL_CELLS * cells.grid.cell_size:
         warn_of_thin_parts(tree, _too_thin(tree, smallest))
         return None
     parts = PartCells(BlockTree(cells), 0.0, smallest)

@@ -32,7 +32,7 @@ from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import ImplicitModel, checked_tree
-from blobtree.tape.part_sizes import fitting_scale, has_small_parts, sized_tape
+from blobtree.tape.part_sizes import fitting_scale, has_small_parts, has_warps, sized_tape
 from blobtree.validation import LARGEST_NUMBER, is_whole, real_number, shown, truth
 
 DEFAULT_RESOLUTION = 64
@@ -203,8 +203,8 @@ def polygonize_parts(
 ) -> Mesh:
     """Return the mesh with cells of `resolution`, and smaller ones where parts are thin, see `polygonize`."""
     truth("creases", creases, InvalidResolution)
-    size = _cell_size(tree, resolution, None)
-    if has_small_parts(tree, BALL_CELLS * size):
+    if shows_small_parts(tree, resolution, BALL_CELLS, device):
+        size = _cell_size(tree, resolution, None)
         with reporting(progress, cancel) as report:
             mesh = _mesh_of_thin_parts(tree, size, creases, device, report)
         if mesh is not None:
@@ -212,6 +212,18 @@ def polygonize_parts(
     return Polygonizer(
         tree, resolution=resolution, creases=creases, device=device, progress=progress, cancel=cancel
     ).mesh
+
+
+def shows_small_parts(tree: ImplicitModel, resolution: int, size: float, device: str | None) -> bool:
+    """Return True if a part is thinner than `size` cells of `resolution`; where there are warps, look."""
+    cell = _cell_size(tree, resolution, None)
+    if not has_small_parts(tree, size * cell) or not has_warps(tree):
+        return has_small_parts(tree, size * cell)
+    from blobtree.meshing.parts import PART_KERNELS, least_size  # imported here, as above
+
+    _load_kernels(tree, device, False, *PART_KERNELS)
+    cells = build_cells(sized_tape(tree), _grid(tree, cell), device=device)
+    return least_size(cells, 0.0) < size * cell
 
 
 def _mesh_of_thin_parts(

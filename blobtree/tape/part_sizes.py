@@ -72,10 +72,14 @@ def leaf_boxes(tree: ImplicitModel) -> Box:
 
 
 def has_small_parts(tree: ImplicitModel, size: float) -> bool:
-    """Return True if a leaf may be thinner than `size`, where radii tell it."""
-    warped = any(isinstance(step, EnterWarp) for step in tree._program)
+    """Return True if a leaf may be thinner than `size`, whatever warps do to it."""
     least, _ = part_sizes(tree)
-    return bool(least.min() < size * (WARP_MARGIN if warped else 1.0))
+    return bool(least.min() < size * (WARP_MARGIN if has_warps(tree) else 1.0))
+
+
+def has_warps(tree: ImplicitModel) -> bool:
+    """Return True if a warp changes sizes of leaves."""
+    return any(isinstance(step, EnterWarp) for step in tree._program)
 
 
 def fitting_scale(tree: ImplicitModel, size: float) -> float:

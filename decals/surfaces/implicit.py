@@ -13,8 +13,7 @@ from blobtree.device import known_device, launch
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, UNION
 from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
-from blobtree.meshing.polygonize import polygonize_parts
-from blobtree.tape.part_sizes import has_small_parts
+from blobtree.meshing.polygonize import polygonize_parts, shows_small_parts
 from blobtree.tracing.trace import trace
 from blobtree.validation import point_array
 from decals.errors import InvalidMesh, InvalidScattering
@@ -109,9 +108,7 @@ class ImplicitSurface(Immutable):
                 f"expected a tree with a surface, got none in {cells} cells; "
                 "its parts may be too small, or cut each other away"
             )
-        self.has_small_parts = resolution is None and has_small_parts(
-            tree, SMALL_PART * _cell_size(tree, cells)
-        )
+        self.has_small_parts = resolution is None and shows_small_parts(tree, cells, SMALL_PART, device)
         """True if parts of the tree are small beside it, and the mesh has smaller cells for them."""
         self._coarse = (
             CurvedMesh(coarse, device=device)

@@ -20,6 +20,7 @@ from blobtree import (
     polygonize,
 )
 from blobtree._typing import Float64Array
+from decals.surfaces import ImplicitSurface
 from tests.blobtree.trees import random_tree as plain_tree
 from tests.thin_trees import is_closed, mesh_areas, random_tree
 
@@ -93,6 +94,13 @@ def test_creases_are_kept_beside_thin_parts() -> None:
     assert mesh.sheet_counts is not None
     assert (mesh.sheet_counts == 2).sum() > 50
     assert np.abs(cut(mesh.vertices) - 0.5).max() < 1e-4
+
+
+def test_a_warp_does_not_make_thick_parts_thin() -> None:
+    tree = Torus((0, 0, 0), (0, 0, 1), 1.0, radius=0.3).twist(20.0)
+    uniform, default = polygonize(tree, resolution=64), polygonize(tree)
+    assert np.array_equal(uniform.vertices, default.vertices)
+    assert not ImplicitSurface(tree).has_small_parts
 
 
 @pytest.mark.parametrize("seed", range(8))
