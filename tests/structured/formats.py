@@ -1,10 +1,13 @@
 """The formats of which files are generated."""
 
 from tests.structured.model import Format
+from tests.structured.placed_files import gltf, threemf
 from tests.structured.polygon_files import obj, off, ply, stl
 from tests.structured.vtk_files import vtk, vtp, vts, vtu
 
 FORMATS: dict[str, Format] = {
+    "3mf": threemf,
+    "gltf": gltf,
     "obj": obj,
     "off": off,
     "ply": ply,

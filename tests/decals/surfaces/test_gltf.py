@@ -23,7 +23,7 @@ from decals.surfaces.base_color import CLAY
 from decals.surfaces.files import gltf, pieces
 from decals.surfaces.mesh_file import read_mesh_data
 from tests.decals.meshes import icosphere
-from tests.scene_files import GltfWriter, SceneFile, broken_gltf, glb, random_gltf
+from tests.structured.placed_files import GltfWriter, SceneFile, broken_gltf, glb, random_gltf
 
 QUARTER = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
 """Quaternion of a quarter turn about z."""

@@ -18,7 +18,15 @@ from decals.surfaces.files import threemf
 from decals.surfaces.mesh_file import read_mesh_data
 from tests.decals.meshes import icosphere
 from tests.decals.surfaces.test_gltf import PIXELS, check, light_at_corners, linear, shapes
-from tests.scene_files import CORE, broken_3mf, mesh_xml, package, random_3mf, relationships, transform_text
+from tests.structured.placed_files import (
+    CORE,
+    broken_3mf,
+    mesh_xml,
+    package,
+    random_3mf,
+    relationships,
+    transform_text,
+)
 
 TETRAHEDRON = mesh_xml(
     np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]), [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]

@@ -18,6 +18,7 @@ from urllib.parse import quote
 import numpy as np
 
 from tests.decals.meshes import icosphere
+from tests.structured.model import PolygonMesh, StructuredFile
 
 COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
@@ -58,6 +59,29 @@ class SceneFile:
         for name, content in self.files.items():
             (folder / name).write_bytes(content)
         return folder / self.name
+
+    def structured(self) -> StructuredFile:
+        """Return the same with polygons in place of triangles."""
+        mesh = None
+        if self.triangles is not None:
+            points = np.asarray(self.triangles, np.float64).reshape(-1, 3)
+            mesh = PolygonMesh(points, np.arange(len(points)).reshape(-1, 3).tolist())
+        (name, content), *others = self.files.items()
+        return StructuredFile(Path(name).suffix, content, mesh, dict(others))
+
+
+BROKEN = 0.45
+"""Share of broken files."""
+
+
+def gltf(chance: random.Random) -> StructuredFile:
+    """Return a glTF or GLB file: accessors, nodes, skins and copies of all forms, or broken ones."""
+    return (broken_gltf if chance.random() < BROKEN else random_gltf)(chance).structured()
+
+
+def threemf(chance: random.Random) -> StructuredFile:
+    """Return a 3MF file: objects, components and parts of all forms, or broken ones."""
+    return (broken_3mf if chance.random() < BROKEN else random_3mf)(chance).structured()
 
 
 # -- glTF -------------------------------------------------------------------------------------------------
@@ -396,7 +420,7 @@ def package(parts: dict[str, str | bytes], method: int = zipfile.ZIP_DEFLATED) -
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", method) as archive:
         for name, part in parts.items():
-            archive.writestr(name, part)
+            archive.writestr(zipfile.ZipInfo(name), part, method)  # without the time of day
     return content.getvalue()
 
 
