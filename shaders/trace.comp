@@ -16,10 +16,15 @@ void main() {
     ivec2 texel = rectangle.xy + offset;
     Hit hit = trace_pixel(vec2(texel) + 0.5);
     vec4 before = imageLoad(g_position, texel);
-    if (hit.distance < 0.0 || (before.w > 0.0 && dot(before.xyz - hit.position, hit.direction) <= 0.0)) {
+    bool missed =
+        hit.distance < 0.0 || (before.w > 0.0 && dot(before.xyz - hit.position, hit.direction) <= 0.0);
+    Surface surface;
+    if (!missed) {
+        surface = surface_of(hit);
+    }
+    if (loops_ended() || missed) {
         return;
     }
-    Surface surface = surface_of(hit);
     imageStore(g_position, texel, surface.position);
     imageStore(g_normal, texel, surface.normal);
     imageStore(g_color, texel, surface.color);

@@ -4,9 +4,14 @@
 
 void main() {
     Hit hit = trace_pixel(gl_FragCoord.xy);
-    if (hit.distance < 0.0) {
+    bool missed = hit.distance < 0.0;
+    Surface surface;
+    if (!missed) {
+        surface = surface_of(hit);
+    }
+    if (loops_ended() || missed) {
         discard;
     }
-    write_surface(surface_of(hit));
+    write_surface(surface);
     gl_FragDepth = window_depth(hit.position);
 }

@@ -1,6 +1,7 @@
 // The ray through a pixel against an implicit object (blobtree/tracing/rays.py); body of trace.frag and trace.comp.
 //@ include camera.glsl
 //@ include surface.glsl
+//@ include loop_guard.glsl
 // blobtree.tracing.tree_cells.TracingCells
 uniform sampler2D tape;
 uniform int tape_start;
@@ -9,6 +10,7 @@ uniform vec3 grid_lower;
 uniform float block_size;
 uniform ivec3 grid_counts;
 uniform float tolerance;
+uniform vec2 ray_part;
 
 vec4 tape_texel(sampler2D data, int i) {
     return texelFetch(data, ivec2(i & 4095, i >> 12), 0);

@@ -15,6 +15,7 @@ from blobtree.formulas.skeletons import (
     POINT,
     SKELETONS,
     box_to_point,
+    influence_near,
     squared_distances_to_ball,
 )
 from blobtree.kernels import KERNEL_OPTIONS
@@ -30,7 +31,9 @@ from blobtree.tape.codes import (
     WARP_REGISTERS,
 )
 from blobtree.tape.dispatch import (
+    clearance,
     closest,
+    depth,
     direct_stride,
     is_convex,
     min_influence,
@@ -73,7 +76,10 @@ def widened(r: wp.vec2) -> wp.vec2:
 def ball_range(kind: wp.int32, center: wp.vec3, half: wp.float32, tape: Texels, at: wp.int32) -> wp.vec2:
     """Return the range of a primitive over the ball around the cube center ± half."""
     c = closest(kind, center, tape, at)
-    distances = squared_distances_to_ball(center, half * HALF_DIAGONAL, c, min_influence(kind, tape, at))
+    inside = depth(kind, center, tape, at)
+    radius = half * HALF_DIAGONAL
+    smallest = influence_near(center, c, min_influence(kind, tape, at), clearance(kind, center, tape, at))
+    distances = squared_distances_to_ball(center, radius, c, smallest, inside)
     return falloff_range(distances[0], distances[1])
 
 
@@ -95,13 +101,14 @@ def distances_in_box(
     A convex skeleton lies behind the plane through its closest point across the way to it.
     """
     c = closest(kind, center, tape, at)
-    smallest = min_influence(kind, tape, at)
+    smallest = influence_near(center, c, min_influence(kind, tape, at), clearance(kind, center, tape, at))
     away = wp.abs(center - wp.vec3(c[0], c[1], c[2]))
     distance = wp.length(away)
     toward = radius
     if is_convex(kind) and distance > 0.0:
         toward = wp.min(radius, wp.dot(away, half) / distance)
-    farthest = wp.min(distance / c[3] + radius / smallest, wp.length(away + half) / c[3])
+    outside = wp.max(radius - wp.max(depth(kind, center, tape, at), 0.0), 0.0)
+    farthest = wp.min(distance / c[3] + outside / smallest, wp.length(away + half) / c[3])
     return wp.vec2(wp.max(distance / c[3] - toward / smallest, 0.0), farthest)
 
 

@@ -8,10 +8,19 @@ bracket the minima. No start value can lead to the wrong one of two minima.
 
 import warp as wp
 
-from blobtree.formulas.skeletons import JOINT_YIELD, TUBE_CELLS, Skeleton, min_influence_of_one
+from blobtree.formulas.skeletons import (
+    JOINT_YIELD,
+    TUBE_CELLS,
+    Skeleton,
+    distance_to_segment,
+    min_influence_of_one,
+)
 from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
+
+CHORDS = 6
+"""Chords that bound the distance from a curve."""
 
 ROOT_STEPS = 20
 """Most steps of a bracketed root: bisection alone then leaves an interval of 1e-6."""
@@ -283,6 +292,27 @@ def min_influence_of_curve(tape: Texels, at: wp.int32) -> wp.float32:
     return wp.min(start, wp.min(start + 0.5 * first, start + first + tape[at + 2][3]))
 
 
+@wp.func
+def clearance_of_curve(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
+    """Return a lower bound on the distance from a parabola, by chords of its pieces.
+
+    Over a piece of Δt it is at most |a| Δt² / 4 away from the chord, a being the coefficient of t². Nothing
+    is known of a cubic, whose influence is constant.
+    """
+    bend = tape[at + 2]
+    if tape[at + 1][3] == 0.0 and bend[3] == 0.0:
+        return 0.0
+    before = curve_point(0.0, tape, at)
+    least = float(1.0e30)
+    for k in range(CHORDS):
+        after = curve_point(float(k + 1) / float(CHORDS), tape, at)
+        a = wp.vec3(before[0], before[1], before[2])
+        least = wp.min(least, distance_to_segment(q, a, wp.vec3(after[0], after[1], after[2])))
+        before = after
+    sag = wp.length(wp.vec3(bend[0], bend[1], bend[2])) / float(4 * CHORDS * CHORDS)
+    return wp.max(least - sag, 0.0)
+
+
 JOINED_SEGMENT = Skeleton(
     "joined_segment",
     closest_on_joined_segment,
@@ -292,6 +322,13 @@ JOINED_SEGMENT = Skeleton(
     cells=TUBE_CELLS,
 )
 ARC = Skeleton("arc", closest_on_arc, min_influence_of_one, parameters=3, cells=TUBE_CELLS)
-CURVE = Skeleton("curve", closest_on_curve, min_influence_of_curve, parameters=4, cells=TUBE_CELLS)
+CURVE = Skeleton(
+    "curve",
+    closest_on_curve,
+    min_influence_of_curve,
+    parameters=4,
+    clearance=clearance_of_curve,
+    cells=TUBE_CELLS,
+)
 
 CURVE_SKELETONS = (JOINED_SEGMENT, ARC, CURVE)

@@ -24,6 +24,12 @@ The joint is not the closest point where the next skeleton has a closer one, but
 the distances: a closest point at a distance of 3e-4 along the skeleton has the same one.
 """
 
+INFLUENCE_MARGIN = wp.constant(1.0 - 1e-5)
+"""Lowers bounds on influences, for rounding and joints."""
+
+TINY = wp.constant(1e-30)
+"""Divides numbers that may be 0."""
+
 HALF_DIAGONAL = math.sqrt(3.0)
 """Distance from a cube's centre to its corners, in half sides."""
 
@@ -121,6 +127,20 @@ def closest_on_box(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
 
 
 @wp.func
+def depth_in_box(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
+    """Return the distance from the faces, below 0 outside."""
+    center = tape[at]
+    size = tape[at + 1]
+    return wp.min(
+        wp.min(
+            0.5 * size[0] - wp.abs(q[0] - center[0]),
+            0.5 * size[1] - wp.abs(q[1] - center[1]),
+        ),
+        0.5 * size[2] - wp.abs(q[2] - center[2]),
+    )
+
+
+@wp.func
 def min_influence_of_one(tape: Texels, at: wp.int32) -> wp.float32:
     """Return the influence radius of a skeleton that has one."""
     return tape[at][3]
@@ -133,13 +153,44 @@ def min_influence_of_cone(tape: Texels, at: wp.int32) -> wp.float32:
 
 
 @wp.func
+def clearance_of_cone(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
+    """Return the distance from the axis."""
+    start = tape[at]
+    end = tape[at + 1]
+    a = wp.vec3(start[0], start[1], start[2])
+    return distance_to_segment(q, a, a + wp.vec3(end[0], end[1], end[2]))
+
+
+@wp.func
+def distance_to_segment(q: wp.vec3, a: wp.vec3, b: wp.vec3) -> wp.float32:
+    """Return the distance of q from the line from a to b."""
+    way = b - a
+    t = wp.clamp(wp.dot(q - a, way) / wp.max(wp.dot(way, way), TINY), 0.0, 1.0)
+    return wp.length(q - a - way * t)
+
+
+@wp.func
+def influence_near(q: wp.vec3, c: wp.vec4, smallest: wp.float32, clearance: wp.float32) -> wp.float32:
+    """Return s such that u = |q − closest| / influence changes by at most 1 / s per unit away from q.
+
+    c is the closest point to q. Where no point of the skeleton is nearer than `clearance`, all ratios at a
+    distance r from q are at least u (1 − r / clearance), and the least is at most u + r / influence at c.
+    """
+    u = wp.length(q - wp.vec3(c[0], c[1], c[2])) / c[3]
+    return wp.max(smallest, wp.min(clearance / wp.max(u, TINY), c[3]) * INFLUENCE_MARGIN)
+
+
+@wp.func
 def squared_distances_to_ball(
-    center: wp.vec3, radius: wp.float32, c: wp.vec4, min_influence: wp.float32
+    center: wp.vec3, radius: wp.float32, c: wp.vec4, min_influence: wp.float32, depth: wp.float32
 ) -> wp.vec2:
-    """Bounds on (|x − skeleton| / influence)² over a ball, c being the skeleton's answer at its center."""
+    """Bounds on (|x − skeleton| / influence)² over a ball.
+
+    c and `depth` are the skeleton's answers at its center, `depth` 0 or less outside a solid one.
+    """
     distance = wp.length(center - wp.vec3(c[0], c[1], c[2])) / c[3]
     nearest = wp.max(distance - radius / min_influence, 0.0)
-    farthest = distance + radius / min_influence
+    farthest = distance + wp.max(radius - wp.max(depth, 0.0), 0.0) / min_influence
     return wp.vec2(nearest * nearest, farthest * farthest)
 
 
@@ -176,6 +227,10 @@ class Skeleton:
     """True for a convex set with one influence radius: distances along a ray are then convex."""
     cells: float = BALL_CELLS
     """Cells along the radius with which a mesh shows a thin primitive of this kind."""
+    clearance: wp.Function | float = 0.0
+    """Of a set whose influence varies: a lower bound on the distance of a point from it; 0 is unknown."""
+    depth: wp.Function | float = 0.0
+    """Of a solid set: a lower bound on the distance of a point inside from its rim, at most 0 outside."""
     digest: str = ""
     """Digest of the sources of a custom kind."""
 
@@ -189,10 +244,25 @@ POINT = Skeleton("point", closest_on_point, min_influence_of_one, parameters=1, 
 SEGMENT = Skeleton(
     "segment", closest_on_segment, min_influence_of_one, parameters=2, convex=True, cells=TUBE_CELLS
 )
-CONE = Skeleton("cone", closest_on_cone, min_influence_of_cone, parameters=2, cells=TUBE_CELLS)
+CONE = Skeleton(
+    "cone",
+    closest_on_cone,
+    min_influence_of_cone,
+    parameters=2,
+    clearance=clearance_of_cone,
+    cells=TUBE_CELLS,
+)
 CIRCLE = Skeleton("circle", closest_on_circle, min_influence_of_one, parameters=2, cells=TUBE_CELLS)
 DISC = Skeleton("disc", closest_on_disc, min_influence_of_one, parameters=2, convex=True, cells=PLATE_CELLS)
-BOX = Skeleton("box", closest_on_box, min_influence_of_one, parameters=2, folds_maps=False, convex=True)
+BOX = Skeleton(
+    "box",
+    closest_on_box,
+    min_influence_of_one,
+    parameters=2,
+    folds_maps=False,
+    convex=True,
+    depth=depth_in_box,
+)
 
 SKELETONS = (POINT, SEGMENT, CONE, CIRCLE, DISC, BOX)
 """Every kind; its index here is its code on the tape."""

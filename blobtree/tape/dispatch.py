@@ -53,6 +53,16 @@ def min_influence(kind: wp.int32, tape: Texels, at: wp.int32) -> wp.float32:
 
 
 @of_row("skeletons")
+def clearance(kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
+    """Return `Skeleton.clearance`."""
+
+
+@of_row("skeletons")
+def depth(kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
+    """Return `Skeleton.depth`."""
+
+
+@of_row("skeletons")
 def stride(kind: wp.int32) -> wp.int32:
     """Return the number of texels of a primitive: its parameters and its colour."""
 

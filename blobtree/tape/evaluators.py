@@ -12,6 +12,8 @@ Each evaluator is the set of functions over which the interpreter's loop is clos
   front;
 * `scale_speed(kind, q, speed, reach, tape, at)`: a bound on the speed behind the warp with parameters at
   tape[at] of a point that moves at most at `speed` in front of it;
+* `way(kind, q, ahead, speed, tape, at)`: the part of the way ahead on which a primitive of the skeleton at
+  tape[at] may change;
 * `combine(operator, a, b, reach, parameter, tape)`, and the `empty` field;
 * `paint(q, c, color, tape)`: the colour of a leaf at q, from its texel, for the three functions of leaves.
 
@@ -35,9 +37,11 @@ from blobtree.formulas.falloff import (
     falloff_slope_bound,
     falloff_steepest,
 )
+from blobtree.formulas.skeletons import TINY
 from blobtree.formulas.windows import box_window, box_window_bounds, windowed, windowed_bounds
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.dispatch import (
+    depth,
     falloff_numbers,
     falloff_slope,
     falloff_value,
@@ -187,6 +191,14 @@ def constant_speed(
     return speed
 
 
+@wp.func
+def whole_way(
+    kind: wp.int32, q: wp.vec3, ahead: wp.vec4, speed: wp.float32, tape: Texels, at: wp.int32
+) -> wp.vec4:
+    """Return `ahead`: results at a point alone do not depend on it."""
+    return ahead
+
+
 # -- value ----------------------------------------------------------------------------------------------
 
 
@@ -245,6 +257,25 @@ def value_combine(
 def bound_empty() -> wp.vec3:
     """Return the bounds of the empty field, which is 0 and flat."""
     return wp.vec3(0.0, 0.0, 0.0)
+
+
+@wp.func
+def way_outside(ahead: wp.vec4, inside: wp.float32, speed: wp.float32) -> wp.vec4:
+    """Return the way ahead without its part inside a solid skeleton, where the field is constant.
+
+    `inside` is the depth of its start in the skeleton, 0 or less outside.
+    """
+    if inside <= 0.0:
+        return ahead
+    return wp.vec4(ahead[0], ahead[1], ahead[2], wp.max(ahead[3] - inside / wp.max(speed, TINY), 0.0))
+
+
+@wp.func
+def bound_way(
+    kind: wp.int32, q: wp.vec3, ahead: wp.vec4, speed: wp.float32, tape: Texels, at: wp.int32
+) -> wp.vec4:
+    """Return the way ahead outside a solid skeleton."""
+    return way_outside(ahead, depth(kind, q, tape, at), speed)
 
 
 @wp.func
@@ -511,6 +542,7 @@ class Evaluator:
     empty: wp.Function
     type: Any
     paint: wp.Function = own_color
+    way: wp.Function = whole_way
 
 
 VALUE = Evaluator(
@@ -534,6 +566,7 @@ BOUND = Evaluator(
     bound_combine,
     bound_empty,
     wp.vec3,
+    way=bound_way,
 )
 GRADIENT = Evaluator(
     gradient_leaf,

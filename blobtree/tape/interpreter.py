@@ -7,6 +7,7 @@ from typing import Any
 
 import warp as wp
 
+from blobtree.formulas.skeletons import influence_near
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.codes import (
     FIELD,
@@ -20,7 +21,15 @@ from blobtree.tape.codes import (
     WARP,
     WARP_REGISTERS,
 )
-from blobtree.tape.dispatch import closest, direct_stride, is_convex, min_influence, stride, warp_forward
+from blobtree.tape.dispatch import (
+    clearance,
+    closest,
+    direct_stride,
+    is_convex,
+    min_influence,
+    stride,
+    warp_forward,
+)
 from blobtree.tape.evaluators import (
     BOUND,
     COLOR,
@@ -54,7 +63,7 @@ def make_interpreter(evaluator: Evaluator) -> wp.Function:
     leaf, direct, combine, empty = evaluator.leaf, evaluator.direct, evaluator.combine, evaluator.empty
     profiled_leaf = evaluator.profiled_leaf
     pullback_affine, pullback_warp = evaluator.pullback_affine, evaluator.pullback_warp
-    scale_speed, paint = evaluator.scale_speed, evaluator.paint
+    scale_speed, paint, way = evaluator.scale_speed, evaluator.paint, evaluator.way
     result_type = evaluator.type
     registers_type = _registers(result_type)
 
@@ -81,9 +90,11 @@ def make_interpreter(evaluator: Evaluator) -> wp.Function:
         at = first
         for _i in range(int(header[2])):
             c = closest(code, point, tape, at)
-            rate = speed / min_influence(code, tape, at)
+            smallest = min_influence(code, tape, at)
+            rate = speed / influence_near(point, c, smallest, clearance(code, point, tape, at))
+            outside = way(code, point, ahead, speed, tape, at)
             at += texels
-            f = leaf(point, c, paint(point, c, tape[at - 1], tape), ahead, rate)
+            f = leaf(point, c, paint(point, c, tape[at - 1], tape), outside, rate)
             accumulator = combine(operator, accumulator, f, reach, header[3], tape)
         return accumulator
 
@@ -108,10 +119,14 @@ def make_interpreter(evaluator: Evaluator) -> wp.Function:
             v = direction_to_local(direction, tape, at)
             if not is_convex(kind):
                 v = wp.vec3()
+            profile = tape[at + 3]
             ahead = wp.vec4(v[0], v[1], v[2], reach)
             c = closest(kind, local, tape, at + PREFIX)
-            profile = tape[at + 3]
-            rate = speed * profile[0] / min_influence(kind, tape, at + PREFIX)
+            smallest = min_influence(kind, tape, at + PREFIX)
+            local_speed = speed * profile[0]
+            apart = clearance(kind, local, tape, at + PREFIX)
+            ahead = way(kind, local, ahead, local_speed, tape, at + PREFIX)
+            rate = local_speed / influence_near(local, c, smallest, apart)
             end = at + PREFIX + stride(kind)
             color = paint(local, c, tape[end - 1], tape)
             f = empty()
@@ -240,7 +255,7 @@ def field_gradient(q: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.vec4:
 def field_bound(q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: Texels, span: wp.vec2i) -> wp.vec3:
     """Return (value at q, bound on the rise of the field, bound on its fall) along `direction` up to `reach`.
 
-    With a direction of 0 both bound |∇f| over the ball of radius `reach` about q.
+    With a direction of 0 both bound |f(x) − f(q)| / |x − q| for all x in the ball of radius `reach` about q.
     """
     return interpret_bound(q, direction, reach, tape, span)
 

@@ -57,6 +57,7 @@ BLOCK_OVERLAP = 0.1
     tape="tape",
     start="tape_start",
     blocks="blocks",
+    part="ray_part",
 )
 class RayCells:
     """`tree_cells.TracingCells` on one device; ``shaders/trace.glsl`` declares the fields as uniforms."""
@@ -68,6 +69,8 @@ class RayCells:
     tape: Texels
     start: wp.int32
     blocks: wp.array(dtype=wp.int32)
+    part: wp.vec2
+    """Start and end of the part of each ray that is traced, over its length in the grid: (0, 1) for all."""
 
 
 @wp.func
@@ -184,9 +187,10 @@ def trace_ray(origin: wp.vec3, direction: wp.vec3, cells: RayCells) -> wp.vec3:
     extent = cells.block_size * wp.vec3(float(counts[0]), float(counts[1]), float(counts[2]))
     interval = box_interval(origin, direction, cells.lower, cells.lower + extent)
     entry = origin + direction * interval[0]  # distances count from here, for the origin may be far away
-    last = interval[1] - interval[0]
+    length = interval[1] - interval[0]
+    last = length * cells.part[1]
     inverse = reciprocal(direction)
-    t = float(0.0)
+    t = length * cells.part[0]
     for _block in range(MAX_BLOCKS):
         if t > last:
             return wp.vec3(MISS, 0.0, 0.0)

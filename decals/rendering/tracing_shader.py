@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-from blobtree.formulas.skeletons import Skeleton
+import warp as wp
+
+from blobtree.formulas.skeletons import Skeleton, influence_near
 from blobtree.tape.codes import FIELD, POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP
 from blobtree.tape.dispatch import (
     directed_partials,
@@ -36,9 +38,11 @@ from blobtree.tape.evaluators import (
     COLOR,
     GRADIENT,
     Evaluator,
+    bound_way,
     direct_value_gradient,
     direction_to_local,
     to_local,
+    way_outside,
 )
 from blobtree.tape.instruction_set import BUILT_IN, InstructionSet
 from blobtree.tape.interpreter import field_bound, field_gradient
@@ -107,12 +111,14 @@ class Kinds:
 
 
 @lru_cache(maxsize=32)
-def tracing_shader(kinds: Kinds, backend: PassBackend = PassBackend.FRAGMENT) -> Source:
-    """``trace.frag`` or ``trace.comp`` with the cases of `kinds`."""
-    slots = tracing_slots(kinds)
+def tracing_shader(
+    kinds: Kinds, backend: PassBackend = PassBackend.FRAGMENT, *, guarded: bool = False
+) -> Source:
+    """``trace.frag`` or ``trace.comp`` with the cases of `kinds`; `guarded` ones report ended loops."""
+    slots, defines = tracing_slots(kinds), {"GUARDED": guarded}
     if backend is PassBackend.COMPUTE:
-        return compose("trace.comp", slots=slots, defines={"GROUP": GROUP}, version="430 core")
-    return compose("trace.frag", slots=slots)
+        return compose("trace.comp", slots=slots, defines={"GROUP": GROUP, **defines}, version="430 core")
+    return compose("trace.frag", slots=slots, defines=defines, version="420 core" if guarded else "330 core")
 
 
 def tracing_slots(kinds: Kinds, functions: Iterable[Any] = ()) -> dict[str, str | Source]:
@@ -145,6 +151,7 @@ def _library(kinds: Kinds, others: Iterable[Any]) -> str:
     skeletons = [kinds.instruction_set.skeletons[code] for code in kinds.skeletons]
     functions = [
         *(f for skeleton in skeletons for f in (skeleton.closest, skeleton.min_influence)),
+        *(f for one in skeletons for f in (one.depth, one.clearance) if isinstance(f, wp.Function)),
         *(f for choices in _choices(kinds).values() for f in choices.values()),
         *(
             f
@@ -157,6 +164,8 @@ def _library(kinds: Kinds, others: Iterable[Any]) -> str:
         *(_functions_along(kinds, skeletons) if kinds.directed else ()),
         to_local,
         direction_to_local,
+        way_outside,
+        influence_near,
         trace_ray,
         *others,
     ]
@@ -252,7 +261,8 @@ def _interpreter(name: str, evaluator: Evaluator, glsl_type: str, kinds: Kinds) 
         "COMBINE": evaluator.combine.key,
         "PRIMITIVE_COLOR": "tape_texel(tape, at - 1)" if colored else "vec4(0.0)",
     }
-    return _loop(kinds, defines, _run_cases(kinds), "vec4 w{i} = vec4(0.0);\n", _warp_cases)
+    runs = _run_cases(kinds, bounds=evaluator.way is bound_way)
+    return _loop(kinds, defines, runs, "vec4 w{i} = vec4(0.0);\n", _warp_cases)
 
 
 def _loop(
@@ -274,21 +284,44 @@ def _loop(
     return compose("interpreter.glsl", version=None, defines=defines, slots=slots)
 
 
-def _run_cases(kinds: Kinds) -> Iterable[str]:
-    """Return one loop per kind of skeleton, so that no loop branches on the kind."""
+def _run_cases(kinds: Kinds, *, bounds: bool) -> Iterable[str]:
+    """Return one loop per kind of skeleton, so that no loop branches on the kind.
+
+    Bounds on slopes read the depth in solid skeletons, and the distance from tapered ones.
+    """
     for code in kinds.skeletons:
         skeleton = kinds.instruction_set.skeletons[code]
-        names = {
-            "closest": skeleton.closest.key,
-            "min_influence": skeleton.min_influence.key,
-            "direction": "local_direction" if skeleton.convex else "vec3(0.0)",
-            "mapped": "direction_to_local(local_direction, tape, map)" if skeleton.convex else "vec3(0.0)",
-        }
-        yield _run_case(code, _RUN, stride=skeleton.stride, **names)
+        smallest = skeleton.min_influence.key
+        influence, mapped_influence = f"{smallest}(tape, at)", f"{smallest}(tape, map + {PREFIX})"
+        if bounds and isinstance(skeleton.clearance, wp.Function):
+            apart = skeleton.clearance.key
+            influence = f"influence_near(point, c, {influence}, {apart}(point, tape, at))"
+            mapped_influence = (
+                f"influence_near(local, c, {mapped_influence}, {apart}(local, tape, map + {PREFIX}))"
+            )
+        way, mapped_way = "vec4(0.0, 0.0, 0.0, reach)", "vec4(0.0, 0.0, 0.0, reach)"
+        if skeleton.convex:
+            way, mapped_way = (
+                "vec4(local_direction, reach)",
+                "vec4(direction_to_local(local_direction, tape, map), reach)",
+            )
+        if bounds and isinstance(skeleton.depth, wp.Function):
+            depth = skeleton.depth.key
+            way = f"way_outside({way}, {depth}(point, tape, at), speed)"
+            mapped_way = f"way_outside({mapped_way}, {depth}(local, tape, map + {PREFIX}), speed * profile.x)"
+        closest = skeleton.closest.key
+        yield _run_case(code, _RUN, stride=skeleton.stride, closest=closest, way=way, influence=influence)
         if kinds.stretched:
-            field = (_PROFILED_FIELD if kinds.falloffs else _MAPPED_FIELD).format(**names)
-            stride = skeleton.stride + PREFIX
-            yield _run_case(code + STRETCHED, _STRETCHED_RUN, stride=stride, field=field, **names)
+            field = _PROFILED_FIELD if kinds.falloffs else _MAPPED_FIELD
+            yield _run_case(
+                code + STRETCHED,
+                _STRETCHED_RUN,
+                stride=skeleton.stride + PREFIX,
+                field=field,
+                closest=closest,
+                way=mapped_way,
+                influence=mapped_influence,
+            )
     for code in kinds.fields:
         stride = kinds.instruction_set.fields[code].stride + PREFIX
         yield _run_case(code + FIELD, _DIRECT_RUN, stride=stride, kind=code)
@@ -385,9 +418,10 @@ _DIRECT_RUN_ALONG = """\
 
 _RUN = """\
         vec4 c = {closest}(point, tape, at);
-        float rate = speed / {min_influence}(tape, at);
+        float rate = speed / {influence};
+        vec4 ahead = {way};
         at += {stride};
-        FIELD field = LEAF(point, c, PRIMITIVE_COLOR, vec4({direction}, reach), rate);
+        FIELD field = LEAF(point, c, PRIMITIVE_COLOR, ahead, rate);
 """
 
 _STRETCHED_RUN = """\
@@ -395,17 +429,17 @@ _STRETCHED_RUN = """\
         vec3 local = to_local(point, tape, map);
         vec4 c = {closest}(local, tape, map + {prefix});
         vec4 profile = tape_texel(tape, map + {prefix} - 1);
-        float rate = speed * profile.x / {min_influence}(tape, map + {prefix});
+        float rate = speed * profile.x / {influence};
+        vec4 ahead = {way};
         at += {stride};
         FIELD field = {field};
         field = PULLBACK_AFFINE(field, tape, map);
 """
 
-_MAPPED_FIELD = "LEAF(local, c, PRIMITIVE_COLOR, vec4({mapped}, reach), rate)"
+_MAPPED_FIELD = "LEAF(local, c, PRIMITIVE_COLOR, ahead, rate)"
 
 _PROFILED_FIELD = (
-    f"profile.z == 0.0 ? {_MAPPED_FIELD}"
-    " : PROFILED_LEAF(local, c, PRIMITIVE_COLOR, vec4({mapped}, reach), rate, profile)"
+    f"profile.z == 0.0 ? {_MAPPED_FIELD} : PROFILED_LEAF(local, c, PRIMITIVE_COLOR, ahead, rate, profile)"
 )
 
 

@@ -11,14 +11,18 @@ from blobtree.tracing.tree_cells import TracingCells, tracing_cells
 from decals.rendering.context import Context
 from decals.rendering.data_texture import DataTexture
 from decals.rendering.gbuffer import GBuffer
+from decals.rendering.loop_guard import LoopGuard, is_guarded
 from decals.rendering.pixel_pass import GROUP, PassBackend, Program, attach_camera, draw, set_uniform
 from decals.rendering.tracing_shader import Kinds, tracing_shader
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile
 from decals.rendering.warmup import SHADERS, SHAPES, WarmupPlan, WarmupTask
-from decals.shaders import compose
+from decals.shaders import Source, compose
 
 BOX_VERTICES = 36
 """Vertices of the triangles in ``box.vert``."""
+
+RAY_PARTS = (1, 8, 64, 512)
+"""Parts in which rays are traced, one drawing each: the first number for which no loop is ended."""
 
 POSITION_UNIT, NORMAL_UNIT, COLOR_UNIT = range(3)
 """Image units of ``trace.comp``."""
@@ -49,6 +53,7 @@ class TreeDrawable:
         self._uniforms = {**tracing_uniforms(cells), "tape": 0, "blocks": 1}
         self._gl = context.gl
         self._program = tracing_program(context, self.kinds)
+        self._guard = LoopGuard(context)
         self._box: moderngl.VertexArray | None = None
         if isinstance(self._program, moderngl.Program):
             self._box = context.gl.vertex_array(self._program, [])
@@ -59,7 +64,7 @@ class TreeDrawable:
         tree, kinds = item.tree, Kinds.of(item.tree.tape)
         tasks = (
             WarmupTask(SHAPES, lambda: tracing_cells(tree), threaded=True),
-            WarmupTask(SHADERS, lambda: tracing_shader(kinds, context.backend)),
+            WarmupTask(SHADERS, lambda: _source(context, kinds)),
             WarmupTask(SHADERS, lambda: tracing_program(context, kinds)),
         )
         return WarmupPlan(kinds, tasks)
@@ -80,6 +85,16 @@ class TreeDrawable:
             texture.use(unit)
         for name, value in {**self._uniforms, "object_id": object_id}.items():
             set_uniform(self._program, name, value)
+        for count in RAY_PARTS:
+            self._guard.use(self._program)
+            for number in range(count):
+                set_uniform(self._program, "ray_part", (number / count, (number + 1) / count))
+                self._trace(tile, gbuffer, part)
+            if not self._guard.ended:
+                return
+
+    def _trace(self, tile: Tile, gbuffer: GBuffer, part: Part) -> None:
+        """Trace these rays once; hits behind others are hidden."""
         if self._box is not None:
             gbuffer.use(tile.width, tile.height, part)
             draw_box(self._gl, self._program, self._box, self._bounds)
@@ -103,6 +118,7 @@ class TreeDrawable:
         """Release the memory."""
         for texture in self._textures:
             texture.release()
+        self._guard.release()
         if self._box is not None:
             self._box.release()
 
@@ -122,10 +138,14 @@ def draw_box(gl: moderngl.Context, program: Program, box: moderngl.VertexArray, 
 
 def tracing_program(context: Context, kinds: Kinds) -> Program:
     """Return the program that traces trees of these kinds, for the context's backend."""
-    source = tracing_shader(kinds, context.backend)
+    source = _source(context, kinds)
     if context.backend is PassBackend.COMPUTE:
         return attach_camera(context.compute_program(source))
     return attach_camera(context.program(compose("box.vert"), source))
+
+
+def _source(context: Context, kinds: Kinds) -> Source:
+    return tracing_shader(kinds, context.backend, guarded=is_guarded(context))
 
 
 def tracing_uniforms(cells: TracingCells) -> dict[str, object]:
@@ -136,6 +156,7 @@ def tracing_uniforms(cells: TracingCells) -> dict[str, object]:
         "grid_counts": cells.counts,
         "tolerance": cells.tolerance,
         "tape_start": cells.start,
+        "ray_part": (0.0, 1.0),
     }
 
 

@@ -145,8 +145,12 @@ def test_no_field_rises_faster_than_its_bound(batch: Batch) -> None:
 
 @EVERY_BATCH
 def test_no_gradient_inside_a_ball_is_longer_than_its_bound(batch: Batch) -> None:
+    """Tapered primitives are left out: only the change from the centre of the ball is bounded there."""
     rng = np.random.default_rng(batch.start)
     for tree, points in batch.cases:
+        skeletons = (tree.tape.instruction_set.skeletons[code] for code in tree.tape.skeletons)
+        if any(skeleton.clearance for skeleton in skeletons):
+            continue
         reach = (10.0 ** rng.uniform(-3.0, 0.5, POINTS)).astype(np.float32)
         direction = rng.normal(size=(POINTS, 3))
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)

@@ -1,0 +1,48 @@
+"""Pictures of sharp CSG show the surface wherever rays in float64 are inside."""
+
+import numpy as np
+import pytest
+
+from blobtree import Box, Node
+from decals.rendering.renderer import Renderer
+from tests.bench.trust_csg import holes_of, visible_tree
+from tests.blobtree.csg_trees import PRIMITIVES, csg_primitive
+
+SIZE = (48, 36)
+DIRECTION = np.array([0.3, 0.5, 1.0])
+
+
+def carved(kind: str, radius: float, operation: str) -> Node:
+    """A box that a primitive of a kind cuts, limits or joins."""
+    body, shape = (
+        Box((0, 0, 0), (1.2, 1, 0.8), radius=radius),
+        csg_primitive(np.random.default_rng(5), kind, radius),
+    )
+    return {"difference": body - shape, "intersection": body & shape, "union": body | shape}[operation]
+
+
+CASES = [
+    (kind, radius, operation)
+    for kind in PRIMITIVES
+    for radius in (0.1, 1e-3, 1e-5)
+    for operation in ("difference", "intersection", "union")
+]
+ORDINARY = {("box", 1e-3, "difference"), ("cylinder", 1e-5, "difference"), ("polygon", 1e-3, "intersection")}
+
+
+@pytest.mark.parametrize(
+    ("kind", "radius", "operation"),
+    [pytest.param(*case, marks=() if case in ORDINARY else pytest.mark.slow) for case in CASES],
+)
+def test_no_pixel_of_sharp_csg_misses(fragment: Renderer, kind: str, radius: float, operation: str) -> None:
+    holes = holes_of(carved(kind, radius, operation), DIRECTION, fragment, SIZE)
+    assert holes.of_picture == holes.of_rays == 0
+    assert operation == "intersection" or holes.pixels > 200
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8))
+def test_no_pixel_of_random_csg_misses(fragment: Renderer, seed: int) -> None:
+    rng = np.random.default_rng([7, seed])
+    holes = holes_of(visible_tree(rng, 1 + seed % 4), rng.normal(size=3), fragment, SIZE)
+    assert holes.of_picture == holes.of_rays == 0
