@@ -67,6 +67,27 @@ float wp_atan2(float y, float x) {
     angle = x < 0.0 ? 3.14159265359 - angle : angle;
     return y < 0.0 ? -angle : angle;
 }
+float wp_round(float x) { float t = trunc(x); return abs(x - t) >= 0.5 ? t + sign(x) : t; }
+float wp_cbrt(float x) {
+    float r = pow(abs(x), 0.33333334);
+    r -= r > 0.0 ? (r - abs(x) / (r * r)) / 3.0 : 0.0;
+    return x < 0.0 ? -r : r;
+}
+float wp_tanh(float x) {
+    float z = x * x;
+    float series = (((0.0218694885 * z - 0.0539682540) * z + 0.133333333) * z - 0.333333333) * z * x + x;
+    float e = exp(-2.0 * abs(x));
+    float far = (1.0 - e) / (1.0 + e);
+    return z < 0.0625 ? series : (x < 0.0 ? -far : far);
+}
+float wp_sinh(float x) {
+    float z = x * x;
+    float series = (((2.75573192e-6 * z + 1.98412698e-4) * z + 8.33333333e-3) * z + 0.166666667) * z * x + x;
+    float e = exp(0.5 * abs(x));
+    float far = 0.5 * e * e - 0.5 / (e * e);
+    return z < 1.0 ? series : (x < 0.0 ? -far : far);
+}
+float wp_cosh(float x) { float e = exp(0.5 * abs(x)); return 0.5 * e * e + 0.5 / (e * e); }
 #define ivec4_sampler isampler2D
 
 """
@@ -74,8 +95,9 @@ float wp_atan2(float y, float x) {
 
 Warp normalises the zero vector to zero, where `normalize` of GLSL is undefined. GLSL's own functions of
 angles have errors of 1e-6 and more in drivers (4096 units in the last place are allowed), so all of them use
-a polynomial here (Moshier 1989, Cephes, atanf), whose error is 2e-7. Textures of integers have one type in
-GLSL and two names here, because their elements are an int or an ivec4.
+a polynomial here (Moshier 1989, Cephes, atanf), whose error is 2e-7. Hyperbolic functions are series near 0,
+where their exponentials cancel, and stay finite as long as float32 holds their result. Textures of integers
+have one type in GLSL and two names here, because their elements are an int or an ivec4.
 """
 
 
@@ -119,7 +141,13 @@ def _template(pattern: str, result: str | None = None) -> Callable[..., Expressi
 
 BUILTINS: dict[str, Callable[..., Expression]] = {
     **{name: _same(name) for name in ("abs", "ceil", "clamp", "cross", "exp", "floor", "log", "max", "min")},
-    **{name: _same(name) for name in ("cos", "pow", "sin", "sqrt", "tan", "trunc")},
+    **{name: _same(name) for name in ("cos", "degrees", "log2", "pow", "radians", "sin", "sqrt", "tan")},
+    **{name: _same(f"wp_{name}") for name in ("cbrt", "cosh", "round", "sinh", "tanh")},
+    "trunc": _same("trunc"),
+    "rint": _same("roundEven"),
+    "frac": _template("({0} - trunc({0}))"),
+    "log10": _template("(log({0}) * 0.4342944819)"),
+    "step": _template("({0} < 0.0 ? 1.0 : 0.0)"),
     **{name: _scalar(name) for name in ("dot", "length")},
     "acos": _template("wp_atan2(sqrt((1.0 - {0}) * (1.0 + {0})), {0})"),
     "asin": _template("wp_atan2({0}, sqrt((1.0 - {0}) * (1.0 + {0})))"),

@@ -50,6 +50,15 @@ RULES: dict[str, Rule] = {
         "wp.where({0} == 0.0, wp.where({1} == 1.0, {d}, 0.0), {1} * wp.pow({0}, {1} - 1.0) * {d})",
         "wp.where({0} > 0.0, {r} * wp.log({0}) * {d}, 0.0)",
     ),
+    "log2": _function("{d} / ({0} * 0.6931471806)"),
+    "log10": _function("{d} / ({0} * 2.302585093)"),
+    "cbrt": _function("wp.where({r} != 0.0, {d} / (3.0 * {r} * {r}), 0.0)"),
+    "frac": _function("{d}"),
+    "degrees": _function("wp.degrees({d})"),
+    "radians": _function("wp.radians({d})"),
+    "sinh": _function("wp.cosh({0}) * {d}"),
+    "cosh": _function("wp.sinh({0}) * {d}"),
+    "tanh": _function("(1.0 - {r} * {r}) * {d}"),
     "sin": _function("wp.cos({0}) * {d}"),
     "cos": _function("-(wp.sin({0}) * {d})"),
     "tan": _function("(1.0 + {r} * {r}) * {d}"),
@@ -80,7 +89,7 @@ RULES: dict[str, Rule] = {
 }
 """Rules by the names of Warp's functions, and by the signs of operators."""
 
-STEPS = frozenset({"ceil", "floor", "sign", "trunc"})
+STEPS = frozenset({"ceil", "floor", "rint", "round", "sign", "step", "trunc"})
 """Functions whose derivative is 0 wherever they have one; their results have the type of their argument."""
 
 CASTS: dict[str, type] = {"float32": wp.float32, "int32": wp.int32, "uint32": wp.uint32}

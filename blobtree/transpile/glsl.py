@@ -389,8 +389,10 @@ class _Translator:
                 return Expression(str(value), "int")
             case float():
                 return Expression(repr(value), "float")
+            case wp.int32() | wp.float32():
+                return self.literal(node, value.value)
             case wp.uint32():
-                return Expression(f"{value.value}u", "uint")
+                return Expression(f"{value.value % (1 << 32)}u", "uint")
             case _:
                 raise self.refusal(node, f"{ast.unparse(node)} is no number")
 

@@ -54,9 +54,21 @@ def _whole_vector(size: int) -> Callable[..., NDArray[np.int64]]:
     return lambda *components: np.array(components or (0,) * size, np.int64)
 
 
+def _round(x: Any) -> Any:
+    """Return the nearest whole number, and of two the one away from 0."""
+    whole = np.trunc(x)
+    return whole + np.sign(x) if abs(x - whole) >= 0.5 else whole
+
+
+def _whole_of_32_bits(x: Any) -> int:
+    """Return a whole number as devices keep it: from −2³¹ to 2³¹ − 1."""
+    return (int(x) + (1 << 31)) % (1 << 32) - (1 << 31)
+
+
 _MATHS: dict[str, Callable[..., Any]] = {
     **{name: getattr(np, name) for name in ("abs", "ceil", "cos", "cross", "dot", "exp", "floor", "log")},
-    **{name: getattr(np, name) for name in ("sin", "sqrt", "tan", "trunc")},
+    **{name: getattr(np, name) for name in ("cbrt", "cosh", "degrees", "log2", "log10", "radians", "rint")},
+    **{name: getattr(np, name) for name in ("sin", "sinh", "sqrt", "tan", "tanh", "trunc")},
     **{name: getattr(np, "arc" + name[1:]) for name in ("acos", "asin", "atan", "atan2")},
     "clamp": lambda x, low, high: np.minimum(np.maximum(x, low), high),
     "cw_div": np.divide,
@@ -68,10 +80,13 @@ _MATHS: dict[str, Callable[..., Any]] = {
     "min": np.minimum,
     "normalize": _normalize,
     "pow": np.power,
+    "frac": lambda x: x - np.trunc(x),
+    "round": _round,
     "sign": lambda x: -1.0 if x < 0.0 else 1.0,
+    "step": lambda x: 1.0 if x < 0.0 else 0.0,
     "where": lambda condition, chosen, other: chosen if condition else other,
-    "int32": int,
-    "uint32": np.uint32,
+    "int32": _whole_of_32_bits,
+    "uint32": lambda x: np.uint32(int(x) % (1 << 32)),
     "bool": bool,
     **{f"vec{size}i": _whole_vector(size) for size in (2, 3, 4)},
 }
@@ -196,6 +211,8 @@ class _PythonTranslation:
             return self._warp
         if id(value) in self._stand_ins:
             return self._stand_ins[id(value)]
+        if isinstance(value, wp.uint32 | wp.int32 | wp.float32):
+            return self._stand_ins[id(type(value))](value.value)
         if isinstance(value, wp.Function) and isinstance(value.func, FunctionType):
             return self.function(value.func)
         return value

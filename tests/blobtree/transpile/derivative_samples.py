@@ -27,6 +27,14 @@ def real_functions(x: wp.float32, y: wp.float32) -> wp.float32:
 
 
 @wp.func
+def more_functions(x: wp.float32, y: wp.float32) -> wp.float32:
+    positive = wp.abs(y) + 0.4
+    r = wp.sinh(x) + wp.cosh(0.7 * y) * wp.tanh(x * y) + wp.log2(positive) - wp.log10(positive + 1.0)
+    r += wp.cbrt(x) + wp.cbrt(-positive) + wp.degrees(0.01 * x) + wp.radians(x * y) + wp.frac(y)
+    return r + wp.round(x) * wp.rint(y) + wp.step(x)
+
+
+@wp.func
 def vectors(v: wp.vec3, w: wp.vec3, s: wp.float32) -> wp.vec3:
     a = wp.cross(v, w) + wp.cw_mul(v, w) - wp.cw_div(v, w + wp.vec3(4.0, 5.0, 6.0)) * s
     b = wp.normalize(v) * wp.dot(v, w) + wp.vec3(wp.length(w), wp.length_sq(v), s)

@@ -12,6 +12,8 @@ from blobtree.transpile.specialize import RowChoice
 
 wp.set_module_options({"enable_backward": False})
 
+NEGATIVE = wp.constant(wp.uint32(-257))
+
 
 @wp.func
 def whole_numbers(x: wp.float32, y: wp.float32) -> wp.float32:
@@ -31,6 +33,20 @@ def real_numbers(x: wp.float32, y: wp.float32) -> wp.float32:
     r %= 3.0
     r += wp.acos(wp.clamp(x, -1.0, 1.0)) + wp.asin(wp.clamp(y, -1.0, 1.0)) + wp.lerp(x, y, 0.3)
     return wp.where(x > y, r, wp.min(r, 2.0) + wp.max(r, wp.float32(1)))
+
+
+@wp.func
+def more_real_numbers(x: wp.float32, y: wp.float32) -> wp.float32:
+    r = wp.sinh(x) + wp.cosh(y) * wp.tanh(0.5 * x) + wp.tanh(40.0 * y) + wp.cbrt(x) + wp.cbrt(0.0)
+    r += wp.log2(wp.abs(x) + 1.0) + wp.log10(wp.abs(y) + 1.0) + wp.degrees(x) - wp.radians(y)
+    return r + wp.frac(3.0 * x) + wp.round(3.0 * y) + wp.rint(5.0 * x) + wp.round(-2.5) + wp.step(x)
+
+
+@wp.func
+def unsigned(x: wp.float32, y: wp.float32) -> wp.float32:
+    h = wp.uint32(-5) ^ wp.uint32(int(100.0 * x))
+    h = (h >> wp.uint32(3)) & NEGATIVE
+    return float(int(h % wp.uint32(1000))) + float(wp.int32(wp.uint32(-7)))
 
 
 @wp.func

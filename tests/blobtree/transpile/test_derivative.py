@@ -34,6 +34,7 @@ FORMULAS = [
 ]
 SAMPLES: list[Any] = [
     samples.real_functions,
+    samples.more_functions,
     samples.vectors,
     samples.four,
     samples.loops,

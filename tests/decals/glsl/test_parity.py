@@ -1,5 +1,6 @@
 """Every typed function that shaders share, in Warp and GLSL, on the same numbers."""
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -53,6 +54,8 @@ OF_WARP_ALONE = {"operator_choice", "operator_range", "starts_from_zero", "unkno
 
 WRITTEN_TWICE = {
     "closest",
+    "depth",
+    "clearance",
     "min_influence",
     "stride",
     "is_convex",
@@ -162,3 +165,47 @@ def test_angles_are_as_exact_as_float32(context: Context) -> None:
     share = np.clip(x, -1.0, 1.0)
     exact = np.stack([np.arctan2(y, x), np.arctan(y), np.arcsin(share), np.arccos(share)], axis=1)
     np.testing.assert_allclose(seen, exact, rtol=5e-7, atol=5e-7)
+
+
+NUMBERS = """#version 330 core
+uniform sampler2D points;
+out vec4 result;
+void main() {
+    float x = texelFetch(points, ivec2(gl_FragCoord.xy), 0).x;
+    result = vec4(%s);
+}
+"""
+MORE_MATHS: dict[str, Callable[[Any], Any]] = {
+    "sinh": np.sinh,
+    "cosh": np.cosh,
+    "tanh": np.tanh,
+    "cbrt": np.cbrt,
+    "round": lambda x: np.trunc(x + np.copysign(0.5, x)),
+    "rint": np.rint,
+    "frac": lambda x: x - np.trunc(x),
+    "step": lambda x: np.where(x < 0.0, 1.0, 0.0),
+    "degrees": np.degrees,
+    "radians": np.radians,
+    "log2": lambda x: np.log2(np.abs(x)),
+    "log10": lambda x: np.log10(np.abs(x)),
+}
+
+
+def test_more_maths_is_as_exact_as_float32(context: Context) -> None:
+    """Beside 0, where exponentials cancel; at halves, where numbers are rounded; and where float32 ends."""
+    rng = np.random.default_rng(1)
+    points = np.zeros((4000, 4), np.float32)
+    points[:, 0] = rng.normal(size=4000) * 10.0 ** rng.uniform(-6.0, 1.3, 4000)
+    points[:10, 0] = (-2.5, -1.5, -0.5, 0.5, 1.5, 2.5, 0.49999997, -0.49999997, 88.0, -88.0)
+    x = points[:, 0].astype(np.float64)
+    for names in np.array_split(np.array(list(MORE_MATHS)), 3):
+        calls = [
+            BUILTINS[name](Expression("abs(x)" if name.startswith("log") else "x", "float")).code
+            for name in names
+        ]
+        source = NUMBERS.replace("uniform", HELPERS + "uniform", 1) % ", ".join(calls)
+        seen = run_program(context, source, len(points), {"points": points}, {})
+        exact = np.stack([MORE_MATHS[name](x) for name in names], axis=1)
+        for column, name in enumerate(names):
+            wrong = ~np.isclose(seen[:, column], exact[:, column], rtol=3e-6, atol=2e-7)
+            assert not wrong.any(), (name, x[wrong][:3], seen[wrong, column][:3], exact[wrong, column][:3])
