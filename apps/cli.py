@@ -13,6 +13,7 @@ from cyclopts import App, CycloptsError, MissingArgumentError, UnusedCliTokensEr
 from rich.console import Console
 from rich.markup import escape
 
+from blobtree.errors import UnusableFile
 from decals.errors import ImplicitDecalsError
 
 BAD_INPUT = 2
@@ -181,6 +182,8 @@ def run(tokens: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         Console(stderr=True).print("interrupted")
         return INTERRUPTED
+    except UnusableFile as error:
+        return _print_error(str(error))
     except OSError as error:
         return _print_error(f"{error.strerror or error}: {error.filename or 'a file'}")
     except UnusedCliTokensError as error:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from blobtree.files import make_folder
+from blobtree.files import is_folder, is_read_only, is_too_long, make_folder
 from decals.errors import InvalidInput
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
@@ -19,8 +19,12 @@ def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
     InvalidInput
         If the extension is unknown, the folder missing or read-only, or the path a folder.
     """
-    if path.is_dir():
+    if is_too_long(path):
+        raise InvalidInput(f"expected a shorter name of an output file, got {path.name!r:.80}; rename it")
+    if is_folder(path):
         raise InvalidInput(f"expected a file to write, {str(path)!r} is a folder; add a file name")
+    if is_read_only(path):
+        raise InvalidInput(f"the output file {str(path)!r} is read-only; choose another name")
     if path.suffix.lower() not in suffixes:
         known = " or ".join(suffixes)
         raise InvalidInput(f"expected an output file that ends in {known}, got {str(path)!r}; rename it")
@@ -29,7 +33,7 @@ def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
 
 def check_animation(path: Path, suffixes: tuple[str, ...]) -> None:
     """Check that a folder of pictures, or a file of one of these formats, can be written; make the folder."""
-    if path.suffix and not path.is_dir():
+    if path.suffix and not is_folder(path):
         check_output(path, suffixes)
     else:
         make_folder(path, InvalidInput)
@@ -37,7 +41,7 @@ def check_animation(path: Path, suffixes: tuple[str, ...]) -> None:
 
 
 def _check_writable(folder: Path) -> None:
-    if not folder.is_dir():
+    if not is_folder(folder):
         raise InvalidInput(f"the output folder {str(folder)!r} does not exist; create it first")
     try:
         tempfile.TemporaryFile(dir=folder).close()  # permissions alone are no proof

@@ -14,11 +14,13 @@ from .errors import (
     InvalidNode,
     InvalidPoints,
     InvalidResolution,
+    MissingFile,
     MissingPackage,
     NoGraphics,
     UnknownKind,
     UntranslatableFunction,
     UnusableCache,
+    UnusableFile,
 )
 from .fitting import Fit, fit
 from .formulas.falloff import ISO, RIM, Falloff
@@ -123,6 +125,7 @@ __all__ = [
     "Masked",
     "Mesh",
     "Mirror",
+    "MissingFile",
     "MissingPackage",
     "NoGraphics",
     "Node",
@@ -168,6 +171,7 @@ __all__ = [
     "UnknownKind",
     "UntranslatableFunction",
     "UnusableCache",
+    "UnusableFile",
     "Volume",
     "__version__",
     "define_falloff",

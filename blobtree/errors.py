@@ -15,11 +15,17 @@
     │   └── (decals.errors adds its own)
     ├── MissingPackage(ImportError)           an optional package is not installed
     ├── NoGraphics(RuntimeError)              no usable OpenGL or no screen; the message says what to do
+    ├── UnusableFile(OSError)                 a file that the system does not read or write
+    │   └── MissingFile(FileNotFoundError)    a file or a folder that does not exist
     ├── UnusableCache                         the folder of compiled kernels cannot be written
     └── Cancelled                             the caller's `cancel` stopped the work
 
 A message says what was expected, what came, and what to do.
 """
+
+import errno
+import os
+from typing import Literal
 
 
 class ImplicitDecalsError(Exception):
@@ -68,6 +74,48 @@ class MissingPackage(ImplicitDecalsError, ImportError):
 
 class NoGraphics(ImplicitDecalsError, RuntimeError):
     """No usable OpenGL on this machine, or no screen for a window; the message says what to do."""
+
+
+class UnusableFile(ImplicitDecalsError, OSError):
+    """A file that the system does not read or write, with the number, reason and path of an OSError."""
+
+    action: Literal["read", "write"] = "read"
+
+    @classmethod
+    def of(
+        cls, error: OSError, path: "str | os.PathLike[str]", action: Literal["read", "write"]
+    ) -> "UnusableFile":
+        """Return the exception for an error of the system at a path."""
+        number = error.errno or errno.EIO
+        kind = MissingFile if number == errno.ENOENT else UnusableFile
+        result = kind(number, error.strerror or str(error), os.fspath(path))
+        result.action = action
+        return result
+
+    def __str__(self) -> str:
+        advice = _ADVICE.get(self.errno or 0, "check the disk")
+        if self.errno == errno.ENOENT:
+            advice = "create its folder first" if self.action == "write" else "check its name"
+        return f"could not {self.action} {self.filename!r} ({self.strerror}); {advice}"
+
+
+class MissingFile(UnusableFile, FileNotFoundError):
+    """A file, or the folder for a file, that does not exist."""
+
+
+_ADVICE = {
+    errno.ENAMETOOLONG: "choose a shorter name",
+    errno.ENOSPC: "free space on the disk",
+    errno.EFBIG: "free space on the disk",
+    errno.EISDIR: "add the name of a file",
+    errno.ENOTDIR: "choose another folder",
+    errno.EACCES: "choose another folder, or change the permissions",
+    errno.EPERM: "choose another folder, or change the permissions",
+    errno.EROFS: "choose another folder",
+    errno.EINVAL: "choose another name",
+}
+if hasattr(errno, "EDQUOT"):
+    _ADVICE[errno.EDQUOT] = "free space on the disk"
 
 
 class UnusableCache(ImplicitDecalsError):

@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
-from blobtree.errors import ImplicitDecalsError
+from blobtree.errors import ImplicitDecalsError, UnusableFile
 
 PREFIX = ".implicit-decals-"
 """Start of the name of a temporary file; the machine, the process and a random part follow."""
@@ -38,7 +38,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
 
     Raises
     ------
-    OSError
+    UnusableFile
         The file cannot be written; the error names ``path``, not the temporary file.
     """
     name = os.fspath(path)
@@ -55,11 +55,12 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         foreign = error.filename is not None and str(error.filename) not in (str(temporary), str(target))
         if foreign:  # of another file that the caller used
             raise
-        raise OSError(error.errno or errno.EIO, error.strerror or str(error), name) from error
+        raise UnusableFile.of(error, name, "write") from error
     except ValueError as error:
         if temporary is not None:
             raise
-        raise OSError(errno.EINVAL, f"not a possible path ({error})", name) from error
+        cause = OSError(errno.EINVAL, f"not a possible path ({error})")
+        raise UnusableFile.of(cause, name, "write") from error
     finally:
         if temporary is not None:
             _remove_all_of(temporary)
@@ -77,7 +78,7 @@ def _check_target(target: Path) -> None:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
     if target.exists() and not target.is_file():
         raise OSError(errno.EINVAL, "a device or pipe cannot be replaced by a file", str(target))
-    if target.exists() and not os.access(target, os.W_OK):
+    if is_read_only(target):
         raise PermissionError(errno.EACCES, "the file is read-only", str(target))
 
 
@@ -143,3 +144,35 @@ def make_folder(folder: Path, error: type[ImplicitDecalsError]) -> None:
     except (OSError, ValueError) as cause:
         reason = "it is a file" if isinstance(cause, FileExistsError) else getattr(cause, "strerror", cause)
         raise error(f"could not make the output folder {str(folder)!r} ({reason}); choose another") from cause
+
+
+def exists(path: str | os.PathLike[str]) -> bool:
+    """Return True if there is something at a path; False for an impossible one, too long or with a NUL."""
+    return os.path.exists(path)  # noqa: PTH110 - that of `Path` raises errors
+
+
+def is_file(path: str | os.PathLike[str]) -> bool:
+    """Return True for an existing file; False also for an impossible path."""
+    return os.path.isfile(path)  # noqa: PTH113
+
+
+def is_folder(path: str | os.PathLike[str]) -> bool:
+    """Return True for an existing folder; False also for an impossible path."""
+    return os.path.isdir(path)  # noqa: PTH112
+
+
+def is_too_long(path: str | os.PathLike[str]) -> bool:
+    """Return True if the file system takes no name of this length."""
+    try:
+        os.lstat(path)
+    except OSError as error:
+        return error.errno == errno.ENAMETOOLONG
+    except ValueError:
+        return False
+    return False
+
+
+def is_read_only(path: str | os.PathLike[str]) -> bool:
+    """Return True for an existing file that this user may not write."""
+    effective = os.access in os.supports_effective_ids
+    return is_file(path) and not os.access(path, os.W_OK, effective_ids=effective)

@@ -25,7 +25,7 @@ from blobtree.custom.field import CustomField
 from blobtree.custom.operator import CustomCombination
 from blobtree.custom.skeleton import CustomPrimitive
 from blobtree.custom.warp import CustomWarp
-from blobtree.errors import ImplicitDecalsError, InvalidFile
+from blobtree.errors import ImplicitDecalsError, InvalidFile, UnusableFile
 from blobtree.files import write_atomically
 from blobtree.formulas.falloff import Falloff
 from blobtree.json_errors import json_reason
@@ -237,7 +237,7 @@ def save(root: Node, path: str | os.PathLike[str]) -> None:
         `root` is not a node.
     InvalidFile
         `path` is not the path of a file.
-    OSError
+    UnusableFile
         The file cannot be written.
 
     Examples
@@ -269,8 +269,8 @@ def load(path: str | os.PathLike[str]) -> Node:
     ------
     InvalidFile
         The file holds no valid tree, or names a custom kind that is not defined.
-    OSError
-        The file cannot be read.
+    UnusableFile
+        The file cannot be read; a `MissingFile` if it does not exist.
 
     Examples
     --------
@@ -284,6 +284,8 @@ def load(path: str | os.PathLike[str]) -> Node:
     path = _checked_path(path)
     try:
         return from_json(Path(path).read_bytes())
+    except OSError as error:
+        raise UnusableFile.of(error, path, "read") from error
     except InvalidFile as error:
         raise InvalidFile(f"{path}: {error}") from None
     except ValueError:  # of the path; a text that is no tree is an InvalidFile

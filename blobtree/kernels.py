@@ -29,7 +29,7 @@ import warp as wp
 
 from blobtree.errors import UnusableCache
 from blobtree.file_lock import FileLock
-from blobtree.files import write_atomically
+from blobtree.files import replacing, write_atomically
 from blobtree.progress import Progress, reporting
 
 KERNEL_OPTIONS: dict[str, Any] = {
@@ -202,9 +202,7 @@ def _copy_shipped(folder: Path) -> None:
     with _cache_errors():
         folder.mkdir(parents=True, exist_ok=True)
         for file in shipped.iterdir():
-            with tempfile.NamedTemporaryFile(dir=folder, delete=False) as copy:
-                copy.write(file.read_bytes())
-            Path(copy.name).replace(folder / file.name)
+            write_atomically(folder / file.name, file.read_bytes())
         _seal(folder)
 
 
@@ -329,10 +327,8 @@ def _copy_newer(source: Path, target: Path) -> None:
         if copy.exists() and copy.stat().st_mtime_ns == file.stat().st_mtime_ns:
             continue
         target.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=target, delete=False) as temporary:
-            temporary.write(file.read_bytes())
-        shutil.copystat(file, temporary.name)
-        Path(temporary.name).replace(copy)
+        with replacing(copy) as temporary:
+            shutil.copy2(file, temporary)
 
 
 def _compile(modules: list[wp.Module], device: wp.Device) -> None:

@@ -89,7 +89,7 @@ def write_polydata(path: str | os.PathLike[str], surface: "pv.PolyData") -> None
 
     Raises
     ------
-    OSError
+    UnusableFile
         The file cannot be written in full; an existing file stays as it was.
     """
     if Path(path).suffix.lower() == ".vtp":
@@ -103,9 +103,7 @@ def write_polydata(path: str | os.PathLike[str], surface: "pv.PolyData") -> None
         with vtk_errors() as errors:
             copy.save(temporary, texture=texture)
         if errors or not _is_whole(temporary, copy):
-            raise OSError(
-                errno.EIO, "the file could not be written in full; is the disk full?", os.fspath(path)
-            )
+            raise OSError(errno.ENOSPC, "the file could not be written in full")
 
 
 def _is_whole(path: Path, surface: "pv.PolyData") -> bool:

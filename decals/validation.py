@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import BoolArray, Float64Array, Int32Array
 from blobtree.colors import color_rgb, is_named
+from blobtree.files import is_folder, is_read_only, is_too_long
 from blobtree.validation import is_whole, real
 from decals.errors import ImplicitDecalsError, InvalidDecals, InvalidImage, InvalidScene, MissingPackage
 
@@ -198,16 +199,17 @@ def require_rgba(name: str, pixels: Any, error: type[ImplicitDecalsError] = Inva
     if not isinstance(pixels, np.ndarray):
         raise error(f"{expected}, got {describe(pixels)}; use decals.DecalImage.load")
     kinds = np.uint8, np.uint16, np.float32
-    if pixels.dtype not in kinds or pixels.ndim != 3 or pixels.shape[2] != 4 or 0 in pixels.shape:
-        raise error(f"{expected}, got {pixels.dtype}{list(pixels.shape)}; use decals.DecalImage.load")
-    if pixels.dtype == np.float32:
-        low, high, alpha = (float(of) for of in (pixels.min(), pixels.max(), pixels[..., 3].max()))
+    native: NDArray[Any] = pixels.astype(pixels.dtype.newbyteorder("="), copy=False)
+    if native.dtype not in kinds or native.ndim != 3 or native.shape[2] != 4 or 0 in native.shape:
+        raise error(f"{expected}, got {native.dtype}{list(native.shape)}; use decals.DecalImage.load")
+    if native.dtype == np.float32:
+        low, high, alpha = (float(of) for of in (native.min(), native.max(), native[..., 3].max()))
         if not (low >= 0.0 and high <= MAX_LIGHT and alpha <= 1.0):
             raise error(
                 f"{name}: expected linear light from 0 to {MAX_LIGHT:g} with alpha up to 1, got {low:g} to "
                 f"{high:g} with alpha up to {alpha:g}; clip it"
             )
-    return pixels
+    return native
 
 
 def is_unicode(text: str) -> bool:
@@ -217,14 +219,6 @@ def is_unicode(text: str) -> bool:
     except UnicodeEncodeError:
         return False
     return True
-
-
-def is_file(path: Path) -> bool:
-    """Return True for an existing file; False also for an impossible path (too long, with a NUL)."""
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
 
 
 def as_path(path: object) -> Path:
@@ -243,10 +237,14 @@ def checked_path(path: str | os.PathLike[str], suffixes: tuple[str, ...]) -> Pat
     path = Path(path)
     if path.suffix.lower() not in suffixes:
         raise InvalidScene(f"path: expected a file that ends in {known}, got {str(path)!r}; rename it")
-    if path.is_dir():
+    if is_too_long(path):
+        raise InvalidScene(f"path: expected a shorter name of a file, got {path.name!r:.80}; rename it")
+    if is_folder(path):
         raise InvalidScene(f"path: expected a file, {str(path)!r} is a folder; add a file name")
+    if is_read_only(path):
+        raise InvalidScene(f"path: the file {str(path)!r} is read-only; choose another name")
     folder = path.parent
-    if not folder.is_dir():
+    if not is_folder(folder):
         raise InvalidScene(f"path: the folder {str(folder)!r} does not exist; create it first")
     try:
         tempfile.TemporaryFile(dir=folder).close()  # permissions alone are no proof
@@ -339,7 +337,10 @@ def whole_array(name: str, values: Any, count: int, *, low: int, high: int, defa
     array = np.array(one_or_each(default if values is None else values, count))
     _check_shape(name, array.shape, (count,))
     if (count and array.dtype.kind not in "iu") or array.dtype.kind not in "iuf":
-        raise InvalidDecals(f"{name}: expected whole numbers, got {array.dtype}; round or index first")
+        first = f" such as {array[0]}" if count and array.dtype.kind == "f" else ""
+        raise InvalidDecals(
+            f"{name}: expected whole numbers, got {array.dtype.name}{first}; convert them with .astype(int)"
+        )
     bad = (array < low) | (array > high)
     if bad.any():
         row = int(np.argmax(bad))

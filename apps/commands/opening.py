@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from blobtree.files import exists, is_file
 from decals import DecalImage, Scene
 from decals.apps.commands.options import DEFAULT_IMAGES, MAX_DECALS, MAX_SEED, check_count
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
@@ -105,7 +106,7 @@ def _is_unsaved(models: list[str]) -> bool:
     """Return True for one scene file that was never saved, with a recovery file beside it."""
     first = Path(models[0])
     return (
-        len(models) == 1 and first.suffix == ".json" and not first.exists() and recovery_path(first).is_file()
+        len(models) == 1 and first.suffix == ".json" and not exists(first) and is_file(recovery_path(first))
     )
 
 

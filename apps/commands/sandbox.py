@@ -24,6 +24,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 from rich.console import Console
 
+from blobtree.files import exists
 from decals.apps.commands.options import (
     Definitions,
     OptionalWhole,
@@ -254,7 +255,7 @@ def _unused(first: Path, taken: Collection[Path]) -> Path:
 
 def _exists(scene: Path) -> bool:
     """Return True if a session has kept something under this name."""
-    return scene.exists() or scene.with_name(f"{scene.stem}.recovery.json").exists()
+    return exists(scene) or exists(scene.with_name(f"{scene.stem}.recovery.json"))
 
 
 def _as_arguments(options: dict[str, Any]) -> list[str]:

@@ -10,12 +10,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from blobtree.files import is_file
 from decals import ImplicitDecalsError, Scene
 from decals import load_model as load_file
 from decals.apps.models.samples import SAMPLES, sample, sample_mesh
 from decals.errors import InvalidInput
 from decals.scenes.objects import MeshObject, SceneObject, as_crease_angle, as_objects
-from decals.validation import is_file
 
 
 def load_model(model: str, *, trust: bool = False, crease_angle: float | None = None) -> SceneObject | Scene:
@@ -95,7 +95,7 @@ def import_definitions(modules: Sequence[str] | None) -> None:
 def import_module_or_file(option: str, module: str) -> ModuleType:
     """Import the module that an option names: a Python file, or a dotted name; errors are those above."""
     path = Path(module)
-    if path.suffix == ".py" and not path.is_file():
+    if path.suffix == ".py" and not is_file(path):
         raise InvalidInput(
             f"{option}: expected a Python file or the name of a module, found no file {module!r}"
         )

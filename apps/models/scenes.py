@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from blobtree.files import exists
 from decals import Camera, DecalImage, Scene
 from decals.apps.views import parse_view
 from decals.editing.recovery import numbered_paths, recovery_path
@@ -18,7 +19,7 @@ def new_file(folder: Path, name: str, *, recover: bool = False) -> Path:
     Unless ``recover`` is True, nor do unsaved changes of it exist.
     """
     paths = numbered_paths(folder / f"{name}.json")
-    return next(p for p in paths if not p.exists() and (recover or not recovery_path(p).exists()))
+    return next(p for p in paths if not exists(p) and (recover or not exists(recovery_path(p))))
 
 
 def empty_scene(images: Sequence[str], axes: Axes) -> Scene:

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from blobtree.files import exists, is_file
 from blobtree.progress import Cancel, Progress
 from decals import cover
 from decals.apps.models.samples import SAMPLES, axes_of, sample, sample_mesh
@@ -85,7 +86,7 @@ class SandboxFiles:
         """Begin an empty scene, in the file of the window if that does not exist and nothing was edited."""
         scene, session = empty_scene(FIRST_IMAGES, UPRIGHT["y"]), self._state.session
         named = None if session.document.objects or session.labels else self._files.path
-        path = "scene" if named is None or Path(named).exists() else Path(named)
+        path = "scene" if named is None or exists(named) else Path(named)
         self._open(lambda *_: scene, path)
 
     def open_sample(self, name: str) -> None:
@@ -107,11 +108,11 @@ class SandboxFiles:
             raise InvalidEdit(f"file: expected a name that ends in {', '.join(MODELS)}, got {describe(name)}")
         path = self._files.inside(name)
         unsaved = self._files.inside(recovery_path(path))  # a link could lead elsewhere
-        if not path.exists() and not unsaved.is_file():
+        if not exists(path) and not is_file(unsaved):
             raise InvalidEdit(f"expected a file of the folder, found no {name!r}")
 
         def load(_progress: Progress, _cancel: Cancel) -> Scene:
-            if not path.exists():  # the recovery file has everything
+            if not exists(path):  # the recovery file has everything
                 return empty_scene(FIRST_IMAGES, UPRIGHT["y"])
             found = load_model(path, samples=sample_mesh)
             if isinstance(found, Scene):
@@ -120,7 +121,7 @@ class SandboxFiles:
             return Scene(objects=[found], camera=camera, images=FIRST_IMAGES)
 
         width, height = self._window.plotter.window_size
-        is_scene = path.suffix == ".json" and (not path.exists() or is_scene_file(path))
+        is_scene = path.suffix == ".json" and (not exists(path) or is_scene_file(path))
         self._open(load, path if is_scene else f"{path.stem}-decals")
 
     def take(self, file: object, key: str = "") -> None:
@@ -226,7 +227,7 @@ class SandboxFiles:
     def read(self, name: str, begin: int) -> bytes:
         """Return the bytes of a written file from number `begin` on, `PART_BYTES` at most."""
         path = self._files.inside(_checked_name(name))
-        if path.suffix.lower() not in WRITTEN_SUFFIXES or not path.is_file():
+        if path.suffix.lower() not in WRITTEN_SUFFIXES or not is_file(path):
             raise InvalidEdit(f"expected a file of the folder, found no {name!r}; write it first")
         try:
             with path.open("rb") as file:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 
+from blobtree.files import is_file, write_atomically
 from decals import DecalImage, Scene, load_model
 from decals.apps.models.samples import sample_mesh
 from decals.editing.recovery import SUFFIX, in_use
@@ -112,10 +113,9 @@ def keep_upload(file: object, folder: Path) -> Path:
     stem, suffix = plain_name(name), Path(name).suffix.lower()
     path = folder / f"{stem}{suffix}"
     try:
-        if not (path.is_file() and path.read_bytes() == content):
+        if not (is_file(path) and path.read_bytes() == content):
             path = folder / f"{unused_name(stem, {other.stem for other in folder.iterdir()}, ' ')}{suffix}"
-            with path.open("xb") as kept:
-                kept.write(content)
+            write_atomically(path, content)
     except OSError as error:
         raise InvalidEdit(f"could not write {path.name} into the folder ({error.strerror})") from error
     return path

@@ -6,6 +6,7 @@ from os import PathLike
 from pathlib import Path
 
 from blobtree._typing import UInt8Array
+from blobtree.files import exists, is_folder
 from blobtree.progress import Cancel, Progress
 from blobtree.pyvista_views import MESH_SUFFIXES
 from decals.baking.bake import SUFFIX as BAKED_SUFFIX
@@ -96,7 +97,7 @@ class FileActions(WindowActions):
         self.screenshot: Callable[[], UInt8Array] | None = None
         self.folder: Path | None = None
         self.recovery = self._recovery_beside(path)
-        self._exists = path is not None and Path(path).exists()
+        self._exists = path is not None and exists(path)
         self._begun: Path | None = None
         self._aside: tuple[str | PathLike[str] | None, RecoveryFile, bool] | None = None
         self._closing = False
@@ -133,7 +134,7 @@ class FileActions(WindowActions):
         A file that a save of this scene is writing, or has just written, is its own.
         """
         names = numbered_paths(Path(path))
-        return next(name for name in names if self._exists or name == self._begun or not name.exists())
+        return next(name for name in names if self._exists or name == self._begun or not exists(name))
 
     @Group.SCENE.action("save_as", "Ctrl+Shift+s", summary="save to another file")
     def save_as(self, _cursor: Cursor) -> None:
@@ -200,7 +201,7 @@ class FileActions(WindowActions):
         """
         path, shows = self._checked_path(text, suffixes), member("video", video, Video, InvalidEdit)
         own = self._exists and self.path is not None and path.absolute() == Path(self.path).absolute()
-        if path.exists() and not (own or replace):
+        if exists(path) and not (own or replace):
             raise InvalidEdit(f"{path} exists; choose to replace it, or give another name")
         suffix = path.suffix.lower()
         if suffix == ".json":
@@ -268,7 +269,7 @@ class FileActions(WindowActions):
                 session.forget_history()
             self.recovery.release()
             self._leave_aside()
-            self.path, self._exists = path, path.exists()
+            self.path, self._exists = path, exists(path)
             self.recovery = self._recovery_beside(path)
             self.recover(recover)
             self.show_view(session.document.camera)
@@ -318,7 +319,7 @@ class FileActions(WindowActions):
         if path.suffix.lower() not in suffixes:
             raise InvalidEdit(f"expected a name that ends in {', '.join(suffixes)}, got {text!r}")
         path = self.inside(path)
-        if path.is_dir() or not path.parent.is_dir():
+        if is_folder(path) or not is_folder(path.parent):
             raise InvalidEdit(f"expected a file in an existing folder, got {text!r}")
         return path
 
@@ -413,5 +414,5 @@ class FileActions(WindowActions):
 
 def _refuse_to_replace(path: Path, repeated: bool) -> None:
     """Raise `InvalidEdit` if a file exists, unless the name was accepted a second time."""
-    if path.exists() and not repeated:
+    if exists(path) and not repeated:
         raise InvalidEdit(f"{path} exists; press Return again to replace it")

@@ -10,6 +10,7 @@ from os import PathLike
 from pathlib import Path
 
 from blobtree.file_lock import FileLock
+from blobtree.files import exists, is_file
 from decals.editing.background import BackgroundJobs
 from decals.editing.commands import ReplaceScene
 from decals.editing.session import EditSession
@@ -153,7 +154,7 @@ class RecoveryFile:
     def _acquire_new(self) -> None:
         """Take the first recovery file that no window has, before it is written for the first time."""
         if self._lock is None:
-            next((path for path in self._candidates() if not path.exists() and self._acquire(path)), None)
+            next((path for path in self._candidates() if not exists(path) and self._acquire(path)), None)
 
     def recover(self, load: Callable[[Path], Scene]) -> str:
         """Take over the recovery file of an earlier window, as one entry that undo takes back.
@@ -175,7 +176,7 @@ class RecoveryFile:
         """
         if self._scene_path is None or self._exists:
             return ""
-        path = next((path for path in self._candidates() if path.is_file() and self._acquire(path)), None)
+        path = next((path for path in self._candidates() if is_file(path) and self._acquire(path)), None)
         if path is None:
             return ""
         when = datetime.fromtimestamp(path.stat().st_mtime).astimezone()

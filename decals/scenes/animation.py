@@ -12,7 +12,7 @@ from typing import Protocol
 from PIL import Image
 
 from blobtree._typing import UInt8Array
-from blobtree.files import make_folder, replacing
+from blobtree.files import is_file, is_folder, make_folder, replacing
 from blobtree.progress import Cancel, Progress, reporting
 from decals.errors import InvalidScene
 from decals.rendering.options import Size, check_scene, drawing_of
@@ -190,7 +190,7 @@ def _target(path: str | os.PathLike[str]) -> Path:
         target = Path(path)
     except TypeError:
         raise InvalidScene(f"path: expected a folder or a file, got {describe(path)}") from None
-    if not target.suffix or target.is_dir():
+    if not target.suffix or is_folder(target):
         return target
     if target.suffix.lower() not in VIDEO_SUFFIXES:
         raise InvalidScene(
@@ -202,7 +202,7 @@ def _target(path: str | os.PathLike[str]) -> Path:
 @contextmanager
 def _sink(target: Path, size: Size, rate: float) -> Iterator[_Sink]:
     """Yield the function that takes frames; at the end the video is whole."""
-    match target.suffix.lower() if not target.is_dir() else "":
+    match target.suffix.lower() if not is_folder(target) else "":
         case ".gif":
             images: list[Image.Image] = []
             yield lambda pixels, _number: images.append(_opaque(pixels).quantize(256))
@@ -237,7 +237,7 @@ def _remove_later_frames(folder: Path, count: int) -> None:
     """Remove the pictures of a longer animation from a folder that got ``count`` new ones."""
     for file in list(folder.iterdir()):
         match = _FRAME.fullmatch(file.name)
-        if match is not None and int(match[1]) > count and file.is_file():
+        if match is not None and int(match[1]) > count and is_file(file):
             file.unlink()
 
 

@@ -34,7 +34,7 @@ from typing import Any, Literal
 import msgspec
 from msgspec import Raw, Struct
 
-from blobtree.files import write_atomically
+from blobtree.files import is_file, is_folder, write_atomically
 from blobtree.json_errors import json_reason
 from blobtree.progress import Progress, reporting
 from decals.errors import ImplicitDecalsError, InvalidScene
@@ -63,7 +63,7 @@ from decals.scenes.records import (
     records_of,
 )
 from decals.scenes.scene import DecalImage, Scene
-from decals.validation import as_path, is_file
+from decals.validation import as_path
 
 PART = 500
 """Decals that are described at a time."""
@@ -141,7 +141,7 @@ def save_scene(scene: Scene, path: str | os.PathLike[str], *, progress: Progress
     if path.suffix.lower() != ".json":
         raise InvalidScene(f"expected a file name that ends in .json, got {path.name!r}; rename the file")
     folder = path.parent
-    if not folder.is_dir():
+    if not is_folder(folder):
         raise InvalidScene(
             f"expected an existing folder for the scene, found none at {str(folder)!r}; make it first"
         )

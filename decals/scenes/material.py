@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from blobtree._typing import Float32Array, UInt8Array
+from blobtree.files import is_file
 from decals.errors import InvalidImage
 from decals.images.load import AnyImage, image_pixels
 from decals.images.texels import Pixels, as_bytes, decode_srgb, unit_levels, without_excess
 from decals.options import Values
 from decals.scenes.scene import DecalImage
-from decals.validation import describe, is_file, real_number
+from decals.validation import describe, real_number
 
 MAP_NAMES = {
     "pixels": ("basecolor", "base_color", "albedo", "diffuse", "color", "col"),

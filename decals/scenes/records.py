@@ -9,6 +9,7 @@ import numpy as np
 from msgspec import UNSET, Meta, Struct, UnsetType
 from numpy.typing import NDArray
 
+from blobtree.files import is_file
 from blobtree.io import TreeFile, from_tree_file, to_tree_file
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.images.builtin import is_builtin
@@ -21,7 +22,6 @@ from decals.surfaces.base_color import COLOR_ARRAYS, BaseColor, BaseTexture, Col
 from decals.surfaces.mesh_data import MeshData
 from decals.surfaces.mesh_file import MeshArrays, read_mesh_data
 from decals.surfaces.normals import CREASE_ANGLE
-from decals.validation import is_file
 
 SAMPLE = "sample:"
 """How the source of a mesh begins that is a sample and no file."""

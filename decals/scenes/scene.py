@@ -68,7 +68,8 @@ class DecalImage:
 
     def __post_init__(self) -> None:
         instance("an image's source", self.source, str, InvalidScene, "give a name or a path")
-        require_rgba(f"image {self.source!r}", self.pixels, InvalidScene)
+        pixels = require_rgba(f"image {self.source!r}", self.pixels, InvalidScene)
+        object.__setattr__(self, "pixels", pixels)
 
     @property
     def is_generated(self) -> bool:

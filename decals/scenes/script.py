@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import blobtree
 from blobtree import Node
-from blobtree.files import write_atomically
+from blobtree.files import replacing, write_atomically
 from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.values import fields_of, left_out
 from decals.errors import InvalidScene
@@ -71,11 +71,12 @@ def write_script(scene: Scene, path: str | os.PathLike[str]) -> None:
     script = _Script(path.with_suffix(".npz").name)
     text = script.text_of(scene)
     try:
-        if script.arrays:
-            buffer = io.BytesIO()
-            np.savez_compressed(buffer, **script.arrays)  # type: ignore[arg-type]  # arrays by name
-            write_atomically(path.with_suffix(".npz"), buffer.getvalue())
-        write_atomically(path, text.encode())
+        with replacing(path) as temporary:  # which refuses a bad path before the arrays are written
+            temporary.write_bytes(text.encode())
+            if script.arrays:
+                buffer = io.BytesIO()
+                np.savez_compressed(buffer, **script.arrays)  # type: ignore[arg-type]  # arrays by name
+                write_atomically(path.with_suffix(".npz"), buffer.getvalue())
     except OSError as error:
         raise InvalidScene(f"could not write {str(path)!r}: {error}") from error
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 import blobtree
 from blobtree import Mesh, Node
+from blobtree.files import is_file
 from blobtree.validation import point_array
 from decals.errors import ImplicitDecalsError, InvalidMesh
 from decals.model import MAX_COORDINATE
@@ -22,7 +23,7 @@ from decals.surfaces.mesh_data import MeshData, joined
 from decals.surfaces.mesh_file import dataset_mesh, polygon_triangles, read_mesh_data
 from decals.surfaces.surface import Surface
 from decals.surfaces.trimesh_colors import trimesh_color
-from decals.validation import describe, is_file
+from decals.validation import describe
 
 if TYPE_CHECKING:
     import pyvista as pv

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
+from blobtree.files import is_file
 from decals.errors import InvalidMesh
 from decals.surfaces.base_color import checked_color
 from decals.surfaces.dataset_colors import dataset_color, has_colors
@@ -27,7 +28,7 @@ from decals.surfaces.files.threemf import read_3mf
 from decals.surfaces.mesh_data import MeshData, joined
 from decals.surfaces.triangulate import Polygons, Triangulation, triangulate
 from decals.surfaces.vtk_process import can_isolate, read_isolated
-from decals.validation import describe, is_file
+from decals.validation import describe
 
 if TYPE_CHECKING:  # its import takes longer than ours, and meshes of arrays do without
     import pyvista as pv

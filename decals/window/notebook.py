@@ -14,6 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from blobtree.files import exists
 from decals.editing.recovery import recovery_path
 from decals.errors import InvalidScene
 from decals.scenes.files import load_scene, save_scene
@@ -77,7 +78,7 @@ def edit_in_notebook(scene: Scene, path: Path | None) -> Scene:
             process.wait()
             shown.update({"text/plain": "The edited scene was returned."}, raw=True)
         unsaved = recovery_path(file)
-        return load_scene(unsaved if unsaved.exists() else file, trust=True)
+        return load_scene(unsaved if exists(unsaved) else file, trust=True)
 
 
 @contextmanager

@@ -1,6 +1,8 @@
 """Files are whole or absent: full disks, kills, links, permissions, and what killed processes leave."""
 
+import errno
 import os
+import pickle
 import re
 import signal
 import stat
@@ -12,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from blobtree.files import PREFIX, replacing, write_atomically
+import blobtree
+from blobtree.files import PREFIX, exists, is_file, is_folder, is_too_long, replacing, write_atomically
 
 posix = pytest.mark.skipif(os.name != "posix", reason="permissions and signals of POSIX")
 
@@ -225,3 +228,29 @@ def test_a_kill_while_saving_leaves_one_of_the_files(tmp_path: Path) -> None:
     assert sizes <= expected
     write_atomically(tmp_path / "b.txt", b"")
     assert files_of(tmp_path) == {"a.json", "a.ply", "b.txt"}
+
+
+def test_an_error_of_the_system_is_one_of_ours(tmp_path: Path) -> None:
+    """It still is the error of the system that programs catch."""
+    tree = blobtree.Point((0, 0, 0), radius=1.0)
+    with pytest.raises(blobtree.UnusableFile, match=r"could not write .* too long.*; choose a shorter name"):
+        blobtree.save(tree, tmp_path / f"{'x' * 300}.json")
+    with pytest.raises(blobtree.MissingFile, match=r"could not write .*; create its folder first") as raised:
+        blobtree.save(tree, tmp_path / "none" / "tree.json")
+    assert isinstance(raised.value, FileNotFoundError)
+    assert raised.value.errno == errno.ENOENT
+    for name in (f"{'x' * 300}.json", "none.json", "."):
+        with pytest.raises(blobtree.UnusableFile, match="could not read") as unreadable:
+            blobtree.load(tmp_path / name)
+        copy = pickle.loads(pickle.dumps(unreadable.value))
+        assert (type(copy), str(copy)) == (type(unreadable.value), str(unreadable.value))
+
+
+@pytest.mark.parametrize("name", ["x" * 300, "nul\0", "\ud800", "a.txt/b.txt"])
+def test_impossible_paths_are_no_files(tmp_path: Path, name: str) -> None:
+    (tmp_path / "a.txt").write_bytes(b"")
+    path = os.path.join(tmp_path, name)  # noqa: PTH118 - a Path refuses some of the names
+    assert not exists(path)
+    assert not is_file(path)
+    assert not is_folder(path)
+    assert is_too_long(path) == (len(name) == 300)
