@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 
 from blobtree._typing import Float32Array
+from blobtree.files import is_file
 from decals.errors import InvalidImage
 from decals.images.builtin import BUILTIN_IMAGES, generate_image, is_builtin
 from decals.images.radiance import decode_radiance, is_radiance
 from decals.images.texels import MAX_IMAGE_EDGE, Pixels, check_size
-from decals.validation import MAX_LIGHT, describe, is_file, require_rgba
+from decals.validation import MAX_LIGHT, describe, require_rgba
 
 PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM", "TGA", "JPEG2000", "AVIF")
 """Formats that are read, by their names in Pillow. Others, such as EPS, would start programs or are rare."""
@@ -106,8 +107,9 @@ def image_pixels(
     ----------
     image : str, path, PIL.Image.Image, numpy.ndarray, pyvista.Texture or DecalImage
         The name of a generated image; the path of a picture; or pixels, row 0 at the top. Arrays are grey
-        ``[h, w]``, RGB ``[h, w, 3]`` or RGBA ``[h, w, 4]``, of bytes, of 16 bits or of sRGB floats from 0 to
-        1. The pixels of a `DecalImage` may also be linear light of any brightness.
+        ``[h, w]``, RGB ``[h, w, 3]`` or RGBA ``[h, w, 4]``, of bytes, of 16 bits, of sRGB floats from 0 to 1,
+        or of truth values, such as those of a mask: True is white. The pixels of a `DecalImage` may also be
+        linear light of any brightness.
     name : str
         Name of the image in messages.
     folder : Path, optional
@@ -229,9 +231,12 @@ def opaque(colors: NDArray[Any]) -> Pixels:
 
 
 def _levels(values: NDArray[Any], name: str, linear: bool) -> NDArray[Any]:
-    """Return channels as integers."""
+    """Return channels as integers; True is the brightest level."""
+    values = values.astype(values.dtype.newbyteorder("="), copy=False)
+    if values.dtype == np.bool_:
+        return np.where(values, np.uint8(255), np.uint8(0))
     if values.dtype in (np.uint8, np.uint16):
-        return values.astype(values.dtype.newbyteorder("="), copy=False)
+        return values
     if values.dtype.kind != "f" or not ((values >= 0.0) & (values <= 1.0)).all():
         limits = f" from {values.min()} to {values.max()}" if values.dtype.kind in "biuf" else ""
         kinds = "16-bit levels or floats of linear light" if linear else "or floats from 0 to 1"

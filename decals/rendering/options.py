@@ -75,6 +75,16 @@ TRANSPARENT = Background((0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
 """No background: alpha is the part of a pixel that objects cover."""
 
 
+def as_background(value: Background | ColorLike) -> Background:
+    """Return a background, or that of one colour; raise InvalidScene for other values."""
+    if isinstance(value, Background):
+        return value
+    if isinstance(value, str) and value.strip().lower() == "transparent":
+        return TRANSPARENT
+    color = color_rgba("background", value, InvalidScene)
+    return Background(color, color)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Drawing:
     """How a scene is drawn, in pictures of any size; a scene and its file keep it.
@@ -88,8 +98,9 @@ class Drawing:
         paper), ``"min"`` or ``"radial"``.
     mapping : ImageMapping or str
         Image mapping: how images lie on curved surface; ``"corrected"``, ``"chord"`` or ``"walked"``.
-    background : Background
-        Colours behind the objects.
+    background : Background or colour
+        Colours behind the objects: a gradient; or one colour, by its name such as ``"white"`` or
+        ``"transparent"``, or by numbers.
     lights : Lighting, optional
         Lights in place of the studio light.
     stiffness : float
@@ -124,7 +135,7 @@ class Drawing:
     filtered: bool = False
     environment: Environment | None = None
 
-    if TYPE_CHECKING:  # names of modes are converted
+    if TYPE_CHECKING:  # names of modes and colours are converted
 
         def __init__(
             self,
@@ -132,7 +143,7 @@ class Drawing:
             samples: int = 2,
             contact: AnyContact | str = DEFAULT_CONTACT,
             mapping: ImageMapping | str = ImageMapping.CORRECTED,
-            background: Background = STUDIO,
+            background: Background | ColorLike = STUDIO,
             lights: Lighting | None = None,
             stiffness: float = DEFAULT_STIFFNESS,
             filtered: bool = False,
@@ -145,9 +156,9 @@ class Drawing:
             "contact": contact_mode(self.contact, InvalidScene),
             "mapping": member("mapping", self.mapping, ImageMapping, InvalidScene),
             "stiffness": stiffness_number(self.stiffness, InvalidScene),
+            "background": as_background(self.background),
             "filtered": instance("filtered", self.filtered, bool, InvalidScene, "such as True"),
         }
-        instance("background", self.background, Background, InvalidScene, "such as decals.rendering.STUDIO")
         if self.lights is not None:
             instance("lights", self.lights, Lighting, InvalidScene, "leave them out for the studio light")
         if self.environment is not None:
@@ -194,7 +205,7 @@ class RenderOptions(Drawing):
 
     size: Size = (800, 600)
 
-    if TYPE_CHECKING:  # names of modes are converted
+    if TYPE_CHECKING:  # names of modes and colours are converted
 
         def __init__(
             self,
@@ -203,7 +214,7 @@ class RenderOptions(Drawing):
             samples: int = 2,
             contact: AnyContact | str = DEFAULT_CONTACT,
             mapping: ImageMapping | str = ImageMapping.CORRECTED,
-            background: Background = STUDIO,
+            background: Background | ColorLike = STUDIO,
             lights: Lighting | None = None,
             stiffness: float = DEFAULT_STIFFNESS,
             filtered: bool = False,

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import cast
 
+from blobtree.colors import ColorLike
 from blobtree.progress import reporting
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
@@ -26,7 +27,7 @@ def render(
     contact: AnyContact | str | None = None,
     stiffness: float | None = None,
     mapping: ImageMapping | str | None = None,
-    background: Background | None = None,
+    background: Background | ColorLike | None = None,
     lights: Lighting | None = None,
     filtered: bool | None = None,
     environment: Environment | AnyImage | None = None,
@@ -53,8 +54,9 @@ def render(
         Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
     mapping : ImageMapping or str, optional
         Image mapping: how images lie on curved surface; ``"corrected"``, ``"chord"`` or ``"walked"``.
-    background : Background, optional
-        Colours behind the objects, such as `decals.rendering.TRANSPARENT`.
+    background : Background or colour, optional
+        Colours behind the objects: a gradient; or one colour, by its name such as ``"white"`` or
+        ``"transparent"``, or by numbers.
     lights : Lighting, optional
         Lights in place of the studio light.
     filtered : bool, optional

@@ -240,3 +240,19 @@ def test_interactions_and_tints_by_name() -> None:
     assert Decals.empty().replace(tints="red", interactions="push").tints.shape == (0, 3)
     with pytest.raises(InvalidDecals, match=r"tints: expected red, .* or a name, got 'reddish'"):
         decals.replace(tints="reddish")
+
+
+@pytest.mark.parametrize("column", ["images", "layers", "interactions"])
+def test_whole_columns_of_another_type_say_how_to_convert_them(column: str) -> None:
+    frame = {"positions": [[0, 0, 0]], "normals": [[0, 0, 1]], "tangents": [[1, 0, 0]], "radii": 1.0}
+    for values in (np.zeros(1), np.zeros(1, np.float16), np.zeros(1, ">f8"), [0.0], 0.0):
+        with pytest.raises(
+            InvalidDecals, match=rf"{column}: expected whole numbers, got .*float.* such as 0\.0; "
+        ):
+            Decals(**frame, **{column: values})  # type: ignore[arg-type]
+    for refused in ([True], [0j], np.array(["0"], "S1")):
+        with pytest.raises(InvalidDecals, match=f"{column}: expected whole numbers, got .*astype"):
+            Decals(**frame, **{column: refused})  # type: ignore[arg-type]
+    for kind in (np.int8, np.uint64, ">i8", np.uint16):
+        made = Decals(**frame, **{column: np.ones(1, kind)})  # type: ignore[arg-type]
+        assert getattr(made, column).tolist() == [1]

@@ -372,3 +372,45 @@ def test_messages_say_an_before_a_vowel() -> None:
 def test_a_folder_is_no_image(tmp_path: Path) -> None:
     with pytest.raises(InvalidImage, match="found no file"):
         read_image(tmp_path)
+
+
+BYTES = np.random.default_rng(4).integers(0, 256, (6, 5, 3), np.uint8)
+ODD_ARRAYS = {
+    "a mask": (BYTES[..., 0] > 127, np.where(BYTES[..., :1] > 127, 255, 0).repeat(3, axis=2)),
+    "truth in channels": (BYTES > 127, np.where(BYTES > 127, 255, 0)),
+    "a list of truth": (
+        (BYTES[..., 0] > 127).tolist(),
+        np.where(BYTES[..., :1] > 127, 255, 0).repeat(3, axis=2),
+    ),
+    "big-endian 16 bits": (BYTES.astype(">u2") * 257, BYTES.astype(np.uint16) * 257),
+    "big-endian floats": ((BYTES / 255.0).astype(">f4"), BYTES),
+    "half floats": ((BYTES / 255.0).astype(np.float16), BYTES),
+    "long floats": ((BYTES / 255.0).astype(np.longdouble), BYTES),
+    "every second row, backwards": (BYTES.repeat(2, axis=0)[::-2], BYTES[::-1]),
+    "columns first": (np.asfortranarray(BYTES), BYTES),
+}
+
+
+@pytest.mark.parametrize("name", ODD_ARRAYS)
+def test_arrays_of_odd_types_are_the_picture_that_they_show(name: str) -> None:
+    array, expected = ODD_ARRAYS[name]
+    pixels = image_pixels(array)
+    assert pixels.dtype.isnative
+    assert pixels.dtype == (np.uint16 if expected.dtype == np.uint16 else np.uint8)
+    np.testing.assert_allclose(
+        pixels[..., :3].astype(float), expected, atol=1 if name == "half floats" else 0
+    )
+
+
+@pytest.mark.parametrize("kind", [np.int64, np.uint32, np.int8, complex, object, str])
+def test_arrays_of_no_pixels_are_refused(kind: type) -> None:
+    with pytest.raises(InvalidImage, match="expected bytes, or floats from 0 to 1"):
+        image_pixels((BYTES // 3).astype(kind))
+
+
+@pytest.mark.parametrize("kind", [">u2", ">f4", "<u2"])
+def test_a_decal_image_has_native_pixels(kind: str) -> None:
+    pixels = np.ones((2, 2, 4), kind)
+    image = decals.DecalImage("one", pixels)
+    assert image.pixels.dtype.isnative
+    np.testing.assert_array_equal(image.pixels, pixels)

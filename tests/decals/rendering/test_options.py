@@ -10,7 +10,7 @@ from decals.field.mapping import ImageMapping
 from decals.record import Contact
 from decals.rendering import Background
 from decals.rendering.lights import Light, Lighting
-from decals.rendering.options import RenderOptions
+from decals.rendering.options import TRANSPARENT, Drawing, RenderOptions
 from decals.rendering.renderer import Renderer
 from decals.scenes.camera import Camera
 from tests.decals.editing.scenes import one, scene
@@ -103,7 +103,7 @@ def test_sizes_and_lights_may_be_any_sequences(renderer: Renderer) -> None:
 def test_a_picture_after_a_refused_one_is_as_before(renderer: Renderer) -> None:
     before = renderer.render(scene(), RenderOptions(size=SIZE))
     refused(lambda: renderer.render(scene(), RenderOptions(size=SIZE), viewpoint=np.eye(4)))  # type: ignore[arg-type]
-    refused(lambda: renderer.render(scene(), RenderOptions(size=SIZE, background="white")))  # type: ignore[arg-type]
+    refused(lambda: renderer.render(scene(), RenderOptions(size=SIZE, background="no colour")))
     np.testing.assert_array_equal(renderer.render(scene(), RenderOptions(size=SIZE)), before)
     with pytest.raises(InvalidScene, match="viewpoint: expected a Camera"):
         renderer.render(scene(), RenderOptions(size=SIZE), viewpoint=Camera)  # type: ignore[arg-type]
@@ -118,3 +118,20 @@ def test_modes_and_colours_by_name() -> None:
     for wrong in ("round", 4, None):
         with pytest.raises(InvalidScene, match=r"contact: expected one of 'product', .*, 'elastic', got"):
             RenderOptions(contact=wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("color", ["white", "#ffffff", (1, 1, 1), [1.0, 1.0, 1.0, 1.0], np.ones(3)])
+def test_a_background_is_a_colour_too(color: Any) -> None:
+    white = Background("white", "white")
+    assert RenderOptions(background=color).background == white
+    assert Drawing(background=color) == Drawing(background=white)
+
+
+def test_a_background_has_a_name(renderer: Renderer) -> None:
+    assert Drawing(background="transparent").background == TRANSPARENT
+    seen = renderer.render(scene(), RenderOptions(size=SIZE, background="red"))
+    assert seen[0, 0].tolist() == [255, 0, 0, 255]
+    with pytest.raises(InvalidScene, match="or a name, got 'no colour'"):
+        Drawing(background="no colour")
+    with pytest.raises(InvalidScene, match="background: expected"):
+        Drawing(background=5)  # type: ignore[arg-type]
