@@ -85,8 +85,9 @@ class _Scene:
     def _read(self, place: Placement) -> Iterator[tuple[Piece, Skinned | None]]:
         for index, primitive in enumerate(self._document.meshes[place.mesh].primitives):
             name = f"mesh {place.mesh} primitive {index}"
+            skinned = place.joints is not None
             part = read_primitive(
-                primitive, place.weights, self._accessors, self._materials, self._notes, name
+                primitive, place.weights, self._accessors, self._materials, self._notes, name, skinned=skinned
             )
             if part is not None:
                 yield part

@@ -42,8 +42,13 @@ def read_primitive(
     materials: Materials,
     notes: Notes,
     place: str,
+    *,
+    skinned: bool,
 ) -> tuple[Piece, Skinned | None] | None:
-    """Return the triangles of a primitive, moved by its morph targets, and its skin; None without faces."""
+    """Return the triangles of a primitive, moved by its morph targets, and its skin if it should have one.
+
+    None stands for a primitive without faces.
+    """
     position = primitive.attributes.get("POSITION")
     if not TRIANGLES <= primitive.mode <= FAN:
         if not 0 <= primitive.mode < TRIANGLES:
@@ -61,7 +66,8 @@ def read_primitive(
     if not np.isfinite(points).all():
         raise Unreadable(f"{place} has positions that are no finite numbers")
     color = _color(primitive, accessors, materials, notes, rows, place)
-    return Piece(points, faces, color), _skinned(primitive, accessors, rows, place)
+    skin = _skinned(primitive, accessors, rows, place) if skinned else None
+    return Piece(points, faces, color), skin
 
 
 def _check_compression(primitive: Primitive, accessors: Accessors, place: str) -> None:

@@ -137,6 +137,14 @@ def test_a_mirrored_skeleton_turns_the_faces(tmp_path: Path) -> None:
     assert volume == pytest.approx(2 * np.linalg.det(np.array(icosphere(2)[0])[icosphere(2)[1]]).sum() / 6.0)
 
 
+def test_joints_of_a_node_without_a_skin_are_not_read(tmp_path: Path) -> None:
+    writer = GltfWriter()
+    primitive = square(writer)
+    primitive["attributes"] |= {"JOINTS_0": 77, "WEIGHTS_0": 77}
+    writer.add("nodes", mesh=writer.add("meshes", primitives=[primitive]))
+    assert len(read_mesh(saved(tmp_path, writer))[1]) == 2
+
+
 @pytest.mark.parametrize(
     ("mesh_weights", "node_weights", "height"),
     [([1.0, 0.25], None, 2.5), ([1, 1], [0.0, 0.5], 3.0), (None, None, 0.0)],
