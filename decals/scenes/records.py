@@ -68,6 +68,9 @@ _ROWS = {
 }
 """Type and width of the arrays of a base colour; 0 for numbers without rows."""
 
+MAX_TEXELS = 1 << 27
+"""Most pixels of all textures of a mesh."""
+
 OF_SOURCE: Literal["source"] = "source"
 """Colour of a mesh that has those of its source."""
 
@@ -185,8 +188,21 @@ def _color_of(record: MeshRecord, mesh: MeshData | None, source: str | None) -> 
         ) from error
     if not all(is_embedded(texture.pixels) for texture in color.textures):
         raise InvalidScene(f"mesh {record.name!r}, texture: expected embedded pictures, got other text")
-    textures = [BaseTexture(load_image(texture.pixels), texture.wrap) for texture in color.textures]
-    return BaseColor(**arrays, textures=textures)
+    return BaseColor(**arrays, textures=_textures(record.name, color.textures))
+
+
+def _textures(name: str, records: Iterable[_TextureRecord]) -> list[BaseTexture]:
+    """Decode the textures of a mesh; InvalidScene if they are too large together."""
+    textures: list[BaseTexture] = []
+    texels = 0
+    for record in records:
+        textures.append(BaseTexture(load_image(record.pixels), record.wrap))
+        texels += textures[-1].pixels[..., 0].size
+        if texels > MAX_TEXELS:
+            raise InvalidScene(
+                f"mesh {name!r}: expected textures of {MAX_TEXELS:,} pixels at most; scale them"
+            )
+    return textures
 
 
 def _mesh(source: str, folder: Path, samples: SampleLoader | None) -> MeshData:

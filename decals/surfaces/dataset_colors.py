@@ -13,8 +13,8 @@ from decals.surfaces.base_color import BaseColor, linear_colors
 if TYPE_CHECKING:
     import pyvista as pv
 
-_COLOR_NAME = re.compile(r"(^|[\W_])(rgba?|colou?rs?)($|[\W_])", re.IGNORECASE)
-"""Names of arrays that hold colours: RGB, vertex_colors, COLOR_0, my_rgba."""
+_COLOR_NAME = re.compile(r"rgb|colou?r", re.IGNORECASE)
+"""Part of the names of arrays that hold colours: RGBA, VertexColors, COLOR_0, my_rgb."""
 
 
 def has_colors(dataset: Any) -> bool:

@@ -73,9 +73,10 @@ class ObjColors:
 
     def _vertex_colors(self) -> Float32Array | None:
         """Return the colours of vertices, which follow their coordinates; None if some have none."""
-        words = [line.text.split() for line in self._lines[b"v"]]
-        if not words or any(len(of_line) < 6 for of_line in words):
+        lines = self._lines[b"v"]
+        if any(len(line.text.split()) < 6 for line in lines):
             return None
+        words = (line.text.split() for line in lines)
         numbers = finite_numbers(word for of_line in words for word in of_line[-3:]).reshape(-1, 3)
         return linear_colors(numbers, name="colours of vertices")
 

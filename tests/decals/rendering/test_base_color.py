@@ -222,3 +222,23 @@ def test_relief_carries_the_base_colours() -> None:
     assert isinstance(item.color, BaseColor)
     shown = rest.color.light_at(rest.faces, numbers, weights)
     assert np.abs(shown - item.color.light_at(item.faces, found, places)).max() < 1e-3
+
+
+def test_a_subplot_shows_textures_and_colours() -> None:
+    """Lit alike, a texture of one colour looks as that colour does; its halves look as two colours do."""
+    red_blue = np.zeros((2, 2, 3), np.uint8)
+    red_blue[:, 0], red_blue[:, 1] = (255, 0, 0), (0, 0, 255)
+
+    def shown(**options: Any) -> NDArray[np.int64]:
+        plotter = pv.Plotter(off_screen=True, window_size=[80, 60])
+        plotter.decals.add_mesh(pv.Plane(i_size=2, j_size=2), **options)
+        plotter.view_xy()  # type: ignore[call-arg]
+        pixels = np.asarray(plotter.screenshot(return_img=True))[..., :3].astype(np.int64)
+        plotter.close()
+        return pixels
+
+    left, right = shown(color=(1.0, 0.0, 0.0)), shown(color=(0.0, 0.0, 1.0))
+    halves = shown(texture=BaseTexture(red_blue, "clamp"))
+    assert np.abs(halves[30, 25] - left[30, 25]).max() <= 1
+    assert np.abs(halves[30, 55] - right[30, 55]).max() <= 1
+    assert np.abs(left[30, 25] - right[30, 25]).max() > 50

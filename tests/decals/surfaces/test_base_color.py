@@ -102,6 +102,15 @@ def test_arrays_that_are_no_colours_are_none() -> None:
     assert item.color == CLAY
 
 
+@pytest.mark.parametrize("name", ["RGB", "rgba", "VertexColors", "COLOR_0", "my colour", "data_rgba"])
+def test_floats_are_colours_by_their_names(name: str) -> None:
+    mesh = pv.Sphere()
+    mesh["pressure"] = mesh.points[:, 0]  # the active scalars
+    values = np.random.default_rng(0).random((mesh.n_points, 4))
+    mesh.point_data.set_array(values, name)
+    assert np.allclose(colors_of(color_of(mesh)), linear(values[:, :3]), atol=1e-6)
+
+
 def test_an_explicit_colour_wins() -> None:
     mesh = pv.Sphere()
     mesh["RGB"] = bytes_of(mesh.n_points, 3)
@@ -263,3 +272,11 @@ def test_a_scene_file_reads_no_other_file_as_a_texture(tmp_path: Path) -> None:
     (tmp_path / "other.json").write_text(text[:start] + "/etc/hostname" + text[end:])
     with pytest.raises(decals.errors.InvalidScene, match="expected embedded pictures"):
         decals.load_scene(tmp_path / "other.json")
+
+
+def test_textures_of_a_scene_file_have_a_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = decals.Scene(objects=(textured(),), camera=decals.Camera((0, 0, 3), (0, 0, 0), (0, 1, 0), 30))
+    decals.save_scene(scene, tmp_path / "scene.json")
+    monkeypatch.setattr("decals.scenes.records.MAX_TEXELS", 13)
+    with pytest.raises(decals.errors.InvalidScene, match="textures of 13 pixels at most"):
+        decals.load_scene(tmp_path / "scene.json")
