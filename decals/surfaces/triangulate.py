@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from blobtree._typing import BoolArray, Float64Array, Int64Array
 
@@ -172,6 +171,13 @@ def _ring(size: int) -> Int64Array:
     return np.array([*triangles, ring], np.int64)
 
 
+def _corner_tree(flat: Float64Array) -> Any:
+    """Return the tree of the corners of a loop, by which those near a place are found."""
+    from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
+
+    return cKDTree(flat)
+
+
 class _EarClipper:
     """Division of one polygon in the plane that is not strictly convex.
 
@@ -190,7 +196,7 @@ class _EarClipper:
         self.waiting: dict[int, list[int]] = {}
         self.heap: list[tuple[float, int, int]] = []
         self.blocking = np.array(self.turns) <= FLAT
-        self.tree = cKDTree(flat) if count > TREE_CORNERS else None
+        self.tree = _corner_tree(flat) if count > TREE_CORNERS else None
 
     def triangles(self) -> list[tuple[int, int, int]]:
         """Return one triangle less than there are corners, less one."""
