@@ -3,12 +3,14 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from decals import Camera, ImplicitDecalsError, MeshObject
 from decals.errors import InvalidInput
 from decals.scenes.camera import PRESETS, Axes, Vector
+from decals.scenes.cover import vertices_of
 from decals.scenes.objects import SceneObject
 
 Size = tuple[int, int]
@@ -52,20 +54,26 @@ def parse_view(camera: str | None, axes: Axes) -> View:
 def frame(objects: Sequence[SceneObject], view: View, size: Size) -> Camera:
     """Return a camera that looks at objects so that they fill a picture of this size.
 
+    The camera moves for pictures of other aspect ratios; see `Camera.at`.
+
     Raises
     ------
     InvalidInput
         If the objects are too large or too small for a camera.
     """
+    outermost = np.concatenate([vertices_of(item) for item in objects])
     points = np.concatenate(
         [
-            item.vertices if isinstance(item, MeshObject) else item.surface.sample(_SAMPLES, seed=0)[0]
+            vertices_of(item) if isinstance(item, MeshObject) else item.surface.sample(_SAMPLES, seed=0)[0]
             for item in objects
         ]
     )
+    aspect = size[0] / size[1]
+    options: dict[str, Any] = {"direction": view.direction, "up": view.up, "margin": _MARGIN}
     try:
-        return Camera.fitting(
-            points, direction=view.direction, up=view.up, aspect=size[0] / size[1], margin=_MARGIN
-        )
+        camera = Camera.fitting(points, aspect=aspect, **options)
+        if not camera.shows(outermost, aspect):
+            camera = Camera.fitting(outermost, aspect=aspect, **options)
+        return camera.fitted_to(outermost, margin=_MARGIN)
     except ImplicitDecalsError as error:
         raise InvalidInput(f"no camera sees the model: {error}") from error

@@ -6,7 +6,7 @@ product, not the factors.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +21,14 @@ Vector = tuple[float, float, float]
 
 MIN_NEAR_OVER_FAR = 1e-4
 """Least distance of the near plane as a fraction of the far one: it bounds the depth buffer's rounding."""
+REFERENCE_ASPECT = 4 / 3
+"""Aspect ratio of the picture that a camera for all aspect ratios is placed for."""
+FILLED = 0.8, 0.98
+"""Least and largest share of a picture's width or height that points take before a fitted camera moves."""
+NEAREST, NEAREST_FITTED = 0.05, 0.005
+"""Least distances of the eye from points, in half diagonals: of one picture, and of all aspect ratios."""
+FITTED_ASPECTS, SLOPES = (0.01, 100.0), 48
+"""Range and number of aspect ratios whose outermost points a fitted camera remembers."""
 DEFAULT_DIRECTION: Vector = (0.35, 0.25, 1.0)
 """Default direction from a model toward the camera."""
 THREE_QUARTER: Vector = (0.55, 0.35, 1.0)
@@ -67,6 +75,26 @@ UPRIGHT = {
 
 
 @dataclass(frozen=True, slots=True)
+class Fit:
+    """What pictures of all aspect ratios show of a camera that `Camera.fitting` placed.
+
+    Attributes
+    ----------
+    pose : (position, target, up, fov)
+        The camera that it belongs to; another one is no longer fitted.
+    points : tuple of (x, y, z)
+        Outermost points of the model as seen from the camera's direction. Without points, narrow pictures
+        show as much from left to right as one of the aspect ratio 4:3.
+    margin : float
+        Size of the picture relative to the points.
+    """
+
+    pose: tuple[Vector, Vector, Vector, float]
+    points: tuple[Vector, ...] = ()
+    margin: float = 1.05
+
+
+@dataclass(frozen=True, slots=True)
 class Camera:
     """A perspective camera.
 
@@ -78,6 +106,9 @@ class Camera:
         Upward direction of the picture; any vector that is not along the view.
     fov : float
         Vertical angle of view in degrees, between 0 and 180.
+    fit : Fit, optional
+        What pictures of all aspect ratios show; `fitting` and `decals.cover` make it. A camera that is
+        placed in another way has none.
 
     Raises
     ------
@@ -98,6 +129,7 @@ class Camera:
     target: Vector = (0.0, 0.0, 0.0)
     up: Vector = (0.0, 1.0, 0.0)
     fov: float = 30.0
+    fit: Fit | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name in ("position", "target", "up"):
@@ -112,6 +144,39 @@ class Camera:
             )
         if math.hypot(*self.up) == 0.0 or _parallel(np.array(self.up), self._back):
             raise InvalidScene(f"a camera's up must not be zero or along the view, got {self.up}")
+        if self.fit is not None and self.fit.pose != self._pose:
+            object.__setattr__(self, "fit", None)
+
+    @property
+    def _pose(self) -> tuple[Vector, Vector, Vector, float]:
+        return self.position, self.target, self.up, self.fov
+
+    def at(self, aspect: float) -> "Camera":
+        """Return the camera of a picture whose width over its height is ``aspect``.
+
+        A camera that `fitting` placed for all aspect ratios moves if the points would be cut, or take less
+        than 80 % of the width and of the height. They then fill the picture. All other cameras stay.
+
+        Examples
+        --------
+        >>> import decals
+        >>> camera = decals.Camera.fitting([[-1, 0, 0], [1, 0, 0]], direction=(0, 0, 1), aspect=None)
+        >>> camera.at(0.5).distance > 2 * camera.at(1.4).distance
+        True
+        """
+        if self.fit is None:
+            return self
+        if self.fit.points:
+            points, margin = _points(self.fit.points), self.fit.margin
+            if self.shows(points, aspect):
+                return self
+            return Camera._fitting(
+                points, self._back.tolist(), self.up, self.fov, aspect, margin, NEAREST_FITTED
+            )
+        if aspect >= REFERENCE_ASPECT:
+            return self
+        widened = math.tan(math.radians(self.fov) / 2) * REFERENCE_ASPECT / aspect
+        return replace(self, fov=math.degrees(2.0 * math.atan(widened)))
 
     @property
     def distance(self) -> float:
@@ -151,6 +216,29 @@ class Camera:
         matrix[3, 2] = -1.0
         return matrix
 
+    def fitted_to(self, points: ArrayLike, *, margin: float) -> "Camera":
+        """Return the camera with points that pictures of all aspect ratios show; see `at`."""
+        positions = _points(points)
+        x, y, z = (positions @ self.axes.T).T
+        half = math.tan(math.radians(self.fov) / 2) / _ratio("margin", margin)
+        slopes = half * np.geomspace(*FITTED_ASPECTS, SLOPES)
+        planes = [z, -z, y + half * z, half * z - y]
+        planes += [side * x + slope * z for slope in slopes for side in (1.0, -1.0)]
+        outermost = sorted({int(np.argmax(plane)) for plane in planes})
+        return replace(self, fit=Fit(self._pose, tuple(map(_triple, positions[outermost])), margin))
+
+    def shows(self, points: ArrayLike, aspect: float, *, least: float = FILLED[0]) -> bool:
+        """Return True if points take a share of the picture of at least ``least``, and none is near its rim.
+
+        The share is that of the width or that of the height, whichever is larger.
+        """
+        x, y, z = self.axes @ (_points(points) - self.position).T
+        if z.max() >= 0.0:  # behind the eye
+            return False
+        half = math.tan(math.radians(self.fov) / 2)
+        places = np.stack([x / (half * aspect * z), y / (half * z)])
+        return bool(np.ptp(places, axis=1).max() >= 2.0 * least and np.abs(places).max() <= FILLED[1])
+
     def clip_range(self, bounds: Bounds) -> tuple[float, float]:
         """Return the distances, along the view, of a near and a far plane that enclose a box."""
         depth = (np.array(self.position) - _corners(bounds)) @ self.axes[2]
@@ -161,15 +249,17 @@ class Camera:
 
     def clip_matrix(self, size: tuple[int, int], bounds: Bounds) -> Float64Array:
         """Return the matrix from world to clip space, ``float64[4, 4]``; see `Viewpoint.clip_matrix`."""
-        return self.projection(size[0] / size[1], *self.clip_range(bounds)) @ self.view()
+        camera = self.at(size[0] / size[1])
+        return camera.projection(size[0] / size[1], *camera.clip_range(bounds)) @ camera.view()
 
     def rays(self, width: int, height: int) -> Rays:
         """Return the rays through the pixels of a picture of this size."""
-        right, up, back = self.axes
-        half = math.tan(math.radians(self.fov) / 2)
+        camera = self.at(width / height)
+        right, up, back = camera.axes
+        half = math.tan(math.radians(camera.fov) / 2)
         pixel = 2 * half / height
         corner = -back - half * up - (pixel * width / 2) * right
-        return Rays(np.array(self.position), corner, pixel * right, pixel * up)
+        return Rays(np.array(camera.position), corner, pixel * right, pixel * up)
 
     def turned(self, degrees: float) -> "Camera":
         """Return a camera turned about the upward axis through the target, counter-clockwise from above.
@@ -186,7 +276,8 @@ class Camera:
         along = axis * (axis @ offset)
         across = offset - along
         turned = along + math.cos(angle) * across + math.sin(angle) * np.cross(axis, across)
-        return replace(self, position=_triple(turned + np.array(self.target)))
+        camera = replace(self, position=_triple(turned + np.array(self.target)))
+        return camera if self.fit is None else replace(camera, fit=Fit(camera._pose))
 
     @classmethod
     def framing(
@@ -233,16 +324,34 @@ class Camera:
         direction: Sequence[float] = DEFAULT_DIRECTION,
         up: Sequence[float] = (0.0, 1.0, 0.0),
         fov: float = 30.0,
-        aspect: float = 4 / 3,
+        aspect: float | None = 4 / 3,
         margin: float = 1.05,
     ) -> "Camera":
         """Return a camera that looks at points, ``[n, 3]``, from a direction, with all of them in the middle.
 
         It stands closer than that of `framing` if the points do not fill their box. The four edges of the
         picture are planes through the eye: each pair of opposite planes fixes one coordinate of the eye and a
-        least distance. Other arguments and errors are those of `framing`.
+        least distance. Other arguments and errors are those of `framing`. Without ``aspect``, the points fill
+        pictures of all aspect ratios: the camera remembers the outermost points, see `at`.
         """
         positions = _points(points)
+        if aspect is None:
+            shape = direction, up, fov, REFERENCE_ASPECT, margin
+            return cls._fitting(positions, *shape, NEAREST_FITTED).fitted_to(positions, margin=margin)
+        return cls._fitting(positions, direction, up, fov, aspect, margin, NEAREST)
+
+    @classmethod
+    def _fitting(
+        cls,
+        positions: Float64Array,
+        direction: Sequence[float],
+        up: Sequence[float],
+        fov: float,
+        aspect: float,
+        margin: float,
+        nearest: float,
+    ) -> "Camera":
+        """Return a camera whose picture points fill, at least ``nearest`` half diagonals in front of them."""
         aspect = _ratio("aspect", aspect)
         margin = _ratio("margin", margin)
         toward, upward = _orientation(direction, up)
@@ -252,7 +361,7 @@ class Camera:
         across, depth_of_width = _fit_axis(x, z, half * aspect)
         along, depth_of_height = _fit_axis(y, z, half)
         middle = (z.max() + z.min()) / 2
-        eye = max(depth_of_width, depth_of_height, float(z.max()) + 0.05 * _half_diagonal(positions))
+        eye = max(depth_of_width, depth_of_height, float(z.max()) + nearest * _half_diagonal(positions))
         centre = np.array([across, along, middle]) @ axes_camera.axes
         position = _triple(centre + (eye - middle) * axes_camera.axes[2])
         return cls(position, _triple(centre), _triple(upward), fov)

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -14,9 +15,9 @@ from decals.rendering.options import SceneLike, is_scene_like, relief_ranges
 from decals.scattering.orientation import Direction
 from decals.scattering.scatter import scatter
 from decals.scattering.sizing import Sizing
-from decals.scenes.camera import THREE_QUARTER, UPRIGHT, Camera, Vector
+from decals.scenes.camera import REFERENCE_ASPECT, THREE_QUARTER, UPRIGHT, Camera, Vector
 from decals.scenes.files import load_model
-from decals.scenes.objects import SceneObject, as_objects
+from decals.scenes.objects import MeshObject, SceneObject, as_objects
 from decals.scenes.recipe import Recipe
 from decals.scenes.scene import Scene, as_images
 from decals.surfaces.convert import Model
@@ -26,6 +27,12 @@ from decals.validation import describe, instance, member
 
 FRAMING_SAMPLES = 2000
 """Points per object that the camera is fitted to."""
+
+LEAST_FILLED = 0.9
+"""Least share of a picture's width or height that a model takes; below it, all vertices count."""
+
+DEFAULT_FOV = 30.0
+"""Default angle of view, in degrees."""
 
 FRAMING_MARGIN = 1.1
 """Space around the objects in a picture, 1 for none."""
@@ -40,6 +47,7 @@ def cover(
     sizing: Sizing | str = Sizing.COVERING,
     view_direction: Vector | None = None,
     up: str = "y",
+    fov: float = DEFAULT_FOV,
     crease_angle: float = CREASE_ANGLE,
     orientation: MeshOrientation | str = MeshOrientation.OUTWARD,
     progress: Progress | None = None,
@@ -66,6 +74,8 @@ def cover(
         Direction from the models toward the camera; from three-quarters in front by default.
     up : {"y", "z", "x"}
         The axis that points upward in pictures, ``"z"`` for most meshes of pyvista.
+    fov : float
+        Vertical angle of view of the camera in degrees. The models fill pictures of all aspect ratios.
     crease_angle : float
         Angle between two faces of a mesh, in degrees, from which their edge is drawn sharp. Objects of a
         scene keep their own.
@@ -123,7 +133,7 @@ def cover(
         )
         heights = relief_ranges(pictures)[decals.images, 1] * decals.radii
         raised = float(heights.max(initial=0.0))
-        camera = fitting_camera(objects, direction=toward, up=axes.up, raised=raised)
+        camera = fitting_camera(objects, direction=toward, up=axes.up, fov=fov, aspect=None, raised=raised)
     recipe = Recipe.of(
         "decals.cover",
         seed=seed,
@@ -134,6 +144,7 @@ def cover(
         sizing=rule.value,
         view_direction=toward,
         up=up,
+        fov=fov,
         crease_angle=crease_angle,
         orientation=rule_of_meshes,
     )
@@ -145,16 +156,34 @@ def fitting_camera(
     *,
     direction: Vector = THREE_QUARTER,
     up: Vector = UPRIGHT["y"].up,
-    aspect: float = 4 / 3,
+    fov: float = DEFAULT_FOV,
+    aspect: float | None = 4 / 3,
     raised: float = 0.0,
 ) -> Camera:
     """Return a camera that looks from a direction and whose picture the objects fill.
 
-    Heights of decals raise the surface by at most ``raised``.
+    Heights of decals raise the surface by at most ``raised``. Without ``aspect``, the objects fill pictures
+    of all aspect ratios.
     """
     samples = [item.surface.sample(FRAMING_SAMPLES, seed=0) for item in objects]
     points: Float32Array = np.concatenate([places + raised * normals for places, normals in samples])
-    return Camera.fitting(points, direction=direction, up=up, aspect=aspect, margin=FRAMING_MARGIN)
+    shape = REFERENCE_ASPECT if aspect is None else aspect
+    options: dict[str, Any] = {"direction": direction, "up": up, "fov": fov, "margin": FRAMING_MARGIN}
+    camera = Camera.fitting(points, aspect=shape, **options)
+    outermost = np.concatenate([points, *map(vertices_of, objects)])
+    if not camera.shows(outermost, shape, least=LEAST_FILLED):
+        camera = Camera.fitting(outermost, aspect=None, **options)
+    elif aspect is None:
+        camera = camera.fitted_to(outermost, margin=FRAMING_MARGIN)
+    return camera if aspect is None else replace(camera.at(aspect), fit=None)
+
+
+def vertices_of(item: SceneObject) -> Float32Array:
+    """Return the vertices of the faces of an object, of a tree those of a coarse mesh."""
+    surface = item.surface if isinstance(item, MeshObject) else item.surface.mesh
+    used = np.zeros(len(surface.vertices), np.bool_)
+    used[surface.faces[surface.sound]] = True
+    return surface.vertices[used]
 
 
 def scene_or_objects(model: object) -> SceneLike | list[SceneObject]:

@@ -41,7 +41,7 @@ from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.images.builtin import is_builtin
 from decals.images.load import embedded_image, is_embedded, load_image
 from decals.model import Decals
-from decals.scenes.camera import Camera, Vector
+from decals.scenes.camera import Camera, Fit, Vector
 from decals.scenes.drawing_record import DrawingRecord, drawing_of_record, drawing_record
 from decals.scenes.material import DecalMaterial
 from decals.scenes.material_record import MaterialRecord, material_of, material_record, sources_of
@@ -83,11 +83,13 @@ class _Header(Struct):
     version: int = 0
 
 
-class _CameraRecord(Struct, forbid_unknown_fields=True):
+class _CameraRecord(Struct, forbid_unknown_fields=True, omit_defaults=True):
     position: Vector
     target: Vector
     up: Vector
     fov: float
+    fit: list[Vector] | None = None
+    margin: float = 1.0
 
 
 class _RecipeRecord(Struct, forbid_unknown_fields=True):
@@ -209,7 +211,7 @@ def to_json(scene: Scene, *, folder: Path, progress: Progress | None = None) -> 
         "version": VERSION,
         "objects": _lines(record_of(item, folder) for item in scene.objects),
         "images": [_image_record(image, folder) for image in scene.images],
-        "camera": _CameraRecord(camera.position, camera.target, camera.up, camera.fov),
+        "camera": _camera_record(camera),
         "drawing": drawing_record(scene.drawing, folder),
         "decals": decals,
     }
@@ -328,9 +330,17 @@ def _lines(records: Iterator[Any]) -> Raw:
     return Raw(b"[" + b",".join(lines) + b"\n  ]") if lines else Raw(b"[]")
 
 
+def _camera_record(camera: Camera) -> _CameraRecord:
+    fit = camera.fit
+    of_fit = () if fit is None else (list(fit.points), fit.margin)
+    return _CameraRecord(camera.position, camera.target, camera.up, camera.fov, *of_fit)
+
+
 def _camera(record: _CameraRecord) -> Camera:
+    pose = record.position, record.target, record.up, record.fov
     try:
-        return Camera(record.position, record.target, record.up, record.fov)
+        fit = None if record.fit is None else Fit(pose, tuple(record.fit), record.margin)
+        return Camera(*pose, fit)
     except ImplicitDecalsError as error:
         raise InvalidScene(f"camera: {error}") from error
 

@@ -98,6 +98,10 @@ class _Script:
         decals = self._decals("decals", scene.decals)
         camera, drawing = scene.camera, self._drawing(scene.drawing)
         view = ", ".join(repr(getattr(camera, name)) for name in ("position", "target", "up", "fov"))
+        if camera.fit is not None and camera.fit.points:
+            fit = f".fitted_to({list(camera.fit.points)!r}, margin={camera.fit.margin!r})"
+        else:
+            fit = ""
         head = ['"""A scene of Implicit Decals; run this file to see it, or import ``scene``."""', ""]
         if self.arrays:
             head += ["from pathlib import Path", ""]
@@ -109,7 +113,7 @@ class _Script:
         body = [
             *self._lines,
             "",
-            f"camera = decals.Camera({view})",
+            f"camera = decals.Camera({view}){fit}",
             "scene = decals.Scene(",
             f"    objects=[{', '.join(objects)}],",
             f"    images=[{', '.join(images)}],",

@@ -146,6 +146,11 @@ class ImplicitSurface(Immutable):
         return WeakValueDictionary()
 
     @property
+    def mesh(self) -> MeshSurface:
+        """Coarse mesh of the surface."""
+        return self._coarse
+
+    @property
     def area(self) -> float:
         """Area of the coarse mesh."""
         return self._coarse.area

@@ -447,12 +447,12 @@ REFINE_MILLISECONDS = 100
 
 def show_camera(plotter: Any, scene: Scene) -> None:
     """Let the active subplot of a plotter show what the camera of a scene sees."""
-    view = plotter.camera
+    view, camera = plotter.camera, scene.camera.at(plotter.renderer.GetTiledAspectRatio())
     view.position, view.focal_point = (
-        np.add(point, scene.origin) for point in (scene.camera.position, scene.camera.target)
+        np.add(point, scene.origin) for point in (camera.position, camera.target)
     )
-    view.up = scene.camera.up
-    view.view_angle = scene.camera.fov
+    view.up = camera.up
+    view.view_angle = camera.fov
     view.parallel_projection = False
     plotter.renderer.camera_set = True
     plotter.renderer.reset_camera_clipping_range()
