@@ -460,7 +460,8 @@ def checked_color(
 
 def _rows(name: str, values: ArrayLike, width: int) -> Float32Array:
     try:
-        array = real(np.asarray(values)).astype(np.float32)
+        with np.errstate(over="ignore"):  # infinity is refused below
+            array = real(np.asarray(values)).astype(np.float32)
     except (TypeError, ValueError, OverflowError):
         raise InvalidMesh(f"{name}: expected numbers in rows of {width}, got {describe(values)}") from None
     if array.ndim != 2 or array.shape[1] != width:
