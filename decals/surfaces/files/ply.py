@@ -105,21 +105,23 @@ def _read(content: bytes, path: Path) -> tuple[Float64Array, Polygons, Paint]:
         for strip in np.split(part.corners, np.cumsum(part.sizes)[:-1])
     ]
     polygons = Polygons.joined([*faces, *map(Polygons.of, triangles)])
-    face = next((table for table in tables if table.name == "face" and not triangles), None)
+    face_tables = [table for table in tables if table.name == "face"]
+    face = face_tables[0] if len(face_tables) == 1 and not triangles else None
     paint = PlyColors(
         path,
         _TEXTURE_FILE.findall(content[: len(content) - len(body)].decode("utf-8", "replace")),
         _typed(vertices[0], elements),
         {} if face is None else _typed(face, elements),
         polygons,
-        next(
-            ((face.lists[name].lengths, face.lists[name].entries) for name in _PLACES if name in face.lists),
-            None,
-        )
-        if face is not None
-        else None,
+        None if face is None else _places(face),
     )
     return points, polygons, paint
+
+
+def _places(face: _Table) -> tuple[Int64Array, NDArray[np.generic]] | None:
+    """Return the lengths and entries of the lists of texture coordinates; None without such lists."""
+    lists = next((face.lists[name] for name in _PLACES if name in face.lists), None)
+    return None if lists is None else (lists.lengths, lists.entries)
 
 
 def _typed(table: _Table, elements: list[_Element]) -> dict[str, NDArray[np.generic]]:

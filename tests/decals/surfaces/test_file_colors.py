@@ -212,6 +212,16 @@ def test_a_ply_file_has_textures_at_the_corners_of_its_faces(tmp_path: Path) -> 
         assert np.abs(found[row] - right[0]).max() < 1e-5
 
 
+def test_colours_of_one_of_two_lists_of_faces_are_left_out(tmp_path: Path) -> None:
+    columns = ["uchar red", "uchar green", "uchar blue"]
+    text = ply(np.eye(3), [], ["3 0 1 2 255 0 0"], columns)
+    second = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    (tmp_path / "a.ply").write_text(text.replace("end_header\n", second) + "3 0 2 1\n")
+    item = read(tmp_path / "a.ply")
+    assert len(item.faces) == 2
+    assert item.color == CLAY
+
+
 def test_colours_of_a_ply_file_out_of_range_are_left_out(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
