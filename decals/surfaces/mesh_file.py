@@ -55,15 +55,15 @@ _logger = logging.getLogger(__name__)
 
 
 def read_mesh(path: str | PathLike[str]) -> MeshArrays:
-    """Read a mesh file of any format that pyvista reads, as triangles.
+    """Read a mesh file as triangles.
 
     Polygons and triangle strips are triangulated. Of volume meshes the boundary is taken. Vertices keep their
-    order. Cells without area, such as lines, are left out.
+    order. Cells without area, such as lines, are left out. The parts of glTF and 3MF files become one mesh.
 
     Parameters
     ----------
     path : str or path
-        File of a format that pyvista knows by its suffix.
+        OBJ, OFF, PLY, STL, glTF, GLB or 3MF file, or one of another format that pyvista knows by its suffix.
 
     Returns
     -------
