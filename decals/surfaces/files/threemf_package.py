@@ -1,6 +1,5 @@
 """The ZIP package of a 3MF file: its parts, read in pieces and within limits."""
 
-import lzma
 import struct
 import zipfile
 import zlib
@@ -25,7 +24,7 @@ CHUNK = 1 << 16
 
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
-_FAULTS = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, NotImplementedError, RuntimeError,
+_FAULTS = (zipfile.BadZipFile, zlib.error, struct.error, NotImplementedError, RuntimeError,
            EOFError, OSError, ValueError, OverflowError)  # fmt: skip
 """What `zipfile` raises for damaged archives."""
 
