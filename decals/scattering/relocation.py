@@ -31,7 +31,7 @@ GAP_REACH = 1.5
 CANDIDATES_PER_MOVER, CANDIDATES_PER_PARTICLE = 200, 4
 """Candidate points for each particle that moves, and at most for each particle."""
 
-THIN_REACH, THIN_SHARE = 2.0, 0.25
+THIN_REACH, THIN_SHARE = 4.0, 0.45
 """Distance in spacings within which a thin part has less than this share of the area of a disc."""
 
 _CANDIDATE_STREAM = 1000
