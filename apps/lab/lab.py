@@ -215,6 +215,8 @@ class Lab:
         self._window.actions.state.end_stroke()
 
         def started() -> None:
+            if not window.actions.files.is_aside:
+                window.session.mark_saved()  # a lesson without edits needs no recovery
             self._number, self._asked, self._asking, self.probe = number, None, False, settings.probe
             self._results = self._pending = None
             self._first = window.document.decals.next_number - len(lesson.scene.decals)

@@ -13,9 +13,10 @@ from decals.editing.brushes import Brush, BrushSettings, default_decal_radius, d
 from decals.editing.commands import ReplaceImage, SetValues
 from decals.editing.decal_actions import FIRST_DECAL_COUNT
 from decals.editing.document import Document
+from decals.editing.scatter_commands import ScatterDecals
 from decals.errors import InvalidEdit
 from decals.model import FADE_ANGLES, FADE_DEPTHS, NO_IMAGE, Decals
-from decals.options import described, options_of, values_of
+from decals.options import arguments_of, described, options_of, values_of
 from decals.receivers import labels_of
 from decals.rendering.options import Drawing
 from decals.scattering.scatter import scatter
@@ -174,6 +175,13 @@ def first_scatter_values(count: int) -> dict[str, Any]:
     options = options_of(scatter).values()
     first = {o.name: o.default for o in options if o.name not in NOT_OF_SCATTER}
     return first | {"count": count or FIRST_DECAL_COUNT}
+
+
+def check_scatter_values(values: dict[str, Any]) -> None:
+    """Raise an error for options of `decals.scatter` that the next scattering would refuse."""
+    options = arguments_of(scatter, values)
+    count, seed = options.pop("count"), options.pop("seed")
+    ScatterDecals((), 0 if count is None else count, seed, options).check_values()
 
 
 def scatter_controls(values: dict[str, Any]) -> list[dict[str, Any]]:

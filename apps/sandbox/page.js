@@ -104,6 +104,31 @@
     view.dispatchEvent(new KeyboardEvent("keydown", { key, ctrlKey, metaKey, shiftKey }));
   });
 
+  // A press elsewhere takes what is being typed, before anything else follows from it. Escape drops it.
+  const typedIn = () => document.activeElement?.closest("input:not([type=range]), textarea");
+  document.addEventListener("pointerdown", (event) => {
+    const field = typedIn();
+    if (field && !field.contains(event.target)) field.blur();
+  }, true);
+  document.addEventListener("keydown", (event) => {
+    const field = typedIn();
+    const value = field?.closest("[data-value]")?.dataset.value;
+    if (event.key !== "Escape" || value === undefined) return;
+    event.stopPropagation();
+    field.value = value;
+    field.dispatchEvent(new Event("input", { bubbles: true }));
+  }, true);
+
+  // Escape ends from everywhere what it ends in the view, unless something on the page takes it.
+  const OPEN = ".v-overlay--active:not(.v-tooltip)";
+  document.addEventListener("keydown", (event) => {
+    const view = document.querySelector("[role=application]");
+    const taken = event.defaultPrevented || typedIn() || document.querySelector(OPEN);
+    if (event.key === "Escape" && !taken && !view.contains(event.target)) {
+      view.dispatchEvent(new KeyboardEvent("keydown", { key: "Escape" }));
+    }
+  }, true);
+
   // Of the toolbar and of the outline, Tab reaches one button; arrows lead from it to the others.
   const BUTTONS = "button, [role=button]";
   const rove = (group, reached = group.reached) => {

@@ -8,6 +8,7 @@ from typing import Any
 from trame.ui.vuetify3 import VAppLayout
 from trame.widgets import client, html, vuetify3
 
+from decals.apps.memory import keep_for_work
 from decals.apps.sandbox import panels
 from decals.apps.sandbox.connections import Connections
 from decals.apps.sandbox.folder import thumbnails
@@ -190,9 +191,11 @@ class Page:
 
     def refresh(self) -> None:
         """Send the values that have changed since the last look."""
+        keep_for_work(self._window.background.busy_editing)
         self.sandbox.settle()
         self.view.follow_size()
         values = self.values()
+        values["trame__title"] = f"{values['title']} \N{EN DASH} sandbox"  # of the browser's tab
         changed = {name: value for name, value in values.items() if self._shown.get(name, self) != value}
         self._shown.update(changed)
         if changed:

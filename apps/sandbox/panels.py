@@ -120,20 +120,22 @@ def build_controls(source: str, event: Any, identifiers: str, *, key: str = "c.n
                 update_modelValue=(event, f"[{identifiers}, $event, false]"),
                 end=(event, f"[{identifiers}, $event, true]"),
             )
-            _number_field(
-                "c.value", "c.label", event, f"[{identifiers}, $event.target.value, true]", "max-width: 84px"
-            )
+            sent = f"[{identifiers}, $event.target.value, true]"
+            _number_field("c.value", "c.label", event, sent, f"[{identifiers}]", "max-width: 84px")
         with html.Div(v_if="c.kind === 'vector'", classes="d-flex ga-1"):
             sent = f"[{identifiers}, $event.target.value, true, [i]]"
             label = "`${c.label} ${i + 1}`"
-            _number_field("number", label, event, sent, v_for="(number, i) in c.value", key="i")
+            _number_field(
+                "number", label, event, sent, f"[{identifiers}, i]", v_for="(number, i) in c.value", key="i"
+            )
         with (
             html.Div(v_if="c.kind === 'list'"),
             html.Div(v_for="(row, i) in c.value", key="i", classes="d-flex ga-1 mb-1"),
         ):
             sent = f"[{identifiers}, $event.target.value, true, Array.isArray(row) ? [i, j] : [i]]"
             label = "`${c.label} ${i + 1} ${j + 1}`"
-            _number_field("number", label, event, sent, v_for="(number, j) in [].concat(row)", key="j")
+            place = f"[{identifiers}, i].concat(Array.isArray(row) ? [j] : [])"
+            _number_field("number", label, event, sent, place, v_for="(number, j) in [].concat(row)", key="j")
         html.Input(
             v_if="c.kind === 'color'",
             type="color",
@@ -159,17 +161,31 @@ def build_controls(source: str, event: Any, identifiers: str, *, key: str = "c.n
             color="primary",
         )
         html.Div("{{ c.value }}", v_if="c.kind === 'text'", classes="text-caption")
+        html.Div(
+            "{{ fields.text }}",
+            v_if=f"fields.control === [{identifiers}].join(' ')",
+            classes="text-caption refused",
+            raw_attrs=['role="alert"'],
+        )
 
 
-def _number_field(value: str, label: str, event: Any, sent: str, style: str = "", **options: Any) -> None:
-    """Build a field for a number, or for nothing.
+def _number_field(
+    value: str, label: str, event: Any, sent: str, place: str, style: str = "", **options: Any
+) -> None:
+    """Build a field for a number, or for nothing; a refused value marks it.
 
-    What was refused goes away: a refusal turns the value into another type, so that the field takes it anew.
+    What was refused goes away: a reset turns the value into another type, so that the field takes it anew.
     """
     number = f"typeof {value} === 'number' ? Number({value}.toPrecision(5)) : null"
+    field = f"{place}.join(' ')"
     vuetify3.VTextField(
-        model_value=(f"(n => refusals % 2 ? n : String(n ?? ''))({number})",),
-        raw_attrs=named(label),
+        model_value=(f"(n => fields.resets[{field}] % 2 ? n : String(n ?? ''))({number})",),
+        error=(f"fields.refused === {field}",),
+        raw_attrs=[
+            *named(label),
+            f':aria-invalid="fields.refused === {field}"',
+            f":data-value=\"{number} ?? ''\"",
+        ],
         style=style,
         change=(event, sent),
         **options,

@@ -16,6 +16,7 @@ from blobtree.custom.definition import custom_kinds
 from decals.apps.sandbox import decal_panel
 from decals.apps.sandbox.controls import KIND, controls_of, exchanged, kind_control, parsed, parsed_option
 from decals.apps.sandbox.display import PHASES, Display
+from decals.apps.sandbox.fields import Fields
 from decals.apps.sandbox.files import SandboxFiles
 from decals.apps.sandbox.outline import outline
 from decals.editing import new_nodes
@@ -139,6 +140,7 @@ class Sandbox:
         self._marked: list[str] = []
         self._image: int | None = None
         self._scattering: dict[str, Any] = {}
+        self._fields = Fields()
         self._background = window.document.drawing.background
         self._outlined: tuple[Any, ...] = ()
         self._measured: tuple[object, float] = None, 1.0
@@ -153,8 +155,8 @@ class Sandbox:
         return {
             "title": window.actions.files.title,
             "status": self.status,
-            "refusals": state.refusals,
             "refused": bool(state.refusal),
+            "fields": self._fields.values(session.changes),
             "help": window.actions.help_visible,
             "busy": window.busy,
             "queue": [vars(work) for work in state.background.queue],
@@ -320,7 +322,12 @@ class Sandbox:
             setter = setters[one_of("panel", panel, setters, InvalidEdit)]
             setter(name, raw, last=bool(last), index=index)
 
+        refusals, changes = self._state.refusals, self._window.session.changes
         self.slide(step, last=bool(last))
+        if last:
+            refused = self._state.refusals > refusals
+            reason = self._state.refusal if refused else ""
+            self._fields.typed(panel, name, index, reason, changes)
 
     def _set_parameter(
         self, followed: FollowedNode, name: str, raw: Any, *, last: bool, index: object
@@ -339,7 +346,9 @@ class Sandbox:
 
     def _set_scattering(self, name: str, raw: Any, **_others: object) -> None:
         one_of("option", name, self._scatter_values(), InvalidEdit)
-        self._scattering[name] = parsed_option(scatter, name, raw)
+        changed = {name: parsed_option(scatter, name, raw)}
+        decal_panel.check_scatter_values(self._scatter_values() | changed)
+        self._scattering |= changed
         self._state.show(f"set {name}")
 
     def slide(self, step: Callable[[], None], *, last: bool) -> None:

@@ -286,6 +286,11 @@ class FileActions(WindowActions):
             self._aside = self.path, self.recovery, self._exists
             self.path, self.recovery, self._exists = None, self._recovery_beside(None), False
 
+    @property
+    def is_aside(self) -> bool:
+        """True while the scene's file is set aside."""
+        return self._aside is not None
+
     def take_back(self) -> None:
         """Continue with the file that was set aside, if one was."""
         if self._aside is not None:

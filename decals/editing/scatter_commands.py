@@ -14,9 +14,10 @@ from decals.editing.document import Document, Edit
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points
 from decals.errors import InvalidEdit
 from decals.model import MAX_COORDINATE, Decals
+from decals.scattering.appearance import Appearance
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.polish import PUSHING_RADIUS, relax_near
-from decals.scattering.scatter import scatter
+from decals.scattering.scatter import check_regularity, scatter
 from decals.scenes.objects import (
     MeshObject,
     SceneObject,
@@ -149,11 +150,9 @@ class ScatterDecals:
         """
         for number in object_indices(self.objects):
             whole_number("object", number, 0, len(objects) - 1, InvalidEdit)
-        whole_number("count", self.count, 0, MAX_SCATTERED_DECALS, InvalidEdit)
         if images < 1:
             raise InvalidEdit("expected an image for the decals to show, got none; add one first")
-        for name in instance("options", self.options, dict, InvalidEdit, "such as {'factor': 0.5}"):
-            one_of("option", name, SCATTER_OPTIONS, InvalidEdit)
+        self.check_values()
         covered = tuple(objects[number] for number in self.objects)
         decals = scatter(
             [item.surface for item in covered],
@@ -168,6 +167,17 @@ class ScatterDecals:
         given = {"models": names, "count": self.count, "images": images, **self.options}
         recipe = Recipe.of("decals.scatter", seed=self.seed, **given)
         return ReplaceDecals(self.objects, decals, covered, recipe)
+
+    def check_values(self) -> None:
+        """Raise `InvalidEdit` or `InvalidScattering` for a count, a seed or an option that is not valid."""
+        whole_number("count", self.count, 0, MAX_SCATTERED_DECALS, InvalidEdit)
+        whole_number("seed", self.seed, 0, None, InvalidEdit)
+        options = dict(instance("options", self.options, dict, InvalidEdit, "such as {'factor': 0.5}"))
+        for name in options:
+            one_of("option", name, SCATTER_OPTIONS, InvalidEdit)
+        check_regularity(options.pop("regularity", 1.0))
+        options.pop("weights", None)  # as many as there are images
+        Appearance(**options)
 
     def compute(self, document: Document) -> Edit:
         """Return the edit, which may take long."""

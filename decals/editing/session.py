@@ -348,6 +348,16 @@ class EditSession:
         self._saved = self._history.start
         self._revision += 1
 
+    @property
+    def changes(self) -> int:
+        """Number that grows with every change of the document or of the history."""
+        return self._revision
+
+    def mark_saved(self) -> None:
+        """Count the present state as saved, such as a scene that can be opened again."""
+        self.end_stroke()
+        self._saved = self.position
+
     # -- listeners and files ----------------------------------------------------------------------------
 
     def subscribe(self, listener: Callable[[Edit], None]) -> Callable[[], None]:

@@ -137,9 +137,7 @@ def scatter(
     40
     """
     checked_surfaces = as_surfaces(surfaces)
-    real_number(
-        "regularity", regularity, "a number from 0 to 1", lambda value: 0.0 <= value <= 1.0, InvalidScattering
-    )
+    check_regularity(regularity)
     function_or_none("progress", progress, InvalidScattering)
     Appearance(sizing, factor, direction, images, weights, choice, jitter)  # check before the long work
     with reporting(progress) as report:
@@ -177,6 +175,13 @@ def scatter(
             )
             report_radii("measuring radii", 1.0)
     return decals
+
+
+def check_regularity(regularity: float) -> None:
+    """Raise `InvalidScattering` unless a regularity is a number from 0 to 1."""
+    real_number(
+        "regularity", regularity, "a number from 0 to 1", lambda value: 0.0 <= value <= 1.0, InvalidScattering
+    )
 
 
 def _projections(surfaces: Sequence[Surface]) -> list[wp.Kernel]:

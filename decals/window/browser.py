@@ -8,8 +8,11 @@ from decals.errors import InvalidEdit
 from decals.validation import describe, finite_number, instance
 from decals.window.window import EditWindow
 
-_FOCUS = "$event.currentTarget.focus({preventScroll: true})"
-"""Give the element under the pointer the focus, so that it receives keys."""
+_FOCUS = (
+    "$event.currentTarget.ownerDocument.activeElement?.matches('input, textarea')"
+    " || $event.currentTarget.focus({preventScroll: true})"
+)
+"""Give the element under the pointer the focus, so that it receives keys, unless a field has it."""
 
 _RECORD_POSITION = (
     "$event.currentTarget.dataset.at = [$event.offsetX / $event.target.clientWidth, "

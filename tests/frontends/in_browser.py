@@ -582,6 +582,56 @@ async def panels(picture: str | None = None) -> None:
     window.close()
 
 
+async def fields() -> None:
+    """What is typed in a field is taken or dropped, and never becomes another edit."""
+    plotter = pv.Plotter(off_screen=True)
+    server = get_server("fields", client_type="vue3")
+    window = EditWindow(scene(), path="fields.json", plotter=plotter)
+    window.show()
+    sandbox_page = SandboxPage(server, window, folder=Path(tempfile.mkdtemp()))
+    keys = window.actions.state
+    async with served(server, size=(1280, 800), guard=sandbox_page.guard) as browser:
+        assert await browser.title() == "fields.json \N{EN DASH} sandbox"
+        await browser.get_by_text("Point", exact=True).first.click()
+        field = browser.locator("input[aria-label='radius']").first
+        view = browser.locator("[role=application]")
+
+        async def shown(text: str) -> None:
+            async with asyncio.timeout(PATIENCE):
+                while await field.input_value() != text:
+                    await asyncio.sleep(0.05)
+
+        await shown("1")
+        await field.press("End")
+        await browser.keyboard.type("55")
+        await browser.keyboard.press("Control+z")
+        await shown("1")
+        await view.hover(position={"x": 300, "y": 200})
+        await view.hover(position={"x": 320, "y": 220})
+        await browser.keyboard.type("1x")  # X evens decals out in the view
+        await shown("11x")
+        await browser.keyboard.press("Escape")
+        await shown("1")
+        for text in ("-5", "abc"):
+            await field.fill(text)
+            await field.press("Enter")
+            await browser.get_by_role("alert").filter(has_text="radius: expected").wait_for()
+            assert await field.get_attribute("aria-invalid") == "true"
+            await shown("1")
+        await field.fill("0.8")
+        await browser.get_by_text("Point", exact=True).nth(1).click()
+        await until(lambda: keys.primitive == (0, (1,)) and not window.background.busy_editing)
+        assert window.session.labels == ("set radius",)
+        await shown("0.5")
+        await field.fill("0.4")
+        await browser.get_by_role("button", name="undo").first.click()
+        await until(lambda: window.session.undone_labels == ("set radius",))
+        await shown("0.5")
+        await browser.keyboard.press("Escape")  # the focus is on the button
+        await until(lambda: keys.primitive is None)
+    window.close()
+
+
 async def lab(picture: str | None = None) -> None:
     """A student answers each lesson's question wrong, then right."""
     plotter = pv.Plotter(off_screen=True)
@@ -746,6 +796,7 @@ def main() -> None:
         "lab": lab,
         "ended": ended,
         "panels": panels,
+        "fields": fields,
         "shared": shared,
     }
     asyncio.run(checks[name](*arguments))

@@ -32,7 +32,20 @@ def require(*modules: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "check", ["page", "user", "streamed", "sandbox", "start", "creature", "lab", "ended", "panels", "shared"]
+    "check",
+    [
+        "page",
+        "user",
+        "streamed",
+        "sandbox",
+        "start",
+        "creature",
+        "lab",
+        "ended",
+        "panels",
+        "fields",
+        "shared",
+    ],
 )
 def test_in_a_browser(check: str) -> None:
     require(*NEEDED)

@@ -456,7 +456,8 @@ def test_wrong_events_say_why_and_change_nothing(window: EditWindow) -> None:
     sandbox, before = Sandbox(window), digest(window.document)
     sandbox.set_control("node", "radius", 0.5)
     assert "no node is selected" in sandbox.status
-    assert sandbox.values()["refusals"] == 1  # fields show their values again
+    fields = sandbox.values()["fields"]
+    assert (fields["refused"], fields["resets"]) == ("node radius", {"node radius": 1})  # it shows its value
     for key in ("0/7", "9", "x", "object x", None, 3, "image 7"):
         sandbox.select(key)  # type: ignore[arg-type]
         assert "expected" in sandbox.status
@@ -576,3 +577,36 @@ def test_escape_deselects_rows_before_it_cancels_work(window: EditWindow) -> Non
     assert not window.background.busy_editing
     finish(window)
     assert window.session.labels == ()
+
+
+def test_a_refused_value_marks_its_field_and_says_the_range(window: EditWindow) -> None:
+    sandbox = Sandbox(window)
+    for raw, reason in (
+        (-5, "count: expected a whole number from 0 to"),
+        ("abc", "count: expected a finite number"),
+    ):
+        sandbox.set_control("scattering", "count", raw)
+        fields = sandbox.values()["fields"]
+        assert (fields["refused"], fields["control"]) == ("scattering count",) * 2
+        assert reason in fields["text"]
+    assert fields["resets"] == {"scattering count": 2}
+    for name, raw in (("factor", -1), ("regularity", 2), ("seed", -1)):
+        sandbox.set_control("scattering", name, raw)
+        assert sandbox.values()["fields"]["refused"] == f"scattering {name}"
+    sandbox.set_control("scattering", "seed", 7)
+    fields = sandbox.values()["fields"]
+    assert (fields["refused"], fields["text"]) == ("", "")
+    sandbox.select("0/1")
+    sandbox.set_control("node", "center", "x", index=[1])
+    assert sandbox.values()["fields"]["refused"] == "node center 1"
+    assert window.session.labels == ()
+
+
+def test_a_field_shows_its_value_again_if_what_was_typed_is_undone(window: EditWindow) -> None:
+    sandbox = Sandbox(window)
+    sandbox.select("0/1")
+    sandbox.values()
+    sandbox.set_control("node", "radius", "0.7")
+    sandbox.perform("undo")
+    finish(window)
+    assert sandbox.values()["fields"]["resets"] == {"node radius": 1}
