@@ -1,5 +1,6 @@
 """Files of the folder in which the sandbox was started: the start page, opening, uploads, and writing."""
 
+import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -17,6 +18,7 @@ from decals.apps.sandbox.folder import HDR, MODELS, keep_upload, listed, plain_n
 from decals.apps.views import THREE_QUARTER
 from decals.editing.commands import AddImage, ReplaceImage
 from decals.editing.file_actions import WRITTEN_SUFFIXES
+from decals.editing.file_names import open_plain
 from decals.editing.outline_actions import Part, image_on_layer
 from decals.editing.queries import SurfacePick
 from decals.editing.recovery import recovery_path
@@ -39,6 +41,9 @@ LIGHT = "light"
 
 PLACE, PLACE_STEPS = re.compile(r"view (\d{1,5})/(\d{1,5})"), 10_000
 """Key of a place of the view, and steps across the view that it counts, from the lower left corner."""
+
+MAX_KEPT = 100
+"""Most pictures that a session writes into the folder, because a page has sent them as light."""
 
 PART_BYTES = 4_000_000
 """Bytes of a file that are sent to a page at once."""
@@ -71,7 +76,7 @@ class SandboxFiles:
         self._folder, self._lessons, self._opened = folder.resolve(), list(lessons), opened
         self._files.folder, self._files.closable = self._folder, False
         self._files.screenshot = lambda: window.plotter.screenshot(None, return_img=True)
-        self.start_open, self._listed = False, dict[str, Any]()
+        self.start_open, self._listed, self._kept = False, dict[str, Any](), 0
 
     def show_start(self, shown: bool) -> None:
         """Show or hide the start page, with the files that are there now."""
@@ -195,7 +200,10 @@ class SandboxFiles:
         """Light the scene with a panorama, which is kept in the folder."""
         present, up = self._window.document.drawing.environment, self._window.actions.view.axes.up
         checked = Environment(picture, up=up) if present is None else replace(present, picture=picture)
+        if self._kept >= MAX_KEPT:
+            raise InvalidEdit(f"expected at most {MAX_KEPT} pictures for the light in one session")
         changed = replace(checked, picture=checked.picture.kept_at(keep_upload(file, self._folder)))
+        self._kept += 1
         self._state.draw_with("set environment", environment=changed)
 
     def remove_light(self) -> None:
@@ -230,8 +238,9 @@ class SandboxFiles:
         if path.suffix.lower() not in WRITTEN_SUFFIXES or not is_file(path):
             raise InvalidEdit(f"expected a file of the folder, found no {name!r}; write it first")
         try:
-            with path.open("rb") as file:
-                file.seek(whole_number("begin", begin, 0, path.stat().st_size, InvalidEdit))
+            with open_plain(self._folder, path) as file:
+                length = os.fstat(file.fileno()).st_size
+                file.seek(whole_number("begin", begin, 0, length, InvalidEdit))
                 return file.read(PART_BYTES)
         except OSError as error:
             raise InvalidEdit(f"could not read {name} ({error.strerror})") from error

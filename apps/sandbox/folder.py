@@ -10,6 +10,7 @@ from pathlib import Path
 from blobtree.files import is_file, write_atomically
 from decals import DecalImage, Scene, load_model
 from decals.apps.models.samples import sample_mesh
+from decals.editing.file_names import is_reserved
 from decals.editing.recovery import SUFFIX, in_use
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.images import read_image
@@ -25,6 +26,11 @@ MAX_LOOKED_AT = 5000
 """Most files of a folder that the start page looks at."""
 
 MAX_UPLOAD_BYTES = 100_000_000
+MAX_UPLOADS = 32
+"""Most files that are taken at once."""
+
+MAX_STEM_BYTES = 120
+"""Longest name of a file that a page sends, without its suffix."""
 
 
 def _files(folder: Path) -> Iterator[os.DirEntry[str]]:
@@ -141,7 +147,11 @@ def _checked(file: object) -> tuple[str, bytes]:
 def plain_name(name: str) -> str:
     """Return the stem of a file's name without characters that mean something in paths."""
     stem = Path(name.replace("\\", "/")).stem
-    return "".join(c if c.isalnum() or c in "-_ " else "-" for c in stem)[:60].strip() or "model"
+    plain = "".join(c if c.isalnum() or c in "-_ " else "-" for c in stem)[:60]
+    while len(plain.encode()) > MAX_STEM_BYTES:
+        plain = plain[:-1]
+    plain = plain.strip() or "model"
+    return f"{plain}-" if is_reserved(plain) else plain
 
 
 def thumbnails() -> dict[str, str]:

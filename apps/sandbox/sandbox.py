@@ -18,6 +18,7 @@ from decals.apps.sandbox.controls import KIND, controls_of, exchanged, kind_cont
 from decals.apps.sandbox.display import PHASES, Display
 from decals.apps.sandbox.fields import Fields
 from decals.apps.sandbox.files import SandboxFiles
+from decals.apps.sandbox.folder import MAX_UPLOADS
 from decals.apps.sandbox.outline import outline
 from decals.editing import new_nodes
 from decals.editing.outline_actions import Part
@@ -446,7 +447,11 @@ class Sandbox:
 
     def upload(self, files: object, key: str = "") -> None:
         """Take files that were dropped on the page; see `SandboxFiles.take`."""
-        for file in files if isinstance(files, list | tuple) else [files]:
+        dropped = files if isinstance(files, list | tuple) else [files]
+        if len(dropped) > MAX_UPLOADS:
+            self.attempt(partial(refuse_number, len(dropped)))
+            return
+        for file in dropped:
             self.attempt(partial(self._files.take, file, key))
 
     # -- view, decals and outline -----------------------------------------------------------------------
@@ -522,6 +527,11 @@ class Sandbox:
         self.take_step()
         self._state.attempt(request)
         self._window.redraw(whole=whole)
+
+
+def refuse_number(count: int) -> None:
+    """Raise the error of too many files at once."""
+    raise InvalidEdit(f"expected at most {MAX_UPLOADS} files at once, got {count}; drop fewer")
 
 
 def first_line(kind: type[Node]) -> str:

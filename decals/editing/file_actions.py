@@ -13,6 +13,7 @@ from decals.baking.bake import SUFFIX as BAKED_SUFFIX
 from decals.baking.bake import bake
 from decals.editing.action_state import ActionState, Cursor, WindowActions
 from decals.editing.commands import AddImage, ReplaceScene
+from decals.editing.file_names import name_fault
 from decals.editing.key_bindings import Group
 from decals.editing.prompts import Question, TextPrompt
 from decals.editing.recovery import RecoveryFile, numbered_paths
@@ -324,6 +325,8 @@ class FileActions(WindowActions):
         if path.suffix.lower() not in suffixes:
             raise InvalidEdit(f"expected a name that ends in {', '.join(suffixes)}, got {text!r}")
         path = self.inside(path)
+        if self.folder is not None and (fault := name_fault(path.relative_to(self.folder))):
+            raise InvalidEdit(f"expected {fault}, got {text[:80]!r}")
         if is_folder(path) or not is_folder(path.parent):
             raise InvalidEdit(f"expected a file in an existing folder, got {text!r}")
         return path
@@ -334,8 +337,12 @@ class FileActions(WindowActions):
         if self.folder is None:
             return path
         inside = self.folder / path
-        if "\0" in str(path) or not inside.resolve().is_relative_to(self.folder.resolve()):
-            raise InvalidEdit(f"expected a file inside {str(self.folder)!r}, got {str(path)!r}")
+        try:
+            leads_out = not inside.resolve().is_relative_to(self.folder.resolve())
+        except (OSError, RuntimeError, ValueError):  # a name that is too long, links in a circle, a NUL
+            leads_out = True
+        if leads_out:
+            raise InvalidEdit(f"expected a file inside {str(self.folder)!r}, got {str(path)[:80]!r}")
         return inside
 
     # -- closing ----------------------------------------------------------------------------------------

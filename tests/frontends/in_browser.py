@@ -192,7 +192,9 @@ async def sandbox(picture: str | None = None) -> None:
         await field.fill("0.6")
         await field.press("Enter")
         await until(lambda: window.session.labels[-1:] == ("set ring_radius",))
-        await browser.get_by_text("set ring_radius", exact=True).wait_for()  # the field has its value back
+        await browser.get_by_text(
+            "set ring_radius", exact=True
+        ).first.wait_for()  # the field has its value back
         if picture is not None:
             window.subplot.vtk_renderer.ResetCamera()
             window.redraw(whole=True)

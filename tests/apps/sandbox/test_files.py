@@ -1,6 +1,7 @@
 """Files of the sandbox without a browser: the start page, opening, uploads, and what is written."""
 
 import io
+import os
 import runpy
 import tempfile
 from collections.abc import Iterator
@@ -17,7 +18,7 @@ import decals
 from blobtree import Point, Segment
 from decals.apps.models.samples import SAMPLES, sample
 from decals.apps.models.scenes import empty_scene
-from decals.apps.sandbox.folder import listed, read_upload, thumbnails
+from decals.apps.sandbox.folder import MAX_UPLOADS, listed, plain_name, read_upload, thumbnails
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing.commands import ScaleDecals
 from decals.errors import ImplicitDecalsError
@@ -283,6 +284,51 @@ def test_wrong_uploads_say_why(file: Any) -> None:
     with pytest.raises(ImplicitDecalsError) as error:
         read_upload(file)
     assert tempfile.gettempdir() not in str(error.value)
+
+
+def test_too_many_files_at_once_are_refused(sandbox: Sandbox, window: EditWindow) -> None:
+    sandbox.upload([{"name": "a.png", "content": b"x"}] * (MAX_UPLOADS + 1))
+    assert "expected at most 32 files at once, got 33; drop fewer" in sandbox.status
+    assert len(window.document.images) == 1
+
+
+def test_names_of_uploads_become_plain_names() -> None:
+    for name, plain in (
+        ("../../sky.png", "sky"),
+        ("..\\..\\sky.hdr", "sky"),
+        ("con.png", "con-"),
+        ("NUL.hdr", "NUL-"),
+        ("com1.png", "com1-"),
+        ("a\nb\x1b[31m.png", "a-b--31m"),
+        ("\u202egnp.png", "-gnp"),
+        (" ...png", "--"),
+    ):
+        assert plain_name(name) == plain, name
+    assert len(plain_name("🦎a" * 500).encode()) <= 120
+    assert len(plain_name("字" * 500).encode()) <= 120
+
+
+@pytest.mark.skipif(not hasattr(os, "O_NOFOLLOW"), reason="links need rights of their own on Windows")
+def test_a_link_that_comes_between_check_and_reading_is_not_followed(
+    sandbox: Sandbox, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    secret = tmp_path.parent / f"{tmp_path.name} secret.ply"
+    secret.write_bytes(b"secret")
+    (tmp_path / "a.ply").write_bytes(b"plain")
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "inner" / "b.ply").write_bytes(b"inner")
+    assert (sandbox.read_file("a.ply", 0), sandbox.read_file("inner/b.ply", 0)) == (b"plain", b"inner")
+    kept = sandbox._files._files.inside
+
+    def swapped(name: Any) -> Path:
+        path = kept(name)
+        (tmp_path / "a.ply").unlink()
+        (tmp_path / "a.ply").symlink_to(secret)
+        return path
+
+    monkeypatch.setattr(sandbox._files._files, "inside", swapped)
+    assert sandbox.read_file("a.ply", 0) == b""
+    assert "could not read a.ply" in sandbox.status
 
 
 def test_written_files_are_read_in_parts(

@@ -279,6 +279,40 @@ def test_files_outside_the_folder_are_refused(tmp_path: Path) -> None:
         actions.files.write("a.txt", False)
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "con.json",
+        "Aux.stl.py",
+        "LPT9.glb",
+        "nul .json",
+        "inner/PRN.json",
+        "a?.json",
+        "a:b.json",
+        "..\\a.json",
+        "a\x07.json",
+        "a\u202e.json",
+        f"{'a' * 300}.json",
+        f"{'字' * 90}.json",
+        "a/" * 20 + "a.json",
+        "inner /a.json",
+        "inner./a.json",
+    ],
+)
+def test_names_that_some_system_cannot_have_are_refused(name: str, tmp_path: Path) -> None:
+    actions = Actions(EditSession(scene()), path=tmp_path / "scene.json")
+    actions.files.folder = tmp_path
+    (tmp_path / "inner").mkdir()
+    with pytest.raises(InvalidEdit, match="expected"):
+        actions.files.write(name, True)
+    assert [path.name for path in tmp_path.iterdir()] == ["inner"]
+    (tmp_path / "round").symlink_to(tmp_path / "round")
+    with pytest.raises(InvalidEdit, match="expected a file inside"):
+        actions.files.write("round/a.json", True)
+    actions.files.write("inner/plain näme (2).json", False)
+    assert (tmp_path / "inner" / "plain näme (2).json").exists()
+
+
 @pytest.mark.parametrize("name", ["script.py", "mesh.stl", pytest.param("baked.glb", marks=pytest.mark.slow)])
 def test_the_suffix_is_the_format(name: str, tmp_path: Path) -> None:
     actions = Actions(EditSession(scene()), path=tmp_path / "scene.json")
