@@ -35,13 +35,11 @@ from decals.apps.commands.options import (
     Whole,
     check_count,
 )
+from decals.apps.jupyter import TOKEN
 from decals.errors import InvalidInput, MissingPackage
 
 HOST = "127.0.0.1"
 """By default, the page is served to this machine only."""
-
-TOKEN = "IMPLICIT_DECALS_TOKEN"
-"""Variable of the environment with the token, for a program that starts the server; default: a new token."""
 
 TITLE = "Implicit Decals sandbox"
 
