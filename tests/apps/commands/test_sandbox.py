@@ -19,6 +19,7 @@ import blobtree
 from blobtree import Point
 from decals.apps.cli import run
 from decals.apps.commands import sandbox as sandbox_module
+from decals.apps.jupyter import TOKEN
 from decals.editing import recovery_path
 from decals.editing.commands import AddImage
 from decals.scenes.scene import DecalImage
@@ -121,12 +122,12 @@ def test_a_program_that_starts_the_server_may_give_the_token(
     capsys: Capture,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setenv(sandbox_module.TOKEN, "0123456789abcdef")
+    monkeypatch.setenv(TOKEN, "0123456789abcdef")
     assert run(["sandbox", "--share", "--no-browser"]) == 0
     assert opened[0][0].options["guard"].token == "0123456789abcdef"
-    assert sandbox_module.TOKEN not in os.environ
+    assert TOKEN not in os.environ
     assert "0123456789abcdef" not in capsys.readouterr().err  # a log may be read by others
-    monkeypatch.setenv(sandbox_module.TOKEN, "short")
+    monkeypatch.setenv(TOKEN, "short")
     assert run(["sandbox", "--share", "--no-browser"]) == 2
     assert "expected at least 16 letters, digits, - and _" in capsys.readouterr().err
 
