@@ -39,13 +39,10 @@ MeshArrays = tuple[Float32Array, Int32Array]
 MIN_PRECISE_RATIO = 500.0
 """Least ratio of coordinates to the extent of a mesh at which float64 is kept."""
 
-_READERS: dict[str, Callable[[Path], tuple[Float64Array, Polygons | Int64Array]]] = {
-    ".off": read_off,
-    ".stl": read_stl,
-}
+_READERS: dict[str, Callable[[Path], tuple[Float64Array, Polygons]]] = {".stl": read_stl}
 """Our own readers, by suffix: they return points and polygons."""
 
-_PAINTED_READERS = {".obj": read_obj, ".ply": read_ply}
+_PAINTED_READERS = {".obj": read_obj, ".off": read_off, ".ply": read_ply}
 """Those that return points, polygons and their colours."""
 
 _PLACED_READERS = {".3mf": read_3mf, ".glb": read_gltf, ".gltf": read_gltf}

@@ -1,13 +1,16 @@
 """Reader of OFF files (Geomview): text, with or without normals, colours and texture coordinates."""
 
 import re
+from functools import partial
 from itertools import chain
 from pathlib import Path
 
-from blobtree._typing import Float64Array
+from blobtree._typing import Float32Array, Float64Array, Int64Array
+from decals.surfaces.base_color import BaseColor, linear_colors
 from decals.surfaces.files.content import (
     Line,
     file_bytes,
+    finite_numbers,
     parsed,
     points_of,
     refusal,
@@ -15,13 +18,14 @@ from decals.surfaces.files.content import (
     text_lines,
     whole_numbers,
 )
-from decals.surfaces.triangulate import Polygons
+from decals.surfaces.files.paint import Paint
+from decals.surfaces.triangulate import Polygons, Triangulation
 
-_KEYWORD = re.compile(rb"(ST)?C?N?(?P<space>4?n?)OFF", re.IGNORECASE)
+_KEYWORD = re.compile(rb"(ST)?(?P<color>C?)(?P<normal>N?)(?P<space>4?n?)OFF", re.IGNORECASE)
 
 
-def read_off(path: Path) -> tuple[Float64Array, Polygons]:
-    """Read the vertices and polygons of an OFF file.
+def read_off(path: Path) -> tuple[Float64Array, Polygons, Paint]:
+    """Read the vertices and polygons of an OFF file, with their colours.
 
     Raises
     ------
@@ -34,7 +38,7 @@ def read_off(path: Path) -> tuple[Float64Array, Polygons]:
         raise refusal(path, "OFF", error) from error
 
 
-def _read(content: bytes) -> tuple[Float64Array, Polygons]:
+def _read(content: bytes) -> tuple[Float64Array, Polygons, Paint]:
     if re.match(rb"[^\n]{0,20}OFF\s+BINARY", content, re.IGNORECASE):
         raise ValueError("it is a binary OFF file; only text is read")
     lines = [
@@ -42,6 +46,7 @@ def _read(content: bytes) -> tuple[Float64Array, Polygons]:
         for number, line in enumerate(text_lines(content), 1)
         if (text := line.partition(b"#")[0].strip())
     ]
+    first_color = _first_color(lines)
     points, faces, lines = _counts(lines)
     if len(lines) < points + faces:
         raise ValueError(
@@ -49,7 +54,16 @@ def _read(content: bytes) -> tuple[Float64Array, Polygons]:
         )
     if len(lines) > points + faces:
         raise lines[points + faces].expected(f"nothing behind the last of {faces} faces")
-    return points_of(lines[:points]), _polygons(lines[points:], points)
+    polygons = _polygons(lines[points:], points)
+    colors = [line.text.split()[first_color:][:3] for line in lines[:points]] if first_color else []
+    paint = partial(_painted, colors, lines[points:], polygons.sizes)
+    return points_of(lines[:points]), polygons, paint
+
+
+def _first_color(lines: list[Line]) -> int | None:
+    """Return the place of the first colour among the numbers of a vertex; None if it has none."""
+    keyword = _KEYWORD.match(lines[0].text) if lines else None
+    return None if keyword is None or not keyword["color"] else 3 + 3 * len(keyword["normal"])
 
 
 def _counts(lines: list[Line]) -> tuple[int, int, list[Line]]:
@@ -85,3 +99,23 @@ def _polygons(lines: list[Line], points: int) -> Polygons:
         return Polygons(found, sizes)
 
     return parsed(lines, corners, f"a number of corners, and as many vertices from 0 to {points - 1}")
+
+
+def _painted(
+    vertices: list[list[bytes]], faces: list[Line], sizes: Int64Array, triangles: Triangulation
+) -> BaseColor | None:
+    """Return the colours of vertices, or of faces if all have one; None without either."""
+    if vertices:
+        return BaseColor(_light(vertices, "vertices"))
+    colors = [line.text.split()[1 + size :] for line, size in zip(faces, sizes.tolist(), strict=True)]
+    if not all(len(words) in (3, 4) for words in colors):  # a single number is that of a palette
+        return None
+    return BaseColor.of_faces(_light([words[:3] for words in colors], "faces")[triangles.polygons])
+
+
+def _light(colors: list[list[bytes]], what: str) -> Float32Array:
+    """Return linear light of colours: bytes if any is above 1 and none has a fraction, else from 0 to 1."""
+    words = list(chain.from_iterable(colors))
+    values = finite_numbers(words).reshape(-1, 3)
+    levels = 255.0 if not any(b"." in word for word in words) and values.max() > 1.0 else 1.0
+    return linear_colors(values, levels=levels, name=f"colours of {what}")

@@ -9,6 +9,7 @@ import pytest
 
 from decals.errors import InvalidMesh
 from decals.surfaces import read_mesh
+from decals.surfaces.mesh_file import read_mesh_data
 
 V = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 VT = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
@@ -298,3 +299,25 @@ def test_what_is_left_out_is_logged(tmp_path: Path, caplog: pytest.LogCaptureFix
     messages = "\n".join(record.getMessage() for record in caplog.records)
     for part in ("1 faces of fewer than three", "1 free-form", "1 faces cross themselves"):
         assert part in messages
+
+
+@pytest.mark.parametrize("paint", ["255 0 0", "255 0 0 255", "1 0 0", "1.0 0.0 0.0 1.0"])
+@pytest.mark.parametrize("of_vertices", [True, False])
+def test_colours_of_off(tmp_path: Path, paint: str, of_vertices: bool) -> None:
+    rows = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+    content = f"OFF\n4 1 0\n{rows}4 0 1 2 3 {paint}\n"
+    if of_vertices:
+        painted = rows.replace("\n", f" 0 0 1 {paint}\n")
+        content = f"CNOFF\n4 1 0\n{painted}4 0 1 2 3\n"
+    mesh = read_mesh_data(written(tmp_path, "a.off", content))
+    assert mesh.color is not None
+    assert mesh.color.simplified == (1.0, 0.0, 0.0)
+    assert len(mesh.color) == (4 if of_vertices else 2)
+
+
+def test_off_without_whole_colours_is_read_without_them(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert read_mesh_data(written(tmp_path, "a.off", OFF.replace("4 0 1 2 3", "4 0 1 2 3 7"))).color is None
+    assert read_mesh_data(written(tmp_path, "a.off", OFF.replace("OFF", "COFF"))).color is None
+    assert "Left out the colours" in caplog.text
