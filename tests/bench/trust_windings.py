@@ -9,13 +9,13 @@ from tests.oracles.windings import KINDS, Case, oriented_triangles, volume
 TARGETS = {"winding_faults": "0"}
 """Targets of the counts; each stands beside its number of cases."""
 
-CASES, QUICK_CASES = 500, 60
+CASES, QUICK_CASES = 500, 40
 """Solids, and those of a quick run."""
 
 PICTURES_EVERY = 10
 """A solid of so many is covered and drawn too."""
 
-SIZE = (96, 64)
+SIZE = (64, 48)
 """Size of the pictures."""
 
 
@@ -50,7 +50,7 @@ def looks_wrong(case: Case, seed: int) -> bool:
 
     Decals on solids that share walls are compared by the area they cover: a wall may change sides.
     """
-    scenes = [decals.cover(case.arrays(right=right), count=30, seed=seed) for right in (True, False)]
+    scenes = [decals.cover(case.arrays(right=right), count=12, seed=seed) for right in (True, False)]
     pictures = [np.asarray(decals.render(scene, size=SIZE), np.float64) for scene in scenes]
     if case.welded:
         return bool(abs(pictures[0].mean() - pictures[1].mean()) > 4.0)

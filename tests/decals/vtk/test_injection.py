@@ -464,3 +464,26 @@ def test_actors_refuse_scenes_with_walked_images(plotter: Factory) -> None:
     document.draw_as(Drawing(mapping=ImageMapping.WALKED))
     with pytest.warns(UserWarning, match="mapping: expected 'corrected' or 'chord'"):
         shot(pl)
+
+
+@pytest.mark.parametrize("kind", ["turned", "mixed", "mirrored"])
+def test_actors_that_wind_inward_show_the_same_decals(plotter: Factory, kind: str) -> None:
+    mesh: Any = pv.Sphere(theta_resolution=16, phi_resolution=16)
+    layout, given, matrix = decals_over(mesh), mesh, np.eye(4)
+    if kind == "turned":
+        given = mesh.flip_faces()
+    elif kind == "mixed":
+        faces = mesh.regular_faces.copy()
+        faces[::3] = faces[::3, ::-1]
+        given = pv.PolyData.from_regular_faces(mesh.points, faces)
+    else:
+        matrix = np.diag([-1.0, 1.0, 1.0, 1.0])
+        given = mesh.transform(matrix, inplace=False).flip_faces()
+    pictures = []
+    for shown, user_matrix in ((mesh, np.eye(4)), (given, matrix)):
+        pl, actor = subplot_with(plotter, shown, layout, paint=OWNER, lighting=False)
+        actor.user_matrix = user_matrix
+        pictures.append(shot(pl).astype(int))
+    shown = np.abs(pictures[0] - pictures[1]).max(axis=-1) > 8
+    assert (pictures[0].max(axis=-1) > 0).any()
+    assert shown.mean() < 0.01
