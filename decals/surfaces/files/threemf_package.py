@@ -39,7 +39,11 @@ class Package:
             raise Unreadable(f"it is no ZIP archive: {error}") from error
         self._unpacked, self._limit = 0, MAX_UNPACKED + UNPACKED_PER_BYTE * path.stat().st_size
         self._parts = {_normal(entry.filename): entry for entry in self._zip.infolist()}
-        self.model_part = self._start()
+        try:
+            self.model_part = self._start()
+        except Unreadable:
+            self._zip.close()
+            raise
 
     def __enter__(self) -> Self:
         return self
