@@ -57,12 +57,15 @@ def measure(*, quick: bool) -> dict[str, float]:
         seconds, positions = _scattered(model.tree, None, count)
         logger.removeHandler(messages)
         bare, shares = _bare_parts(model, positions)
-        lost, over = bare | _parts_without_mesh(model), _named_parts(model, messages.texts)
+        over = _named_parts(model, messages.texts)
+        lost = _parts_without_mesh(model) - over
+        if not over:  # else its area, and so all shares, are not those of the surface
+            lost |= bare
         figures["thin_cases"] += 1
         figures["thin_parts"] += len(_counted_parts(model))
         figures["thin_shares"] += shares
-        figures["thin_parts_over_memory"] += len(over)
-        figures["thin_parts_lost"] += 0 if over else len(lost)
+        figures["thin_parts_over_memory"] += len(over & _counted_parts(model))
+        figures["thin_parts_lost"] += len(lost)
         if before > 0.0:
             ratios.append(seconds / before)
     figures["thin_cost"] = float(np.mean(ratios))
@@ -115,11 +118,11 @@ def _bare_parts(model: ThinTree, positions: Float64Array) -> tuple[set[int], int
 
 
 def _named_parts(model: ThinTree, messages: list[str]) -> set[int]:
-    """Return the counted parts that warnings name by their paths."""
+    """Return the parts that warnings name by their paths."""
     alone = len(model.parts) == 1
     return {
         number
-        for number in _counted_parts(model)
+        for number in range(len(model.parts))
         if any(alone or f"at path ({number}," in text for text in messages)
     }
 
