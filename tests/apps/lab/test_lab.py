@@ -182,6 +182,23 @@ def test_wrong_events_change_nothing(lab: Lab, window: EditWindow, number: Any, 
 # -- plots ----------------------------------------------------------------------------------------------
 
 
+def test_a_lesson_without_edits_leaves_no_recovery_file(vtk_display: None, tmp_path: Path) -> None:
+    with EditWindow(EMPTY, off_screen=True, size=(60, 40), path=tmp_path / "scene.json") as window:
+        window.show()
+        lab = Lab(window, load_lessons(LESSONS))
+        lab.start(0)
+        while window.background.busy:
+            window.tick()
+        assert not window.session.modified
+        assert window.actions.files.recovery.keep() is None
+        lab.set_value(0, 0.4)
+        window.actions.state.end_stroke()
+        assert window.session.modified
+        lab.close()
+        window.session.undo()
+    assert [*tmp_path.iterdir()] == []
+
+
 @pytest.mark.slow_cases("5")
 @pytest.mark.parametrize("number", range(6))
 def test_plots_are_pictures_without_addresses(lab: Lab, number: int) -> None:
