@@ -211,7 +211,7 @@ def _triangles(vertices: Float64Array, faces: IndexArray | Int32Array) -> tuple[
 def is_closed(faces: Int32Array) -> bool:
     """Return True if each edge has two triangles, on which it runs in opposite directions."""
     start, end = faces.ravel().astype(np.int64), np.roll(faces, -1, axis=1).ravel().astype(np.int64)
-    count = int(faces.max()) + 1
+    count = int(faces.max(initial=-1)) + 1
     forth, back = np.sort(start * count + end), np.sort(end * count + start)
     return bool((np.diff(forth) > 0).all() and np.array_equal(forth, back))
 
