@@ -15,6 +15,7 @@ import threading
 import traceback
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,6 @@ import decals
 from blobtree import Point, Segment, Torus
 from decals.editing.commands import MoveDecals
 from decals.window import EditWindow
-from tests.apps.sandbox.messages import resident_megabytes
 from tests.decals.editing.scenes import one, scene
 
 Work = Callable[[], tuple[Any, ...]]
@@ -104,6 +104,12 @@ def thread_failures(device: str, rounds: int, *, threads: int = 2, seed: int = 0
     for thread in started:
         thread.join()
     return failures
+
+
+def resident_megabytes() -> float:
+    """Return the memory that this process has from the system (Linux)."""
+    fields = Path("/proc/self/statm").read_text(encoding="ascii").split()
+    return int(fields[1]) * 4096 / 1e6
 
 
 def window_failures(count: int, *, seed: int = 0) -> tuple[list[str], float]:

@@ -23,7 +23,7 @@ FORBIDDEN = {
 PYVISTA_FILES = ("colors.py", "tree.py", "pyvista_views.py", "field_slice.py", "graphics.py", "vtk_errors.py")
 """The files of `blobtree` that use pyvista; a test checks that they import it late."""
 
-PAGES = "connections.py", "lab.py", "page.py", "panels.py", "sandbox.py", "sessions.py", "view.py"
+PAGES = "connections.py", "guard.py", "lab.py", "page.py", "panels.py", "sandbox.py", "sessions.py", "view.py"
 EXTRAS = dict.fromkeys(PAGES, "browser")
 """Files that need the packages of an extra, which a command imports late."""
 

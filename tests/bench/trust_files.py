@@ -21,7 +21,7 @@ from typing import Any
 from tests.fuzz import Outcome, run_stage, structured_case
 
 TARGETS = {"file_faults": "0", "file_misread": "0"}
-"""Targets of the issue's figures."""
+"""Targets of the figures."""
 
 CHUNK = 2000
 """Cases that one run of a worker reads."""

@@ -38,6 +38,7 @@ from decals.editing.actions import KEYS
 from decals.window import EditWindow
 from tests.apps.sandbox.test_connections import CALLS, SIZE, Browser, Connect, serve
 from tests.decals.editing.scenes import digest
+from tests.endurance import resident_megabytes
 
 ODD: list[Any] = [None, "", "x", -1, 0, 7, 0.5, 1e308, float("nan"), True, [], {}, [1, 2, 3], "0", "#00ff00"]
 ODD += [{"a": 1}, "\0", "x" * 3000, [[1, [2]]], -(2**40), b"\xff"]
@@ -434,12 +435,6 @@ def growth(memory: Sequence[tuple[int, float]], first_part: float) -> float:
         return 0.0
     numbers, megabytes = np.transpose(steady)
     return 1000.0 * float(np.polyfit(numbers, megabytes, 1)[0])
-
-
-def resident_megabytes() -> float:
-    """Return the memory that this process has from the system (Linux)."""
-    fields = Path("/proc/self/statm").read_text(encoding="ascii").split()
-    return int(fields[1]) * 4096 / 1e6
 
 
 def measure(
