@@ -106,6 +106,10 @@
 
   // A press elsewhere takes what is being typed, before anything else follows from it. Escape drops it.
   const typedIn = () => document.activeElement?.closest("input:not([type=range]), textarea");
+  document.addEventListener("change", ({ target }) => (target.taken = true), true);
+  ["input", "focusin"].forEach((name) => {
+    document.addEventListener(name, ({ target }) => (target.taken = false), true);
+  });
   document.addEventListener("pointerdown", (event) => {
     const field = typedIn();
     if (field && !field.contains(event.target)) field.blur();

@@ -9,10 +9,13 @@ from decals.validation import describe, finite_number, instance
 from decals.window.window import EditWindow
 
 _FOCUS = (
-    "$event.currentTarget.ownerDocument.activeElement?.matches('input, textarea')"
-    " || $event.currentTarget.focus({preventScroll: true})"
+    "(field => field?.matches('input, textarea') && !field.taken"
+    " || $event.currentTarget.focus({preventScroll: true}))($event.currentTarget.ownerDocument.activeElement)"
 )
-"""Give the element under the pointer the focus, so that it receives keys, unless a field has it."""
+"""Give the element under the pointer the focus, so that it receives keys, unless the user may be typing.
+
+A page sets `taken` of a field whose text has been taken.
+"""
 
 _RECORD_POSITION = (
     "$event.currentTarget.dataset.at = [$event.offsetX / $event.target.clientWidth, "
