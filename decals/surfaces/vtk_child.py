@@ -38,7 +38,7 @@ def main() -> None:
     with Path(os.devnull).open("r+b") as nothing:  # libraries may print
         for descriptor in (0, 1, 2):
             os.dup2(nothing.fileno(), descriptor)
-    _send(answers, {"ready": True})
+    _send(answers, {}, {"ready": True})
     while True:
         if sys.platform != "win32" and not select.select([requests], [], [], IDLE_SECONDS)[0]:
             return
@@ -49,7 +49,7 @@ def main() -> None:
         if hasattr(os, "fork"):
             _answer_in_fork(request, answers)
         else:
-            _answer(request, answers)
+            _send(answers, request, *_answer(request))
 
 
 def _answer_in_fork(request: dict[str, Any], answers: BinaryIO) -> None:
@@ -57,14 +57,15 @@ def _answer_in_fork(request: dict[str, Any], answers: BinaryIO) -> None:
     if child == 0:
         try:
             _limit(request)
-            _answer(request, answers)
+            answer = _answer(request)  # VTK's data are freed: a crash there comes before the answer
+            _send(answers, request, *answer)
             os._exit(0)
         finally:
             os._exit(1)
     _, status = os.waitpid(child, 0)
-    if status != 0:  # it sends its answer last
+    if status != 0:
         limited = os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGXCPU
-        _send(answers, {"limit": "time"} if limited else {"error": "VTK's reader crashed"})
+        _send(answers, request, {"limit": "time"} if limited else {"error": "VTK's reader crashed"})
 
 
 def _limit(request: dict[str, Any]) -> None:
@@ -87,25 +88,25 @@ def _limit_step(seconds: float) -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(time.process_time() + seconds), most))
 
 
-def _answer(request: dict[str, Any], answers: BinaryIO) -> None:
+def _answer(request: dict[str, Any]) -> tuple[Any, ...]:
+    """Return the header of an answer, and the contents of its arrays."""
     try:
         mesh = _read(Path(os.fsdecode(bytes.fromhex(request["path"]))), request["seconds"])
     except ImplicitDecalsError as error:
-        _send(answers, {"error": str(error), "whole": True})
+        return ({"error": str(error), "whole": True},)
     except MemoryError:
-        _send(answers, {"error": "it would take too much memory"})
+        return ({"error": "it would take too much memory"},)
     except Exception as error:
-        _send(answers, {"error": f"{type(error).__name__}: {error}"})
-    else:
-        arrays = {
-            "vertices": np.ascontiguousarray(mesh.vertices),
-            "faces": np.ascontiguousarray(mesh.faces, np.int32),
-        }
-        for name in COLOR_ARRAYS if mesh.color is not None else ():
-            if (array := getattr(mesh.color, name)) is not None:
-                arrays[name] = np.ascontiguousarray(array)
-        shapes = {name: [array.dtype.str, *array.shape] for name, array in arrays.items()}
-        _send(answers, {"arrays": shapes}, *(array.data.cast("B") for array in arrays.values() if array.size))
+        return ({"error": f"{type(error).__name__}: {error}"},)
+    arrays = {
+        "vertices": np.ascontiguousarray(mesh.vertices),
+        "faces": np.ascontiguousarray(mesh.faces, np.int32),
+    }
+    for name in COLOR_ARRAYS if mesh.color is not None else ():
+        if (array := getattr(mesh.color, name)) is not None:
+            arrays[name] = np.ascontiguousarray(array)
+    shapes = {name: [array.dtype.str, *array.shape] for name, array in arrays.items()}
+    return {"arrays": shapes}, *(array.data.cast("B") for array in arrays.values() if array.size)
 
 
 def _read(path: Path, seconds: float) -> MeshData:
@@ -116,8 +117,9 @@ def _read(path: Path, seconds: float) -> MeshData:
     return dataset_mesh(dataset, name=str(path))
 
 
-def _send(answers: BinaryIO, header: dict[str, Any], *contents: memoryview) -> None:
-    answers.write(json.dumps(header).encode() + b"\n")
+def _send(answers: BinaryIO, request: dict[str, Any], header: dict[str, Any], *contents: memoryview) -> None:
+    """Send an answer with the number of its request, so that none is taken for that of another file."""
+    answers.write(json.dumps({**header, "number": request.get("number")}).encode() + b"\n")
     for content in contents:
         answers.write(content)
     answers.flush()

@@ -14,6 +14,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import IO, Any
 
@@ -67,13 +68,18 @@ class _ReaderProcess:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._child: subprocess.Popen[bytes] | None = None
+        self._requests = count()
 
     def read(self, path: Path) -> MeshData:
         """Read a file; see `read_isolated`."""
         size = path.stat().st_size
         seconds = math.ceil(SECONDS + SECONDS_PER_BYTE * size)
         memory = MEMORY + MEMORY_PER_BYTE * size
-        request = {"path": os.fsencode(path.absolute()).hex(), "seconds": seconds, "bytes": memory}
+        request: dict[str, Any] = {
+            "path": os.fsencode(path.absolute()).hex(),
+            "seconds": seconds,
+            "bytes": memory,
+        }
         with self._lock:
             try:
                 answer = self._answer(request, PATIENCE * seconds)
@@ -104,6 +110,7 @@ class _ReaderProcess:
     ) -> tuple[dict[str, Any], dict[str, Any]] | None:
         """Return the header and the arrays of an answer; None if the process ended or took too long."""
         child = self._started()
+        request["number"] = next(self._requests)
         assert child.stdin is not None
         assert child.stdout is not None
         with _time_limit(child, seconds), ended_by_cancel(partial(_kill, child)):
@@ -116,7 +123,10 @@ class _ReaderProcess:
                 whole = all(_fill(child.stdout, array) for array in arrays.values())
             except (OSError, ValueError):  # the pipe is broken, or ends within a line
                 return None
-            return (header, arrays) if whole else None
+        if header["number"] != request["number"]:  # the former request was answered twice
+            self.stop()
+            return self._answer(request, seconds)
+        return (header, arrays) if whole else None
 
     def _started(self) -> "subprocess.Popen[bytes]":
         """Return the process, started again if it has ended."""

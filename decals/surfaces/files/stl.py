@@ -85,6 +85,8 @@ def _binary_corners(content: bytes) -> Float64Array:
 
 def _text_corners(content: bytes) -> Float64Array:
     lines = [Line(number, text) for number, text in enumerate(text_lines(content), 1) if text.strip()]
+    if not lines:
+        raise ValueError("it is empty")
     if _first_word(lines[-1]) != b"endsolid":
         raise ValueError("it ends without 'endsolid', so it is cut off")
     within = [line for line in lines if _first_word(line) not in (b"solid", b"endsolid")]

@@ -321,3 +321,13 @@ def test_off_without_whole_colours_is_read_without_them(
     assert read_mesh_data(written(tmp_path, "a.off", OFF.replace("4 0 1 2 3", "4 0 1 2 3 7"))).color is None
     assert read_mesh_data(written(tmp_path, "a.off", OFF.replace("OFF", "COFF"))).color is None
     assert "Left out the colours" in caplog.text
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b" \n\n", b"\xff\xfe", "\n \n".encode("utf-16"), b"\xef\xbb\xbf\n" * 60]
+)
+def test_an_stl_file_of_blanks_is_refused(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "blank.stl"
+    path.write_bytes(content)
+    with pytest.raises(InvalidMesh, match=r"blank\.stl"):
+        read_mesh(path)

@@ -71,6 +71,21 @@ vtk_child._answer_in_fork(request, answers)
     assert header["arrays"]["faces"][1:] == [len(faces), 3]
 
 
+def test_an_answer_to_a_former_request_is_not_taken(sphere: Path, tmp_path: Path) -> None:
+    """As if a reader had crashed once its answer was sent: the process then adds a second answer."""
+    check_sphere(sphere)
+    other = tmp_path / "other.vtp"
+    pv.Plane(i_resolution=2, j_resolution=3).save(other)
+    child = _process._child
+    assert child is not None
+    assert child.stdin is not None
+    request = {"path": os.fsencode(other).hex(), "seconds": 60.0, "bytes": 1 << 30, "number": -1}
+    child.stdin.write(json.dumps(request).encode() + b"\n")
+    check_sphere(sphere)
+    check_sphere(sphere)
+    assert _process._child is not child
+
+
 def test_the_process_is_kept_and_started_again(sphere: Path) -> None:
     check_sphere(sphere)
     child = _process._child
