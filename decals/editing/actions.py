@@ -172,7 +172,7 @@ class Actions:
             state.background.cancel(exports=True)
 
     def _revert_drag(self) -> bool:
-        """Revert the drag; return False if there is none."""
+        """Revert the drag; return False without a drag."""
         background = self.state.background
         dragged = self.forget_press() or self.state.session.stroke_open or background.following
         if dragged:

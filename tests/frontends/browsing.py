@@ -26,7 +26,7 @@ ERRORS = """window.pageErrors = [];
 window.addEventListener('error', event => window.pageErrors.push(event.message));"""
 """Collects the errors that a page shows in its console, also those of observers."""
 WORDS = "error", "warning"
-"""What no page may write to its console."""
+"""Kinds of console messages that no page may write."""
 REFUSED = "net::ERR_CONNECTION_REFUSED"
 LOSS = 2.0
 """Levels of 255 in the mean that JPEG may take away."""

@@ -63,7 +63,7 @@ def reading(path: Path, kind: str) -> Iterator[Notes]:
 
 
 def item(items: Sequence[_Item], index: int, kind: str, place: str) -> _Item:
-    """Return an item that a place of a file names by its index; `Unreadable` if there is none."""
+    """Return an item that a place of a file names by its index; raise `Unreadable` for a wrong index."""
     if not 0 <= index < len(items):
         raise Unreadable(f"{place} asks for {kind} {index}, but there are {len(items)}")
     return items[index]
