@@ -22,6 +22,7 @@ from decals.surfaces.files.content import encoding_of, without_mark
 from decals.surfaces.files.gltf import read_gltf
 from decals.surfaces.files.obj import read_obj
 from decals.surfaces.files.off import read_off
+from decals.surfaces.files.paint import Paint
 from decals.surfaces.files.ply import read_ply, strip_triangles
 from decals.surfaces.files.stl import read_stl
 from decals.surfaces.files.threemf import read_3mf
@@ -39,14 +40,16 @@ MeshArrays = tuple[Float32Array, Int32Array]
 MIN_PRECISE_RATIO = 500.0
 """Least ratio of coordinates to the extent of a mesh at which float64 is kept."""
 
-_READERS: dict[str, Callable[[Path], tuple[Float64Array, Polygons]]] = {".stl": read_stl}
-"""Our own readers, by suffix: they return points and polygons."""
+_POLYGON_READERS: dict[str, Callable[[Path], tuple[Float64Array, Polygons, Paint]]] = {
+    ".obj": read_obj,
+    ".off": read_off,
+    ".ply": read_ply,
+    ".stl": read_stl,
+}
+"""Our own readers of polygons, by suffix: they return points, polygons and their colours."""
 
-_PAINTED_READERS = {".obj": read_obj, ".off": read_off, ".ply": read_ply}
-"""Those that return points, polygons and their colours."""
-
-_PLACED_READERS = {".3mf": read_3mf, ".glb": read_gltf, ".gltf": read_gltf}
-"""Those of files that place meshes in space; they return a mesh with its colours."""
+_SCENE_READERS = {".3mf": read_3mf, ".glb": read_gltf, ".gltf": read_gltf}
+"""Those of files that place meshes in space: they return one mesh with its colours."""
 
 _logger = logging.getLogger(__name__)
 
@@ -92,16 +95,15 @@ def read_mesh_data(path: str | PathLike[str]) -> MeshData:
     path = Path(path)
     if not is_file(path):
         raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
-    if placed := _PLACED_READERS.get(path.suffix.lower()):
-        data = placed(path)
+    suffix = path.suffix.lower()
+    if suffix in _SCENE_READERS:
+        data = _SCENE_READERS[suffix](path)
         return MeshData(*polygon_triangles(*data.arrays, name=str(path)), data.color)
-    if painted := _PAINTED_READERS.get(path.suffix.lower()):
-        points, polygons, paint = painted(path)
+    if suffix in _POLYGON_READERS:
+        points, polygons, paint = _POLYGON_READERS[suffix](path)
         vertices, faces, triangles = traced_triangles(points, polygons, name=str(path))
         color = checked_color(lambda: paint(triangles), str(path), len(vertices), len(faces))
         return MeshData(vertices, faces, color)
-    if reader := _READERS.get(path.suffix.lower()):
-        return MeshData(*polygon_triangles(*reader(path), name=str(path)))
     if can_isolate():
         return read_isolated(path)
     return dataset_mesh(read_dataset(path), name=str(path))

@@ -18,11 +18,10 @@ from decals.errors import InvalidImage
 from decals.images.load import picture_pixels
 from decals.surfaces.base_color import BaseTexture, Wrap
 from decals.surfaces.files.faults import Notes, Unreadable, item
-from decals.surfaces.files.gltf_buffers import Buffers, read_uri
+from decals.surfaces.files.gltf_buffers import Buffers
 from decals.surfaces.files.gltf_document import BufferView, Document, Index, Record
-
-MAX_TEXELS = 1 << 27
-"""Most pixels of all textures of a file."""
+from decals.surfaces.files.paint import MAX_TEXELS
+from decals.surfaces.files.uris import read_uri
 
 WRAPS = {10497: Wrap.REPEAT, 33071: Wrap.CLAMP, 33648: Wrap.MIRROR}
 """Wrap modes by their codes of OpenGL."""

@@ -9,9 +9,9 @@ from decals.images.texels import decode_srgb
 from decals.surfaces.base_color import CLAY, WHITE, BaseColor, linear_colors
 from decals.surfaces.files.content import Line, finite_numbers
 from decals.surfaces.files.faults import Notes, Unreadable
-from decals.surfaces.files.gltf_buffers import read_uri
 from decals.surfaces.files.mtl import Material, read_materials
 from decals.surfaces.files.paint import TextureFiles
+from decals.surfaces.files.uris import read_uri
 from decals.surfaces.triangulate import Triangulation
 
 

@@ -7,7 +7,7 @@ from decals.errors import InvalidImage
 from decals.images.load import picture_pixels
 from decals.surfaces.base_color import BaseColor, BaseTexture, Wrap
 from decals.surfaces.files.faults import Notes, Unreadable
-from decals.surfaces.files.gltf_buffers import read_uri
+from decals.surfaces.files.uris import read_uri
 from decals.surfaces.triangulate import Triangulation
 
 Paint = Callable[[Triangulation], BaseColor | None]
@@ -15,6 +15,10 @@ Paint = Callable[[Triangulation], BaseColor | None]
 
 MAX_TEXELS = 1 << 27
 """Most pixels of all textures of a file."""
+
+
+def unpainted(_: Triangulation) -> None:
+    """Return no colour: a `Paint` of formats without colours."""
 
 
 class TextureFiles:

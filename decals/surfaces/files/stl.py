@@ -15,6 +15,7 @@ from decals.surfaces.files.content import (
     text_lines,
     without_mark,
 )
+from decals.surfaces.files.paint import Paint, unpainted
 from decals.surfaces.triangulate import Polygons
 
 _HEADER = 84
@@ -30,7 +31,7 @@ _NUMBERS = [k for k, word in enumerate(_WORDS) if word == b"0"][3:]
 """Places of the keywords, and of the coordinates, among the words of a facet."""
 
 
-def read_stl(path: Path) -> tuple[Float64Array, Polygons]:
+def read_stl(path: Path) -> tuple[Float64Array, Polygons, Paint]:
     """Read the facets of an STL file; equal corners become one vertex.
 
     Raises
@@ -43,7 +44,7 @@ def read_stl(path: Path) -> tuple[Float64Array, Polygons]:
         corners = _text_corners(content) if _is_text(content) else _binary_corners(content)
     except (ValueError, MemoryError) as error:
         raise refusal(path, "STL", error) from error
-    return _merged(corners)
+    return *_merged(corners), unpainted
 
 
 def _is_text(content: bytes) -> bool:
