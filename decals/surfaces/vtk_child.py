@@ -1,22 +1,27 @@
 """The process in which `vtk_process` reads mesh files: VTK's readers may crash or hang on damaged ones.
 
-It imports pyvista once and forks for every file, so that a crash or corrupt memory does not reach the next
-file. Where the system has no fork it reads by itself, and is started again after a crash.
+It imports pyvista once, reads a small file of its own, and forks for every other file, so that a crash or
+corrupt memory does not reach the next file. Where the system has no fork it reads by itself, and is started
+again after a crash.
 """
 
 import contextlib
+import gc
 import json
 import math
 import os
 import select
 import signal
 import sys
+import tempfile
 import time
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 import pyvista  # noqa: F401  # here, because every fork would import it again
+import vtkmodules.vtkIOXML  # noqa: F401  # for the same reason: of the most common formats
+from vtkmodules.vtkCommonCore import vtkSMPTools
 
 import blobtree.vtk_errors  # noqa: F401
 from decals.errors import ImplicitDecalsError
@@ -30,6 +35,19 @@ STATM = Path("/proc/self/statm")
 IDLE_SECONDS = 120.0
 """Seconds without a request after which the process ends."""
 
+TRIANGLE = b"""# vtk DataFile Version 3.0
+one triangle
+ASCII
+DATASET UNSTRUCTURED_GRID
+POINTS 3 float
+0 0 0 1 0 0 0 1 0
+CELLS 1 4
+3 0 1 2
+CELL_TYPES 1
+5
+"""
+"""File of a grid, whose reading passes through all steps of `_read`."""
+
 
 def main() -> None:
     """Answer requests until the parent closes the pipe, or sends none for a while."""
@@ -38,6 +56,8 @@ def main() -> None:
     with Path(os.devnull).open("r+b") as nothing:  # libraries may print
         for descriptor in (0, 1, 2):
             os.dup2(nothing.fileno(), descriptor)
+    if hasattr(os, "fork"):
+        warm_up()
     _send(answers, {}, {"ready": True})
     while True:
         if sys.platform != "win32" and not select.select([requests], [], [], IDLE_SECONDS)[0]:
@@ -50,6 +70,18 @@ def main() -> None:
             _answer_in_fork(request, answers)
         else:
             _send(answers, request, *_answer(request))
+
+
+def warm_up() -> None:
+    """Load what reading needs before the first fork, because every fork would load it again."""
+    backend = vtkSMPTools.GetBackend()
+    vtkSMPTools.SetBackend("Sequential")  # a pool of threads would not be there in the forks
+    with contextlib.suppress(OSError), tempfile.TemporaryDirectory() as folder:  # the disk may be full
+        path = Path(folder) / "triangle.vtk"
+        path.write_bytes(TRIANGLE)
+        dataset_mesh(read_dataset(path), name=str(path))
+    vtkSMPTools.SetBackend(backend)
+    gc.freeze()  # a collection in a fork would copy the pages of all objects
 
 
 def _answer_in_fork(request: dict[str, Any], answers: BinaryIO) -> None:

@@ -71,6 +71,23 @@ vtk_child._answer_in_fork(request, answers)
     assert header["arrays"]["faces"][1:] == [len(faces), 3]
 
 
+@pytest.mark.parametrize("folder", ["usable", "missing"])
+def test_a_fork_loads_nothing_that_an_earlier_one_loaded(folder: str, sphere: Path) -> None:
+    """Unless no file can be written, in which case the process reads all the same."""
+    program = f"""
+import pathlib, sys, tempfile
+from decals.surfaces import vtk_child
+tempfile.tempdir = {str(sphere.parent if folder == "usable" else sphere)!r}
+vtk_child.warm_up()
+loaded = set(sys.modules)
+vtk_child._read(pathlib.Path({str(sphere.with_suffix(".vtu"))!r}), 60.0)
+print(len(set(sys.modules) - loaded))
+"""
+    pv.read(sphere).cast_to_unstructured_grid().save(sphere.with_suffix(".vtu"))
+    answer = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+    assert (int(answer.stdout) == 0) == (folder == "usable")
+
+
 def test_an_answer_to_a_former_request_is_not_taken(sphere: Path, tmp_path: Path) -> None:
     """As if a reader had crashed once its answer was sent: the process then adds a second answer."""
     check_sphere(sphere)
