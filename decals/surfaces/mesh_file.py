@@ -4,6 +4,7 @@ VTK's readers crash or hang on some damaged files, so they run in a process of t
 """
 
 import logging
+import math
 import re
 from collections.abc import Callable, Sequence
 from os import PathLike
@@ -223,6 +224,12 @@ def _check_cells(dataset: Any, name: str) -> None:
     if isinstance(dataset, pv.MultiBlock):
         for block in dataset:
             _check_cells(block, name)
+    elif isinstance(dataset, pv.StructuredGrid):
+        if dataset.n_points != (expected := math.prod(dataset.dimensions)):
+            raise InvalidMesh(
+                f"{name!r} has {dataset.n_points} points but its dimensions {dataset.dimensions} ask for "
+                f"{expected}; correct them"
+            )
     elif isinstance(dataset, pv.PolyData | pv.UnstructuredGrid):
         grid = isinstance(dataset, pv.UnstructuredGrid)
         for cells in [dataset.GetCells()] if grid else [dataset.GetPolys(), dataset.GetStrips()]:
@@ -249,6 +256,8 @@ def read_dataset(path: Path) -> "pv.DataSet | pv.MultiBlock":
     from blobtree.vtk_errors import vtk_errors
 
     _check_mark(path)
+    if path.suffix.lower() == ".vts":
+        _check_pieces(path)
     cause = None
     try:
         with vtk_errors() as errors:
@@ -269,6 +278,39 @@ def _check_mark(path: Path) -> None:
         encoding = encoding_of(file.read(4))
     if encoding not in (None, "utf-8") and path.suffix.lower() != ".vtk":
         raise InvalidMesh(f"{str(path)!r} starts with the mark of {encoding}; VTK needs UTF-8, so convert it")
+
+
+def _check_pieces(path: Path) -> None:
+    """Refuse a structured grid whose pieces leave points out: VTK gives those what its memory holds."""
+    head = path.read_bytes().partition(b"<AppendedData")[0]
+    whole, pieces = _boxes(head, b"StructuredGrid", b"WholeExtent"), _boxes(head, b"Piece", b"Extent")
+    if len(whole) != 1:
+        raise InvalidMesh(f"expected one whole extent of six integers in {str(path)!r}; export it again")
+    ends = np.concatenate([whole, pieces])
+    cuts = [np.unique(ends[:, axis]) for axis in range(3)]
+    covered = np.zeros([len(cut) - 1 for cut in cuts], bool)
+    for box in pieces:
+        covered[_slots(cuts, box)] = True
+    inside = covered[_slots(cuts, whole[0])]
+    if not inside.all() or inside.sum() < covered.sum():
+        raise InvalidMesh(f"{str(path)!r} has pieces that do not fill its whole extent; export it again")
+
+
+def _boxes(head: bytes, element: bytes, attribute: bytes) -> Int64Array:
+    """Return the extents ``int64[n, 3, 2]`` of XML elements, each with the number behind its last point."""
+    pattern = rb"<%s\s(?:[^>]*\s)?%s\s*=\s*[\"']\s*(-?\d{1,9}(?:\s+-?\d{1,9}){5})\s*[\"']" % (
+        element,
+        attribute,
+    )
+    extents = [[int(word) for word in match.split()] for match in re.findall(pattern, head)]
+    boxes = np.array(extents, np.int64).reshape(-1, 3, 2)
+    boxes[..., 1] += 1
+    return boxes
+
+
+def _slots(cuts: Sequence[Int64Array], box: Int64Array) -> tuple[slice, ...]:
+    """Return the part of the grid between cuts of each axis that a box takes."""
+    return tuple(slice(*np.searchsorted(cut, ends)) for cut, ends in zip(cuts, box, strict=True))
 
 
 def _read_legacy(path: Path) -> "pv.DataSet | pv.MultiBlock":

@@ -210,6 +210,48 @@ def test_cells_that_do_not_follow_each_other_are_refused(offsets: list[int], kin
         dataset_triangles(pv.MultiBlock([dataset]), name="a")
 
 
+@pytest.mark.parametrize("dimensions", [(1000, 100, 1), (2, 2, 1)])
+def test_a_structured_grid_has_the_points_of_its_dimensions(dimensions: tuple[int, int, int]) -> None:
+    grid = pv.StructuredGrid()
+    grid.points = np.random.default_rng(0).random((12, 3))
+    grid.dimensions = dimensions
+    with pytest.raises(InvalidMesh, match="12 points but its dimensions"):
+        dataset_triangles(grid, name="grid")
+
+
+@pytest.mark.parametrize(
+    ("whole", "pieces", "works"),
+    [
+        ("0 4 0 3 0 0", ["0 4 0 3 0 0"], True),
+        ("1 5 -3 0 2 2", ["1 5 -3 0 2 2"], True),
+        ("0 4 0 3 0 0", ["0 4 0 3 0 0", "0 -1 0 -1 0 -1"], True),
+        ("0 4 0 3 0 0", ["0 2 0 3 0 0", "2 4 0 3 0 0"], True),
+        ("0 4 0 3 0 0", ["0 2 0 3 0 0", "0 2 0 3 0 0"], False),
+        ("0 4 0 9 0 0", ["0 4 0 3 0 0"], False),
+        ("0 3 0 3 0 0", ["0 4 0 3 0 0"], False),
+        ("0 4 0 3 0 0", [], False),
+        ("0 4 0 3 0", ["0 4 0 3 0 0"], False),
+        ("0 4 0 1000000 0 0", ["0 4 0 3 0 0"], False),
+    ],
+)
+def test_the_pieces_of_a_grid_fill_it(whole: str, pieces: list[str], works: bool, tmp_path: Path) -> None:
+    path = tmp_path / "grid.vts"
+    text = [f'<VTKFile type="StructuredGrid" version="0.1"><StructuredGrid WholeExtent="{whole}">']
+    for extent in pieces:
+        x, y, z = [range(low, high + 1) for low, high in np.array(extent.split(), int).reshape(3, 2)]
+        points = " ".join(f"{a} {b} {c}" for c in z for b in y for a in x)
+        array = f'<DataArray type="Float32" NumberOfComponents="3" format="ascii">{points}</DataArray>'
+        text.append(f"<Piece Extent='{extent}'><Points>{array if points else ''}</Points></Piece>")
+    path.write_text("\n".join([*text, "</StructuredGrid></VTKFile>"]), encoding="ascii")
+    if works:
+        vertices, faces = read_mesh(path)
+        assert (len(vertices), len(faces)) == (20, 24)
+        assert np.ptp(vertices, axis=0).tolist() == [4.0, 3.0, 0.0]
+    else:
+        with pytest.raises(InvalidMesh, match="whole extent"):
+            read_mesh(path)
+
+
 def test_points_without_faces(tmp_path: Path) -> None:
     pv.PolyData(np.random.default_rng(0).random((5, 3))).save(tmp_path / "cloud.vtp")
     with pytest.raises(InvalidMesh, match=r"no faces|cloud"):
