@@ -167,13 +167,17 @@ def file_case(folder: Path, files: Sequence[Path], seed: int) -> Case:
     return run
 
 
+def format_of(number: int) -> str:
+    """Return the format of the generated file of a number: all formats in turn."""
+    return list(FORMATS)[number % len(FORMATS)]
+
+
 def structured_case(folder: Path, seed: int) -> Case:
     """Return the stage of generated files of all formats in turn; a misread one raises MisreadError."""
-    names = list(FORMATS)
     logging.disable(logging.WARNING)  # of faces that are left out
 
     def run(number: int) -> None:
-        name = names[number % len(names)]
+        name = format_of(number)
         check(FORMATS[name](random.Random(f"{seed}:{name}:{number}")), folder)
 
     return run

@@ -3,7 +3,8 @@
     python -m tests.bench.trust_files [--cases 200000] [--workers 16] [--seed 1] [--json FILE]
 
 Each worker reads ranges of the cases in forked children; see `tests.fuzz`. A case follows from the seed and
-its number, so a failed one can be read again with ``--first NUMBER --cases 1``.
+its number, so a failed one can be read again with ``--first NUMBER --cases 1``. Each range that has ended is
+printed with its failures, so a campaign that was interrupted goes on with ``--first``.
 """
 
 import argparse
@@ -13,12 +14,14 @@ import os
 import re
 import sys
 import tempfile
+from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tests.fuzz import Outcome, run_stage, structured_case
+from tests.fuzz import Outcome, format_of, run_stage, structured_case
 
 TARGETS = {"file_faults": "0", "file_misread": "0"}
 """Targets of the figures."""
@@ -36,24 +39,36 @@ def measure(*, quick: bool) -> dict[str, float]:
 
 
 def campaign(
-    cases: int, *, workers: int, seed: int = 1, first: int = 0
+    cases: int,
+    *,
+    workers: int,
+    seed: int = 1,
+    first: int = 0,
+    report: Callable[[str], None] = lambda _: None,
 ) -> tuple[dict[str, float], list[str]]:
-    """Return the figures of a number of cases, and a line for each failure."""
-    size = min(CHUNK, -(-cases // workers))
-    ranges = [(start, min(start + size, first + cases)) for start in range(first, first + cases, size)]
+    """Return the figures of a number of cases, and a line for each failure; report each range of cases."""
+    size, end = min(CHUNK, -(-cases // workers)), first + cases
+    ranges = [(start, min(start + size, end)) for start in range(first, end, size)]
     spawn = multiprocessing.get_context("spawn")
+    lines: list[str] = []
     with tempfile.TemporaryDirectory() as name, ProcessPoolExecutor(workers, spawn) as pool:
-        outcomes = list(pool.map(partial(_read, Path(name), seed), ranges))
-    crashes = [f"{number}: crash" for outcome in outcomes for number in outcome.crashes]
-    hangs = [f"{number}: hang" for outcome in outcomes for number in outcome.hangs]
-    lines = [line for outcome in outcomes for line in outcome.foreign]
-    misread = [line for line in lines if _MISREAD.match(line)]
+        outcomes = pool.map(partial(_read, Path(name), seed), ranges)
+        for (start, stop), outcome in zip(ranges, outcomes, strict=True):
+            failures = [
+                *(f"{number}: crash" for number in outcome.crashes),
+                *(f"{number}: hang" for number in outcome.hangs),
+                *outcome.foreign,
+            ]
+            report("\n".join([f"{start} to {stop - 1}: {len(failures)} failures", *failures]))
+            lines += failures
+    misread = sum(bool(_MISREAD.match(line)) for line in lines)
     figures: dict[str, float] = {
         "file_cases": cases,
-        "file_faults": len(crashes) + len(hangs) + len(lines) - len(misread),
-        "file_misread": len(misread),
+        "file_faults": len(lines) - misread,
+        "file_misread": misread,
     }
-    return figures, [*crashes, *hangs, *lines]
+    counts = Counter(map(format_of, range(first, end)))
+    return figures | {f"file_cases_{name}": count for name, count in sorted(counts.items())}, lines
 
 
 def _read(folder: Path, seed: int, bounds: tuple[int, int]) -> Outcome:
@@ -74,9 +89,13 @@ def main() -> int:
     parser.add_argument("--json", type=Path, help="also write the figures and failures to this file")
     options = parser.parse_args()
     figures, failures = campaign(
-        options.cases, workers=options.workers, seed=options.seed, first=options.first
+        options.cases,
+        workers=options.workers,
+        seed=options.seed,
+        first=options.first,
+        report=lambda line: print(line, file=sys.stderr, flush=True),
     )
-    print("\n".join([*(f"{key:14} {value:g}" for key, value in figures.items()), *failures]))
+    print("\n".join([*(f"{key:16} {value:g}" for key, value in figures.items()), *failures]))
     if options.json:
         report: dict[str, Any] = {**figures, "failures": failures}
         options.json.write_text(json.dumps(report, indent=1), encoding="utf-8")
