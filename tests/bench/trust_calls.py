@@ -30,8 +30,7 @@ def measure(*, quick: bool) -> dict[str, float]:
     figures: dict[str, float] = {}
     for kind in ("call", "command"):
         figures[f"{kind}_faults"] = sum(map(len, found["failures"][f"{kind}s"].values()))
-    sent = messages.measure(counts["message"], 0)
-    figures["message_faults"] = sent["errors"] + sent["unanswered"] + (not sent["restored"])
+    figures["message_faults"] = messages.faults(messages.measure(counts["message"], 0))
     figures["thread_faults"] = len(thread_failures("cpu", counts["thread"]))
     windows, growth = window_failures(counts["window"])
     figures["window_faults"] = len(windows)

@@ -195,7 +195,7 @@ async def get(
             return answer.status, await answer.text(errors="replace"), answer.headers
 
 
-def _opens(status: int, text: str) -> bool:
+def opens(status: int, text: str) -> bool:
     return status < 400 and ("trame" in text or "session starts" in text)
 
 
@@ -235,7 +235,7 @@ async def rebinding(server: Server) -> str:
             if await talk(server, cookies=known, Origin=f"http://{host}", Host=host):
                 return f"read the scene as {host}"
             status, text, _ = await get(server, "index.html", known, Host=host, **NAVIGATE)
-            if _opens(status, text):
+            if opens(status, text):
                 return f"read the page as {host}"
     return ""
 
@@ -246,11 +246,11 @@ async def image(server: Server) -> str:
     for site in ("cross-site", "same-site"):
         for cookies in ({}, known):
             status, text, _ = await get(server, "", cookies, **IMAGE, Sec_Fetch_Site=site)
-            if _opens(status, text):
+            if opens(status, text):
                 return "got an answer"
     for headers in ({}, IMAGE, {"Accept": "image/*"}):
         status, text, _ = await get(server, "", {}, **headers)
-        if _opens(status, text):
+        if opens(status, text):
             return "got an answer without a cookie"
     await asyncio.sleep(0.5)
     return "a process started" if len(server.children()) > before else ""
@@ -263,7 +263,7 @@ async def link(server: Server) -> str:
     for site in ("cross-site", "same-site", "none"):
         for path in ("", "index.html", "?again=", "?token=", "?secret=wslink-secret"):
             status, text, _ = await get(server, path, **{**NAVIGATE, "Sec-Fetch-Site": site})
-            if _opens(status, text):
+            if opens(status, text):
                 return f"opened /{path}"
     await asyncio.sleep(0.5)
     return "a process started" if len(server.children()) > before else ""
@@ -276,7 +276,7 @@ async def frame(server: Server) -> str:
     for site in ("cross-site", "same-site", "same-origin", "none"):
         for path in ("", "index.html", f"?frame={FOREIGN}"):
             status, text, _ = await get(server, path, cookies, **{**inside, "Sec-Fetch-Site": site})
-            if _opens(status, text):
+            if opens(status, text):
                 return f"showed /{path}"
     _, _, headers = await get(server, "index.html", cookies, **NAVIGATE)
     policy = headers.get("Content-Security-Policy", "")
@@ -334,7 +334,7 @@ async def stranger(server: Server) -> str:
                 return f"read the scene with {token!r}"
             for path in ("index.html", "vue.global.js", "", f"?token={token}", f"?secret={token}"):
                 status, text, _ = await get(server, path, cookies, **browser, **bearer)
-                if status < 400 or _opens(status, text):
+                if status < 400 or opens(status, text):
                     return f"got /{path}"
     return ""
 
@@ -557,7 +557,7 @@ async def flood(server: Server) -> str:
             open_.append(client)
         async with asyncio.timeout(20):
             status, text, _ = await get(server, "index.html", cookies, **NAVIGATE)
-        return "" if _opens(status, text) else f"the page answers {status}"
+        return "" if opens(status, text) else f"the page answers {status}"
     except TimeoutError:
         return "the page does not open"
     finally:

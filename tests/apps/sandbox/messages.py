@@ -1,10 +1,12 @@
-"""Random messages of two browsers to the sandbox's server: valid, malformed and torn.
+"""Random messages of two browsers to the sandbox's server: valid, malformed, torn and in wrong orders.
 
     python -m tests.apps.sandbox.messages --count 10000
 
-Browsers vanish while they drag and while they wait for answers; a third one takes 2 s for each picture. The
-figures are printed as JSON: errors of the server, whether undoing all restores the first scene bit for bit,
-and the growth of the memory once the first tenth has been sent and once the first half has.
+Browsers vanish while they drag and while they wait for answers; a third one takes 2 s for each picture.
+Strangers ask with wrong tokens and as foreign pages. A fifth of the messages goes to a page that the browsers
+share: messages of the one that only watches must change nothing. The figures are printed as JSON: errors of
+the server, what strangers and watchers got, whether undoing all restores the first scene bit for bit, and the
+growth of the memory once the first tenth has been sent and once the first half has.
 
 They also say for how long the server's loop did not return to its other tasks: time on the clock, which other
 work on the machine lengthens, and processor time of the loop's thread. Those with most of that are listed
@@ -27,6 +29,7 @@ import time
 from collections import Counter
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -36,6 +39,8 @@ import numpy as np
 from decals.apps.memory import import_ahead, keep_memory_low, share_heap
 from decals.editing.actions import KEYS
 from decals.window import EditWindow
+from tests.apps.sandbox.attacks import Server
+from tests.apps.sandbox.misuse import ask_as_stranger, random_steps
 from tests.apps.sandbox.test_connections import CALLS, SIZE, Browser, Connect, serve
 from tests.decals.editing.scenes import digest
 from tests.endurance import resident_megabytes
@@ -120,6 +125,9 @@ PICTURE_SECONDS = 2.0
 
 SAMPLES = 20
 """Looks at the memory during a run."""
+
+SHARED_PART = 0.2
+"""Part of the messages that goes to a page which the browsers share."""
 
 FIRST_PARTS = {"growth_mb_per_1000": 0.1, "steady_growth_mb_per_1000": 0.5}
 """Parts of a run after which the memory should not grow, by the name of the figure."""
@@ -242,13 +250,23 @@ class Messages:
     ----------
     window, page, connect
         What `serve` gives to its check.
+    folder
+        Folder of the page's files.
     seed
         Seed of the messages.
+    shared
+        The browsers share the page.
     """
 
-    def __init__(self, window: EditWindow, page: Any, connect: Connect, seed: int) -> None:
+    def __init__(
+        self, window: EditWindow, page: Any, connect: Connect, folder: Path, seed: int, *, shared: bool
+    ) -> None:
         self._window, self._page, self._connect = window, page, connect
-        self._rng = random.Random(seed)
+        self._folder, self._shared = folder, shared
+        self._rng = random.Random(f"{seed}:{shared}")
+        guard, port = page.guard, page._server.port
+        nothing: Any = None
+        self._server = Server("here", nothing, folder, guard.address(port), guard.token)
         self._modes = {name: getattr(window.subplot, name) for name in ("contact", "mapping", "stiffness")}
         self._browsers: list[Browser] = []
         self._tasks: list[asyncio.Task[None]] = []
@@ -257,19 +275,22 @@ class Messages:
         self._memory: list[tuple[int, float]] = []
         self.changed = self.unanswered = 0
         self.restored = True
+        self.intrusions: list[str] = []
 
     async def run(self, count: int, report: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
         """Send messages and return the figures; now and then, undo all that they did."""
         before = self._saved()
         self._browsers = [await self._connect(), await self._connect()]
-        self._tasks = [asyncio.create_task(self._watch.run()), asyncio.create_task(self._read_slowly())]
+        self._tasks = [asyncio.create_task(self._watch.run())]
+        if not self._shared:  # it could become the driver
+            self._tasks.append(asyncio.create_task(self._read_slowly()))
         for number in range(1, count + 1):
             labels = self._window.session.labels
             await self._send()
             self.changed += labels != self._window.session.labels
             self._window.actions.state.prompt.close()
             if len(self._window.document.objects) > 4 or len(self._window.document.decals) > 300:
-                await self._answer("go_to", self._trigger(0, "go_to", 0))
+                await self._answer("go_to", self._trigger(self._driver(), "go_to", 0))
             if number % max(count // SAMPLES, 1) == 0:
                 await self._undo_all()
                 self.restored = self.restored and self._saved() == before
@@ -292,6 +313,8 @@ class Messages:
             "changed": self.changed,
             "restored": self.restored,
             "unanswered": self.unanswered,
+            "intrusions": len(self.intrusions),
+            "first_intrusions": self.intrusions[:3],
             "memory_mb": round(self._memory[-1][1]) if self._memory else 0,
             **{name: round(growth(self._memory, part), 2) for name, part in FIRST_PARTS.items()},
             **summary("clock", self._watch.clock),
@@ -343,25 +366,95 @@ class Messages:
     # -- messages ---------------------------------------------------------------------------------------
 
     async def _send(self) -> None:
-        """Send one message, or two at once."""
-        rng = self._rng
-        kind, number = rng.random(), rng.randrange(len(self._browsers))
-        if kind < 0.02:
+        """Send one message or several; those of a browser that watches must change nothing."""
+        number = self._rng.randrange(len(self._browsers))
+        together = self._rng.random() < 0.1
+        if not self._watches(number) or together or not self._is_steady():
+            await self._send_as(number, together=together)
+        else:
+            before = self._changeable()
+            await self._send_as(number, together=False)
+            if self._changeable() != before:
+                self.intrusions.append(f"a watcher's {self._message}")
+
+    async def _send_as(self, number: int, *, together: bool) -> None:
+        """Send one message or several as a browser, or events of all browsers together."""
+        rng, kind = self._rng, self._rng.random()
+        if together:
+            await asyncio.gather(*(self._event(number) for number in range(len(self._browsers))))
+        elif kind < 0.02:
             await self._reconnect(number, rng.choice((self._tear, self._vanish, self._leave)))
-        elif kind < 0.10:
+        elif kind < 0.04:
+            self._message = "stranger"
+            if got := await ask_as_stranger(self._server, rng):
+                self.intrusions.append(got)
+        elif kind < 0.08:
+            await self._send_steps(number)
+        elif kind < 0.16:
             name = rng.choice(CALLS)
             odd = [rng.choice(ODD) for _ in range(rng.randrange(4))]
             await self._answer(name, self._browsers[number].call(name, *odd))
-        elif kind < 0.35:
+        elif kind < 0.41:
             await self._answer("mouse", self._mouse(number))
-        elif kind < 0.45:
-            await asyncio.gather(*(self._event(number) for number in range(len(self._browsers))))
         else:
             await self._event(number)
         if rng.random() < 0.5:
             if self._window.tools.dragging:
                 await self._answer("mouse", self._mouse(number, "up"))
             await self._wait_until(lambda: not self._window.background.busy)
+
+    async def _send_steps(self, number: int) -> None:
+        """Send messages in a wrong order: one after the other, all at once, or as the last of a browser."""
+        calls = [partial(self._step, number, *step) for step in random_steps(self._rng)]
+        kind = self._rng.random()
+        if kind < 0.5:
+            for call in calls:
+                await call()
+        elif kind < 0.8:
+            await asyncio.gather(*(call() for call in calls))
+        else:
+            tasks = [asyncio.ensure_future(call()) for call in calls]
+            await asyncio.sleep(0)
+            await self._browsers[number].break_off()
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            self._browsers[number] = await self._connect()
+
+    async def _step(self, number: int, name: str, *arguments: Any) -> None:
+        """Send a message of `random_steps`."""
+        browser = self._browsers[number]
+        if name == "mouse":
+            call: Awaitable[Any] = self._mouse(number, *arguments)
+        elif name == "lifecycle":
+            call = browser.call("trame.lifecycle.update", *arguments)
+        elif name in ("pass_control", "ask_to_drive"):
+            call = browser.trigger(name)
+        else:
+            call = self._trigger(number, name, *arguments)
+        await self._answer(f"step {name} {arguments[:1]}", call)
+
+    # -- browsers that watch ----------------------------------------------------------------------------
+
+    def _watches(self, number: int) -> bool:
+        """Return True if a browser only watches what another one does."""
+        driver = self._page._connections.driving("")["driver"]
+        return self._shared and bool(self._browsers[number].driving["number"] != driver)
+
+    def _driver(self) -> int:
+        return next(number for number in range(len(self._browsers)) if not self._watches(number))
+
+    def _is_steady(self) -> bool:
+        """Return True if nothing goes on that changes the document by itself."""
+        window = self._window
+        return not (window.background.busy or window.session.stroke_open or window.tools.dragging)
+
+    def _changeable(self) -> tuple[Any, ...]:
+        """Return what messages of a browser that drives can change."""
+        state, options = self._window.actions.state, self._page.sandbox.display.options
+        files = sorted((path.name, path.stat().st_size) for path in self._folder.rglob("*"))
+        chosen = state.selection, state.primitive, self._window.actions.help_page
+        return self._window.session.labels, chosen, options, self._page._server.state.theme, files
 
     async def _event(self, number: int) -> None:
         rng = self._rng
@@ -392,9 +485,11 @@ class Messages:
     async def _reconnect(self, number: int, end: Callable[[int], Awaitable[None]]) -> None:
         await end(number)
         await self._browsers[number].close()
+        wrong = self._rng.choice(ODD)
         with contextlib.suppress(PermissionError):
-            await self._connect(self._rng.choice(ODD))
-            raise AssertionError("a wrong token was accepted")
+            intruder = await self._connect(wrong)
+            self.intrusions.append(f"stranger with {wrong!r:.50}")
+            await intruder.close()
         self._browsers[number] = await self._connect()
 
     async def _tear(self, number: int) -> None:
@@ -442,32 +537,51 @@ def measure(
 ) -> dict[str, Any]:
     """Send random messages to a server of this process, and return the figures."""
     share_heap()
-    figures: dict[str, Any] = {}
+    shared_count = int(SHARED_PART * count)
     errors: list[str] = []
 
     class Noted(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
             errors.append(record.getMessage())
 
-    async def check(window: EditWindow, page: Any, connect: Connect) -> None:
-        keep_memory_low()
-        import_ahead()
-        loop = asyncio.get_running_loop()
-        loop.set_exception_handler(lambda _, context: errors.append(repr(context)))
-        figures.update(await Messages(window, page, connect, seed).run(count, report))
+    def send(part: int, folder: Path, *, shared: bool) -> dict[str, Any]:
+        """Send a part of the messages to a server of its own."""
+        figures: dict[str, Any] = {}
+
+        async def check(window: EditWindow, page: Any, connect: Connect) -> None:
+            keep_memory_low()
+            import_ahead()
+            loop = asyncio.get_running_loop()
+            loop.set_exception_handler(lambda _, context: errors.append(repr(context)))
+            figures.update(
+                await Messages(window, page, connect, folder, seed, shared=shared).run(part, report)
+            )
+
+        serve(check, folder=folder, shared=shared)
+        return figures
 
     noted = Noted(logging.ERROR)
     logging.getLogger().addHandler(noted)
     try:
-        with tempfile.TemporaryDirectory() as folder:
-            serve(check, folder=Path(folder))
+        with tempfile.TemporaryDirectory() as name:
+            figures = send(count - shared_count, Path(name), shared=False)
+            others = send(shared_count, Path(name), shared=True)
     finally:
         logging.getLogger().removeHandler(noted)
+    for key in ("sent", "changed", "unanswered", "intrusions", "first_intrusions"):
+        figures[key] += others[key]
+    figures["restored"] &= others["restored"]
     return {**figures, "errors": len(errors), "first_errors": errors[:3]}
 
 
+def faults(figures: dict[str, Any]) -> int:
+    """Return the number of failures among the figures of a run."""
+    counts: list[int] = [figures[name] for name in ("errors", "unanswered", "intrusions")]
+    return sum(counts) + (not figures["restored"])
+
+
 def main() -> int:
-    """Print the figures as JSON; the exit code is 1 after an error or a wrong scene."""
+    """Print the figures as JSON; the exit code is 1 after a failure."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -478,7 +592,7 @@ def main() -> int:
         options.count, options.seed, lambda part: print(json.dumps(part), file=sys.stderr, flush=True)
     )
     print(json.dumps(figures))
-    return int(figures["errors"] > 0 or figures["unanswered"] > 0 or not figures["restored"])
+    return int(faults(figures) > 0)
 
 
 if __name__ == "__main__":

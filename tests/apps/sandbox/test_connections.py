@@ -95,6 +95,11 @@ class Browser:
             if PICTURES in message.data[:HEAD_BYTES]:
                 await asyncio.sleep(seconds)
 
+    async def break_off(self) -> None:
+        """End the connection without a closing message, whatever is under way."""
+        self.socket._response.close()
+        await self.close()
+
     async def close(self) -> None:
         """Vanish without a word to the page."""
         await self.socket.close()

@@ -1,9 +1,12 @@
 """Random messages of browsers, valid and malformed: none raises, and undoing all restores the first state."""
 
 import asyncio
+import random
 import sys
 import time
 from collections import Counter
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -63,8 +66,43 @@ def test_a_pause_is_attributed_to_our_innermost_function() -> None:
 
 @pytest.mark.slow
 def test_random_messages_raise_nothing(vtk_display: None) -> None:
-    from tests.apps.sandbox.messages import measure
+    from tests.apps.sandbox.messages import faults, measure
 
     figures = measure(300, seed=1)
-    assert figures["restored"]
-    assert (figures["errors"], figures["unanswered"]) == (0, 0), figures["first_errors"]
+    assert faults(figures) == 0, figures
+
+
+@pytest.mark.slow
+def test_an_edit_of_a_watcher_is_noticed(vtk_display: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a page on which watchers may do all."""
+    from decals.apps.sandbox.connections import DRIVES, Connections
+    from tests.apps.sandbox import messages
+
+    monkeypatch.setattr(messages, "SHARED_PART", 0.9)
+    monkeypatch.setattr(Connections, "_allows", lambda _self, _client, name, _arguments: name in DRIVES)
+    figures = messages.measure(60, seed=1)
+    assert any(line.startswith("a watcher's") for line in figures["first_intrusions"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("open_to_all", [False, True])
+def test_strangers_get_nothing_unless_any_text_is_a_token(
+    open_to_all: bool, vtk_display: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from decals.apps.sandbox.guard import Guard
+    from decals.window import EditWindow
+    from tests.apps.sandbox.attacks import Server
+    from tests.apps.sandbox.misuse import ask_as_stranger
+    from tests.apps.sandbox.test_connections import Connect, serve
+
+    if open_to_all:
+        monkeypatch.setattr(Guard, "is_token", lambda _self, text: isinstance(text, str))
+    got: list[str] = []
+
+    async def check(_: EditWindow, page: Any, _connect: Connect) -> None:
+        nothing: Any = None
+        server = Server("here", nothing, Path(), page.guard.address(page._server.port), page.guard.token)
+        got.extend([await ask_as_stranger(server, random.Random(number)) for number in range(40)])
+
+    serve(check)
+    assert any(got) == open_to_all
