@@ -4,7 +4,8 @@
 
 Each worker reads ranges of the cases in forked children; see `tests.fuzz`. A case follows from the seed and
 its number, so a failed one can be read again with ``--first NUMBER --cases 1``. Each range that has ended is
-printed with its failures, so a campaign that was interrupted goes on with ``--first``.
+printed with its failures, so a campaign that was interrupted goes on with ``--first``. The figures say how
+many files of each format were read, since their shares differ (`tests.structured.formats`).
 """
 
 import argparse

@@ -18,3 +18,12 @@ FORMATS: dict[str, Format] = {
     "vtu": vtu,
 }
 """Function that makes a file from a random generator, by the name of the format."""
+
+FORKING = ("vtk", "vtp", "vts", "vtu")
+"""Formats that VTK reads: the product forks a process for each file, which takes ten times as long."""
+
+OWN_FILES = 4
+"""Files of each format of our own readers for one file of each format in `FORKING`."""
+
+TURNS = [name for turn in range(OWN_FILES) for name in FORMATS if turn == 0 or name not in FORKING]
+"""Formats in the order in which a campaign reads files of them, again and again."""

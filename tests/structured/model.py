@@ -3,6 +3,7 @@
 import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -28,13 +29,19 @@ class PolygonMesh:
     polygons: Sequence[Sequence[int]]
 
     @property
+    def _corners(self) -> NDArray[np.int64]:
+        return np.fromiter(chain.from_iterable(self.polygons), np.int64)
+
+    @property
     def area(self) -> float:
         """Area by the vector areas of the polygons, which needs no triangles."""
-        total = 0.0
-        for polygon in self.polygons:
-            loop = self.points[list(polygon)] - self.points[polygon[0]]
-            total += float(np.linalg.norm(np.cross(loop, np.roll(loop, -1, axis=0)).sum(axis=0)) / 2)
-        return total
+        sizes = np.array([len(polygon) for polygon in self.polygons])
+        begins = np.cumsum(sizes) - sizes
+        loops = self.points[self._corners] - np.repeat(self.points[self._corners[begins]], sizes, axis=0)
+        following = np.arange(1, len(loops) + 1)
+        following[begins + sizes - 1] = begins
+        areas = np.add.reduceat(np.cross(loops, loops[following]), begins)
+        return float(np.linalg.norm(areas, axis=1).sum() / 2)
 
     @property
     def triangles(self) -> int:
@@ -44,7 +51,7 @@ class PolygonMesh:
     @property
     def bounds(self) -> NDArray[np.float64]:
         """Lowest and highest corner of the box around the polygons."""
-        used = self.points[np.concatenate([np.array(polygon) for polygon in self.polygons])]
+        used = self.points[self._corners]
         return np.stack([used.min(axis=0), used.max(axis=0)])
 
 
@@ -79,10 +86,13 @@ Format = Callable[[random.Random], StructuredFile]
 
 def check(file: StructuredFile, folder: Path) -> None:
     """Read a file in a folder; raise MisreadError for a valid one that is refused or read as another mesh."""
-    for name, content in file.others.items():
-        (folder / name).write_bytes(content)
     path = folder / f"case{file.suffix}"
-    path.write_bytes(file.content)
+    for place, content in {
+        path: file.content,
+        **{folder / key: own for key, own in file.others.items()},
+    }.items():
+        place.unlink(missing_ok=True)  # some file systems write to the disk at once what replaces a content
+        place.write_bytes(content)
     try:
         vertices, faces = read_mesh(path)
     except InvalidMesh as error:
