@@ -485,7 +485,7 @@ class Messages:
     async def _reconnect(self, number: int, end: Callable[[int], Awaitable[None]]) -> None:
         await end(number)
         await self._browsers[number].close()
-        wrong = self._rng.choice(ODD)
+        wrong = self._rng.choice([odd for odd in ODD if odd is not None])  # None stands for the token
         with contextlib.suppress(PermissionError):
             intruder = await self._connect(wrong)
             self.intrusions.append(f"stranger with {wrong!r:.50}")
