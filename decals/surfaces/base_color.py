@@ -222,7 +222,7 @@ class BaseColor(Immutable):
         material_of_face: Int32Array,
         corners: Int32Array,
         *,
-        coordinates: Float32Array | None = None,
+        coordinates: NDArray[Any] | None = None,
         colors: Float32Array | None = None,
     ) -> Self:
         """Return the base colour of a mesh whose faces have materials.
@@ -237,7 +237,7 @@ class BaseColor(Immutable):
             Material of each face.
         corners : int32[m, 3]
             Row of each corner: the faces, if there is a row for each vertex.
-        coordinates, colors : float32[n, 2], float32[n, 3]
+        coordinates, colors : float[n, 2], float32[n, 3]
             The rows, as for `BaseColor`.
         """
         shades = _unit_range("factors of materials", _rows("factors of materials", factors, 3))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blobtree._typing import Float32Array, Int64Array
+from blobtree._typing import Int64Array
 from decals.surfaces.base_color import BaseColor, linear_colors
 
 if TYPE_CHECKING:
@@ -71,8 +71,8 @@ def _holds_colors(name: str, values: NDArray[Any], *, active: bool) -> bool:
     return (active or named) if values.dtype == np.uint8 else named and values.dtype.kind == "f"
 
 
-def _coordinates(surface: "pv.PolyData") -> Float32Array | None:
+def _coordinates(surface: "pv.PolyData") -> NDArray[Any] | None:
     array = surface.active_texture_coordinates
     if array is None or array.ndim != 2 or array.shape[1] < 2:
         return None
-    return np.asarray(array[:, :2], np.float32)
+    return np.asarray(array[:, :2])

@@ -28,7 +28,7 @@ def trimesh_color(mesh: Any) -> BaseColor | None:
 
 def _textured(visual: Any, faces: Int32Array) -> BaseColor | None:
     """Return the base colour of the materials of faces, with their textures if there are coordinates."""
-    coordinates = None if visual.uv is None else np.asarray(visual.uv, np.float32)
+    coordinates = None if visual.uv is None else np.asarray(visual.uv)
     materials = list(getattr(visual.material, "materials", ())) or [visual.material]
     of_face = np.zeros(len(faces), np.int32)
     if visual.face_materials is not None and len(materials) > 1:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from blobtree._typing import Float32Array, Int64Array
+from blobtree._typing import Float32Array, Float64Array, Int64Array
 from decals.images.texels import decode_srgb
 from decals.surfaces.base_color import CLAY, WHITE, BaseColor, linear_colors
 from decals.surfaces.files.content import Line, finite_numbers
@@ -48,7 +48,7 @@ class ObjColors:
         keys = self._vertices * (count + 1) + (0 if coordinates is None else np.maximum(self._places, -1) + 1)
         distinct, rows = np.unique(keys, return_inverse=True)
         if coordinates is not None:
-            padded = np.concatenate([np.zeros((1, 2), np.float32), coordinates])
+            padded = np.concatenate([np.zeros((1, 2)), coordinates])
             coordinates = padded[distinct % (count + 1)]
         if colors is not None:
             colors = colors[distinct // (count + 1)]
@@ -80,13 +80,13 @@ class ObjColors:
         numbers = finite_numbers(word for of_line in words for word in of_line[-3:]).reshape(-1, 3)
         return linear_colors(numbers, name="colours of vertices")
 
-    def _coordinates(self) -> Float32Array | None:
+    def _coordinates(self) -> Float64Array | None:
         """Return the texture coordinates of the file; None if no corner has any."""
         lines = self._lines[b"vt"]
         if not lines or (self._places < 0).all():
             return None
         words = [[*line.text.split(), b"0", b"0"][:2] for line in lines]
-        return finite_numbers(word for of_line in words for word in of_line).reshape(-1, 2).astype(np.float32)
+        return finite_numbers(word for of_line in words for word in of_line).reshape(-1, 2)
 
     def _materials(self, notes: Notes) -> tuple[list[Material], Int64Array]:
         """Return the materials that polygons use, and the one of each polygon; -1 for none."""

@@ -68,11 +68,11 @@ class PlyColors:
         of_faces = _light(self._faces, "faces")
         return None if of_faces is None else BaseColor.of_faces(of_faces[triangles.polygons])
 
-    def _corner_places(self) -> Float32Array | None:
+    def _corner_places(self) -> NDArray[Any] | None:
         """Return texture coordinates of all corners; None if the faces have no such list of their length."""
         if self._corners is None or not (self._corners[0] == 2 * self._polygons.sizes).all():
             return None
-        return np.asarray(self._corners[1], np.float32).reshape(-1, 2)
+        return self._corners[1].reshape(-1, 2)
 
     def _textures(self) -> tuple[list[BaseTexture], NDArray[np.int32] | None]:
         """Return the textures that can be read, and that of each polygon; None if all have the first."""
@@ -98,6 +98,6 @@ def _light(columns: Columns, what: str) -> Float32Array | None:
     return linear_colors(np.stack([columns[name] for name in names], axis=1), name=f"colours of {what}")
 
 
-def _columns(columns: Columns, choices: tuple[tuple[str, str], ...]) -> Float32Array | None:
+def _columns(columns: Columns, choices: tuple[tuple[str, str], ...]) -> NDArray[Any] | None:
     names = next((pair for pair in choices if set(pair) <= columns.keys()), None)
-    return None if names is None else np.stack([columns[name] for name in names], axis=1).astype(np.float32)
+    return None if names is None else np.stack([columns[name] for name in names], axis=1)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import pyvista as pv
 import trimesh
 from numpy.typing import NDArray
 from PIL import Image
@@ -251,3 +252,31 @@ def test_files_of_trimesh_have_the_colours_of_its_mesh(suffix: str, tmp_path: Pa
     places = np.einsum("nc,nci->ni", weights, right.vertices[right.faces[numbers]].astype(np.float64))
     found, own = item.surface.locate(places)
     assert np.abs(light_of(item, found, own) - light_of(right, numbers, weights)).max() < 1e-3
+
+
+@pytest.mark.parametrize("kind", ["obj", "vertices of ply", "corners of ply", "pyvista", "trimesh"])
+def test_coordinates_beyond_float32_cost_no_face(
+    kind: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Left out with a word in the log, without a warning of NumPy."""
+    suffix = kind.rpartition(" ")[2]
+    path, huge = tmp_path / f"a.{suffix}", [[0.0, 1e300], [1.0, 0.0], [0.0, 1.0]]
+    model: Any = path
+    if kind == "obj":
+        path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 1e300\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n")
+    elif kind == "vertices of ply":
+        path.write_text(ply(np.hstack([np.eye(3), huge]), ["double s", "double t"], ["3 0 1 2"], []))
+    elif kind == "corners of ply":
+        path.write_text(ply(np.eye(3), [], ["3 0 1 2 6 0 1e300 1 0 0 1"], ["list uchar double texcoord"]))
+    elif kind == "trimesh":
+        model = trimesh.Trimesh(
+            np.eye(3), [[0, 1, 2]], process=False, visual=trimesh.visual.TextureVisuals(uv=huge)
+        )
+    else:
+        model = pv.PolyData(np.eye(3), faces=[3, 0, 1, 2])
+        model.active_texture_coordinates = np.array(huge)
+    with caplog.at_level(logging.WARNING):
+        item = as_object(model, "file")
+    assert isinstance(item, MeshObject)
+    assert len(item.faces) == 1
+    assert "texture coordinates: expected finite numbers" in caplog.text
