@@ -117,6 +117,16 @@ implicit-decals bake scene.json -o model.glb --size 4096
 
 implicit-decals bake scene.json -o small.glb --vertex-colors
 """,
+    "export": """Write a scene as a file of another program, or check a mesh file.
+
+For example:
+
+implicit-decals export scene.json -o model.gltf --size 4096
+
+implicit-decals export scene.json -o model.ply --attribute owner --attribute field
+
+implicit-decals export --check model.ply
+""",
     "displace": """Write the surface of a scene, moved by the heights of its decals, as a mesh.
 
 For example:

@@ -12,8 +12,8 @@ import re
 import shutil
 import time
 import uuid
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
@@ -70,6 +70,15 @@ def write_atomically(path: str | os.PathLike[str], content: bytes) -> None:
     """Write `content` to `path` so that a crash leaves the old file or the new one; see `replacing`."""
     with replacing(path) as temporary, temporary.open("xb") as file:
         file.write(content)
+
+
+def write_together(files: Mapping[Path, bytes]) -> None:
+    """Write several files, all or none, but for a crash between two of them; the first is replaced last."""
+    with ExitStack() as stack:
+        temporaries = [stack.enter_context(replacing(path)) for path in files]
+        for temporary, content in zip(temporaries, files.values(), strict=True):
+            with temporary.open("xb") as file:
+                file.write(content)
 
 
 def _check_target(target: Path) -> None:

@@ -93,7 +93,7 @@ def write_polydata(path: str | os.PathLike[str], surface: "pv.PolyData") -> None
         The file cannot be written in full; an existing file stays as it was.
     """
     if Path(path).suffix.lower() == ".vtp":
-        write_atomically(path, _vtp(surface))
+        write_atomically(path, vtp_bytes(surface))
         return
     from blobtree.vtk_errors import vtk_errors
 
@@ -123,7 +123,7 @@ def _is_whole(path: Path, surface: "pv.PolyData") -> bool:
             return bool(found) and len(body) == _ply_length(header.decode("ascii"), surface)
 
 
-def _vtp(surface: "pv.PolyData") -> bytes:
+def vtp_bytes(surface: "pv.PolyData") -> bytes:
     """Return a surface as a VTP file; on a full disk, VTK's own writing to the file kills the process."""
     from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 

@@ -2,6 +2,7 @@ from . import editing, errors, field, images, index, rendering, scattering, scen
 from ._version import __version__
 from .baking.bake import bake
 from .baking.displace import displace
+from .baking.export import export
 from .errors import ImplicitDecalsError
 from .field.evaluate import evaluate
 from .field.law import ContactLaw, define_contact
@@ -51,6 +52,7 @@ __all__ = [
     "editing",
     "errors",
     "evaluate",
+    "export",
     "field",
     "images",
     "index",

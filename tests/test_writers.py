@@ -6,7 +6,7 @@ import pytest
 
 from tests.writers import WRITERS, cases, failure, failure_on_full_disk
 
-ORDINARY = {"tree.json", "picture.png", "surface.ply", "scene.json", "script.py", "table.csv"}
+ORDINARY = {"plain.ply", "tree.json", "picture.png", "surface.ply", "scene.json", "script.py", "table.csv"}
 
 
 @pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")

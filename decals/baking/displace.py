@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
-from blobtree.meshing.mesh import Mesh
 from blobtree.meshing.polygonize import polygonize
 from blobtree.progress import Cancel, Progress, reporting
-from blobtree.pyvista_views import MESH_SUFFIXES, to_polydata, write_polydata
+from blobtree.pyvista_views import MESH_SUFFIXES
 from blobtree.validation import truth
-from decals.baking.bake import SUFFIX, SurfaceColors, bake, evaluation_options
-from decals.baking.meshes import bake_mesh
+from decals.baking.export import VERTICES, bake_parts, export
+from decals.baking.plain_files import as_polydata
+from decals.baking.surface_colors import evaluation_options
 from decals.errors import InvalidMesh, InvalidScene
 from decals.field.evaluate import evaluate
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.images.texels import encode_srgb
 from decals.model import Decals
 from decals.scenes.cover import as_scene
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject
@@ -60,21 +59,7 @@ class DisplacedScene(PosedScene):
     def to_polydata(self) -> "pv.PolyData":
         """Return all objects as one mesh with normals and the colours of surface and decals, as "RGB"."""
         with reporting() as report:
-            meshes = [bake_mesh(item, resolution=None, creases=False, report=report) for item in self.objects]
-        colors = SurfaceColors(meshes, self.objects, self.decals, self.images, self.drawing)
-        first, *others = (
-            to_polydata(
-                Mesh(
-                    mesh.vertices,
-                    mesh.faces,
-                    mesh.normals,
-                    encode_srgb(colors.at_vertices(number)).astype(np.float32),
-                )
-            )
-            for number, mesh in enumerate(meshes)
-        )
-        merged: pv.PolyData = first.append_polydata(*others) if others else first
-        return merged
+            return as_polydata(bake_parts(self, VERTICES, report).merged())
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the surface to a file with the colours of surface and decals at its vertices.
@@ -92,14 +77,8 @@ class DisplacedScene(PosedScene):
         MissingPackage
             A GLB file needs the extra ``bake``; the message has the command.
         """
-        path = checked_path(path, (SUFFIX, *MESH_SUFFIXES))
-        if path.suffix.lower() == SUFFIX:
-            bake(self, path, vertex_colors=True)
-            return
-        try:
-            write_polydata(path, self.to_polydata())
-        except OSError as error:
-            raise InvalidScene(f"could not write {str(path)!r} ({error.strerror})") from error
+        path = checked_path(path, (".glb", *MESH_SUFFIXES))
+        export(self, path, colors=None if path.suffix.lower() == ".stl" else VERTICES)
 
 
 def displace(

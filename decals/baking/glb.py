@@ -1,15 +1,15 @@
-"""GLB files (binary glTF 2.0), encoded by trimesh."""
+"""GLB and glTF files (glTF 2.0), encoded by trimesh."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import base64
+import json
+from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from PIL import Image
 
-from blobtree._typing import Float32Array, Int32Array
 from decals.baking.materials import ROUGHNESS, Maps
+from decals.baking.parts import Baked
 from decals.validation import optional_package
 
 PREFIX = "_"
@@ -18,44 +18,8 @@ PREFIX = "_"
 LINEAR, LINEAR_MIPMAP_LINEAR, CLAMP_TO_EDGE = 9729, 9987, 33071
 
 
-@dataclass(frozen=True, eq=False)
-class Node:
-    """A named mesh of a file.
-
-    Attributes
-    ----------
-    name : str
-        Name of the node, unique in its file.
-    vertices, normals : float32[n, 3]
-    faces : int32[m, 3]
-    uv : float32[n, 2], optional
-        Texture coordinates, v upward.
-    colors : float32[n, 3], optional
-        Linear colours.
-    tangents : float32[n, 4], optional
-        Tangents along u, and the signs of the bitangents.
-    """
-
-    name: str
-    vertices: Float32Array
-    faces: Int32Array
-    normals: Float32Array
-    uv: Float32Array | None = None
-    colors: Float32Array | None = None
-    tangents: Float32Array | None = None
-
-
-def glb_bytes(nodes: Sequence[Node], maps: Maps | None = None, origin: ArrayLike = (0.0, 0.0, 0.0)) -> bytes:
-    """Return a GLB file of nodes that share one material.
-
-    Parameters
-    ----------
-    nodes : sequence of Node
-        All with ``uv`` and textures, or all with ``colors`` and without any.
-    maps : Maps, optional
-        Textures, first row at the top.
-    origin : (x, y, z), optional
-        Point that all vertices are relative to, in float64; it becomes the translation of the nodes.
+def glb_bytes(baked: Baked) -> bytes:
+    """Return a GLB file, with a node for each part; all share one material.
 
     Raises
     ------
@@ -66,30 +30,45 @@ def glb_bytes(nodes: Sequence[Node], maps: Maps | None = None, origin: ArrayLike
     material = trimesh.visual.material.PBRMaterial(
         name="baked",
         doubleSided=True,
-        **_textures(maps),
+        **_textures(baked.maps),
     )
     base = "scene"
-    while any(node.name == base for node in nodes):
+    while any(part.name == base for part in baked.parts):
         base = f"{base}-"
     scene = trimesh.Scene(base_frame=base)
-    transform = np.eye(4)
-    transform[:3, 3] = origin
-    for node in nodes:
+    transform = baked.placement("y", metres=True)
+    for part in baked.parts:
         mesh = trimesh.Trimesh(
-            vertices=node.vertices,
-            faces=node.faces,
-            vertex_normals=node.normals,
-            visual=trimesh.visual.TextureVisuals(uv=node.uv, material=material),
+            vertices=part.vertices,
+            faces=part.faces,
+            vertex_normals=part.normals,
+            visual=trimesh.visual.TextureVisuals(uv=part.uv, material=material),
             process=False,
         )
-        for name, values in (("COLOR_0", node.colors), ("TANGENT", node.tangents)):
+        for name, values in (("COLOR_0", part.colors), ("TANGENT", part.tangents)):
             if values is not None:
-                mesh.vertex_attributes[PREFIX + name] = values
-        scene.add_geometry(mesh, node_name=node.name, geom_name=node.name, transform=transform)
+                mesh.vertex_attributes[PREFIX + name] = values.astype(np.float32)
+        for name, values in part.attributes.items():  # no attribute may have integers of 32 bits
+            mesh.vertex_attributes[PREFIX + name.upper()] = values.astype(np.float32)
+        scene.add_geometry(mesh, node_name=part.name, geom_name=part.name, transform=transform)
     content: bytes = trimesh.exchange.gltf.export_glb(
-        scene, include_normals=True, tree_postprocessor=_finish_tree
+        scene, include_normals=True, tree_postprocessor=partial(_finish_tree, baked=baked)
     )
     return content
+
+
+def gltf_bytes(baked: Baked) -> bytes:
+    """Return a glTF file in JSON, which holds its buffer as a data URI."""
+    glb = glb_bytes(baked)
+    length = int.from_bytes(glb[12:16], "little")
+    tree, buffer = json.loads(glb[20 : 20 + length]), glb[28 + length :]
+    tree["buffers"][0]["uri"] = data_uri(buffer)
+    return json.dumps(tree, ensure_ascii=False, separators=(",", ":")).encode()
+
+
+def data_uri(content: bytes) -> str:
+    """Return the URI that holds bytes itself."""
+    return f"data:application/octet-stream;base64,{base64.b64encode(content).decode()}"
 
 
 def _textures(maps: Maps | None) -> dict[str, Any]:
@@ -106,8 +85,8 @@ def _textures(maps: Maps | None) -> dict[str, Any]:
     return factors | {name: Image.fromarray(texels) for name, texels in given.items()}
 
 
-def _finish_tree(tree: dict[str, Any]) -> None:
-    """Name attributes as glTF does, and let viewers filter textures without wrapping them."""
+def _finish_tree(tree: dict[str, Any], baked: Baked) -> None:
+    """Name attributes as glTF does, let viewers filter textures without wrapping them, and add the recipe."""
     for mesh in tree["meshes"]:
         for primitive in mesh["primitives"]:
             attributes = primitive["attributes"]
@@ -119,3 +98,5 @@ def _finish_tree(tree: dict[str, Any]) -> None:
         tree["samplers"] = [{"magFilter": LINEAR, "minFilter": LINEAR_MIPMAP_LINEAR, **wrap}]
         for texture in textures:
             texture["sampler"] = 0
+    if baked.recipe is not None:
+        tree["asset"]["extras"] = {"recipe": vars(baked.recipe)}

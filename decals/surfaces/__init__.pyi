@@ -2,6 +2,7 @@ from .base_color import BaseColor, BaseTexture, Wrap, linear_colors
 from .convert import Model, as_surface
 from .implicit import ImplicitSurface
 from .mesh import MeshSurface
+from .mesh_check import MeshCheck, check_mesh
 from .mesh_file import read_mesh
 from .surface import Surface
 
@@ -9,11 +10,13 @@ __all__ = [
     "BaseColor",
     "BaseTexture",
     "ImplicitSurface",
+    "MeshCheck",
     "MeshSurface",
     "Model",
     "Surface",
     "Wrap",
     "as_surface",
+    "check_mesh",
     "linear_colors",
     "read_mesh",
 ]

@@ -19,7 +19,8 @@ NAMES = [
     "Camera", "Contact", "ContactLaw", "DecalImage", "DecalMaterial", "Decals", "ImageMapping",
     "ImplicitDecalsError",
     "Interaction", "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__",
-    "animate", "bake", "cover", "define_contact", "displace", "edit", "evaluate", "load_image", "load_model",
+    "animate", "bake", "cover", "define_contact", "displace", "edit", "evaluate", "export", "load_image",
+    "load_model",
     "load_scene", "measure", "pose", "render", "save_scene", "scatter", "show", "skin", "turntable",
 ]  # fmt: skip
 OF_PACKAGES = {
@@ -35,8 +36,8 @@ OF_PACKAGES = {
         "Spherical", "TextureCoordinates", "gradient_of", "region_mask", "remeshed_points", "vertex_density",
     ],
     "surfaces": [
-        "BaseColor", "BaseTexture", "ImplicitSurface", "MeshSurface", "Model", "Surface", "Wrap",
-        "as_surface", "linear_colors", "read_mesh",
+        "BaseColor", "BaseTexture", "ImplicitSurface", "MeshCheck", "MeshSurface", "Model", "Surface", "Wrap",
+        "as_surface", "check_mesh", "linear_colors", "read_mesh",
     ],
 }  # fmt: skip
 

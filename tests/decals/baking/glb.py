@@ -165,7 +165,7 @@ def read_attribute(path: Path, mesh: int, name: str) -> Array:
     accessor = tree["accessors"][tree["meshes"][mesh]["primitives"][0]["attributes"][name]]
     view = tree["bufferViews"][accessor["bufferView"]]
     assert accessor["componentType"] == 5126
-    columns = {"VEC2": 2, "VEC3": 3, "VEC4": 4}[accessor["type"]]
+    columns = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}[accessor["type"]]
     start = 28 + len(json_bytes(path)) + view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
     flat = np.frombuffer(path.read_bytes(), "<f4", accessor["count"] * columns, start)
     return flat.reshape(-1, columns)

@@ -12,7 +12,7 @@ import decals
 from blobtree import Point
 from decals import MeshObject, Scene, TreeObject
 from decals.baking import atlas as atlas_module
-from decals.baking import bake as bake_module
+from decals.baking import surface_colors as colors_module
 from decals.baking import texture as texture_module
 from decals.baking.atlas import unwrap
 from decals.baking.meshes import bake_mesh
@@ -297,7 +297,7 @@ def textured(size: int, samples: int = 1) -> Array:
         bake_mesh(item, resolution=None, creases=False, report=lambda *_: None) for item in scene.objects
     ]
     drawing = scene.drawing.overridden(contact=decals.Contact.PRODUCT)
-    colors = bake_module.SurfaceColors(meshes, scene.objects, scene.decals, scene.images, drawing)
+    colors = colors_module.SurfaceColors(meshes, scene.objects, scene.decals, scene.images, drawing)
     return bake_texture(
         meshes, unwrap(meshes, size, lambda *_: None), size, samples, colors.at, lambda *_: None
     )

@@ -1,0 +1,149 @@
+"""``implicit-decals export``: a scene as a file of another program, and a check of such files."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+from rich.console import Console
+from rich.table import Table
+
+from decals import export as export_scene
+from decals.apps.commands.options import (
+    MAX_SAMPLES,
+    ContactName,
+    CreaseAngle,
+    Definitions,
+    MappingName,
+    OptionalWhole,
+    Stiffness,
+    Trust,
+    Whole,
+    check_count,
+    given,
+)
+from decals.apps.commands.progress_bars import preparing
+from decals.apps.models.loading import load_model
+from decals.apps.output import check_output, print_path
+from decals.baking.formats import FORMATS
+from decals.errors import InvalidInput
+from decals.surfaces import MeshCheck, check_mesh, read_mesh
+
+LABELS = {
+    "vertices": "vertices",
+    "faces": "faces",
+    "parts": "connected parts",
+    "borders": "edges of one face",
+    "flipped": "flipped edges",
+    "inward": "closed parts that wind inward",
+    "degenerate": "degenerate faces",
+    "copies": "copied faces",
+    "branching": "edges of more than two faces",
+    "pinched": "pinched vertices",
+    "area": "area",
+    "volume": "volume",
+}
+"""Rows of the table of checks."""
+
+
+def export(
+    scene: str,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"), show_default=False)] = None,
+    check: Annotated[bool, Parameter(negative=())] = False,
+    colors: Annotated[Literal["texture", "vertices", "none"] | None, Parameter(show_default=False)] = None,
+    attributes: Annotated[
+        list[Literal["owner", "uv", "field", "stretch"]] | None,
+        Parameter(name=("--attribute", "--attributes"), negative=(), show_default=False),
+    ] = None,
+    unit: Annotated[
+        Literal["micron", "millimeter", "centimeter", "inch", "foot", "meter"] | None,
+        Parameter(show_default=False),
+    ] = None,
+    up: Annotated[Literal["y", "z"] | None, Parameter(show_default=False)] = None,
+    size: Whole = 2048,
+    samples: Whole = 2,
+    contact: ContactName = None,
+    stiffness: Stiffness = None,
+    mapping: MappingName = None,
+    resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None,
+    creases: Annotated[bool, Parameter(negative=())] = False,
+    crease_angle: CreaseAngle = None,
+    define: Definitions = None,
+    trust: Trust = False,
+) -> None:
+    """Write a scene as a file of another program, or check a mesh file.
+
+    Parameters
+    ----------
+    scene
+        A saved scene. Models that render takes are written without decals. With --check alone, a mesh file.
+    output
+        The file: glb, gltf, obj, ply, stl or vtp.
+    check
+        Print whether the mesh of each object is closed and sound.
+    colors
+        Where the colours are. Default: a texture in glb, gltf and obj files, else vertices.
+    attributes
+        Value at the vertices besides the colours. Can be repeated.
+    unit
+        Unit of the scene's lengths, for formats that have one.
+    up
+        The axis of the scene that points upward, for formats that have one.
+    size
+        Width and height of the texture in texels, from 16 to 8192.
+    samples
+        Samples per texel along each axis: 1 is fast, 2 smooth, 4 fine.
+    contact
+        Contact mode, as for render.
+    stiffness
+        Stiffness of elastic contact, as for render.
+    mapping
+        Image mapping, as for render.
+    resolution
+        Cells along the longest side of each implicit object. Default: 64.
+    creases
+        Keep the edges that unions, intersections and differences leave.
+    """
+    if output is None:
+        if not check:
+            raise InvalidInput("export: missing -o FILE; or --check, to check a mesh file")
+        _print_checks([check_mesh(*read_mesh(scene), Path(scene).name)])
+        return
+    check_output(output, tuple(FORMATS))
+    check_count("--samples", samples, 1, MAX_SAMPLES)
+    with preparing(define) as progress:
+        checks = export_scene(
+            load_model(scene, trust=trust, crease_angle=crease_angle),
+            output,
+            attributes=attributes or (),
+            size=size,
+            samples=samples,
+            resolution=resolution,
+            creases=creases,
+            progress=progress,
+            **given(colors=colors, unit=unit, up=up, contact=contact, stiffness=stiffness, mapping=mapping),
+        )
+    print_path(output)
+    if check:
+        _print_checks(checks)
+
+
+def _print_checks(checks: Sequence[MeshCheck]) -> None:
+    """Print a table with a column for each mesh."""
+    table = Table(box=None)
+    for name in ("", *(check.name for check in checks)):
+        table.add_column(name, justify="right" if name else "left")
+    table.add_row("closed", *("yes" if check.closed else "no" for check in checks))
+    table.add_row("sound", *("yes" if check.sound else "no" for check in checks))
+    for name, label in LABELS.items():
+        values = [getattr(check, name) for check in checks]
+        table.add_row(
+            label, *(f"{value:,}" if isinstance(value, int) else f"{value:.4g}" for value in values)
+        )
+    Console().print(table, highlight=False, markup=False)
+
+
+def _text(value: float) -> str:
+    return f"{value:,}" if isinstance(value, int) else f"{value:.4g}"

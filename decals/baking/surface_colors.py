@@ -1,0 +1,150 @@
+"""Colours of a scene's surface with the decals on it, without light, at any of its points."""
+
+from collections.abc import Callable, Collection, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blobtree._typing import Float32Array, Float64Array
+from decals.baking.materials import surface_values
+from decals.baking.meshes import BakeMesh
+from decals.field.evaluate import Samples, evaluate
+from decals.field.jacobian import normal_derivatives_of_triangles, stretch_of
+from decals.field.walks import walks_for
+from decals.images.texels import decode_srgb
+from decals.index.editor import DecalEditor
+from decals.index.index import DecalIndex
+from decals.model import Decals
+from decals.rendering.options import Drawing, ImageLike, modes_of
+from decals.scenes.scene import DecalImage
+
+BLOCK = 1 << 18
+"""Vertices that are evaluated at once."""
+
+
+class SurfaceColors:
+    """Colours of the objects of a scene with the decals on them, without light.
+
+    Parameters
+    ----------
+    meshes : sequence of BakeMesh
+        The objects.
+    objects : sequence of objects of a scene
+        The same as the scene has them, which decides which decals lie on them.
+    decals : Decals or DecalEditor
+        The decals on them.
+    images : sequence of images
+        Images of the decals.
+    drawing : Drawing
+        Has the modes of the decals.
+    """
+
+    def __init__(
+        self,
+        meshes: Sequence[BakeMesh],
+        objects: Sequence[object],
+        decals: Decals | DecalEditor,
+        images: Sequence[ImageLike],
+        drawing: Drawing,
+    ) -> None:
+        self._meshes, self._objects, self._decals = meshes, objects, decals
+        self.has_materials = any(hasattr(image, "surface_texels") for image in images)
+        self._materials = list(images)
+        self._images = [DecalImage(f"image {i}", image.pixels) for i, image in enumerate(images)]
+        self._options = evaluation_options(drawing, decals, objects)
+
+    def at_vertices(self, number: int, rows: slice = slice(None)) -> Float64Array:
+        """Return linear colours of vertices of mesh ``number``, ``float64[n, 3]``."""
+        mesh = self._meshes[number]
+        base = None if mesh.vertex_light is None else mesh.vertex_light[rows]
+        return self.at(number, mesh.places[rows], mesh.facings[rows], base=base)
+
+    def at(
+        self,
+        number: int,
+        points: Float32Array,
+        normals: Float32Array,
+        tangents: Float32Array | None = None,
+        base: Float64Array | None = None,
+    ) -> Float64Array:
+        """Return linear colours ``float64[n, 3]`` of mesh ``number`` at points with unit normals.
+
+        With tangents, they are the values of all maps, see `decals.baking.materials.surface_values`. The base
+        colours at the points are linear too; by default those of `BakeMesh.base_colors`.
+        """
+        if base is None:
+            srgb = np.asarray(self._meshes[number].base_colors(points), np.float64)
+            base = decode_srgb(srgb).astype(np.float64, copy=False)
+        samples = evaluate(
+            self._decals,
+            points,
+            normals,
+            images=self._images if tangents is None else self._materials,
+            materials=tangents is not None,
+            on=self._objects[number],
+            **self._options,
+        )
+        over = samples.color
+        assert over is not None  # there are images, if only an empty list of them
+        colors: Float64Array = base * (1.0 - over[:, 3:]) + over[:, :3]
+        if tangents is None or samples.materials is None:
+            return colors
+        return surface_values(colors, samples.materials, normals, tangents)
+
+    def attributes_at_vertices(self, number: int, names: Collection[str]) -> dict[str, NDArray[Any]]:
+        """Return some of `ATTRIBUTES` at the vertices of mesh ``number``."""
+        mesh = self._meshes[number]
+        columns: dict[str, list[NDArray[Any]]] = {name: [] for name in names}
+        turns = _normal_derivatives(mesh) if "stretch" in names else None
+        for first in range(0, len(mesh.places) if names else 0, BLOCK):
+            rows = slice(first, first + BLOCK)
+            samples = evaluate(
+                self._decals,
+                mesh.places[rows],
+                mesh.facings[rows],
+                on=self._objects[number],
+                jacobian=turns is not None,
+                normal_derivatives=None if turns is None else turns[rows],
+                **self._options,
+            )
+            for name, column in columns.items():
+                column.append(ATTRIBUTES[name](samples))
+        return {name: np.concatenate(column) for name, column in columns.items()}
+
+
+def _stretch(samples: Samples) -> Float32Array:
+    """Return the stretch of the image at each point, 0 without an owner."""
+    assert samples.jacobian is not None
+    known = (samples.owner >= 0) & np.isfinite(samples.jacobian).all(axis=(1, 2))
+    values = np.zeros(len(known), np.float32)
+    values[known] = stretch_of(samples.jacobian[known])
+    return values
+
+
+ATTRIBUTES: dict[str, Callable[[Samples], NDArray[Any]]] = {
+    "owner": lambda samples: samples.owner,
+    "uv": lambda samples: samples.uv,
+    "field": lambda samples: samples.field,
+    "stretch": _stretch,
+}
+"""Values of decals at points, by the names under which files hold them."""
+
+
+def _normal_derivatives(mesh: BakeMesh) -> Float64Array:
+    """Return the derivative of the normal at each vertex, ``float64[n, 3, 3]``: the mean of its faces."""
+    turns = normal_derivatives_of_triangles(mesh.places[mesh.faces], mesh.facings[mesh.faces])
+    corners = mesh.faces.reshape(-1)
+    count = np.maximum(np.bincount(corners, minlength=len(mesh.places)), 1)
+    rows = np.repeat(turns.reshape(-1, 9), 3, axis=0)
+    sums = np.stack([np.bincount(corners, column, len(mesh.places)) for column in rows.T], axis=1)
+    means: Float64Array = (sums / count[:, None]).reshape(-1, 3, 3)
+    return means
+
+
+def evaluation_options(
+    drawing: Drawing, decals: Decals | DecalEditor, objects: Sequence[object]
+) -> dict[str, Any]:
+    """Return the arguments of `evaluate` that are the same everywhere on some objects."""
+    index = DecalIndex.of(decals) if isinstance(decals, Decals) else None
+    return modes_of(drawing) | {"index": index, "walks": walks_for(drawing.mapping, decals, objects)}

@@ -1,0 +1,76 @@
+"""``implicit-decals export``."""
+
+from pathlib import Path
+
+import pytest
+import pyvista as pv
+
+from blobtree import Point, save
+from decals import save_scene
+from decals.apps.cli import run
+from tests.decals.baking.glb import ball_and_cube, need, read_json
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def saved(folder: Path) -> Path:
+    """A scene file in the empty folder."""
+    scene = ball_and_cube(count=8)
+    save_scene(scene.replace(decals=scene.decals.replace(images=[-1] * 8), images=()), folder / "scene.json")
+    return folder
+
+
+def test_a_scene_becomes_a_ply_file_with_attributes(saved: Path, capsys: Capture) -> None:
+    assert run(["export", "scene.json", "-o", "a.ply", "--attribute", "owner", "--attribute", "uv"]) == 0
+    assert capsys.readouterr().out == "a.ply\n"
+    header = (saved / "a.ply").read_bytes().partition(b"end_header")[0].decode()
+    assert [line.split()[-1] for line in header.splitlines() if line.startswith("property")] == [
+        *("x", "y", "z", "nx", "ny", "nz", "red", "green", "blue", "owner", "uv_0", "uv_1", "vertex_indices")
+    ]
+
+
+def test_unit_and_axis_reach_the_file(saved: Path) -> None:
+    need("trimesh")
+    save(Point((0, 0, 0), radius=1.0), "ball.json")
+    words = ["export", "ball.json", "--colors", "none", "--unit", "millimeter", "--up", "z", "--cells", "8"]
+    assert run([*words, "-o", "a.glb"]) == 0
+    matrix = next(node for node in read_json(saved / "a.glb")["nodes"] if "mesh" in node)["matrix"]
+    assert matrix[:8] == pytest.approx([1e-3, 0, 0, 0, 0, 0, -1e-3, 0])
+
+
+def test_check_prints_a_table_for_written_objects_and_for_files(saved: Path, capsys: Capture) -> None:
+    assert run(["export", "scene.json", "-o", "a.stl", "--check"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "a.stl"
+    assert lines[1].split() == ["ball", "cube"]
+    assert lines[2].split() == ["closed", "yes", "yes"]
+    sheet = pv.Plane(i_resolution=2, j_resolution=1).triangulate()
+    sheet.save("sheet.vtp")
+    assert run(["export", "--check", "sheet.vtp"]) == 0
+    table = dict(line.rsplit(maxsplit=1) for line in capsys.readouterr().out.splitlines()[1:])
+    assert {key.strip(): value for key, value in table.items()} == {
+        "closed": "no", "sound": "yes", "vertices": "6", "faces": "4", "connected parts": "1",
+        "edges of one face": "6", "flipped edges": "0", "closed parts that wind inward": "0",
+        "degenerate faces": "0", "copied faces": "0", "edges of more than two faces": "0",
+        "pinched vertices": "0", "area": "1", "volume": "nan",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["scene.json"], "missing -o FILE; or --check"),
+        (["scene.json", "-o", "a.fbx"], "expected an output file that ends in .glb"),
+        (["scene.json", "-o", "nowhere/a.ply"], "'nowhere' does not exist"),
+        (["nothing.json", "-o", "a.ply"], "found no file 'nothing.json'"),
+        (["--check", "nothing.ply"], "found none at 'nothing.ply'"),
+        (["scene.json", "-o", "a.stl", "--attribute", "owner"], "attributes: expected none for 'a.stl'"),
+        (["scene.json", "-o", "a.ply", "--samples", "99"], "--samples: expected"),
+    ],
+)
+def test_bad_input_is_one_line(saved: Path, capfd: Capture, words: list[str], says: str) -> None:
+    assert run(["export", *words]) == 2
+    (line,) = capfd.readouterr().err.strip().splitlines()
+    assert says in line
+    assert [path.name for path in saved.iterdir()] == ["scene.json"]

@@ -1,0 +1,143 @@
+"""Scenes to export, made at random, and their files read back by other libraries."""
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+import decals
+from blobtree import Point, Segment, Torus
+from decals import DecalMaterial, Decals, MeshObject, Scene, TreeObject
+from decals.surfaces.mesh_file import read_mesh_data
+from tests.decals.baking.glb import Array, gradient
+from tests.decals.meshes import box, icosphere
+
+NAMES = ("ball", "Kürbis 🎃", "a/b", "two words", "<&\"'>", "0", "ゆ")
+"""Names of objects: any text is one."""
+
+SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".vtp")
+
+
+def random_object(rng: np.random.Generator, name: str) -> MeshObject | TreeObject:
+    """A mesh or a tree of a size from 1e-3 to 1e3, somewhere near zero."""
+    scale = float(10 ** rng.uniform(-3, 3))
+    color = tuple(rng.uniform(0, 1, 3).tolist())
+    match rng.integers(0, 5):
+        case 0:
+            vertices, faces = icosphere(2)
+            return MeshObject(name, scale * vertices, faces, color)
+        case 1:
+            cube = box((1.2, 1.0, 0.7), (0.3, 0, 0))
+            return MeshObject(name, scale * cube.vertices, cube.faces, color)
+        case 2:  # an open sheet
+            grid: Any = pv.Plane(i_resolution=4, j_resolution=3).triangulate()
+            return MeshObject(name, scale * np.asarray(grid.points), grid.regular_faces, color)
+        case 3:
+            ball = Point((0, 0, 0), radius=scale, color=color)
+            return TreeObject(name, ball + Segment((0, 0, 0), (2 * scale, 0, 0), radius=0.4 * scale))
+        case _:
+            return TreeObject(name, Torus((0, 0, 0), (0, 0, 1), scale, radius=0.3 * scale, color=color))
+
+
+@cache
+def random_scene(seed: int) -> Scene:
+    """A scene of one to three objects under 0, 1 or some decals, with layers, and at times a material."""
+    rng = np.random.default_rng(seed)
+    names = rng.permutation(NAMES)[: rng.integers(1, 4)].tolist()
+    objects = [random_object(rng, name) for name in names]
+    scale = float(np.ptp(np.stack(objects[0].bounds), axis=0).max())
+    objects = [_scaled(item, scale, rng) for item in objects]
+    count = int(rng.choice([0, 1, 12]))
+    images: list[Any] = [gradient(seed), gradient(seed + 1)]
+    if rng.random() < 0.4:
+        images[1] = DecalMaterial("stone", images[1][..., :3] / 255, roughness=0.3, metallic=0.8)
+    points, normals = (
+        np.concatenate(parts)
+        for parts in zip(*(item.surface.sample(count, seed=seed) for item in objects), strict=True)
+    )
+    there = (
+        Decals(
+            points,
+            normals,
+            rng.normal(size=points.shape),
+            scale * rng.uniform(0.1, 0.3, len(points)),
+            images=rng.integers(-1, 2, len(points)),
+            tints=rng.uniform(0.2, 1, (len(points), 3)),
+            layers=rng.integers(0, 2, len(points)),
+        )
+        if count
+        else Decals.empty()
+    )
+    return Scene(objects=objects, camera=decals.Camera((0, 0, 5 * scale)), decals=there, images=images)
+
+
+def _scaled(item: MeshObject | TreeObject, scale: float, rng: np.random.Generator) -> MeshObject | TreeObject:
+    """The same with the size of the first object, moved away from it."""
+    own = float(np.ptp(np.stack(item.bounds), axis=0).max())
+    move = rng.uniform(-2, 2, 3) * scale
+    if isinstance(item, TreeObject):
+        return TreeObject(item.name, item.tree.scale(scale / own).translate(move))
+    return MeshObject(item.name, item.vertices * (scale / own) + move, item.faces, item.color)
+
+
+@dataclass(frozen=True, eq=False)
+class ReadBack:
+    """All objects of a file as one mesh: corners of faces, with their sRGB colours from 0 to 1 if known."""
+
+    triangles: Array
+    """float64[m, 3, 3]"""
+    colors: Array | None = None
+    """float64[m, 3, 3]"""
+
+    @property
+    def ordered(self) -> "ReadBack":
+        """The same with the faces in an order that depends on their corners alone, rounded to float32."""
+        rounded = self.triangles.astype(np.float32)
+        order = np.lexsort(rounded.reshape(len(rounded), -1).T)
+        return ReadBack(rounded[order], None if self.colors is None else self.colors[order])
+
+
+def read_by_trimesh(path: Path) -> ReadBack:
+    """The file as trimesh reads it, in the order of the file."""
+    import trimesh
+
+    loaded: Any = trimesh.load(path, process=False, maintain_order=True)
+    meshes = loaded.dump() if isinstance(loaded, trimesh.Scene) else [loaded]
+    corners = [np.asarray(mesh.vertices, float)[mesh.faces] for mesh in meshes]
+    colors = [_trimesh_colors(mesh) for mesh in meshes]
+    return ReadBack(
+        np.concatenate(corners),
+        None if colors[0] is None else np.concatenate([color for color in colors if color is not None]),
+    )
+
+
+def _trimesh_colors(mesh: Any) -> Array | None:
+    if mesh.visual.kind == "vertex":
+        colors: Array = np.asarray(mesh.visual.vertex_colors, float)[mesh.faces][..., :3] / 255
+        return colors
+    return None
+
+
+def read_by_pyvista(path: Path) -> ReadBack:
+    """The file as VTK reads it."""
+    data: Any = pv.read(path)
+    if isinstance(data, pv.MultiBlock):
+        data = data.combine().extract_surface(algorithm="dataset_surface")
+    faces = data.regular_faces
+    rgb = np.asarray(data.point_data["RGB"], float)[faces] / 255 if "RGB" in data.point_data else None
+    return ReadBack(np.asarray(data.points, float)[faces], rgb)
+
+
+def read_by_decals(path: Path) -> ReadBack:
+    """The file as this package reads it."""
+    data = read_mesh_data(path)
+    triangles = np.asarray(data.vertices, float)[data.faces]
+    if data.color is None:
+        return ReadBack(triangles)
+    numbers = np.repeat(np.arange(len(data.faces)), 3)
+    light = data.color.light_at(data.faces, numbers, np.tile(np.eye(3), (len(data.faces), 1)))
+    encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return ReadBack(triangles, encoded.reshape(-1, 3, 3))
