@@ -16,8 +16,6 @@ with the last message, the mode of the view, and the place in the program at whi
 import argparse
 import asyncio
 import contextlib
-import ctypes
-import gc
 import json
 import logging
 import math
@@ -27,7 +25,7 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -43,7 +41,7 @@ from tests.apps.sandbox.attacks import Server
 from tests.apps.sandbox.misuse import ask_as_stranger, random_steps
 from tests.apps.sandbox.test_connections import CALLS, SIZE, Browser, Connect, serve
 from tests.decals.editing.scenes import digest
-from tests.endurance import resident_megabytes
+from tests.endurance import growth, kept_megabytes
 
 ODD: list[Any] = [None, "", "x", -1, 0, 7, 0.5, 1e308, float("nan"), True, [], {}, [1, 2, 3], "0", "#00ff00"]
 ODD += [{"a": 1}, "\0", "x" * 3000, [[1, [2]]], -(2**40), b"\xff"]
@@ -295,9 +293,7 @@ class Messages:
                 await self._undo_all()
                 self.restored = self.restored and self._saved() == before
                 self._window.session.forget_history()
-                gc.collect()
-                ctypes.CDLL(None).malloc_trim(0)  # as the server does every 10 s
-                self._memory.append((number, resident_megabytes()))
+                self._memory.append((number, kept_megabytes()))  # the server gives memory back every 10 s
                 report({"sent": number, **self.figures()})
         for task in self._tasks:
             task.cancel()
@@ -513,23 +509,6 @@ class Messages:
         await asyncio.sleep(0)
         await self._browsers[number].close()
         task.cancel()
-
-
-def growth(memory: Sequence[tuple[int, float]], first_part: float) -> float:
-    """Return the growth per 1,000 messages after the first part of a run: the slope of the best line.
-
-    Parameters
-    ----------
-    memory
-        Numbers of sent messages and megabytes then.
-    first_part
-        Part of the run that is left out.
-    """
-    steady = [look for look in memory if look[0] >= first_part * memory[-1][0]]
-    if len(steady) < 2:
-        return 0.0
-    numbers, megabytes = np.transpose(steady)
-    return 1000.0 * float(np.polyfit(numbers, megabytes, 1)[0])
 
 
 def measure(

@@ -17,7 +17,7 @@ pytest.importorskip("trame_vtk")
 
 
 def test_growth_is_measured_after_the_first_part() -> None:
-    from tests.apps.sandbox.messages import growth
+    from tests.endurance import growth
 
     memory = [(1000, 50.0), (2000, 90.0), (3000, 100.0), (4000, 103.0), (5000, 106.0)]
     assert growth(memory, 0.5) == pytest.approx(3.0)
