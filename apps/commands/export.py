@@ -57,6 +57,7 @@ def export(
         list[Literal["owner", "uv", "field", "stretch"]] | None,
         Parameter(name=("--attribute", "--attributes"), negative=(), show_default=False),
     ] = None,
+    instances: Annotated[bool, Parameter(negative=())] = False,
     unit: Annotated[
         Literal["micron", "millimeter", "centimeter", "inch", "foot", "meter"] | None,
         Parameter(show_default=False),
@@ -80,13 +81,15 @@ def export(
     scene
         A saved scene. Models that render takes are written without decals. With --check alone, a mesh file.
     output
-        The file: glb, gltf, obj, ply, stl or vtp.
+        The file: glb, gltf, obj, ply, stl, vtp, 3mf or usdz.
     check
         Print whether the mesh of each object is closed and sound.
     colors
-        Where the colours are. Default: a texture in glb, gltf and obj files, else vertices.
+        Where the colours are. Default: a texture in glb, gltf, obj and usdz files, else vertices.
     attributes
         Value at the vertices besides the colours. Can be repeated.
+    instances
+        Write the decals as copies of a square, for programs with decals of their own (glb, gltf).
     unit
         Unit of the scene's lengths, for formats that have one.
     up
@@ -118,6 +121,7 @@ def export(
             load_model(scene, trust=trust, crease_angle=crease_angle),
             output,
             attributes=attributes or (),
+            instances=instances,
             size=size,
             samples=samples,
             resolution=resolution,

@@ -16,6 +16,7 @@ from blobtree.progress import Cancel, Progress, reporting
 from blobtree.validation import truth
 from decals.baking.atlas import Unwrapped, unwrap
 from decals.baking.formats import FORMATS
+from decals.baking.instances import Instances, decal_instances
 from decals.baking.materials import CHANNELS, Maps, material_bytes, split_maps, vertex_tangents
 from decals.baking.meshes import BakeMesh, bake_mesh
 from decals.baking.parts import METRES, UP, Baked, Part
@@ -32,7 +33,7 @@ from decals.scenes.objects import SceneObject
 from decals.scenes.origin import WORLD
 from decals.scenes.recipe import Recipe
 from decals.surfaces.convert import Model
-from decals.surfaces.mesh_check import MeshCheck, check_mesh
+from decals.surfaces.mesh_check import MeshCheck
 from decals.validation import checked_path, describe, one_of, optional_package, whole_number
 
 _logger = logging.getLogger(__name__)
@@ -53,6 +54,7 @@ def export(
     *,
     colors: str | None = None,
     attributes: str | Iterable[str] = (),
+    instances: bool = False,
     unit: str | None = None,
     up: str | None = None,
     size: int = 2048,
@@ -76,15 +78,18 @@ def export(
         A scene; or a model as `decals.cover` takes it, a list of such models, or the path of a model or a
         scene.
     path : str or path
-        The file, which ends in glb, gltf, obj, ply, stl or vtp; its folder must exist. Textures of OBJ and
-        PLY files lie beside it, under its name.
+        The file, which ends in glb, gltf, obj, ply, stl, vtp, 3mf or usdz; its folder must exist. Textures of
+        OBJ and PLY files lie beside it, under its name.
     colors : str, optional
         ``"texture"`` (needs the extra ``bake``), ``"vertices"`` or ``"none"``. Default: a texture in GLB,
-        glTF and OBJ files, else colours at the vertices, where the format has them.
+        glTF, OBJ and USDZ files, else colours at the vertices, where the format has them.
     attributes : str or sequence of str
         Values at the vertices besides the colours: ``"owner"``, ``"uv"`` and ``"field"`` as `decals.evaluate`
         returns them, and ``"stretch"``, the ratio of the largest to the smallest stretch of the image. They
         are 0 outside of decals, but for the owner, -1.
+    instances : bool
+        Leave the decals out of the colours, and write them as copies of a square with their images, for
+        programs with decals of their own (EXT_mesh_gpu_instancing). For GLB and glTF files.
     unit : str, optional
         Unit of the scene's lengths: ``"millimeter"``, ``"centimeter"``, ``"meter"``, ``"inch"``, ``"foot"``
         or ``"micron"``. Formats in metres are scaled by it, others keep the numbers.
@@ -137,7 +142,9 @@ def export(
     """
     path = checked_path(path, tuple(FORMATS))
     rules = FORMATS[path.suffix.lower()]
-    place = _color_place(colors, rules.colors, path)
+    if truth("instances", instances, InvalidScene) and not rules.instances:
+        raise InvalidScene(f"instances: expected a .glb or .gltf file, got {str(path)!r}; choose one of them")
+    place = _color_place(VERTICES if instances and colors is None else colors, rules.colors, path)
     names = _attribute_names(attributes, rules.attributes, path)
     for name, value, choices in (("unit", unit, tuple(METRES)), ("up", up, UP)):
         if value is not None:
@@ -157,6 +164,7 @@ def export(
             place,
             report,
             attributes=names,
+            instances=instances,
             size=size,
             samples=samples,
             resolution=resolution,
@@ -164,7 +172,7 @@ def export(
             **modes,
         )
         report("writing the file", 0.0)
-        checks = tuple(check_mesh(part.vertices, part.faces, part.name) for part in baked.parts)
+        checks = tuple(part.check for part in baked.parts)
         content = rules.write(replace(baked, unit=unit, up=up), path.stem)
         report("writing the file", 0.5)
         write_together(
@@ -184,6 +192,7 @@ def bake_parts(
     report: Progress,
     *,
     attributes: Collection[str] = (),
+    instances: bool = False,
     size: int = 2048,
     samples: int = 2,
     resolution: int | None = None,
@@ -200,7 +209,7 @@ def bake_parts(
         Place of the colours: `TEXTURE`, `VERTICES` or `NO_COLORS`.
     report
         Called with the stage and the fraction done.
-    attributes, size, samples, resolution, creases, **modes
+    attributes, instances, size, samples, resolution, creases, **modes
         See `export`.
 
     Raises
@@ -211,10 +220,15 @@ def bake_parts(
     source = _Source.of(scene)
     if not source.objects:
         raise InvalidScene("expected at least one object to export, got none; add a mesh or a BlobTree")
+    copies: list[Instances] = []
+    if instances:
+        rows = source.decals.decals if isinstance(source.decals, DecalEditor) else source.decals
+        copies = decal_instances(rows, source.images, [getattr(item, "name", "") for item in source.objects])
+        source = replace(source, decals=Decals.empty())
     work = _Work(source, source.drawing.overridden(**modes), resolution, creases, report)
     parts, maps = work.textured(size, samples) if place == TEXTURE else (work.plain(place), None)
     parts = [work.with_attributes(number, part, attributes) for number, part in enumerate(parts)]
-    return Baked(parts, maps, source.origin, recipe=source.recipe)
+    return Baked(parts, maps, source.origin, recipe=source.recipe, instances=copies)
 
 
 def _color_place(colors: object, held: tuple[str, ...], path: Path) -> str:

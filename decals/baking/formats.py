@@ -7,6 +7,8 @@ from decals.baking.glb import glb_bytes, gltf_bytes
 from decals.baking.obj import obj_files
 from decals.baking.parts import Baked
 from decals.baking.plain_files import ply_files, stl_bytes, vtp_file
+from decals.baking.threemf import threemf_bytes
+from decals.baking.usd import usdz_bytes
 
 Files = Mapping[str, bytes]
 """Contents by names; the main file has the name ""."""
@@ -24,6 +26,8 @@ class Format:
         Places of colours, the usual one first.
     attributes : bool
         True if vertices may have values besides their colours.
+    instances : bool
+        True if decals may be copies of a square.
     packages : tuple of (str, str)
         Packages that the writer needs, and the extras that install them.
     """
@@ -31,6 +35,7 @@ class Format:
     write: Callable[[Baked, str], Files]
     colors: tuple[str, ...] = ()
     attributes: bool = False
+    instances: bool = False
     packages: tuple[tuple[str, str], ...] = ()
 
 
@@ -42,11 +47,13 @@ def _alone(encode: Callable[[Baked], bytes]) -> Callable[[Baked, str], Files]:
 _TRIMESH = (("trimesh", "bake"),)
 
 FORMATS: dict[str, Format] = {
-    ".glb": Format(_alone(glb_bytes), ("texture", "vertices"), True, _TRIMESH),
-    ".gltf": Format(_alone(gltf_bytes), ("texture", "vertices"), True, _TRIMESH),
+    ".glb": Format(_alone(glb_bytes), ("texture", "vertices"), True, True, _TRIMESH),
+    ".gltf": Format(_alone(gltf_bytes), ("texture", "vertices"), True, True, _TRIMESH),
     ".obj": Format(obj_files, ("texture", "vertices")),
     ".ply": Format(ply_files, ("vertices", "texture"), True),
     ".stl": Format(_alone(stl_bytes)),
+    ".3mf": Format(_alone(threemf_bytes), ("vertices", "texture")),
+    ".usdz": Format(_alone(usdz_bytes), ("texture", "vertices"), True, packages=(("pxr", "usd"),)),
     ".vtp": Format(_alone(vtp_file), ("vertices",), True),
 }
 """Formats by suffix."""

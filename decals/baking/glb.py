@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from decals.baking.instances import SQUARE, SQUARE_FACES, add_instances
 from decals.baking.materials import ROUGHNESS, Maps
 from decals.baking.parts import Baked
 from decals.validation import optional_package
@@ -33,7 +34,7 @@ def glb_bytes(baked: Baked) -> bytes:
         **_textures(baked.maps),
     )
     base = "scene"
-    while any(part.name == base for part in baked.parts):
+    while base in {*(part.name for part in baked.parts), *(group.name for group in baked.instances)}:
         base = f"{base}-"
     scene = trimesh.Scene(base_frame=base)
     transform = baked.placement("y", metres=True)
@@ -51,8 +52,25 @@ def glb_bytes(baked: Baked) -> bytes:
         for name, values in part.attributes.items():  # no attribute may have integers of 32 bits
             mesh.vertex_attributes[PREFIX + name.upper()] = values.astype(np.float32)
         scene.add_geometry(mesh, node_name=part.name, geom_name=part.name, transform=transform)
+    for group in baked.instances:
+        picture = Image.fromarray(group.picture)
+        paint = {"metallicFactor": 0.0, "roughnessFactor": ROUGHNESS, "alphaMode": "BLEND"}
+        decal = trimesh.visual.material.PBRMaterial(
+            name=group.name, doubleSided=True, baseColorTexture=picture, **paint
+        )
+        square = trimesh.Trimesh(
+            vertices=SQUARE,
+            faces=SQUARE_FACES,
+            vertex_normals=np.tile([0.0, 0.0, 1.0], (len(SQUARE), 1)),
+            visual=trimesh.visual.TextureVisuals(uv=(SQUARE[:, :2] + 1.0) / 2.0, material=decal),
+            process=False,
+        )
+        scene.add_geometry(square, node_name=group.name, geom_name=group.name, transform=transform)
     content: bytes = trimesh.exchange.gltf.export_glb(
-        scene, include_normals=True, tree_postprocessor=partial(_finish_tree, baked=baked)
+        scene,
+        include_normals=True,
+        tree_postprocessor=partial(_finish_tree, baked=baked),
+        buffer_postprocessor=partial(add_instances, instances=baked.instances),
     )
     return content
 
@@ -62,13 +80,9 @@ def gltf_bytes(baked: Baked) -> bytes:
     glb = glb_bytes(baked)
     length = int.from_bytes(glb[12:16], "little")
     tree, buffer = json.loads(glb[20 : 20 + length]), glb[28 + length :]
-    tree["buffers"][0]["uri"] = data_uri(buffer)
+    text = base64.b64encode(buffer).decode()
+    tree["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{text}"
     return json.dumps(tree, ensure_ascii=False, separators=(",", ":")).encode()
-
-
-def data_uri(content: bytes) -> str:
-    """Return the URI that holds bytes itself."""
-    return f"data:application/octet-stream;base64,{base64.b64encode(content).decode()}"
 
 
 def _textures(maps: Maps | None) -> dict[str, Any]:

@@ -8,10 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, Float64Array, Int32Array, UInt8Array
+from blobtree.lazy import Lazy
+from decals.baking.instances import Instances
 from decals.baking.materials import Maps
 from decals.images.texels import encode_srgb
 from decals.scenes.origin import WORLD, Origin
 from decals.scenes.recipe import Recipe
+from decals.surfaces.mesh_check import MeshCheck, check_mesh
 
 METRES = {
     "micron": 1e-6,
@@ -56,6 +59,11 @@ class Part:
     tangents: Float32Array | None = None
     attributes: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
+    @Lazy
+    def check(self) -> MeshCheck:
+        """Return whether the mesh is closed and sound."""
+        return check_mesh(self.vertices, self.faces, self.name)
+
     @property
     def color_bytes(self) -> UInt8Array | None:
         """Colours as sRGB bytes, ``uint8[n, 3]``; rounded from float32, as those of pictures."""
@@ -83,6 +91,8 @@ class Baked:
         The axis that points upward, "y" or "z".
     recipe : Recipe, optional
         How the decals were made.
+    instances : sequence of Instances
+        Decals that are copies of a square.
     """
 
     parts: Sequence[Part]
@@ -91,6 +101,7 @@ class Baked:
     unit: str | None = None
     up: str | None = None
     recipe: Recipe | None = None
+    instances: Sequence[Instances] = ()
 
     def placement(self, up: str, *, metres: bool) -> Float64Array:
         """Return the map of vertices to the coordinates of a format, ``float64[4, 4]``.

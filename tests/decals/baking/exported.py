@@ -1,7 +1,9 @@
 """Scenes to export, made at random, and their files read back by other libraries."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +13,13 @@ import pyvista as pv
 import decals
 from blobtree import Point, Segment, Torus
 from decals import DecalMaterial, Decals, MeshObject, Scene, TreeObject
+from decals.images.texels import encode_srgb
 from decals.surfaces.mesh_file import read_mesh_data
 from tests.decals.baking.glb import Array, gradient
 from tests.decals.meshes import box, icosphere
 
 NAMES = ("ball", "Kürbis 🎃", "a/b", "two words", "<&\"'>", "0", "ゆ")
 """Names of objects: any text is one."""
-
-SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".vtp")
 
 
 def random_object(rng: np.random.Generator, name: str) -> MeshObject | TreeObject:
@@ -131,6 +132,61 @@ def read_by_pyvista(path: Path) -> ReadBack:
     return ReadBack(np.asarray(data.points, float)[faces], rgb)
 
 
+def read_by_lib3mf(path: Path) -> ReadBack:
+    """A 3MF file as the library of the 3MF Consortium reads it, which names every fault."""
+    lib3mf: Any = __import__("lib3mf")
+    wrapper = lib3mf.get_wrapper()
+    model = wrapper.CreateModel()
+    reader = model.QueryReader("3mf")
+    reader.SetStrictModeActive(True)
+    reader.ReadFromBuffer(path.read_bytes())
+    assert reader.GetWarningCount() == 0
+    triangles, colors = [], []
+    items = model.GetBuildItems()
+    while items.MoveNext():
+        mesh = items.GetCurrent().GetObjectResource()
+        vertices = np.array([list(vertex.Coordinates) for vertex in mesh.GetVertices()])
+        faces = np.array([list(triangle.Indices) for triangle in mesh.GetTriangleIndices()])
+        triangles.append(vertices[faces])
+        rows = mesh.GetAllTriangleProperties()
+        group = model.GetColorGroupByID(rows[0].ResourceID)
+        shade = {key: group.GetColor(key) for row in rows for key in row.PropertyIDs}
+        corners = [[shade[key] for key in row.PropertyIDs] for row in rows]
+        colors.append(np.array([[[c.Red, c.Green, c.Blue] for c in row] for row in corners]) / 255)
+    return ReadBack(np.concatenate(triangles), np.concatenate(colors))
+
+
+def read_by_openusd(path: Path) -> ReadBack:
+    """A USDZ file as OpenUSD reads it."""
+    usd, geometry = import_module("pxr.Usd"), import_module("pxr.UsdGeom")
+    stage = usd.Stage.Open(str(path))
+    triangles, colors = [], []
+    for prim in stage.Traverse():
+        if prim.IsA(geometry.Mesh):
+            mesh = geometry.Mesh(prim)
+            faces = np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
+            triangles.append(np.array(mesh.GetPointsAttr().Get(), float)[faces])
+            shades = geometry.PrimvarsAPI(prim).GetPrimvar("displayColor").Get()
+            colors.append(np.asarray(encode_srgb(np.array(shades, float)))[faces])
+    return ReadBack(np.concatenate(triangles), np.concatenate(colors))
+
+
+FORMATS = {
+    ".glb": ("decals", "trimesh", "pyvista"),
+    ".gltf": ("decals", "trimesh", "pyvista"),
+    ".obj": ("decals", "trimesh", "pyvista"),
+    ".ply": ("decals", "trimesh", "pyvista"),
+    ".stl": ("decals", "trimesh", "pyvista"),
+    ".vtp": ("decals", "pyvista"),
+    ".3mf": ("decals", "lib3mf"),
+    ".usdz": ("pxr",),
+}
+"""The readers of each format."""
+
+WITHOUT_COLORS = {("trimesh", ".glb"), ("trimesh", ".gltf"), ("trimesh", ".obj")}
+"""Readers that do not return the colours of vertices as they are in a format."""
+
+
 def read_by_decals(path: Path) -> ReadBack:
     """The file as this package reads it."""
     data = read_mesh_data(path)
@@ -139,5 +195,14 @@ def read_by_decals(path: Path) -> ReadBack:
         return ReadBack(triangles)
     numbers = np.repeat(np.arange(len(data.faces)), 3)
     light = data.color.light_at(data.faces, numbers, np.tile(np.eye(3), (len(data.faces), 1)))
-    encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    return ReadBack(triangles, encoded.reshape(-1, 3, 3))
+    return ReadBack(triangles, np.asarray(encode_srgb(light)).reshape(-1, 3, 3))
+
+
+READERS: dict[str, Callable[[Path], ReadBack]] = {
+    "decals": read_by_decals,
+    "trimesh": read_by_trimesh,
+    "pyvista": read_by_pyvista,
+    "lib3mf": read_by_lib3mf,
+    "pxr": read_by_openusd,
+}
+"""Readers of files by the packages that they need."""
