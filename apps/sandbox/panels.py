@@ -383,12 +383,20 @@ def _build_light(sandbox: Sandbox) -> None:
 
 
 def build_scatter(sandbox: Sandbox) -> None:
-    """Build the button that covers an object with decals."""
-    with html.Div(v_if="outline.length > 1", classes="d-flex align-center ga-2 px-3 pt-3"):
+    """Build the button that covers an object with decals, and the one that fills what a pull has opened."""
+    with html.Div(v_if="outline.length > 1", classes="d-flex flex-wrap align-center ga-2 px-3 pt-3"):
         vuetify3.VBtn(
             "{{ decals ? 'Scatter again' : 'Scatter decals' }}",
             variant="tonal",
             click=sandbox.scatter,
+        )
+        vuetify3.VBtn(
+            "Fill {{ bare }} bare {{ bare === 1 ? 'place' : 'places' }}",
+            v_if="bare",
+            color="primary",
+            variant="tonal",
+            title=SUMMARIES["fill"],
+            click=(sandbox.perform, "['fill']"),
         )
 
 

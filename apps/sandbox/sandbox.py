@@ -183,6 +183,7 @@ class Sandbox:
             "image": decal_panel.image_values(document, self._shown_image),
             "pick": self._pick(),
             "decals": len(document.decals),
+            "bare": window.actions.bare.places if window.actions.bare.offer else 0,
         }
 
     def _selected(self) -> str:

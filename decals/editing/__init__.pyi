@@ -18,6 +18,7 @@ from .commands import (
     TurnDecals,
 )
 from .document import Document
+from .filling import FillBarePlaces
 from .pointer_tools import PointerTools
 from .queries import first_hit, nearest_points, outline, pick
 from .recovery import recovery_path
@@ -57,6 +58,7 @@ __all__ = [
     "DuplicateDecals",
     "DuplicatePrimitive",
     "EditSession",
+    "FillBarePlaces",
     "FlagNodes",
     "GroupOperands",
     "HideDecals",

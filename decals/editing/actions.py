@@ -9,6 +9,7 @@ from os import PathLike
 
 from decals.editing.action_state import ActionState, Cursor
 from decals.editing.background import are_many
+from decals.editing.bare_watch import BareWatch
 from decals.editing.brush_actions import BrushActions
 from decals.editing.brushes import Brush
 from decals.editing.commands import DeleteDecals, DuplicateDecals
@@ -45,6 +46,8 @@ class Actions:
     ----------
     state : ActionState
         Selection, message and background jobs.
+    bare : BareWatch
+        Counts the bare places that edits open.
     decals : DecalActions
         Actions on decals.
     trees : TreeActions
@@ -89,7 +92,8 @@ class Actions:
         threaded: bool = False,
     ) -> None:
         self.state = ActionState(session, threaded=threaded)
-        self.decals = DecalActions(self.state)
+        self.bare = BareWatch(session)
+        self.decals = DecalActions(self.state, self.bare)
         self.trees = TreeActions(self.state)
         self.files = FileActions(self.state, path)
         self.visibility = VisibilityActions(self.state)

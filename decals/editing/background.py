@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from blobtree.device import core_left_free
 from blobtree.progress import Cancel, Progress, reporting
 from decals.editing.commands import DecalCommand
+from decals.editing.filling import FillBarePlaces
 from decals.editing.scatter_commands import AddObject, RelaxDecals, RemoveObject, ReplaceDecals, ScatterDecals
 from decals.editing.session import Command, EditSession, SaveJob
 from decals.editing.tree_commands import PrimitiveCommand
@@ -233,7 +234,15 @@ SHORT_SWITCH_INTERVAL = ShortSwitchInterval()
 MAX_IMMEDIATE_DECALS = 500
 """Commands for more decals than this run in the background."""
 
-LONG_COMMANDS = (AddObject, PrimitiveCommand, RelaxDecals, RemoveObject, ReplaceDecals, ScatterDecals)
+LONG_COMMANDS = (
+    AddObject,
+    FillBarePlaces,
+    PrimitiveCommand,
+    RelaxDecals,
+    RemoveObject,
+    ReplaceDecals,
+    ScatterDecals,
+)
 """Commands that query surfaces at many points, or build surfaces."""
 
 CLOSE_TIMEOUT = 5.0

@@ -8,13 +8,15 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Int32Array
 from blobtree.progress import Progress
-from decals.editing.action_state import Cursor, WindowActions, require_pick
+from decals.editing.action_state import ActionState, Cursor, WindowActions, require_pick
+from decals.editing.bare_watch import BareWatch
 from decals.editing.commands import AddDecals, MapValues, OrderDecals, ScaleDecals, TurnDecals
 from decals.editing.document import Document
+from decals.editing.filling import FillBarePlaces
 from decals.editing.key_bindings import Group
 from decals.editing.queries import mean_normal, nearest_points
 from decals.editing.scatter_commands import RelaxDecals, ScatterDecals
-from decals.editing.session import Command
+from decals.editing.session import Command, EditSession
 from decals.model import LAYER_LIMIT, NO_IMAGE, Decals, Interaction
 from decals.scattering.orientation import tangents
 from decals.scenes.objects import bounds_of
@@ -64,9 +66,21 @@ def new_decal(document: Document, position: Float32Array, normal: Float32Array, 
 
 
 class DecalActions(WindowActions):
-    """Actions on the selected decals, and on decals under the cursor."""
+    """Actions on the selected decals, and on decals under the cursor.
+
+    Parameters
+    ----------
+    state
+        State of the window.
+    bare
+        Counts the bare places that edits open.
+    """
 
     _scatter_count = 0
+
+    def __init__(self, state: ActionState, bare: BareWatch) -> None:
+        super().__init__(state)
+        self._bare = bare
 
     def _map(self, label: str, name: str, function: Callable[[Decals], ArrayLike]) -> None:
         """Set a value of the selected decals to a function of them."""
@@ -192,6 +206,17 @@ class DecalActions(WindowActions):
     def relax(self, cursor: Cursor) -> None:
         """Even out the decals around the cursor."""
         self._state.run(RelaxDecals(require_pick(cursor).position))
+
+    @Group.MANY.action("fill", "Shift+g", summary="fill bare places: those of the last pull, else all here")
+    def fill(self, cursor: Cursor) -> None:
+        """Fill the places that the last edit of a shape opened, else all of the object under the cursor."""
+        command = self._bare.offer or FillBarePlaces((require_pick(cursor).object,))
+
+        def step(session: EditSession) -> str:
+            count = len(session.do(command).after.numbers)
+            return f"{count} new decals fill the bare places" if count else "no place is bare"
+
+        self._state.background.edit(command.label, step)
 
     @Group.MANY.action("scatter", "g", summary="scatter new decals over the object under the cursor")
     def scatter(self, cursor: Cursor) -> None:

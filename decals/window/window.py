@@ -52,6 +52,9 @@ from decals.window.overlay import Overlay, PrimitiveHandle
 HELP_HINT = "h: help"
 """First part of the status line, unless a prompt is open."""
 
+BARE_HINT = "Shift+G: fill bare places"
+"""Part of the status line after an edit that opened some; their number follows."""
+
 EMPTY_HINT = f"{HELP_HINT}   n: add a ball   l: add a limb"
 """The same for a scene without objects."""
 
@@ -284,7 +287,8 @@ class EditWindow:
         state = self.actions.state
         hint = HELP_HINT if self.document.objects else EMPTY_HINT
         progress = self.warmup.status, self._work, self.background.progress
-        parts = (state.prompt.text or hint, *progress, state.message)
+        bare = f"{BARE_HINT}: {self.actions.bare.places}" if self.actions.bare.offer else ""
+        parts = (state.prompt.text or hint, bare, *progress, state.message)
         return "   ".join(filter(None, parts))
 
     def _show_work(self, stage: str, fraction: float) -> None:
@@ -314,6 +318,8 @@ class EditWindow:
         else:
             self.frames.refine_when_due()
         self.actions.files.update(dragging=dragging)
+        if self.actions.bare.update(resting=not dragging and not self.background.busy_editing):
+            self._show_status()
 
     def in_other_subplot(self, x: int, y: int) -> bool:
         """Return True if a pixel is in a subplot of the same plotter that another window edits."""
@@ -392,6 +398,7 @@ class EditWindow:
         self._closed = True
         self._ticker.stop()
         try:
+            self.actions.bare.close()
             self.background.close()
             self.actions.files.finish()
         finally:

@@ -588,9 +588,10 @@ async def fields() -> None:
     """What is typed in a field is taken or dropped, and never becomes another edit."""
     plotter = pv.Plotter(off_screen=True)
     server = get_server("fields", client_type="vue3")
-    window = EditWindow(scene(), path="fields.json", plotter=plotter)
+    folder = Path(tempfile.mkdtemp())  # gets the recovery file
+    window = EditWindow(scene(), path=folder / "fields.json", plotter=plotter)
     window.show()
-    sandbox_page = SandboxPage(server, window, folder=Path(tempfile.mkdtemp()))
+    sandbox_page = SandboxPage(server, window, folder=folder)
     keys = window.actions.state
     async with served(server, size=(1280, 800), guard=sandbox_page.guard) as browser:
         assert await browser.title() == "fields.json \N{EN DASH} sandbox"
