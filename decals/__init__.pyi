@@ -1,4 +1,17 @@
-from . import editing, errors, field, images, index, rendering, scattering, scenes, surfaces, vtk, window
+from . import (
+    editing,
+    errors,
+    field,
+    hosts,
+    images,
+    index,
+    rendering,
+    scattering,
+    scenes,
+    surfaces,
+    vtk,
+    window,
+)
 from ._version import __version__
 from .baking.bake import bake
 from .baking.displace import displace
@@ -7,6 +20,7 @@ from .errors import ImplicitDecalsError
 from .field.evaluate import evaluate
 from .field.law import ContactLaw, define_contact
 from .field.mapping import ImageMapping
+from .hosts.shader import shader
 from .images import load_image
 from .model import NO_IMAGE, Decals, Interaction
 from .record import Contact
@@ -54,6 +68,7 @@ __all__ = [
     "evaluate",
     "export",
     "field",
+    "hosts",
     "images",
     "index",
     "load_image",
@@ -67,6 +82,7 @@ __all__ = [
     "scatter",
     "scattering",
     "scenes",
+    "shader",
     "show",
     "skin",
     "surfaces",

@@ -99,6 +99,17 @@ def object_mask(item: object, table: Sequence[str]) -> int:
     return surface_mask(labels_of(item), table, named_only=takes_named_only(item))
 
 
+def mask_on(
+    on: object | str | Iterable[str] | None, table: Sequence[str], error: type[ImplicitDecalsError]
+) -> int:
+    """Return the mask of an object, or of surface with labels; None is surface that all decals lie on."""
+    if on is None:
+        return EVERYTHING
+    return (
+        object_mask(on, table) if hasattr(on, "name") else surface_mask(label_names("on", on, error), table)
+    )
+
+
 def takes_named_only(item: object) -> bool:
     """Return True for an object on which only decals lie that name it as their receiver."""
     return bool(getattr(item, "named_only", False))

@@ -13,6 +13,7 @@ PACKAGES = {
     "decals.index": "The index of decals",
     "decals.scenes": "Scenes and cameras",
     "decals.rendering": "Rendering in steps",
+    "decals.hosts": "Decals in other programs",
     "decals.editing": "Editing without a window",
     "decals.window": "Editing windows",
     "decals.vtk": "Decals in pyvista and VTK",

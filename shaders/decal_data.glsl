@@ -1,4 +1,5 @@
 // Records, index and images of decals: decals.rendering.decal_data.DecalData.
+
 uniform sampler2D decal_records;  // decal i: 4i (position, s), 4i + 1 (normal, rank), (u, image), (tint, opacity)
 uniform sampler2D index_levels;
 uniform isampler2D index_table;
@@ -22,5 +23,5 @@ vec4 fetch_index_levels(ivec2 texel, int level) { return stored_levels[texel.y <
 ivec4 fetch_index_table(ivec2 texel, int level) { return stored_table[texel.y << 12 | texel.x]; }
 ivec4 fetch_index_ids(ivec2 texel, int level) { return ivec4(stored_ids[texel.y << 12 | texel.x]); }
 #else
-#define fetch_decal_records(texel, level) texelFetch(decal_records, texel, level)
+vec4 fetch_decal_records(ivec2 texel, int level) { return texelFetch(decal_records, texel, level); }
 #endif

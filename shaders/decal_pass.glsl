@@ -6,7 +6,7 @@
 // offset.glsl has moved.
 // FILTERED: average the decals over each pixel; the slot holds filtered_decals.glsl. With MARKED, pixels may be left
 // `pixel_divided`: they must be drawn again without it. With SHARED, invocations of a group draw their pixels together.
-//@ include camera.glsl
+//@ include footprint.glsl
 //@ include pixel.glsl
 uniform sampler2D g_position;
 uniform sampler2D g_normal;
@@ -117,8 +117,15 @@ Pixel pixel_at(ivec2 texel) {
             }
         }
 #endif
-        DecalHit hit = decal_at(position, normal);  // before the ray, which would take registers meanwhile
-        vec4 color = decal_color(hit, position, normal, ray_direction(vec2(texel) + 0.5));
+        DecalHit hit = decal_at(position, normal);  // before the steps, which would take registers meanwhile
+        vec3 ray = ray_direction(vec2(texel) + 0.5);
+        vec3 right = surface_step(position, normal, ray, ray_right.xyz);
+        vec3 up = surface_step(position, normal, ray, ray_up.xyz);
+#ifdef POSED
+        right = is_posed ? rest_right : right;
+        up = is_posed ? rest_up : up;
+#endif
+        vec4 color = color_from(hit, position, normal, right, up);
         buffers = vec4(float(hit.owner), hit.field, hit.uv);
 #endif
 #endif

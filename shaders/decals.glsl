@@ -1,6 +1,6 @@
 // Owner, image coordinates and colour of decals at a surface point. All formulas and loops are those of
 // decals/field/ownership.py; GLSL adds the image look-up.
-//@ include footprint.glsl
+
 //@ include decal_data.glsl
 
 #ifdef POSED
@@ -111,53 +111,44 @@ void clear_materials() {
 #endif
 
 // Premultiplied linear colour of one decal. The derivatives are those of its undeformed image, rolled out, so no
-// edge between decals, or of an object, shows in them.
-vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
+// edge between decals, or of an object, shows in them: `right` and `up` are the sides of the pixel on the surface.
+vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 right, vec3 up) {
     if (!in_image(hit.uv)) {
         return vec4(0.0);
     }
     vec4 u = decal_texel(4 * hit.owner + 2);
     vec4 tint = decal_texel(4 * hit.owner + 3);
+    float shown = tint.w * fade_at(q, n, hit.owner);
     vec4 color = vec4(1.0);
     if (u.w >= 0.0) {
         float s = decal_texel(4 * hit.owner).w;
         vec3 n_p = decal_texel(4 * hit.owner + 1).xyz;
         float scale = 0.5 / (RIM * s);
-        vec3 right = surface_step(q, n, ray, ray_right.xyz);
-        vec3 up = surface_step(q, n, ray, ray_up.xyz);
-#ifdef POSED
-        if (is_posed) {
-            right = rest_right;
-            up = rest_up;
-        }
-#endif
         vec2 dx = scale * tangent_coordinates(unroll_step(right, n_p, n), n_p, u.xyz);
         vec2 dy = scale * tangent_coordinates(unroll_step(up, n_p, n), n_p, u.xyz);
         color = textureGrad(decal_images, vec3(hit.uv, u.w), dx, dy);
 #ifdef MATERIALS
-        float shown = tint.w * (decal_limited ? fade_at(q, n, hit.owner) : 1.0);
         add_material(vec3(hit.uv, u.w), dx, dy, color.a, shown, n, n_p, u.xyz);
 #endif
     }
-    float fade = decal_limited ? fade_at(q, n, hit.owner) : 1.0;
-    return fade * tint.w * color * vec4(tint.rgb, 1.0);
+    return shown * color * vec4(tint.rgb, 1.0);
 }
 
 // Premultiplied linear colour of all decals at a point over each other, from the topmost (`hit`) down; no cap.
-vec4 decal_color(DecalHit hit, vec3 q, vec3 n, vec3 ray) {
+vec4 color_from(DecalHit hit, vec3 q, vec3 n, vec3 right, vec3 up) {
 #ifdef MATERIALS
     material_left = 1.0;
     clear_materials();
 #endif
     vec4 color = vec4(0.0);
     if (!decal_layered) {
-        return hit.owner < 0 ? color : decal_paint(hit, q, n, ray);
+        return hit.owner < 0 ? color : decal_paint(hit, q, n, right, up);
     }
     while (hit.owner >= 0 && color.a < OPAQUE) {
 #ifdef MATERIALS
         material_left = 1.0 - color.a;
 #endif
-        color += (1.0 - color.a) * decal_paint(hit, q, n, ray);
+        color += (1.0 - color.a) * decal_paint(hit, q, n, right, up);
         int below = owner_below(q, n, rank_of(hit.owner, decal_records), next_number_below(hit.owner, decal_records),
             decal_contact);
         hit = decal_hit(below, q, n);

@@ -119,7 +119,7 @@ Maps material_sums() {
 // Premultiplied linear colour of a decal around a place, of which a part of the pixel is seen. Where the image has more than one texel a pixel, several
 // look-ups along each side, more along the longer one, form a box.
 vec4 image_average(int decal, Place place, vec3 q, vec3 n, float part) {
-    float fade = decal_limited ? fade_at(q, n, decal) : 1.0;
+    float fade = fade_at(q, n, decal);
     vec4 u = decal_texel(4 * decal + 2);
     vec4 tint = decal_texel(4 * decal + 3);
     vec4 color = vec4(1.0);

@@ -1,4 +1,5 @@
 // The ray through a pixel against a BlobTree whose surface heights move; body of offset.frag and offset.comp.
+//@ include footprint.glsl
 //@ include offset_foot.glsl
 //@ include octahedron.glsl
 uniform sampler2D starts;  // see offset_start.glsl

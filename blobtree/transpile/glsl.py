@@ -95,7 +95,12 @@ def uniforms_of(hint: object) -> Mapping[str, Expression] | None:
         return None
 
 
-def translate_library(functions: Iterable[Any], *, provided: Iterable[Any] = ()) -> str:
+def translate_library(
+    functions: Iterable[Any],
+    *,
+    provided: Iterable[Any] = (),
+    constants: Mapping[str, bool | int] | None = None,
+) -> str:
     """Return GLSL of `functions` and of all their callees, each once, callees first.
 
     Parameters
@@ -104,6 +109,9 @@ def translate_library(functions: Iterable[Any], *, provided: Iterable[Any] = ())
         Typed functions (`wp.Function`).
     provided
         Functions that the shader defines by hand, under the same names. The library only declares them.
+    constants
+        Values of uniforms and of parameters, by their names, that are always the same. What they exclude is
+        left out.
 
     Raises
     ------
@@ -113,7 +121,7 @@ def translate_library(functions: Iterable[Any], *, provided: Iterable[Any] = ())
     declarations = {function.key: _Translator(function).signature() + ";" for function in provided}
     translated: dict[str, str] = {}
     for function in functions:
-        _collect(function, translated, frozenset(declarations))
+        _collect(function, translated, frozenset(declarations), constants or {})
     return HELPERS + "\n".join([*declarations.values(), "", *translated.values()])
 
 
@@ -142,13 +150,18 @@ def translate_choice(chooser: Any, choices: Mapping[int, Any]) -> str:
     return "\n".join([signature + " {", *tests, f"    {form.format(calls[last])}", "}", ""])
 
 
-def _collect(function: wp.Function, translated: dict[str, str], provided: frozenset[str]) -> None:
+def _collect(
+    function: wp.Function,
+    translated: dict[str, str],
+    provided: frozenset[str],
+    constants: Mapping[str, bool | int],
+) -> None:
     if function.key in translated or function.key in provided:
         return
-    translator = _Translator(function)
+    translator = _Translator(function, constants)
     source = translator.source()
     for callee in translator.callees:
-        _collect(callee, translated, provided)
+        _collect(callee, translated, provided, constants)
     translated[function.key] = source
 
 
@@ -157,6 +170,7 @@ class _Translator:
     """Translation of one function, with the types of its variables and the functions that it calls."""
 
     function: wp.Function
+    constants: Mapping[str, bool | int] = field(default_factory=dict)
     types: dict[str, str] = field(default_factory=dict)
     structs: dict[str, Any] = field(default_factory=dict)
     returned: tuple[str, ...] = ()
@@ -204,7 +218,7 @@ class _Translator:
         """Return the definition."""
         signature = self.signature()
         parameters = set(self.types)
-        body = [line for statement in self.definition.body for line in self.statement(statement)]
+        body = list(self.statements(self.definition.body))
         variables = [
             f"    {glsl_type} {spell(name)};"
             for name, glsl_type in self.types.items()
@@ -220,6 +234,19 @@ class _Translator:
         )
 
     # -- statements ---------------------------------------------------------------------------------
+
+    def statements(self, nodes: list[ast.stmt]) -> Iterator[str]:
+        """Yield the lines of statements, up to the first that is known to return."""
+        for node in nodes:
+            yield from self.statement(node)
+            if self.returns(node):
+                return
+
+    def returns(self, node: ast.stmt) -> bool:
+        """Return True for a statement after which none is reached."""
+        if isinstance(node, ast.If) and (taken := self.known(node.test)) is not None:
+            return any(map(self.returns, node.body if taken else node.orelse))
+        return isinstance(node, ast.Return)
 
     def statement(self, node: ast.stmt) -> Iterator[str]:
         match node:
@@ -279,9 +306,8 @@ class _Translator:
         return f"    {callee.key}({', '.join(codes)});"
 
     def block(self, statements: list[ast.stmt]) -> Iterator[str]:
-        for statement in statements:
-            for line in self.statement(statement):
-                yield "    " + line
+        for line in self.statements(statements):
+            yield "    " + line
 
     def assignment(self, target: ast.expr, value: Expression) -> str:
         match target:
@@ -307,6 +333,10 @@ class _Translator:
         return False
 
     def branch(self, node: ast.If) -> Iterator[str]:
+        taken = self.known(node.test)
+        if taken is not None:
+            yield from self.statements(node.body if taken else node.orelse)
+            return
         yield f"    if ({self.expression(node.test).code}) {{"
         yield from self.block(node.body)
         if node.orelse:
@@ -322,6 +352,42 @@ class _Translator:
         yield f"    for ({counter} = {start}; {counter} {order} {stop}; {counter} += {step}) {{"
         yield from self.block(body)
         yield "    }"
+
+    # -- constants ----------------------------------------------------------------------------------
+
+    def known(self, node: ast.expr) -> bool | int | None:
+        """Return the value of an expression that `constants` decide; None for any other."""
+        if not self.constants:
+            return None
+        match node:
+            case ast.Constant(value=bool() | int() as value):
+                return value
+            case ast.Name() | ast.Attribute():
+                return self.known_name(node)
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                operand_value = self.known(operand)
+                return None if operand_value is None else not operand_value
+            case ast.BoolOp(op=operator, values=parts):
+                decisive, values = isinstance(operator, ast.Or), [self.known(part) for part in parts]
+                if any(value is not None and bool(value) is decisive for value in values):
+                    return decisive
+                return None if None in values else not decisive
+            case ast.Compare(left=left, ops=[ast.Eq()], comparators=[right]):
+                pair = self.known(left), self.known(right)
+                return None if None in pair else pair[0] == pair[1]
+        return None
+
+    def known_name(self, node: ast.Name | ast.Attribute) -> bool | int | None:
+        """Return the value of a constant uniform or parameter, or of a whole number of the module."""
+        match node:
+            case ast.Attribute(value=ast.Name(id=struct), attr=name) if struct in self.structs:
+                return self.constants.get(self.uniform(node, struct, name).code)
+            case ast.Name(id=name) if name in self.hints:
+                return self.constants.get(name)
+            case ast.Attribute(value=ast.Name(id=name)) | ast.Name(id=name) if name in self.scope:
+                value = None if name in self.types else self.resolve(node)
+                return value if isinstance(value, int) else None
+        return None
 
     # -- expressions --------------------------------------------------------------------------------
 

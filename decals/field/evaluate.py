@@ -23,7 +23,7 @@ from decals.images.texels import Pixels, linear_premultiplied, unit_levels
 from decals.index.editor import RECORDS, DecalEditor
 from decals.index.index import DecalIndex, index_on
 from decals.model import NO_IMAGE, Decals
-from decals.receivers import label_names, object_mask, surface_mask, takes_named_only
+from decals.receivers import mask_on, takes_named_only
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, NEIGHBOR_REACH, RECORD, RIM_RADIUS
 from decals.validation import describe, member, stiffness_number
 
@@ -451,15 +451,10 @@ def _limit(
     indexed: Any, decals: Decals | DecalEditor, on: object | str | Iterable[str] | None, device: Any
 ) -> None:
     """Give indexed decals their limits, if they have any, and the mask of the surface that they lie on."""
-    labels = () if on is None or hasattr(on, "name") else label_names("on", on, InvalidScene)
+    mask = mask_on(on, decals.receiver_table, InvalidScene)
     indexed.limited = decals.limited or takes_named_only(on)
-    if not indexed.limited:
-        return
-    indexed.limits = wp.array(decals.limits, dtype=wp.vec4, device=device)
-    if hasattr(on, "name"):
-        indexed.surface = object_mask(on, decals.receiver_table)
-    elif on is not None:
-        indexed.surface = surface_mask(labels, decals.receiver_table)
+    if indexed.limited:
+        indexed.limits, indexed.surface = wp.array(decals.limits, dtype=wp.vec4, device=device), mask
 
 
 def _as_rows(name: str, values: ArrayLike, shape: tuple[int, ...] = (3,)) -> Float32Array:

@@ -67,6 +67,8 @@ def smooth_step(t: wp.float32) -> wp.float32:
 @wp.func
 def fade_at(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, index: IndexedDecals) -> wp.float32:
     """Return the part of its opacity, 0 to 1, that the fades of a decal leave at q."""
+    if not index.limited:
+        return 1.0
     own = index.limits[decal]
     normal = xyz(index.records[RECORD * decal + 1])
     fade = wp.float32(1.0)

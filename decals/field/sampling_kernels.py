@@ -51,9 +51,7 @@ def decal_color(
         return wp.vec4(0.0, 0.0, 0.0, 0.0)
     image = int(index.records[RECORD * decal + 2][3])
     tint = index.records[RECORD * decal + 3]
-    opacity = tint[3]
-    if index.limited:
-        opacity = opacity * fade_at(q, n_q, decal, index)
+    opacity = tint[3] * fade_at(q, n_q, decal, index)
     color = wp.vec4(1.0, 1.0, 1.0, 1.0)
     if image >= 0:
         color = image_at(uv, extents[image], texels)

@@ -1,6 +1,7 @@
 """Arrays as textures."""
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import moderngl
@@ -41,7 +42,7 @@ class DataTexture:
 
     def __init__(self, context: Context, array: NDArray[Any]) -> None:
         components, dtype = _kind(array)
-        rows = max(1, -(-len(array) // ROW_TEXELS))
+        rows = texel_rows(len(array))
         if rows > context.max_texture_size:
             raise TooMuchData(
                 f"{len(array):,} elements do not fit into one texture here; expected at most "
@@ -51,7 +52,7 @@ class DataTexture:
             rows = max(rows + 1, 3)  # llvmpipe compiles programs anew where a side becomes a power of two
         self.count = len(array)
         self.texture = context.gl.texture(
-            (ROW_TEXELS, rows), components, _rows(array, rows, components), dtype=dtype
+            (ROW_TEXELS, rows), components, padded_rows(array, rows), dtype=dtype
         )
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._shape, self._kind = array.shape[1:], array.dtype
@@ -65,17 +66,13 @@ class DataTexture:
 
     def write(self, first: int, array: NDArray[Any]) -> None:
         """Overwrite the elements from ``first`` on; only their bytes are uploaded."""
-        done = 0
-        while done < len(array):
-            x, y = (first + done) % ROW_TEXELS, (first + done) // ROW_TEXELS
-            left = len(array) - done
-            whole_rows = x == 0 and left >= ROW_TEXELS
-            width, height = (ROW_TEXELS, left // ROW_TEXELS) if whole_rows else (min(ROW_TEXELS - x, left), 1)
-            part = np.ascontiguousarray(array[done : done + width * height], self._kind)
+        if self._buffer is not None and len(array):
+            part = np.ascontiguousarray(array, self._kind)
+            self._buffer.write(part, first * part[0].nbytes)
+        for x, y, texels in rectangles(first, array):
+            height, width = texels.shape[:2]
+            part = np.ascontiguousarray(texels, self._kind)
             self.texture.write(part, viewport=(x, y, width, height))
-            if self._buffer is not None:
-                self._buffer.write(part, (first + done) * part[0].nbytes)
-            done += width * height
 
     def use(self, unit: int) -> None:
         """Bind the texture to a unit."""
@@ -94,6 +91,31 @@ class DataTexture:
             self._buffer.release()
 
 
+def texel_rows(count: int) -> int:
+    """Return the rows of texels that so many elements take, at least one."""
+    return max(1, -(-count // ROW_TEXELS))
+
+
+def rectangles(first: int, array: NDArray[Any]) -> Iterator[tuple[int, int, NDArray[Any]]]:
+    """Yield column, row and texels ``[h, w, …]`` of the rectangles that elements from ``first`` on fill."""
+    done = 0
+    while done < len(array):
+        y, x = divmod(first + done, ROW_TEXELS)
+        left = len(array) - done
+        whole_rows = x == 0 and left >= ROW_TEXELS
+        width, height = (ROW_TEXELS, left // ROW_TEXELS) if whole_rows else (min(ROW_TEXELS - x, left), 1)
+        part = array[done : done + width * height]
+        yield x, y, part.reshape(height, width, *array.shape[1:])
+        done += len(part)
+
+
+def padded_rows(array: NDArray[Any], rows: int) -> NDArray[Any]:
+    """Return an array as so many rows of texels, with zeros behind its end."""
+    padded = np.zeros((rows * ROW_TEXELS, *array.shape[1:]), array.dtype)
+    padded[: len(array)] = array
+    return padded.reshape(rows, ROW_TEXELS, *array.shape[1:])
+
+
 def _kind(array: NDArray[Any]) -> tuple[int, str]:
     """Return the components of a texel, and their moderngl type."""
     kind = _TEXTURE_KINDS.get((array.dtype, array.shape[1:]))
@@ -102,9 +124,3 @@ def _kind(array: NDArray[Any]) -> tuple[int, str]:
             f"expected float32[n, 4], int32[n] or int32[n, 4], got {array.dtype}{list(array.shape)}"
         )
     return math.prod(array.shape[1:]), kind
-
-
-def _rows(array: NDArray[Any], rows: int, components: int) -> NDArray[Any]:
-    padded = np.zeros(rows * ROW_TEXELS * components, array.dtype)
-    padded[: array.size] = array.reshape(-1)
-    return padded

@@ -6,8 +6,9 @@ import numpy as np
 
 from blobtree._typing import Int64Array
 from decals.errors import TooMuchData
-from decals.index.editor import LIMITS, RECORDS, DecalEditor
-from decals.index.index import DecalIndex, has_nested
+from decals.index.arrays import DecalArrays
+from decals.index.editor import LIMITS, DecalEditor
+from decals.index.index import DecalIndex
 from decals.model import Decals
 from decals.rendering.context import Context
 from decals.rendering.data_texture import DataTexture
@@ -83,34 +84,20 @@ class DecalData:
     ) -> None:
         self._context = context
         self.limited = limited
-        self.version = 0
         iterations = context.max_loop_iterations
         self._loop_limit = LoopLimit(None if iterations is None else iterations // lookups)
-        if isinstance(decals, DecalEditor):
-            self.version = decals.version
-            arrays, index = decals.arrays, decals.index
-        else:
-            index = DecalIndex.of(decals)
-            arrays = {
-                RECORDS: decals.packed(),
-                LIMITS: decals.limits,
-                "index_levels": index.levels,
-                "index_table": index.table,
-                "index_ids": index.ids,
-            }
-            indexed = index.on("cpu", records=arrays[RECORDS], layered=decals.layered, copy=False)
-            self.nested = has_nested(indexed, len(decals))
-        self._loop_limit.check(index, layered=decals.layered, version=self.version)
+        data = DecalArrays.of(decals)
+        self._loop_limit.check(data.index, layered=data.layered, version=data.version)
         self._textures = {
-            name: DataTexture(context, array) for name, array in arrays.items() if limited or name != LIMITS
+            name: DataTexture(context, array)
+            for name, array in data.arrays.items()
+            if limited or name != LIMITS
         }
-        self._read_uniforms(decals, index)
+        self._read(data)
 
-    def _read_uniforms(self, decals: Decals | DecalEditor, index: DecalIndex) -> None:
-        self.layered = decals.layered
-        if isinstance(decals, DecalEditor):
-            self.nested = decals.nested
-        self._uniforms = {"index_level_count": index.level_count, "index_mask": index.mask}
+    def _read(self, data: DecalArrays) -> None:
+        self.layered, self.nested, self.version = data.layered, data.nested, data.version
+        self._uniforms = data.uniforms
 
     def update(self, editor: DecalEditor) -> int:
         """Upload the changes of an editor since the last call; return the number of bytes.
@@ -122,13 +109,12 @@ class DecalData:
         TooMuchData
             If more decals reach one point than the driver allows; nothing is uploaded.
         """
-        index = editor.index
-        self._loop_limit.check(index, layered=editor.layered, version=editor.version)
-        byte_count, since, self.version = 0, self.version, editor.version
-        for name, ranges in editor.changed_rows(since).items():
+        data, byte_count = DecalArrays.of(editor), 0
+        self._loop_limit.check(data.index, layered=data.layered, version=data.version)
+        for name, ranges in editor.changed_rows(self.version).items():
             if name not in self._textures:
                 continue
-            array = editor.arrays[name]
+            array = data.arrays[name]
             if self._textures[name].count != len(array):
                 self._textures[name].release()
                 self._textures[name] = DataTexture(self._context, array)
@@ -137,7 +123,7 @@ class DecalData:
             for first, end in ranges:
                 self._textures[name].write(first, array[first:end])
                 byte_count += array[first:end].nbytes
-        self._read_uniforms(editor, index)
+        self._read(data)
         return byte_count
 
     @property

@@ -1,33 +1,16 @@
 """The decal pass: colours all pixels at once, for any number of decals and objects."""
 
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
 import moderngl
 
 from blobtree._typing import Float32Array
-from blobtree.formulas.falloff import RIM
-from blobtree.transpile.glsl import translate_library
-from decals.field.elastic import bump_at, image_shift, join_bumps
 from decals.field.law import AnyContact, ContactLaw
-from decals.field.mapping import ImageMapping, in_image, tangent_coordinates, unroll_step
-from decals.field.ownership import contact_at, owner_at, owner_below, single_layer_at, uv_at
-from decals.field.pixel_filter import (
-    contact_distance,
-    image_steps,
-    inner_part,
-    pixel_line,
-    push_gradient,
-    pushed_steps,
-)
-from decals.field.radial import is_above, lies_on_top, power
-from decals.field.receivers import acts, fade_at
-from decals.index.lookup import next_number_below
-from decals.record import Contact, balls_nested, has_cells
+from decals.field.mapping import ImageMapping
 from decals.rendering.context import Context
 from decals.rendering.data_texture import DataTexture
 from decals.rendering.decal_data import DecalData, stored
+from decals.rendering.decal_library import decal_constants, decal_library
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.image_array import ImageArray
 from decals.rendering.lights import Lighting
@@ -268,79 +251,3 @@ def decal_programs(
         )
         for stage in stages
     )
-
-
-LIBRARY_FUNCTIONS = (
-    single_layer_at,
-    owner_at,
-    owner_below,
-    next_number_below,
-    contact_at,
-    uv_at,
-    in_image,
-    tangent_coordinates,
-    unroll_step,
-    fade_at,
-)
-"""Functions that ``shaders/decals.glsl`` calls."""
-
-
-FILTER_FUNCTIONS = (
-    *LIBRARY_FUNCTIONS,
-    acts,
-    contact_distance,
-    power,
-    balls_nested,
-    is_above,
-    lies_on_top,
-    has_cells,
-    pixel_line,
-    inner_part,
-    push_gradient,
-    pushed_steps,
-    image_steps,
-    bump_at,
-    join_bumps,
-    image_shift,
-)
-"""Functions that ``shaders/filtered_decals.glsl`` calls."""
-
-
-@cache
-def decal_library(
-    contact: AnyContact,
-    *,
-    layered: bool,
-    limited: bool,
-    nested: bool,
-    walked: bool = False,
-    filtered: bool = False,
-) -> str:
-    """Return the GLSL of all decal formulas, for the slot ``functions``, in one contact mode or law."""
-    constants = decal_constants(contact, layered=layered, limited=limited, nested=nested, walked=walked)
-    law = contact if isinstance(contact, ContactLaw) else None
-    return constants + _translated_functions(law, filtered)
-
-
-def decal_constants(contact: AnyContact, *, layered: bool, limited: bool, nested: bool, walked: bool) -> str:
-    """Return the GLSL constants of decals, for the slot ``functions``, in one contact mode or law."""
-    return (
-        f"const float RIM = {float(RIM)!r};\n"
-        f"const int decal_contact = {int(contact)};\n"
-        f"const bool decal_nested = {str(nested and contact in (Contact.RADIAL, Contact.ELASTIC)).lower()};\n"
-        f"const bool decal_limited = {str(limited).lower()};\n"
-        f"const bool decal_walked = {str(walked).lower()};\n"
-        f"const bool decal_layered = {str(layered).lower()};\n"
-        f"const bool decal_single_layer = {str(not layered and contact != Contact.RADIAL).lower()};\n"
-    )
-
-
-@cache
-def _translated_functions(law: ContactLaw | None, filtered: bool) -> str:
-    return translate_library(decal_functions(law, filtered=filtered))
-
-
-def decal_functions(law: ContactLaw | None, *, filtered: bool = False) -> tuple[Any, ...]:
-    """Return the typed functions that ``decals.glsl`` or ``filtered_decals.glsl`` calls."""
-    functions: tuple[Any, ...] = FILTER_FUNCTIONS if filtered else LIBRARY_FUNCTIONS
-    return functions if law is None else tuple(map(law.formulas.function, functions))

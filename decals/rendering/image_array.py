@@ -48,7 +48,7 @@ class ImageArray:
         self.texture = context.gl.texture_array((self.width, self.height, layers), 4, dtype="f2")
         empty = np.zeros((1, 1, 4), np.uint8)
         for layer, image in enumerate(images or [empty]):
-            texels = _texels(image, (self.height, self.width))[::-1]
+            texels = color_texels(image, (self.height, self.width))[::-1]
             region = (0, 0, layer, self.width, self.height, 1)
             self.texture.write(texels.astype(np.float16).tobytes(), viewport=region)
         self.texture.repeat_x = self.texture.repeat_y = False
@@ -81,7 +81,7 @@ def common_shape(shapes: Sequence[tuple[int, int]], *, limit: int) -> tuple[int,
     return height, width
 
 
-def _texels(image: Pixels, shape: tuple[int, int]) -> Float32Array:
+def color_texels(image: Pixels, shape: tuple[int, int]) -> Float32Array:
     """Return an image in linear light and another shape, with colours around its disc."""
     if image.dtype == np.uint8:
         return linear_premultiplied(filled_corners(resized(image.astype(np.uint8, copy=False), shape)))

@@ -24,7 +24,7 @@ class MaterialArray:
 
     def __init__(self, context: Context, images: Sequence[ImageLike], shape: tuple[int, int]) -> None:
         self.texture = context.gl.texture_array((shape[1], shape[0], 2 * len(images)), 4, dtype="f2")
-        layers = (texels for image in images for texels in _texels(image, shape))
+        layers = (texels for image in images for texels in map_texels(image, shape))
         for layer, texels in enumerate(layers):
             region = (0, 0, layer, shape[1], shape[0], 1)
             self.texture.write(texels[::-1].astype(np.float16).tobytes(), viewport=region)
@@ -276,7 +276,7 @@ def has_materials(scene: SceneLike) -> bool:
     return len(scene.decals) > 0 and any(hasattr(image, "surface_texels") for image in scene.images)
 
 
-def _texels(image: ImageLike, shape: tuple[int, int]) -> Iterator[Float32Array]:
+def map_texels(image: ImageLike, shape: tuple[int, int]) -> Iterator[Float32Array]:
     """Yield the two layers of an image, the upper row first."""
     if not hasattr(image, "surface_texels"):
         for _ in range(2):

@@ -24,7 +24,8 @@ from blobtree.progress import reporting
 from decals.field.law import ContactLaw
 from decals.rendering.context import Context
 from decals.rendering.decal_data import stored
-from decals.rendering.decal_pass import DecalSource, decal_functions
+from decals.rendering.decal_library import decal_functions
+from decals.rendering.decal_pass import DecalSource
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.pixel_pass import GROUP, PassBackend, PixelPass, Program, attach_camera, set_uniform
 from decals.rendering.rest_buffer import RestBuffer

@@ -22,7 +22,8 @@ from decals.field.mapping import ImageMapping
 from decals.index.editor import DecalEditor
 from decals.rendering.context import Context
 from decals.rendering.decal_data import DecalData
-from decals.rendering.decal_pass import decal_library, decal_programs
+from decals.rendering.decal_library import decal_library
+from decals.rendering.decal_pass import decal_programs
 from decals.rendering.dirty_regions import TargetState
 from decals.rendering.drawable import register, warmup_of
 from decals.rendering.frame_plan import FramePlan, FrameRequest, decal_source, plan_frame

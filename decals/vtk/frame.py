@@ -22,7 +22,7 @@ from decals.rendering.background_compiler import BackgroundCompiler
 from decals.rendering.context import Context
 from decals.rendering.current_context import is_egl, kept_current
 from decals.rendering.dirty_regions import TargetState, decal_version, same_objects
-from decals.rendering.pixel_pass import CameraBuffer, set_uniform, use_textures
+from decals.rendering.pixel_pass import set_uniform, use_textures
 from decals.rendering.progressive import ProgressiveFrame
 from decals.rendering.targets import Targets
 from decals.rendering.viewpoint import Projection, Rectangle
@@ -301,8 +301,6 @@ class FrameRenderer:
     ----------
     drawn_fraction
         Part of the last frame's work, 0 to 1, that was done.
-    camera
-        Uniform block with the camera, for VTK's shaders that show decals.
     """
 
     def __init__(self, context: WindowContext) -> None:
@@ -317,7 +315,6 @@ class FrameRenderer:
         with context.current():
             self.renderer = Renderer(context)
             self._composite = Composite(context)
-            self.camera = CameraBuffer(context.gl)
 
     def draw(self, scene: SceneLike, options: FrameOptions, viewpoint: Projection, *, wait: bool) -> Targets:
         """Draw a scene into the renderer's targets; with ``wait``, until the graphics card has finished."""
@@ -456,7 +453,6 @@ class FrameRenderer:
         with self.context.current():
             self.renderer.release()
             self._composite.release()
-            self.camera.release()
 
 
 def texels_of(x: int, y: int, pixels: Size, texels: Size, *, magnified: bool) -> Rectangle:

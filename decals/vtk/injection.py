@@ -16,13 +16,12 @@ from blobtree._typing import Float64Array
 from decals.errors import InvalidScene
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.hosts.code import Code, Form, code_of
 from decals.receivers import EVERYTHING, surface_mask
 from decals.rendering import Renderer, SceneLike
 from decals.rendering.decal_data import DecalData
-from decals.rendering.decal_pass import decal_library
 from decals.rendering.image_array import ImageArray
-from decals.rendering.pixel_pass import CameraBuffer
-from decals.rendering.viewpoint import PictureView, Rectangle
+from decals.rendering.viewpoint import Projection
 from decals.shaders import compose
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.surfaces.windings import MeshOrientation
@@ -33,10 +32,14 @@ from decals.vtk.mapper import NORMALS, ShaderAdditions, ShaderTag, SmoothNormals
 POSITION, NORMAL, MODEL = "decalPositionVSOutput", "decalNormalVSOutput", "decalModel"
 """Names of the shader variables: varyings, and the matrix from the actor to the decals."""
 
+EYE = "decalEye"
+"""Name of the uniform with the eye and 1; in a parallel projection, with the way to the eye and 0."""
+
+PREFIX = "decal_"
+"""Beginning of the names of the decals' code."""
+
 NO_SHIFT_SCALE = 0
 """VTK's option to upload vertices without shift and scale."""
-
-UNIT_BOX = np.zeros(3), np.ones(3)
 
 DECLARATIONS, BODY, COLOR = "//VTK::TCoord::Dec", "//VTK::TCoord::Impl", "//VTK::Color::Impl"
 """Tags of VTK's shader templates: declarations, the body of main, and the point where colours are known."""
@@ -55,9 +58,9 @@ GEOMETRY_DECLARATION = "".join(
 GEOMETRY = "".join(
     f"    {name.replace('VSOutput', 'GSOutput')} = {name}[i];\n" for name in (POSITION, NORMAL)
 )
-FRAGMENT_DECLARATION = f"in vec3 {POSITION};\nin vec3 {NORMAL};\n"
+FRAGMENT_DECLARATION = f"in vec3 {POSITION};\nin vec3 {NORMAL};\nuniform vec4 {EYE};\n"
 PAINT = f"""
-  vec4 decals = injected_decals({POSITION}, {NORMAL});
+  vec4 decals = decal_color({POSITION}, {NORMAL}, {EYE}.w * {POSITION} - {EYE}.xyz);
   diffuseColor = decal_over(diffuseColor, diffuseIntensity, decals);
   ambientColor = decal_over(ambientColor, ambientIntensity, decals);
 """
@@ -73,8 +76,6 @@ class InjectionTarget(Protocol):
     @property
     def renderer(self) -> Renderer: ...  # noqa: D102
     @property
-    def camera(self) -> CameraBuffer: ...  # noqa: D102
-    @property
     def applied(self) -> InjectedDecals: ...  # noqa: D102
     @property
     def mapping(self) -> ImageMapping: ...  # noqa: D102
@@ -83,7 +84,6 @@ class InjectionTarget(Protocol):
     @property
     def stiffness(self) -> float: ...  # noqa: D102
     def world_matrix(self) -> Float64Array: ...  # noqa: D102
-    def viewport(self) -> tuple[int, int, int, int]: ...  # noqa: D102
     def current(self) -> AbstractContextManager[None]: ...  # noqa: D102
     def current_if_present(self) -> AbstractContextManager[None]: ...  # noqa: D102
 
@@ -127,9 +127,7 @@ class Injection:
         self._mapper.SetVBOShiftScaleMethod(NO_SHIFT_SCALE)
         self._subplot = weakref.ref(subplot)
         self._additions = ShaderAdditions(actor)
-        self._library = ""
-        self._code: dict[ShaderTag, str] = {}
-        self._written = False
+        self._code: Code | None = None
         injection = weakref.ref(self)
 
         def bind(_caller: object, _event: str, program: Any) -> None:
@@ -150,12 +148,9 @@ class Injection:
             return
         self._add_normals()  # the mapper's input may have been replaced
         subplot, data, _ = source
-        variant = {"layered": data.layered, "limited": data.limited, "nested": data.nested}
-        library = decal_library(subplot.contact, **variant)  # computed once for each variant
-        if library != self._library:
-            self._library, self._code = library, _code(library, self._paint)
-        self._additions.write(self._code)
-        self._written = True
+        form = Form(subplot.contact, data.layered, data.limited, data.nested)
+        self._code = code_of(form, "330 core", "fragment", PREFIX)  # computed once for each form
+        self._additions.write(_additions(self._code.text, self._paint))
 
     def _add_normals(self) -> None:
         """Add smooth normals to the mesh, unless the injection of another subplot has added them."""
@@ -172,18 +167,19 @@ class Injection:
     def _erase(self) -> None:
         """Restore the shader."""
         self._additions.erase()
-        self._written = False
+        self._code = None
 
     # -- whenever VTK draws the actor -------------------------------------------------------------------
 
     def bind(self, program: Any) -> None:
-        """Bind decals, images and camera to VTK's program."""
-        source = self._source() if self._written else None
-        if source is None or not source[0].applied.in_frame:  # another renderer may draw the actor
-            return
+        """Give decals, images and the eye to VTK's program."""
+        code = self._code
+        source = self._source() if code is not None else None
+        if code is None or source is None or not source[0].applied.in_frame:
+            return  # another renderer draws the actor
         subplot, data, images = source
         world = self._world_matrix(subplot)
-        self._use_camera(subplot, world)
+        program.SetUniform4f(EYE, _eye(vtk_projection(subplot.vtk_renderer, world)))
         model = np.linalg.inv(world) @ matrix_of(self.actor)
         program.SetUniformMatrix(MODEL, _vtk_matrix(model))
         units = subplot.applied.texture_units()
@@ -191,9 +187,10 @@ class Injection:
         images.use(units[0])
         uniforms |= {"decal_images": units[0], "decal_mapping": int(subplot.mapping)}
         uniforms["surface_receivers"] = self._mask(subplot)
-        for name, value in uniforms.items():
-            program.SetUniformi(name, value)
-        program.SetUniformf("decal_stiffness", subplot.stiffness)
+        names = code.textures | code.uniforms
+        for name in uniforms.keys() & names.keys():
+            program.SetUniformi(names[name], uniforms[name])
+        program.SetUniformf(names["decal_stiffness"], subplot.stiffness)
         subplot.vtk_renderer.GetRenderWindow().GetState().ResetGLActiveTexture()
 
     def _source(self) -> tuple[InjectionTarget, DecalData, ImageArray] | None:
@@ -214,13 +211,6 @@ class Injection:
         """Return the matrix from the decals' space to the world."""
         return matrix_of(self.actor) if self._follow else subplot.world_matrix()
 
-    def _use_camera(self, subplot: InjectionTarget, world: Float64Array) -> None:
-        """Fill the uniform block of the camera; VTK's frame may be larger than the window."""
-        x, y, width, height = subplot.viewport()
-        view = vtk_projection(subplot.vtk_renderer, world)
-        whole = PictureView.of(view, (width, height), UNIT_BOX)
-        subplot.camera.use(whole.part(Rectangle(-x, -y, width, height)))
-
     def release(self) -> None:
         """Restore the actor."""
         self._erase()
@@ -229,15 +219,21 @@ class Injection:
             self._mapper.RemoveVertexAttributeMapping("decalNormalMC")
 
 
-def _code(functions: str, paint: str) -> dict[ShaderTag, str]:
+def _eye(projection: Projection) -> tuple[float, ...]:
+    """Return the uniform `EYE` of a projection."""
+    rays = projection.rays(1, 1)
+    return (*(-rays.corner if rays.parallel else rays.origin).tolist(), float(not rays.parallel))
+
+
+def _additions(decals: str, paint: str) -> dict[ShaderTag, str]:
     """Return our code for each tag of VTK's shader templates."""
-    text = compose("injected_decals.glsl", slots={"functions": functions}, version=None).text
+    over = compose("injected_decals.glsl", version=None).text
     return {
         ("Vertex", DECLARATIONS): VERTEX_DECLARATION,
         ("Vertex", BODY): VERTEX,
         ("Geometry", DECLARATIONS): GEOMETRY_DECLARATION,
         ("Geometry", BODY): GEOMETRY,
-        ("Fragment", DECLARATIONS): FRAGMENT_DECLARATION + text,
+        ("Fragment", DECLARATIONS): FRAGMENT_DECLARATION + decals + over,
         ("Fragment", COLOR): paint,
     }
 

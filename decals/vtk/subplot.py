@@ -27,7 +27,6 @@ from decals.rendering import Environment, Renderer, RenderOptions, SceneLike, Si
 from decals.rendering.dirty_regions import same_objects
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Drawing, check_scene, drawing_of
-from decals.rendering.pixel_pass import CameraBuffer
 from decals.rendering.viewpoint import Projection
 from decals.scenes.objects import Box, SceneObject, as_crease_angle, bounds_of
 from decals.scenes.origin import WORLD
@@ -519,11 +518,6 @@ class SubplotRenderer(KnownAttributes):
     def renderer(self) -> Renderer:
         """The renderer in the window's context; use it inside ``with subplot.current():``."""
         return self._current_frames().renderer
-
-    @property
-    def camera(self) -> CameraBuffer:
-        """Uniform block with the camera, for VTK's shaders."""
-        return self._current_frames().camera
 
     @contextmanager
     def current(self) -> Iterator[None]:

@@ -20,6 +20,7 @@ PACKAGES = (
     "blobtree",
     "decals",
     "decals.editing",
+    "decals.hosts",
     "decals.images",
     "decals.index",
     "decals.rendering",

@@ -6,7 +6,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -126,6 +126,18 @@ def check_rendering(session: Session) -> None:
     assert (session["buffers"].owner >= 0).any()
 
 
+def check_shader(session: Session) -> None:
+    """The picture of plain moderngl is that of `render` without light; an edit uploads few bytes."""
+    from tests.decals.hosts.agreement import equal_pixels
+
+    scene = session["scene"]
+    gray = replace(scene.objects[0], color=(0.7354, 0.7354, 0.7354))
+    shown = np.asarray(Image.open("ring.png"))
+    assert equal_pixels(shown, scene.replace(objects=[gray])) >= 0.995
+    assert sum(upload.array.nbytes for upload in session["changes"].uploads) < 4000
+    assert "decal_records" in session["printed"]
+
+
 def check_scattering(session: Session) -> None:
     assert len(session["spots"]) == 300
     assert (session["spots"].positions[:, 1] > -0.5).all()
@@ -187,6 +199,7 @@ CHECKS: dict[str, Callable[[Session], None]] = {
     "decals": check_decals,
     "rendering": check_rendering,
     "baking": check_baking,
+    "shader": check_shader,
     "scattering": check_scattering,
     "inputs": check_inputs,
     "editing": check_editing,

@@ -16,7 +16,8 @@ from decals.model import Decals
 from decals.record import Contact
 from decals.rendering import viewpoint as tile
 from decals.rendering.context import Context
-from decals.rendering.decal_pass import decal_library, decal_programs
+from decals.rendering.decal_library import decal_library
+from decals.rendering.decal_pass import decal_programs
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
 from decals.scenes.camera import Camera
@@ -66,7 +67,7 @@ def test_without_nested_decals_their_code_is_left_out(
         points = decals, buffers.position[seen], buffers.normal[seen]
         uv = evaluate(*points).uv
         with monkeypatch.context() as patch:
-            patch.setattr("decals.rendering.decal_data.has_nested", lambda *_, value=same: value)
+            patch.setattr("decals.index.arrays.has_nested", lambda *_, value=same: value)
             patch.setattr("decals.field.evaluate.index_on", index_without_nested)
             other = renderer.render(replace(view, decals=decals[:]), options)
             change = np.abs(other.astype(int) - first).max()

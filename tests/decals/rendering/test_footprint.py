@@ -51,7 +51,7 @@ def test_a_footprint_is_the_way_to_the_next_pixel(
     context: Context, tmp_path: Path, viewpoint: Viewpoint, normal: tuple[float, float, float]
 ) -> None:
     (tmp_path / "main.frag").write_text(MAIN)
-    for name in ("footprint.glsl", "camera.glsl"):
+    for name in ("footprint.glsl", "camera.glsl", "tangent_step.glsl"):
         (tmp_path / name).write_text((DIRECTORY / name).read_text(encoding="utf-8"), encoding="utf-8")
     unit = np.array(normal) / np.linalg.norm(normal)
     program = attach_camera(context.program(compose("screen.vert"), compose("main.frag", directory=tmp_path)))

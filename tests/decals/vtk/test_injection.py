@@ -29,15 +29,18 @@ UV_STEPS = 4096.0
 
 OWNER = f"""
   vec3 n = normalize({injection.NORMAL});
-  DecalHit found = decal_at({injection.POSITION}, n);
-  int number = found.owner + 1;
+  float field;
+  vec2 uv;
+  int number = decal_owner({injection.POSITION}, n, field, uv) + 1;
   ambientColor = vec3(0.0);
   diffuseColor = vec3(float(number & 255), float((number >> 8) & 255), 128.0) / 255.0;
 """
 UV = f"""
   vec3 n = normalize({injection.NORMAL});
-  DecalHit found = decal_at({injection.POSITION}, n);
-  int u = int(round(found.uv.x * {UV_STEPS - 1})), v = int(round(found.uv.y * {UV_STEPS - 1}));
+  float field;
+  vec2 uv;
+  decal_owner({injection.POSITION}, n, field, uv);
+  int u = int(round(uv.x * {UV_STEPS - 1})), v = int(round(uv.y * {UV_STEPS - 1}));
   ambientColor = vec3(0.0);
   diffuseColor = vec3(float(u & 255), float((u >> 8) + 16 * (v >> 8)), float(v & 255)) / 255.0;
 """

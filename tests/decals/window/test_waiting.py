@@ -16,7 +16,7 @@ from decals.errors import TooMuchData
 from decals.rendering.background_compiler import GL, BackgroundCompiler
 from decals.rendering.context import Context
 from decals.rendering.current_context import system_library
-from decals.rendering.decal_pass import decal_library
+from decals.rendering.decal_library import decal_library
 from decals.rendering.options import RenderOptions
 from decals.rendering.pixel_pass import compile_program
 from decals.rendering.progressive import DRAWING

@@ -1,0 +1,17 @@
+"""Export: decals in the shaders of other programs.
+
+    python -m tests.bench.export [--json FILE] [--quick] [--only shader]
+
+The parts are modules of their own.
+"""
+
+import sys
+
+from tests.bench.parts import run
+
+PARTS = ("shader",)
+"""Names of the parts; each is the module `tests.bench.export_NAME`."""
+
+
+if __name__ == "__main__":
+    sys.exit(run("export", PARTS, __doc__))
