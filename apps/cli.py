@@ -125,6 +125,8 @@ implicit-decals export scene.json -o model.gltf --size 4096
 
 implicit-decals export scene.json -o model.ply --attribute owner --attribute field
 
+implicit-decals export blob.json -o blob.vti --distance
+
 implicit-decals export --check model.ply
 """,
     "displace": """Write the surface of a scene, moved by the heights of its decals, as a mesh.

@@ -70,6 +70,7 @@ from .nodes.tree import Difference, Intersection, Node, Offset, Ricci, Sum, Tran
 from .nodes.tree_volumes import sample
 from .nodes.volumes import Volume, from_mesh, from_sdf
 from .progress import Cancel, Progress
+from .sampling.field_grid import FieldGrid, field_grid
 from .sampling.tree_distances import SignedDistances, to_sdf
 from .tape.tape import Tape
 from .tracing.trace import Hits
@@ -106,6 +107,7 @@ __all__ = [
     "Disc",
     "Ellipsoid",
     "Falloff",
+    "FieldGrid",
     "FieldPrimitive",
     "Fit",
     "GradientBlend",
@@ -179,6 +181,7 @@ __all__ = [
     "define_operator",
     "define_skeleton",
     "define_warp",
+    "field_grid",
     "fit",
     "from_json",
     "from_mesh",

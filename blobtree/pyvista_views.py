@@ -73,6 +73,18 @@ def to_polydata(mesh: ColoredMesh) -> "pv.PolyData":
     return surface
 
 
+def to_image_data(
+    name: str, values: Float32Array, origin: tuple[float, float, float], spacing: float
+) -> "pv.ImageData":
+    """Return values ``float32[nx, ny, nz]`` at the points of a grid as `pyvista.ImageData`."""
+    _require_pyvista()
+    import pyvista as pv
+
+    grid = pv.ImageData(dimensions=values.shape, spacing=3 * (spacing,), origin=origin)
+    grid.point_data[name] = values.ravel(order="F")
+    return grid
+
+
 MESH_SUFFIXES = (".ply", ".obj", ".stl", ".vtp")
 """Formats of `write_polydata`."""
 
@@ -93,7 +105,7 @@ def write_polydata(path: str | os.PathLike[str], surface: "pv.PolyData") -> None
         The file cannot be written in full; an existing file stays as it was.
     """
     if Path(path).suffix.lower() == ".vtp":
-        write_atomically(path, vtp_bytes(surface))
+        write_atomically(path, xml_bytes(surface))
         return
     from blobtree.vtk_errors import vtk_errors
 
@@ -123,12 +135,12 @@ def _is_whole(path: Path, surface: "pv.PolyData") -> bool:
             return bool(found) and len(body) == _ply_length(header.decode("ascii"), surface)
 
 
-def vtp_bytes(surface: "pv.PolyData") -> bytes:
-    """Return a surface as a VTP file; on a full disk, VTK's own writing to the file kills the process."""
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+def xml_bytes(dataset: "pv.PolyData | pv.ImageData") -> bytes:
+    """Return a VTP or VTI file; on a full disk, VTK's own writing to the file kills the process."""
+    from vtkmodules.vtkIOXML import vtkXMLImageDataWriter, vtkXMLPolyDataWriter
 
-    writer = vtkXMLPolyDataWriter()
-    writer.SetInputData(surface)
+    writer = vtkXMLPolyDataWriter() if dataset.IsA("vtkPolyData") else vtkXMLImageDataWriter()
+    writer.SetInputData(dataset)
     writer.SetDataModeToBinary()
     writer.WriteToOutputStringOn()
     writer.Write()

@@ -68,6 +68,12 @@ def surface() -> Any:
     return blobtree.Point((0, 0, 0), radius=1.0).to_pyvista(resolution=10)
 
 
+@cache
+def grid() -> blobtree.FieldGrid:
+    """A field on a grid."""
+    return blobtree.field_grid(blobtree.Point((0, 0, 0), radius=1.0), resolution=10)
+
+
 def command(*words: str) -> Writer:
     """A command of the command line, whose last option is the output; its message becomes an exception."""
 
@@ -91,6 +97,7 @@ WRITERS: dict[str, Writer] = {
         f"surface{end}": lambda path: write_polydata(path, surface())
         for end in (".ply", ".obj", ".stl", ".vtp")
     },
+    **{f"grid{end}": lambda path: grid().save(path) for end in (".vti", ".nrrd", ".npz", ".npy")},
     "mesh.ply": lambda path: blobtree.polygonize(blobtree.Point((0, 0, 0), radius=1.0), resolution=8).save(
         path
     ),

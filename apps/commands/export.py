@@ -1,13 +1,18 @@
 """``implicit-decals export``: a scene as a file of another program, and a check of such files."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
+from blobtree import field_grid
+from blobtree.sampling.field_grid import GRID_FORMATS
+from decals import Scene, TreeObject
 from decals import export as export_scene
 from decals.apps.commands.options import (
     MAX_SAMPLES,
@@ -58,6 +63,7 @@ def export(
         Parameter(name=("--attribute", "--attributes"), negative=(), show_default=False),
     ] = None,
     instances: Annotated[bool, Parameter(negative=())] = False,
+    distance: Annotated[bool, Parameter(negative=())] = False,
     unit: Annotated[
         Literal["micron", "millimeter", "centimeter", "inch", "foot", "meter"] | None,
         Parameter(show_default=False),
@@ -74,14 +80,15 @@ def export(
     define: Definitions = None,
     trust: Trust = False,
 ) -> None:
-    """Write a scene as a file of another program, or check a mesh file.
+    """Write a scene as a file of another program, the field of a model on a grid, or check a mesh file.
 
     Parameters
     ----------
     scene
         A saved scene. Models that render takes are written without decals. With --check alone, a mesh file.
     output
-        The file: glb, gltf, obj, ply, stl, vtp, 3mf or usdz.
+        The file: glb, gltf, obj, ply, stl, vtp, 3mf or usdz; for the field of a BlobTree vti, nrrd, npz or
+        npy.
     check
         Print whether the mesh of each object is closed and sound.
     colors
@@ -90,6 +97,9 @@ def export(
         Value at the vertices besides the colours. Can be repeated.
     instances
         Write the decals as copies of a square, for programs with decals of their own (glb, gltf).
+    distance
+        Write signed distances in place of the field, below 0 inside, and print their error (vti, nrrd, npz,
+        npy).
     unit
         Unit of the scene's lengths, for formats that have one.
     up
@@ -114,7 +124,21 @@ def export(
             raise InvalidInput("export: missing -o FILE; or --check, to check a mesh file")
         _print_checks([check_mesh(*read_mesh(scene), Path(scene).name)])
         return
-    check_output(output, tuple(FORMATS))
+    check_output(output, (*FORMATS, *GRID_FORMATS))
+    if output.suffix.lower() in GRID_FORMATS:
+        with preparing(define) as progress:
+            tree = _only_tree(load_model(scene, trust=trust), scene)
+            grid = field_grid(tree.tree, resolution=resolution, distance=distance, progress=progress)
+            x, y, z = (np.array(grid.origin) + tree.origin).tolist()
+            replace(grid, origin=(x, y, z)).save(output)
+        print_path(output)
+        if grid.error is not None:
+            Console().print(f"distances are exact to {grid.error:.2g}", highlight=False)
+        return
+    if distance:
+        raise InvalidInput(
+            f"--distance: expected an output that ends in {' or '.join(GRID_FORMATS)}, got {str(output)!r}"
+        )
     check_count("--samples", samples, 1, MAX_SAMPLES)
     with preparing(define) as progress:
         checks = export_scene(
@@ -132,6 +156,19 @@ def export(
     print_path(output)
     if check:
         _print_checks(checks)
+
+
+def _only_tree(loaded: object, name: str) -> TreeObject:
+    """Return a BlobTree, or that of a scene with one visible object."""
+    items = [item.shown for item in loaded.objects] if isinstance(loaded, Scene) else [loaded]
+    shown = [item for item in items if item is not None]
+    if len(shown) != 1 or not isinstance(shown[0], TreeObject):
+        kinds = ", ".join(type(item).__name__ for item in shown) or "nothing"
+        raise InvalidInput(
+            f"expected a BlobTree, or a scene with one visible object that is one, got {kinds} in {name!r}; "
+            "save the tree in a file of its own"
+        )
+    return shown[0]
 
 
 def _print_checks(checks: Sequence[MeshCheck]) -> None:

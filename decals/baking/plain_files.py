@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blobtree.pyvista_views import vtp_bytes
+from blobtree.pyvista_views import xml_bytes
 from decals.baking.parts import Baked, Part
 from decals.baking.pictures import png_bytes
 from decals.surfaces.windings import Triangles
@@ -70,7 +70,7 @@ def vtp_file(baked: Baked) -> bytes:
     counts = [len(part.faces) for part in baked.parts]
     surface.cell_data["object"] = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
     surface.GetFieldData().AddArray(_names(baked))
-    return vtp_bytes(surface)
+    return xml_bytes(surface)
 
 
 def _names(baked: Baked) -> Any:

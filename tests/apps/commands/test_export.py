@@ -1,6 +1,7 @@
 """``implicit-decals export``."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 import pyvista as pv
@@ -70,6 +71,38 @@ def test_check_prints_a_table_for_written_objects_and_for_files(saved: Path, cap
     ],
 )
 def test_bad_input_is_one_line(saved: Path, capfd: Capture, words: list[str], says: str) -> None:
+    assert run(["export", *words]) == 2
+    (line,) = capfd.readouterr().err.strip().splitlines()
+    assert says in line
+    assert [path.name for path in saved.iterdir()] == ["scene.json"]
+
+
+def test_the_field_of_a_tree_becomes_a_volume(folder: Path, capsys: Capture) -> None:
+    ball = Point((1e6, 0, 0), radius=1.0)
+    save(ball, "ball.json")
+    assert run(["export", "ball.json", "-o", "ball.vti", "--cells", "16"]) == 0
+    assert run(["export", "ball.json", "-o", "ball.nrrd", "--cells", "16", "--distance"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:2] == ["ball.vti", "ball.nrrd"]
+    assert lines[2].startswith("distances are exact to 0.0")
+    field = pv.read("ball.vti")
+    distance: Any = pv.read("ball.nrrd")
+    assert field.center == pytest.approx((1e6, 0, 0), abs=0.1)
+    assert field.bounds == pytest.approx(distance.bounds)
+    assert field.point_data["field"].max() == pytest.approx(1.0, abs=1e-3)
+    assert distance.active_scalars.min() == pytest.approx(-1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["scene.json", "-o", "a.vti"], "got MeshObject, MeshObject in 'scene.json'"),
+        (["knot", "-o", "a.nrrd"], "got MeshObject in 'knot'"),
+        (["scene.json", "-o", "a.ply", "--distance"], "--distance: expected an output that ends in .vti"),
+        (["spheres", "-o", "a.npy", "--cells", "99999"], "expected at most 67,108,864 grid points"),
+    ],
+)
+def test_what_is_no_volume_is_one_line(saved: Path, capfd: Capture, words: list[str], says: str) -> None:
     assert run(["export", *words]) == 2
     (line,) = capfd.readouterr().err.strip().splitlines()
     assert says in line

@@ -1,0 +1,1 @@
+"""Tests of fields and distances on grids."""
