@@ -1,22 +1,41 @@
 // The software rasteriser ends all loops of a pixel after a number of turns, without an error: then a loop of two
-// turns has one (decals/rendering/loop_guard.py). To be included once, and called behind all other loops.
+// turns has one. Such a pixel is drawn again from where it was, until it is complete (decals/rendering/loop_guard.py).
 #ifdef GUARDED
 layout(binding = 3, r32ui) writeonly uniform uimage2D ended_loops;
+layout(binding = 4, r32f) uniform image2D resumed_ways;  // of each pixel: where its ray goes on; -1: complete
 uniform int guard_turns;  // 2; a number here would be unrolled
+uniform bool resumed;     // false: all rays begin at their start
 
 bool loops_ended() {
     int turns = 0;
     while (turns < guard_turns) {
         turns += 1;
     }
-    if (turns == guard_turns) {
-        return false;
+    return turns != guard_turns;
+}
+
+// The way along its ray at which a pixel begins; -1 if the pixel is complete.
+float resumed_way(ivec2 pixel) {
+    return resumed ? imageLoad(resumed_ways, pixel).x : 0.0;
+}
+
+// Return whether a pixel is complete; `way` is known to be free of surface.
+bool complete(ivec2 pixel, float way) {
+    bool ended = loops_ended();
+    if (ended) {
+        imageStore(ended_loops, ivec2(0), uvec4(1u));
     }
-    imageStore(ended_loops, ivec2(0), uvec4(1u));
-    return true;
+    if (ended || resumed) {
+        imageStore(resumed_ways, pixel, vec4(ended ? way : -1.0));
+    }
+    return !ended;
 }
 #else
-bool loops_ended() {
-    return false;
+float resumed_way(ivec2 pixel) {
+    return 0.0;
+}
+
+bool complete(ivec2 pixel, float way) {
+    return true;
 }
 #endif

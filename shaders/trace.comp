@@ -14,7 +14,11 @@ void main() {
         return;
     }
     ivec2 texel = rectangle.xy + offset;
-    Hit hit = trace_pixel(vec2(texel) + 0.5);
+    float start = resumed_way(texel);
+    if (start < 0.0) {
+        return;
+    }
+    Hit hit = trace_pixel(vec2(texel) + 0.5, start);
     vec4 before = imageLoad(g_position, texel);
     bool missed =
         hit.distance < 0.0 || (before.w > 0.0 && dot(before.xyz - hit.position, hit.direction) <= 0.0);
@@ -22,7 +26,7 @@ void main() {
     if (!missed) {
         surface = surface_of(hit);
     }
-    if (loops_ended() || missed) {
+    if (!complete(texel, hit.way) || missed) {
         return;
     }
     imageStore(g_position, texel, surface.position);

@@ -3,13 +3,18 @@
 //@ include trace.glsl
 
 void main() {
-    Hit hit = trace_pixel(gl_FragCoord.xy);
+    ivec2 texel = ivec2(gl_FragCoord.xy);
+    float start = resumed_way(texel);
+    if (start < 0.0) {
+        discard;
+    }
+    Hit hit = trace_pixel(gl_FragCoord.xy, start);
     bool missed = hit.distance < 0.0;
     Surface surface;
     if (!missed) {
         surface = surface_of(hit);
     }
-    if (loops_ended() || missed) {
+    if (!complete(texel, hit.way) || missed) {
         discard;
     }
     write_surface(surface);

@@ -10,7 +10,6 @@ uniform vec3 grid_lower;
 uniform float block_size;
 uniform ivec3 grid_counts;
 uniform float tolerance;
-uniform vec2 ray_part;
 
 vec4 tape_texel(sampler2D data, int i) {
     return texelFetch(data, ivec2(i & 4095, i >> 12), 0);
@@ -34,18 +33,19 @@ struct Hit {
     vec3 direction;  // unit
     vec3 position;
     ivec2 span;      // of the tape in the block of the hit
+    float way;       // up to which the ray was traced, see trace_ray
 };
 
-Hit trace_pixel(vec2 pixel) {
+Hit trace_pixel(vec2 pixel, float start) {
     vec3 origin = ray_origin(pixel);
     vec3 direction = normalize(ray_direction(pixel));
-    vec3 hit = trace_ray(origin, direction);
+    vec4 hit = trace_ray(origin, direction, start);
     vec3 position = origin + direction * hit.x;
     float depth = window_depth(position);
     if (depth < 0.0 || depth > 1.0) {
         hit.x = -1.0;  // a clipping plane hides it
     }
-    return Hit(hit.x, direction, position, ivec2(hit.yz));
+    return Hit(hit.x, direction, position, ivec2(hit.zw), hit.y);
 }
 
 Surface surface_of(Hit hit) {

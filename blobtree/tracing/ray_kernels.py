@@ -57,7 +57,6 @@ BLOCK_OVERLAP = 0.1
     tape="tape",
     start="tape_start",
     blocks="blocks",
-    part="ray_part",
 )
 class RayCells:
     """`tree_cells.TracingCells` on one device; ``shaders/trace.glsl`` declares the fields as uniforms."""
@@ -69,8 +68,6 @@ class RayCells:
     tape: Texels
     start: wp.int32
     blocks: wp.array(dtype=wp.int32)
-    part: wp.vec2
-    """Start and end of the part of each ray that is traced, over its length in the grid: (0, 1) for all."""
 
 
 @wp.func
@@ -82,8 +79,11 @@ def first_hit(
     tolerance: wp.float32,
     tape: Texels,
     span: wp.vec2i,
-) -> wp.float32:
+) -> wp.vec2:
     """Return the distance along the unit `direction` to the first point inside in [t_min, t_max], or MISS.
+
+    The second number is the distance up to which the ray was traced before the last step. A driver that ends
+    loops (``shaders/loop_guard.glsl``) can spoil that step alone, because it ends this loop behind it.
 
     A point is a hit if it lies inside, or if Newton's method along the gradient takes it to the surface in
     few steps of at most a tolerance: ISO − f ≤ tolerance · |∇f|. One step is not enough, for a steep field
@@ -95,16 +95,18 @@ def first_hit(
     """
     t = t_min
     reach = wp.max(t_max - t_min, 4.0 * tolerance)
+    traced = float(t_min)
     last_gap = float(1.0)
     last_step = float(0.0)
     for step in range(MAX_STEPS):
+        traced = t
         if t > t_max:
-            return MISS
+            return wp.vec2(MISS, traced)
         bound = field_bound(origin + direction * t, direction, reach, tape, span)
         gap = ISO - bound[0]
         free = reach
         if gap <= 0.0:
-            return t + last_step * gap / (last_gap - gap)
+            return wp.vec2(t + last_step * gap / (last_gap - gap), traced)
         if bound[1] * reach > gap:
             free = gap / bound[1]
             if free <= tolerance:
@@ -124,13 +126,13 @@ def first_hit(
                         break
                     q += slope * ((ISO - f[0]) / (steepness * steepness))
                 if at_surface:
-                    return t + newton_step(gap, rise, tolerance)
+                    return wp.vec2(t + newton_step(gap, rise, tolerance), traced)
             free = wp.max(free, tolerance * wp.max(1.0, float(step) / STEPS_PER_TOLERANCE))
         t += free
         last_gap = gap
         last_step = free
         reach = 2.0 * free
-    return MISS
+    return wp.vec2(MISS, traced)
 
 
 @wp.func
@@ -181,19 +183,23 @@ def exit_distance(origin: wp.vec3, inverse: wp.vec3, lower: wp.vec3, upper: wp.v
 
 
 @wp.func
-def trace_ray(origin: wp.vec3, direction: wp.vec3, cells: RayCells) -> wp.vec3:
-    """Return the first hit of a ray: (distance or MISS, first texel of the tape there, one past its last)."""
+def trace_ray(origin: wp.vec3, direction: wp.vec3, start: wp.float32, cells: RayCells) -> wp.vec4:
+    """Return the first hit of a ray: (distance or MISS, way, first texel of the tape there, end of the tape).
+
+    A way counts from where the ray enters the grid. The ray is traced from the way `start`, and was traced up
+    to the one that is returned.
+    """
     counts = cells.counts
     extent = cells.block_size * wp.vec3(float(counts[0]), float(counts[1]), float(counts[2]))
     interval = box_interval(origin, direction, cells.lower, cells.lower + extent)
     entry = origin + direction * interval[0]  # distances count from here, for the origin may be far away
-    length = interval[1] - interval[0]
-    last = length * cells.part[1]
+    last = interval[1] - interval[0]
     inverse = reciprocal(direction)
-    t = length * cells.part[0]
+    t = float(start)
+    way = float(start)
     for _block in range(MAX_BLOCKS):
         if t > last:
-            return wp.vec3(MISS, 0.0, 0.0)
+            return wp.vec4(MISS, way, 0.0, 0.0)
         p = (entry + direction * t - cells.lower) / cells.block_size
         x = wp.clamp(int(wp.floor(p[0])), 0, counts[0] - 1)
         y = wp.clamp(int(wp.floor(p[1])), 0, counts[1] - 1)
@@ -208,14 +214,15 @@ def trace_ray(origin: wp.vec3, direction: wp.vec3, cells: RayCells) -> wp.vec3:
         leave = wp.max(leave, t) + BLOCK_OVERLAP * cells.tolerance
         if block == SURELY_INSIDE:
             whole = float(cells.start + 1)
-            return wp.vec3(interval[0] + t, whole, whole + cells.tape[cells.start][0])
+            return wp.vec4(interval[0] + t, t, whole, whole + cells.tape[cells.start][0])
         if block >= 0:
             span = wp.vec2i(block + 1, block + 1 + int(cells.tape[block][0]))
             hit = first_hit(entry, direction, t, leave, cells.tolerance, cells.tape, span)
-            if hit >= 0.0:
-                return wp.vec3(interval[0] + hit, float(span[0]), float(span[1]))
+            way = hit[1]
+            if hit[0] >= 0.0:
+                return wp.vec4(interval[0] + hit[0], way, float(span[0]), float(span[1]))
         t = leave
-    return wp.vec3(MISS, 0.0, 0.0)
+    return wp.vec4(MISS, way, 0.0, 0.0)
 
 
 @wp.kernel
@@ -230,9 +237,9 @@ def trace_rays(
     """Write the distance to each ray's first hit, inf for a miss, and the span of the tape at the hit."""
     i = first + wp.tid()
     direction = wp.normalize(directions[i])
-    hit = trace_ray(origins[i], direction, cells)
+    hit = trace_ray(origins[i], direction, 0.0, cells)
     t = hit[0]
     if t < 0.0:
         t = wp.inf
     distances[i] = t
-    spans[i] = wp.vec2i(int(hit[1]), int(hit[2]))
+    spans[i] = wp.vec2i(int(hit[2]), int(hit[3]))

@@ -94,7 +94,6 @@ class TracingCells:
         copy = device != "cpu"  # the processor's kernels read the arrays themselves
         arrays.tape = wp.array(self.tape, dtype=wp.vec4, device=device, copy=copy)
         arrays.start = self.start
-        arrays.part = wp.vec2(0.0, 1.0)
         arrays.blocks = wp.array(self.blocks, dtype=wp.int32, device=device, copy=copy)
         return DeviceCells(arrays.tape, arrays, self.instruction_set)
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from blobtree._typing import Float32Array
 from decals.rendering.context import DEPTH, Context
+from decals.rendering.loop_guard import LoopGuard
 from decals.rendering.pixel_pass import (
     GROUP,
     PassBackend,
@@ -39,6 +40,7 @@ class GBuffer:
         self.depth = context.texture(size, DEPTH)
         for texture in (self.position, self.normal, self.color):
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self.guard = LoopGuard(context, size)
         self._framebuffer = context.gl.framebuffer([self.position, self.normal, self.color], self.depth)
         self._depth_framebuffer = context.gl.framebuffer([], self.depth)
         self._depth_program = depth_program(context)
@@ -107,7 +109,15 @@ class GBuffer:
     def release(self) -> None:
         """Release the memory."""
         framebuffers = self._framebuffer, self._depth_framebuffer
-        for resource in (self._screen, *framebuffers, self.position, self.normal, self.color, self.depth):
+        for resource in (
+            self._screen,
+            *framebuffers,
+            self.guard,
+            self.position,
+            self.normal,
+            self.color,
+            self.depth,
+        ):
             resource.release()
 
 

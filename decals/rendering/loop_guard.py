@@ -1,9 +1,12 @@
-"""Detection of loops that the software rasteriser ended.
+"""Drawings that go on where the software rasteriser ended loops.
 
 Mesa's software rasteriser ends all loops of a pixel, and of the pixels beside it, after
 `context.SOFTWARE_LOOP_ITERATIONS` turns, without an error. Such a pixel has no right value. A shader with
-``shaders/loop_guard.glsl`` leaves it out and reports it here, so that it can be drawn again in several parts.
+``shaders/loop_guard.glsl`` leaves it out, reports it, and keeps how far its ray was traced. Further drawings
+go on there. Each of them takes every ray on by one step at least.
 """
+
+from collections.abc import Iterator
 
 import moderngl
 import numpy as np
@@ -11,41 +14,65 @@ import numpy as np
 from decals.rendering.context import Context
 from decals.rendering.pixel_pass import Program, set_uniform
 
-GUARD_UNIT = 3
-"""Image unit of ``loop_guard.glsl``."""
+REPORT_UNIT, WAYS_UNIT = 3, 4
+"""Image units of ``loop_guard.glsl``."""
 
 GUARD_VERSION = 420
 """Version of OpenGL whose shaders write to images."""
 
+MAX_DRAWINGS = 4096
+"""Most drawings of the same pixels; what is still incomplete then is left out."""
+
+COMPLETE = -1.0
+"""Entry of a pixel that is complete, in place of the way along its ray."""
+
 
 class LoopGuard:
-    """The report of one kind of shader, on drivers that end loops; on others nothing is reported."""
+    """The incomplete pixels of one target, on drivers that end loops; on others all are complete.
 
-    def __init__(self, context: Context) -> None:
-        self._gl = context.gl
-        self._report: moderngl.Texture | None = None
-        if is_guarded(context):
-            self._report = context.gl.texture((1, 1), 1, dtype="u4")
+    Parameters
+    ----------
+    context
+        Where to make the textures.
+    size
+        Width and height of the target in samples.
+    """
 
-    def use(self, program: Program) -> None:
-        """Clear the report, and bind it for a program."""
-        if self._report is not None:
-            self._report.write(np.zeros(1, np.uint32).tobytes())
-            self._report.bind_to_image(GUARD_UNIT, read=False, write=True)
-            set_uniform(program, "guard_turns", 2)
+    def __init__(self, context: Context, size: tuple[int, int]) -> None:
+        self._context, self._size = context, size
+        self._textures: list[moderngl.Texture] = []
+        self._all_complete = False
 
-    @property
-    def ended(self) -> bool:
-        """True if loops were ended since `use`; this waits for the drawing."""
-        if self._report is None:
-            return False
-        self._gl.memory_barrier()
-        return bool(np.frombuffer(self._report.read(), np.uint32)[0])
+    def drawings(self, program: Program) -> Iterator[None]:
+        """Yield before each drawing with a program, until all pixels are complete."""
+        if not is_guarded(self._context):
+            yield
+            return
+        report, ways = self._textures = self._textures or self._new_textures()
+        if not self._all_complete:  # new, or a drawing was given up
+            ways.write(np.full(self._size, COMPLETE, np.float32).tobytes())
+        set_uniform(program, "guard_turns", 2)
+        for number in range(MAX_DRAWINGS):
+            report.write(np.zeros(1, np.uint32).tobytes())
+            report.bind_to_image(REPORT_UNIT, read=False, write=True)
+            ways.bind_to_image(WAYS_UNIT, read=True, write=True)
+            set_uniform(program, "resumed", number > 0)
+            self._all_complete = False
+            yield
+            self._context.gl.memory_barrier()
+            self._all_complete = not np.frombuffer(report.read(), np.uint32)[0]
+            if self._all_complete:
+                return
+
+    def _new_textures(self) -> list[moderngl.Texture]:
+        """Return the textures: whether loops were ended, and how far the ray of each pixel was traced."""
+        gl = self._context.gl
+        return [gl.texture((1, 1), 1, dtype="u4"), gl.texture(self._size, 1, dtype="f4")]
 
     def release(self) -> None:
         """Release the memory."""
-        if self._report is not None:
-            self._report.release()
+        for texture in self._textures:
+            texture.release()
 
 
 def is_guarded(context: Context) -> bool:

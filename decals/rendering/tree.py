@@ -11,7 +11,7 @@ from blobtree.tracing.tree_cells import TracingCells, tracing_cells
 from decals.rendering.context import Context
 from decals.rendering.data_texture import DataTexture
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.loop_guard import LoopGuard, is_guarded
+from decals.rendering.loop_guard import is_guarded
 from decals.rendering.pixel_pass import GROUP, PassBackend, Program, attach_camera, draw, set_uniform
 from decals.rendering.tracing_shader import Kinds, tracing_shader
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile
@@ -20,9 +20,6 @@ from decals.shaders import Source, compose
 
 BOX_VERTICES = 36
 """Vertices of the triangles in ``box.vert``."""
-
-RAY_PARTS = (1, 8, 64, 512)
-"""Parts in which rays are traced, one drawing each: the first number for which no loop is ended."""
 
 POSITION_UNIT, NORMAL_UNIT, COLOR_UNIT = range(3)
 """Image units of ``trace.comp``."""
@@ -53,7 +50,6 @@ class TreeDrawable:
         self._uniforms = {**tracing_uniforms(cells), "tape": 0, "blocks": 1}
         self._gl = context.gl
         self._program = tracing_program(context, self.kinds)
-        self._guard = LoopGuard(context)
         self._box: moderngl.VertexArray | None = None
         if isinstance(self._program, moderngl.Program):
             self._box = context.gl.vertex_array(self._program, [])
@@ -85,13 +81,8 @@ class TreeDrawable:
             texture.use(unit)
         for name, value in {**self._uniforms, "object_id": object_id}.items():
             set_uniform(self._program, name, value)
-        for count in RAY_PARTS:
-            self._guard.use(self._program)
-            for number in range(count):
-                set_uniform(self._program, "ray_part", (number / count, (number + 1) / count))
-                self._trace(tile, gbuffer, part)
-            if not self._guard.ended:
-                return
+        for _ in gbuffer.guard.drawings(self._program):
+            self._trace(tile, gbuffer, part)
 
     def _trace(self, tile: Tile, gbuffer: GBuffer, part: Part) -> None:
         """Trace these rays once; hits behind others are hidden."""
@@ -118,7 +109,6 @@ class TreeDrawable:
         """Release the memory."""
         for texture in self._textures:
             texture.release()
-        self._guard.release()
         if self._box is not None:
             self._box.release()
 
@@ -156,7 +146,6 @@ def tracing_uniforms(cells: TracingCells) -> dict[str, object]:
         "grid_counts": cells.counts,
         "tolerance": cells.tolerance,
         "tape_start": cells.start,
-        "ray_part": (0.0, 1.0),
     }
 
 

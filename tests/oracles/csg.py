@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from blobtree import (
     Box,
@@ -27,18 +27,23 @@ from blobtree import (
     Polyline,
     Rectangle,
     Segment,
+    Superquadric,
+    SymmetricDifference,
     Torus,
     Transform,
     Triangle,
     Union,
+    Volume,
 )
-from tests.oracles import shapes
+from tests.oracles import shapes, volumes
 
 Floats = NDArray[np.float64]
 
-CURVE_SAMPLES = 4000
-NEAREST_SAMPLES = 8
+CURVE_BALLS = 4001
 COARSE_STEP = 16
+
+POINTS_AT_ONCE = 2048
+"""Points for which an evaluation of a tree takes hardly longer than for one."""
 
 
 def signed_distance(node: Node, q: Floats) -> Floats:
@@ -55,6 +60,12 @@ def signed_distance(node: Node, q: Floats) -> Floats:
             local = np.linalg.solve(linear, (q - offset).T).T
             smallest = float(np.linalg.svd(linear, compute_uv=False)[-1])
             return np.asarray(smallest * signed_distance(child, local))
+        case SymmetricDifference():
+            return signed_distance(node.expanded, q)
+        case Volume():
+            return np.asarray(volumes.distance(node, q) / np.sqrt(3.0))  # each of its slopes is 1 at most
+        case Superquadric():
+            return _from_superquadric(q, node)
         case Ellipsoid(center=center, semi_axes=axes):
             ratio = np.linalg.norm((q - np.array(center)) / np.array(axes), axis=1)
             return np.asarray(min(axes) * (ratio - 1.0))
@@ -135,22 +146,36 @@ def _from_cone(q: Floats, cone: Cone) -> Floats:
     return np.asarray(np.hypot(across, along - place) - (cone.radius + slope * place))
 
 
+def _from_superquadric(q: Floats, node: Superquadric) -> Floats:
+    """The norm less 1, over its largest slope: those of p-norms, p = 2 / exponent, multiply."""
+    x, y, z = (np.abs(q - np.array(node.center)) / np.array(node.semi_axes)).T
+    across = _p_norm(x, y, 2.0 / node.horizontal)
+    excess = [max(0.5 * exponent - 0.5, 0.0) for exponent in (node.horizontal, node.vertical)]
+    slope = 2.0 ** sum(excess) / min(node.semi_axes)
+    return np.asarray((_p_norm(across, z, 2.0 / node.vertical) - 1.0) / slope)
+
+
+def _p_norm(x: Floats, y: Floats, p: float) -> Floats:
+    largest = np.maximum(np.maximum(x, y), 1e-300)
+    return np.asarray(largest * ((x / largest) ** p + (y / largest) ** p) ** (1.0 / p))
+
+
 def _from_curve(q: Floats, node: object) -> Floats:
-    """The least distance less radius, over the nearest samples of a curve and fewer of all of it."""
-    balls = shapes.curve_of(node)(np.linspace(0.0, 1.0, CURVE_SAMPLES))
-    nearest = cKDTree(balls[:, :3]).query(q, NEAREST_SAMPLES)[1]
-    least = (np.linalg.norm(q[:, None] - balls[nearest, :3], axis=2) - balls[nearest, 3]).min(axis=1)
-    if np.ptp(balls[:, 3]) == 0.0:
-        return np.asarray(least)
-    for ball in balls[::COARSE_STEP]:
-        least = np.minimum(least, np.linalg.norm(q - ball[:3], axis=1) - ball[3])
-    return np.asarray(least)
+    """The least distance less radius, over every COARSE_STEP-th ball of a curve and all beside the best."""
+    balls = shapes.curve_of(node)(np.linspace(0.0, 1.0, CURVE_BALLS))
+    coarse = balls[::COARSE_STEP]
+    best = (cdist(q, coarse[:, :3]) - coarse[:, 3]).argmin(axis=1)
+    places = COARSE_STEP * best[:, None] + np.arange(-COARSE_STEP, COARSE_STEP + 1)
+    near = balls[np.clip(places, 0, CURVE_BALLS - 1)]
+    gaps: Floats = np.linalg.norm(q[:, None] - near[..., :3], axis=2) - near[..., 3]
+    return gaps.min(axis=1)
 
 
 def deep_hits(node: Node, origins: Floats, directions: Floats, depth: float) -> Floats:
     """Distances (n,) along rays of unit direction at which they first are `depth` inside; inf for none.
 
-    Rays march in steps of the signed distance, half the depth at least.
+    Rays march in steps of the signed distance, half the depth at least. Where few rays are left, each takes
+    several of the least steps at once.
     """
     center = np.mean(node.support, axis=0, dtype=np.float64)
     radius = 0.5 * float(np.linalg.norm(np.subtract(*node.support[::-1])))
@@ -158,9 +183,14 @@ def deep_hits(node: Node, origins: Floats, directions: Floats, depth: float) -> 
     t, far = np.maximum(middle - radius, 0.0), middle + radius
     found, active = np.full(len(t), np.inf), np.arange(len(t))
     while len(active):
-        distance = signed_distance(node, origins[active] + t[active, None] * directions[active])
-        deep = distance < -depth
-        found[active[deep]] = t[active[deep]]
-        t[active] += np.maximum(np.abs(distance), 0.5 * depth)
-        active = active[~deep & (t[active] <= far[active])]
+        ahead = 0.5 * depth * np.arange(max(POINTS_AT_ONCE // len(active), 1))
+        ways = t[active, None] + ahead
+        points = origins[active, None] + ways[..., None] * directions[active, None]
+        distances = signed_distance(node, points.reshape(-1, 3)).reshape(ways.shape)
+        free = np.maximum.accumulate(ways + np.maximum(np.abs(distances), 0.5 * depth), axis=1)
+        deep = distances < -depth
+        first = np.where(deep.any(axis=1), deep.argmax(axis=1), -1)
+        found[active] = np.where(first < 0, np.inf, ways[np.arange(len(active)), first])
+        t[active] = free[:, -1]
+        active = active[(first < 0) & (t[active] <= far[active])]
     return found

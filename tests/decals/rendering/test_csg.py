@@ -5,11 +5,12 @@ import pytest
 
 from blobtree import Box, Node
 from decals.rendering.renderer import Renderer
-from tests.bench.trust_csg import holes_of, visible_tree
+from decals.scenes.camera import Camera
+from tests.bench.trust_csg import holes_of, scene
 from tests.blobtree.csg_trees import PRIMITIVES, csg_primitive
 
 SIZE = (48, 36)
-DIRECTION = np.array([0.3, 0.5, 1.0])
+DIRECTION = (0.3, 0.5, 1.0)
 
 
 def carved(kind: str, radius: float, operation: str) -> Node:
@@ -35,14 +36,14 @@ ORDINARY = {("box", 1e-3, "difference"), ("cylinder", 1e-5, "difference"), ("pol
     [pytest.param(*case, marks=() if case in ORDINARY else pytest.mark.slow) for case in CASES],
 )
 def test_no_pixel_of_sharp_csg_misses(fragment: Renderer, kind: str, radius: float, operation: str) -> None:
-    holes = holes_of(carved(kind, radius, operation), DIRECTION, fragment, SIZE)
+    tree = carved(kind, radius, operation)
+    holes = holes_of(tree, Camera.framing(tree.support, direction=DIRECTION), fragment, SIZE)
     assert holes.of_picture == holes.of_rays == 0
     assert operation == "intersection" or holes.pixels > 200
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(8))
-def test_no_pixel_of_random_csg_misses(fragment: Renderer, seed: int) -> None:
-    rng = np.random.default_rng([7, seed])
-    holes = holes_of(visible_tree(rng, 1 + seed % 4), rng.normal(size=3), fragment, SIZE)
+@pytest.mark.parametrize("case", range(24))
+def test_no_pixel_of_random_csg_misses(fragment: Renderer, case: int) -> None:
+    holes = holes_of(*scene(7, case), fragment, SIZE)
     assert holes.of_picture == holes.of_rays == 0

@@ -1,0 +1,110 @@
+"""Pixels whose loops the software rasteriser ends are drawn to their end, and leave nothing behind."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blobtree import Box, Node, Point, Union
+from decals.rendering.loop_guard import LoopGuard
+from decals.rendering.options import RenderOptions
+from decals.rendering.pixel_pass import Program
+from decals.rendering.renderer import Renderer
+from decals.rendering.tree import TreeDrawable
+from decals.scenes.camera import Camera
+from tests.blobtree.csg_trees import csg_primitive
+from tests.decals.glsl.tapes import Model
+from tests.decals.shapes import View
+
+SIZE = (48, 36)
+
+
+def bored() -> Node:
+    """A block with bores that taper to nothing: some rays take thousands of roots of polynomials."""
+    bores = (csg_primitive(np.random.default_rng([3, number]), "tapered", 1e-5) for number in range(6))
+    return Box((0, 0, 0), (1.6, 1.6, 1.2), radius=1e-5) - Union(tuple(bores))
+
+
+def camera_of(tree: Node) -> Camera:
+    return Camera.framing(tree.support, direction=(0.3, 0.5, 1.0))
+
+
+def missing(tree: Node, renderer: Renderer) -> int:
+    """Return the number of pixels that show no surface where a ray through them hits."""
+    camera = camera_of(tree)
+    x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, SIZE[1] - np.arange(SIZE[1]) - 0.5)
+    rays = camera.rays(*SIZE)
+    directions = rays.directions(x, y).reshape(-1, 3)
+    hits = tree.raycast(np.broadcast_to(rays.origin, directions.shape), directions).hit
+    buffers = renderer.buffers(View((Model(tree),), camera), RenderOptions(size=SIZE))
+    return int((hits & (buffers.object_id.ravel() < 0)).sum())
+
+
+@pytest.fixture
+def drawings(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The number of drawings of each tree."""
+    numbers: list[int] = []
+    plain = LoopGuard.drawings
+
+    def counted(guard: LoopGuard, program: Program) -> Iterator[None]:
+        numbers.append(0)
+        for _ in plain(guard, program):
+            numbers[-1] += 1
+            yield
+
+    monkeypatch.setattr(LoopGuard, "drawings", counted)
+    return numbers
+
+
+def skip_without_limit(renderer: Renderer) -> None:
+    if renderer.context.max_loop_iterations is None:
+        pytest.skip("this driver has no limit of turns")
+
+
+@pytest.mark.parametrize("backend", ["fragment", "compute"])
+def test_rays_go_on_where_loops_were_ended(
+    request: pytest.FixtureRequest, drawings: list[int], backend: str
+) -> None:
+    renderer: Renderer = request.getfixturevalue(backend)
+    skip_without_limit(renderer)
+    tree = bored()
+    assert missing(tree, renderer) == 0
+    assert drawings[-1] > 2
+    renderer.buffers(View((Model(Point((0, 0, 0), radius=1.0)),), camera_of(tree)), RenderOptions(size=SIZE))
+    assert drawings[-1] == 1
+
+
+def test_without_the_guard_pixels_miss(fragment: Renderer) -> None:
+    skip_without_limit(fragment)
+    tree = bored()
+    with Renderer() as unguarded:
+        unguarded.context.max_loop_iterations = None
+        assert missing(tree, unguarded) > 0
+
+
+def test_a_drawing_that_was_given_up_hides_no_pixel(
+    fragment: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    skip_without_limit(fragment)
+    tree, left = bored(), 2
+    view, options = View((Model(tree),), camera_of(tree)), RenderOptions(size=SIZE)
+    plain = TreeDrawable._trace
+
+    def given_up(*arguments: Any) -> None:
+        nonlocal left
+        left -= 1
+        if not left:
+            raise InterruptedError
+        plain(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(TreeDrawable, "_trace", given_up)
+        with pytest.raises(InterruptedError):
+            fragment.buffers(view, options)
+    ball = Point((0, 0, 0), radius=1.0)
+    seen = fragment.buffers(View((Model(ball),), view.camera), options)
+    with Renderer() as other:
+        expected = other.buffers(View((Model(ball),), view.camera), options)
+    np.testing.assert_array_equal(seen.object_id, expected.object_id)
+    assert missing(tree, fragment) == 0
