@@ -157,8 +157,13 @@ def _row(
     texts["call"] = f"{source.function.key}({', '.join(['q', *readings])})"
     scope = {source.function.key: source.function}
     closest = generated(kind, digest, "closest", _CLOSEST, scope, **texts)
+    apart = (
+        generated(kind, digest, "apart", _APART, {closest.key: closest}, call=closest.key) if convex else 1.0
+    )
     smallest = cast(wp.Function, min_influence_of_one)
-    return Skeleton(kind, closest, smallest, texels, folds_maps=False, convex=convex, digest=digest)
+    return Skeleton(
+        kind, closest, smallest, texels, folds_maps=False, convex=convex, apart=apart, digest=digest
+    )
 
 
 _CLOSEST = '''\
@@ -166,4 +171,12 @@ def {name}(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
     """The user's closest point, and the influence."""
 {texels}    c = {call}
     return wp.vec4(c[0], c[1], c[2], t0[{influence}])
+'''
+
+_APART = '''\
+def {name}(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
+    """The squared distance from the skeleton, over the squared influence."""
+    c = {call}(q, tape, at)
+    w = q - wp.vec3(c[0], c[1], c[2])
+    return wp.dot(w, w) / (c[3] * c[3])
 '''

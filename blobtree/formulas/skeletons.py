@@ -231,6 +231,8 @@ class Skeleton:
     """Of a set whose influence varies: a lower bound on the distance of a point from it; 0 is unknown."""
     depth: wp.Function | float = 0.0
     """Of a solid set: a lower bound on the distance of a point inside from its rim, at most 0 outside."""
+    apart: wp.Function | float = 1.0
+    """Of a convex set of unknown depth: (|q − closest| / influence)² of a point q; 1 is unknown."""
     digest: str = ""
     """Digest of the sources of a custom kind."""
 

@@ -63,6 +63,11 @@ def depth(kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
 
 
 @of_row("skeletons")
+def apart(kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
+    """Return `Skeleton.apart`."""
+
+
+@of_row("skeletons")
 def stride(kind: wp.int32) -> wp.int32:
     """Return the number of texels of a primitive: its parameters and its colour."""
 

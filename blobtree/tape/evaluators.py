@@ -12,8 +12,8 @@ Each evaluator is the set of functions over which the interpreter's loop is clos
   front;
 * `scale_speed(kind, q, speed, reach, tape, at)`: a bound on the speed behind the warp with parameters at
   tape[at] of a point that moves at most at `speed` in front of it;
-* `way(kind, q, ahead, speed, tape, at)`: the part of the way ahead on which a primitive of the skeleton at
-  tape[at] may change;
+* `way(kind, q, c, ahead, speed, tape, at)`: the part of the way ahead on which a primitive of the skeleton at
+  tape[at] may change, c being the closest point to q;
 * `combine(operator, a, b, reach, parameter, tape)`, and the `empty` field;
 * `paint(q, c, color, tape)`: the colour of a leaf at q, from its texel, for the three functions of leaves.
 
@@ -41,6 +41,7 @@ from blobtree.formulas.skeletons import TINY
 from blobtree.formulas.windows import box_window, box_window_bounds, windowed, windowed_bounds
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.dispatch import (
+    apart,
     depth,
     falloff_numbers,
     falloff_slope,
@@ -59,6 +60,9 @@ from blobtree.tape.dispatch import (
 from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
+
+INSIDE = wp.constant(1e-3)
+"""Distance from a solid skeleton, over its influence, up to which rounding may move a point inside."""
 
 BALL_MARGIN = wp.constant(1.0 + 1e-6)
 """Widening of the ball around a segment of a ray, for rounding."""
@@ -193,7 +197,7 @@ def constant_speed(
 
 @wp.func
 def whole_way(
-    kind: wp.int32, q: wp.vec3, ahead: wp.vec4, speed: wp.float32, tape: Texels, at: wp.int32
+    kind: wp.int32, q: wp.vec3, c: wp.vec4, ahead: wp.vec4, speed: wp.float32, tape: Texels, at: wp.int32
 ) -> wp.vec4:
     """Return `ahead`: results at a point alone do not depend on it."""
     return ahead
@@ -271,11 +275,31 @@ def way_outside(ahead: wp.vec4, inside: wp.float32, speed: wp.float32) -> wp.vec
 
 
 @wp.func
+def way_end(q: wp.vec3, ahead: wp.vec4) -> wp.vec3:
+    """Return the end of the way ahead."""
+    return q + wp.vec3(ahead[0], ahead[1], ahead[2]) * ahead[3]
+
+
+@wp.func
+def way_between(ahead: wp.vec4, start_apart: wp.float32, end_apart: wp.float32) -> wp.vec4:
+    """Return the way ahead; none of it if both its ends lie in a convex skeleton, which then has all of it.
+
+    The numbers are (distance / influence)² of the ends.
+    """
+    direction = wp.vec3(ahead[0], ahead[1], ahead[2])
+    if wp.dot(direction, direction) == 0.0 or start_apart + end_apart > INSIDE * INSIDE:
+        return ahead
+    return wp.vec4(ahead[0], ahead[1], ahead[2], 0.0)
+
+
+@wp.func
 def bound_way(
-    kind: wp.int32, q: wp.vec3, ahead: wp.vec4, speed: wp.float32, tape: Texels, at: wp.int32
+    kind: wp.int32, q: wp.vec3, c: wp.vec4, ahead: wp.vec4, speed: wp.float32, tape: Texels, at: wp.int32
 ) -> wp.vec4:
-    """Return the way ahead outside a solid skeleton."""
-    return way_outside(ahead, depth(kind, q, tape, at), speed)
+    """Return the way ahead outside a solid skeleton, as far as its depth or its convexity is known."""
+    end_apart = apart(kind, way_end(q, ahead), tape, at)
+    outside = way_between(ahead, squared_distance(q, c), end_apart)
+    return way_outside(outside, depth(kind, q, tape, at), speed)
 
 
 @wp.func

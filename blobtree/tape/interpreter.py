@@ -92,7 +92,7 @@ def make_interpreter(evaluator: Evaluator) -> wp.Function:
             c = closest(code, point, tape, at)
             smallest = min_influence(code, tape, at)
             rate = speed / influence_near(point, c, smallest, clearance(code, point, tape, at))
-            outside = way(code, point, ahead, speed, tape, at)
+            outside = way(code, point, c, ahead, speed, tape, at)
             at += texels
             f = leaf(point, c, paint(point, c, tape[at - 1], tape), outside, rate)
             accumulator = combine(operator, accumulator, f, reach, header[3], tape)
@@ -125,7 +125,7 @@ def make_interpreter(evaluator: Evaluator) -> wp.Function:
             smallest = min_influence(kind, tape, at + PREFIX)
             local_speed = speed * profile[0]
             apart = clearance(kind, local, tape, at + PREFIX)
-            ahead = way(kind, local, ahead, local_speed, tape, at + PREFIX)
+            ahead = way(kind, local, c, ahead, local_speed, tape, at + PREFIX)
             rate = local_speed / influence_near(local, c, smallest, apart)
             end = at + PREFIX + stride(kind)
             color = paint(local, c, tape[end - 1], tape)

@@ -42,6 +42,8 @@ from blobtree.tape.evaluators import (
     direct_value_gradient,
     direction_to_local,
     to_local,
+    way_between,
+    way_end,
     way_outside,
 )
 from blobtree.tape.instruction_set import BUILT_IN, InstructionSet
@@ -151,7 +153,12 @@ def _library(kinds: Kinds, others: Iterable[Any]) -> str:
     skeletons = [kinds.instruction_set.skeletons[code] for code in kinds.skeletons]
     functions = [
         *(f for skeleton in skeletons for f in (skeleton.closest, skeleton.min_influence)),
-        *(f for one in skeletons for f in (one.depth, one.clearance) if isinstance(f, wp.Function)),
+        *(
+            f
+            for one in skeletons
+            for f in (one.depth, one.clearance, one.apart)
+            if isinstance(f, wp.Function)
+        ),
         *(f for choices in _choices(kinds).values() for f in choices.values()),
         *(
             f
@@ -164,6 +171,8 @@ def _library(kinds: Kinds, others: Iterable[Any]) -> str:
         *(_functions_along(kinds, skeletons) if kinds.directed else ()),
         to_local,
         direction_to_local,
+        way_between,
+        way_end,
         way_outside,
         influence_near,
         trace_ray,
@@ -304,6 +313,13 @@ def _run_cases(kinds: Kinds, *, bounds: bool) -> Iterable[str]:
             way, mapped_way = (
                 "vec4(local_direction, reach)",
                 "vec4(direction_to_local(local_direction, tape, map), reach)",
+            )
+        if bounds and isinstance(skeleton.apart, wp.Function):
+            away = skeleton.apart.key
+            way = f"way_between({way}, squared_distance(point, c), {away}(way_end(point, {way}), tape, at))"
+            mapped_way = (
+                f"way_between({mapped_way}, squared_distance(local, c), "
+                f"{away}(way_end(local, {mapped_way}), tape, map + {PREFIX}))"
             )
         if bounds and isinstance(skeleton.depth, wp.Function):
             depth = skeleton.depth.key

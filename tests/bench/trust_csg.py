@@ -74,7 +74,7 @@ def scene(seed: int, case: int) -> tuple[Node, Camera]:
 
 def _near(rng: np.random.Generator, tree: Node) -> Camera | None:
     """A wide camera in or beside the box of a tree, but not in or at its solid; None if none is found."""
-    lower, upper = np.float64(tree.support)
+    lower, upper = (corner.astype(np.float64) for corner in tree.support)
     diagonal = float(np.linalg.norm(upper - lower))
     for _ in range(100):
         eye, target = rng.uniform(lower - 0.1 * diagonal, upper + 0.1 * diagonal), rng.uniform(lower, upper)
@@ -83,8 +83,13 @@ def _near(rng: np.random.Generator, tree: Node) -> Camera | None:
     return None
 
 
-def holes_of(tree: Node, camera: Camera, renderer: Renderer, size: tuple[int, int]) -> Holes:
-    """Return the holes of a tree in a camera's view; pixels beside a silhouette do not count."""
+def holes_of(
+    tree: Node, camera: Camera, renderer: Renderer, size: tuple[int, int], *, twin: Node | None = None
+) -> Holes:
+    """Return the holes of a tree in a camera's view; pixels beside a silhouette do not count.
+
+    `twin` has the same shape, of kinds that the oracle knows.
+    """
     width, height = size
     x, y = np.meshgrid(np.arange(width) + 0.5, height - np.arange(height) - 0.5)
     rays = camera.rays(width, height)
@@ -92,7 +97,7 @@ def holes_of(tree: Node, camera: Camera, renderer: Renderer, size: tuple[int, in
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     origins = np.broadcast_to(rays.origin, directions.shape)
     depth = DEPTH * float(np.linalg.norm(tree.support[1] - tree.support[0]))
-    deep = deep_hits(tree, origins, directions, depth)
+    deep = deep_hits(twin or tree, origins, directions, depth)
     counted = _surrounded(np.isfinite(deep).reshape(height, width)).ravel()
     buffers = renderer.buffers(View((Model(tree),), camera), RenderOptions(size=size))
     distances = np.linalg.norm(buffers.position.reshape(-1, 3) - rays.origin, axis=1)

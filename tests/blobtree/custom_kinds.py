@@ -50,6 +50,7 @@ STEW_PARAMETERS = ("left", "right", "both", "less_left", "less_right")
 
 Ring = define_skeleton(ring, limits={"axis": (1e-3, None), "size": (0.0, None)})
 Brick = define_skeleton(brick, convex=True)
+RoughBrick = define_skeleton(brick, name="rough_brick")
 Path = define_skeleton(path)
 Soft = define_operator(soft, steepest=1.0, like="blend", monotone=True, limits={"hardness": (0.0, SOFTEST)})
 Carve = define_operator(carve, steepest=carve_steepest, like="difference", monotone=True)
@@ -137,6 +138,7 @@ def everything() -> Node:
     third = Path((0, 0, 0), (0, 1, 0), (0, 1, 1), radius=0.2)
     stewed = Stew((first, third), 0.9, 0.8, 0.7, 0.6, 0.5)
     bars = Swirl(Sway(GivenSway(Bar(0.5, radius=0.2), 0.4, 2.0), 0.4, 2.0), (0.1, 0, 0.5), 3)
+    rough = RoughBrick((0, 1, 0), (1, 1, 1), radius=0.2)
     fields = Lump((0, 0, 0), (1, 1, 1), (0, 0, 0), 0.5) + Waves((0, 0, 0), (1, 1, 1), 4.0)
     balls = Point((0, 0, 0), radius=0.2, falloff=Staircase) + Point((0, 0, 0), radius=0.2, falloff=Tent)
     balls += Pair((0, 0, 0), radius=0.2, other=(0.5, 0, 0))
@@ -145,7 +147,7 @@ def everything() -> Node:
             stewed,
             Mean((Soft((first, second), 1.0), third)),
             Carve((second, Shared((first, second)))),
-            bars + fields + balls,
+            bars + rough + fields + balls,
         )
     )
 

@@ -168,7 +168,7 @@ def _from_curve(q: Floats, node: object) -> Floats:
     places = COARSE_STEP * best[:, None] + np.arange(-COARSE_STEP, COARSE_STEP + 1)
     near = balls[np.clip(places, 0, CURVE_BALLS - 1)]
     gaps: Floats = np.linalg.norm(q[:, None] - near[..., :3], axis=2) - near[..., 3]
-    return gaps.min(axis=1)
+    return np.asarray(gaps.min(axis=1))
 
 
 def deep_hits(node: Node, origins: Floats, directions: Floats, depth: float) -> Floats:

@@ -90,7 +90,7 @@ BY_NAME: dict[str, Draw] = {
     "ahead": beside(units_or_none, powers(-3, 0.5)), "decal": whole(0, DECALS),
     "limit": whole(-1, DECALS),
     "depth": uniform(-1.0, 1.0), "smallest": uniform(0.1, 0.3), "clearance": share,
-    "inside": uniform(-1.0, 1.0),
+    "inside": uniform(-1.0, 1.0), "start_apart": among(0.0, 4e-7, 0.5), "end_apart": among(0.0, 4e-7, 0.5),
     "direction": units, "distance": uniform(0.0, 1.5), "g": place, "kind": whole(0, len(WARPS)),
     "p": uniform(-1.5, 1.5, 4), "rate": uniform(0.1, 3.0), "min_influence": uniform(0.3, 2.5),
     "e": share, "e_k": uniform(0.0, 0.5), "e_i": share,

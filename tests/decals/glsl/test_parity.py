@@ -53,6 +53,7 @@ OF_WARP_ALONE = {"operator_choice", "operator_range", "starts_from_zero", "unkno
 """Functions that no shader calls."""
 
 WRITTEN_TWICE = {
+    "apart",
     "closest",
     "depth",
     "clearance",

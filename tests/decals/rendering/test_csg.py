@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from blobtree import Box, Node
+from blobtree import Box, CustomPrimitive, Node
 from decals.rendering.renderer import Renderer
 from decals.scenes.camera import Camera
 from tests.bench.trust_csg import holes_of, scene
 from tests.blobtree.csg_trees import PRIMITIVES, csg_primitive
+from tests.blobtree.custom_kinds import Brick, RoughBrick
 
 SIZE = (48, 36)
 DIRECTION = (0.3, 0.5, 1.0)
@@ -40,6 +41,20 @@ def test_no_pixel_of_sharp_csg_misses(fragment: Renderer, kind: str, radius: flo
     holes = holes_of(tree, Camera.framing(tree.support, direction=DIRECTION), fragment, SIZE)
     assert holes.of_picture == holes.of_rays == 0
     assert operation == "intersection" or holes.pixels > 200
+
+
+@pytest.mark.ordinary_cases("brick-0.001")
+@pytest.mark.parametrize("radius", [0.1, 1e-3, 1e-5])
+@pytest.mark.parametrize("kind", [Brick, RoughBrick], ids=["brick", "rough brick"])
+def test_own_solids_cut_as_sharply_as_boxes(
+    fragment: Renderer, kind: type[CustomPrimitive], radius: float
+) -> None:
+    """Nothing is known of the depth inside an own solid, whether it is known to be convex or not."""
+    body, place, size = Box((0, 0, 0), (1.2, 1, 0.8), radius=radius), (0.3, 0.2, 0.4), (0.8, 0.6, 0.8)
+    tree, twin = body - kind(place, size, radius=radius), body - Box(place, size, radius=radius)
+    holes = holes_of(tree, Camera.framing(tree.support, direction=DIRECTION), fragment, SIZE, twin=twin)
+    assert holes.of_picture == holes.of_rays == 0
+    assert holes.pixels > 200
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from decals.rendering.renderer import Renderer
 from decals.rendering.tree import TreeDrawable
 from decals.scenes.camera import Camera
 from tests.blobtree.csg_trees import csg_primitive
+from tests.blobtree.custom_kinds import Brick
 from tests.decals.glsl.tapes import Model
 from tests.decals.shapes import View
 
@@ -73,6 +74,14 @@ def test_rays_go_on_where_loops_were_ended(
     assert drawings[-1] > 2
     renderer.buffers(View((Model(Point((0, 0, 0), radius=1.0)),), camera_of(tree)), RenderOptions(size=SIZE))
     assert drawings[-1] == 1
+
+
+def test_rays_cross_an_own_convex_solid_without_many_steps(fragment: Renderer, drawings: list[int]) -> None:
+    """Steps of its tiny influence would end the loops of nearly all pixels."""
+    skip_without_limit(fragment)
+    tree = Box((0, 0, 0), (1.2, 1, 0.8), radius=1e-5) - Brick((0.3, 0.2, 0.4), (0.8, 0.6, 0.8), radius=1e-5)
+    assert missing(tree, fragment) == 0
+    assert drawings == [1]
 
 
 def test_without_the_guard_pixels_miss(fragment: Renderer) -> None:
