@@ -1,4 +1,4 @@
-"""Hostile files, calls, edit commands and kills: ``python -m tests.fuzz --files 20000 --calls 10000 ...``.
+"""Hostile files, meshes, calls, commands and kills: ``python -m tests.fuzz --files 20000 --calls 10000 ...``.
 
 Each stage runs in a forked child, which writes the number of its case to a file. If the child dies, the case
 counts as a crash. If a case takes longer than the limit, it counts as a hang. A new child goes on with the
@@ -28,6 +28,7 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
+from numpy.typing import NDArray
 from PIL import Image
 
 import blobtree
@@ -38,9 +39,12 @@ from blobtree.files import PREFIX, write_atomically
 from blobtree.pyvista_views import write_polydata
 from decals.editing import EditSession
 from decals.rendering import Picture
+from decals.surfaces import MeshSurface
+from tests.bench.trust_windings import is_wrong
 from tests.decals.editing.fuzz import RandomCommands
 from tests.decals.editing.scenes import digest, scene
 from tests.fuzz_calls import call_table, not_called
+from tests.oracles.windings import KINDS
 from tests.structured.formats import FORMATS, TURNS
 from tests.structured.model import check
 from tests.test_hostile_calls import CALLS, HUGE, PLY
@@ -181,6 +185,66 @@ def structured_case(folder: Path, seed: int) -> Case:
         check(FORMATS[name](random.Random(f"{seed}:{name}:{number}")), folder)
 
     return run
+
+
+# -- windings -------------------------------------------------------------------------------------------
+
+
+def winding_case(seed: int) -> Case:
+    """Return the stage of windings: solids of known windings in turn with damaged ones.
+
+    A damaged one keeps its triangles, and is not turned again once it has been turned.
+    """
+    kinds = list(KINDS)
+    logging.disable(logging.WARNING)  # of faces that are turned
+
+    def run(number: int) -> None:
+        rng = np.random.default_rng([seed, number])
+        case = KINDS[kinds[number // 2 % len(kinds)]](rng)
+        if number % 2 == 0:
+            if is_wrong(case):
+                raise AssertionError(f"{case.kind}: not the windings of the solid")
+            return
+        vertices, faces = damaged_solid(*case.arrays(right=False), rng)
+        try:
+            surface = MeshSurface(vertices, faces)
+        except ImplicitDecalsError:
+            return
+        if not np.array_equal(np.sort(surface.faces, axis=1), np.sort(faces, axis=1)):
+            raise AssertionError(f"{case.kind}: other triangles than in the file")
+        if not np.array_equal(MeshSurface(surface.vertices, surface.faces).faces, surface.faces):
+            raise AssertionError(f"{case.kind}: turned a second time")
+
+    return run
+
+
+def damaged_solid(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], rng: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Drop, turn, copy and tear faces, and flatten, scale, move and break vertices, up to three times."""
+    vertices, faces = vertices.copy(), faces.copy()
+    for _ in range(rng.integers(1, 4)):
+        some = rng.random(len(faces)) < rng.choice([0.02, 0.2, 0.5])
+        match rng.integers(9):
+            case 0:
+                faces = faces[~some]
+            case 1:
+                faces[some] = faces[some, ::-1]
+            case 2:
+                faces = np.concatenate([faces, faces[some]])
+            case 3:
+                vertices[:, rng.integers(3)] *= rng.choice([0.0, 1e-6, 1e-3])
+            case 4:
+                vertices *= 10.0 ** rng.uniform(-15, 15)
+            case 5:
+                vertices += 10.0 ** rng.uniform(0, 6) * rng.normal(size=3)
+            case 6:
+                faces[some, 1] = faces[some, 0]
+            case 7:
+                faces[some, rng.integers(3)] = rng.integers(len(vertices))
+            case 8:
+                vertices[rng.integers(len(vertices))] = rng.choice([np.nan, np.inf, 1e300, 0.0])
+    return vertices, faces
 
 
 # -- calls ----------------------------------------------------------------------------------------------
@@ -384,19 +448,27 @@ def _watch(child: int, state: Path, first: int, outcome: Outcome) -> int:
 
 
 def fuzz(
-    *, files: int, calls: int, commands: int, kills: int, seed: int, structured: int = 0
+    *,
+    files: int,
+    calls: int,
+    commands: int,
+    kills: int,
+    seed: int,
+    structured: int = 0,
+    windings: int = 0,
 ) -> dict[str, Any]:
     """Run all stages; return the number of failures of each kind, and their descriptions."""
     stages: dict[str, Outcome] = {}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for stage in ("corpus", "files", "structured", "calls", "commands", "kills"):
+        for stage in ("corpus", "files", "structured", "windings", "calls", "commands", "kills"):
             (folder / stage).mkdir()
         paths = corpus(folder / "corpus")
         stages["files"] = run_stage(lambda work: file_case(work, paths, seed), files, folder / "files")
         stages["structured"] = run_stage(
             lambda work: structured_case(work, seed), structured, folder / "structured"
         )
+        stages["windings"] = run_stage(lambda _: winding_case(seed), windings, folder / "windings")
         stages["calls"] = run_stage(lambda _: call_case(seed), calls, folder / "calls")
         stages["commands"] = run_stage(lambda _: command_case(seed), commands, folder / "commands")
         torn = torn_files(folder / "kills", kills, seed) if kills else []
@@ -409,6 +481,7 @@ def fuzz(
         "cases": {
             "files": files,
             "structured": structured,
+            "windings": windings,
             "calls": calls,
             "commands": commands,
             "kills": kills,
@@ -421,14 +494,16 @@ def fuzz(
 def main() -> int:
     """Run the fuzzer with the budget of the command line; the exit code is 1 after a failure."""
     parser = argparse.ArgumentParser(description=__doc__)
-    budget = {"files": 2000, "structured": 2000, "calls": 2000, "commands": 500, "kills": 20, "seed": 0}
+    budget = {"files": 2000, "structured": 2000, "windings": 500, "calls": 2000, "commands": 500, "kills": 20}
     for name, count in budget.items():
         parser.add_argument(f"--{name}", type=int, default=count)
+    parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", action="store_true", help="print the figures and failures as JSON")
     options = parser.parse_args()
     figures = fuzz(
         files=options.files,
         structured=options.structured,
+        windings=options.windings,
         calls=options.calls,
         commands=options.commands,
         kills=options.kills,

@@ -14,11 +14,11 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="the fuzzer fork
 
 @pytest.mark.slow
 def test_the_fuzzer_finds_nothing() -> None:
-    figures = fuzz.fuzz(files=600, structured=800, calls=2000, commands=400, kills=20, seed=1)
+    figures = fuzz.fuzz(files=600, structured=800, windings=60, calls=2000, commands=400, kills=20, seed=1)
     assert figures["failures"] == {
         **{
             name: {"crashes": [], "hangs": [], "foreign": []}
-            for name in ("files", "structured", "calls", "commands")
+            for name in ("files", "structured", "windings", "calls", "commands")
         },
         "torn": [],
     }

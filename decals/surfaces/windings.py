@@ -355,7 +355,8 @@ def _turned_outward(
     if (volumes[solid] < 0.0).all():
         result[numbers] = True
     else:
-        result[numbers] = outward_turns(parts, numbers, volumes[numbers], triangles.corners)
+        corners = triangles.turned(np.flatnonzero(turned)).corners
+        result[numbers] = outward_turns(parts, numbers, volumes[numbers], corners)
     faces = np.bincount(parts, minlength=count)[result].sum()
     if faces:
         _logger.info("Turned %d of %d closed parts outward", result.sum(), len(numbers))

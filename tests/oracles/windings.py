@@ -22,11 +22,16 @@ MAX_DEPTH = 4
 
 @dataclass
 class Shell:
-    """A closed part as it should wind, and whether its file has it turned."""
+    """A closed part as it should wind, and whether its file has it, or some of its faces, turned."""
 
     vertices: Floats
     faces: Ints
-    turned: bool = False
+    turned: bool | NDArray[np.bool_] = False
+
+    def faces_in_file(self) -> Ints:
+        """Return the faces as they are in the file."""
+        turned = np.broadcast_to(self.turned, len(self.faces))
+        return np.where(turned[:, None], self.faces[:, ::-1], self.faces)
 
 
 @dataclass
@@ -44,7 +49,7 @@ class Case:
         vertices = np.concatenate([shell.vertices for shell in self.shells])
         faces = np.concatenate(
             [
-                (shell.faces[:, ::-1] if shell.turned and not right else shell.faces) + start
+                (shell.faces if right else shell.faces_in_file()) + start
                 for shell, start in zip(self.shells, starts, strict=True)
             ]
         )
@@ -105,6 +110,19 @@ def nests(rng: np.random.Generator) -> Case:
     return case
 
 
+def scrambled(rng: np.random.Generator) -> Case:
+    """Return nests of which single faces are turned too: at most a third of the area of each shell."""
+    case = nests(rng)
+    case.kind = "scrambled"
+    for shell in case.shells:
+        a, b, c = np.moveaxis(shell.vertices[shell.faces], 1, 0)
+        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        order = rng.permutation(len(areas))
+        few = np.cumsum(areas[order]) < areas.sum() * rng.uniform(0.0, 1.0 / 3.0)
+        shell.turned = shell.turned ^ np.isin(np.arange(len(areas)), order[few])
+    return case
+
+
 def disagreeing(rng: np.random.Generator) -> Case:
     """Return balls in balls, in turn bodies and cavities, turned so that one winds inward in empty space."""
     depth = int(rng.integers(3, MAX_DEPTH + 1))
@@ -162,6 +180,7 @@ def mirrored(rng: np.random.Generator) -> Case:
 
 KINDS: dict[str, Callable[[np.random.Generator], Case]] = {
     "nests": nests,
+    "scrambled": scrambled,
     "disagreeing": disagreeing,
     "touching": touching,
     "crossing": crossing,
