@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+from decals.apps import memory
+
 PIECES = """
 import sys, time
 from pathlib import Path
@@ -82,3 +84,78 @@ print(hasattr(importlib.import_module(FIRST_USED), "evaluate_sensitivities"))
 @pytest.mark.slow
 def test_kernels_of_the_first_drag_are_imported_ahead() -> None:
     assert subprocess.check_output([sys.executable, "-c", AHEAD], text=True) == "True\n"
+
+
+FAULTS = """
+import resource, numpy as np
+from decals.apps.memory import keep_for_work, keep_memory_low
+
+def faults():
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    for _ in range(20):
+        np.ones(2_000_000)  # 16 MB: 3,906 pages
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+
+def held():
+    return int(open("/proc/self/statm").read().split()[1])
+
+keep_for_work(True)  # no effect yet
+keep_memory_low(3600.0)
+resting = faults()
+keep_for_work(True)
+faults()
+working, kept = faults(), held()
+keep_for_work(False)
+after = faults()
+print(resting, working, after, kept - held())
+"""
+
+
+class Library:
+    """The C library, which only notes what it is asked for."""
+
+    def __init__(self) -> None:
+        self.options: list[tuple[int, int]] = []
+
+    def mallopt(self, option: int, value: int) -> int:
+        self.options.append((option, value))
+        return 1
+
+
+@pytest.fixture
+def library(monkeypatch: pytest.MonkeyPatch) -> Library:
+    library = Library()
+    monkeypatch.setattr(memory, "_glibc", lambda: library)
+    monkeypatch.setattr(memory, "_session", memory._Session())
+    return library
+
+
+def test_only_changes_of_a_session_that_keeps_memory_low_set_options(
+    library: Library, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    memory.keep_for_work(working=True)
+    assert library.options == []
+    monkeypatch.setattr(memory, "_session", memory._Session(kept_low=True))
+    for working, options in ((False, {}), (True, memory.WORK_ALLOCATION), (False, memory.ALLOCATION)):
+        library.options.clear()
+        for _ in range(3):  # the page asks ten times a second
+            memory.keep_for_work(working=working)
+        assert dict(library.options) == options
+        assert len(library.options) == len(options)
+
+
+def test_another_c_library_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "_glibc", lambda: None)
+    monkeypatch.setattr(memory, "_session", memory._Session(kept_low=True))
+    memory.keep_for_work(working=True)
+    assert not memory._session.working
+
+
+@pytest.mark.skipif(memory._glibc() is None, reason="the options are those of glibc")
+def test_work_takes_its_memory_from_the_system_once() -> None:
+    resting, working, after, returned = map(
+        int, subprocess.check_output([sys.executable, "-c", FAULTS], text=True).split()
+    )
+    assert working < 0.1 * resting  # page faults; large pages take fewer in all
+    assert after > 0.5 * resting
+    assert returned > 3000

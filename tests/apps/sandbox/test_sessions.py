@@ -13,6 +13,7 @@ pytest.importorskip("aiohttp")
 
 import aiohttp
 from aiohttp import ClientSession as Client
+from yarl import URL
 
 from decals.apps.sandbox import sessions as module
 from decals.apps.sandbox.guard import Guard
@@ -43,10 +44,11 @@ asyncio.run(main())
 """
 
 
-async def started(**options: Any) -> tuple[Sessions, asyncio.Task[int], str]:
+async def started(name: str = "", **options: Any) -> tuple[Sessions, asyncio.Task[int], str]:
     """Start a server of sessions; return also its task and its URL."""
     guard = Guard(token=TOKEN)
-    sessions = Sessions(lambda number: [sys.executable, "-c", PROGRAM, str(number)], guard=guard, **options)
+    program = [sys.executable, "-c", PROGRAM]
+    sessions = Sessions(lambda number: [*program, f"{name}{number}"], guard=guard, **options)
     port: asyncio.Future[int] = asyncio.get_running_loop().create_future()
     task = asyncio.create_task(sessions.serve("127.0.0.1", 0, port.set_result))
     return sessions, task, f"http://127.0.0.1:{await port}"
@@ -117,6 +119,35 @@ def test_each_browser_has_a_session_of_its_own(folder: Path) -> None:
 
     serve(check, limit=2)
     assert {path.name for path in folder.iterdir()} == {"saved 1", "saved 2"}
+
+
+def test_servers_on_two_ports_keep_their_sessions_apart() -> None:
+    """A browser sends the cookies of a machine to all its ports."""
+
+    async def run() -> None:
+        (_, first, here), (_, second, there) = await started("a", limit=2), await started("b", limit=2)
+        try:
+            async with browser() as user:
+                for _ in range(2):  # to and fro
+                    for url, name in ((here, "a1"), (there, "b1")):
+                        assert await opened(user, url) == f"session {name} /index.html"
+                        async with await connected(user, url) as socket:
+                            await socket.send_bytes(b"")
+                            assert await socket.receive_bytes() == name.encode()
+                one, other = (user.cookie_jar.filter_cookies(URL(url)) for url in (here, there))
+                assert {*one} == {*other}
+                assert len(one) == 2
+                names = [f"implicit-decals-{url.rsplit(':', 1)[1]}" for url in (here, there)]
+                stolen = {names[0]: one[names[1]].value}
+            async with aiohttp.ClientSession(cookies=stolen) as stranger:
+                assert (await text(stranger, f"{here}/a.js"))[
+                    0
+                ] == 403  # each server signs with its own secret
+        finally:
+            await ended(first)
+            await ended(second)
+
+    asyncio.run(run())
 
 
 def test_idle_sessions_are_saved_and_ended_and_their_number_is_limited(
