@@ -19,7 +19,7 @@ from decals.editing.slicing import MOVE, NONE, TILT, TILTED, SliceDrag, SlicePla
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.camera import UPRIGHT, Camera
 from decals.scenes.meshes import as_polydata, meshed
-from decals.scenes.objects import SceneObject, bounds_of
+from decals.scenes.objects import SceneObject, bounds_of, same_shape
 from decals.surfaces.surface import unit_rows
 from decals.validation import finite_number, number_of, one_of, whole_number
 from decals.vtk.subplot import FrameStatus
@@ -75,7 +75,7 @@ class Display:
         self.bookmarks: list[tuple[str, Any]] = []
         self.message = ""
         self._key: tuple[object, ...] = ()
-        self._meshes: tuple[Sequence[SceneObject], list[pv.PolyData]] = (), []
+        self._meshes: list[tuple[SceneObject, pv.PolyData]] = []
         self._names: list[str] = []
         self._axes = False
         self._slice_drag: SliceDrag | None = None
@@ -185,8 +185,11 @@ class Display:
             return False
         if options == DisplayOptions() or not document.objects:
             return self._clear()
-        modes = [getattr(document.drawing, name) for name in SAMPLING_MODES]
-        key = options, document.objects, document.decals.version, *modes
+        read: tuple[object, ...] = ()  # overlays alone show decals
+        if options.overlay != OVERLAYS[0]:
+            modes = (getattr(document.drawing, name) for name in SAMPLING_MODES)
+            read = document.decals.version, *modes
+        key = options, document.objects, *read
         if key == self._key:
             return False
         self._key = key
@@ -194,14 +197,15 @@ class Display:
 
         def work(_progress: object, _cancel: object) -> Callable[[], None]:
             objects = fork.objects
-            known = meshes[1] if meshes[0] is objects else None
-            parts = known or [as_polydata([item], resolution=RESOLUTION) for item in objects]
+            parts = [
+                _known_mesh(item, meshes) or as_polydata([item], resolution=RESOLUTION) for item in objects
+            ]
             shown, message = shown_data(fork, parts, options)
             polygonized = options.mode == MODES[1] and options.slice is None
             drawn = meshed(objects, parts) if polygonized else None
 
             def install() -> None:
-                self._meshes = objects, parts
+                self._meshes = [*zip(objects, parts, strict=True)]
                 self._install(shown, message, options, drawn)
 
             return install
@@ -217,7 +221,7 @@ class Display:
         self._install([], "", self.options)
 
     def _clear(self) -> bool:
-        had, self._key, self._meshes = self._key != (), (), ((), [])
+        had, self._key, self._meshes = self._key != (), (), []
         if had:
             self._install([], "", self.options)
         return had
@@ -373,3 +377,13 @@ class Display:
         for name, value in zip(CAMERA_VALUES, kept, strict=True):
             setattr(self._window.subplot.vtk_renderer.camera, name, value)
         self._window.subplot.vtk_renderer.reset_camera_clipping_range()
+
+
+def _known_mesh(item: SceneObject, meshes: Sequence[tuple[SceneObject, pv.PolyData]]) -> pv.PolyData | None:
+    """Return the mesh of an object of the same shape and colour, if there is one."""
+    for other, mesh in meshes:
+        drawn = getattr(item, "color", None) is getattr(other, "color", None)
+        drawn &= getattr(item, "crease_angle", 0.0) == getattr(other, "crease_angle", 0.0)
+        if drawn and item.hidden == other.hidden and same_shape(item, other):
+            return mesh
+    return None

@@ -14,6 +14,7 @@ from blobtree.kernels import NotCompiled, without_compiling
 from blobtree.nodes.paths import Path
 from decals.editing.background import BackgroundJobs, Busy, Step, step_of, takes_long
 from decals.editing.brushes import BrushSettings
+from decals.editing.carrying import inputs_of
 from decals.editing.commands import SetDrawing
 from decals.editing.document import Document, Edit
 from decals.editing.prompts import PromptLine
@@ -267,7 +268,7 @@ class ActionState:
         """Carry out a command, in the background if it takes long, then call ``done``."""
         step = step_of(command)
         if takes_long(command) or not self._done_now(step):
-            self.background.edit(command.label, step, done)
+            self.background.edit(command.label, step, done, inputs=inputs_of(command))
         elif done is not None:
             done()
 

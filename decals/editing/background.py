@@ -2,14 +2,15 @@
 
 A thread runs one job at a time, reports progress and can be cancelled. A long edit is done to a fork of the
 session, in a thread. The session then adopts the fork, which takes the same time however much was changed. If
-the session was edited meanwhile, the long edit is repeated on a new fork, so no edit is lost.
+the session was edited meanwhile, the long edit is repeated on a new fork, so no edit is lost. While what
+it reads has not changed, its result is carried over.
 """
 
 import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import count
 from os import PathLike
@@ -20,10 +21,11 @@ from numpy.typing import ArrayLike
 
 from blobtree.device import core_left_free
 from blobtree.progress import Cancel, Progress, reporting
+from decals.editing.carrying import CarriedEdit, Inputs
 from decals.editing.commands import DecalCommand
 from decals.editing.filling import FillBarePlaces
 from decals.editing.scatter_commands import AddObject, RelaxDecals, RemoveObject, ReplaceDecals, ScatterDecals
-from decals.editing.session import Command, EditSession, SaveJob
+from decals.editing.session import Command, EditSession, SaveJob, UndoEntry
 from decals.editing.tree_commands import PrimitiveCommand
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.camera import Camera
@@ -297,13 +299,39 @@ def step_of(command: Command) -> Step:
     return step
 
 
+def _carried_step(entry: UndoEntry, message: str) -> Step:
+    """Return the step that carries an entry of a fork's history over to another state."""
+
+    def step(session: EditSession) -> str:
+        session.do(CarriedEdit(entry.edit, entry.label))
+        return message
+
+    return step
+
+
 @dataclass(frozen=True, eq=False)
 class _Request:
-    """An edit to make: its label, the step, and a callback for the moment at which it is visible."""
+    """An edit to make.
+
+    Attributes
+    ----------
+    label
+        What it does.
+    step
+        The edit.
+    done
+        Called at the moment at which it is visible.
+    inputs
+        What the step reads, if that is known.
+    carried
+        Takes over what the step has computed for a former state.
+    """
 
     label: str
     step: Step
     done: Callable[[], None] | None = None
+    inputs: Inputs | None = None
+    carried: Step | None = None
 
 
 @dataclass(frozen=True)
@@ -375,7 +403,14 @@ class BackgroundJobs:
 
     # -- edits ------------------------------------------------------------------------------------------
 
-    def edit(self, label: str, step: Step, done: Callable[[], None] | None = None) -> None:
+    def edit(
+        self,
+        label: str,
+        step: Step,
+        done: Callable[[], None] | None = None,
+        *,
+        inputs: Inputs | None = None,
+    ) -> None:
         """Edit the session in the background.
 
         Parameters
@@ -386,6 +421,8 @@ class BackgroundJobs:
             The edit. It may run several times, each time on a new fork.
         done
             Called once the session has adopted the edit.
+        inputs
+            What the step reads. While only other things change, it does not run again. Default: anything.
 
         Raises
         ------
@@ -396,7 +433,7 @@ class BackgroundJobs:
             self._adopted(step(self._session), done)
             return
         self.require_idle(label)
-        self._edits.start(self._fork_job(_Request(label, step, done)))
+        self._edits.start(self._fork_job(_Request(label, step, done, inputs)))
 
     def _adopted(self, message: str, done: Callable[[], None] | None) -> None:
         """Call the callback of an edit that the session has adopted, and show its message."""
@@ -512,30 +549,38 @@ class BackgroundJobs:
     def _fork_job(self, request: _Request) -> Job:
         """Return the job that edits a fork; its completion adopts the fork, or repeats the job on a new one.
 
-        A step that fails on an outdated fork is repeated too: it may succeed on the next one.
+        A result for a state that had the same inputs is carried over. A step that fails on an outdated fork
+        is repeated too: it may succeed on the next one.
         """
         fork, following = self._session.fork(), self._following
+        entries, inputs = len(fork.labels), request.inputs
+        message, seen = "", None
+        failure: Exception | None = None
 
         def work(_progress: Progress, _cancel: Cancel) -> Completion:
-            message = ""
-            failure: Exception | None = None
+            nonlocal message, seen, failure
             try:
-                message = request.step(fork)
+                seen = None if inputs is None else inputs(fork.document)
+                message = (request.carried or request.step)(fork)
                 fork.prepare(surfaces=not following)
             except ImplicitDecalsError as error:
                 failure = error.with_traceback(None)  # its frames would keep the fork in a cycle
+            return complete
 
-            def complete() -> Job | None:
-                if failure is not None and fork.current:
-                    raise failure
-                if failure is not None or not self._session.adopt(fork):
-                    if not self._following:
-                        self._end_stroke()
-                    return self._fork_job(request)
+        def complete() -> Job | None:
+            if failure is not None and fork.current and request.carried is None:
+                raise failure
+            if failure is None and self._session.adopt(fork):
                 self._adopted(message, request.done)
                 return None
-
-            return complete
+            if not self._following:
+                self._end_stroke()
+            carried = None
+            if failure is None and inputs is not None and len(fork.labels) == entries + 1:
+                entry = fork.next_undo
+                if entry is not None and inputs(self._session.document) == seen:
+                    carried = _carried_step(entry, message)
+            return self._fork_job(replace(request, carried=carried))
 
         return Job(request.label, work)
 

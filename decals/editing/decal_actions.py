@@ -10,6 +10,7 @@ from blobtree._typing import Float32Array, Int32Array
 from blobtree.progress import Progress
 from decals.editing.action_state import ActionState, Cursor, WindowActions, require_pick
 from decals.editing.bare_watch import BareWatch
+from decals.editing.carrying import inputs_of
 from decals.editing.commands import AddDecals, MapValues, OrderDecals, ScaleDecals, TurnDecals
 from decals.editing.document import Document
 from decals.editing.filling import FillBarePlaces
@@ -216,7 +217,7 @@ class DecalActions(WindowActions):
             count = len(session.do(command).after.numbers)
             return f"{count} new decals fill the bare places" if count else "no place is bare"
 
-        self._state.background.edit(command.label, step)
+        self._state.background.edit(command.label, step, inputs=inputs_of(command))
 
     @Group.MANY.action("scatter", "g", summary="scatter new decals over the object under the cursor")
     def scatter(self, cursor: Cursor) -> None:

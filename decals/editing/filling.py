@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
+from decals.editing.carrying import columns_of, shapes_of
 from decals.editing.document import Document, Edit
 from decals.editing.scatter_commands import object_indices
 from decals.errors import InvalidEdit
@@ -284,6 +285,11 @@ class FillBarePlaces:
     opened_by: Edit | None = None
     seed: int = 0
     label: ClassVar[str] = "fill bare places"
+
+    def inputs(self, document: Document) -> object:
+        """Return what the command reads; new decals take their looks from decals as they are at the start."""
+        modes = tuple(modes_of(document.drawing).values())
+        return shapes_of(document.objects), columns_of(document.decals.decals), modes, document.locked_layers
 
     def compute(self, document: Document) -> Edit:
         """Return the edit, which may take long; it is empty where no place is bare."""

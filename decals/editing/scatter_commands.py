@@ -7,9 +7,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree._typing import Int64Array
+from blobtree._typing import Float32Array, IndexArray, Int64Array
 from blobtree.progress import Progress
 from blobtree.validation import point_array
+from decals.editing.carrying import columns_of, shapes_of
 from decals.editing.document import Document, Edit
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points
 from decals.errors import InvalidEdit
@@ -212,15 +213,21 @@ class RelaxDecals:
     radius: float | None = None
     label: ClassVar[str] = "relax"
 
-    def compute(self, document: Document) -> Edit:
-        """Return the edit; radii stay."""
+    def inputs(self, document: Document) -> object:
+        """Return what the command reads: the shapes of objects, and the decals around the point."""
+        _, rows = self._around(document)
+        decals = document.decals.decals[rows]
+        return shapes_of(document.objects), document.decals.numbers[rows].tolist(), columns_of(decals)
+
+    def _around(self, document: Document) -> tuple[Float32Array, IndexArray]:
+        """Return the point, and the rows of the decals that take part."""
         center = point_array(finite_vector("point", self.point, InvalidEdit)[None])[0]
         radius = self.radius
         if radius is not None:  # no scene is larger than the largest coordinate
             radius = min(finite_number("radius", radius, InvalidEdit), MAX_COORDINATE)
-        numbers, decals = document.decals.numbers, document.decals.decals
+        decals = document.decals.decals
         if not len(decals) or not document.objects:
-            return Edit()
+            return center, np.zeros(0, np.intp)
         distances = np.linalg.norm(decals.positions - center, axis=1)
         closest = int(distances.argmin())
         reach = RELAXED_DISTANCE * SPACING * decals.radii[closest]
@@ -228,7 +235,12 @@ class RelaxDecals:
             reach += radius
         near = distances < reach
         near &= ~np.isin(decals.layers, document.locked_layers)
-        rows = np.flatnonzero(near & (decals.ranks == decals.ranks[closest]))
+        return center, np.flatnonzero(near & (decals.ranks == decals.ranks[closest]))
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit; radii stay."""
+        center, rows = self._around(document)
+        numbers, decals = document.decals.numbers, document.decals.decals
         if len(rows) < 2:
             return Edit()
         surfaces = nearest_points(document.objects, decals.positions[rows]).objects
@@ -241,7 +253,7 @@ class RelaxDecals:
             np.ones(len(rows), np.bool_),
             (SPACING * decals.radii[rows]).astype(np.float32),
             center,
-            radius,
+            None if self.radius is None else min(self.radius, MAX_COORDINATE),
         )
         moved = np.flatnonzero((after.positions != before.positions).any(axis=1))
         points = SurfacePoints(after.positions[moved], after.normals[moved], after.surface_ids[moved])

@@ -16,6 +16,7 @@ from blobtree.nodes.places import Place
 from blobtree.nodes.surgery import Join, dominant_primitive, join_of, path_of, paths_after, world_space_path
 from decals.editing.action_state import Cursor, WindowActions, require_pick
 from decals.editing.background import Step
+from decals.editing.carrying import usual_inputs
 from decals.editing.decal_actions import TINTS
 from decals.editing.document import Document
 from decals.editing.gizmo import Handle, HandleDrag, Ray, handles_of, moved_point, snap_distance
@@ -598,7 +599,7 @@ class TreeActions(WindowActions):
             for number, path in result:
                 self._state.select_primitive(number, path, handle_offset)
 
-        self._state.background.edit(label, step, select)
+        self._state.background.edit(label, step, select, inputs=usual_inputs)
 
     # -- objects ----------------------------------------------------------------------------------------
 

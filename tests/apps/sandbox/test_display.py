@@ -16,12 +16,14 @@ from blobtree.nodes.paths import node_at
 from blobtree.nodes.surgery import move_branch
 from decals.apps.sandbox.decal_panel import drawing_controls
 from decals.apps.sandbox.sandbox import Sandbox
-from decals.editing.commands import AddImage, ReplaceImage, SetDrawing
+from decals.editing import MovePrimitive, RenameObject
+from decals.editing.commands import AddImage, ReplaceImage, SetDrawing, SetValues
 from decals.field.mapping import ImageMapping
 from decals.record import Contact
 from decals.rendering import Environment
 from decals.rendering.options import Background
 from decals.scenes.camera import PRESETS
+from decals.scenes.meshes import as_polydata
 from decals.scenes.objects import MeshObject
 from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of
@@ -85,7 +87,7 @@ def test_every_mode_and_overlay_changes_the_picture_and_all_go_back(
             least = 0.1 if value == "polygonized" else 0.3  # the mesh looks much like the surface
             assert all(np.abs(drawn - other).mean() > least for other in pictures), (name, value)
             pictures.append(drawn)
-    assert sandbox.display._meshes == ((), [])  # the view of the scene itself needs none
+    assert sandbox.display._meshes == []  # the view of the scene itself needs none
     sandbox.set_control("display", "overlay", "folds")
     sandbox.settle()
     assert "preparing the view" in sandbox.status
@@ -156,6 +158,37 @@ def test_overlays_follow_edits(sandbox: Sandbox, shared: EditWindow) -> None:
     sandbox.perform("delete")
     settle(sandbox, shared)
     assert "39 seeds" in sandbox.status
+
+
+def test_the_view_is_made_again_only_if_what_it_shows_has_changed(
+    sandbox: Sandbox, shared: EditWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+
+    def counted(objects: Any, **options: Any) -> Any:
+        made.append(objects[0].name)
+        return as_polydata(objects, **options)
+
+    monkeypatch.setattr("decals.apps.sandbox.display.as_polydata", counted)
+    sandbox.set_control("display", "mode", "wireframe")
+    settle(sandbox, shared)
+    assert made == ["blob", "crate"]
+    shared.session.do(SetValues.each([1, 2], layers=3, radii=0.1))
+    sandbox.settle()
+    assert not sandbox.values()["display"]["busy"]  # no decal is in this view
+    shared.session.do(RenameObject(1, "chest"))
+    settle(sandbox, shared)
+    assert made == ["blob", "crate"]
+    shared.session.do(MovePrimitive(0, (0,), (0.1, 0, 0)))
+    settle(sandbox, shared)
+    assert made == ["blob", "crate", "blob"]
+    sandbox.set_control("display", "overlay", "owners")
+    settle(sandbox, shared)
+    shared.session.do(SetValues.each([1, 2], radii=0.2))
+    sandbox.settle()
+    assert sandbox.values()["display"]["busy"]
+    settle(sandbox, shared)
+    assert made == ["blob", "crate", "blob"]
 
 
 def test_an_overlay_with_a_scale_is_added_without_a_frame(

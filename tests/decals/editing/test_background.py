@@ -6,25 +6,36 @@ from typing import Any
 import numpy as np
 import pytest
 
+from blobtree import Point
 from blobtree.kernels import NotCompiled
 from decals.editing import (
     Actions,
+    AddObject,
+    AddPrimitive,
     DeleteDecals,
     EditSession,
+    FillBarePlaces,
     FlagNodes,
+    MoveDecals,
     MovePrimitive,
+    RelaxDecals,
     RemoveObject,
     RenameObject,
     ScaleDecals,
+    SetCamera,
+    SetValues,
     TurnDecals,
 )
 from decals.editing.action_state import COMPILING
 from decals.editing.background import BUSY, MAX_WAITING, step_of
 from decals.editing.brushes import Brush
+from decals.editing.carrying import LOOKS, inputs_of
 from decals.editing.document import Document, Edit
+from decals.editing.scatter_commands import decals_on
 from decals.errors import InvalidEdit
+from decals.scenes.objects import TreeObject
 from tests.decals.editing.background import LONG, Held, finish, press, threaded
-from tests.decals.editing.scenes import digest, scene
+from tests.decals.editing.scenes import digest, goes_back_and_forth, scene
 
 pytestmark = pytest.mark.usefixtures("few_are_many")
 
@@ -504,3 +515,100 @@ def test_an_edit_that_no_thread_does_raises_at_once() -> None:
     actions = Actions(EditSession(scene()))
     with pytest.raises(InvalidEdit):
         actions.state.background.edit("scale", step_of(ScaleDecals([1], np.nan)))
+
+
+class Counted:
+    """A command that counts how often it is computed, and waits the first time."""
+
+    def __init__(self, command: Any) -> None:
+        self.command, self.label, self.runs = command, command.label, 0
+        self.begun, self.go = threading.Event(), threading.Event()
+        if hasattr(command, "inputs"):
+            self.inputs = command.inputs
+
+    def compute(self, document: Any) -> Any:
+        self.runs += 1
+        self.begun.set()
+        assert self.go.wait(LONG)
+        return self.command.compute(document)
+
+
+def looks(session: EditSession) -> None:
+    """Edits that neither move a decal nor change a shape."""
+    numbers = session.document.decals.numbers[-9:]
+    session.do(SetValues.each(numbers, tints=(1.0, 0.5, 0.2), opacities=0.5, images=1))
+    session.do(SetCamera(session.document.camera))
+
+
+def far_away(session: EditSession) -> None:
+    """Edits of decals on another object."""
+    numbers = session.document.decals.numbers
+    numbers = numbers[session.document.decals.column("positions")[:, 0].argsort()]
+    session.do(ScaleDecals(numbers[:1], 1.5))
+    session.do(DeleteDecals(numbers[1:2]))
+    session.do(RenameObject(1, "stone"))
+
+
+WORK: dict[str, Any] = {
+    "relax": lambda: RelaxDecals((1.8, 1.5, 0)),
+    "fill": lambda: FillBarePlaces((0,)),
+    "scale many": lambda: ScaleDecals(decals_on(EditSession(scene()).document, [0])[6:], 2.0),
+    "add an object": lambda: AddObject(TreeObject("ball", Point((5, 0, 0), radius=1.0))),
+    "add a primitive": lambda: AddPrimitive(0, (), Point((0, 1.2, 0), radius=0.4)),
+    "move a primitive": lambda: MovePrimitive(0, (0, 0), (0.1, 0, 0)),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "meanwhile", "runs"),
+    [
+        *((name, looks, 1) for name in WORK),
+        ("relax", far_away, 1),
+        ("fill", far_away, 2),
+        ("move a primitive", far_away, 2),
+        ("relax", lambda session: session.do(MovePrimitive(0, (0, 0), (0.05, 0, 0))), 2),
+        ("relax", lambda session: session.do(MoveDecals([59], (1.5, 1.3, 0.5), (0, 0, 1))), 2),
+        ("scale many", far_away, 2),
+    ],
+)
+def test_work_begins_again_only_if_what_it_reads_has_changed(name: str, meanwhile: Any, runs: int) -> None:
+    actions = threaded()
+    session, command = actions.state.session, Counted(WORK[name]())
+    first: Any = DeleteDecals(decals_on(session.document, [0])[:6])
+    if name == "relax":  # decals interact over some radii
+        first = ScaleDecals(session.document.decals.numbers, 0.45)
+    session.do(first)
+    actions.state.background.edit(command.label, step_of(command), inputs=inputs_of(command))
+    assert command.begun.wait(LONG)
+    meanwhile(session)
+    command.go.set()
+    finish(actions)
+    assert command.runs == runs
+    assert session.labels[-1] == command.label
+    # the same as one after the other
+    other = EditSession(scene())
+    other.do(first)
+    meanwhile(other)
+    other.do(WORK[name]())
+    present, expected = session.document.decals.decals, other.document.decals.decals
+    for column in ("positions", "normals", "tangents", "radii", "layers", "tints", "opacities"):
+        # new decals are like those that were there when the work began
+        rows = slice(0, 50) if column in LOOKS else slice(None)
+        np.testing.assert_array_equal(getattr(present, column)[rows], getattr(expected, column)[rows])
+    assert session.document.decals.numbers.tolist() == other.document.decals.numbers.tolist()
+    assert [item.name for item in session.document.objects] == [o.name for o in other.document.objects]
+    goes_back_and_forth(session)
+
+
+def test_a_result_that_cannot_be_carried_over_is_computed_again() -> None:
+    """The inputs claim too little: the same values changed, so the work runs once more."""
+    actions = threaded()
+    session, command = actions.state.session, Counted(ScaleDecals(np.arange(60), 2.0))
+    radius = scene().decals.radii[7]
+    actions.state.background.edit("scale", step_of(command), inputs=lambda _document: ())
+    assert command.begun.wait(LONG)
+    session.do(ScaleDecals([7], 3.0))
+    command.go.set()
+    finish(actions)
+    assert command.runs == 2
+    assert session.document.decals[7].radii[0] == pytest.approx(6 * radius)
