@@ -24,7 +24,11 @@ from decals.rendering.materials import has_materials
 from decals.rendering.options import SceneLike, check_scene, drawing_of, is_limited
 from decals.scenes.origin import WORLD, Origin
 from decals.shaders import ComposeError
+from decals.shaders.isolate import prefixed_name
 from decals.validation import describe, instance, one_of, whole_number
+
+RECEIVERS = "surface_receivers"
+"""Uniform with the mask of an object."""
 
 MAX_PREFIX = 64
 """Characters of a prefix, at most: WebGL allows names of 1,024."""
@@ -165,8 +169,13 @@ class Shader(Immutable):
         """
         return mask_on(on, self.receiver_table, InvalidScene)
 
-    def uniform_block(self) -> bytes:
+    def uniform_block(self, receivers: int | None = None) -> bytes:
         """Return the values of the block of uniforms in version "450", as std140 lays them out.
+
+        Parameters
+        ----------
+        receivers : int, optional
+            Value of the uniform ``surface_receivers``, see `receivers`. Default: that in `uniforms`.
 
         Examples
         --------
@@ -175,8 +184,13 @@ class Shader(Immutable):
         >>> len(decals.shader(scene, version="450").uniform_block())
         16
         """
-        kinds = "".join("f" if isinstance(value, float) else "i" for value in self.uniforms.values())
-        packed = struct.pack(f"<{kinds}", *self.uniforms.values())
+        values = dict(self.uniforms)
+        if receivers is not None:
+            values[prefixed_name(RECEIVERS, self.prefix)] = receivers
+        packed = b"".join(
+            struct.pack("<f" if isinstance(self.uniforms[name], float) else "<i", values[name])
+            for name in self.uniforms
+        )
         return packed + bytes(-len(packed) % 16)
 
     def changes(self, editor: DecalEditor, since: int) -> Changes | None:
@@ -317,7 +331,7 @@ def shader(
         **data.uniforms,
         "decal_mapping": int(drawing.mapping),
         "decal_stiffness": drawing.stiffness,
-        "surface_receivers": EVERYTHING,
+        RECEIVERS: EVERYTHING,
     }
     return Shader(
         code=code.text,

@@ -1,12 +1,16 @@
 """The exported shader: values of all its forms, its names, and pictures of other programs with it."""
 
+import tempfile
 from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
 
 from decals import shader
 from decals.hosts.code import VERSIONS, Form, code_of
 from decals.record import Contact
 from decals.rendering.context import Context
-from tests.decals.hosts import moderngl_host
+from decals.scenes.scene import Scene
+from tests.decals.hosts import moderngl_host, wgpu_host
 from tests.decals.hosts.agreement import equal_pixels, wrong_values
 from tests.decals.hosts.form_scenes import name_of, points_on, scene_of
 from tests.decals.hosts.glsl_names import global_names
@@ -24,6 +28,7 @@ def measure(*, quick: bool) -> dict[str, float]:
     with Context.standalone() as context, context.current():
         failed = sum(map(len, (failures(context, form, QUICK_POINTS if quick else POINTS) for form in forms)))
         shares = dict(pictures(context, QUICK_SIZE if quick else SIZE))
+    shares |= dict(pictures_elsewhere(QUICK_SIZE if quick else SIZE))
     return {
         "forms_failed": failed,
         "forms": len(forms) * len(VERSIONS),
@@ -46,7 +51,7 @@ def failures(context: Context, form: Form, count: int) -> list[str]:
             values = moderngl_host.at_points(context.gl, exported, points, normals)
             wrong = wrong_values(form, scene, points, normals, values)
         except Exception as error:
-            wrong = [str(error)]
+            wrong = [repr(error)]
         if wrong:
             print(f"{name_of(form)}, {version}: {', '.join(wrong)}")
             failed.append(version)
@@ -63,15 +68,47 @@ def unprefixed_names(form: Form) -> int:
     return sum(not name.startswith(PREFIX) for code in codes for name in global_names(code.text))
 
 
+def scenes() -> list[Scene]:
+    """Scenes of all contact modes, with layers, masks and materials and without."""
+    forms = [Form(contact) for contact in Contact]
+    forms += [Form(contact, True, True, True, True) for contact in Contact]
+    return list(map(scene_of, forms))
+
+
 def pictures(context: Context, size: tuple[int, int]) -> Iterator[tuple[str, float]]:
-    """Yield the least share of equal pixels of each host over some scenes."""
-    scenes = [scene_of(Form(contact)) for contact in Contact]
-    scenes += [scene_of(Form(contact, True, True, True, True)) for contact in Contact]
+    """Yield the least share of equal pixels of moderngl in its versions over some scenes."""
     for version in ("330 core", "300 es"):
         shares = (
             equal_pixels(
                 moderngl_host.picture(context.gl, shader(scene, version=version), scene, size), scene
             )
-            for scene in scenes
+            for scene in scenes()
         )
-        yield f"moderngl_{version.replace(' ', '_')}", min(shares)
+        yield f"pixels_moderngl_{version.replace(' ', '_')}", min(shares)
+
+
+def pictures_elsewhere(size: tuple[int, int]) -> Iterator[tuple[str, float]]:
+    """Yield the same of three.js and wgpu-py; print why one of them cannot draw here."""
+    if reason := wgpu_host.missing_translator() or wgpu_host.missing_adapter():
+        print(f"without wgpu-py: {reason}")
+    else:
+        shares = (
+            equal_pixels(wgpu_host.picture(shader(scene, version="450"), scene, size), scene)
+            for scene in scenes()
+        )
+        yield "pixels_wgpu", min(shares)
+    if find_spec("playwright") is None:
+        print("without three.js: playwright is not installed (pip install playwright)")
+        return
+    from tests.decals.hosts import three_host
+
+    with tempfile.TemporaryDirectory() as folder:
+        if reason := three_host.missing(Path(folder)):
+            print(f"without three.js: {reason}")
+            return
+        with three_host.three_page(Path(folder)) as page:
+            shares = (
+                equal_pixels(three_host.picture(page, shader(scene, version="300 es"), scene, size), scene)
+                for scene in scenes()
+            )
+            yield "pixels_three", min(shares)

@@ -178,6 +178,19 @@ def test_a_shader_is_frozen_and_survives_a_pickle() -> None:
         exported.code = ""  # type: ignore[misc]
 
 
+def test_the_block_of_uniforms_holds_their_values() -> None:
+    exported = decals.shader(scene_of(FULL), version="450", stiffness=2.5)
+    kinds = {
+        name: np.float32 if isinstance(value, float) else np.int32
+        for name, value in exported.uniforms.items()
+    }
+    for receivers, expected in ((None, -1), (6, 6)):
+        block = np.frombuffer(exported.uniform_block(receivers), np.dtype([*kinds.items(), ("rest", "V12")]))
+        assert block["decal_surface_receivers"] == expected
+        assert block["decal_stiffness"] == 2.5
+    assert decals.shader(scene_of(PLAIN), version="450").uniform_block(6)
+
+
 def test_levels_are_means_of_light() -> None:
     texture = decals.shader(scene_of(PLAIN)).textures[-1]
     levels = texture.levels()

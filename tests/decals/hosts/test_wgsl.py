@@ -1,0 +1,36 @@
+"""WGSL from version "450": naga takes each form, and wgpu-py shows decals as `render` does."""
+
+import pytest
+
+from decals import shader
+from decals.hosts.code import Form
+from decals.record import Contact
+from tests.decals.hosts import wgpu_host
+from tests.decals.hosts.agreement import equal_pixels
+from tests.decals.hosts.form_scenes import name_of, scene_of
+
+SIZE = (160, 120)
+FORMS = [Form(contact) for contact in Contact] + [
+    Form(contact, True, True, True, True) for contact in Contact
+]
+
+
+@pytest.mark.ordinary_cases("radial-layered-limited-nested-materials")
+@pytest.mark.parametrize("form", Form.all(), ids=name_of)
+def test_naga_takes_each_form(form: Form) -> None:
+    if reason := wgpu_host.missing_translator():
+        pytest.skip(reason)
+    exported = shader(scene_of(form), version="450", prefix="x_")
+    text = wgpu_host.wgsl(wgpu_host.fragment_of(exported), "frag")
+    assert "textureSampleGrad" in text
+    assert text.count("@group(0) @binding(") == 2 + len(exported.textures)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("form", FORMS, ids=name_of)
+def test_pictures_equal_those_of_render(form: Form) -> None:
+    if reason := wgpu_host.missing_translator() or wgpu_host.missing_adapter():
+        pytest.skip(reason)
+    scene = scene_of(form)
+    shown = wgpu_host.picture(shader(scene, version="450"), scene, SIZE)
+    assert equal_pixels(shown, scene) >= 0.995
