@@ -5,6 +5,7 @@ from . import (
     hosts,
     images,
     index,
+    pages,
     rendering,
     scattering,
     scenes,
@@ -23,6 +24,7 @@ from .field.mapping import ImageMapping
 from .hosts.shader import shader
 from .images import load_image
 from .model import NO_IMAGE, Decals, Interaction
+from .pages.page import save_html
 from .record import Contact
 from .scattering.relaxation import Relaxation
 from .scattering.scatter import scatter
@@ -75,9 +77,11 @@ __all__ = [
     "load_model",
     "load_scene",
     "measure",
+    "pages",
     "pose",
     "render",
     "rendering",
+    "save_html",
     "save_scene",
     "scatter",
     "scattering",

@@ -14,6 +14,7 @@ PACKAGES = {
     "decals.scenes": "Scenes and cameras",
     "decals.rendering": "Rendering in steps",
     "decals.hosts": "Decals in other programs",
+    "decals.pages": "Pages",
     "decals.editing": "Editing without a window",
     "decals.window": "Editing windows",
     "decals.vtk": "Decals in pyvista and VTK",

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from blobtree import field_grid
 from blobtree.sampling.field_grid import GRID_FORMATS
-from decals import Scene, TreeObject
+from decals import Scene, TreeObject, save_html
 from decals import export as export_scene
 from decals.apps.commands.options import (
     MAX_SAMPLES,
@@ -32,6 +32,7 @@ from decals.apps.models.loading import load_model
 from decals.apps.output import check_output, print_path
 from decals.baking.formats import FORMATS
 from decals.errors import InvalidInput
+from decals.pages.page import SUFFIXES
 from decals.surfaces import MeshCheck, check_mesh, read_mesh
 
 LABELS = {
@@ -87,8 +88,8 @@ def export(
     scene
         A saved scene. Models that render takes are written without decals. With --check alone, a mesh file.
     output
-        The file: glb, gltf, obj, ply, stl, vtp, 3mf or usdz; for the field of a BlobTree vti, nrrd, npz or
-        npy.
+        The file: glb, gltf, obj, ply, stl, vtp, 3mf or usdz; html for a page in the browser; for the field of
+        a BlobTree vti, nrrd, npz or npy.
     check
         Print whether the mesh of each object is closed and sound.
     colors
@@ -124,7 +125,7 @@ def export(
             raise InvalidInput("export: missing -o FILE; or --check, to check a mesh file")
         _print_checks([check_mesh(*read_mesh(scene), Path(scene).name)])
         return
-    check_output(output, (*FORMATS, *GRID_FORMATS))
+    check_output(output, (*FORMATS, *GRID_FORMATS, *SUFFIXES))
     if output.suffix.lower() in GRID_FORMATS:
         with preparing(define) as progress:
             tree = _only_tree(load_model(scene, trust=trust), scene)
@@ -140,19 +141,29 @@ def export(
             f"--distance: expected an output that ends in {' or '.join(GRID_FORMATS)}, got {str(output)!r}"
         )
     check_count("--samples", samples, 1, MAX_SAMPLES)
+    modes = given(contact=contact, stiffness=stiffness, mapping=mapping)
+    in_file = given(colors=colors, unit=unit, up=up)
+    checks: Sequence[MeshCheck] = ()
     with preparing(define) as progress:
-        checks = export_scene(
-            load_model(scene, trust=trust, crease_angle=crease_angle),
-            output,
-            attributes=attributes or (),
-            instances=instances,
-            size=size,
-            samples=samples,
-            resolution=resolution,
-            creases=creases,
-            progress=progress,
-            **given(colors=colors, unit=unit, up=up, contact=contact, stiffness=stiffness, mapping=mapping),
-        )
+        loaded = load_model(scene, trust=trust, crease_angle=crease_angle)
+        if output.suffix.lower() in SUFFIXES:
+            if in_file or attributes or instances or check:
+                raise InvalidInput("export: a page takes no options of mesh files; leave them out")
+            save_html(loaded, output, resolution=resolution, progress=progress, **modes)
+        else:
+            checks = export_scene(
+                loaded,
+                output,
+                attributes=attributes or (),
+                instances=instances,
+                size=size,
+                samples=samples,
+                resolution=resolution,
+                creases=creases,
+                progress=progress,
+                **in_file,
+                **modes,
+            )
     print_path(output)
     if check:
         _print_checks(checks)
@@ -184,7 +195,3 @@ def _print_checks(checks: Sequence[MeshCheck]) -> None:
             label, *(f"{value:,}" if isinstance(value, int) else f"{value:.4g}" for value in values)
         )
     Console().print(table, highlight=False, markup=False)
-
-
-def _text(value: float) -> str:
-    return f"{value:,}" if isinstance(value, int) else f"{value:.4g}"

@@ -289,6 +289,28 @@ class Scene:
         """
         decals.save_scene(self, path, progress=progress)
 
+    def save_html(self, path: str | os.PathLike[str], **options: Any) -> None:
+        """Write the scene as one HTML page whose decals can be moved; see `decals.pages.page`.
+
+        Examples
+        --------
+        >>> import blobtree, decals
+        >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20)
+        >>> scene.save_html("ball.html", resolution=16)
+        """
+        decals.save_html(self, path, **options)
+
+    def page(self, **options: Any) -> Any:
+        """Return the scene as one HTML page, which a notebook shows inline; see `decals.pages.page`.
+
+        Examples
+        --------
+        >>> import blobtree, decals
+        >>> decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20).page(title="Ball", resolution=16)
+        Page(title='Ball')
+        """
+        return decals.pages.page(self, **options)
+
     def render(self, **options: Any) -> rendering.Picture:
         """Draw the scene as its `drawing` says; options and errors are those of `decals.render`.
 

@@ -1,6 +1,6 @@
-"""Export: decals in the shaders of other programs.
+"""Export: decals in the shaders of other programs, and in pages.
 
-    python -m tests.bench.export [--json FILE] [--quick] [--only shader]
+    python -m tests.bench.export [--json FILE] [--quick] [--only shader,page]
 
 The parts are modules of their own.
 """
@@ -9,7 +9,7 @@ import sys
 
 from tests.bench.parts import run
 
-PARTS = ("shader",)
+PARTS = "shader", "page"
 """Names of the parts; each is the module `tests.bench.export_NAME`."""
 
 

@@ -12,8 +12,8 @@ from decals.editing import GroupOperands, RemovePrimitive
 from decals.options import described
 
 PACKAGES = [
-    "editing", "errors", "field", "hosts", "images", "index", "rendering", "scattering", "scenes", "surfaces",
-    "vtk", "window",
+    "editing", "errors", "field", "hosts", "images", "index", "pages", "rendering", "scattering", "scenes",
+    "surfaces", "vtk", "window",
 ]  # fmt: skip
 NAMES = [
     "Camera", "Contact", "ContactLaw", "DecalImage", "DecalMaterial", "Decals", "ImageMapping",
@@ -21,12 +21,14 @@ NAMES = [
     "Interaction", "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__",
     "animate", "bake", "cover", "define_contact", "displace", "edit", "evaluate", "export", "load_image",
     "load_model",
-    "load_scene", "measure", "pose", "render", "save_scene", "scatter", "shader", "show", "skin", "turntable",
+    "load_scene", "measure", "pose", "render", "save_html", "save_scene", "scatter", "shader", "show", "skin",
+    "turntable",
 ]  # fmt: skip
 OF_PACKAGES = {
     "field": ["MaterialSamples", "Neighbors", "Samples", "Walks"],
     "hosts": ["Changes", "Shader", "ShaderTexture", "Upload"],
     "index": ["DecalEditor", "DecalIndex"],
+    "pages": ["Page", "page", "viewer_script"],
     "rendering": [
         "Background", "Buffers", "Context", "Drawable", "Drawing", "Environment", "Light", "Lighting",
         "Picture", "Projection", "RenderOptions", "Renderer", "STUDIO", "SceneLike", "Size", "TRANSPARENT",

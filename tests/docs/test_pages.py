@@ -138,6 +138,10 @@ def check_shader(session: Session) -> None:
     assert "decal_records" in session["printed"]
 
 
+def check_pages(_session: Session) -> None:
+    assert Path("scales.html").read_text(encoding="utf-8").startswith("<!doctype html>")
+
+
 def check_scattering(session: Session) -> None:
     assert len(session["spots"]) == 300
     assert (session["spots"].positions[:, 1] > -0.5).all()
@@ -200,6 +204,7 @@ CHECKS: dict[str, Callable[[Session], None]] = {
     "rendering": check_rendering,
     "baking": check_baking,
     "shader": check_shader,
+    "pages": check_pages,
     "scattering": check_scattering,
     "inputs": check_inputs,
     "editing": check_editing,

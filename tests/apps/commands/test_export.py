@@ -40,6 +40,15 @@ def test_unit_and_axis_reach_the_file(saved: Path) -> None:
     assert matrix[:8] == pytest.approx([1e-3, 0, 0, 0, 0, 0, -1e-3, 0])
 
 
+def test_a_page_takes_no_options_of_meshes(saved: Path, capsys: Capture) -> None:
+    assert run(["export", "scene.json", "-o", "a.html", "--contact", "min"]) == 0
+    assert capsys.readouterr().out == "a.html\n"
+    assert (saved / "a.html").read_text(encoding="utf-8").startswith("<!doctype html>")
+    assert run(["export", "scene.json", "-o", "b.html", "--unit", "inch"]) == 2
+    assert "a page takes no options of mesh files" in capsys.readouterr().err
+    assert not (saved / "b.html").exists()
+
+
 def test_check_prints_a_table_for_written_objects_and_for_files(saved: Path, capsys: Capture) -> None:
     assert run(["export", "scene.json", "-o", "a.stl", "--check"]) == 0
     lines = capsys.readouterr().out.splitlines()

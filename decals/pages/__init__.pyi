@@ -1,0 +1,7 @@
+from .page import Page, page, viewer_script
+
+__all__ = [
+    "Page",
+    "page",
+    "viewer_script",
+]

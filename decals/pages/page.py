@@ -1,0 +1,230 @@
+"""`page` and `save_html`: a scene as one HTML page, where any browser shows and moves its decals."""
+
+import base64
+import html
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
+from io import BytesIO
+from typing import Any
+
+from PIL import Image
+
+from blobtree.colors import ColorLike
+from blobtree.files import write_atomically
+from blobtree.immutable import Immutable
+from blobtree.progress import Progress, reporting
+from blobtree.validation import truth
+from decals.errors import InvalidScene, NoGraphics
+from decals.field.mapping import ImageMapping
+from decals.pages.contents import page_contents
+from decals.pages.packing import packed
+from decals.record import Contact
+from decals.rendering.options import Background, as_background
+from decals.rendering.picture import on_white
+from decals.scenes.cover import as_scene
+from decals.scenes.objects import SceneObject
+from decals.scenes.scene import Scene
+from decals.surfaces.convert import Model
+from decals.validation import checked_path, describe
+
+MODULES = (
+    "vectors", "packing", "index", "decals", "camera", "meshes", "link", "painter", "controls", "pointer",
+    "viewer",
+)  # fmt: skip
+"""Modules of the viewer, each after those that it imports."""
+
+PICTURE_SIZE = 480, 360
+"""Width and height of the picture that is shown without WebGL 2, in pixels."""
+
+PICTURE_QUALITY = 85
+"""Quality of that picture, of 100."""
+
+NOTEBOOK_HEIGHT = 520
+"""Height of a page in a notebook, in pixels."""
+
+SUFFIXES = ".html", ".htm"
+"""Ends of the names of pages."""
+
+SLOT = re.compile(r"<!--([A-Z]+)-->")
+"""Places of the page's template that are filled."""
+
+VIEWER = files("decals.pages") / "viewer"
+"""Template, style and modules of the viewer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Page(Immutable):
+    """A scene as one HTML page, see `page`. A notebook shows it inline.
+
+    Attributes
+    ----------
+    text : str
+        The whole page.
+    data : str
+        The part of it that the module of `viewer_script` shows.
+    title : str
+        Its title.
+    """
+
+    text: str = field(repr=False)
+    data: str = field(repr=False)
+    title: str
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the page to a file named ``.html``, whole or not at all.
+
+        Raises
+        ------
+        InvalidScene
+            The file has another name, or its folder does not exist or cannot be written.
+        UnusableFile
+            The file cannot be written.
+
+        Examples
+        --------
+        >>> import blobtree, decals
+        >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20)
+        >>> decals.pages.page(scene, resolution=16).save("ball.html")
+        """
+        write_atomically(checked_path(path, SUFFIXES), self.text.encode("utf-8"))
+
+    def _repr_html_(self) -> str:
+        title, text = html.escape(self.title), html.escape(self.text)
+        style = f"width: 100%; height: {NOTEBOOK_HEIGHT}px; border: 0"
+        return f'<iframe title="{title}" style="{style}" srcdoc="{text}"></iframe>'
+
+
+def page(
+    scene: Scene | SceneObject | Model | Sequence[SceneObject | Model],
+    *,
+    title: str | None = None,
+    alt: str | None = None,
+    controls: bool = True,
+    background: Background | ColorLike | None = None,
+    resolution: int | None = None,
+    contact: Contact | str | None = None,
+    stiffness: float | None = None,
+    mapping: ImageMapping | str | None = None,
+    progress: Progress | None = None,
+) -> Page:
+    """Return a scene as one HTML page that shows it in any browser, without a server and without a network.
+
+    Decals can be picked, dragged, turned, scaled, added and deleted there; their neighbours yield at once. A
+    link keeps the state, and the scene can be saved as a file for `decals.load_scene`. The page needs WebGL 2
+    and shows a picture without it. Its light is that of the studio, without the shade of corners.
+
+    Parameters
+    ----------
+    scene : Scene, SceneObject or Model
+        A scene; or a model as `decals.cover` takes it, a list of such models, or the path of a model or a
+        scene. Trees are shown as meshes.
+    title : str, optional
+        Title of the page. Default: names of the objects.
+    alt : str, optional
+        What the picture shows, for people who do not see it. Default: the objects and the number of decals.
+    controls : bool
+        False leaves out the buttons. Mouse, touch and keys stay.
+    background : Background or colour, optional
+        In place of that of the scene.
+    resolution : int, optional
+        Cells along the longest side of trees, as for `blobtree.polygonize`.
+    contact, stiffness, mapping : optional
+        Modes, as for `decals.render`. Default: those of the scene.
+    progress : callable, optional
+        Function of the stage and its finished fraction, 0 to 1, called repeatedly.
+
+    Returns
+    -------
+    Page
+        The text of the page.
+
+    Raises
+    ------
+    InvalidScene
+        No scene, one without objects, or one with a feature that pages do not have, see `decals.shader`.
+    TooMuchData
+        More decals than a page shows.
+
+    Examples
+    --------
+    >>> import blobtree, decals
+    >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20)
+    >>> shown = decals.pages.page(scene, title="Ball", resolution=16)
+    >>> shown
+    Page(title='Ball')
+    >>> "http://" in shown.text or "https://" in shown.text
+    False
+    """
+    given = as_scene(scene)
+    drawing = given.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping)
+    given = given.replace(drawing=drawing)
+    names = ", ".join(item.name for item in given.objects)
+    title = _text("title", title, names or "Decals")
+    alt = _text("alt", alt, f"{names} with {len(given.decals)} decals")
+    shown = {"title": title, "alt": alt, "controls": truth("controls", controls, InvalidScene)}
+    sky = drawing.background if background is None else as_background(background)
+    with reporting(progress) as report:
+        header, arrays = page_contents(given, background=sky, resolution=resolution, report=report)
+    slots = {
+        "TITLE": html.escape(title),
+        "ALT": html.escape(alt),
+        "PICTURE": _picture(given),
+        "STYLE": (VIEWER / "page.css").read_text(encoding="utf-8"),
+        "SCRIPT": _inline(viewer_script()),
+        "DATA": (data := packed({**header, **shown}, arrays)),
+    }
+    parts = SLOT.split((VIEWER / "page.html").read_text(encoding="utf-8"))
+    parts[1::2] = [slots[name] for name in parts[1::2]]
+    return Page("".join(parts), data, title)
+
+
+def save_html(
+    scene: Scene | SceneObject | Model | Sequence[SceneObject | Model],
+    path: str | os.PathLike[str],
+    **options: Any,
+) -> None:
+    """Write a scene as one HTML file; options and errors are those of `decals.pages.page`.
+
+    Examples
+    --------
+    >>> import blobtree, decals
+    >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20, images=["scale"])
+    >>> decals.save_html(scene, "ball.html", resolution=16)
+    """
+    path = checked_path(path, SUFFIXES)  # before the long work
+    page(scene, **options).save(path)
+
+
+@cache
+def viewer_script() -> str:
+    """Return the viewer as one ES module that exports `mount`."""
+    texts = [(VIEWER / f"{name}.mjs").read_text(encoding="utf-8") for name in MODULES]
+    lines = "".join(texts).splitlines()
+    kept = [line.removeprefix("export ") for line in lines if not line.startswith("import ")]
+    return "\n".join([*kept, "export { mount };", ""])
+
+
+def _inline(module: str) -> str:
+    """Return a module as a classic script: browsers load no modules from files."""
+    return f"const {{ mount }} = (() => {{\n{module.replace('export { mount };', 'return { mount };')}}})();"
+
+
+def _text(name: str, value: Any, default: str) -> str:
+    if value is not None and not isinstance(value, str):
+        raise InvalidScene(f"{name}: expected a text, got {describe(value)}")
+    return value or default
+
+
+def _picture(scene: Scene) -> str:
+    """Return a picture of the scene as a data URL; empty where nothing can be drawn."""
+    try:
+        pixels = scene.render(size=PICTURE_SIZE).pixels
+    except NoGraphics:
+        return ""
+    content = BytesIO()
+    on_white(Image.fromarray(pixels)).save(content, "jpeg", quality=PICTURE_QUALITY)
+    return f"data:image/jpeg;base64,{base64.b64encode(content.getvalue()).decode('ascii')}"

@@ -1,0 +1,248 @@
+"""Pages of scenes without a browser: what they hold, what they refuse, and the modules of their viewer."""
+
+import base64
+import errno
+import json
+import re
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+
+import decals
+from blobtree import Point
+from decals.errors import InvalidScene, TooMuchData
+from decals.pages import contents, page, viewer_script
+from decals.pages.packing import packed
+from decals.pages.page import MODULES
+from decals.scenes.camera import REFERENCE_ASPECT
+from decals.scenes.scene import Scene
+from tests.decals.pages.viewer_scripts import VIEWER, needs_node, node, run_node
+
+NAME = '</script><img src=x onerror="alert(1)">'
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    """Return a ball with decals, under a name that HTML must not read."""
+    ball = decals.TreeObject(NAME, Point((0, 0, 0), radius=1))
+    return decals.cover(ball, count=20, images=["scale"])
+
+
+@pytest.fixture(scope="module")
+def text(scene: Scene) -> str:
+    """Return the page of that scene."""
+    return page(scene, resolution=16).text
+
+
+def data_of(text: str) -> bytes:
+    """Return what a page packs."""
+    (found,) = re.findall(r'<script type="application/octet-stream" id="data">([^<]*)</script>', text)
+    return zlib.decompress(base64.b64decode(found))
+
+
+def header_of(text: str) -> Any:
+    """Return the header of a page."""
+    data = data_of(text)
+    return json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
+
+
+def test_a_page_is_whole_and_asks_no_host(text: str) -> None:
+    assert text.startswith("<!doctype html>")
+    assert not re.findall(r"<!--[A-Z]+-->", text)
+    assert not re.findall(r"""(?:src|href)=["'](?!data:|x onerror)[^"']*:""", text)
+    assert "http://" not in text
+    assert "https://" not in text
+    assert "import " not in text.replace("import {", "")
+
+
+def test_texts_are_escaped(text: str) -> None:
+    assert NAME not in text
+    assert "<title>&lt;/script&gt;" in text
+    assert header_of(text)["title"] == NAME
+
+
+def test_options_reach_the_page(scene: Scene) -> None:
+    shown = page(scene, title="Ball", alt="A ball", controls=False, background="white", resolution=16)
+    header = header_of(shown.text)
+    assert (header["title"], header["alt"], header["controls"]) == ("Ball", "A ball", False)
+    assert header["background"]["top"] == [1.0, 1.0, 1.0, 1.0]
+    assert shown.title == "Ball"
+    assert 'title="Ball"' in shown._repr_html_()
+    assert header_of(page(scene, contact="radial", stiffness=3.0, resolution=16).text)["mode"] == "radial"
+
+
+def test_the_scene_in_a_page_is_that_of_its_file(scene: Scene, text: str, tmp_path: Path) -> None:
+    record = header_of(text)["scene"]
+    (tmp_path / "scene.json").write_text(json.dumps(record), encoding="utf-8")
+    loaded = decals.load_scene(tmp_path / "scene.json")
+    assert np.array_equal(loaded.decals.packed(), scene.decals.packed())
+    assert [item.name for item in loaded.objects] == [NAME]
+
+
+def test_what_pages_do_not_have_is_refused(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InvalidScene, match="walked"):
+        page(scene, mapping="walked")
+    with pytest.raises(InvalidScene, match="expected an object to show"):
+        page(scene.replace(objects=(), decals=scene.decals.replace(receivers=None)))
+    with pytest.raises(InvalidScene, match="title: expected a text"):
+        page(scene, title=3)  # type: ignore[arg-type]
+    monkeypatch.setattr(contents, "MAX_DECALS", 19)
+    with pytest.raises(TooMuchData, match="at most 19 decals, got 20"):
+        page(scene)
+
+
+def test_files_are_whole_or_not_there(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InvalidScene, match=r"ends in \.html"):
+        scene.save_html(tmp_path / "ball.txt")
+    with pytest.raises(InvalidScene, match="does not exist"):
+        scene.save_html(tmp_path / "none" / "ball.html")
+    scene.save_html(tmp_path / "ball.html", resolution=16)
+    before = (tmp_path / "ball.html").read_bytes()
+
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        page(scene, title="Other", resolution=16).save(tmp_path / "ball.html")
+    assert (tmp_path / "ball.html").read_bytes() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["ball.html"]
+
+
+def test_the_viewer_is_one_module() -> None:
+    script = viewer_script()
+    assert {f"{name}.mjs" for name in MODULES} == {path.name for path in VIEWER.glob("*.mjs")}
+    assert re.findall(r"^\s*(?:import|export) .*", script, re.MULTILINE) == ["export { mount };"]
+
+
+@needs_node
+@pytest.mark.parametrize("name", MODULES)
+def test_modules_are_valid(name: str) -> None:
+    assert node is not None
+    assert run_node(f'await import("./{name}.mjs"); console.log(1);', None) == 1
+
+
+@needs_node
+def test_packed_arrays_are_unpacked() -> None:
+    random = np.random.default_rng(0)
+    arrays: dict[str, NDArray[Any]] = {
+        "floats": random.normal(size=(7, 3)).astype(np.float32),
+        "numbers": random.integers(-(2**31), 2**31, 50, dtype=np.int32),
+        "faces": np.arange(12, dtype=np.int32).reshape(4, 3),
+        "normals": random.integers(-32767, 32768, (5, 3), dtype=np.int16),
+        "bytes": random.integers(0, 256, (9, 4), dtype=np.uint8),
+        "halves": random.normal(size=(6, 4)).astype(np.float16),
+        "none": np.zeros((0, 3), np.float32),
+    }
+    script = """
+    const { unpacked } = await import("./packing.mjs");
+    const { header, arrays } = await unpacked(data);
+    const bytes = (array) => Buffer.from(array.buffer, array.byteOffset, array.byteLength).toString("base64");
+    const found = Object.entries(arrays).map(([name, array]) => [name, bytes(array)]);
+    console.log(JSON.stringify([header.word, Object.fromEntries(found)]));
+    """
+    word, found = run_node(script, packed({"word": "ß"}, arrays))
+    assert word == "ß"
+    assert {name: base64.b64decode(text) for name, text in found.items()} == {
+        name: array.tobytes() for name, array in arrays.items()
+    }
+
+
+@needs_node
+@pytest.mark.parametrize("aspect", [4 / 3, 2.0, 0.6])
+def test_the_camera_is_that_of_the_picture(aspect: float) -> None:
+    camera = decals.Camera((3, 2, 5), (0.5, 0, -0.5), (0.1, 1, 0), 40)
+    bounds = [[-1.0, -1.0, -1.0], [1.0, 2.0, 1.0]]
+    script = """
+    const { Camera } = await import("./camera.mjs");
+    const camera = new Camera(data.camera, data.bounds, data.reference);
+    const [width, height] = [data.width, 300];
+    const place = camera.seen([0.2, 0.3, 0.4], width / height);
+    const direction = camera.direction(...place, width / height);
+    const found = [camera.matrix(width / height), camera.rays(width, height), place, direction];
+    console.log(JSON.stringify(found));
+    """
+    given = {"position": camera.position, "target": camera.target, "up": camera.up, "fov": camera.fov}
+    width = round(300 * aspect)
+    data = {"camera": given, "bounds": bounds, "reference": REFERENCE_ASPECT, "width": width}
+    matrix, rays, place, direction = run_node(script, data)
+    half = np.tan(np.radians(camera.fov) / 2)
+    if aspect < REFERENCE_ASPECT:
+        half *= REFERENCE_ASPECT / (width / 300)
+    wide = decals.Camera(camera.position, camera.target, camera.up, float(np.degrees(2 * np.arctan(half))))
+    expected = wide.clip_matrix((width, 300), (np.array(bounds[0]), np.array(bounds[1])))
+    assert_allclose(np.reshape(matrix, (4, 4)).T, expected, rtol=1e-9, atol=1e-12)
+    known = wide.rays(width, 300)
+    assert_allclose(np.ravel(rays), np.ravel([known.origin, known.corner, known.right, known.up]), atol=1e-12)
+    clip = expected @ [0.2, 0.3, 0.4, 1]
+    assert_allclose(place, clip[:2] / clip[3], atol=1e-12)
+    toward = np.subtract([0.2, 0.3, 0.4], camera.position)
+    assert_allclose(direction, toward / np.linalg.norm(toward), atol=1e-12)
+
+
+@needs_node
+def test_links_hold_the_state_and_refuse_nonsense() -> None:
+    script = """
+    const { read, written } = await import("./link.mjs");
+    const row = (x) => ({ position: [x, 0, 0], normal: [0, 0, 1], tangent: [1, 0, 0], radius: 1 });
+    const originals = [row(0), row(1), row(2)];
+    const rows = [originals[0], null, { ...row(5), radius: 0.25 }, { ...row(7), image: 2 }];
+    const camera = { position: [1, 2, 3], target: [0, 0, 0.125] };
+    const state = { camera, mode: "radial", stiffness: 2.5, decals: { rows } };
+    const link = written(state, originals);
+    const many = { ...state, decals: { rows: Array.from({ length: 200 }, (_, i) => row(i)) } };
+    const wrong = ["", "#", "#d=99999999x", "#d=0:1,2,3", "#d=1:NaN", "#eye=1,2&at=3", "#k=-1", "#d=7x"];
+    const found = wrong.map((text) => read(text, originals));
+    console.log(JSON.stringify([read(link, originals), written(many, originals), found]));
+    """
+    state, too_long, wrong = run_node(script, None)
+    assert state["camera"] == {"position": [1, 2, 3], "target": [0, 0, 0.125]}
+    assert (state["mode"], state["stiffness"]) == ("radial", 2.5)
+    changes = dict(state["changes"])
+    assert changes[1] is None
+    assert changes[2]["position"] == [5, 0, 0]
+    assert changes[2]["radius"] == 0.25
+    assert changes[3]["image"] == 2
+    assert too_long is None
+    assert wrong == [{"changes": []}] * len(wrong)
+
+
+@needs_node
+def test_a_ray_meets_the_first_face() -> None:
+    import pyvista as pv
+
+    from decals.surfaces import MeshSurface
+
+    ball = pv.Sphere(theta_resolution=24, phi_resolution=24)
+    faces = ball.regular_faces.astype(np.int32)
+    random = np.random.default_rng(1)
+    origins = random.normal(size=(60, 3)) * 2
+    directions = random.normal(size=(60, 3)) * 0.3 - origins
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    script = """
+    const { Mesh, firstHit } = await import("./meshes.mjs");
+    const mesh = new Mesh({ mask: -1 }, data.vertices, data.faces, data.normals);
+    const found = data.rays.map((ray) => firstHit([mesh], ...ray)?.position ?? null);
+    console.log(JSON.stringify(found));
+    """
+    data = {
+        "vertices": ball.points.ravel().tolist(),
+        "faces": faces.ravel().tolist(),
+        "normals": ball.point_normals.ravel().tolist(),
+        "rays": [
+            [origin.tolist(), direction.tolist()]
+            for origin, direction in zip(origins, directions, strict=True)
+        ],
+    }
+    distances = MeshSurface(ball.points, faces).raycast(origins, directions)
+    for origin, direction, distance, point in zip(
+        origins, directions, distances, run_node(script, data), strict=True
+    ):
+        assert (point is None) == (not np.isfinite(distance))
+        if point is not None:
+            assert_allclose(point, origin + distance * direction, atol=1e-5)
