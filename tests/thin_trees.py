@@ -1,6 +1,8 @@
 """Random trees with thin parts, and the exact areas of their parts, in float64.
 
-Each part is a surface of revolution as dense triangles. A deformation acts on the triangles as on the tree.
+Each part is a surface of revolution, or a box, as dense triangles. Some parts are as thin as no primitive of
+theirs: walls that differences and shells leave, and the lenses of intersections. A deformation acts on the
+triangles as on the tree.
 The *own region* of a part is where no other part has any field: there its surface is known, however the parts
 are combined.
 """
@@ -11,17 +13,19 @@ from dataclasses import dataclass
 import numpy as np
 
 import blobtree
-from blobtree import Disc, Node, Point, Segment, Torus
+from blobtree import Box, Disc, Node, Point, Segment, Shell, Torus
 from blobtree._typing import BoolArray, Float64Array, IndexArray, Int32Array
 
-KINDS = ("ball", "hair", "rod", "ring", "plate")
+PRIMITIVES = ("ball", "hair", "rod", "ring", "plate")
+WALLS = ("lens", "shell", "pipe", "case")
+KINDS = (*PRIMITIVES, *WALLS)
 AROUND = 48
 """Steps around the axis of a part."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a tree: its kind, its radius, its node, and its own region."""
+    """A part of a tree: its kind, its radius (for walls half the thickness), its node, and its own region."""
 
     kind: str
     radius: float
@@ -63,15 +67,18 @@ Deformation = Callable[[Node], Node]
 PointMap = Callable[[Float64Array], Float64Array]
 
 
-def random_tree(seed: int) -> ThinTree:
-    """Return a random tree with one to four thin parts, attached or apart, mostly beside a large one."""
+def random_tree(seed: int, *, thinnest: float = 2e-4) -> ThinTree:
+    """Return a random tree with one to four thin parts, attached or apart, mostly beside a large one.
+
+    Their sizes are `thinnest` or more beside a ball of radius 1.
+    """
     rng = np.random.default_rng([33, seed])
     blend = str(rng.choice(["union", "sum"]))
     nodes: list[_Part] = []
     if rng.random() < 0.7:
         nodes.append(("ball", 1.0, Point((0, 0, 0), radius=1.0), _ball(np.zeros(3), 1.0)))
     for number in range(rng.integers(1, 5)):
-        size = 10.0 ** rng.uniform(np.log10(2e-4), np.log10(0.4))
+        size = 10.0 ** rng.uniform(np.log10(thinnest), np.log10(0.4))
         apart = rng.random() < 0.5 or not nodes
         away = 0.0 if not apart else 4.0 + 4.0 * number
         nodes.append(_random_part(rng, str(rng.choice(KINDS)), size, away))
@@ -109,16 +116,52 @@ def _random_part(rng: np.random.Generator, kind: str, size: float, away: float) 
         return kind, radius, tube, _capsule(start, end, radius)
     extent = rng.uniform(0.4, 1.2)
     radius = min(size, 0.3 * extent)
+    if kind in WALLS:
+        return _random_wall(rng, kind, radius, extent, start if away else 1.5 * direction, aside)
     if kind == "ring":
         center = start if away else np.zeros(3)
         extent = extent if away else 1.0 + 0.5 * extent
         ring = Torus(_vector(center), _vector(aside), extent, radius=radius)
         return kind, radius, ring, _torus(center, aside, extent, radius)
-    radius = min(max(radius, 2e-3), 0.3 * extent)  # plates that memory allows
     center = start if away else direction * (0.9 + extent)
     axis = aside if away else np.cross(direction, aside) / np.linalg.norm(np.cross(direction, aside))
     plate = Disc(_vector(center), _vector(axis), extent, radius=radius)
     return kind, radius, plate, _plate(center, axis, extent, radius)
+
+
+def _random_wall(
+    rng: np.random.Generator,
+    kind: str,
+    radius: float,
+    extent: float,
+    center: Float64Array,
+    axis: Float64Array,
+) -> _Part:
+    """Return a part that an operator leaves, twice as thick as `radius`."""
+    thickness = 2.0 * radius
+    if kind == "lens":
+        apart = (extent - radius) * axis
+        balls = [Point(_vector(center + side * apart), radius=extent) for side in (-1.0, 1.0)]
+        return kind, radius, balls[0] & balls[1], _lens(center, axis, extent, radius)
+    if kind == "shell":
+        shell = Shell(Point(_vector(center), radius=extent), thickness)
+        both = _ball(center, extent), _ball(center, extent - thickness)
+        return kind, radius, shell, _joined(*both)
+    if kind == "pipe":
+        end, wide = center + 1.5 * extent * axis, 0.5 * extent
+        radius, thickness = min(radius, 0.3 * wide), min(thickness, 0.6 * wide)
+        ends = _vector(center), _vector(end)
+        pipe = Segment(*ends, radius=wide) - Segment(*ends, radius=wide - thickness)
+        both = _capsule(center, end, wide), _capsule(center, end, wide - thickness)
+        return kind, radius, pipe, _joined(*both)
+    edge = extent * 10.0 ** rng.uniform(-2.0, -1.0)
+    sides = extent * rng.uniform(0.5, 1.0, 3)
+    radius = min(radius, 0.3 * float(sides.min()))
+    case = Box(_vector(center), _vector(sides), radius=edge) - Box(
+        _vector(center), _vector(sides - 2.0 * radius), radius=edge
+    )
+    boxes = [_rounded_box(center, 0.5 * (sides - gap), edge) for gap in (0.0, 2.0 * radius)]
+    return kind, 0.5 * radius, case, _joined(*boxes)
 
 
 def _random_deformation(rng: np.random.Generator) -> tuple[Deformation, PointMap]:
@@ -179,6 +222,56 @@ def _torus(center: Float64Array, axis: Float64Array, extent: float, radius: floa
     return _revolved(profile, center, axis, closed=True)
 
 
+def _lens(center: Float64Array, axis: Float64Array, extent: float, radius: float) -> Triangles:
+    """Return what two balls of radius `extent` have in common, `radius` high on both sides of their rim."""
+    half = float(np.arccos(1.0 - radius / extent))
+    cap = extent * _arc(0.5 * np.pi - half, 0.5 * np.pi, 200) - [0.0, extent - radius]
+    profile = np.concatenate([cap[::-1] * [1.0, -1.0], cap[1:]])
+    return _revolved(profile, center, axis, closed=False)
+
+
+def _rounded_box(center: Float64Array, half: Float64Array, edge: float) -> Triangles:
+    """Return everything within `edge` of a box with these half sides.
+
+    A ball is cut open along three planes, and its pieces move apart. Rows go from the middle of the lower
+    side to that of the upper one, columns around the box.
+    """
+    turn, ahead, still = np.linspace(0.0, 0.5 * np.pi, 9), np.linspace(-1.0, 1.0, 25), np.ones(25)
+    fill = np.linspace(0.0, 1.0, 15)
+    corners = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    angles, outlines = [], []
+    for quarter in range(4):
+        middle, half_way = (
+            (corners[quarter] + corners[quarter - 3]) / 2,
+            (corners[quarter - 3] - corners[quarter]) / 2,
+        )
+        angles += [quarter * 0.5 * np.pi + turn, (quarter + 1) * 0.5 * np.pi * still]
+        outlines += [np.tile(corners[quarter], (9, 1)), middle + ahead[:, None] * half_way]
+    around, outline = np.concatenate(angles), np.concatenate(outlines)
+    low, high = np.full(15, -0.5 * np.pi), np.full(15, 0.5 * np.pi)
+    up = np.concatenate([low, turn - 0.5 * np.pi, 0.0 * ahead, turn, high])[:, None]
+    level = np.concatenate([-np.ones(24), ahead, np.ones(24)])[:, None]
+    share = np.concatenate([fill, np.ones(43), fill[::-1]])[:, None]
+    x, y = (half[axis] * share * outline[:, axis] for axis in range(2))
+    vertices = np.stack(
+        [
+            x + edge * np.cos(up) * np.cos(around),
+            y + edge * np.cos(up) * np.sin(around),
+            np.broadcast_to(half[2] * level + edge * np.sin(up), x.shape),
+        ],
+        axis=2,
+    )
+    return center + vertices.reshape(-1, 3), _quads(len(up), len(around), closed=False)
+
+
+def _joined(first: Triangles, second: Triangles) -> Triangles:
+    """Return two surfaces as one."""
+    return (
+        np.concatenate([first[0], second[0]]),
+        np.concatenate([first[1], second[1] + len(first[0])]),
+    )
+
+
 def _revolved(profile: Float64Array, center: Float64Array, axis: Float64Array, *, closed: bool) -> Triangles:
     """Return vertices and faces of a profile (n, 2) of distances and heights, turned about an axis.
 
@@ -193,12 +286,15 @@ def _revolved(profile: Float64Array, center: Float64Array, axis: Float64Array, *
     radial = np.cos(angles)[:, None] * first + np.sin(angles)[:, None] * second
     radial *= (np.pi / around) / np.sin(np.pi / around)
     vertices = center + profile[:, None, :1] * radial + profile[:, None, 1:] * axis
-    rows = len(profile) if closed else len(profile) - 1
-    i, j = np.divmod(np.arange(rows * around), around)
-    k, after = (i + 1) % len(profile), (j + 1) % around
-    a, b, c, d = i * around + j, i * around + after, k * around + after, k * around + j
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    return vertices.reshape(-1, 3), faces
+    return vertices.reshape(-1, 3), _quads(len(profile), around, closed=closed)
+
+
+def _quads(rows: int, columns: int, *, closed: bool) -> IndexArray:
+    """Return the triangles between rows of points, each a loop; `closed` if the last row meets the first."""
+    i, j = np.divmod(np.arange((rows if closed else rows - 1) * columns), columns)
+    k, after = (i + 1) % rows, (j + 1) % columns
+    a, b, c, d = i * columns + j, i * columns + after, k * columns + after, k * columns + j
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
 def _triangles(vertices: Float64Array, faces: IndexArray | Int32Array) -> tuple[Float64Array, Float64Array]:

@@ -113,15 +113,15 @@ class AdaptiveCells:
         octants = [_octant_samples(values, octant) for octant in OCTANT_OFFSETS]
         agrees = [_agrees(samples, self._tolerance / sides) for samples in octants]
         bends = np.stack([_bend(samples) for samples in octants], axis=1)
-        ok = SIMPLE[_codes(inside[::4, ::4, ::4]).reshape(count)]
+        ok = SIMPLE[cell_codes(inside[::4, ::4, ::4]).reshape(count)]
         ok &= _agrees(values[::2, ::2, ::2], 0.5 * self._tolerance / sides)
-        codes = _codes(inside)
+        codes = cell_codes(inside)
         for name, rows in {
             "divided": np.zeros((count, OCTANTS), bool),
             "links": np.full(count * CHILDREN, -1, np.int32),
             "_codes": codes,
             "_cell_ok": SIMPLE[codes],
-            "_octant_codes": _codes(inside[::2, ::2, ::2]),
+            "_octant_codes": cell_codes(inside[::2, ::2, ::2]),
             "_octant_agrees": np.stack(agrees, axis=1),
             "_block_ok": ok,
             "_explored": bends <= MAX_BEND,
@@ -262,7 +262,7 @@ def _octant_samples(samples: Float32Array, octant: Int32Array) -> Float32Array:
     return samples[x : x + 3, y : y + 3, z : z + 3]
 
 
-def _codes(inside: BoolArray) -> NDArray[np.uint8]:
+def cell_codes(inside: BoolArray) -> NDArray[np.uint8]:
     """Return the codes (n, k³) of cells from the signs of their corners (k + 1, k + 1, k + 1, n)."""
     side, count = len(inside) - 1, inside.shape[-1]
     code = np.zeros((side, side, side, count), np.uint8)

@@ -5,11 +5,12 @@ are: a ball, a tube or a plate by its radius, a box by its shortest side too, al
 warps that shrink them. So the blocks in which a thin primitive acts are refined until their cells resolve it,
 and all others keep their size. The result is a mesh of adaptive cells, which is closed where sizes meet.
 
-The thickness of walls that differences and intersections leave is not that of any primitive; see
-`docs/meshing.md`.
+Walls that differences and intersections leave are thinner than any primitive: `walls` finds them.
 """
 
 import logging
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ import warp as wp
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray
 from blobtree.cells.grid import CHILDREN, Grid
-from blobtree.cells.sparse_cells import SparseCells
+from blobtree.cells.sparse_cells import SparseCells, build_cells
 from blobtree.device import launch
 from blobtree.formulas.skeletons import BALL_CELLS
 from blobtree.meshing.adaptive_cell_kernels import write_polygons
@@ -28,13 +29,25 @@ from blobtree.meshing.block_tree import BlockTree
 from blobtree.meshing.dual_kernels import sample_blocks
 from blobtree.meshing.mesh import Mesh
 from blobtree.meshing.part_kernels import measure_parts
+from blobtree.meshing.walls import Walls
 from blobtree.progress import Progress
 from blobtree.tape.model import ImplicitModel
-from blobtree.tape.part_sizes import leaf_boxes, part_sizes
-from blobtree.tape.program import PROGRAM_CHILDREN, ProgramNode, Run, postorder
+from blobtree.tape.operands import has_walls
+from blobtree.tape.part_sizes import fitting_scale, fitting_wall_scale, leaf_boxes, part_sizes, sized_tape
+from blobtree.tape.program import (
+    PROGRAM_CHILDREN,
+    ProgramLeaf,
+    ProgramNode,
+    Run,
+    compile_program,
+    postorder,
+)
 
-MAX_PART_BLOCKS = 1 << 15
-"""Most blocks that thin parts take; the mesh has up to a million triangles then."""
+PART_BYTES, BLOCK_BYTES = 2 << 30, 12 << 10
+"""Memory that thin parts take at most, and the memory of a block: its samples, its leaves and their mesh."""
+
+MAX_PART_BLOCKS = PART_BYTES // BLOCK_BYTES
+"""Most blocks that thin parts take; the mesh has up to five million triangles then."""
 
 SPARE_SHARE = 1 / 16
 """Part of these blocks that small parts take in any case, once larger ones have taken all."""
@@ -52,6 +65,18 @@ PART_KERNELS = (measure_parts, place_on_surface, write_polygons, sample_blocks)
 """Kernels of every mesh with thin parts, for `load_together`."""
 
 _logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class ThinPart:
+    """A part that is not resolved."""
+
+    size: float
+    """Size of the cells that it needs."""
+    place: Float64Array
+    """A place in it (3,)."""
+    of_wall: ProgramLeaf | None = None
+    """A leaf beside a wall that no primitive is as thin as."""
 
 
 def needed_sizes(
@@ -79,16 +104,16 @@ def least_size(cells: SparseCells, least: float) -> float:
 class PartCells(AdaptiveCells):
     """Adaptive cells that are small where parts are thin."""
 
-    def __init__(self, tree: BlockTree, tolerance: float, least: float) -> None:
+    def __init__(self, tree: BlockTree, tolerance: float, least: float, walls: Walls | None) -> None:
         super().__init__(tree, tolerance)
-        self._least = least
-        self.unresolved: list[tuple[float, Float64Array]] = []
-        """Sizes of the cells that parts need for which there is no room, and a place in each part."""
+        self._least, self._walls = least, walls
+        self.unresolved: list[ThinPart] = []
+        """Parts for whose cells there is no room."""
         self._divide_thin_parts()
 
     def _divide_thin_parts(self) -> None:
         """Divide the leaves that are too large for the parts in them."""
-        tree, level, growth = self.tree, 0, SHEET_GROWTH
+        tree, level, growth, first = self.tree, 0, SHEET_GROWTH, 0
         blocks, needed = np.arange(len(tree)), self._needed(0)
         while True:
             size = tree.grid(level).cell_size
@@ -96,6 +121,8 @@ class PartCells(AdaptiveCells):
             deep = deep[self._affordable(blocks[deep], needed[deep], growth)]
             if not len(deep):
                 return
+            if self._walls is not None:
+                self._walls.refine(first, blocks[deep])
             first, level = len(tree), level + 1
             tree.refine((blocks[deep, None] * CHILDREN + np.arange(CHILDREN)).ravel())
             growth = max(1.0, (len(tree) - first) / len(deep))
@@ -110,7 +137,8 @@ class PartCells(AdaptiveCells):
         if first == count:
             return np.empty(0, np.float32)
         grid = tree.grid(int(tree.levels[first]))
-        return needed_sizes(tree.cells, grid, tree.level_arrays(), first, count, self._least)
+        needed = needed_sizes(tree.cells, grid, tree.level_arrays(), first, count, self._least)
+        return needed if self._walls is None else np.minimum(needed, self._walls.needed(first))
 
     def _affordable(self, blocks: IndexArray, needed: Float32Array, growth: float) -> BoolArray:
         """Return True for the blocks to refine, without the parts with most blocks if there are too many."""
@@ -127,7 +155,9 @@ class PartCells(AdaptiveCells):
         fits[order] = np.cumsum(counts[order]) <= room
         for number in np.flatnonzero(~fits):
             dropped = np.flatnonzero(part == number)
-            self.unresolved.append((float(needed[dropped].min()), self._middle(blocks[dropped])))
+            size, middle = float(needed[dropped].min()), self._middle(blocks[dropped])
+            of_wall = None if self._walls is None else self._walls.leaf_at(middle, 4.0 * size)
+            self.unresolved.append(ThinPart(size, middle, of_wall))
         return np.asarray(fits[part], bool)
 
     def _middle(self, blocks: IndexArray) -> Float64Array:
@@ -138,43 +168,59 @@ class PartCells(AdaptiveCells):
         return middle
 
 
-def mesh_of_parts(tree: ImplicitModel, cells: SparseCells, creases: bool, report: Progress) -> Mesh | None:
-    """Return a mesh of `cells`, which are divided where parts are thin; None if no part is too thin for them.
+def mesh_of_parts(
+    tree: ImplicitModel, grid_of: Callable[[float], Grid], device: str | None, creases: bool, report: Progress
+) -> Mesh | None:
+    """Return a mesh of cells that are smaller where parts are thin; None if those of `grid_of(1.0)` do.
 
-    The tape of the cells is the `sized_tape` of the tree.
+    `grid_of` returns a grid whose cells are smaller by a factor.
     """
     lower, upper = tree.support
     smallest = LEAST_CELL * float((upper - lower).max())
-    if least_size(cells, smallest) >= BALL_CELLS * cells.grid.cell_size:
+    size, tape = grid_of(1.0).cell_size, sized_tape(tree)
+
+    def sampled(scale: float) -> tuple[BlockTree, Walls | None]:
+        blocks = BlockTree(build_cells(tape, grid_of(scale), device=device, report=report))
+        return blocks, Walls(tree, blocks, smallest) if has_walls(tree._program) else None
+
+    scale = fitting_scale(tree, size)
+    blocks, walls = sampled(scale)
+    needed = walls.sizes if walls is not None else np.empty(0, np.float32)
+    if len(needed):
+        scale = fitting_wall_scale(needed, size)
+        blocks, walls = sampled(scale)
+    elif least_size(blocks.cells, smallest) >= BALL_CELLS * blocks.cells.grid.cell_size:
         warn_of_thin_parts(tree, _too_thin(tree, smallest))
         return None
-    parts = PartCells(BlockTree(cells), 0.0, smallest)
+    parts = PartCells(blocks, 0.0, smallest, walls)
     mesh = AdaptiveMesher(parts, creases).mesh(report)
     warn_of_thin_parts(tree, parts.unresolved + _too_thin(tree, smallest))
     return mesh.mesh(creases)
 
 
-def _too_thin(tree: ImplicitModel, smallest: float) -> list[tuple[float, Float64Array]]:
-    """Return the sizes of the cells that leaves need, where they are below `smallest`, and places in these.
+def _too_thin(tree: ImplicitModel, smallest: float) -> list[ThinPart]:
+    """Return the leaves that need cells below `smallest`.
 
     Tips of cones are left out: only their end is missing.
     """
     needed = part_sizes(tree)[1] / BALL_CELLS
     lower, upper = leaf_boxes(tree)
-    return [(float(needed[i]), 0.5 * (lower[i] + upper[i])) for i in np.flatnonzero(needed < smallest)]
+    return [
+        ThinPart(float(needed[i]), 0.5 * (lower[i] + upper[i])) for i in np.flatnonzero(needed < smallest)
+    ]
 
 
-def warn_of_thin_parts(tree: ImplicitModel, unresolved: list[tuple[float, Float64Array]]) -> None:
+def warn_of_thin_parts(tree: ImplicitModel, unresolved: list[ThinPart]) -> None:
     """Log one warning that names the parts that are not resolved, the thinnest first."""
     if not unresolved:
         return
     lower, upper = tree.support
     longest = float((upper - lower).max())
     texts: dict[str, str] = {}
-    for size, place in sorted(unresolved, key=lambda part: part[0]):
-        at = ", ".join(f"{x:.4g}" for x in place)
-        wish = f"near ({at}), which needs a resolution of {longest / size:,.0f}"
-        texts.setdefault(_name_of_part(tree, size, place), wish)
+    for part in sorted(unresolved, key=lambda part: part.size):
+        at = ", ".join(f"{x:.4g}" for x in part.place)
+        wish = f"near ({at}), which needs a resolution of {longest / part.size:,.0f}"
+        texts.setdefault(_name_of_part(tree, part), wish)
     named = [f"{name} {wish}" for name, wish in list(texts.items())[:MAX_NAMED_PARTS]]
     more = len(texts) - len(named)
     _logger.warning(
@@ -185,19 +231,34 @@ def warn_of_thin_parts(tree: ImplicitModel, unresolved: list[tuple[float, Float6
     )
 
 
-def _name_of_part(tree: ImplicitModel, size: float, place: Float64Array) -> str:
-    """Return the class and the path of the leaf near `place` that needs cells of this size."""
-    least, most = np.log(part_sizes(tree)) - np.log(BALL_CELLS * size)
+def _name_of_part(tree: ImplicitModel, part: ThinPart) -> str:
+    """Return the class and the path of a part: a leaf, or the node whose operator leaves a wall."""
+    if part.of_wall is not None:
+        nodes = _way_to(tree, part.of_wall)
+        path, node = [found for found in nodes if has_walls(compile_program(found[1]))][-1]
+        return f"a wall of the {type(node).__name__} at path {path}"
+    least, most = np.log(part_sizes(tree)) - np.log(BALL_CELLS * part.size)
     misfit = np.round(np.maximum(least, -most).clip(0.0), 1)
     lower, upper = leaf_boxes(tree)
-    gaps = np.linalg.norm(np.maximum(lower - place, place - upper).clip(0.0), axis=1)
+    gaps = np.linalg.norm(np.maximum(lower - part.place, part.place - upper).clip(0.0), axis=1)
     number = np.lexsort([gaps, misfit])[0]
     leaves = [placed.primitive for run in tree._program if isinstance(run, Run) for placed in run.primitives]
-    pending: list[tuple[tuple[int, ...], ProgramNode]] = [((), tree)]
-    while pending:
-        path, node = pending.pop()
-        pending.extend(((*path, step), child) for step, child in enumerate(node.children))
-        below = [] if node.children else postorder(node, below=PROGRAM_CHILDREN)
-        if any(leaf is leaves[number] for leaf in below):
-            return f"the {type(node).__name__} at path {path}"
-    return f"a {type(leaves[number]).__name__}"
+    path, node = _way_to(tree, leaves[number])[-1]
+    return f"the {type(node).__name__} at path {path}"
+
+
+def _way_to(tree: ImplicitModel, leaf: ProgramLeaf) -> list[tuple[tuple[int, ...], ProgramNode]]:
+    """Return the paths and the nodes from the root down to the one that is, or stands for, a leaf."""
+    way: list[tuple[tuple[int, ...], ProgramNode]] = [((), tree)]
+    while True:
+        path, node = way[-1]
+        below = enumerate(node.children)
+        step = next((at for at, child in below if leaf in _leaves(child)), None)
+        if step is None:
+            return way
+        way.append(((*path, step), node.children[step]))
+
+
+def _leaves(node: ProgramNode) -> list[ProgramNode]:
+    """Return the leaves of programs below a node."""
+    return [below for below in postorder(node, below=PROGRAM_CHILDREN) if isinstance(below, ProgramLeaf)]

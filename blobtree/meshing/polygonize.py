@@ -32,7 +32,8 @@ from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import ImplicitModel, checked_tree
-from blobtree.tape.part_sizes import fitting_scale, has_small_parts, has_warps, sized_tape
+from blobtree.tape.operands import has_walls
+from blobtree.tape.part_sizes import has_small_parts, has_warps, sized_tape
 from blobtree.validation import LARGEST_NUMBER, is_whole, real_number, shown, truth
 
 DEFAULT_RESOLUTION = 64
@@ -203,7 +204,7 @@ def polygonize_parts(
 ) -> Mesh:
     """Return the mesh with cells of `resolution`, and smaller ones where parts are thin, see `polygonize`."""
     truth("creases", creases, InvalidResolution)
-    if shows_small_parts(tree, resolution, BALL_CELLS, device):
+    if shows_small_parts(tree, resolution, BALL_CELLS, device) or has_walls(tree._program):
         size = _cell_size(tree, resolution, None)
         with reporting(progress, cancel) as report:
             mesh = _mesh_of_thin_parts(tree, size, creases, device, report)
@@ -233,9 +234,7 @@ def _mesh_of_thin_parts(
     from blobtree.meshing.parts import PART_KERNELS, mesh_of_parts  # imported here, as above
 
     _load_kernels(tree, device, creases, *PART_KERNELS)
-    size *= fitting_scale(tree, size)
-    cells = build_cells(sized_tape(tree), _grid(tree, size), device=device, report=report)
-    return mesh_of_parts(tree, cells, creases, report)
+    return mesh_of_parts(tree, lambda scale: _grid(tree, scale * size), device, creases, report)
 
 
 def _load_kernels(tree: ImplicitModel, device: str | None, creases: bool, *kernels: wp.Kernel) -> None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from blobtree._typing import Box, Float64Array
+from blobtree._typing import Box, Float32Array, Float64Array
 from blobtree.formulas.falloff import RIM
 from blobtree.formulas.skeletons import BALL_CELLS, PLATE_CELLS, TUBE_CELLS, Skeleton
 from blobtree.tape.bounds import field_boxes, primitive_boxes
@@ -96,11 +96,22 @@ def fitting_scale(tree: ImplicitModel, size: float) -> float:
         [len(run.primitives) for run in runs],
     )
     whole = (float((tree.support[1] - tree.support[0]).max()) / size) ** 2
+    return _cheapest_scale(size, sizes, lengths**powers, whole)
+
+
+def fitting_wall_scale(walls: Float32Array, size: float) -> float:
+    """Return the factor of `size` with which walls take the fewest cells; `walls` are sizes they need."""
+    needed = walls.astype(np.float64)
+    return _cheapest_scale(size, needed, (size / needed) ** 2.0, 0.0)
+
+
+def _cheapest_scale(size: float, needed: Float64Array, cells: Float64Array, whole: float) -> float:
+    """Return the scale of `size` with the fewest cells, for parts that take `cells` of the size needed."""
     costs = []
     for scale in CELL_SCALES:
-        halvings = np.ceil(np.log2(np.maximum(scale * size / sizes, 1.0)))
-        fineness = sizes / (scale * size) * 2.0**halvings
-        costs.append(whole / scale**2 + (lengths**powers * fineness**2)[halvings > 0].sum())
+        halvings = np.ceil(np.log2(np.maximum(scale * size / needed, 1.0)))
+        fineness = needed / (scale * size) * 2.0**halvings
+        costs.append(whole / scale**2 + (cells * fineness**2)[halvings > 0].sum())
     return CELL_SCALES[int(np.argmin(costs))]
 
 

@@ -108,7 +108,8 @@ class ImplicitSurface(Immutable):
                 f"expected a tree with a surface, got none in {cells} cells; "
                 "its parts may be too small, or cut each other away"
             )
-        self.has_small_parts = resolution is None and shows_small_parts(tree, cells, SMALL_PART, device)
+        self._finds_parts = resolution is None
+        self.has_small_parts = self._finds_parts and shows_small_parts(tree, cells, SMALL_PART, device)
         """True if parts of the tree are small beside it, and the mesh has smaller cells for them."""
         self._coarse = (
             CurvedMesh(coarse, device=device)
@@ -134,7 +135,7 @@ class ImplicitSurface(Immutable):
         resolution = RESOLUTION if cells <= RESOLUTION else MAX_RESOLUTION
         mesh = self._meshes.get(resolution)
         if mesh is None:
-            refine = polygonize_parts if self.has_small_parts else polygonize
+            refine = polygonize_parts if self._finds_parts else polygonize
             fine = refine(self.tree, resolution=resolution, creases=True, device=self.device)
             mesh = MeshSurface(
                 fine.vertices, fine.faces, device=self.device, orientation=MeshOrientation.KEEP

@@ -1,0 +1,299 @@
+"""Walls: parts between two surfaces of operands, which no primitive is as thin as.
+
+What a difference leaves between its body and its tool, the lens of an intersection and the walls of a shell
+have both their sides on surfaces of operands. These surfaces are far smoother than the wall is thin, so cells
+of any size show them. Points on them are the samples: from each, a ray into the solid finds the other side.
+Where the wall is thin, more samples lie between them, as close as the blocks of the next level.
+
+A wedge is thin at its edge, whatever the size of cells. In a strip along it, a small part of a cell of the
+base wide, cells are as large as at the strip's inner side.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import warp as wp
+
+from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray
+from blobtree.cells.sparse_cells import SparseCells, build_cells
+from blobtree.device import launch
+from blobtree.formulas.falloff import ISO
+from blobtree.formulas.skeletons import PLATE_CELLS
+from blobtree.meshing.adaptive_cells import CELL_OFFSETS, CORNERS, cell_codes
+from blobtree.meshing.block_tree import BlockTree, on_device
+from blobtree.meshing.part_kernels import UNLIMITED
+from blobtree.meshing.patches import EDGES
+from blobtree.meshing.wall_kernels import climb, measure_walls, place_samples
+from blobtree.tape.model import ImplicitModel
+from blobtree.tape.operands import Operand, operands_of
+from blobtree.tape.program import ProgramLeaf
+from blobtree.tape.tape import DeviceTape
+
+WALL_CELLS = 2.0 * PLATE_CELLS
+"""Cells across a wall, for the corners of cells to lie in it."""
+
+RIM_SHARE = 1 / 48
+"""Width of the strip along the edge of a wedge, over the radius of a disc with as many samples."""
+
+EDGE_SHARE = 1 / 4
+"""Size of the smallest cells at the edges of a lens, over that of the thinnest parts."""
+
+PARALLEL = np.radians(12.0)
+"""Angle between the sides of a wall below which they are nearly parallel."""
+
+LENS_REACH = 3.0
+"""Largest radius of a lens over that of its part with nearly parallel sides, for all angles of its edge."""
+
+CLIMBS = 3
+"""Steps of samples toward the solid, before its thickness is measured."""
+
+CROSSED_EDGE: IndexArray = np.array(
+    [[(code >> a & 1) != (code >> b & 1) for a, b in EDGES] for code in range(256)]
+).argmax(axis=1)
+"""By code of a cell (256,), the first edge that the surface crosses."""
+
+Ends = tuple[Float32Array, Float32Array]
+"""Both ends of lines (n, 3)."""
+
+SPREAD: dict[int, Float64Array] = {
+    count: np.stack(np.meshgrid(*2 * [(np.arange(count) + 0.5) / count - 0.5]), axis=-1).reshape(-1, 2)
+    for count in (2, 4)
+}
+"""Places in a square of `count`² samples, in sides of it."""
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """Thin places of the surface of one operand."""
+
+    leaf: ProgramLeaf
+    tape: DeviceTape
+    rim: float
+    """Width of the strip along the edge of a wedge that keeps larger cells."""
+    places: Float32Array
+    """Points on the surface (n, 3)."""
+    normals: Float32Array
+    """Inward normals (n, 3)."""
+    needed: Float32Array
+    """Sizes of the cells that the wall needs (n,)."""
+
+    def chosen(self, among: BoolArray | IndexArray) -> "_Samples":
+        """Return some of the samples."""
+        return replace(
+            self, places=self.places[among], normals=self.normals[among], needed=self.needed[among]
+        )
+
+    def thinned(self, spacing: float) -> "_Samples":
+        """Return one sample in each cube of this side: many of them climb to one place."""
+        cubes = np.floor(self.places / spacing).astype(np.int64)
+        return self.chosen(np.unique(cubes, axis=0, return_index=True)[1])
+
+    @property
+    def both_sides(self) -> Float64Array:
+        """The places, and those on the other side of the wall (2 n, 3)."""
+        across = self.normals.astype(np.float64) * (WALL_CELLS * self.needed)[:, None]
+        return np.concatenate([self.places, self.places + across])
+
+    def spread(self, spacing: float, count: int) -> Ends:
+        """Return lines across the surface, count² around each place, in a square of this side."""
+        first = np.cross(self.normals, np.eye(3)[np.abs(self.normals).argmin(axis=1)])
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        second = np.cross(self.normals, first)
+        offsets = spacing * SPREAD[count]
+        places = self.places[:, None] + offsets[:, :1] * first[:, None] + offsets[:, 1:] * second[:, None]
+        across = 0.5 * spacing * self.normals[:, None]
+        low, high = ((places + side * across).reshape(-1, 3).astype(np.float32) for side in (-1, 1))
+        return low, high
+
+
+class Walls:
+    """The thin walls of a tree, sampled level by level as its blocks are refined."""
+
+    def __init__(self, tree: ImplicitModel, blocks: BlockTree, least: float) -> None:
+        self._blocks, self._least = blocks, EDGE_SHARE * least
+        cells = blocks.cells
+        self._device, self._kernel = cells.device, cells.tape.instruction_set.kernel_for
+        operands = operands_of(tree._program, tree.tape)
+        lines = [_crossed_edges(build_cells(one.tape, cells.grid, device=self._device)) for one in operands]
+        self._samples = []
+        for operand, (low, high), near in zip(
+            operands, lines, self._near_others(operands, lines), strict=True
+        ):
+            tape = operand.tape.on(self._device)
+            samples = self._thin(operand.leaf, tape, 0.0, low[near], high[near], 0)
+            if count := len(samples.needed):
+                rim = RIM_SHARE * cells.grid.cell_size * float(np.sqrt(count / np.pi))
+                samples = self._thin(operand.leaf, tape, rim, low[near], high[near], 0)
+            self._samples.append(samples)
+
+    def _near_others(self, operands: list[Operand], lines: list[Ends]) -> list[BoolArray]:
+        """Return which lines of each operand lie in a block, or beside one, that another operand crosses.
+
+        A tool of several primitives counts as another one to itself.
+        """
+        grid = self._blocks.cells.grid
+        all_blocks = [
+            np.floor((low - grid.origin) / (4 * grid.cell_size)).astype(np.int64) for low, _ in lines
+        ]
+        count = np.array([len(blocks) for blocks in all_blocks])
+        owners = np.repeat(np.arange(len(lines)), count)
+        blocks, rows = np.unique(
+            np.concatenate([np.empty((0, 3), np.int64), *all_blocks]), axis=0, return_inverse=True
+        )
+        crossed = np.zeros((len(blocks), len(lines)), bool)
+        crossed[rows.ravel(), owners] = True
+        index, near = _Index(blocks), np.zeros_like(crossed)
+        for offset in np.ndindex(3, 3, 3):
+            beside = index.find(blocks + offset - 1)
+            near[beside >= 0] |= crossed[beside[beside >= 0]]
+        shared = near.sum(axis=1) > 1
+        shared |= near[:, [operand.faces_itself for operand in operands]].any(axis=1)
+        return np.split(shared[rows.ravel()], np.cumsum(count)[:-1])
+
+    @property
+    def sizes(self) -> Float32Array:
+        """Sizes of the cells that walls need, at all samples."""
+        return np.concatenate([np.empty(0, np.float32), *(samples.needed for samples in self._samples)])
+
+    def needed(self, first: int) -> Float32Array:
+        """Return the sizes of cells that walls need in blocks of the finest level, from number `first` on."""
+        needed = np.full(len(self._blocks) - first, UNLIMITED, np.float32)
+        for samples in self._samples:
+            rows = self._rows(samples.both_sides, first)
+            found = rows >= 0
+            np.minimum.at(needed, rows[found], np.tile(samples.needed, 2)[found])
+        return self._spread_to_neighbors(needed, first)
+
+    def _spread_to_neighbors(self, needed: Float32Array, first: int) -> Float32Array:
+        """Return sizes of cells, with the least one of its neighbours for each block without a sample."""
+        thin = np.flatnonzero(needed < UNLIMITED)
+        at = self._blocks.coordinates[first:][thin].astype(np.int64)
+        index = _Index(self._blocks.coordinates[first:].astype(np.int64))
+        result = np.full_like(needed, UNLIMITED)
+        for offset in np.ndindex(3, 3, 3):
+            rows = index.find(at + offset - 1)
+            np.minimum.at(result, rows[rows >= 0], needed[thin[rows >= 0]])
+        return np.where(needed < UNLIMITED, needed, result)
+
+    def refine(self, first: int, refined: IndexArray) -> None:
+        """Put more samples into blocks that are refined, of those from number `first` on at their level."""
+        blocks = self._blocks
+        level = int(blocks.levels[refined[0]])
+        spacing = _spacing(blocks.grid(level).cell_size, level)
+        chosen = np.zeros(len(blocks) + 1, bool)
+        chosen[refined] = True
+        for number, samples in enumerate(self._samples):
+            rows = self._rows(samples.both_sides, first).reshape(2, -1)
+            either = np.any(chosen[np.where(rows >= 0, first + rows, -1)], axis=0)
+            kept = samples.chosen(np.flatnonzero(either))
+            ends = kept.spread(spacing, 2 if level == 0 else 4)
+            self._samples[number] = self._thin(samples.leaf, samples.tape, samples.rim, *ends, level + 1)
+
+    def leaf_at(self, place: Float64Array, size: float) -> ProgramLeaf | None:
+        """Return a leaf of the operand with a sample nearest to a place whose wall needs cells of a size.
+
+        None if no wall there needs cells as small.
+        """
+        nearest, result = 4.0 * self._blocks.grid(0).cell_size, None
+        for samples in self._samples:
+            gaps = np.linalg.norm(samples.places[samples.needed <= size] - place, axis=1)
+            if gaps.min(initial=np.inf) < nearest:
+                nearest, result = gaps.min(), samples.leaf
+        return result
+
+    def _rows(self, places: Float64Array, first: int) -> IndexArray:
+        """Return the blocks of the finest level that hold places, counted from number `first`, or −1."""
+        blocks = self._blocks
+        if first == len(blocks):
+            return np.full(len(places), -1)
+        grid = blocks.grid(int(blocks.levels[first]))
+        at = np.floor((places - grid.origin) / (4 * grid.cell_size)).astype(np.int64)
+        return _Index(blocks.coordinates[first:].astype(np.int64)).find(at)
+
+    def _thin(
+        self,
+        leaf: ProgramLeaf,
+        tape: DeviceTape,
+        rim: float,
+        starts: Float32Array,
+        ends: Float32Array,
+        level: int,
+    ) -> _Samples:
+        """Return the samples between `starts` and `ends` where a wall is too thin for cells of a level."""
+        count, device = len(starts), self._device
+        size, limit = (self._blocks.grid(at).cell_size for at in (level, max(level - 1, 0)))
+        low, high = (on_device(array, wp.vec3, device) for array in (starts, ends))
+        places, moved, normals = (wp.zeros(count, dtype=wp.vec3, device=device) for _ in range(3))
+        thicknesses, angles = (wp.zeros(count, dtype=wp.float32, device=device) for _ in range(2))
+        arrays = self._blocks.arrays()
+        of_operand = [tape.data, tape.span]
+        launch(self._kernel(place_samples), count, [low, high, 0.5 * size, *of_operand], [places], device)
+        for _climb in range(CLIMBS):
+            launch(self._kernel(climb), count, [places, size, *of_operand, arrays], [moved], device)
+            places, moved = moved, places
+        inputs = [places, size, WALL_CELLS * limit, WALL_CELLS * self._least, rim, arrays]
+        launch(self._kernel(measure_walls), count, inputs, [moved, normals, thicknesses, angles], device)
+        needed = thicknesses.numpy() / np.float32(WALL_CELLS)
+        needed = np.where(needed < 0.0, self._next_size(-needed), needed)
+        samples = _Samples(leaf, tape, rim, moved.numpy(), normals.numpy(), needed)
+        thin = (needed < limit) & (needed >= self._least)
+        if level == 0:
+            thin[thin] = _beside_parallel_sides(samples.places[thin], angles.numpy()[thin], size)
+        samples = samples.chosen(thin)
+        return samples.thinned(0.5 * _spacing(size, level))
+
+    def _next_size(self, needed: Float32Array) -> Float32Array:
+        """Return the next larger sizes that cells can have."""
+        base = self._blocks.grid(0).cell_size
+        halvings = np.floor(np.log2(base / np.maximum(needed, 1e-30)))
+        return np.asarray(np.nextafter(base * 2.0**-halvings, np.inf), np.float32)
+
+
+def _beside_parallel_sides(places: Float32Array, angles: Float32Array, spacing: float) -> BoolArray:
+    """Return which places are near nearly parallel sides; all others are only sharp edges."""
+    from scipy.spatial import cKDTree  # most meshes have no thin walls
+
+    seeds = places[angles < PARALLEL]
+    if not len(seeds):
+        return np.zeros(len(places), bool)
+    reach = LENS_REACH * spacing * float(np.sqrt(len(seeds) / np.pi)) + 2.0 * spacing
+    return np.asarray(cKDTree(seeds).query(places)[0] < reach, bool)
+
+
+def _spacing(size: float, level: int) -> float:
+    """Return the distance between samples in blocks of a level with cells of a size."""
+    return size if level == 0 else 2.0 * size
+
+
+def _crossed_edges(cells: SparseCells) -> Ends:
+    """Return both ends of an edge of each cell that a surface crosses."""
+    blocks = BlockTree(cells)
+    codes = cell_codes(np.ascontiguousarray(np.moveaxis(blocks.values, 0, -1)) >= ISO)
+    rows, offsets = np.nonzero((codes > 0) & (codes < 255))
+    lowest = blocks.coordinates[rows] * 4 + CELL_OFFSETS[offsets]
+    edges = np.array(EDGES)[CROSSED_EDGE[codes[rows, offsets]]]
+    low, high = (cells.grid.origin + (lowest + CORNERS[end]) * cells.grid.cell_size for end in edges.T)
+    return low.astype(np.float32), high.astype(np.float32)
+
+
+class _Index:
+    """Rows of integer coordinates (n, 3)."""
+
+    def __init__(self, coordinates: IndexArray) -> None:
+        keys = _keys(coordinates)
+        self._order = np.argsort(keys)
+        self._keys = keys[self._order]
+
+    def find(self, coordinates: IndexArray) -> IndexArray:
+        """Return the row of each of other coordinates (m, 3), −1 where there is none."""
+        wanted = _keys(coordinates)
+        at = np.searchsorted(self._keys, wanted).clip(max=len(self._keys) - 1)
+        rows: IndexArray = np.where(self._keys[at] == wanted, self._order[at], -1)
+        return rows
+
+
+def _keys(coordinates: IndexArray) -> IndexArray:
+    """Return numbers (n,) that tell integer coordinates (n, 3) apart."""
+    x, y, z = coordinates.clip(-1, (1 << 20) - 2).T + 1
+    keys: IndexArray = (x << 42) + (y << 21) + z
+    return keys

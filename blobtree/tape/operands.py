@@ -1,0 +1,136 @@
+"""Operands of a tree that removes: the parts of its tape whose surfaces bound walls and lenses.
+
+Differences, intersections and their smooth kin leave parts that are thinner than any primitive: a wall
+between two surfaces, a lens where two bodies overlap. Both sides of such a part belong to different operands.
+So a tree is cut into operands that remove nothing themselves.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from blobtree._typing import Float32Array
+from blobtree.formulas.operators import SUM, UNION, Operator, Support
+from blobtree.tape.program import EnterWarp, Instruction, LeaveWarp, Pop, ProgramLeaf, Push, Run
+from blobtree.tape.tape import Tape
+
+
+@dataclass(frozen=True)
+class Operand:
+    """A part of a tape that removes nothing itself."""
+
+    tape: Tape
+    leaf: ProgramLeaf
+    """The first of its leaves."""
+    faces_itself: bool
+    """True for a tool of several primitives, between which it may leave walls."""
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Texels of instructions that leave one value in the accumulator, and the leaves among them."""
+
+    texels: tuple[Float32Array, ...] = ()
+    leaves: tuple[ProgramLeaf, ...] = ()
+    tool: bool = False
+
+    def then(self, texels: Float32Array, leaves: tuple[ProgramLeaf, ...]) -> "_Part":
+        """Return these instructions and one more."""
+        return _Part((*self.texels, texels), self.leaves + leaves)
+
+    def within(self, enter: Float32Array, leave: Float32Array) -> "_Part":
+        """Return these instructions inside a warp."""
+        return replace(self, texels=(enter, *self.texels, leave))
+
+
+@dataclass(frozen=True)
+class _Value:
+    """The accumulator: its instructions, and its operands if it removes."""
+
+    whole: _Part = _Part()
+    operands: tuple[_Part, ...] = ()
+
+    @property
+    def parts(self) -> tuple[_Part, ...]:
+        """The operands, or all of it."""
+        return self.operands or ((self.whole,) if self.whole.texels else ())
+
+    @property
+    def tools(self) -> tuple[_Part, ...]:
+        """The parts, as those of a second operand."""
+        return tuple(replace(part, tool=True) for part in self.parts)
+
+
+def removes(operator: Operator) -> bool:
+    """Return True if the operator removes from its first operand."""
+    return operator.support is not Support.EITHER
+
+
+def has_walls(program: list[Instruction]) -> bool:
+    """Return True if an operator of the program may leave walls or lenses."""
+    return any(removes(step.operator) for step in program if isinstance(step, Run | Pop))
+
+
+def operands_of(program: list[Instruction], tape: Tape) -> list[Operand]:
+    """Return the operands of a tree that removes; none for other trees."""
+    starts = tape.headers.tolist()
+    pieces = [tape.data[a:b] for a, b in zip(starts, [*starts[1:], len(tape.data)], strict=True)]
+    value = _Value()
+    registers: dict[int, tuple[_Value, Float32Array]] = {}
+    enters: dict[int, Float32Array] = {}
+    for step, texels in zip(program, pieces, strict=True):
+        match step:
+            case Run(operator=operator, primitives=primitives):
+                leaves = tuple(placed.primitive for placed in primitives)
+                more: tuple[_Part, ...] = ()
+                if removes(operator):
+                    more = tuple(_runs(step, texels, tape))
+                elif value.operands:
+                    more = (_Part((texels,), leaves),)
+                operands = value.parts + more if more else ()
+                value = _Value(value.whole.then(texels, leaves), operands)
+            case Push(register):
+                registers[register], value = (value, texels), _Value()
+            case Pop(register, operator, _, swapped):
+                first, push = registers[register]
+                left, right = (value, first) if swapped else (first, value)
+                both = (*first.whole.texels, push, *value.whole.texels, texels)
+                whole = _Part(both, left.whole.leaves + right.whole.leaves)
+                operands = ()
+                if removes(operator):
+                    operands = left.parts + right.tools
+                elif left.operands or right.operands:
+                    operands = left.parts + right.parts
+                value = _Value(whole, operands)
+            case EnterWarp(register=register):
+                enters[register], value = texels, _Value()
+            case LeaveWarp(entry):
+                enter = enters[entry.register]
+                within = tuple(part.within(enter, texels) for part in value.operands)
+                value = _Value(value.whole.within(enter, texels), within)
+    return [_operand(part, tape) for part in value.operands if part.leaves]
+
+
+def _runs(step: Run, texels: Float32Array, tape: Tape) -> Iterator[_Part]:
+    """Yield the primitives of a run that removes, as operands of their own.
+
+    What tools cut away lies outside all of them, so a union of tools has all of the surface that is left.
+    """
+    operators = tape.instruction_set.operators
+    leaves = tuple(placed.primitive for placed in step.primitives)
+    if step.operator.support is Support.LEFT:
+        header = [texels[0, 0], operators.index(UNION), texels[0, 2], 0.0]
+        yield _Part((np.vstack([header, texels[1:]]),), leaves, tool=True)
+        return
+    header = [texels[0, 0], operators.index(SUM), 1.0, 0.0]
+    for leaf, own in zip(leaves, np.split(texels[1:], len(leaves)), strict=True):
+        yield _Part((np.vstack([header, own]),), (leaf,))
+
+
+def _operand(part: _Part, tape: Tape) -> Operand:
+    """Return an operand with its tape, behind the data region of the whole one."""
+    data = np.concatenate([tape.data[: tape.start], *part.texels]).astype(tape.data.dtype)
+    starts = tape.start + np.cumsum([0, *(len(texels) for texels in part.texels[:-1])])
+    several = len(part.leaves) > 1
+    return Operand(replace(tape, data=data, headers=starts), part.leaves[0], part.tool and several)

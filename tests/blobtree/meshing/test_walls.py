@@ -1,0 +1,98 @@
+"""Walls that operators leave, thinner than any primitive: closed meshes with the area of both sides."""
+
+import logging
+
+import numpy as np
+import pytest
+
+from blobtree import Box, Node, Point, Segment, Shell, SmoothDifference, polygonize
+from blobtree.meshing.polygonize import polygonize_parts
+from tests.thin_trees import is_closed, mesh_areas
+
+BALL = Point((0, 0, 0), radius=1.0)
+CUBE = Box((0, 0, 0), (1, 1, 1), radius=0.1)
+
+
+def box_area(side: float, edge: float) -> float:
+    """Return the area of everything within `edge` of a cube."""
+    return 6.0 * side**2 + 6.0 * np.pi * side * edge + 4.0 * np.pi * edge**2
+
+
+def lens(height: float) -> tuple[Node, float]:
+    """Return what two balls of radius 1 have in common, and its area."""
+    apart = 2.0 - height
+    return BALL & BALL.translate((apart, 0, 0)), 2.0 * np.pi * height
+
+
+WALLS: dict[str, tuple[Node, float]] = {
+    "shell": (Shell(BALL, 0.1), 4.0 * np.pi * 1.81),
+    "case": (CUBE - Box((0, 0, 0), (0.92, 0.92, 0.92), radius=0.1), box_area(1.0, 0.1) + box_area(0.92, 0.1)),
+    "sharp case": (
+        Box((0, 0, 0), (1, 1, 1), radius=1e-3) - Box((0, 0, 0), (0.9, 0.9, 0.9), radius=1e-3),
+        box_area(1.0, 1e-3) + box_area(0.9, 1e-3),
+    ),
+    "lens": lens(0.05),
+    "small lens": lens(0.01),
+    "twisted pipe": (
+        (Segment((0, 0, 0), (0, 0, 2), radius=0.5) - Segment((0, 0, 0), (0, 0, 2), radius=0.45)).twist(20.0),
+        4.0 * np.pi * (0.95 + 0.4525),
+    ),
+    "stretched shell": (
+        Shell(BALL, 0.1).transform(np.diag([0.01, 0.01, 0.01, 1.0])[:3]),
+        4e-4 * np.pi * 1.81,
+    ),
+}
+
+
+@pytest.mark.slow_cases("small lens")
+@pytest.mark.parametrize("name", WALLS)
+def test_both_sides_of_a_wall_have_their_area(name: str) -> None:
+    tree, area = WALLS[name]
+    mesh = polygonize_parts(tree, resolution=16)
+    assert is_closed(mesh.faces)
+    assert mesh_areas(mesh)[1].sum() == pytest.approx(area, rel=0.06)
+
+
+def test_a_wall_between_two_holes_has_its_area() -> None:
+    holes = [Segment((x, 0, -1), (x, 0, 1), radius=0.3) for x in (-0.31, 0.31)]
+    box = Box((0, 0, 0), (2, 1, 0.4), radius=0.01)
+    arc = 2.0 * 0.3 * np.arccos((0.31 - 0.02) / 0.3)
+    for tree in (box - holes[0] - holes[1], box - (holes[0] | holes[1])):
+        mesh = polygonize_parts(tree, resolution=24)
+        centers, areas = mesh_areas(mesh)
+        middle = (np.abs(centers[:, 0]) < 0.02) & (np.abs(centers[:, 2]) < 0.15)
+        assert is_closed(mesh.faces)
+        assert areas[middle].sum() == pytest.approx(2.0 * arc * 0.3, rel=0.1)
+
+
+@pytest.mark.slow  # kernels of this operator compile
+def test_a_smooth_difference_leaves_a_wall() -> None:
+    tree = SmoothDifference(BALL, Point((0, 0, 0), radius=0.9), 0.02)
+    mesh = polygonize_parts(tree, resolution=16)
+    assert is_closed(mesh.faces)
+    assert mesh_areas(mesh)[1].sum() == pytest.approx(4.0 * np.pi * 1.81, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_without_walls_cuts_keep_cells_of_one_size(seed: int) -> None:
+    turned = Segment((0, 0, -2), (0, 0.1 * seed, 2), radius=0.3)
+    for tree in (CUBE - turned, BALL & CUBE.translate((0.4, 0, 0)), BALL - turned.rotate((1, 2, 3), 70)):
+        uniform, default = polygonize(tree, resolution=64), polygonize(tree)
+        assert np.array_equal(uniform.vertices, default.vertices)
+        assert np.array_equal(uniform.faces, default.faces)
+
+
+def test_sharp_edges_are_no_walls() -> None:
+    crescent = BALL - Point((0.5, 0.3, 0), radius=0.9)
+    uniform, default = polygonize(crescent, resolution=64), polygonize(crescent)
+    assert np.array_equal(uniform.vertices, default.vertices)
+
+
+@pytest.mark.slow
+def test_a_wall_too_thin_for_memory_is_named_once(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING):
+        mesh = polygonize(BALL.translate((4, 0, 0)) | Shell(BALL, 5e-4))
+    assert is_closed(mesh.faces)
+    (record,) = caplog.records
+    assert "a wall of the Shell at path (1,)" in record.getMessage()
+    assert "resolution of" in record.getMessage()
