@@ -31,7 +31,7 @@ from decals.surfaces.windings import MeshOrientation
 from decals.validation import describe, instance
 from decals.vtk.adapters import Lights
 from decals.vtk.attributes import KnownAttributes
-from decals.vtk.exports import restore_exports, warn_of_exports
+from decals.vtk.exports import restore_exports, watch_exports
 from decals.vtk.frame import WindowContext
 from decals.vtk.subplot import PickResult, SubplotRenderer
 
@@ -347,7 +347,7 @@ class DecalsComponent(KnownAttributes):
         renderer = self._plotter.renderer
         if id(renderer) not in self._subplots:
             if not self._subplots:
-                warn_of_exports(self._plotter)
+                watch_exports(self._plotter)
             self._subplots[id(renderer)] = SubplotRenderer(self._plotter, renderer, self._window_context)
         return self._subplots[id(renderer)]
 

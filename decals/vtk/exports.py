@@ -1,15 +1,22 @@
-"""Exports of pyvista, and its views in a browser, that omit decals: warnings."""
+"""Exports of pyvista, which write baked decals or warn; and its views in a browser, which warn."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from functools import wraps
+from importlib.util import find_spec
 from typing import Any
 
 import pyvista as pv
+
+from blobtree.progress import reporting
+from decals.baking.export import TEXTURE, VERTICES, bake_parts
+from decals.baking.parts import Baked
+from decals.baking.plain_files import as_polydata
+from decals.rendering.options import drawn_objects
 
 WATCHED = "add_on_render_callback"
 """Method of a plotter that every view of trame-pyvista calls."""
@@ -19,16 +26,29 @@ CLIENTS = {
     "PyVistaWasmView": "draws",
 }
 """Views that draw in the browser."""
-EXPORTS = ("export_html", "export_vtksz", "export_gltf", "export_obj", "export_vrml")
-"""Methods of a plotter that write VTK's actors to a file."""
+BAKING_EXPORTS = ("export_html", "export_gltf", "export_obj")
+"""Methods of a plotter that write VTK's actors to a file with their textures; decals are baked for them."""
+OTHER_EXPORTS = ("export_vtksz", "export_vrml")
+"""Methods that write VTK's actors alone."""
+
+BAKED = "plotter.decals, baked"
+"""Name in pyvista of the actor with baked decals, while an export writes it."""
+
+TEXTURE_SIZE, TEXTURE_SAMPLES = 1024, 2
+"""Width and height of baked textures in texels, and the samples along each axis of a texel."""
 
 
 _exporting = ContextVar("exporting", default=False)
 
 
-def warn_of_exports(plotter: pv.BasePlotter) -> None:
-    """Make a plotter's exports, and views that draw in a browser, warn that they omit decals."""
-    for name, wrapper in {**dict.fromkeys(EXPORTS, _exporter), WATCHED: _watcher}.items():
+def watch_exports(plotter: pv.BasePlotter) -> None:
+    """Make exports of a plotter write baked decals or warn, and views that draw in a browser warn."""
+    wrappers: dict[str, Callable[[str, Any], Any]] = {
+        **dict.fromkeys(BAKING_EXPORTS, _baking_exporter),
+        **dict.fromkeys(OTHER_EXPORTS, _exporter),
+        WATCHED: _watcher,
+    }
+    for name, wrapper in wrappers.items():
         method = getattr(plotter, name, None)
         if method is not None:
             # Around pyvista's guard against new attributes, as pyvista itself does for components.
@@ -38,19 +58,90 @@ def warn_of_exports(plotter: pv.BasePlotter) -> None:
 def _exporter(name: str, method: Any) -> Any:
     @wraps(method)
     def export(*arguments: Any, **options: Any) -> Any:
-        warnings.warn(
+        _warn(
             f"{name} writes VTK's own actors; objects of plotter.decals are drawn by OpenGL and are not "
-            "in the file. For a picture call `screenshot`; for geometry add `pyvista.PolyData` of "
-            "`blobtree.polygonize`",
-            stacklevel=2,
+            f"in the file. Call decals.bake(plotter.decals.scene, 'scene.glb'), or one of "
+            f"{', '.join(BAKING_EXPORTS)}, which write baked decals"
         )
-        token = _exporting.set(True)
-        try:
+        with _silent_views():
             return method(*arguments, **options)
-        finally:
-            _exporting.reset(token)
 
     return export
+
+
+def _baking_exporter(name: str, method: Any) -> Any:
+    @wraps(method)
+    def export(*arguments: Any, **options: Any) -> Any:
+        place = TEXTURE if find_spec("xatlas") else VERTICES
+        if place == VERTICES:
+            _warn(
+                f"{name} writes decals as colours of vertices, as the package xatlas is not installed; for a "
+                "texture run pip install 'implicit-decals[bake]'"
+            )
+        with ExitStack() as stack:
+            for subplot in method.__self__.decals.subplots:
+                if len(subplot.applied):
+                    _warn(
+                        f"{name} writes actors of VTK without the decals that plotter.decals.apply shows on "
+                        "them; add their meshes with plotter.decals.add_mesh instead"
+                    )
+                stack.enter_context(_baked(subplot, place))
+            stack.enter_context(_silent_views())
+            return method(*arguments, **options)
+
+    return export
+
+
+@contextmanager
+def _baked(subplot: Any, place: str) -> Iterator[None]:
+    """Show the objects of a subplot as an actor with baked decals, in a texture or at the vertices."""
+    scene = subplot.scene
+    if scene is None or not drawn_objects(scene):
+        yield
+        return
+    modes = {mode: getattr(subplot, mode) for mode in ("contact", "mapping", "stiffness")}
+    with reporting() as report:
+        baked = bake_parts(scene, place, report, size=TEXTURE_SIZE, samples=TEXTURE_SAMPLES, **modes)
+    renderer, proxy = subplot.vtk_renderer, subplot.actor
+    visible = proxy.GetVisibility()
+    proxy.SetVisibility(False)
+    actor, _ = renderer.add_actor(_actor(baked), name=BAKED, reset_camera=False, render=False)
+    try:
+        yield
+    finally:
+        renderer.remove_actor(actor, reset_camera=False, render=False)
+        proxy.SetVisibility(visible)
+
+
+def _actor(baked: Baked) -> pv.Actor:
+    """Return an actor of all parts, with their texture or the colours of their vertices."""
+    mapper: Any = pv.DataSetMapper(as_polydata(baked.merged()))
+    actor = pv.Actor(mapper=mapper)
+    actor.prop.color = "white"
+    if baked.maps is not None:
+        mapper.scalar_visibility = False
+        make_texture: Any = pv.Texture
+        actor.texture = make_texture(baked.maps.color)
+    else:
+        mapper.SetScalarModeToUsePointFieldData()
+        mapper.SelectColorArray("RGB")
+        mapper.SetColorModeToDirectScalars()
+        mapper.scalar_visibility = True
+    return actor
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, stacklevel=3)
+
+
+@contextmanager
+def _silent_views() -> Iterator[None]:
+    """Let views in a browser not warn, which exports make."""
+    token = _exporting.set(True)
+    try:
+        yield
+    finally:
+        _exporting.reset(token)
 
 
 def _watcher(_name: str, method: Any) -> Any:
@@ -78,6 +169,6 @@ def _class_names(callback: Callable[..., Any]) -> set[str]:
 
 
 def restore_exports(plotter: pv.BasePlotter) -> None:
-    """Undo `warn_of_exports`."""
-    for name in (*EXPORTS, WATCHED):
+    """Undo `watch_exports`."""
+    for name in (*BAKING_EXPORTS, *OTHER_EXPORTS, WATCHED):
         plotter.__dict__.pop(name, None)

@@ -298,6 +298,10 @@ class InjectedDecals:
             )
         )
 
+    def __len__(self) -> int:
+        """Return the number of actors with decals."""
+        return len(self._injections)
+
     def refuse(self, mapping: ImageMapping) -> bool:
         """Return True if there are actors that cannot be drawn in a mapping."""
         return mapping is ImageMapping.WALKED and bool(self._injections)

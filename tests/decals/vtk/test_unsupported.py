@@ -1,9 +1,7 @@
-"""Modes that cannot show us as we are say so once; exports too."""
+"""Modes that cannot show us as we are say so once; views in a browser too."""
 
 import warnings
 from collections.abc import Callable
-from contextlib import suppress
-from pathlib import Path
 
 import pytest
 import pyvista as pv
@@ -73,25 +71,6 @@ def test_vtks_own_peeling_with_multisampling_is_as_we_say(plotter: Factory) -> N
 
     share = reddish(True) / reddish(False)
     assert share < 0.2 if any("Mesa" in maker for maker in makers) else share > 0.9
-
-
-def test_exports_say_what_they_leave_out(plotter: Factory, tmp_path: Path) -> None:
-    pl = plotter(shape=(1, 2))
-    pl.add_mesh(pv.Sphere())
-    pl.decals.add_scene(both(), camera=True)
-    pl.subplot(0, 1)
-    pl.decals.add_scene(both(), camera=True)
-    shot(pl)
-    with pytest.warns(UserWarning, match="export_obj writes VTK's own actors; .* by OpenGL") as exporting:
-        pl.export_obj(tmp_path / "scene.obj")
-    assert (tmp_path / "scene.obj").exists()
-    assert len(exporting) == 1
-    with warnings.catch_warnings(record=True) as said, suppress(ImportError, AttributeError):
-        warnings.simplefilter("always")
-        pl.export_html(tmp_path / "scene.html")  # pyvista wants a package for it that may not be here
-    assert len([item for item in said if "export_html writes" in str(item.message)]) == 1
-    pl.close()
-    assert "export_html" not in pl.__dict__
 
 
 class View:
