@@ -13,6 +13,7 @@ sys.path.insert(0, str(DOCS))
 
 import api_pages  # noqa: E402
 import node_pages  # noqa: E402
+import page_examples  # noqa: E402
 from gallery_scripts import GalleryArguments, PictureScraper  # noqa: E402
 
 from blobtree.graphics import missing_gl_libraries  # noqa: E402
@@ -38,6 +39,8 @@ myst_heading_anchors = 3
 
 api_pages.write(DOCS / "api")
 node_pages.write(DOCS / "nodes")
+page_examples.write(DOCS / "extra")
+html_extra_path = ["extra"]
 autosummary_generate = True
 autodoc_typehints = "none"
 numpydoc_show_class_members = False

@@ -52,6 +52,12 @@ def test_in_a_browser(check: str) -> None:
     assert "done" in run_module("tests.frontends.in_browser", check)
 
 
+@pytest.mark.parametrize("check", ["picture", "use"])
+def test_html_pages(check: str) -> None:
+    require("playwright", "axe_playwright_python")
+    assert "done" in run_module("tests.frontends.in_html_page", check)
+
+
 def test_in_a_live_notebook() -> None:
     require(*NEEDED, *FOR_NOTEBOOKS)
     assert "done" in run_module("tests.frontends.in_notebook")
