@@ -35,6 +35,9 @@ SAMPLERS = {
 }
 """Types of textures, and those where samplers are apart from textures."""
 
+FIRST_TEXTURE = 2
+"""Binding of the first texture where they have numbers, behind the block of uniforms and the sampler."""
+
 
 class Version(NamedTuple):
     """A version of GLSL.
@@ -162,7 +165,3 @@ def _apart(parts: list[Declaration], prefix: str) -> str:
         head += f"layout({place} + {binding}) {replaced(part.code, SAMPLERS)}\n"
     body = replaced(_joined([part for part in parts if part.kind != "uniform"]), SAMPLERS)
     return head + re.sub(r"\btextureGrad\((\w+),", rf"textureGrad(sampler2DArray(\1, {sampler}),", body)
-
-
-FIRST_TEXTURE = 2
-"""Binding of the first texture where they have numbers, behind the block of uniforms and the sampler."""

@@ -1,6 +1,8 @@
 """`decals.shader`: what it promises beside values; its refusals, its names, its edits."""
 
 import pickle
+import shutil
+import subprocess
 from dataclasses import FrozenInstanceError, replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,7 @@ import warp as wp
 
 import decals
 from blobtree import Point
+from decals.editing.document import Document
 from decals.errors import InvalidScene
 from decals.hosts.code import STAGES, VERSIONS, Form, code_of
 from decals.hosts.unsupported import UNSUPPORTED
@@ -161,6 +164,47 @@ def test_textures_and_uniforms_are_those_that_the_code_declares() -> None:
         assert {
             name: "float" if isinstance(v, float) else "int" for name, v in exported.uniforms.items()
         } == declared
+
+
+CALL = """
+{inputs}
+void main() {{
+    float field;
+    vec2 uv;
+    int owner = decal_owner({q}, {q}, field, uv);
+    vec4 color = decal_color({q}, {q}, vec3(0.0), vec3(0.0));
+    color += decal_material({q}, {q}, vec3(0.0), vec3(0.0)).color;
+    {output} = color + vec4(float(owner), field, uv);
+}}
+"""
+
+
+@pytest.mark.parametrize("version", ["330 core", "300 es"])
+def test_vertex_shaders_have_the_functions(context: Context, version: str) -> None:
+    exported = decals.shader(scene_of(FULL), version=version, stage="vertex")
+    vertex = CALL.format(inputs="in vec3 q;", q="q", output="gl_Position")
+    fragment = "precision highp float;\nout vec4 shown;\nvoid main() { shown = vec4(1.0); }\n"
+    context.gl.program(
+        vertex_shader=exported.header + exported.code + vertex, fragment_shader=exported.header + fragment
+    ).release()
+
+
+@pytest.mark.parametrize("stage", ["vertex", "compute"])
+def test_stages_of_spirv_have_the_functions(stage: str, tmp_path: Path) -> None:
+    if shutil.which("glslangValidator") is None:
+        pytest.skip("glslangValidator is not installed (on Debian: apt-get install glslang-tools)")
+    exported = decals.shader(scene_of(FULL), version="450", stage=stage)
+    if stage == "vertex":
+        call = CALL.format(inputs="layout(location = 0) in vec3 q;", q="q", output="gl_Position")
+    else:
+        inputs = "layout(local_size_x = 8) in;\nlayout(set = 1, binding = 0) buffer Result { vec4 rows[]; };"
+        place = "vec3(gl_GlobalInvocationID)"
+        call = CALL.format(inputs=inputs, q=place, output="rows[gl_GlobalInvocationID.x]")
+    source = tmp_path / f"decals.{stage[:4]}"
+    source.write_text(exported.header + exported.code + call, encoding="utf-8")
+    command = ["glslangValidator", "-V", str(source), "-o", str(tmp_path / "decals.spv")]
+    ran = subprocess.run(command, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stdout
 
 
 # -- the object -----------------------------------------------------------------------------------------
@@ -351,6 +395,25 @@ def edit(editor: DecalEditor, rng: np.random.Generator) -> None:
             editor.change(number, layers=[int(rng.integers(0, 3))])
         case _:
             editor.change(number, receivers=["lid"], fade_angles=[60.0])
+
+
+def test_a_document_is_a_scene() -> None:
+    """The textures of a document keep their texels when it is edited; its edits are their changes."""
+    document = Document.from_scene(scene_of(PLAIN))
+    editor = document.decals
+    exported, version = decals.shader(document, editable=True), editor.version
+    records = exported.textures[0].array
+    before = records.copy()
+    editor.change(3, radii=[0.25])
+    np.testing.assert_array_equal(records, before)
+    changes = exported.changes(editor, version)
+    assert changes is not None
+    after = before.copy()
+    for upload in changes.uploads:
+        if upload.texture == "decal_records":
+            after[upload.y, upload.x : upload.x + upload.array.shape[1]] = upload.array[0]
+    assert (after != before).any()
+    np.testing.assert_array_equal(after, decals.shader(document, editable=True).textures[0].array)
 
 
 def test_one_moved_decal_uploads_its_own_bytes() -> None:
