@@ -48,6 +48,13 @@ class FieldGrid:
     error : float, optional
         Distance by which signed distances differ from exact ones at most, see `SignedDistances`; None for a
         field.
+
+    Examples
+    --------
+    >>> from blobtree import Point, field_grid
+    >>> grid = field_grid(Point((0, 0, 0), radius=1.0), resolution=16)
+    >>> grid.values.ndim, grid.name
+    (3, 'field')
     """
 
     values: Float32Array
