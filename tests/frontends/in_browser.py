@@ -635,6 +635,33 @@ async def fields() -> None:
     window.close()
 
 
+async def filled() -> None:
+    """A pull bares a part of the skin: the page counts the places, and one click fills them."""
+    plotter = pv.Plotter(off_screen=True)
+    server = get_server("filled", client_type="vue3")
+    window = EditWindow(decals.cover(BLOB, count=60, images=["tile", "scale"]), plotter=plotter)
+    window.show()
+    sandbox_page = SandboxPage(server, window)
+    button = re.compile(r"^Fill \d+ bare places?$")
+    async with served(server, size=(1280, 800), guard=sandbox_page.guard) as browser:
+        await browser.get_by_text("Point", exact=True).nth(1).click()
+        field = browser.get_by_role("textbox", name="center 1", exact=True)
+        await field.fill("2.1")
+        await field.press("Enter")
+        await browser.get_by_role("button", name=button).wait_for()
+        assert decals.measure(window.document.scene).coverage < 0.999
+        pulled = digest(window.document)
+        await browser.get_by_role("button", name=button).click()
+        await until(lambda: window.session.labels[-1:] == ("fill bare places",) and not window.busy)
+        assert decals.measure(window.document.scene).coverage > 0.9999
+        await browser.get_by_role("button", name=button).wait_for(state="detached")
+        await shows(browser, plotter)
+        await browser.get_by_label("undo").first.click()
+        await until(lambda: digest(window.document) == pulled)
+        await browser.get_by_role("button", name=button).wait_for()
+    window.close()
+
+
 async def lab(picture: str | None = None) -> None:
     """A student answers each lesson's question wrong, then right."""
     plotter = pv.Plotter(off_screen=True)
@@ -800,6 +827,7 @@ def main() -> None:
         "ended": ended,
         "panels": panels,
         "fields": fields,
+        "filled": filled,
         "shared": shared,
     }
     asyncio.run(checks[name](*arguments))

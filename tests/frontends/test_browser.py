@@ -44,6 +44,7 @@ def require(*modules: str) -> None:
         "ended",
         "panels",
         "fields",
+        "filled",
         "shared",
     ],
 )
