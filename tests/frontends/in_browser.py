@@ -30,6 +30,7 @@ from decals.apps.lab.lesson import LESSONS, load_lessons
 from decals.apps.lab.page import LabPage
 from decals.apps.models.scenes import empty_scene
 from decals.apps.sandbox.page import Page as SandboxPage
+from decals.editing.recovery import AUTOSAVE_SECONDS
 from decals.editing.scatter_commands import decals_on
 from decals.scenes.camera import UPRIGHT
 from decals.window import EditWindow, notebook
@@ -435,6 +436,9 @@ async def sandbox_start(picture: str | None = None) -> None:
         await browser.get_by_label("sample creature").click()
         await until(lambda: len(window.document.decals) == 500)
         await shows(browser, plotter)
+        await asyncio.sleep(AUTOSAVE_SECONDS + 1.0)
+        assert [*folder.iterdir()] == []  # the sample has no edits to recover
+        assert await browser.title() == f"{window.actions.files.title} \N{EN DASH} sandbox"
         middle = plotter.window_size[0] // 2, plotter.window_size[1] // 2
         path = [(middle[0] + x, middle[1]) for x in (0, 10, 30)]
         for brush in ("erase", "scatter", "push"):
