@@ -251,6 +251,25 @@ def call_table() -> Calls:
                 "creases": False,
             },
         ),
+        "export": (
+            decals.export,
+            {
+                "scene": triangle,
+                "path": "a.ply",
+                "colors": "vertices",
+                "attributes": ["owner", "uv"],
+                "instances": False,
+                "unit": "inch",
+                "up": "z",
+                "size": 16,
+                "samples": 1,
+                "creases": False,
+            },
+        ),
+        "field_grid": (
+            blobtree.field_grid,
+            {"tree": tree, "resolution": 6, "spacing": None, "distance": True},
+        ),
         "displace": (
             decals.displace,
             {

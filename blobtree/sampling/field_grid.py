@@ -18,7 +18,7 @@ from blobtree.pyvista_views import to_image_data, xml_bytes
 from blobtree.sampling.mesh_distances import grid_points
 from blobtree.sampling.tree_distances import TreeMeter
 from blobtree.tape.model import ImplicitModel, checked_tree, values_at
-from blobtree.validation import positive_number, truth
+from blobtree.validation import positive_number, shown, truth
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -254,6 +254,9 @@ def _whole_resolution(resolution: Any) -> int:
     """Return a number of cells, by default `DEFAULT_RESOLUTION`; raise InvalidResolution for others."""
     if resolution is None:
         return DEFAULT_RESOLUTION
-    if isinstance(resolution, bool) or not isinstance(resolution, int | np.integer) or resolution < 1:
-        raise InvalidResolution(f"resolution: expected a whole number from 1 on, got {resolution!r:.80}")
+    whole = isinstance(resolution, int | np.integer) and not isinstance(resolution, bool)
+    if not whole or not 1 <= resolution <= MAX_POINTS:
+        raise InvalidResolution(
+            f"resolution: expected a whole number from 1 to {MAX_POINTS:,}, got {shown(resolution)}"
+        )
     return int(resolution)

@@ -247,9 +247,10 @@ def _color_place(colors: object, held: tuple[str, ...], path: Path) -> str:
 
 def _attribute_names(names: str | Iterable[str], held: bool, path: Path) -> tuple[str, ...]:
     """Return names of attributes, each once."""
-    if not isinstance(names, str | Iterable):
-        raise InvalidScene(f"attributes: expected names, got {describe(names)}")
-    listed = (names,) if isinstance(names, str) else names
+    try:
+        listed = [names] if isinstance(names, str) else list(names)
+    except TypeError:  # arrays without dimensions are iterable by their type alone
+        raise InvalidScene(f"attributes: expected names, got {describe(names)}") from None
     checked = dict.fromkeys(one_of("attributes", name, tuple(ATTRIBUTES), InvalidScene) for name in listed)
     if checked and not held:
         others = ", ".join(suffix for suffix, rules in FORMATS.items() if rules.attributes)

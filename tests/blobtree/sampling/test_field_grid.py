@@ -173,9 +173,10 @@ def test_large_grids_are_computed_in_parts(monkeypatch: pytest.MonkeyPatch) -> N
     ("options", "says"),
     [
         ({"tree": 7}, "expected a"),
-        ({"resolution": 0}, "resolution: expected a whole number from 1 on, got 0"),
+        ({"resolution": 0}, "resolution: expected a whole number from 1 to 67,108,864, got 0"),
         ({"resolution": 2.5}, "resolution"),
         ({"resolution": True}, "resolution"),
+        ({"resolution": 10**400}, "resolution"),
         ({"spacing": -1.0}, "spacing"),
         ({"spacing": float("nan")}, "spacing"),
         ({"spacing": 1e-9}, "grid points"),

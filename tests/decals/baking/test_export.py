@@ -267,6 +267,7 @@ def test_checks_of_written_meshes(tmp_path: Path, caplog: pytest.LogCaptureFixtu
         ({"path": "a.obj", "attributes": "owner"}, r"attributes: expected none for 'a.obj', got owner"),
         ({"attributes": ["color"]}, "attributes: expected one of"),
         ({"attributes": 7}, "attributes: expected names, got 7"),
+        ({"attributes": np.array("owner")}, "attributes: expected names"),
         ({"unit": "mile"}, "unit: expected one of"),
         ({"up": "x"}, "up: expected one of"),
         ({"colors": "both"}, "colors: expected one of"),
