@@ -32,8 +32,11 @@ from blobtree.tape.tape import DeviceTape
 WALL_CELLS = 2.0 * PLATE_CELLS
 """Cells across a wall, for the corners of cells to lie in it."""
 
-RIM_SHARE = 1 / 48
-"""Width of the strip along the edge of a wedge, over the radius of a disc with as many samples."""
+RIM_SHARE, SMALL_RIM_SHARE = 1 / 24, 1 / 16
+"""Width of the strip along the edge of a lens, over the lens's radius; of small lenses too."""
+
+SMALL_LENS = 3.0
+"""Radius of a lens, in cells of the base, below which it is small: it takes many cells for a small area."""
 
 EDGE_SHARE = 1 / 4
 """Size of the smallest cells at the edges of a lens, over that of the thinnest parts."""
@@ -122,7 +125,9 @@ class Walls:
             tape = operand.tape.on(self._device)
             samples = self._thin(operand.leaf, tape, 0.0, low[near], high[near], 0)
             if count := len(samples.needed):
-                rim = RIM_SHARE * cells.grid.cell_size * float(np.sqrt(count / np.pi))
+                radius = float(np.sqrt(count / np.pi))
+                share = RIM_SHARE if radius > SMALL_LENS else SMALL_RIM_SHARE
+                rim = share * radius * cells.grid.cell_size
                 samples = self._thin(operand.leaf, tape, rim, low[near], high[near], 0)
             self._samples.append(samples)
 
