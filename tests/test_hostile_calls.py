@@ -120,6 +120,8 @@ CALLS: dict[str, Callable[[], object]] = {
     "large sample": lambda: blobtree.from_sdf(np.full((2, 2, 2), 1e308), (0, 0, 0), spacing=1.0, width=1.0),
     "quick move": lambda: EditSession(SCENE).do(MovePrimitive(0, (), (0, 0, 1), quick=WRONG)),
     "endless distance": lambda: decals.Relaxation(MeshSurface(*TRIANGLE), count=3).polish(close=1e308),
+    "array as frames": lambda: decals.animate(np.array("x"), "a.gif"),
+    "array as attributes": lambda: decals.export(BALL, "a.ply", attributes=np.array("x")),
     "vertex colours": lambda: decals.bake(SCENE, "a.glb", vertex_colors=np.zeros(0)),  # type: ignore[arg-type]
     "array as surfaces": lambda: decals.Relaxation(np.array("x"), count=1),  # type: ignore[arg-type]
     "endless origin": lambda: decals.MeshObject("a", TRIANGLE[0], TRIANGLE[1], origin=HUGE),

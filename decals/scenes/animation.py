@@ -3,7 +3,7 @@
 import os
 import re
 from collections.abc import Iterable, Iterator, Sized
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -153,15 +153,11 @@ def animate(
     """
     target = _target(path)
     speed = real_number("rate", rate, _RATE, lambda number: 0.1 <= number <= 240.0, InvalidScene)
-    if isinstance(frames, Scene | PosedScene) or not isinstance(frames, Iterable):
-        raise InvalidScene(
-            f"frames: expected a list of scenes, got {describe(frames)}; decals.turntable makes one"
-        )
+    scenes = _scenes(frames)
     if count is None:
         expected = len(frames) if isinstance(frames, Sized) else 0
     else:
         expected = whole_number("count", count, 1, 10 * MAX_FRAMES, InvalidScene)
-    scenes = iter(frames)
     first = next(scenes, None)
     if first is None:
         raise InvalidScene("frames: expected at least one scene, got none")
@@ -182,6 +178,16 @@ def animate(
                     pixels = renderer.render(scene, options)
                 write(pixels, number)
     return target
+
+
+def _scenes(frames: Iterable[Scene | PosedScene]) -> Iterator[Scene | PosedScene]:
+    """Return the frames one by one; raise InvalidScene for anything else, such as an array without axes."""
+    if not isinstance(frames, Scene | PosedScene):
+        with suppress(TypeError):
+            return iter(frames)
+    raise InvalidScene(
+        f"frames: expected a list of scenes, got {describe(frames)}; decals.turntable makes one"
+    )
 
 
 def _target(path: str | os.PathLike[str]) -> Path:
