@@ -166,11 +166,11 @@ def _cells(cells: Any) -> Polygons:
 def precise_points(points: ArrayLike) -> Any:
     """Return points as float32; keep float64 of points so far from zero that float32 would round them."""
     given = np.asarray(points)
-    if given.dtype == np.float64 and len(given):
-        extent = np.ptp(given, axis=0).max()
-        if np.isfinite(given).all() and np.abs(given).max() > MIN_PRECISE_RATIO * extent:
+    with np.errstate(over="ignore", invalid="ignore"):  # surfaces refuse infinity and NaN
+        finite = given.dtype == np.float64 and len(given) and np.isfinite(given).all()
+        if finite and np.abs(given).max() > MIN_PRECISE_RATIO * np.ptp(given, axis=0).max():
             return given
-    return given.astype(np.float32)
+        return given.astype(np.float32)
 
 
 def polygon_triangles(
@@ -184,8 +184,7 @@ def traced_triangles(
     points: ArrayLike, polygons: Polygons | NDArray[Any] | Sequence[NDArray[Any]], *, name: str
 ) -> tuple[Float32Array, Int32Array, Triangulation]:
     """Return vertices and triangles as `polygon_triangles` does, and which corners the triangles have."""
-    with np.errstate(over="ignore"):  # what float32 cannot hold becomes infinity, refused by surfaces
-        vertices: Any = precise_points(points)
+    vertices: Any = precise_points(points)
     polygons = Polygons.of(polygons)
     if len(polygons) == 0:
         raise InvalidMesh(f"{name!r} has {len(vertices)} points but no faces; give a surface mesh")

@@ -5,7 +5,7 @@ VTK's own reader crashes on truncated files and wrong indices, and does not read
 
 import re
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,8 @@ _TYPES = {
 }  # fmt: skip
 _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">", "ascii": ""}
 _CORNERS = ("vertex_indices", "vertex_index")
+_SINGLE = frozenset({"x", "y", "z", *_CORNERS})
+"""Properties that an element must not have twice."""
 
 _PLACES = ("texcoord", "texcoords")
 """Lists of faces with the texture coordinates of their corners."""
@@ -189,8 +191,11 @@ def _row_count(text: str) -> int:
 
 
 def _extended(element: _Element, prop: _Property) -> _Element:
+    """Return an element with another property; of properties of one name, the first counts."""
     if any(other.name == prop.name for other in element.properties):
-        raise ValueError(f"its element {element.name!r} has two properties {prop.name!r}")
+        if prop.name in _SINGLE:
+            raise ValueError(f"its element {element.name!r} has two properties {prop.name!r}")
+        prop = replace(prop, name=f"{prop.name} {len(element.properties)}")  # names in files have no spaces
     return _Element(element.name, element.count, (*element.properties, prop))
 
 

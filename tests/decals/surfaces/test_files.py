@@ -277,6 +277,10 @@ def test_ply_of_odd_headers(tmp_path: Path) -> None:
         assert area(written(tmp_path, "a.ply", content)) == pytest.approx(1.0)
     more = PLY.replace("4 0 1 2 3", "3 0 1 2 9 1 1 1\n3 0 2 3 9 2 2 2").replace("face 1", "face 2")
     assert area(written(tmp_path, "a.ply", more)) == pytest.approx(1.0), "more words than the header declares"
+    twice = PLY.replace("float z\n", "float z\nproperty uchar quality\nproperty float quality\n")
+    for row in ("0 0 0", "1 0 0", "1 1 0", "0 1 0"):
+        twice = twice.replace(f"\n{row}\n", f"\n{row} 7 0.5\n")
+    assert area(written(tmp_path, "a.ply", twice)) == pytest.approx(1.0), "of one name, the first counts"
     binary = PLY.replace("ascii", "binary_little_endian").partition("end_header\n")[0].encode()
     body = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], "<f4").tobytes()
     body += struct.pack("<B4i", 4, 0, 1, 2, 3)

@@ -5,7 +5,7 @@ import pytest
 import pyvista as pv
 
 from decals.errors import InvalidMesh
-from decals.surfaces.mesh_file import dataset_triangles, read_dataset, read_mesh
+from decals.surfaces.mesh_file import dataset_triangles, polygon_triangles, read_dataset, read_mesh
 
 HEADER = """ply
 format {form} 1.0
@@ -19,6 +19,9 @@ element face {faces}
 property list uchar int vertex_indices
 end_header
 """
+SIGNALLING = np.array([0x7FF4000000000001], np.uint64).view(np.float64)[0]
+"""A NaN that raises a flag of the processor wherever it is used."""
+
 SQUARE = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)]
 
 
@@ -250,6 +253,15 @@ def test_the_pieces_of_a_grid_fill_it(whole: str, pieces: list[str], works: bool
     else:
         with pytest.raises(InvalidMesh, match="whole extent"):
             read_mesh(path)
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan, SIGNALLING, 1e308])
+def test_points_beyond_numbers_are_refused_without_a_warning(value: float) -> None:
+    points = np.array([[value, 0, 0], [value, 1, 0], [value, 1, 1]], np.float64)
+    if np.isfinite(value):
+        points[1, 0] = -value
+    with pytest.raises(InvalidMesh, match="not finite"):
+        polygon_triangles(points, [np.arange(3)], name="mesh")
 
 
 def test_points_without_faces(tmp_path: Path) -> None:
