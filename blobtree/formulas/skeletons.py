@@ -176,6 +176,8 @@ def influence_near(q: wp.vec3, c: wp.vec4, smallest: wp.float32, clearance: wp.f
     c is the closest point to q. Where no point of the skeleton is nearer than `clearance`, all ratios at a
     distance r from q are at least u (1 − r / clearance), and the least is at most u + r / influence at c.
     """
+    if clearance <= 0.0:
+        return smallest
     u = wp.length(q - wp.vec3(c[0], c[1], c[2])) / c[3]
     return wp.max(smallest, wp.min(clearance / wp.max(u, TINY), c[3]) * INFLUENCE_MARGIN)
 

@@ -35,14 +35,16 @@ def closest_on_cylinder(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """tape[at] = (start of the axis, influence); tape[at + 1] = (end − start, radius of the cylinder)."""
     start = tape[at]
     end = tape[at + 1]
-    if depth_in_cylinder(q, tape, at) >= 0.0:
-        return wp.vec4(q[0], q[1], q[2], start[3])
     ab = wp.vec3(end[0], end[1], end[2])
+    length = wp.length(ab)
     place = beside_axis(q, tape, at)
     c = wp.vec3(place[0], place[1], place[2])
-    if wp.length(c) > end[3]:
-        c = wp.normalize(c) * end[3]
-    c += wp.normalize(ab) * wp.clamp(place[3], 0.0, wp.length(ab))
+    across = wp.length(c)
+    if across > end[3]:
+        c *= end[3] / across
+    elif place[3] >= 0.0 and place[3] <= length:
+        return wp.vec4(q[0], q[1], q[2], start[3])
+    c += wp.normalize(ab) * wp.clamp(place[3], 0.0, length)
     return wp.vec4(start[0] + c[0], start[1] + c[1], start[2] + c[2], start[3])
 
 

@@ -297,8 +297,10 @@ def bound_way(
     kind: wp.int32, q: wp.vec3, c: wp.vec4, ahead: wp.vec4, speed: wp.float32, tape: Texels, at: wp.int32
 ) -> wp.vec4:
     """Return the way ahead outside a solid skeleton, as far as its depth or its convexity is known."""
-    end_apart = apart(kind, way_end(q, ahead), tape, at)
-    outside = way_between(ahead, squared_distance(q, c), end_apart)
+    start_apart = squared_distance(q, c)
+    if start_apart > INSIDE * INSIDE:
+        return ahead
+    outside = way_between(ahead, start_apart, apart(kind, way_end(q, ahead), tape, at))
     return way_outside(outside, depth(kind, q, tape, at), speed)
 
 
