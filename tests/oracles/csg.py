@@ -128,7 +128,7 @@ def _from_lines(q: Floats, points: Floats) -> Floats:
     least = np.full(len(q), np.inf)
     for a, b in pairwise(points):
         way = b - a
-        share = np.clip((q - a) @ way / (way @ way), 0.0, 1.0)
+        share = np.clip((q - a) @ way / max(way @ way, 1e-300), 0.0, 1.0)
         least = np.minimum(least, np.linalg.norm(q - a - share[:, None] * way, axis=1))
     return least
 
@@ -137,10 +137,11 @@ def _from_cone(q: Floats, cone: Cone) -> Floats:
     """The least |q − c(t)| − radius(t): with k the slope of the radius, at x + k y / √(1 − k²) along it."""
     start, end = np.array(cone.start), np.array(cone.end)
     length = float(np.linalg.norm(end - start))
-    slope = (cone.end_radius - cone.radius) / length
-    if abs(slope) >= 1.0:
+    rise = cone.end_radius - cone.radius
+    if abs(rise) >= length:
         ball, radius = max((end, cone.end_radius), (start, cone.radius), key=lambda pair: pair[1])
         return np.asarray(np.linalg.norm(q - ball, axis=1) - radius)
+    slope = rise / length
     across, along = _cylindrical(q, start, end - start)
     place = np.clip(along + slope * across / np.sqrt(1.0 - slope**2), 0.0, length)
     return np.asarray(np.hypot(across, along - place) - (cone.radius + slope * place))
