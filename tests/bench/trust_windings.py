@@ -1,5 +1,7 @@
 """Windings: generated solids with parts turned at random, beside the same solids as they should be."""
 
+import sys
+
 import numpy as np
 
 import decals
@@ -23,14 +25,16 @@ def measure(seed: int = 1, *, quick: bool) -> dict[str, float]:
     """Count the solids of which volume, normals, decals or pictures differ from the right ones."""
     count = QUICK_CASES if quick else CASES
     kinds = list(KINDS)
-    faults = 0
+    faults = pictures = 0
     for number in range(count):
         rng = np.random.default_rng([seed, number])
         case = KINDS[kinds[number % len(kinds)]](rng)
-        faults += is_wrong(case) or (
-            number % (len(kinds) * PICTURES_EVERY) < len(kinds) and looks_wrong(case, number)
-        )
-    return {"winding_faults": faults, "winding_cases": count}
+        drawn = number % (len(kinds) * PICTURES_EVERY) < len(kinds)
+        pictures += drawn
+        if is_wrong(case) or (drawn and looks_wrong(case, number)):
+            faults += 1
+            print(f"windings: case {number} ({case.kind}) is wrong", file=sys.stderr, flush=True)
+    return {"winding_faults": faults, "winding_cases": count, "winding_pictures": pictures}
 
 
 def is_wrong(case: Case) -> bool:
