@@ -324,9 +324,9 @@ def _has_rim(
     lengths = np.bincount(which, np.linalg.norm(end - start, axis=1), len(marked))
     for node, weight in zip(nodes, np.array([5.0, 8.0, 5.0]) / 18.0, strict=True):
         at = start + node * (end - start)
-        fives = np.column_stack([at, np.ones(len(at))])
+        homogeneous = np.column_stack([at, np.ones(len(at))])
         for field, factor in zip(sums, factors, strict=True):
-            values = np.prod([fives @ factor[:, i].T for i in range(3)], axis=0)
+            values = np.prod([homogeneous @ factor[:, i].T for i in range(3)], axis=0)
             along = weight * direction * np.einsum("ij,ij->i", values, end - start)
             field += np.bincount(which, along, len(marked))
     open_ = np.abs(sums).max(axis=0) > SEAM * np.maximum(lengths, 1e-300)

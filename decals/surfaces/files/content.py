@@ -76,6 +76,7 @@ def text_lines(content: bytes) -> list[bytes]:
     text = without_mark(content)
     if b"\0" in text:
         raise ValueError("it holds null bytes: it is binary, or UTF-16 without a byte order mark")
+    text = text.replace(codecs.BOM_UTF8, b"")  # where several files were joined to one
     return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
 
 

@@ -31,6 +31,9 @@ _REFERRED = {b"v": "vertex", b"vt": "texture coordinate", b"vn": "normal"}
 _MATERIAL = (b"mtllib", b"usemtl")
 """Keywords of materials."""
 
+_NUMBERS = (*_REFERRED, b"f", b"fo")
+"""Keywords that numbers follow, of the lines that are read."""
+
 _FREE_FORM = (b"surf", b"curv", b"curv2")
 """Keywords of curves and surfaces that are not polygons."""
 
@@ -70,24 +73,27 @@ def _read(content: bytes, path: Path) -> tuple[Float64Array, Polygons, Paint]:
 
 
 def _lines_by_keyword(texts: Sequence[bytes]) -> dict[bytes, list[Line]]:
-    """Return the lines of the keywords that are read, without the keywords and without comments."""
+    """Return the lines of the keywords that are read, without the keywords and without comments.
+
+    Lines of materials stay whole, since names such as "Material #25" are usual.
+    """
     lines: dict[bytes, list[Line]] = {keyword: [] for keyword in (*_REFERRED, b"f", *_MATERIAL, *_FREE_FORM)}
     known = {**lines, b"fo": lines[b"f"]}  # the old name of a face
     for number, text in _whole_lines(texts):
         keyword, _, rest = text.strip().replace(b"\t", b" ").partition(b" ")
         if (found := known.get(keyword)) is not None:
-            found.append(Line(number, rest.partition(b"#")[0]))
+            found.append(Line(number, rest if keyword in _MATERIAL else rest.partition(b"#")[0]))
     return lines
 
 
 def _whole_lines(texts: Sequence[bytes]) -> Iterator[tuple[int, bytes]]:
-    """Yield lines with their numbers; a line that ends with a backslash goes on in the next one."""
+    """Yield lines with their numbers; numbers that end with a backslash go on in the next line."""
     parts: list[bytes] = []
     start = 1
     for number, text in enumerate(texts, 1):
-        if text.endswith(b"\\") and (parts or not text.lstrip().startswith(b"#")):
+        if b"\\" in text and _goes_on(text, first=not parts):
             start = start if parts else number
-            parts.append(text[:-1])
+            parts.append(text.rstrip()[:-1])
         elif parts:
             yield start, b" ".join([*parts, text])
             parts.clear()
@@ -95,6 +101,13 @@ def _whole_lines(texts: Sequence[bytes]) -> Iterator[tuple[int, bytes]]:
             yield number, text
     if parts:
         yield start, b" ".join(parts)
+
+
+def _goes_on(text: bytes, *, first: bool) -> bool:
+    """Return True if a backslash continues a line; those that end comments and names do not."""
+    if not text.rstrip().endswith(b"\\") or b"#" in text:
+        return False
+    return not first or text.split(None, 1)[0] in _NUMBERS
 
 
 def _references(faces: list[Line]) -> Int64Array:

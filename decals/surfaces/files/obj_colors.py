@@ -1,10 +1,13 @@
 """Base colours of an OBJ file: colours behind the coordinates of vertices, and its materials."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array, Int64Array
+from blobtree.files import is_file
 from decals.images.texels import decode_srgb
 from decals.surfaces.base_color import CLAY, WHITE, BaseColor, linear_colors
 from decals.surfaces.files.content import Line, finite_numbers
@@ -41,7 +44,9 @@ class ObjColors:
         notes = Notes()
         materials, of_polygon = self._materials(notes)
         notes.report(self._path)
-        colors, coordinates, mapped = self._vertex_colors(), self._coordinates(), self._places >= 0
+        clay = decode_srgb(np.array(CLAY, np.float64))
+        colors = self._vertex_colors(WHITE if materials else clay)
+        coordinates, mapped = self._coordinates(), self._places >= 0
         if colors is None and coordinates is None and not materials:
             return None
         count = 0 if coordinates is None else len(coordinates)
@@ -55,8 +60,7 @@ class ObjColors:
         corners = rows.reshape(-1)[triangles.places].astype(np.int32)
         if not materials:
             return BaseColor(colors, coordinates, corners=corners)
-        shade = np.array(WHITE) if colors is not None else decode_srgb(np.array(CLAY, np.float64))
-        plain = Material(shade.astype(np.float64))
+        plain = Material(np.array(WHITE if colors is not None else clay, np.float64))
         known = [*materials, plain]
         # Faces without coordinates have the factor of their material alone.
         bare = [Material(material.factor) for material in known]
@@ -71,14 +75,20 @@ class ObjColors:
             colors=colors,
         )
 
-    def _vertex_colors(self) -> Float32Array | None:
-        """Return the colours of vertices, which follow their coordinates; None if some have none."""
-        lines = self._lines[b"v"]
-        if any(len(line.text.split()) < 6 for line in lines):
+    def _vertex_colors(self, others: ArrayLike) -> Float32Array | None:
+        """Return the colours of vertices, which follow their coordinates; None if no vertex has one.
+
+        Vertices without a colour get another one.
+        """
+        words = [line.text.split() for line in self._lines[b"v"]]
+        colored = np.array([len(of_line) >= 6 for of_line in words], np.bool_)
+        if not colored.any():
             return None
-        words = (line.text.split() for line in lines)
-        numbers = finite_numbers(word for of_line in words for word in of_line[-3:]).reshape(-1, 3)
-        return linear_colors(numbers, name="colours of vertices")
+        given = (word for of_line in words if len(of_line) >= 6 for word in of_line[-3:])
+        numbers = finite_numbers(given).reshape(-1, 3)
+        colors = np.tile(np.asarray(others, np.float32), (len(words), 1))
+        colors[colored] = linear_colors(numbers, name="colours of vertices")
+        return colors
 
     def _coordinates(self) -> Float64Array | None:
         """Return the texture coordinates of the file; None if no corner has any."""
@@ -91,11 +101,11 @@ class ObjColors:
     def _materials(self, notes: Notes) -> tuple[list[Material], Int64Array]:
         """Return the materials that polygons use, and the one of each polygon; -1 for none."""
         uses, faces = self._lines[b"usemtl"], self._lines[b"f"]
-        names = [line.text.strip() for line in uses]
-        known = self._library(notes) if names else {}
+        known = self._library(notes) if uses else {}
+        names = [_name(line, known.__contains__) for line in uses]
         for name in names:
             if name and name not in known and known:
-                notes.add("materials are missing", repr(name.decode("utf-8", "replace")))
+                notes.add("materials are missing", repr(_text(name)))
         used = sorted({name for name in names if name in known})
         numbers = np.array([*(used.index(name) if name in known else -1 for name in names), -1], np.int64)
         before = np.searchsorted([line.number for line in uses], [line.number for line in faces]) - 1
@@ -107,12 +117,22 @@ class ObjColors:
         folder = self._path.parent
         textures = TextureFiles(folder, notes)
         for line in self._lines[b"mtllib"]:
-            file = line.text.strip().decode("utf-8", "replace")
-            names = [file] if (folder / file).is_file() else file.split()
-            for name in names:
+            file = _name(line, lambda name: is_file(folder / _text(name)))
+            names = [file] if is_file(folder / _text(file)) else file.split()
+            for name in map(_text, names):
                 try:
                     content = read_uri(name, folder, "a material file")
                     found |= read_materials(content, textures, notes, name)
                 except (Unreadable, ValueError) as fault:
                     notes.add("materials are left out", str(fault))
         return found
+
+
+def _name(line: Line, exists: Callable[[bytes], bool]) -> bytes:
+    """Return the name in a line; what follows a "#" is a part of it only if the whole name exists."""
+    whole = line.text.strip()
+    return whole if exists(whole) else whole.partition(b"#")[0].strip()
+
+
+def _text(name: bytes) -> str:
+    return name.decode("utf-8", "replace")

@@ -5,8 +5,11 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
+import numpy as np
+
 from blobtree._typing import Float32Array, Float64Array, Int64Array
-from decals.surfaces.base_color import BaseColor, linear_colors
+from decals.images.texels import decode_srgb
+from decals.surfaces.base_color import CLAY, BaseColor, linear_colors
 from decals.surfaces.files.content import (
     Line,
     file_bytes,
@@ -104,13 +107,16 @@ def _polygons(lines: list[Line], points: int) -> Polygons:
 def _painted(
     vertices: list[list[bytes]], faces: list[Line], sizes: Int64Array, triangles: Triangulation
 ) -> BaseColor | None:
-    """Return the colours of vertices, or of faces if all have one; None without either."""
+    """Return the colours of vertices, or of faces; None without either."""
     if vertices:
         return BaseColor(_light(vertices, "vertices"))
     colors = [line.text.split()[1 + size :] for line, size in zip(faces, sizes.tolist(), strict=True)]
-    if not all(len(words) in (3, 4) for words in colors):  # a single number is that of a palette
+    colored = np.array([len(words) in (3, 4) for words in colors], np.bool_)  # one number is of a palette
+    if not colored.any():
         return None
-    return BaseColor.of_faces(_light([words[:3] for words in colors], "faces")[triangles.polygons])
+    light = np.tile(decode_srgb(np.array(CLAY)), (len(colors), 1))
+    light[colored] = _light([colors[k][:3] for k in np.flatnonzero(colored)], "faces")
+    return BaseColor.of_faces(light[triangles.polygons])
 
 
 def _light(colors: list[list[bytes]], what: str) -> Float32Array:

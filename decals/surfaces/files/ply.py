@@ -5,6 +5,7 @@ VTK's own reader crashes on truncated files and wrong indices, and does not read
 
 import re
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -169,13 +170,14 @@ def _header(content: bytes) -> tuple[str, list[_Element], bytes]:
     for line in data[: end.start()].decode("ascii", "replace").splitlines()[1:]:
         match line.split():
             case ["format", name, _]:
-                order = _ORDERS[name]
+                order = _known(_ORDERS, name, "format")
             case ["element", name, count]:
                 elements.append(_Element(name, _row_count(count), ()))
             case ["property", "list", count_kind, kind, name]:
-                elements.append(_extended(elements.pop(), _Property(name, _TYPES[kind], _TYPES[count_kind])))
+                kinds = _known(_TYPES, kind, "type"), _known(_TYPES, count_kind, "type")
+                _extend(elements, _Property(name, *kinds))
             case ["property", kind, name]:
-                elements.append(_extended(elements.pop(), _Property(name, _TYPES[kind])))
+                _extend(elements, _Property(name, _known(_TYPES, kind, "type")))
     if order is None:
         raise ValueError("its header names no format")
     if order and encoding_of(content) not in (None, "utf-8"):
@@ -190,13 +192,23 @@ def _row_count(text: str) -> int:
     return count
 
 
-def _extended(element: _Element, prop: _Property) -> _Element:
-    """Return an element with another property; of properties of one name, the first counts."""
+def _known(names: Mapping[str, str], name: str, what: str) -> str:
+    """Return what a name of the header stands for."""
+    if name not in names:
+        raise ValueError(f"its header has the unknown {what} {name[:40]!r}")
+    return names[name]
+
+
+def _extend(elements: list[_Element], prop: _Property) -> None:
+    """Add a property to the last element of the header; of properties of one name, the first counts."""
+    if not elements:
+        raise ValueError(f"its property {prop.name[:40]!r} belongs to no element")
+    element = elements.pop()
     if any(other.name == prop.name for other in element.properties):
         if prop.name in _SINGLE:
             raise ValueError(f"its element {element.name!r} has two properties {prop.name!r}")
         prop = replace(prop, name=f"{prop.name} {len(element.properties)}")  # names in files have no spaces
-    return _Element(element.name, element.count, (*element.properties, prop))
+    elements.append(_Element(element.name, element.count, (*element.properties, prop)))
 
 
 def _tables(order: str, elements: list[_Element], body: bytes) -> list[_Table]:

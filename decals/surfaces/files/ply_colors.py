@@ -57,7 +57,9 @@ class PlyColors:
         """Return the base colour of triangles; None if the file has none."""
         textures, of_polygon = self._textures()
         places = self._corner_places()
-        colors = _light(self._vertices, "vertices")
+        colors, of_faces = _light(self._vertices, "vertices"), _light(self._faces, "faces")
+        if of_faces is not None and colors is None and not textures:
+            return BaseColor.of_faces(of_faces[triangles.polygons])
         if places is not None:
             by_corner = None if colors is None else colors[self._polygons.corners]
             of_face = None if of_polygon is None else of_polygon[triangles.polygons]
@@ -65,7 +67,6 @@ class PlyColors:
         coordinates = _columns(self._vertices, _PLACES)
         if coordinates is not None or colors is not None:
             return BaseColor(colors, coordinates, textures[:1] if coordinates is not None else ())
-        of_faces = _light(self._faces, "faces")
         return None if of_faces is None else BaseColor.of_faces(of_faces[triangles.polygons])
 
     def _corner_places(self) -> NDArray[Any] | None:

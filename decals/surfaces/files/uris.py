@@ -43,13 +43,14 @@ def _inside(folder: Path, path: str, name: str) -> Path | None:
     """Return the file of a path relative to a folder; `Unreadable` if it lies elsewhere."""
     try:
         found = folder.joinpath(*PureWindowsPath(path).parts).resolve()
-        if not found.is_relative_to(folder.resolve()):
-            raise Unreadable(
-                f"{name}, {path[:80]!r}, lies outside of the model's folder", "put it beside the model"
-            )
-        return found if found.is_file() else None
-    except (OSError, RuntimeError):  # a name that no file can have, or a circle of links
+        inside, exists = found.is_relative_to(folder.resolve()), found.is_file()
+    except (OSError, RuntimeError, ValueError):  # a name that no file can have, or a circle of links
         return None
+    if not inside:
+        raise Unreadable(
+            f"{name}, {path[:80]!r}, lies outside of the model's folder", "put it beside the model"
+        )
+    return found if exists else None
 
 
 def _file(path: Path, name: str) -> bytes:

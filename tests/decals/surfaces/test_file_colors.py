@@ -128,6 +128,30 @@ def test_an_obj_file_has_colours_behind_its_coordinates(tmp_path: Path) -> None:
     assert np.abs(light_of(item, numbers, weights) - right).max() < 1e-5
 
 
+def test_vertices_of_obj_without_a_colour_cost_the_others_none(tmp_path: Path) -> None:
+    text = "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nv 1 1 0\nv 2 1 0\nv 1 2 0\nf 1 2 3\nf 4 5 6\n"
+    (tmp_path / "a.obj").write_text(text)
+    light = light_of(read(tmp_path / "a.obj"), [0, 1], np.full((2, 3), 1 / 3))
+    np.testing.assert_allclose(light, [[1.0, 0.0, 0.0], linear(np.array(CLAY))], atol=1e-6)
+
+
+def test_names_of_materials_and_their_files_may_have_a_hash(tmp_path: Path) -> None:
+    triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+    uses = "usemtl Material #25\nf 1 2 3\nusemtl Material #26\nf 1 2 3\nusemtl plain # a comment\nf 1 2 3\n"
+    (tmp_path / "a.obj").write_text("mtllib a#1.mtl\nmtllib b.mtl # a comment\n" + triangle + uses)
+    (tmp_path / "a#1.mtl").write_text("newmtl Material #25\nKd 1 0 0\nnewmtl Material #26\nKd 0 0 1\n")
+    (tmp_path / "b.mtl").write_text("newmtl plain\nKd 0 1 0\n")
+    light = light_of(read(tmp_path / "a.obj"), [0, 1, 2], np.full((3, 3), 1 / 3))
+    np.testing.assert_allclose(light, [[1, 0, 0], [0, 0, 1], [0, 1, 0]], atol=1e-6)
+
+
+def test_a_name_that_no_file_can_have_costs_no_face(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (tmp_path / "a.obj").write_text(f"mtllib {'x' * 300}.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n")
+    with caplog.at_level(logging.WARNING):
+        assert len(read(tmp_path / "a.obj").faces) == 1
+    assert "is missing" in caplog.text
+
+
 @pytest.mark.parametrize(
     ("texture", "message"),
     [("none.png", "is missing"), ("../sheet.png", "outside"), ("sheet.obj", "textures are left out")],
@@ -184,6 +208,21 @@ def test_a_ply_file_has_colours_of_vertices_or_faces(of: str, kind: str, tmp_pat
     owners = [polygon_of(item, faces, face) for face in numbers.tolist()]
     corners = light[item.faces[numbers]] if of == "vertices" else np.repeat(light[owners][:, None], 3, axis=1)
     assert np.abs(light_of(item, numbers, weights) - base_light(weights, corners)).max() < 1e-5
+
+
+@pytest.mark.parametrize("of", ["vertices", "corners"])
+def test_coordinates_without_a_texture_leave_the_colours_of_ply_faces(of: str, tmp_path: Path) -> None:
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    places, columns = "", ["uchar red", "uchar green", "uchar blue"]
+    of_points: list[str] = []
+    if of == "corners":
+        places, columns = " 6 0 0 1 0 1 1", ["list uchar float texcoord", *columns]
+    else:
+        points, of_points = np.hstack([points, points[:, :2]]), ["float s", "float t"]
+    faces = [f"3 0 1 2{places} 255 0 0", f"3 0 2 3{places} 0 0 255"]
+    (tmp_path / "a.ply").write_text(ply(points, of_points, faces, columns))
+    light = light_of(read(tmp_path / "a.ply"), [0, 1], np.full((2, 3), 1 / 3))
+    np.testing.assert_allclose(light, [[1, 0, 0], [0, 0, 1]], atol=1e-6)
 
 
 def test_a_ply_file_has_textures_at_the_corners_of_its_faces(tmp_path: Path) -> None:

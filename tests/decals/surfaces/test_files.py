@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from decals.errors import InvalidMesh
+from decals.images.texels import decode_srgb
 from decals.surfaces import read_mesh
+from decals.surfaces.base_color import CLAY
 from decals.surfaces.mesh_file import read_mesh_data
 
 V = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
@@ -56,9 +58,14 @@ OBJ_SQUARES: dict[str, str | bytes] = {
     "numbers": "v 0e0 -0 0.\nv +1 .0 0\nv 1e+0 1E-0 0.0\nv 0 1.00e0 0\nf +1 +2 +3 +4\n",
     "names": "o a name with spaces\ng\nusemtl\nmtllib no file.mtl\n" + V + "s off\nf 1 2 3 4\nxyzzy 1 2\n",
     "colours": "".join(line + " 0.5 0.5 0.5\n" for line in V.splitlines()) + "f 1 2 3 4\n",
+    "comment that ends with a backslash": V + "f 1 2 3 # C:\\a\\\nf 1 3 4\n",
+    "names that end with a backslash": "o C:\\a\\\n" + V + "g b\\\nf 1 2 3 4\n",
+    "continued before spaces": V + "f 1 2 \\ \n3 4\n",
     "tabs": (V + "f 1 2 3 4\n").replace(" ", "\t"),
     "spaces": "  " + (V + "f 1 2 3 4  \n").replace(" ", "   "),
     "no last line end": V + "f 1 2 3 4",
+    "two marks": "\ufeff\ufeff" + V + "f 1 2 3 4\n",
+    "marks between": "v 0 0 0\nv 1 0 0\nv 1 1 0\n\ufefff 1 2 3\n\ufeffv 0 1 0\nf 1 3 4\n",
     "latin-1": (V + "o caf\xe9\nf 1 2 3 4\n").encode("latin-1"),
     "old face": V + "fo 1 2 3 4\n",
 }
@@ -292,6 +299,9 @@ def test_ply_of_odd_headers(tmp_path: Path) -> None:
         (PLY.replace("4 0 1 2 3", "4 0 1 2 2.5"), "not whole"),
         (PLY.replace("property float z", "property float x"), "two properties 'x'"),
         (PLY.replace("element face", "element edges"), "no faces"),
+        (PLY.replace("ascii", "binary_middle_endian"), "unknown format 'binary_middle_endian'"),
+        (PLY.replace("float z", "quad z"), "unknown type 'quad'"),
+        (PLY.replace("element vertex", "property float q\nelement vertex"), "'q' belongs to no element"),
     ):
         with pytest.raises(InvalidMesh, match=reason):
             read_mesh(written(tmp_path, "a.ply", content))
@@ -317,6 +327,17 @@ def test_colours_of_off(tmp_path: Path, paint: str, of_vertices: bool) -> None:
     assert mesh.color is not None
     assert mesh.color.simplified == (1.0, 0.0, 0.0)
     assert len(mesh.color) == (4 if of_vertices else 2)
+
+
+def test_off_faces_without_a_colour_have_the_usual_one(tmp_path: Path) -> None:
+    faces = "3 0 1 2 255 0 0\n3 0 2 3\n"
+    path = written(tmp_path, "a.off", OFF.replace("4 1 0", "4 2 0").replace("4 0 1 2 3\n", faces))
+    color = read_mesh_data(path).color
+    assert color is not None
+    assert color.corners is not None
+    assert color.colors is not None
+    light = color.colors[color.corners[:, 0]]
+    np.testing.assert_allclose(light, [[1.0, 0.0, 0.0], decode_srgb(np.array(CLAY))], atol=1e-6)
 
 
 def test_off_without_whole_colours_is_read_without_them(

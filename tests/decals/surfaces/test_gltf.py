@@ -253,6 +253,7 @@ BROKEN: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "outside": (lambda d: d["buffers"][0].update(uri="..%2Fc.bin"), "outside of the model's folder"),
     "root": (lambda d: d["buffers"][0].update(uri="/etc/passwd"), "is missing|outside of the model's folder"),
     "missing": (lambda d: d["buffers"][0].update(uri="c%20d.bin"), "'c%20d.bin', is missing"),
+    "null": (lambda d: d["buffers"][0].update(uri="a%00b.bin"), "is missing"),
     "no data": (lambda d: d["buffers"][0].update(uri="data:x"), "data URI without data"),
     "base64": (lambda d: d["buffers"][0].update(uri="data:;base64,AAAAA"), "no base64"),
 }  # fmt: skip
@@ -443,6 +444,7 @@ def attributes(document: dict[str, Any]) -> Any:
     ("change", "message"),
     [
         (lambda d: d["images"][0].update(uri="nothing.png"), "image 0, 'nothing.png', is missing"),
+        (lambda d: d["images"][0].update(uri="a\0b.png"), "textures are left out: image 0, .*missing"),
         (lambda d: d["images"][0].update(uri="../a.png"), "textures are left out: image 0, .*outside"),
         (lambda d: d["images"][0].update(uri="data:,text"), "textures are left out: .*image 0"),
         (lambda d: d["images"][0].update(uri=[]), "textures are left out: image 0 is wrong: Expected"),
