@@ -221,12 +221,12 @@ def is_unicode(text: str) -> bool:
     return True
 
 
-def as_path(path: object) -> Path:
-    """Return the path of a file; InvalidScene for values of other types."""
+def as_path(path: object, error: type[ImplicitDecalsError] = InvalidScene) -> Path:
+    """Return the path of a file; raise an error for values of other types."""
     try:
         return Path(cast("str | os.PathLike[str]", path))
     except TypeError:
-        raise InvalidScene(f"path: expected the path of a file, got {describe(path)}; give a text") from None
+        raise error(f"path: expected the path of a file, got {describe(path)}; give a text") from None
 
 
 def checked_path(path: str | os.PathLike[str], suffixes: tuple[str, ...]) -> Path:

@@ -34,6 +34,9 @@ COOKIE_SECONDS = 30 * 24 * 3600
 MAX_SOCKETS = 64
 """Most connections for messages of one server."""
 
+MAX_NAME_BYTES = 255
+"""Longest name in an address; file systems refuse longer ones."""
+
 MAX_FRAMES = 16
 """Most origins of notebooks that show the page in a frame."""
 
@@ -158,6 +161,8 @@ class Guard:
         finds = request.method == "POST" and request.path == FINDER
         if request.method not in ("GET", "HEAD") and not finds:
             raise web.HTTPMethodNotAllowed(request.method, ["GET", "HEAD"])
+        if any(len(name.encode(errors="replace")) > MAX_NAME_BYTES for name in request.path.split("/")):
+            raise web.HTTPNotFound(text="expected a shorter address")
         bearer, token = self._is_bearer(request), self.is_token(request.query.get("token"))
         visit = _is_visit(request, token)
         token = visit and token

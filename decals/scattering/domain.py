@@ -17,7 +17,7 @@ from decals.scattering.projection import SurfaceProjection, spans_of
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import Surface, vectors
-from decals.validation import function_or_none, function_values, real_number, whole_number
+from decals.validation import function_or_none, function_values, real_array, real_number, whole_number
 
 AREA_SAMPLES = 16384
 """Samples that estimate the visible area of a surface."""
@@ -233,7 +233,7 @@ class Domain:
 
     def project_fixed(self, fixed: ArrayLike | None) -> OrientedPoints:
         """Project fixed particles onto the surfaces that they are closest to."""
-        if fixed is None or np.size(fixed) == 0:
+        if fixed is None or real_array("fixed", fixed, InvalidScattering).size == 0:
             return OrientedPoints.empty()
         if not self.surfaces:
             raise InvalidScattering("fixed: expected a surface for them to lie on, got none")

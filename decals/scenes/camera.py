@@ -144,6 +144,10 @@ class Camera:
             )
         if math.hypot(*self.up) == 0.0 or _parallel(np.array(self.up), self._back):
             raise InvalidScene(f"a camera's up must not be zero or along the view, got {self.up}")
+        if self.fit is not None and not isinstance(self.fit, Fit):
+            raise InvalidScene(
+                f"a camera's fit: expected a Fit or None, got {describe(self.fit)}; use Camera.fitting"
+            )
         if self.fit is not None and self.fit.pose != self._pose:
             object.__setattr__(self, "fit", None)
 

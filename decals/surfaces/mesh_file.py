@@ -30,7 +30,7 @@ from decals.surfaces.files.threemf import read_3mf
 from decals.surfaces.mesh_data import MeshData, joined
 from decals.surfaces.triangulate import Polygons, Triangulation, triangulate
 from decals.surfaces.vtk_process import can_isolate, read_isolated
-from decals.validation import describe
+from decals.validation import as_path, describe
 
 if TYPE_CHECKING:  # its import takes longer than ours, and meshes of arrays do without
     import pyvista as pv
@@ -93,7 +93,7 @@ def read_mesh(path: str | PathLike[str]) -> MeshArrays:
 
 def read_mesh_data(path: str | PathLike[str]) -> MeshData:
     """Read a mesh file with its colours; see `read_mesh`."""
-    path = Path(path)
+    path = as_path(path, InvalidMesh)
     if not is_file(path):
         raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
     suffix = path.suffix.lower()

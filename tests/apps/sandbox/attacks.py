@@ -412,20 +412,22 @@ print(json.dumps(found))
 
 
 async def path(server: Server) -> str:
-    """A program with the cookie asks for files outside the page's folder."""
+    """A program with the cookie asks for files outside the page's folder, and for impossible names."""
     cookies = await server.enter()
     for name in (
         "../" * 8 + "etc/passwd",
         "%2e%2e/" * 8 + "etc/passwd",
         "..%5c" * 8 + "etc/passwd",
         "//etc/passwd",
+        "a" * 3000,
     ):
         request = f"GET /{name} HTTP/1.1\r\nHost: {server.authority}\r\nConnection: close\r\n"
         request += "".join(f"Cookie: {key}={value}\r\n" for key, value in cookies.items()) + "\r\n"
         reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
         writer.write(request.encode())
-        if b"root:" in await asyncio.wait_for(reader.read(), 20):
-            return f"read {name}"
+        answer = await asyncio.wait_for(reader.read(), 20)
+        if b"root:" in answer or answer.startswith(b"HTTP/1.1 500"):
+            return f"read or failed at {name[:40]}"
         writer.close()
     return ""
 

@@ -88,7 +88,10 @@ RELAXATION_ARGUMENTS: list[tuple[str, list[Any]]] = [
             lambda p: p,
         ],
     ),
-    ("fixed", ["x", 5, [1, 2], [[1, 2]], [[NAN, 0, 0]], [["a", "b", "c"]], np.zeros((30, 3)), fail]),
+    (
+        "fixed",
+        ["x", 5, [1, 2], [[1, 2]], [[1, 2], [3]], [[NAN, 0, 0]], [["a", "b", "c"]], np.zeros((30, 3)), fail],
+    ),
     ("device", ["bogus", 5, "cuda:99", [1]]),
 ]
 APPEARANCE_ARGUMENTS: list[tuple[str, list[Any]]] = [

@@ -133,6 +133,7 @@ def test_clip_range_follows_the_scene() -> None:
         {"position": (0, 0, 1), "fov": 0},
         {"position": (0, 0, 1), "fov": 180},
         {"position": (0, 0, 1), "fov": np.nan},
+        {"position": (0, 0, 1), "fit": True},
     ],
 )
 def test_bad_cameras_are_refused(arguments: dict[str, Any]) -> None:

@@ -132,7 +132,8 @@ def test_vertices_of_obj_without_a_colour_cost_the_others_none(tmp_path: Path) -
     text = "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nv 1 1 0\nv 2 1 0\nv 1 2 0\nf 1 2 3\nf 4 5 6\n"
     (tmp_path / "a.obj").write_text(text)
     light = light_of(read(tmp_path / "a.obj"), [0, 1], np.full((2, 3), 1 / 3))
-    np.testing.assert_allclose(light, [[1.0, 0.0, 0.0], linear(np.array(CLAY))], atol=1e-6)
+    right = np.stack([np.array([1.0, 0.0, 0.0]), linear(np.array(CLAY))])
+    assert light == pytest.approx(right, abs=1e-6)
 
 
 def test_names_of_materials_and_their_files_may_have_a_hash(tmp_path: Path) -> None:

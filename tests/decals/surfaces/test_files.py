@@ -337,7 +337,8 @@ def test_off_faces_without_a_colour_have_the_usual_one(tmp_path: Path) -> None:
     assert color.corners is not None
     assert color.colors is not None
     light = color.colors[color.corners[:, 0]]
-    np.testing.assert_allclose(light, [[1.0, 0.0, 0.0], decode_srgb(np.array(CLAY))], atol=1e-6)
+    usual = decode_srgb(np.array(CLAY))
+    assert light == pytest.approx(np.stack([np.array([1.0, 0.0, 0.0]), usual]), abs=1e-6)
 
 
 def test_off_without_whole_colours_is_read_without_them(

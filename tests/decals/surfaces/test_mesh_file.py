@@ -1,4 +1,5 @@
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -271,6 +272,12 @@ def test_points_without_faces(tmp_path: Path) -> None:
     (tmp_path / "a.ply").write_bytes(_ascii_ply(SQUARE, []))
     with pytest.raises(InvalidMesh, match="4 points but no faces"):
         read_mesh(tmp_path / "a.ply")
+
+
+@pytest.mark.parametrize("path", [None, 0, b"a.ply", [], np.zeros(3)])
+def test_a_value_that_is_no_path_is_refused(path: Any) -> None:
+    with pytest.raises(InvalidMesh, match="expected the path of a file"):
+        read_mesh(path)
 
 
 def test_missing_file_and_folder(tmp_path: Path) -> None:
