@@ -20,6 +20,7 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray
 from blobtree.cells.grid import CHILDREN, Grid
 from blobtree.cells.sparse_cells import SparseCells, build_cells
 from blobtree.device import launch
+from blobtree.errors import InvalidResolution
 from blobtree.formulas.skeletons import BALL_CELLS
 from blobtree.meshing.adaptive_cell_kernels import write_polygons
 from blobtree.meshing.adaptive_cells import AdaptiveCells
@@ -57,6 +58,9 @@ LEAST_CELL = 3e-5
 
 SHEET_GROWTH = 16.0
 """Blocks of the next level in each block that a plate crosses; a tube crosses fewer."""
+
+LATER_GROWTH = 0.6
+"""Growth of a part's blocks in later levels, over that in the last one, which is larger at ends and edges."""
 
 MAX_NAMED_PARTS = 3
 """Parts that a warning names."""
@@ -109,6 +113,8 @@ class PartCells(AdaptiveCells):
         self._least, self._walls = least, walls
         self.unresolved: list[ThinPart] = []
         """Parts for whose cells there is no room."""
+        self._in_walls = np.empty(0, bool)
+        self._counts: dict[int, int] = {}
         self._divide_thin_parts()
 
     def _divide_thin_parts(self) -> None:
@@ -138,7 +144,9 @@ class PartCells(AdaptiveCells):
             return np.empty(0, np.float32)
         grid = tree.grid(int(tree.levels[first]))
         needed = needed_sizes(tree.cells, grid, tree.level_arrays(), first, count, self._least)
-        return needed if self._walls is None else np.minimum(needed, self._walls.needed(first))
+        of_walls = np.full_like(needed, np.inf) if self._walls is None else self._walls.needed(first)
+        self._in_walls = np.append(self._in_walls[:first], of_walls < needed)
+        return np.minimum(needed, of_walls)
 
     def _affordable(self, blocks: IndexArray, needed: Float32Array, growth: float) -> BoolArray:
         """Return True for the blocks to refine, without the parts with most blocks if there are too many."""
@@ -149,16 +157,35 @@ class PartCells(AdaptiveCells):
             refined = len(tree) - len(tree.cells.leaves)
             room = max(MAX_PART_BLOCKS - refined, SPARE_SHARE * MAX_PART_BLOCKS) / growth
         parts = np.round(4.0 * np.log2(needed)).astype(np.int64)
-        _, part, counts = np.unique(parts, return_inverse=True, return_counts=True)
-        order = np.argsort(counts, kind="stable")
+        keys, part, counts = np.unique(parts, return_inverse=True, return_counts=True)
+        expected = counts * self._later_growth(blocks, keys, part, counts)
+        order = np.argsort(expected, kind="stable")
         fits = np.empty(len(counts), bool)
-        fits[order] = np.cumsum(counts[order]) <= room
+        fits[order] = np.cumsum(expected[order]) <= room
         for number in np.flatnonzero(~fits):
             dropped = np.flatnonzero(part == number)
             size, middle = float(needed[dropped].min()), self._middle(blocks[dropped])
             of_wall = None if self._walls is None else self._walls.leaf_at(middle, 4.0 * size)
             self.unresolved.append(ThinPart(size, middle, of_wall))
         return np.asarray(fits[part], bool)
+
+    def _later_growth(
+        self, blocks: IndexArray, keys: IndexArray, part: IndexArray, counts: IndexArray
+    ) -> Float64Array:
+        """Return the factors by which the blocks of parts are expected to grow after this level.
+
+        The last level shows how they grow. Walls need cells of many sizes, so nothing is known of theirs.
+        """
+        before = np.array([self._counts.get(key, 0) for key in keys.tolist()])
+        self._counts = dict(zip(keys.tolist(), counts.tolist(), strict=True))
+        growth = np.where(before > 0, counts / np.maximum(before, 1), 1.0)
+        growth[np.unique(part[self._in_walls[blocks]])] = 1.0
+        if not len(blocks):
+            return growth
+        size = self.tree.grid(int(self.tree.levels[blocks[0]])).cell_size
+        later = np.ceil(0.5 * np.log2(size) - 0.125 * keys).clip(min=1.0) - 1.0
+        factors: Float64Array = np.maximum(LATER_GROWTH * growth, 1.0) ** later
+        return factors
 
     def _middle(self, blocks: IndexArray) -> Float64Array:
         """Return the centre of the middle one of blocks."""
@@ -192,10 +219,24 @@ def mesh_of_parts(
     elif least_size(blocks.cells, smallest) >= BALL_CELLS * blocks.cells.grid.cell_size:
         warn_of_thin_parts(tree, _too_thin(tree, smallest))
         return None
-    parts = PartCells(blocks, 0.0, smallest, walls)
-    mesh = AdaptiveMesher(parts, creases).mesh(report)
-    warn_of_thin_parts(tree, parts.unresolved + _too_thin(tree, smallest))
+    unresolved = _too_thin(tree, smallest)
+    try:
+        parts = PartCells(blocks, 0.0, smallest, walls)
+        mesh = AdaptiveMesher(parts, creases).mesh(report)
+    except InvalidResolution:
+        if walls is None or not len(needed):
+            raise
+        unresolved += _all_walls(walls)  # without them, the tree has the mesh that it has by its primitives
+        blocks = BlockTree(blocks.cells)
+        parts = PartCells(blocks, 0.0, smallest, None)
+        mesh = AdaptiveMesher(parts, creases).mesh(report)
+    warn_of_thin_parts(tree, parts.unresolved + unresolved)
     return mesh.mesh(creases)
+
+
+def _all_walls(walls: Walls) -> list[ThinPart]:
+    """Return the thinnest place of each operand's walls."""
+    return [ThinPart(size, place, leaf) for size, place, leaf in walls.thinnest]
 
 
 def _too_thin(tree: ImplicitModel, smallest: float) -> list[ThinPart]:
@@ -234,8 +275,10 @@ def warn_of_thin_parts(tree: ImplicitModel, unresolved: list[ThinPart]) -> None:
 def _name_of_part(tree: ImplicitModel, part: ThinPart) -> str:
     """Return the class and the path of a part: a leaf, or the node whose operator leaves a wall."""
     if part.of_wall is not None:
-        nodes = _way_to(tree, part.of_wall)
-        path, node = [found for found in nodes if has_walls(compile_program(found[1]))][-1]
+        beside = part.of_wall
+        path, node = _last_on_way(
+            tree, lambda child: _has_leaf(child, beside) and has_walls(compile_program(child))
+        )
         return f"a wall of the {type(node).__name__} at path {path}"
     least, most = np.log(part_sizes(tree)) - np.log(BALL_CELLS * part.size)
     misfit = np.round(np.maximum(least, -most).clip(0.0), 1)
@@ -243,22 +286,23 @@ def _name_of_part(tree: ImplicitModel, part: ThinPart) -> str:
     gaps = np.linalg.norm(np.maximum(lower - part.place, part.place - upper).clip(0.0), axis=1)
     number = np.lexsort([gaps, misfit])[0]
     leaves = [placed.primitive for run in tree._program if isinstance(run, Run) for placed in run.primitives]
-    path, node = _way_to(tree, leaves[number])[-1]
+    path, node = _last_on_way(tree, lambda child: _has_leaf(child, leaves[number]))
     return f"the {type(node).__name__} at path {path}"
 
 
-def _way_to(tree: ImplicitModel, leaf: ProgramLeaf) -> list[tuple[tuple[int, ...], ProgramNode]]:
-    """Return the paths and the nodes from the root down to the one that is, or stands for, a leaf."""
-    way: list[tuple[tuple[int, ...], ProgramNode]] = [((), tree)]
+def _last_on_way(
+    tree: ImplicitModel, leads: Callable[[ProgramNode], bool]
+) -> tuple[tuple[int, ...], ProgramNode]:
+    """Return path and node at the end of the way from the root through children for which `leads` is true."""
+    path: tuple[int, ...] = ()
+    node: ProgramNode = tree
     while True:
-        path, node = way[-1]
-        below = enumerate(node.children)
-        step = next((at for at, child in below if leaf in _leaves(child)), None)
+        step = next((at for at, child in enumerate(node.children) if leads(child)), None)
         if step is None:
-            return way
-        way.append(((*path, step), node.children[step]))
+            return path, node
+        path, node = (*path, step), node.children[step]
 
 
-def _leaves(node: ProgramNode) -> list[ProgramNode]:
-    """Return the leaves of programs below a node."""
-    return [below for below in postorder(node, below=PROGRAM_CHILDREN) if isinstance(below, ProgramLeaf)]
+def _has_leaf(node: ProgramNode, leaf: ProgramLeaf) -> bool:
+    """Return True if a leaf is below a node in programs."""
+    return any(below is leaf for below in postorder(node, below=PROGRAM_CHILDREN))

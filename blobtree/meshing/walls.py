@@ -160,6 +160,16 @@ class Walls:
         """Sizes of the cells that walls need, at all samples."""
         return np.concatenate([np.empty(0, np.float32), *(samples.needed for samples in self._samples)])
 
+    @property
+    def thinnest(self) -> list[tuple[float, Float64Array, ProgramLeaf]]:
+        """Size of cells, place and leaf of the sample of each operand where its wall is thinnest."""
+        return [
+            (float(samples.needed[at]), samples.places[at].astype(np.float64), samples.leaf)
+            for samples in self._samples
+            if len(samples.needed)
+            for at in [int(samples.needed.argmin())]
+        ]
+
     def needed(self, first: int) -> Float32Array:
         """Return the sizes of cells that walls need in blocks of the finest level, from number `first` on."""
         needed = np.full(len(self._blocks) - first, UNLIMITED, np.float32)

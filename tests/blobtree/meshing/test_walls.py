@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from blobtree import Box, Node, Point, Segment, Shell, SmoothDifference, polygonize
+from blobtree.errors import InvalidResolution
+from blobtree.meshing.adaptive_mesh import AdaptiveMesh, AdaptiveMesher
 from blobtree.meshing.polygonize import polygonize_parts
+from blobtree.progress import Progress
 from tests.thin_trees import is_closed, mesh_areas
 
 BALL = Point((0, 0, 0), radius=1.0)
@@ -96,3 +99,24 @@ def test_a_wall_too_thin_for_memory_is_named_once(caplog: pytest.LogCaptureFixtu
     (record,) = caplog.records
     assert "a wall of the Shell at path (1,)" in record.getMessage()
     assert "resolution of" in record.getMessage()
+
+
+def test_a_wall_that_cells_cannot_close_leaves_the_rest(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    tree = BALL.translate((4, 0, 0)) | Shell(BALL, 0.1)
+    whole = AdaptiveMesher.mesh
+    failures = iter([True, False])
+
+    def failing_once(self: AdaptiveMesher, report: Progress) -> AdaptiveMesh:
+        if next(failures):
+            raise InvalidResolution("cells could not be divided")
+        return whole(self, report)
+
+    monkeypatch.setattr(AdaptiveMesher, "mesh", failing_once)
+    with caplog.at_level(logging.WARNING):
+        mesh = polygonize_parts(tree, resolution=24)
+    (record,) = caplog.records
+    assert is_closed(mesh.faces)
+    assert mesh_areas(mesh)[1].sum() > 4.0 * np.pi * 0.95
+    assert "a wall of the Shell at path (1,)" in record.getMessage()
