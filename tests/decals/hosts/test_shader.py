@@ -12,10 +12,10 @@ import pytest
 import warp as wp
 
 import decals
-from blobtree import Point
 from decals.editing.document import Document
-from decals.errors import InvalidScene
+from decals.errors import InvalidScene, TooMuchData
 from decals.hosts.code import STAGES, VERSIONS, Form, code_of
+from decals.hosts.textures import MAX_ROWS, data_size
 from decals.hosts.unsupported import UNSUPPORTED
 from decals.index import DecalEditor
 from decals.rendering.context import Context
@@ -181,7 +181,7 @@ void main() {{
 
 @pytest.mark.parametrize("version", ["330 core", "300 es"])
 def test_vertex_shaders_have_the_functions(context: Context, version: str) -> None:
-    exported = decals.shader(scene_of(FULL), version=version, stage="vertex")
+    exported = decals.shader(scene_of(PLAIN), version=version, stage="vertex")
     vertex = CALL.format(inputs="in vec3 q;", q="q", output="gl_Position")
     fragment = "precision highp float;\nout vec4 shown;\nvoid main() { shown = vec4(1.0); }\n"
     context.gl.program(
@@ -260,6 +260,11 @@ def test_a_scene_without_decals_has_none(context: Context) -> None:
     values = at_points(context.gl, decals.shader(scene), points, normals)
     assert (values["found"][:, 0] == -1).all()
     assert not values["color"].any()
+
+
+def test_more_rows_than_a_texture_has_are_refused() -> None:
+    with pytest.raises(TooMuchData, match="67,108,865 elements do not fit"):
+        data_size(np.zeros((MAX_ROWS * 4096 + 1, 0), np.float32))
 
 
 def test_receivers_are_those_of_evaluate(context: Context) -> None:
@@ -417,7 +422,7 @@ def test_a_document_is_a_scene() -> None:
 
 
 def test_one_moved_decal_uploads_its_own_bytes() -> None:
-    scene = decals.cover(Point((0, 0, 0), radius=1.0), count=300)
+    scene = scene_of(PLAIN)
     editor = DecalEditor(scene.decals)
     exported = decals.shader(scene, editable=True)
     first = exported.changes(editor, 0)
