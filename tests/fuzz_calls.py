@@ -558,6 +558,7 @@ def _commands(whole: decals.Scene, number: int, path: tuple[int, ...]) -> Calls:
         "OrderDecals": {"numbers": [0], "front": True},
         "PaintPrimitive": {**node, "color": (1, 1, 1)},
         "PushDecals": {"point": point, "offset": (0.1, 0.0, 0.0), "radius": 0.3},
+        "FillBarePlaces": {"objects": (0,), "seed": 0},
         "RelaxDecals": {"point": point, "radius": 0.3},
         "RemoveImage": {"number": 0},
         "RemoveObject": {"number": 0},
