@@ -215,7 +215,8 @@ class EditWindow:
         coarse = self.frames.state is FrameState.COARSE
         unsaved = self.actions.files.recovery.pending
         drawing = coarse or self.subplot.warming_up or self.subplot.walking
-        return not self._closed and (self.background.busy or unsaved or drawing)
+        working = self.background.busy or self.actions.bare.busy
+        return not self._closed and (working or unsaved or drawing)
 
     def _shown_version(self) -> tuple[object, ...]:
         subplot, document = self.subplot, self.document
