@@ -33,7 +33,7 @@ DRAG = """(steps) => {
     times.push(performance.now() - start);
     const drawn = performance.now();
     viewer.draw();
-    viewer.painter.gl.finish();
+    viewer.painter.finish();
     draws.push(performance.now() - drawn);
   }
   const median = (values) => values.sort((a, b) => a - b)[Math.floor(values.length / 2)];

@@ -210,6 +210,11 @@ export class Painter {
     this.drawMeshes("color", state);
   }
 
+  // Wait until the picture is drawn: in browsers only a read does so.
+  finish() {
+    this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
+  }
+
   // The number of the decal at a pixel, counted from the lower left; −1 for none.
   owner(state, x, y) {
     const { gl, canvas } = this;

@@ -74,7 +74,7 @@ class Viewer {
   start() {
     this.resize();
     this.draw();
-    this.painter.gl.finish();
+    this.painter.finish();
     performance.mark("first frame");
     setTimeout(() => this.painter.programOf(this.mode, "pick")); // so that the first click does not wait
   }
