@@ -13,16 +13,16 @@ from blobtree.formulas.falloff import RIM
 from blobtree.progress import Progress
 from decals.baking.meshes import BakeMesh, bake_mesh
 from decals.errors import InvalidScene, TooMuchData
-from decals.hosts.code import code_of
+from decals.hosts.code import Form, code_of
 from decals.hosts.shader import Shader, shader
 from decals.images.load import embedded_image
 from decals.images.texels import decode_srgb
 from decals.index.decal_cells import FINEST, LEVEL_SHIFT, NO_FLOOR, NO_PARITY, REACH_WITH_SLACK
 from decals.index.index import DecalIndex
-from decals.index.lookup import HALF_RANGE, MIX_ALL, MIX_X, MIX_Y, MIX_Z
+from decals.index.lookup import HALF_RANGE, MIX_ALL, MIX_X, MIX_Y, MIX_Z, NESTING_SLACK
 from decals.model import LAYER_LIMIT
 from decals.receivers import object_mask
-from decals.record import Contact
+from decals.record import MIN_KEPT_RADIUS, Contact
 from decals.rendering.context import MAX_ANISOTROPY
 from decals.rendering.options import Background
 from decals.rendering.studio import studio_ambient, studio_constants
@@ -62,7 +62,7 @@ def page_contents(
             f"a page shows at most {MAX_DECALS:,} decals, got {len(scene.decals):,}, about "
             f"{len(scene.decals) * 100 // 2**20} MB; show a part of them, or write a picture"
         )
-    code = shader(scene, version="300 es", prefix=PREFIX, editable=True)
+    code = shader(scene, version="300 es", prefix=PREFIX)
     shown = [(item, part) for item in scene.objects if (part := item.shown) is not None]
     meshes = [
         (item, bake_mesh(part, resolution=resolution, creases=True, report=report)) for item, part in shown
@@ -98,7 +98,8 @@ def page_contents(
         "mode": code.form.contact.name.lower(),
         "stiffness": scene.drawing.stiffness,
         "mapping": int(scene.drawing.mapping),
-        "rules": record_rules(code.receiver_table) | {"index": index_rules(DecalIndex.of(scene.decals))},
+        "rules": record_rules(code.receiver_table, code.form)
+        | {"index": index_rules(DecalIndex.of(scene.decals))},
         "scene": _scene_record(scene),
     }, arrays
 
@@ -129,7 +130,10 @@ def _mesh_record(item: SceneObject, mesh: BakeMesh, code: Shader) -> dict[str, A
 
 
 def _shaders(code: Shader) -> dict[str, Any]:
-    """Return the vertex shader, and the parts of the fragment shaders: of each contact mode, and the ends."""
+    """Return the vertex shader, and the parts of the fragment shaders: of each contact mode, and the ends.
+
+    The plain form of a mode is fast, and the full one is right for all decals that an edit can make.
+    """
     precision = "precision highp float;\nprecision highp int;\n"
     vertex = compose("base_mesh.vert", version=None).text
     light: dict[str, str | bool] = {**studio_ambient(), "MATERIAL_LIGHT": code.form.materials}
@@ -141,17 +145,30 @@ def _shaders(code: Shader) -> dict[str, Any]:
         "color": compose("page.frag", slots=material, defines=light, version=None).text,
         "pick": compose("page.frag", slots=material, defines={**light, "PICK": True}, version=None).text,
     }
-    forms = {mode.name.lower(): replace(code.form, contact=mode) for mode in Contact}
+    full = replace(code.form, layered=True, limited=True, nested=True)
     modes = {
-        name: code.header + code_of(form, code.version, code.stage, code.prefix).text
-        for name, form in forms.items()
+        mode.name.lower(): {
+            name: code.header + code_of(form, code.version, code.stage, code.prefix).text
+            for name, form in (
+                ("plain", replace(code.form, contact=mode)),
+                ("full", replace(full, contact=mode)),
+            )
+        }
+        for mode in Contact
     }
     return {"vertex": code.header + precision + vertex, "modes": modes, "ends": ends}
 
 
-def record_rules(receivers: Sequence[str]) -> dict[str, Any]:
-    """Return the constants of records."""
-    return {"rim": float(RIM), "layerLimit": LAYER_LIMIT, "receivers": receivers}
+def record_rules(receivers: Sequence[str], form: Form) -> dict[str, Any]:
+    """Return the constants of records, and for which decals the plain form of the shaders is right."""
+    return {
+        "rim": float(RIM),
+        "layerLimit": LAYER_LIMIT,
+        "receivers": receivers,
+        "keptRadius": MIN_KEPT_RADIUS,
+        "nestingSlack": NESTING_SLACK,
+        "plain": {name: getattr(form, name) for name in ("layered", "limited", "nested")},
+    }
 
 
 def index_rules(index: DecalIndex) -> dict[str, Any]:

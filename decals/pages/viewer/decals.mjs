@@ -15,6 +15,8 @@ export class DecalSet {
     this.rows.forEach((row, number) => row && this.pack(row, number));
     this.index = new DecalIndex(rules.index, this.records);
     this.index.build(this.numbers);
+    this.rank = this.numbers.length ? this.index.rank(this.numbers[0]) : null; // of all, without layers
+    this.full = false; // an edit made decals for which the plain shaders are wrong
     this.changed = null; // all rows
   }
 
@@ -57,8 +59,33 @@ export class DecalSet {
     if (row) {
       this.pack(row, number);
       this.index.insert(number);
+      this.full ||= this.needsFull(number);
     }
     this.changed?.add(number);
+  }
+
+  // True if the plain form of the shaders, which is right for the first decals, is wrong for a changed one.
+  needsFull(number) {
+    const { layered, limited, nested } = this.rules.plain;
+    this.rank ??= this.index.rank(number);
+    if (!layered && this.index.rank(number) !== this.rank) return true;
+    if (!limited && this.limits.subarray(4 * number, 4 * number + 4).some((value) => value)) return true;
+    return !nested && this.numbers.some((other) => this.areNested(number, other));
+  }
+
+  // As `are_nested_contact` of decals/index/lookup.py.
+  areNested(decal, other) {
+    const rank = this.index.rank(decal);
+    if (decal === other || rank % 4 !== INTERACTIONS.push || this.index.rank(other) !== rank) return false;
+    const [a, b] = [RECORD * decal, RECORD * other];
+    const sizes = [this.records[a + 3], this.records[b + 3]].map((size) => this.rules.rim * size);
+    const [smaller, larger] = [Math.min(...sizes), Math.max(...sizes) * (1 + this.rules.nestingSlack)];
+    let squared = 0;
+    for (let axis = 0; axis < 3; axis++) squared += (this.records[a + axis] - this.records[b + axis]) ** 2;
+    const difference = (larger - smaller) * (larger + smaller);
+    const least = (2 * this.rules.keptRadius) ** 2 * squared;
+    const [near, far] = [squared - difference, squared + difference];
+    return near <= 0 || near ** 2 <= least * smaller ** 2 || far ** 2 <= least * larger ** 2;
   }
 
   grow() {

@@ -81,11 +81,12 @@ export class Painter {
   }
 
   // The program that draws, or picks, in a contact mode: compiled when it is first used.
-  programOf(mode, kind) {
-    const key = `${mode} ${kind}`;
+  programOf(mode, kind, full) {
+    const form = full ? "full" : "plain";
+    const key = `${mode} ${kind} ${form}`;
     if (!this.programs.has(key)) {
       const { vertex, modes, ends } = this.header.shaders;
-      this.programs.set(key, this.program(vertex, `${modes[mode]}${ends[kind]}`));
+      this.programs.set(key, this.program(vertex, `${modes[mode][form]}${ends[kind]}`));
     }
     return this.programs.get(key);
   }
@@ -240,7 +241,7 @@ export class Painter {
 
   drawMeshes(kind, { camera, decals, mode, stiffness, lit }) {
     const { gl } = this;
-    const program = this.programOf(mode, kind);
+    const program = this.programOf(mode, kind, decals.full);
     gl.enable(gl.DEPTH_TEST);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     this.upload(decals);

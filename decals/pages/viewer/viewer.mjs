@@ -76,7 +76,7 @@ class Viewer {
     this.draw();
     this.painter.finish();
     performance.mark("first frame");
-    setTimeout(() => this.painter.programOf(this.mode, "pick")); // so that the first click does not wait
+    setTimeout(() => this.painter.programOf(this.mode, "pick", this.decals.full)); // so that the first click does not wait
   }
 
   get aspect() {

@@ -16,11 +16,16 @@ from numpy.typing import NDArray
 import decals
 from blobtree import Point
 from decals.errors import InvalidScene, TooMuchData
+from decals.hosts.code import Form
+from decals.index import DecalIndex
+from decals.index.index import has_nested, index_on
 from decals.pages import contents, page, viewer_script
+from decals.pages.contents import index_rules, record_rules
 from decals.pages.packing import packed
 from decals.pages.page import MODULES
 from decals.scenes.camera import REFERENCE_ASPECT
 from decals.scenes.scene import Scene
+from tests.decals.pages.test_viewer_index import rows_of
 from tests.decals.pages.viewer_scripts import VIEWER, needs_node, node, run_node
 
 NAME = '</script><img src=x onerror="alert(1)">'
@@ -210,6 +215,60 @@ def test_links_hold_the_state_and_refuse_nonsense() -> None:
     assert changes[3]["image"] == 2
     assert too_long is None
     assert wrong == [{"changes": []}] * len(wrong)
+
+
+@needs_node
+@pytest.mark.parametrize("seed", range(3))
+def test_the_page_finds_nested_decals(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    count = 60
+    given = decals.Decals(
+        positions=random.normal(size=(count, 3)),
+        normals=random.normal(size=(count, 3)),
+        tangents=random.normal(size=(count, 3)),
+        radii=10.0 ** random.uniform(-1.5, 0.0, count),
+        interactions=random.integers(0, 2, count),
+    )
+    nested = [
+        [bool(has_nested(index_on(given[[a, b]]), 2)) for b in range(count) if b != a] for a in range(count)
+    ]
+    rules = record_rules([""], Form(decals.Contact.ELASTIC)) | {"index": index_rules(DecalIndex.of(given))}
+    script = """
+    const { DecalSet } = await import("./decals.mjs");
+    const set = new DecalSet(data.rows, data.rules);
+    const { numbers } = set;
+    const row = (a) => numbers.filter((b) => b !== a).map((b) => set.areNested(a, b));
+    console.log(JSON.stringify(numbers.map(row)));
+    """
+    assert any(map(any, nested))
+    assert run_node(script, {"rows": rows_of(given), "rules": rules}) == nested
+
+
+@needs_node
+def test_an_edit_takes_the_full_shaders_where_it_must() -> None:
+    given = decals.Decals(
+        positions=[[0, 0, 0], [5, 0, 0]], normals=[[0, 0, 1]] * 2, tangents=[[1, 0, 0]] * 2, radii=[1, 1]
+    )
+    rows = rows_of(given)
+    rules = record_rules([""], Form(decals.Contact.ELASTIC)) | {"index": index_rules(DecalIndex.of(given))}
+    edits = {
+        "moved": {"position": [4, 0, 0]},
+        "nested": {"position": [5, 0, 0], "radius": 0.1},
+        "over": {"interaction": "overlap"},
+        "upper": {"layer": 1},
+        "fading": {"fade_angle": 60},
+    }
+    script = """
+    const { DecalSet } = await import("./decals.mjs");
+    const found = Object.entries(data.edits).map(([name, change]) => {
+      const set = new DecalSet(data.rows, data.rules);
+      set.set(0, { ...data.rows[0], ...change });
+      return [name, set.full];
+    });
+    console.log(JSON.stringify(Object.fromEntries(found)));
+    """
+    found = run_node(script, {"rows": rows, "rules": rules, "edits": edits})
+    assert found == {"moved": False, "nested": True, "over": True, "upper": True, "fading": True}
 
 
 @needs_node

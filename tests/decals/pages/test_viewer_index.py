@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from decals import Decals
+from decals import Contact, Decals
+from decals.hosts.code import Form
 from decals.index import DecalIndex
 from decals.index.decal_cells import LEVEL_SHIFT
 from decals.model import LAYER_LIMIT
@@ -92,7 +93,10 @@ def _by_size(rows: Any, levels: NDArray[Any], numbers: Any) -> Cells:
 
 def page_index(rows: list[Any], rules: dict[str, Any], edits: list[Any]) -> tuple[Cells, NDArray[Any], Any]:
     """Return the cells, the levels and the records of the index that a page has after edits."""
-    found = run_node(SCRIPT, {"rows": rows, "edits": edits, "rules": record_rules([""]) | {"index": rules}})
+    found = run_node(
+        SCRIPT,
+        {"rows": rows, "edits": edits, "rules": record_rules([""], Form(Contact.ELASTIC)) | {"index": rules}},
+    )
     levels = np.array(found["levels"], np.float32).reshape(-1, 4)
     listed = [(*row[:3], row[3:]) for row in found["cells"]]
     return _by_size(listed, levels, list), levels, np.array(found["records"], np.float32)
