@@ -41,10 +41,10 @@ SMALL_LENS = 3.0
 EDGE_SHARE = 1 / 4
 """Size of the smallest cells at the edges of a lens, over that of the thinnest parts."""
 
-PARALLEL = np.radians(12.0)
+PARALLEL = np.radians(25.0)
 """Angle between the sides of a wall below which they are nearly parallel."""
 
-LENS_REACH = 3.0
+LENS_REACH = 2.0
 """Largest radius of a lens over that of its part with nearly parallel sides, for all angles of its edge."""
 
 CLIMBS = 3

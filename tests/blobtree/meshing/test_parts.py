@@ -46,7 +46,7 @@ def test_random_trees_have_closed_meshes_of_all_parts(seed: int, caplog: pytest.
     size = float((model.tree.support[1] - model.tree.support[0]).max())
     for part in model.parts:
         if part.radius >= 5e-5 * size and part.area > 0.0 and not caplog.records:
-            assert areas[part.owns(centers)].sum() == pytest.approx(part.area, rel=0.11), part.kind
+            assert areas[part.owns(centers)].sum() == pytest.approx(part.area, rel=0.15), part.kind
 
 
 def test_a_far_ball_has_a_mesh() -> None:
