@@ -121,7 +121,7 @@ class AdaptiveMesher:
         self._changes = LeafChanges(cells)
         self._known_edges: LeafEdges
 
-    def mesh(self, report: Progress) -> AdaptiveMesh:
+    def mesh(self, report: Progress, max_repairs: int = MAX_REPAIRS) -> AdaptiveMesh:
         """Return the mesh of the leaves; divide those at which it would not be a manifold.
 
         Raises
@@ -129,8 +129,8 @@ class AdaptiveMesher:
         InvalidResolution
             Cells cannot be divided any further.
         """
-        for repair in range(MAX_REPAIRS):
-            report("connecting vertices", repair / MAX_REPAIRS)
+        for repair in range(max_repairs):
+            report("connecting vertices", repair / max_repairs)
             self._cells.settle()
             leaves = self._cells.leaves()
             rows, polygons, irregular, pierced = self._polygons(leaves)

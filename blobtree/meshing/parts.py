@@ -59,6 +59,9 @@ LEAST_CELL = 3e-5
 SHEET_GROWTH = 16.0
 """Blocks of the next level in each block that a plate crosses; a tube crosses fewer."""
 
+MAX_PART_REPAIRS = 40
+"""Most rounds in which cells are divided until the mesh of thin parts is closed; most take one or two."""
+
 LATER_GROWTH = 0.6
 """Growth of a part's blocks in later levels, over that in the last one, which is larger at ends and edges."""
 
@@ -115,18 +118,20 @@ class PartCells(AdaptiveCells):
         """Parts for whose cells there is no room."""
         self._in_walls = np.empty(0, bool)
         self._counts: dict[int, int] = {}
+        self._dropped: list[int] = []
         self._divide_thin_parts()
 
     def _divide_thin_parts(self) -> None:
         """Divide the leaves that are too large for the parts in them."""
         tree, level, growth, first = self.tree, 0, SHEET_GROWTH, 0
         blocks, needed = np.arange(len(tree)), self._needed(0)
+        finer: list[tuple[IndexArray, Float32Array, float]] = []
         while True:
             size = tree.grid(level).cell_size
             deep = np.flatnonzero(needed < size)
             deep = deep[self._affordable(blocks[deep], needed[deep], growth)]
             if not len(deep):
-                return
+                break
             if self._walls is not None:
                 self._walls.refine(first, blocks[deep])
             first, level = len(tree), level + 1
@@ -135,7 +140,10 @@ class PartCells(AdaptiveCells):
             blocks, needed = np.arange(first, len(tree)), self._needed(first)
             small = needed < size
             blocks, needed = blocks[small], needed[small]
-            self.replace(blocks, 2.0 * tree.grid(level).cell_size > needed)
+            finer.append((blocks, needed, 2.0 * tree.grid(level).cell_size))
+        for blocks, needed, largest in finer:
+            kept = self._in_walls[blocks] | ~np.isin(_size_keys(needed), self._dropped)
+            self.replace(blocks[kept], largest > needed[kept])
 
     def _needed(self, first: int) -> Float32Array:
         """Return the sizes of cells that the blocks of the finest level need, from number `first` on."""
@@ -156,34 +164,55 @@ class PartCells(AdaptiveCells):
         else:
             refined = len(tree) - len(tree.cells.leaves)
             room = max(MAX_PART_BLOCKS - refined, SPARE_SHARE * MAX_PART_BLOCKS) / growth
-        parts = np.round(4.0 * np.log2(needed)).astype(np.int64)
-        keys, part, counts = np.unique(parts, return_inverse=True, return_counts=True)
-        expected = counts * self._later_growth(blocks, keys, part, counts)
+        keys, of_key, counts = np.unique(_size_keys(needed), return_inverse=True, return_counts=True)
+        before = np.array([self._counts.get(key, 0) for key in keys.tolist()])
+        self._counts = dict(zip(keys.tolist(), counts.tolist(), strict=True))
+        parts = self._parts_of(keys)
+        part = parts[of_key]
+        sizes, earlier = (
+            np.bincount(parts, weights=numbers).astype(np.float64) for numbers in (counts, before)
+        )
+        expected = sizes * self._later_growth(blocks, keys, part, sizes, earlier)
         order = np.argsort(expected, kind="stable")
-        fits = np.empty(len(counts), bool)
+        fits = np.empty(len(expected), bool)
         fits[order] = np.cumsum(expected[order]) <= room
         for number in np.flatnonzero(~fits):
             dropped = np.flatnonzero(part == number)
             size, middle = float(needed[dropped].min()), self._middle(blocks[dropped])
             of_wall = None if self._walls is None else self._walls.leaf_at(middle, 4.0 * size)
             self.unresolved.append(ThinPart(size, middle, of_wall))
+            self._dropped += keys[parts == number].tolist()
         return np.asarray(fits[part], bool)
 
+    def _parts_of(self, keys: IndexArray) -> IndexArray:
+        """Return numbers of the parts to which ascending keys of sizes belong.
+
+        Below warps, a part has many sizes next to each other.
+        """
+        apart = 1 if self.tree.cells.tape.warps else 0
+        parts: IndexArray = np.cumsum(np.diff(keys, prepend=keys[:1]) > apart)
+        return parts
+
     def _later_growth(
-        self, blocks: IndexArray, keys: IndexArray, part: IndexArray, counts: IndexArray
+        self,
+        blocks: IndexArray,
+        keys: IndexArray,
+        part: IndexArray,
+        counts: Float64Array,
+        before: Float64Array,
     ) -> Float64Array:
         """Return the factors by which the blocks of parts are expected to grow after this level.
 
         The last level shows how they grow. Walls need cells of many sizes, so nothing is known of theirs.
         """
-        before = np.array([self._counts.get(key, 0) for key in keys.tolist()])
-        self._counts = dict(zip(keys.tolist(), counts.tolist(), strict=True))
-        growth = np.where(before > 0, counts / np.maximum(before, 1), 1.0)
+        growth = np.where(before > 0.0, counts / np.maximum(before, 1.0), 1.0)
         growth[np.unique(part[self._in_walls[blocks]])] = 1.0
         if not len(blocks):
             return growth
         size = self.tree.grid(int(self.tree.levels[blocks[0]])).cell_size
-        later = np.ceil(0.5 * np.log2(size) - 0.125 * keys).clip(min=1.0) - 1.0
+        finest = np.full(len(counts), np.inf)
+        np.minimum.at(finest, self._parts_of(keys), keys)
+        later = np.ceil(0.5 * np.log2(size) - 0.125 * finest).clip(min=1.0) - 1.0
         factors: Float64Array = np.maximum(LATER_GROWTH * growth, 1.0) ** later
         return factors
 
@@ -220,23 +249,34 @@ def mesh_of_parts(
         warn_of_thin_parts(tree, _too_thin(tree, smallest))
         return None
     unresolved = _too_thin(tree, smallest)
+    parts = PartCells(blocks, 0.0, smallest, walls)
     try:
-        parts = PartCells(blocks, 0.0, smallest, walls)
-        mesh = AdaptiveMesher(parts, creases).mesh(report)
+        mesh = AdaptiveMesher(parts, creases).mesh(report, MAX_PART_REPAIRS)
     except InvalidResolution:
-        if walls is None or not len(needed):
-            raise
-        unresolved += _all_walls(walls)  # without them, the tree has the mesh that it has by its primitives
-        blocks = BlockTree(blocks.cells)
-        parts = PartCells(blocks, 0.0, smallest, None)
-        mesh = AdaptiveMesher(parts, creases).mesh(report)
+        warn_of_thin_parts(tree, parts.unresolved + unresolved + _all_parts(blocks.cells, walls, smallest))
+        return None
     warn_of_thin_parts(tree, parts.unresolved + unresolved)
     return mesh.mesh(creases)
 
 
-def _all_walls(walls: Walls) -> list[ThinPart]:
-    """Return the thinnest place of each operand's walls."""
-    return [ThinPart(size, place, leaf) for size, place, leaf in walls.thinnest]
+def _all_parts(cells: SparseCells, walls: Walls | None, least: float) -> list[ThinPart]:
+    """Return the thinnest places: one of all primitives, and one of the walls of each operand."""
+    found = [] if walls is None else [ThinPart(size, place, leaf) for size, place, leaf in walls.thinnest]
+    needed, grid = (
+        needed_sizes(cells, cells.grid, cells.leaves.arrays, 0, len(cells.leaves), least),
+        cells.grid,
+    )
+    thinnest = int(needed.argmin())
+    if needed[thinnest] < grid.cell_size:
+        at = cells.leaves.blocks.numpy()[thinnest]
+        found.append(ThinPart(float(needed[thinnest]), grid.origin + (at + 0.5) * 4 * grid.cell_size))
+    return found
+
+
+def _size_keys(needed: Float32Array) -> IndexArray:
+    """Return numbers that tell sizes of cells apart, as sizes of different parts."""
+    keys: IndexArray = np.round(4.0 * np.log2(needed)).astype(np.int64)
+    return keys
 
 
 def _too_thin(tree: ImplicitModel, smallest: float) -> list[ThinPart]:

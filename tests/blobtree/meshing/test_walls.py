@@ -101,19 +101,15 @@ def test_a_wall_too_thin_for_memory_is_named_once(caplog: pytest.LogCaptureFixtu
     assert "resolution of" in record.getMessage()
 
 
-def test_a_wall_that_cells_cannot_close_leaves_the_rest(
+def test_parts_that_cells_cannot_close_leave_the_rest(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     tree = BALL.translate((4, 0, 0)) | Shell(BALL, 0.1)
-    whole = AdaptiveMesher.mesh
-    failures = iter([True, False])
 
-    def failing_once(self: AdaptiveMesher, report: Progress) -> AdaptiveMesh:
-        if next(failures):
-            raise InvalidResolution("cells could not be divided")
-        return whole(self, report)
+    def failing(self: AdaptiveMesher, report: Progress, max_repairs: int) -> AdaptiveMesh:
+        raise InvalidResolution("cells could not be divided")
 
-    monkeypatch.setattr(AdaptiveMesher, "mesh", failing_once)
+    monkeypatch.setattr(AdaptiveMesher, "mesh", failing)
     with caplog.at_level(logging.WARNING):
         mesh = polygonize_parts(tree, resolution=24)
     (record,) = caplog.records
