@@ -29,6 +29,9 @@ from decals.surfaces.base_color import COLOR_ARRAYS
 from decals.surfaces.mesh_data import MeshData
 from decals.surfaces.mesh_file import dataset_mesh, read_dataset
 
+if sys.platform != "win32":
+    import resource
+
 STATM = Path("/proc/self/statm")
 """The size of this process, to which the memory for reading is added; macOS has no such file."""
 
@@ -102,8 +105,6 @@ def _answer_in_fork(request: dict[str, Any], answers: BinaryIO) -> None:
 
 def _limit(request: dict[str, Any]) -> None:
     """Limit the memory of this process on Linux, and let it write no core file."""
-    import resource
-
     if STATM.exists():
         pages = int(STATM.read_text(encoding="ascii").split()[0])
         memory = pages * resource.getpagesize() + int(request["bytes"])
@@ -114,8 +115,6 @@ def _limit(request: dict[str, Any]) -> None:
 def _limit_step(seconds: float) -> None:
     """Limit the processor time of this process from now on; Windows has no such limit."""
     if sys.platform != "win32":
-        import resource
-
         most = resource.getrlimit(resource.RLIMIT_CPU)[1]
         resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(time.process_time() + seconds), most))
 
