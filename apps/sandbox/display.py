@@ -380,7 +380,7 @@ class Display:
 
 
 def _known_mesh(item: SceneObject, meshes: Sequence[tuple[SceneObject, pv.PolyData]]) -> pv.PolyData | None:
-    """Return the mesh of an object of the same shape and colour, if there is one."""
+    """Return the mesh of another object with this shape and colour; None without such an object."""
     for other, mesh in meshes:
         drawn = getattr(item, "color", None) is getattr(other, "color", None)
         drawn &= getattr(item, "crease_angle", 0.0) == getattr(other, "crease_angle", 0.0)

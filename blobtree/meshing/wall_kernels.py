@@ -104,9 +104,9 @@ def measure_walls(
     thicknesses: wp.array(dtype=wp.float32),
     angles: wp.array(dtype=wp.float32),
 ) -> None:
-    """Write the thickness of the wall at each point, UNLIMITED where it is above `thickest` or there is none.
+    """Write the thickness of the wall at each point, and the angle between its sides.
 
-    Write the angle between its sides too.
+    The thickness is UNLIMITED for walls above `thickest`, and for points without a wall.
 
     Start from the tree's surface within `size`, and look along the inward normal for the other side, with
     steps that double from `thinnest` on. The two sides of a wall face away from each other. A wedge is as

@@ -300,7 +300,7 @@ class _Index:
         self._keys = keys[self._order]
 
     def find(self, coordinates: IndexArray) -> IndexArray:
-        """Return the row of each of other coordinates (m, 3), −1 where there is none."""
+        """Return the row of each of other coordinates (m, 3); −1 for coordinates that have no row."""
         wanted = _keys(coordinates)
         at = np.searchsorted(self._keys, wanted).clip(max=len(self._keys) - 1)
         rows: IndexArray = np.where(self._keys[at] == wanted, self._order[at], -1)

@@ -276,7 +276,7 @@ def shader(
     mapping : ImageMapping or str, optional
         Image mapping, ``"corrected"`` or ``"chord"``.
     editable : bool
-        True for code that stays the same whatever is edited. It is slower where decals are simple.
+        True for code that stays the same after all edits of decals. It is slower for simple decals.
 
     Returns
     -------

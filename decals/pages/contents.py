@@ -15,12 +15,12 @@ from decals.baking.meshes import BakeMesh, bake_mesh
 from decals.errors import InvalidScene, TooMuchData
 from decals.hosts.code import Form, code_of
 from decals.hosts.shader import Shader, shader
-from decals.images.load import embedded_image
+from decals.images.load import embedded_image, opaque
 from decals.images.texels import decode_srgb
 from decals.index.decal_cells import FINEST, LEVEL_SHIFT, NO_FLOOR, NO_PARITY, REACH_WITH_SLACK
 from decals.index.index import DecalIndex
 from decals.index.lookup import HALF_RANGE, MIX_ALL, MIX_X, MIX_Y, MIX_Z, NESTING_SLACK
-from decals.model import LAYER_LIMIT
+from decals.model import LAYER_LIMIT, MAX_COORDINATE, MIN_RADIUS
 from decals.receivers import object_mask
 from decals.record import MIN_KEPT_RADIUS, Contact
 from decals.rendering.context import MAX_ANISOTROPY
@@ -29,7 +29,7 @@ from decals.rendering.studio import studio_ambient, studio_constants
 from decals.scenes.camera import REFERENCE_ASPECT
 from decals.scenes.files import to_json
 from decals.scenes.material import DecalMaterial
-from decals.scenes.objects import MeshObject, SceneObject
+from decals.scenes.objects import MeshObject
 from decals.scenes.scene import Scene
 from decals.shaders import compose
 
@@ -69,9 +69,11 @@ def page_contents(
     ]
     if not meshes:
         raise InvalidScene("scene: expected an object to show, got none; show one of its objects")
+    colors = [_vertex_colors(mesh) for _, mesh in meshes]
     arrays: Arrays = {}
     for number, (_, mesh) in enumerate(meshes):
-        arrays |= {f"{name} {number}": array for name, array in _mesh_arrays(mesh).items()}
+        parts = _mesh_arrays(mesh, colors[number])
+        arrays |= {f"{name} {number}": array for name, array in parts.items()}
     for number, item in enumerate(scene.objects):
         if isinstance(item, MeshObject):
             arrays |= {f"vertices of {number}": item.vertices, f"faces of {number}": item.faces}
@@ -85,7 +87,10 @@ def page_contents(
         "aspect": REFERENCE_ASPECT,
         "bounds": [side.tolist() for side in scene.bounds],
         "background": {"top": background.top, "bottom": background.bottom},
-        "meshes": [_mesh_record(item, mesh, code) for item, mesh in meshes],
+        "meshes": [
+            {"mask": object_mask(item, code.receiver_table), "color": shades[0].tolist()}
+            for (item, _), shades in zip(meshes, colors, strict=True)
+        ],
         "images": {
             "textures": {
                 name: {"size": t.size, "format": t.format, "levels": len(levels[name])}
@@ -104,11 +109,10 @@ def page_contents(
     }, arrays
 
 
-def _mesh_arrays(mesh: BakeMesh) -> Arrays:
+def _mesh_arrays(mesh: BakeMesh, colors: NDArray[np.float32]) -> Arrays:
     """Return vertices, faces and normals of a mesh, and the colours of its vertices if they differ."""
     normals = np.rint(NORMAL_LEVELS * mesh.normals).astype(np.int16)
     arrays: Arrays = {"vertices": mesh.vertices, "faces": mesh.faces, "normals": normals}
-    colors = _vertex_colors(mesh)
     if (colors != colors[0]).any():
         arrays["color"] = colors
     return arrays
@@ -119,14 +123,6 @@ def _vertex_colors(mesh: BakeMesh) -> NDArray[np.float32]:
     if mesh.vertex_light is not None:
         return mesh.vertex_light.astype(np.float32)
     return decode_srgb(np.asarray(mesh.base_colors(mesh.vertices), np.float64)).astype(np.float32)
-
-
-def _mesh_record(item: SceneObject, mesh: BakeMesh, code: Shader) -> dict[str, Any]:
-    return {
-        "name": item.name,
-        "mask": object_mask(item, code.receiver_table),
-        "color": _vertex_colors(mesh)[0].tolist(),
-    }
 
 
 def _shaders(code: Shader) -> dict[str, Any]:
@@ -165,6 +161,8 @@ def record_rules(receivers: Sequence[str], form: Form) -> dict[str, Any]:
         "rim": float(RIM),
         "layerLimit": LAYER_LIMIT,
         "receivers": receivers,
+        "minRadius": MIN_RADIUS,
+        "maxCoordinate": MAX_COORDINATE,
         "keptRadius": MIN_KEPT_RADIUS,
         "nestingSlack": NESTING_SLACK,
         "plain": {name: getattr(form, name) for name in ("layered", "limited", "nested")},
@@ -196,4 +194,7 @@ def _scene_record(scene: Scene) -> Mapping[str, Any]:
         if not isinstance(image, DecalMaterial) and not image.is_generated:
             name, pixels = Path(image.source).stem, embedded_image(image.pixels)
             record["images"][number] = {"name": name, "pixels": pixels}
+    environment = scene.drawing.environment
+    if environment is not None:  # a path would name a folder of this machine
+        record["drawing"]["environment"]["picture"] = embedded_image(opaque(environment.picture.light))
     return record

@@ -112,7 +112,7 @@ print(resting, working, after, kept - held())
 
 
 class Library:
-    """The C library, which only notes what it is asked for."""
+    """Stands for the C library: it records the calls."""
 
     def __init__(self) -> None:
         self.options: list[tuple[int, int]] = []

@@ -153,7 +153,9 @@ async def use() -> None:
     """A decal is dragged, turned, scaled, added and deleted; links, files and undo hold what happened."""
     scene = meshed(tree_scene())
     async with shown(scene, (700, 600)) as page:
+        await page.evaluate("viewer.set({ link: 'mode=toString&d=0:1e300,0,0,0,0,0,0,0,0,1e300' })")
         before = await state(page)
+        assert before["mode"] == scene.drawing.contact.name.lower()
         assert len(before["decals"]) == len(scene.decals)
         number = await page.evaluate("viewer.decalAt(0, 0)")
         assert number >= 0

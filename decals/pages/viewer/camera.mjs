@@ -108,14 +108,6 @@ export class Camera {
     this.position = add(this.target, scaled(unit(offset), distance));
   }
 
-  // The point of a plane across the view, through another point, that is seen at a place.
-  onPlane(through, x, y, aspect) {
-    const direction = this.direction(x, y, aspect);
-    const back = this.axes[2];
-    const depth = dot(subtract(through, this.position), back) / dot(direction, back);
-    return add(this.position, scaled(direction, depth));
-  }
-
   // The direction that is upward in the picture, along a surface.
   upAlong(normal) {
     const [right, up] = this.axes;

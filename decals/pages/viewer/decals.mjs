@@ -1,10 +1,20 @@
 // Decals as a scene file has them, and the records that shaders read (Decals.packed, Decals.limits).
-import { DecalIndex } from "./index.mjs";
+import { DecalIndex, RECORD } from "./index.mjs";
+import { length } from "./vectors.mjs";
 
-const RECORD = 16; // numbers of a record
 const INTERACTIONS = { independent: 0, push: 1, contact: 1, overlap: 2 };
 
 const linear = (c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+
+// True for a decal that a scene file may have, with a frame of unit vectors.
+export function isDecal({ position, normal, tangent, radius, image = 0 }, rules, images) {
+  const { maxCoordinate, minRadius } = rules;
+  const isVector = (v) => v.length === 3 && v.every((x) => Math.abs(x) <= maxCoordinate);
+  const isUnit = (v) => isVector(v) && Math.abs(length(v) - 1) < 1e-6;
+  const isImage = Number.isInteger(image) && image >= -1 && image < images;
+  const isRadius = radius >= minRadius && radius <= maxCoordinate;
+  return isVector(position) && isUnit(normal) && isUnit(tangent) && isRadius && isImage;
+}
 
 export class DecalSet {
   constructor(rows, rules) {

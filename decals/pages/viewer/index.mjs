@@ -1,6 +1,7 @@
 // The index of decals, as decals/index/index.py describes it: a hash grid of several levels in three arrays.
 // Lists have room at their ends, so that one decal moves without the others.
 
+export const RECORD = 16; // numbers of a record
 const MIN_ROOM = 4;
 const MAX_LEVELS = 128;
 const FIRST_SIZE = 1024; // slots of an empty table
@@ -25,7 +26,7 @@ export class DecalIndex {
   }
 
   rank(number) {
-    return Math.floor(this.records[16 * number + 7]);
+    return Math.floor(this.records[RECORD * number + 7]);
   }
 
   before(a, b) {
@@ -33,7 +34,7 @@ export class DecalIndex {
   }
 
   reach(number) {
-    return this.records[16 * number + 3] * this.rules.reach;
+    return this.records[RECORD * number + 3] * this.rules.reach;
   }
 
   // The exponent of a decal's cells, as `cell_exponent` of decals/index/decal_cells.py.
@@ -44,7 +45,7 @@ export class DecalIndex {
     const joins = parity !== null && ((own % 2) + 2) % 2 !== parity ? 1 : 0;
     let farthest = 0;
     for (let axis = 0; axis < 3; axis++) {
-      farthest = Math.max(farthest, Math.abs(this.records[16 * number + axis]));
+      farthest = Math.max(farthest, Math.abs(this.records[RECORD * number + axis]));
     }
     const least = exponentAbove(farthest + reach) - finest;
     return Math.max(own - joins, least, floor ?? -Infinity);
@@ -54,7 +55,7 @@ export class DecalIndex {
   eachCell(number, exponent, call) {
     const width = 2 ** exponent;
     const reach = this.reach(number);
-    const centre = this.records.subarray(16 * number, 16 * number + 3);
+    const centre = this.records.subarray(RECORD * number, RECORD * number + 3);
     const low = [0, 1, 2].map((axis) => Math.floor((centre[axis] - reach) / width));
     const high = [0, 1, 2].map((axis) => Math.floor((centre[axis] + reach) / width));
     const outside = (axis, cell) =>

@@ -1,5 +1,5 @@
 // Triangles of the drawn objects, and the first one on a ray.
-import { add, dot, scaled, unit } from "./vectors.mjs";
+import { add, scaled, unit } from "./vectors.mjs";
 
 const CHUNK = 64; // triangles of one box
 
@@ -93,6 +93,5 @@ export function firstHit(meshes, origin, direction) {
   }
   if (!best) return null;
   const position = add(origin, scaled(direction, best.distance));
-  const normal = best.mesh.normalAt(best);
-  return { position, normal, facing: -dot(normal, direction), mesh: best.mesh };
+  return { position, normal: best.mesh.normalAt(best) };
 }

@@ -28,7 +28,7 @@ export class Painter {
   constructor(canvas, header, arrays) {
     const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
     if (!gl) throw new Error("this browser has no WebGL 2");
-    Object.assign(this, { gl, canvas, header, programs: new Map(), textures: new Map(), uploaded: 0 });
+    Object.assign(this, { gl, canvas, header, programs: new Map(), textures: new Map() });
     this.camera = gl.createBuffer();
     this.pixel = this.pixelTarget();
     this.images = this.imagesOf(header.images, arrays);
@@ -179,7 +179,6 @@ export class Painter {
     }
     const [texels, kind] = FORMATS[format].map((word) => gl[word]);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl[format], WIDTH, rows, 0, texels, kind, padded);
-    this.uploaded += padded.byteLength;
   }
 
   // Overwrite some rows of a data texture.
@@ -192,7 +191,6 @@ export class Painter {
       const width = Math.min(WIDTH - x, count - done);
       const part = data.subarray(row * (first + done), row * (first + done + width));
       gl.texSubImage2D(gl.TEXTURE_2D, 0, x, y, width, 1, texels, kind, part);
-      this.uploaded += part.byteLength;
       done += width;
     }
   }

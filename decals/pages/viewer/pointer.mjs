@@ -1,6 +1,7 @@
 // Mouse, touch and keys of a viewer.
 import { subtract, add } from "./vectors.mjs";
 
+const ZOOM = 1.1; // of the camera, at a press
 const KEYS = {
   n: (viewer) => viewer.select(1),
   p: (viewer) => viewer.select(-1),
@@ -17,16 +18,16 @@ const KEYS = {
   arrowright: (viewer) => viewer.arrow(1, 0),
   arrowup: (viewer) => viewer.arrow(0, 1),
   arrowdown: (viewer) => viewer.arrow(0, -1),
-  "+": (viewer) => resize(viewer, 1.1),
-  "=": (viewer) => resize(viewer, 1.1),
-  "-": (viewer) => resize(viewer, 1 / 1.1),
+  "+": (viewer) => grow(viewer, "larger", 1 / ZOOM),
+  "=": (viewer) => grow(viewer, "larger", 1 / ZOOM),
+  "-": (viewer) => grow(viewer, "smaller", ZOOM),
 };
 const COMMANDS = { z: "undo", y: "redo" };
 
-// Scale the selected decal, or the picture.
-function resize(viewer, factor) {
-  if (viewer.selected >= 0) return viewer.scale(factor);
-  viewer.camera.zoom(1 / factor);
+// Scale the selected decal by a command, or the distance of the camera by a factor.
+function grow(viewer, command, factor) {
+  if (viewer.selected >= 0) return viewer.run(command);
+  viewer.camera.zoom(factor);
   viewer.changed("view");
 }
 

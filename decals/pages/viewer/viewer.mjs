@@ -1,7 +1,7 @@
 // A page's viewer: the model with its decals, which are picked, dragged, turned, scaled, added and deleted.
 import { Camera } from "./camera.mjs";
 import { Controls } from "./controls.mjs";
-import { DecalSet, History } from "./decals.mjs";
+import { DecalSet, History, isDecal } from "./decals.mjs";
 import { read, written } from "./link.mjs";
 import { Mesh, firstHit } from "./meshes.mjs";
 import { toBase64, unpacked } from "./packing.mjs";
@@ -31,7 +31,7 @@ class Viewer {
     this.history = new History(this.decals, () => this.changed("decals"));
     this.camera = new Camera(header.camera, header.bounds, header.aspect);
     this.home = this.camera.pose;
-    Object.assign(this, { mode: header.mode, stiffness: header.stiffness, lit: options.lit ?? true });
+    Object.assign(this, { mode: header.mode, stiffness: header.stiffness, lit: true });
     this.pointer = new Pointer(this);
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.canvas);
@@ -52,7 +52,7 @@ class Viewer {
       this.set(state);
     }
     if (camera) this.camera.place(camera);
-    if (mode in this.header.shaders.modes) this.mode = mode;
+    if (Object.hasOwn(this.header.shaders.modes, mode ?? "")) this.mode = mode;
     if (stiffness >= 1) this.stiffness = stiffness;
     if (decals) this.edit(Object.entries(decals).map(([number, row]) => [Number(number), row]));
     if (selected !== undefined) this.selected = this.decals.rows[selected] ? selected : -1;
@@ -137,16 +137,17 @@ class Viewer {
 
   // -- edits ----------------------------------------------------------------------------------------------
 
-  // Change decals, with normals and tangents made perpendicular and of length 1.
+  // Change decals, with normals and tangents made perpendicular and of length 1; others than valid ones stay.
   edit(pairs, options) {
     const framed = (row) => {
       const normal = unit(row.normal);
       return { ...row, normal, tangent: tangential(row.tangent, normal) };
     };
-    this.history.change(
-      pairs.map(([number, row]) => [number, row && framed(row)]),
-      options,
-    );
+    const isValid = (row) => !row || isDecal(row, this.header.rules, this.header.images.count);
+    const changes = pairs
+      .map(([number, row]) => [number, row && framed(row)])
+      .filter(([, row]) => isValid(row));
+    if (changes.length) this.history.change(changes, options);
   }
 
   editSelected(change, options) {

@@ -96,7 +96,7 @@ class Browser:
                 await asyncio.sleep(seconds)
 
     async def break_off(self) -> None:
-        """End the connection without a closing message, whatever is under way."""
+        """End the connection without a closing message, also during a call."""
         self.socket._response.close()
         await self.close()
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
+from PIL import Image
 
 import decals
 from blobtree import Point
@@ -23,6 +24,7 @@ from decals.pages import contents, page, viewer_script
 from decals.pages.contents import index_rules, record_rules
 from decals.pages.packing import packed
 from decals.pages.page import MODULES
+from decals.rendering import Environment
 from decals.scenes.camera import REFERENCE_ASPECT
 from decals.scenes.scene import Scene
 from tests.decals.pages.test_viewer_index import rows_of
@@ -87,6 +89,15 @@ def test_the_scene_in_a_page_is_that_of_its_file(scene: Scene, text: str, tmp_pa
     loaded = decals.load_scene(tmp_path / "scene.json")
     assert np.array_equal(loaded.decals.packed(), scene.decals.packed())
     assert [item.name for item in loaded.objects] == [NAME]
+
+
+def test_a_page_names_no_files(scene: Scene, tmp_path: Path) -> None:
+    path = tmp_path / "of-this-machine.png"
+    Image.fromarray(np.full((4, 8, 3), 128, np.uint8)).save(path)
+    lit = scene.replace(drawing=scene.drawing.overridden(environment=Environment(str(path))))
+    data = data_of(page(lit, resolution=16).text)
+    assert b"of-this-machine" not in data
+    assert header_of(page(lit, resolution=16).text)["scene"]["drawing"]["environment"]["picture"]
 
 
 def test_what_pages_do_not_have_is_refused(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -215,6 +226,30 @@ def test_links_hold_the_state_and_refuse_nonsense() -> None:
     assert changes[3]["image"] == 2
     assert too_long is None
     assert wrong == [{"changes": []}] * len(wrong)
+
+
+@needs_node
+def test_decals_of_links_are_those_that_files_may_have() -> None:
+    """Infinite numbers would end no loop of the index, and other images do not exist."""
+    good = {"position": [1, 2, 3], "normal": [0, 0, 1], "tangent": [1, 0, 0], "radius": 0.5, "image": 1}
+    wrong = [
+        {"position": [1e300, 0, 0]},
+        {"position": [0, 0]},
+        {"normal": [0, 0, 0]},
+        {"tangent": [0, 0, 0]},
+        {"radius": 1e300},
+        {"radius": 0},
+        {"image": 2},
+        {"image": -2},
+        {"image": 0.5},
+    ]
+    script = """
+    const { isDecal } = await import("./decals.mjs");
+    console.log(JSON.stringify(data.rows.map((row) => isDecal(row, data.rules, 2))));
+    """
+    rows = [good, {**good, "image": -1}, *({**good, **change} for change in wrong)]
+    rules = record_rules([""], Form(decals.Contact.ELASTIC))
+    assert run_node(script, {"rows": rows, "rules": rules}) == [True, True, *[False] * len(wrong)]
 
 
 @needs_node
