@@ -23,7 +23,7 @@ from decals.index.lookup import HALF_RANGE, MIX_ALL, MIX_X, MIX_Y, MIX_Z, NESTIN
 from decals.model import LAYER_LIMIT, MAX_COORDINATE, MIN_RADIUS
 from decals.receivers import object_mask
 from decals.record import MIN_KEPT_RADIUS, Contact
-from decals.rendering.context import MAX_ANISOTROPY
+from decals.rendering.context import MAX_ANISOTROPY, MESA_SOFTWARE
 from decals.rendering.options import Background
 from decals.rendering.studio import studio_ambient, studio_constants
 from decals.scenes.camera import REFERENCE_ASPECT
@@ -98,6 +98,7 @@ def page_contents(
             },
             "count": len(scene.images),
             "anisotropy": MAX_ANISOTROPY,
+            "isotropic": MESA_SOFTWARE,
         },
         "shaders": _shaders(code),
         "mode": code.form.contact.name.lower(),

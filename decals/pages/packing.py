@@ -16,11 +16,18 @@ LEVEL = 9
 def packed(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str:
     """Return a header and arrays by their names as base64 of zlib.
 
-    Inside are the length of the header, the header in JSON, and the arrays. Whole numbers are written as
-    differences. The bytes of each row are then sorted by their place, so that like bytes follow each other.
+    Inside are the length of the header, the header in JSON, and the arrays. Equal arrays are written once.
+    Whole numbers are written as differences. The bytes of each row are then sorted by their place, so that
+    like bytes follow each other.
     """
-    parts, directory = [], []
+    parts: list[bytes] = []
+    directory: list[dict[str, Any]] = []
+    written: dict[tuple[str, bytes], str] = {}
     for name, array in arrays.items():
+        first = written.setdefault((array.dtype.name, array.tobytes()), name)
+        if first != name:
+            directory.append({"name": name, "like": first})
+            continue
         rows = array.reshape(len(array), -1) if array.dtype == np.uint8 else array.reshape(-1, 1)
         given = np.ascontiguousarray(rows)
         if differences := array.dtype == np.int32:

@@ -95,7 +95,8 @@ class Page(Immutable):
     def _repr_html_(self) -> str:
         title, text = html.escape(self.title), html.escape(self.text)
         style = f"width: 100%; height: {NOTEBOOK_HEIGHT}px; border: 0"
-        return f'<iframe title="{title}" style="{style}" srcdoc="{text}"></iframe>'
+        allowed = "allow-scripts allow-downloads"  # not what the notebook itself may do
+        return f'<iframe title="{title}" style="{style}" sandbox="{allowed}" srcdoc="{text}"></iframe>'
 
 
 def page(

@@ -36,6 +36,9 @@ from decals.shaders import Source, compose
 MIN_VERSION = 330
 """Version of OpenGL that is enough for everything but compute shaders; macOS ends at 410."""
 
+MESA_SOFTWARE = "llvmpipe", "softpipe"
+"""Names of Mesa's renderers that draw on the processor."""
+
 MAX_ANISOTROPY = 8.0
 """Greatest ratio of a pixel's footprint in an image at which the image is not blurred."""
 
@@ -68,7 +71,7 @@ _idle: list["Context"] = []
 
 def _is_software(gl: moderngl.Context) -> bool:
     """Return True if Mesa draws on the processor."""
-    return "llvmpipe" in gl.info["GL_RENDERER"] or "softpipe" in gl.info["GL_RENDERER"]
+    return any(name in gl.info["GL_RENDERER"] for name in MESA_SOFTWARE)
 
 
 def _anisotropy(gl: moderngl.Context) -> float:

@@ -9,7 +9,6 @@ from contextlib import asynccontextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,6 @@ from playwright.async_api import Page, async_playwright
 
 import decals
 from blobtree import Point, Segment, polygonize
-from decals.pages import contents
 from decals.rendering.lights import Lighting
 from decals.scenes.scene import Scene
 from tests.frontends.browsing import ERRORS, browser_path
@@ -80,7 +78,7 @@ async def shown(
     scene: Scene, size: tuple[int, int] = SIZE, *, software: bool = False, **options: Any
 ) -> AsyncIterator[Page]:
     """A page of a scene in a browser, which asks for nothing but its file; ``software``: by SwiftShader."""
-    with tempfile.TemporaryDirectory() as folder, patch.object(contents, "MAX_ANISOTROPY", 1.0):
+    with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.html"
         decals.save_html(scene, path, resolution=CELLS, **options)
         async with async_playwright() as player:

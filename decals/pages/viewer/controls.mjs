@@ -3,14 +3,14 @@
 const BUTTONS = [
   ["undo", "↶", "Undo (Ctrl + Z)"],
   ["redo", "↷", "Redo (Ctrl + Y)"],
-  ["add", "＋", "Add a decal in the middle of the picture (A)"],
+  ["add", "Add", "Add a decal in the middle of the picture (A)"],
   ["remove", "✕", "Delete the decal (Delete)"],
   ["left", "⟲", "Turn the decal to the left (Q)"],
   ["right", "⟳", "Turn the decal to the right (E)"],
   ["smaller", "−", "Make the decal smaller (−)"],
-  ["larger", "◯", "Make the decal larger (+)"],
+  ["larger", "+", "Make the decal larger (+)"],
   ["home", "⌂", "Show the whole model (Home)"],
-  ["link", "🔗", "Copy a link to this state (L)"],
+  ["link", "Link", "Copy a link to this state (L)"],
   ["save", "⤓", "Save as a scene file (S)"],
 ];
 

@@ -32,7 +32,11 @@ export async function unpacked(text) {
   const header = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + size)));
   const arrays = {};
   let first = 4 + size;
-  for (const { name, kind, count, width, differences } of header.arrays) {
+  for (const { name, like, kind, count, width, differences } of header.arrays) {
+    if (like !== undefined) {
+      arrays[name] = arrays[like];
+      continue;
+    }
     const array = new KINDS[kind](count);
     const target = new Uint8Array(array.buffer);
     const rows = target.length / width;

@@ -114,9 +114,12 @@ export class Painter {
   }
 
   // Make the texture arrays of decal images and their maps; return their units by name.
-  imagesOf({ textures, anisotropy }, arrays) {
+  imagesOf({ textures, anisotropy, isotropic }, arrays) {
     const { gl } = this;
-    const anisotropic = gl.getExtension("EXT_texture_filter_anisotropic");
+    const renderer = gl.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER;
+    const name = gl.getParameter(renderer);
+    const wrong = isotropic.some((part) => name.includes(part)); // see `_anisotropy` of decals/rendering/context.py
+    const anisotropic = wrong ? null : gl.getExtension("EXT_texture_filter_anisotropic");
     return Object.entries(textures).map(([name, { size, format, levels }], i) => {
       const unit = IMAGE_UNIT + i;
       const [inner, kind] = IMAGE_FORMATS[format].map((word) => gl[word]);

@@ -238,7 +238,12 @@ class Viewer {
       this.controls.say("So many decals have changed that no link can hold them: save a scene file.");
       return;
     }
-    history.replaceState(null, "", `#${link}`);
+    try {
+      history.replaceState(null, "", `#${link}`);
+    } catch {
+      this.controls.say("A page inside a notebook has no link of its own: save a scene file.");
+      return;
+    }
     const done = () =>
       this.controls.say("The link of this state is in the address bar and in the clipboard.");
     const refused = () => this.controls.say("The link of this state is in the address bar.");

@@ -155,6 +155,7 @@ def test_packed_arrays_are_unpacked() -> None:
         "halves": random.normal(size=(6, 4)).astype(np.float16),
         "none": np.zeros((0, 3), np.float32),
     }
+    arrays["again"] = arrays["faces"].copy()
     script = """
     const { unpacked } = await import("./packing.mjs");
     const { header, arrays } = await unpacked(data);
@@ -162,11 +163,19 @@ def test_packed_arrays_are_unpacked() -> None:
     const found = Object.entries(arrays).map(([name, array]) => [name, bytes(array)]);
     console.log(JSON.stringify([header.word, Object.fromEntries(found)]));
     """
-    word, found = run_node(script, packed({"word": "ß"}, arrays))
+    text = packed({"word": "ß"}, arrays)
+    word, found = run_node(script, text)
     assert word == "ß"
     assert {name: base64.b64decode(text) for name, text in found.items()} == {
         name: array.tobytes() for name, array in arrays.items()
     }
+
+
+def test_equal_arrays_are_packed_once() -> None:
+    numbers = np.random.default_rng(1).integers(0, 2**31, 20_000, dtype=np.int32)
+    once = packed({}, {"a": numbers})
+    assert len(packed({}, {"a": numbers, "b": numbers.copy()})) < len(once) + 200
+    assert len(packed({}, {"a": numbers, "b": numbers.view(np.float32)})) > 1.9 * len(once)
 
 
 @needs_node
@@ -230,9 +239,15 @@ def test_links_hold_the_state_and_refuse_nonsense() -> None:
 
 @needs_node
 def test_decals_of_links_are_those_that_files_may_have() -> None:
-    """Infinite numbers would end no loop of the index, and other images do not exist."""
-    good = {"position": [1, 2, 3], "normal": [0, 0, 1], "tangent": [1, 0, 0], "radius": 0.5, "image": 1}
-    wrong = [
+    """With infinite numbers the loops of the index would not end."""
+    good: dict[str, Any] = {
+        "position": [1, 2, 3],
+        "normal": [0, 0, 1],
+        "tangent": [1, 0, 0],
+        "radius": 0.5,
+        "image": 1,
+    }
+    wrong: list[dict[str, Any]] = [
         {"position": [1e300, 0, 0]},
         {"position": [0, 0]},
         {"normal": [0, 0, 0]},
