@@ -47,6 +47,7 @@ from blobtree.device import known_device
 from blobtree.errors import InvalidNode
 from blobtree.formulas.falloff import WYVILL
 from blobtree.formulas.fields import FieldKind
+from blobtree.formulas.operators import SUM
 from blobtree.formulas.skeletons import Skeleton
 from blobtree.tape.bounds import warp_parameters
 from blobtree.tape.codes import (
@@ -103,7 +104,7 @@ class Tape:
     registers, warp_registers
         Numbers of registers that an evaluation needs.
     skeletons, operators, warps
-        Codes of the kinds in use, to which shaders are specialised.
+        Codes of the kinds in use, here or in its pruned tapes, to which shaders are specialised.
     stretched
         True if a primitive around a skeleton carries its own map.
     falloffs
@@ -169,7 +170,10 @@ def compile_tape(program: list[Instruction], precision: Precision = np.float32) 
     rows: set[Row] = {run.kind for run in runs}
     rows |= {WYVILL for kind in rows if isinstance(kind, FieldKind)}  # formulas of direct fields name one
     rows |= {step.warp for step in program if isinstance(step, EnterWarp)}
-    rows |= {step.operator for step in program if isinstance(step, Run | Pop)}
+    operators = {step.operator for step in program if isinstance(step, Run | Pop)}
+    rows |= operators
+    if not all(operator.starts_from_zero for operator in operators):
+        rows.add(SUM)  # a pruned tape may begin with any operand, see `prune_kernels.first_operator`
     carrying = [placed.primitive for run in runs if run.stretched for placed in run.primitives]
     rows |= {primitive.profile[0] for primitive in carrying if primitive.profiled}
     instruction_set = instruction_set_for(rows)

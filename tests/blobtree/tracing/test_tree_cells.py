@@ -7,15 +7,17 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_cdt
 
-from blobtree import ISO, Node, Point
+from blobtree import ISO, Box, Node, Point
 from blobtree._typing import Int32Array
 from blobtree.cells.refine_kernels import SURELY_INSIDE
 from blobtree.sized_cache import SizedCache
+from blobtree.tape.codes import PUSH, STRETCHED, UNWARP, WARP
 from blobtree.tape.model import values_at
 from blobtree.tape.tape import Tape
 from blobtree.tracing import tree_cells
 from blobtree.tracing.ray_kernels import EMPTY
 from blobtree.tracing.tree_cells import BLOCKS_ALONG, MAX_LAYERS, TracingCells, device_cells, tracing_cells
+from tests.blobtree.tape.test_tape import instructions
 from tests.blobtree.trees import random_trees
 from tests.oracles import blobtree as oracle
 
@@ -59,6 +61,23 @@ def test_the_table_matches_the_field(name: str | int) -> None:
         here = known == texel
         seen = values_at(pruned(cells, texel, tree.tape), points[here])
         np.testing.assert_allclose(seen, value[here], atol=2e-5 * max(1.0, value.max()))
+
+
+LIMITED = (Point((-1, 0, 0), radius=0.8) | Point((1, 0, 0), radius=0.8)) & Box(
+    (0, 0, 0), (2, 1, 1), radius=0.1
+)
+
+
+@pytest.mark.parametrize("tree", [LIMITED, *random_trees(seed=52, count=12)], ids=["limited", *range(12)])
+def test_pruned_tapes_hold_no_other_kinds_than_the_whole_one(tree: Node) -> None:
+    """Shaders know the kinds of the whole tape alone."""
+    whole, cells = tree.tape, tracing_cells(tree, device="cpu")
+    for texel in np.unique(cells.blocks[cells.blocks >= 0]):
+        part = instructions(pruned(cells, texel, whole))
+        assert {code % STRETCHED for code, *_ in part if code >= 0} <= set(whole.skeletons)
+        assert {kind for code, kind, *_ in part if code not in (PUSH, WARP, UNWARP)} <= set(whole.operators)
+        assert {kind for code, kind, *_ in part if code == WARP} <= set(whole.warps)
+        assert max([count for code, _, count, _ in part if code == PUSH], default=-1) < whole.registers
 
 
 @NAMES

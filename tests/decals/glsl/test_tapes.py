@@ -198,6 +198,8 @@ MODELS = {
     "a superquadric": Superquadric((0, 0, 0), (1, 0.6, 0.8), 0.4, 0.6).rotate((1, 2, 3), 30)
     + Point((1, 0, 0), radius=0.5),
     "one point": Point((0, 0, 0), radius=1.0),
+    "balls in a box": (Point((-0.6, 0, 0), radius=1.0) | Point((0.6, 0, 0), radius=1.0))
+    & Box((0, 0, 0), (2, 1, 1), radius=0.1),
     "one segment": Segment((0, 0, 0), (1, 1, 0), radius=0.4),
     "a tiny model": (Point((0, 0, 0), radius=1.0) - Point((0.5, 0, 1), radius=0.7)).scale(1e-4),
     "a twist in a twist": Segment((0.3, 0, -0.5), (0.3, 0, 0.5), radius=0.3)
