@@ -21,7 +21,7 @@ CENTRE = (0, -1.4, 0)
 
 @pytest.mark.parametrize("contact", list(Contact))
 @pytest.mark.parametrize("order", ["falling", "rising", "shuffled"])
-@pytest.mark.parametrize("count", [64, pytest.param(500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [64, pytest.param(200, marks=pytest.mark.slow)])
 def test_stacks(renderer: Renderer, count: int, order: str, contact: Contact) -> None:
     """Radial contact shows the smallest over the others; the other modes one of highest field."""
     rng = np.random.default_rng(count)

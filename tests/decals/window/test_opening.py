@@ -96,7 +96,7 @@ print(grown * chunks / rounds, marks[-1] - marks[0])
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="memory is read from /proc")  # noqa: PTH110
 @pytest.mark.parametrize(
     ("warm", "rounds"),
-    [pytest.param(3, 10, marks=pytest.mark.slow), pytest.param(20, 200, marks=pytest.mark.slow)],
+    [pytest.param(3, 10, marks=pytest.mark.slow), pytest.param(20, 75, marks=pytest.mark.slow)],
 )
 def test_opening_and_closing_keeps_no_memory(warm: Any, rounds: Any) -> None:
     """In a process of its own: megabytes kept by each window, and by all.
