@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from blobtree._typing import Float32Array, Float64Array
 from decals.baking.materials import surface_values
 from decals.baking.meshes import BakeMesh
-from decals.field.evaluate import Samples, evaluate
+from decals.field.evaluate import ColorEvaluator, Samples, evaluate
 from decals.field.jacobian import normal_derivatives_of_triangles, stretch_of
 from decals.field.walks import walks_for
 from decals.images.texels import decode_srgb
@@ -53,6 +53,7 @@ class SurfaceColors:
         self._materials = list(images)
         self._images = [DecalImage(f"image {i}", image.pixels) for i, image in enumerate(images)]
         self._options = evaluation_options(drawing, decals, objects)
+        self._evaluator = ColorEvaluator(decals, self._images, **self._options)
 
     def at_vertices(self, number: int, rows: slice = slice(None)) -> Float64Array:
         """Return linear colours of vertices of mesh ``number``, ``float64[n, 3]``."""
@@ -76,21 +77,15 @@ class SurfaceColors:
         if base is None:
             srgb = np.asarray(self._meshes[number].base_colors(points), np.float64)
             base = decode_srgb(srgb).astype(np.float64, copy=False)
+        item = self._objects[number]
+        if tangents is None:
+            return _over(self._evaluator.at(points, normals, on=item), base)
         samples = evaluate(
-            self._decals,
-            points,
-            normals,
-            images=self._images if tangents is None else self._materials,
-            materials=tangents is not None,
-            on=self._objects[number],
-            **self._options,
+            self._decals, points, normals, images=self._materials, materials=True, on=item, **self._options
         )
-        over = samples.color
-        assert over is not None  # there are images, if only an empty list of them
-        colors: Float64Array = base * (1.0 - over[:, 3:]) + over[:, :3]
-        if tangents is None or samples.materials is None:
-            return colors
-        return surface_values(colors, samples.materials, normals, tangents)
+        assert samples.color is not None  # there are images
+        assert samples.materials is not None  # there are tangents for materials alone
+        return surface_values(_over(samples.color, base), samples.materials, normals, tangents)
 
     def attributes_at_vertices(self, number: int, names: Collection[str]) -> dict[str, NDArray[Any]]:
         """Return some of `ATTRIBUTES` at the vertices of mesh ``number``."""
@@ -111,6 +106,12 @@ class SurfaceColors:
             for name, column in columns.items():
                 column.append(ATTRIBUTES[name](samples))
         return {name: np.concatenate(column) for name, column in columns.items()}
+
+
+def _over(decals: Float32Array, base: Float64Array) -> Float64Array:
+    """Return base colours under premultiplied colours of decals."""
+    colors: Float64Array = base * (1.0 - decals[:, 3:]) + decals[:, :3]
+    return colors
 
 
 def _stretch(samples: Samples) -> Float32Array:

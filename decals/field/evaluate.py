@@ -9,8 +9,7 @@ import warp as wp
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
-from blobtree.device import known_device
-from blobtree.kernels import loaded
+from blobtree.device import known_device, launch
 from blobtree.validation import real, truth
 from decals.errors import InvalidDecals, InvalidImage, InvalidPoints, InvalidScene
 from decals.field.jacobian import image_jacobians
@@ -225,17 +224,14 @@ def evaluate(
             raise InvalidPoints(
                 f"normal_derivatives: expected one for each of {count} points, got {len(turns)}"
             )
-    indexed = _indexed(decals, index, device)
-    indexed.stiffness, indexed.mapping = stiffness, int(mapping)
+    indexed = _indexed(decals, index, mapping, stiffness, walks, device)
     _limit(indexed, decals, on, device)
-    if mapping is ImageMapping.WALKED:
-        indexed.walked, indexed.walks = True, _walk_texels(walks, len(indexed.records) // RECORD, device)
     query = _Query(decals, indexed, positions, facings, contact, device)
     color = height = maps = None
     if images is not None:
         listed = each_image(images)
         pixels = [image_pixels(image, name=f"image {number}") for number, image in enumerate(listed)]
-        color = query.colors(_laid_out([linear_premultiplied(image) for image in pixels]))
+        color = query.colors([linear_premultiplied(image) for image in pixels])
         reliefs = [image.relief_texels() if hasattr(image, "relief_texels") else None for image in listed]
         if any(relief is not None for relief in reliefs):
             height = query.heights(reliefs, pixels)
@@ -244,6 +240,47 @@ def evaluate(
     derivative = query.jacobians(turns) if jacobian else None
     near = query.neighbors() if neighbors else None
     return Samples(query.owners, query.uv, query.fields, color, derivative, near, height, maps)
+
+
+class ColorEvaluator:
+    """Colours of the same decals at many sets of points: those of `evaluate`, without its other answers.
+
+    Parameters
+    ----------
+    decals, images, mapping, contact, stiffness, index, walks, device
+        See `evaluate`.
+    """
+
+    def __init__(
+        self,
+        decals: Decals | DecalEditor,
+        images: Iterable[AnyImage],
+        *,
+        mapping: ImageMapping = ImageMapping.CORRECTED,
+        contact: AnyContact = DEFAULT_CONTACT,
+        stiffness: float = DEFAULT_STIFFNESS,
+        index: DecalIndex | None = None,
+        walks: Walks | None = None,
+        device: Any = None,
+    ) -> None:
+        self._decals, self._contact, self._device = decals, contact, known_device(device)
+        self._indexed = _indexed(decals, index, mapping, stiffness, walks, self._device)
+        pixels = [image_pixels(image, name=f"image {number}") for number, image in enumerate(images)]
+        layers = [linear_premultiplied(image) for image in pixels]
+        self._images = _image_arrays(decals, layers, self._device)
+        self._nothing = _zeros(self._device, 0, wp.int32, wp.vec2)
+
+    def at(
+        self, points: Float32Array, normals: Float32Array, on: object | str | Iterable[str] | None = None
+    ) -> Float32Array:
+        """Return colours ``float32[m, 4]``, linear and premultiplied; arguments are those of `evaluate`."""
+        _limit(self._indexed, self._decals, on, self._device)
+        rows: list[Any] = [wp.array(of, dtype=wp.vec3, device=self._device) for of in (points, normals)]
+        inputs = [*rows, int(self._contact), self._indexed, *self._nothing, *self._images]
+        (colors,) = _zeros(self._device, len(points), wp.vec4)
+        launch(_with_law(color_points, self._contact), len(points), inputs, [colors], self._device)
+        result: Float32Array = colors.numpy()
+        return result
 
 
 class _Query:
@@ -265,28 +302,23 @@ class _Query:
         device: Any,
     ) -> None:
         self._decals, self._indexed, self._contact, self._device = decals, indexed, contact, device
-        self._rows = decals.decals if isinstance(decals, DecalEditor) else decals
+        self._rows = _rows_of(decals)
         self._points, self._normals = points, normals
         self._inputs = self._inputs_at(points, normals)
-        outputs = self._sample(self._kernel(sample_points), self._inputs)
-        self._owner: Any = outputs[0]
+        outputs = self._sample(self._inputs)
+        self._shown: list[Any] = outputs[:2]
         self.owners, self.uv, self.fields = (array.numpy() for array in outputs)
-
-    def _kernel(self, kernel: Any) -> Any:
-        """Return a kernel for a contact mode, or with the formulas of a contact law."""
-        law = self._contact if isinstance(self._contact, ContactLaw) else None
-        return loaded(kernel if law is None else law.formulas.kernel(kernel), self._device)
 
     def _inputs_at(self, points: Float32Array, normals: Float32Array) -> list[Any]:
         arrays: list[Any] = [wp.array(rows, dtype=wp.vec3, device=self._device) for rows in (points, normals)]
         return [*arrays, int(self._contact), self._indexed]
 
-    def _zeros(self, *kinds: Any, count: int) -> list[Any]:
-        return [wp.zeros(count, dtype=kind, device=self._device) for kind in kinds]
+    def _launch(self, kernel: Any, inputs: list[Any], outputs: list[Any]) -> None:
+        launch(_with_law(kernel, self._contact), len(inputs[0]), inputs, outputs, self._device)
 
-    def _sample(self, kernel: Any, inputs: list[Any]) -> list[Any]:
-        outputs = self._zeros(wp.int32, wp.vec2, wp.float32, count=len(inputs[0]))
-        wp.launch(kernel, len(inputs[0]), inputs, outputs, device=self._device)
+    def _sample(self, inputs: list[Any]) -> list[Any]:
+        outputs = _zeros(self._device, len(inputs[0]), wp.int32, wp.vec2, wp.float32)
+        self._launch(sample_points, inputs, outputs)
         return outputs
 
     def jacobians(self, normal_derivatives: Float64Array | None) -> Float64Array:
@@ -295,10 +327,9 @@ class _Query:
         radii = np.ones(len(self._points))
         owned = self.owners >= 0
         radii[owned] = RIM_RADIUS * spheres[self.owners[owned]]
-        kernel = self._kernel(sample_points)
 
         def sampled(points: Float32Array, normals: Float32Array) -> tuple[Int32Array, Float32Array]:
-            owner, uv, _ = self._sample(kernel, self._inputs_at(points, normals))
+            owner, uv, _ = self._sample(self._inputs_at(points, normals))
             return owner.numpy(), uv.numpy()
 
         center = self.owners, self.uv
@@ -316,36 +347,26 @@ class _Query:
         if wide.limited:
             wide.limits = wp.array(rows.limits_of(decals.receiver_table), dtype=wp.vec4, device=device)
         kept = np.searchsorted(known, self.owners).astype(np.int32)
-        empty = self._zeros(wp.int32, wp.float32, count=0)
-        (counts,) = self._zeros(wp.int32, count=count)
+        empty = _zeros(device, 0, wp.int32, wp.float32)
+        (counts,) = _zeros(device, count, wp.int32)
         placed: Any = wp.array(np.where(self.owners >= 0, kept, self.owners), dtype=wp.int32, device=device)
         given = [*self._inputs[:-1], wide, placed]
-        kernel = self._kernel(list_neighbors)
-        wp.launch(kernel, count, [*given, empty[0]], [counts, empty[0], empty[1], empty[1]], device=device)
+        self._launch(list_neighbors, [*given, empty[0]], [counts, empty[0], empty[1], empty[1]])
         offsets = np.concatenate([[0], np.cumsum(counts.numpy(), dtype=np.int64)])
         starts: Any = wp.array(offsets[:-1], dtype=wp.int32, device=device)
         total = int(offsets[-1])
-        lists = self._zeros(wp.int32, wp.float32, wp.float32, count=total)
-        wp.launch(kernel, count if total else 0, [*given, starts], [counts, *lists], device=device)
+        lists = _zeros(device, total, wp.int32, wp.float32, wp.float32)
+        if total:
+            self._launch(list_neighbors, [*given, starts], [counts, *lists])
         found, fields, pushes = (values.numpy() for values in lists)
         order = np.lexsort((found, np.repeat(np.arange(count), np.diff(offsets))))
         return Neighbors(offsets, known[found[order]].astype(np.int32), fields[order], pushes[order])
 
-    def colors(self, images: tuple[Int32Array, Float32Array]) -> Float32Array:
-        """Return the colours of images by their extents and texels, over each other."""
-        min_count = int(self._rows.images.max(initial=NO_IMAGE)) + 1
-        extents, texels = images
-        if len(extents) < min_count:
-            raise InvalidImage(
-                f"images: expected {min_count} or more, got {len(extents)}; decals refer to them by number"
-            )
-        (colors,) = self._zeros(wp.vec4, count=len(self._points))
-        arrays: list[Any] = [
-            wp.array(extents, dtype=wp.vec3i, device=self._device),
-            wp.array(texels, dtype=wp.vec4, device=self._device),
-        ]
-        inputs = [*self._inputs, self._owner, *arrays]
-        wp.launch(self._kernel(color_points), len(colors), inputs, [colors], device=self._device)
+    def colors(self, layers: Sequence[Float32Array]) -> Float32Array:
+        """Return the colours of images, linear and premultiplied, over each other."""
+        (colors,) = _zeros(self._device, len(self._points), wp.vec4)
+        images = _image_arrays(self._decals, layers, self._device)
+        self._launch(color_points, [*self._inputs, *self._shown, *images], [colors])
         result: Float32Array = colors.numpy()
         return result
 
@@ -399,28 +420,69 @@ class _Query:
         tinted[3::RECORD, :3] = np.where(tinted[2::RECORD, 3:] >= 0.0, tints, 0.0)
         self._indexed.records = wp.array(tinted, dtype=wp.vec4, device=self._device)
         try:
-            return self.colors(_laid_out(layers))
+            return self.colors(layers)
         finally:
             self._indexed.records = records
 
 
-def _laid_out(layers: Sequence[Float32Array]) -> tuple[Int32Array, Float32Array]:
-    """Return images ``float32[h, w, 4]`` in one array of texels, row after row, the upper row first.
+def _with_law(kernel: Any, contact: AnyContact) -> Any:
+    """Return a kernel for a contact mode, or with the formulas of a contact law."""
+    return contact.formulas.kernel(kernel) if isinstance(contact, ContactLaw) else kernel
+
+
+def _zeros(device: Any, count: int, *kinds: Any) -> list[Any]:
+    return [wp.zeros(count, dtype=kind, device=device) for kind in kinds]
+
+
+def _rows_of(decals: Decals | DecalEditor) -> Decals:
+    return decals.decals if isinstance(decals, DecalEditor) else decals
+
+
+def _image_arrays(
+    decals: Decals | DecalEditor, layers: Sequence[Float32Array], device: Any
+) -> tuple[Any, Any]:
+    """Return images ``float32[h, w, 4]`` of decals on a device, row after row, the upper row first.
 
     Returns
     -------
-    extents : int32[k, 3]
+    extents : vec3i[k]
         First texel, width and height of each image.
-    texels : float32[t, 4]
+    texels : vec4[t]
     """
+    min_count = int(_rows_of(decals).images.max(initial=NO_IMAGE)) + 1
+    if len(layers) < min_count:
+        raise InvalidImage(
+            f"images: expected {min_count} or more, got {len(layers)}; decals refer to them by number"
+        )
     sizes = np.array([(layer.shape[1], layer.shape[0]) for layer in layers], np.int32).reshape(-1, 2)
     counts = sizes.prod(axis=1)
+    extents = np.column_stack([np.cumsum(counts) - counts, sizes]).astype(np.int32)
     texels = np.concatenate([np.zeros((0, 4), np.float32), *(layer.reshape(-1, 4) for layer in layers)])
-    return np.column_stack([np.cumsum(counts) - counts, sizes]).astype(np.int32), texels
+    arrays: list[Any] = [
+        wp.array(values, dtype=kind, device=device)
+        for values, kind in ((extents, wp.vec3i), (texels, wp.vec4))
+    ]
+    return arrays[0], arrays[1]
 
 
-def _indexed(decals: Decals | DecalEditor, index: DecalIndex | None, device: Any) -> Any:
-    """Return decals with their index on a device, an `IndexedDecals`."""
+def _indexed(
+    decals: Decals | DecalEditor,
+    index: DecalIndex | None,
+    mapping: ImageMapping,
+    stiffness: float,
+    walks: Walks | None,
+    device: Any,
+) -> Any:
+    """Return decals with their index and their modes on a device, an `IndexedDecals`."""
+    indexed = _bare_indexed(decals, index, device)
+    indexed.stiffness, indexed.mapping = stiffness, int(mapping)
+    if mapping is ImageMapping.WALKED:
+        indexed.walked, indexed.walks = True, _walk_texels(walks, len(indexed.records) // RECORD, device)
+    return indexed
+
+
+def _bare_indexed(decals: Decals | DecalEditor, index: DecalIndex | None, device: Any) -> Any:
+    """Return decals with their index on a device, in the default modes."""
     if isinstance(decals, DecalEditor):
         records = decals.arrays[RECORDS]
         return decals.index.on(device, records=records, layered=decals.layered, copy=False)

@@ -74,6 +74,7 @@ def push_at(
 
 @wp.kernel
 def list_neighbors(
+    first: wp.int32,
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     contact: wp.int32,
@@ -86,7 +87,7 @@ def list_neighbors(
     pushes: wp.array(dtype=wp.float32),
 ):
     """Count the decals with a field at each point; with offsets, also write them, their fields and pushes."""
-    i = wp.tid()
+    i = first + wp.tid()
     q = points[i]
     n_q = wp.normalize(normals[i])
     count = wp.int32(0)

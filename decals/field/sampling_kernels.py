@@ -74,6 +74,7 @@ def image_point(
 
 @wp.kernel
 def sample_points(
+    first: wp.int32,
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     contact: wp.int32,
@@ -83,7 +84,7 @@ def sample_points(
     fields: wp.array(dtype=wp.float32),
 ):
     """Write the topmost decal at each point, its image coordinates and field; no owner leaves zeros."""
-    i = wp.tid()
+    i = first + wp.tid()
     n_q = wp.normalize(normals[i])
     owner = owner_at(points[i], n_q, contact, index)
     owners[i] = owner
@@ -95,27 +96,42 @@ def sample_points(
 
 @wp.kernel
 def color_points(
+    first: wp.int32,
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
     contact: wp.int32,
     index: IndexedDecals,
     owners: wp.array(dtype=wp.int32),
+    uv: wp.array(dtype=wp.vec2),
     extents: wp.array(dtype=wp.vec3i),
     texels: wp.array(dtype=wp.vec4),
     colors: wp.array(dtype=wp.vec4),
 ):
-    """Write the colour of all decals at each point, from the topmost (owners) down; premultiplied linear."""
-    i = wp.tid()
+    """Write the colour of all decals at each point, from the topmost down; premultiplied linear.
+
+    The topmost ones and their image coordinates are those of `sample_points`, or found if there are none.
+    """
+    i = first + wp.tid()
     q = points[i]
     n_q = wp.normalize(normals[i])
-    owner = owners[i]
+    known = owners.shape[0] > 0
+    owner = wp.int32(NO_OWNER)
+    if known:
+        owner = owners[i]
+    if not known:
+        owner = owner_at(q, n_q, contact, index)
     color = wp.vec4(0.0, 0.0, 0.0, 0.0)
     while owner != NO_OWNER and color[3] < OPAQUE_ALPHA:
-        image = image_point(q, n_q, owner, contact, index)
-        uv = wp.vec2(image[0], image[1])
-        color += (1.0 - color[3]) * decal_color(q, n_q, owner, uv, index, extents, texels)
+        place = wp.vec2(0.0, 0.0)
+        if known:
+            place = uv[i]
+        else:
+            image = image_point(q, n_q, owner, contact, index)
+            place = wp.vec2(image[0], image[1])
+        color += (1.0 - color[3]) * decal_color(q, n_q, owner, place, index, extents, texels)
         if not index.layered:
             break
+        known = False
         rank = rank_of(owner, index.records)
         number = next_number_below(owner, index.records)
         owner = owner_below(q, n_q, rank, number, contact, index)
