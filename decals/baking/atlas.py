@@ -5,17 +5,16 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blobtree._typing import Float32Array, Int32Array, Int64Array
 from blobtree.progress import Progress
 from decals.baking.atlas_child import Arrays, atlas, packed, unpacked
 from decals.baking.meshes import BakeMesh
+from decals.baking.unwrapped import Unwrapped
 from decals.errors import InvalidMesh
 from decals.surfaces.vtk_process import can_isolate
 from decals.validation import optional_package
@@ -34,25 +33,6 @@ MAX_CHART_FACES = 300.0
 
 EXPECTED_USE = 0.6
 """Part of the texture that charts are expected to cover, for the first estimate of their scale."""
-
-
-@dataclass(frozen=True, eq=False)
-class Unwrapped:
-    """A mesh on a texture; a vertex on the border of charts has a copy for each chart.
-
-    Attributes
-    ----------
-    rows : int64[k]
-        Vertex of the mesh from which each vertex was copied.
-    faces : int32[m, 3]
-        Corner indices of the faces, in the order of the mesh.
-    places : float32[k, 2]
-        Positions on the texture in texels: x to the right, y down from the upper left corner.
-    """
-
-    rows: Int64Array
-    faces: Int32Array
-    places: Float32Array
 
 
 def unwrap(meshes: Sequence[BakeMesh], size: int, report: Progress) -> list[Unwrapped]:
@@ -83,7 +63,10 @@ def unwrap(meshes: Sequence[BakeMesh], size: int, report: Progress) -> list[Unwr
     unwrapped = []
     for rows, faces, uv in zip(parts[0::3], parts[1::3], parts[2::3], strict=True):
         places = uv * page * (size / page.max())
-        unwrapped.append(Unwrapped(rows.astype(np.int64), faces.astype(np.int32), places.astype(np.float32)))
+        tiles = np.zeros(len(faces), np.int32)
+        unwrapped.append(
+            Unwrapped(rows.astype(np.int64), faces.astype(np.int32), places.astype(np.float32), tiles)
+        )
     return unwrapped
 
 

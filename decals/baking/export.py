@@ -14,14 +14,15 @@ from blobtree.errors import InvalidResolution
 from blobtree.files import write_together
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.validation import truth
-from decals.baking.atlas import Unwrapped, unwrap
+from decals.baking.atlas import unwrap
 from decals.baking.formats import FORMATS
 from decals.baking.instances import Instances, decal_instances
 from decals.baking.materials import CHANNELS, Maps, material_bytes, split_maps, vertex_tangents
 from decals.baking.meshes import BakeMesh, bake_mesh
 from decals.baking.parts import METRES, UP, Baked, Part
 from decals.baking.surface_colors import ATTRIBUTES, BLOCK, SurfaceColors
-from decals.baking.texture import bake_texture
+from decals.baking.texture import Channels, bake_texture
+from decals.baking.unwrapped import Unwrapped
 from decals.errors import InvalidScene
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
@@ -307,12 +308,11 @@ class _Work:
         unwrapped = unwrap(self._meshes, size, self._report)
         self._rows = [part.rows for part in unwrapped]
         pairs = list(zip(self._meshes, unwrapped, strict=True))
-        options: dict[str, Any] = {}
+        channels = Channels(self._colors.at)
         if self._colors.has_materials:  # maps are of the rest pose
             resting = [vertex_tangents(mesh.places, mesh.facings, part) for mesh, part in pairs]
-            options = {"channels": CHANNELS, "encode": material_bytes, "tangents": resting}
-        color_at = self._colors.at
-        texels = bake_texture(self._meshes, unwrapped, size, samples, color_at, self._report, **options)
+            channels = Channels(self._colors.at, CHANNELS, material_bytes, resting)
+        texels = bake_texture(self._meshes, unwrapped, size, samples, channels, self._report)[0]
         parts = [_textured_part(mesh, part, size, self._colors.has_materials) for mesh, part in pairs]
         return parts, split_maps(texels)
 
@@ -335,7 +335,7 @@ class _Work:
         for first in range(0, count, BLOCK):
             self._report("colouring vertices", (number + first / count) / len(self._meshes))
             parts.append(self._colors.at_vertices(number, slice(first, first + BLOCK)))
-        linear: Float64Array = np.clip(np.concatenate(parts), 0.0, 1.0)
+        linear: Float64Array = np.clip(np.concatenate(parts).astype(np.float64), 0.0, 1.0)
         return linear
 
     def with_attributes(self, number: int, part: Part, names: Collection[str]) -> Part:

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from blobtree._typing import Float32Array, Float64Array, UInt8Array
-from decals.baking.atlas import Unwrapped
+from blobtree._typing import Float32Array, UInt8Array
+from decals.baking.unwrapped import Unwrapped
 from decals.field.evaluate import MaterialSamples
 from decals.images.texels import encode_srgb
 
@@ -68,9 +68,9 @@ def vertex_tangents(vertices: Float32Array, unit: Float32Array, part: Unwrapped)
 
 
 def surface_values(
-    colors: Float64Array, samples: MaterialSamples, normals: Float32Array, tangents: Float32Array
-) -> Float64Array:
-    """Return what a texel averages, ``float64[n, 12]``, from base colours and the maps there."""
+    colors: Float32Array, samples: MaterialSamples, normals: Float32Array, tangents: Float32Array
+) -> Float32Array:
+    """Return what a texel averages, ``float32[n, 12]``, from base colours and the maps there."""
     bare = 1.0 - samples.part.astype(np.float64)
     bent = samples.normal + bare[:, None] * normals
     axis = tangents[:, :3] - (tangents[:, :3] * normals).sum(axis=1, keepdims=True) * normals
@@ -80,10 +80,10 @@ def surface_values(
     surface = np.column_stack(
         [samples.occlusion + bare, samples.roughness + bare * ROUGHNESS, samples.metallic]
     )
-    return np.concatenate([colors, local, surface, samples.emission], axis=1)
+    return np.concatenate([colors, local, surface, samples.emission], axis=1).astype(np.float32)
 
 
-def material_bytes(values: Float64Array) -> UInt8Array:
+def material_bytes(values: Float32Array) -> UInt8Array:
     """Return the texels of all maps, ``uint8[n, 12]``, from means of `surface_values`."""
     normals = values[:, 3:6] / np.maximum(np.linalg.norm(values[:, 3:6], axis=1, keepdims=True), 1e-30)
     levels = [

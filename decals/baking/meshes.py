@@ -6,12 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from blobtree import Node
-from blobtree._typing import Float32Array, Float64Array, Int32Array
+from blobtree._typing import Float32Array, Int32Array
 from blobtree.lazy import Lazy
 from blobtree.meshing.creases import split_creases
 from blobtree.meshing.polygonize import polygonize
+from blobtree.nodes.numeric_parameters import nodes_with_paths
+from blobtree.nodes.primitives import Leaf
 from blobtree.progress import Progress
 from decals.errors import InvalidMesh, InvalidScene
+from decals.images.texels import decode_srgb
 from decals.rendering.mesh import split_mesh
 from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.pose import PosedMesh
@@ -20,6 +23,9 @@ from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.normals import SplitMesh, split_at_colors, vertex_normals
 from decals.surfaces.windings import MeshOrientation
 from decals.validation import describe
+
+BaseColors = Color | Callable[[Float32Array], Float32Array]
+"""One sRGB colour of a surface, or a function from its points to their colours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +42,8 @@ class BakeMesh:
         Corner indices, counter-clockwise seen from outside.
     normals : float32[n, 3]
         Unit normals, those with which the renderer draws the object.
-    base_colors : callable
-        Function from points ``float32[k, 3]`` to sRGB colours without decals, ``float32[k, 3]``.
+    base_colors : Color or callable
+        The sRGB colour without decals, or a function from points ``float32[k, 3]`` to ``float32[k, 3]``.
     base : BaseColor, optional
         Base colour whose rows are the vertices, in place of that function.
     places, facings : float32[n, 3]
@@ -48,15 +54,25 @@ class BakeMesh:
     vertices: Float32Array
     faces: Int32Array
     normals: Float32Array
-    base_colors: Callable[[Float32Array], Float32Array]
+    base_colors: BaseColors
     places: Float32Array
     facings: Float32Array
     base: BaseColor | None = None
 
     @Lazy
-    def vertex_light(self) -> Float64Array | None:
-        """Return the linear base colour of each vertex; None if a function has them."""
-        return None if self.base is None else self.base.at_vertices(self.faces, len(self.vertices))
+    def vertex_light(self) -> Float32Array:
+        """Return the linear base colour of each vertex, ``float32[n, 3]``."""
+        if self.base is None:
+            return np.broadcast_to(self.base_light(self.places), self.vertices.shape)
+        return self.base.at_vertices(self.faces, len(self.vertices)).astype(np.float32)
+
+    def base_light(self, points: Float32Array) -> Float32Array:
+        """Return the linear colours without decals at points, ``float32[k, 3]``, or one row if all are equal.
+
+        Those of a `base` depend on faces.
+        """
+        colors = self.base_colors(points) if callable(self.base_colors) else [self.base_colors]
+        return decode_srgb(np.asarray(colors, np.float64)).astype(np.float32)
 
 
 def bake_mesh(item: object, *, resolution: int | None, creases: bool, report: Progress) -> BakeMesh:
@@ -76,12 +92,12 @@ def bake_mesh(item: object, *, resolution: int | None, creases: bool, report: Pr
     if isinstance(item, MeshObject):
         split = split_mesh(item)
         surface = MeshSurface(item.vertices[split.rows], split.faces, orientation=MeshOrientation.KEEP)
-        return _used_parts(item.name, surface, split.normals, _constant(item.color), split.color)
+        return _used_parts(item.name, surface, split.normals, _plain(item.color), split.color)
     if isinstance(item, TreeObject):
         return _tree_mesh(item.name, item.tree, resolution, creases, report)
     if isinstance(item, PosedMesh):
         normals, facings = (vertex_normals(at, item.faces) for at in (item.vertices, item.rest.vertices))
-        colors = _constant(item.rest.color) if item.colors is None else _nearest(item)
+        colors = _plain(item.rest.color) if item.colors is None else _nearest(item)
         split = SplitMesh(np.arange(len(item.vertices)), item.faces, normals)
         if isinstance(item.color, BaseColor):
             split = split_at_colors(split, item.color)
@@ -105,7 +121,7 @@ def _tree_mesh(name: str, tree: Node, resolution: int | None, creases: bool, rep
         name,
         MeshSurface(shown.vertices, shown.faces, orientation=MeshOrientation.KEEP),
         shown.normals,
-        tree.colors,
+        _tree_colors(tree),
     )
 
 
@@ -113,7 +129,7 @@ def _used_parts(
     name: str,
     surface: MeshSurface,
     normals: Float32Array,
-    base_colors: Callable[[Float32Array], Float32Array],
+    base_colors: BaseColors,
     base: BaseColor | None = None,
 ) -> BakeMesh:
     """Return the faces with area, and the vertices that they use."""
@@ -125,10 +141,15 @@ def _used_parts(
     return BakeMesh(name, vertices, corners, facings, base_colors, vertices, facings, base)
 
 
-def _constant(color: Color | BaseColor) -> Callable[[Float32Array], Float32Array]:
-    """Return a function that gives every point the same colour; white where a base colour has them."""
-    shade = WHITE if isinstance(color, BaseColor) else color
-    return lambda points: np.broadcast_to(np.asarray(shade, np.float32), points.shape)
+def _plain(color: Color | BaseColor) -> Color:
+    """Return a colour; white where a base colour has them."""
+    return WHITE if isinstance(color, BaseColor) else color
+
+
+def _tree_colors(tree: Node) -> BaseColors:
+    """Return the colour of a tree whose primitives have one, else its function."""
+    colors = {node.color for _, node in nodes_with_paths(tree) if isinstance(node, Leaf)}
+    return tree.colors if len(colors) != 1 else colors.pop()
 
 
 def _nearest(item: PosedMesh) -> Callable[[Float32Array], Float32Array]:

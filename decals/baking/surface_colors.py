@@ -12,7 +12,6 @@ from decals.baking.meshes import BakeMesh
 from decals.field.evaluate import ColorEvaluator, Samples, evaluate
 from decals.field.jacobian import normal_derivatives_of_triangles, stretch_of
 from decals.field.walks import walks_for
-from decals.images.texels import decode_srgb
 from decals.index.editor import DecalEditor
 from decals.index.index import DecalIndex
 from decals.model import Decals
@@ -55,11 +54,10 @@ class SurfaceColors:
         self._options = evaluation_options(drawing, decals, objects)
         self._evaluator = ColorEvaluator(decals, self._images, **self._options)
 
-    def at_vertices(self, number: int, rows: slice = slice(None)) -> Float64Array:
-        """Return linear colours of vertices of mesh ``number``, ``float64[n, 3]``."""
+    def at_vertices(self, number: int, rows: slice = slice(None)) -> Float32Array:
+        """Return linear colours of vertices of mesh ``number``, ``float32[n, 3]``."""
         mesh = self._meshes[number]
-        base = None if mesh.vertex_light is None else mesh.vertex_light[rows]
-        return self.at(number, mesh.places[rows], mesh.facings[rows], base=base)
+        return self.at(number, mesh.places[rows], mesh.facings[rows], base=mesh.vertex_light[rows])
 
     def at(
         self,
@@ -67,16 +65,15 @@ class SurfaceColors:
         points: Float32Array,
         normals: Float32Array,
         tangents: Float32Array | None = None,
-        base: Float64Array | None = None,
-    ) -> Float64Array:
-        """Return linear colours ``float64[n, 3]`` of mesh ``number`` at points with unit normals.
+        base: Float32Array | None = None,
+    ) -> Float32Array:
+        """Return linear colours ``float32[n, 3]`` of mesh ``number`` at points with unit normals.
 
         With tangents, they are the values of all maps, see `decals.baking.materials.surface_values`. The base
         colours at the points are linear too; by default those of `BakeMesh.base_colors`.
         """
         if base is None:
-            srgb = np.asarray(self._meshes[number].base_colors(points), np.float64)
-            base = decode_srgb(srgb).astype(np.float64, copy=False)
+            base = self._meshes[number].base_light(points)
         item = self._objects[number]
         if tangents is None:
             return _over(self._evaluator.at(points, normals, on=item), base)
@@ -108,9 +105,9 @@ class SurfaceColors:
         return {name: np.concatenate(column) for name, column in columns.items()}
 
 
-def _over(decals: Float32Array, base: Float64Array) -> Float64Array:
+def _over(decals: Float32Array, base: Float32Array) -> Float32Array:
     """Return base colours under premultiplied colours of decals."""
-    colors: Float64Array = base * (1.0 - decals[:, 3:]) + decals[:, :3]
+    colors: Float32Array = base * (1.0 - decals[:, 3:]) + decals[:, :3]
     return colors
 
 

@@ -1,38 +1,83 @@
-"""Texture of unwrapped meshes: texels to surface points, their colours, and gutters around charts."""
+"""Textures of unwrapped meshes: colours of the surface below each texel, seams that match, and gutters."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
+import warp as wp
 
-from blobtree._typing import Float32Array, Float64Array, Int64Array, UInt8Array
+from blobtree._typing import Float32Array, Int32Array, UInt8Array
+from blobtree.device import launch, start_warp
 from blobtree.progress import Progress
-from decals.baking.atlas import Unwrapped
 from decals.baking.meshes import BakeMesh
-from decals.images.texels import encode_srgb
-from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.windings import MeshOrientation
+from decals.baking.texel_kernels import (
+    cover_rows,
+    encode_levels,
+    mark_uneven,
+    nearest_in_rows,
+    nearest_texels,
+    surface_points,
+)
+from decals.baking.unwrapped import Unwrapped
 
-BLOCK_SAMPLES = 1 << 19
-"""Points that are coloured at once, which bounds the memory besides that of the texture."""
+BLOCK_SAMPLES = 1 << 20
+"""Samples that are looked up at once, which bounds the memory besides that of the texture."""
 
-MIN_GUTTER = 4.0
+MIN_GUTTER = 4
 GUTTER_SHARE = 1 / 256
 """Width of the gutters: so many texels, or this part of the texture if that is more."""
 
-ROUNDING = 1e-2
-"""Distance in texels below which a texel counts as inside a chart."""
+ROUNDING = 1e-3
+"""Distance in samples below which a sample counts as inside a face."""
+
+FINE_STEP = 3
+"""Difference of two neighbours, of 255, above which a texel takes several samples."""
+
+BORDER_STEP = 0.5
+"""Distance in texels of points along the borders of charts."""
+
+CPU = "cpu"
+"""Device of everything but the colours: texels lie in the memory of the host."""
+
+WARP_TYPES: dict[type, Any] = {np.uint8: wp.uint8, np.int32: wp.int32, np.float32: wp.float32}
 
 ColorFunction = Callable[
-    [int, Float32Array, Float32Array, Float32Array | None, Float64Array | None], Float64Array
+    [int, Float32Array, Float32Array, Float32Array | None, Float32Array | None], Float32Array
 ]
-"""Linear colours ``float64[n, 3]`` of the surface of the mesh with a number, at points with unit normals; or
+"""Linear colours ``float32[n, 3]`` of the surface of the mesh with a number, at points with unit normals; or
 other values, of as many channels, which need the tangents there. At last base colours, linear."""
 
 
-def color_bytes(colors: Float64Array) -> UInt8Array:
+def color_bytes(colors: Float32Array) -> UInt8Array:
     """Return linear colours as sRGB bytes."""
-    levels: UInt8Array = np.rint(255.0 * encode_srgb(colors)).astype(np.uint8)
+    light = np.ascontiguousarray(colors, np.float32)
+    levels = np.empty(light.shape, np.uint8)
+    launch(encode_levels, light.size, [flat(light)], [flat(levels)], CPU)
     return levels
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """What a texel holds.
+
+    Attributes
+    ----------
+    count : int
+        Number of channels.
+    color_at : callable
+        Values of the surface, see `ColorFunction`.
+    encode : callable
+        Bytes ``uint8[n, count]`` of means of these values.
+    tangents : sequence of float32[n, 4], optional
+        Tangents at the unwrapped vertices of each mesh, if the values need them.
+    """
+
+    color_at: ColorFunction
+    count: int = 3
+    encode: Callable[[Float32Array], UInt8Array] = color_bytes
+    tangents: Sequence[Float32Array] | None = None
 
 
 def bake_texture(
@@ -40,112 +85,242 @@ def bake_texture(
     unwrapped: Sequence[Unwrapped],
     size: int,
     samples: int,
-    color_at: ColorFunction,
+    channels: Channels,
     report: Progress,
-    *,
-    channels: int = 3,
-    encode: Callable[[Float64Array], UInt8Array] = color_bytes,
-    tangents: Sequence[Float32Array] | None = None,
 ) -> UInt8Array:
-    """Return the texture ``uint8[size, size, channels]``, by default sRGB, first row at the top.
+    """Return textures ``uint8[tiles, size, size, channels]``, by default sRGB, first row at the top.
 
-    A texel is the mean colour of ``samples`` × ``samples`` points on it. Texels outside all charts take the
-    colours of the closest points of charts within the gutter, and the mean colour of the charts beyond it, so
-    that smaller mip levels mix in no foreign colour.
+    A texel is the colour at its centre; where neighbours differ, the mean of those of its ``samples`` ×
+    ``samples`` points that lie in charts. Texels outside all charts take the colour of the closest one within
+    the gutter, and the mean colour of the charts beyond it, so that smaller mip levels mix in no foreign
+    colour.
     """
-    sheet = _Sheet(meshes, unwrapped, tangents)
-    gutter = max(MIN_GUTTER, GUTTER_SHARE * size)
-    image = np.zeros((size, size, channels), np.uint8)
-    empty = np.ones((size, size), np.bool_)
-    total, count = np.zeros(channels), 0
-    steps = (np.arange(samples) + 0.5) / samples - 0.5
-    offsets = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    height = max(1, BLOCK_SAMPLES // (size * samples**2))
-    for top in range(0, size, height):
-        report("colouring texels", top / size)
-        rows, columns = np.mgrid[top : min(top + height, size), 0:size].reshape(2, -1)
-        centers = np.stack([columns, rows], axis=1) + 0.5
-        distances = sheet.distances(centers)
-        near = distances <= gutter
-        if not near.any():
-            continue
-        points = (centers[near, None] + offsets).reshape(-1, 2)
-        colors = sheet.colors(points, color_at).reshape(-1, len(offsets), channels).mean(axis=1)
-        image[rows[near], columns[near]] = encode(colors)
-        empty[rows[near], columns[near]] = False
-        inside = distances[near] < ROUNDING
-        total, count = total + colors[inside].sum(axis=0), count + int(inside.sum())
-    if count:
-        image[empty] = encode(total[None] / count)[0]
+    start_warp()
+    tiles = 1 + max(int(part.tile_of_face.max(initial=0)) for part in unwrapped)
+    image = np.zeros((tiles, size, size, channels.count), np.uint8)
+    gutter = max(MIN_GUTTER, round(GUTTER_SHARE * size))
+    for tile in range(tiles):
+        page = _Page(image[tile], channels.encode)
+        for number, (mesh, part) in enumerate(zip(meshes, unwrapped, strict=True)):
+            done = (tile + number / len(meshes)) / tiles, 1.0 / (tiles * len(meshes))
+            sheet = Sheet(number, mesh, part, tile, channels)
+            if len(sheet.faces):
+                page.color(sheet, samples, partial(_report_part, report, *done))
+        page.finish(gutter)
     return image
 
 
-class _Sheet:
-    """All unwrapped meshes as one flat mesh on the texture."""
+def _report_part(report: Progress, begin: float, length: float, share: float) -> None:
+    report("colouring texels", begin + length * share)
 
-    def __init__(
+
+class Sheet:
+    """The charts of one mesh on one tile."""
+
+    def __init__(self, number: int, mesh: BakeMesh, part: Unwrapped, tile: int, channels: Channels) -> None:
+        self._number, self._mesh, self._channels = number, mesh, channels
+        self._chosen = np.flatnonzero(part.tile_of_face == tile)
+        self.faces, self.places = part.faces[self._chosen], part.places
+        self._rows = part.rows
+        self._tangents = None if channels.tangents is None else channels.tangents[number]
+        self._arrays: list[Any] = [
+            wp.array(np.ascontiguousarray(values), dtype=kind, device=CPU)
+            for values, kind in (
+                (self.faces, wp.vec3i),
+                (part.places, wp.vec2),
+                (mesh.places[part.rows], wp.vec3),
+                (mesh.facings[part.rows], wp.vec3),
+            )
+        ]
+        heights = part.places[:, 1][self.faces]
+        self._low, self._high = heights.min(axis=1), heights.max(axis=1)
+
+    def cover(
         self,
-        meshes: Sequence[BakeMesh],
-        unwrapped: Sequence[Unwrapped],
-        tangents: Sequence[Float32Array] | None,
-    ) -> None:
-        counts = [len(part.rows) for part in unwrapped]
-        starts = np.cumsum([0, *counts[:-1]])
-        places = np.concatenate([part.places for part in unwrapped])
-        faces = np.concatenate([part.faces + start for part, start in zip(unwrapped, starts, strict=True)])
-        self._flat = MeshSurface(
-            np.column_stack([places, np.zeros(len(places))]), faces, orientation=MeshOrientation.KEEP
-        )
-        pairs = list(zip(meshes, unwrapped, strict=True))
-        self._vertices = np.concatenate([mesh.places[part.rows] for mesh, part in pairs])
-        self._normals = np.concatenate([mesh.facings[part.rows] for mesh, part in pairs])
-        self._tangents = None if tangents is None else np.concatenate(tangents)
-        self._rows = np.concatenate([part.rows for part in unwrapped])
-        self._bases = [mesh.base for mesh in meshes]
-        self._first_faces = np.cumsum([0, *(len(part.faces) for part in unwrapped[:-1])])
-        self._mesh_of_face = np.repeat(np.arange(len(meshes)), [len(part.faces) for part in unwrapped])
+        top: int,
+        bottom: int,
+        size: int,
+        steps: int,
+        wanted: UInt8Array | None = None,
+        margin: float = ROUNDING,
+    ) -> tuple[Int32Array, int]:
+        """Return the face at each sample of rows of texels, -1 without, and how many lie in two.
 
-    def distances(self, points: Float64Array) -> Float64Array:
-        """Return distances in texels to the closest points of charts, 0 inside up to rounding."""
-        faces, weights = self._locate(points)
-        closest = self._mixed(self._flat.vertices, faces, weights)[:, :2]
-        distances: Float64Array = np.linalg.norm(closest - points, axis=1)
-        return distances
+        Parameters
+        ----------
+        top, bottom : int
+            The rows, without the last.
+        size : int
+            Texels of a row.
+        steps : int
+            Samples along each axis of a texel.
+        wanted : uint8[bottom - top, size], optional
+            0 for texels that are left out.
+        margin : float
+            Distance in samples by which faces are widened.
 
-    def colors(self, points: Float64Array, color_at: ColorFunction) -> Float64Array:
-        """Return colours of the surface at points of the texture."""
-        faces, weights = self._locate(points)
-        positions = self._mixed(self._vertices, faces, weights).astype(np.float32)
-        normals = self._mixed(self._normals, faces, weights)
-        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        units = (normals / np.maximum(lengths, 1e-30)).astype(np.float32)
-        meshes = self._mesh_of_face[faces]
-        tangents = None
+        Returns
+        -------
+        int32[(bottom - top) * steps, size * steps], int
+        """
+        rows = (bottom - top) * steps
+        starts, listed = self._faces_of_rows(top, rows, steps)
+        found: Any = wp.full(rows * size * steps, -1, dtype=wp.int32, device=CPU)
+        overlaps = wp.zeros(rows, dtype=wp.int32, device=CPU)
+        lists: list[Any] = [wp.array(values, dtype=wp.int32, device=CPU) for values in (starts, listed)]
+        texels: Any = np.zeros(0, np.uint8) if wanted is None else wanted.reshape(-1)
+        use: Any = wp.array(texels, dtype=wp.uint8, device=CPU)
+        inputs = [*lists, *self._arrays[:2], top, steps, size * steps, margin, use]
+        launch(cover_rows, rows, inputs, [found, overlaps], CPU)
+        return found.numpy().reshape(rows, -1), int(overlaps.numpy().sum())
+
+    def _faces_of_rows(self, top: int, rows: int, steps: int) -> tuple[Int32Array, Int32Array]:
+        """Return the faces at each row of samples, in their order."""
+        first = np.clip(np.ceil((self._low - top) * steps - 0.5), 0, rows).astype(np.int64)
+        last = np.clip(np.floor((self._high - top) * steps - 0.5), -1, rows - 1).astype(np.int64)
+        counts = np.maximum(last - first + 1, 0)
+        used = np.flatnonzero(counts)
+        counts = counts[used]
+        ends = np.cumsum(counts)
+        within = np.arange(int(counts.sum())) - np.repeat(ends - counts, counts)
+        row = np.repeat(first[used], counts) + within
+        kind = np.uint16 if rows <= 1 << 16 else np.int32  # the shorter ones are sorted by their digits
+        order = np.argsort(row.astype(kind), kind="stable")
+        starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=rows))])
+        return starts.astype(np.int32), np.repeat(used, counts)[order].astype(np.int32)
+
+    def values(self, faces: Int32Array, places: Float32Array) -> Float32Array:
+        """Return the values of the surface at places in faces of this sheet, ``float32[n, channels]``."""
+        count = len(faces)
+        inputs: list[Any] = [
+            wp.array(places, dtype=wp.vec2, device=CPU),
+            wp.array(faces, dtype=wp.int32, device=CPU),
+        ]
+        outputs: list[Any] = [wp.empty(count, dtype=wp.vec3, device=CPU) for _ in range(3)]
+        launch(surface_points, count, [*inputs, *self._arrays], outputs, CPU)
+        points, units, weights = (array.numpy() for array in outputs)
+        corners = self.faces[faces] if self._mesh.base is not None or self._tangents is not None else None
+        along: Float32Array | None = None
+        light: Float32Array | None = None
         if self._tangents is not None:
-            tangents = self._mixed(self._tangents, faces, weights).astype(np.float32)
-        parts = []
-        order = [np.nonzero(meshes == number)[0] for number in np.unique(meshes)]
-        for rows in order:
-            along = None if tangents is None else tangents[rows]
-            number = int(meshes[rows[0]])
-            light = self._base_light(number, faces[rows], weights[rows])
-            parts.append(color_at(number, positions[rows], units[rows], along, light))
-        colors: Float64Array = np.concatenate(parts)[np.argsort(np.concatenate(order))]
-        return colors
+            along = np.einsum("nc,nca->na", weights, self._tangents[corners])
+        if self._mesh.base is not None:
+            wide = weights.astype(np.float64)
+            exact = self._mesh.base.light_of(self._rows[corners], self._chosen[faces], wide)
+            light = exact.astype(np.float32)
+        return self._channels.color_at(self._number, points, units, along, light)
 
-    def _base_light(self, number: int, faces: Int64Array, weights: Float64Array) -> Float64Array | None:
-        """Return the linear base colours of a mesh at points of faces; None for a mesh without any."""
-        base = self._bases[number]
-        if base is None:
-            return None
-        corners = self._rows[self._flat.faces[faces]]
-        return base.light_of(corners, faces - self._first_faces[number], weights)
+    def border_points(self) -> tuple[Int32Array, Float32Array]:
+        """Return faces and places ``float32[n, 2]`` of points along the borders of charts."""
+        sides = np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=2).reshape(-1, 2)
+        keys = np.sort(sides, axis=1).astype(np.int64) @ [len(self.places), 1]
+        _, first, counts = np.unique(keys, return_index=True, return_counts=True)
+        rows = first[counts == 1]
+        begin, end = self.places[sides[rows, 0]], self.places[sides[rows, 1]]
+        steps = np.ceil(np.linalg.norm(end - begin, axis=1) / BORDER_STEP).astype(np.int64) + 1
+        edges = np.repeat(np.arange(len(rows)), steps)
+        number = np.arange(len(edges)) - np.repeat(np.cumsum(steps) - steps, steps)
+        share = (number / np.maximum(steps - 1, 1)[edges])[:, None].astype(np.float32)
+        return (rows[edges] // 3).astype(np.int32), begin[edges] * (1 - share) + end[edges] * share
 
-    def _locate(self, points: Float64Array) -> tuple[Int64Array, Float64Array]:
-        return self._flat.locate(np.column_stack([points, np.zeros(len(points))]))
 
-    def _mixed(self, values: Float32Array, faces: Int64Array, weights: Float64Array) -> Float64Array:
-        """Return values at the vertices, interpolated in faces."""
-        corners = self._flat.faces[faces]
-        mixed: Float64Array = np.einsum("ij,ijk->ik", weights, values[corners].astype(np.float64))
-        return mixed
+class _Page:
+    """One texture while it is made."""
+
+    def __init__(self, image: UInt8Array, encode: Callable[[Float32Array], UInt8Array]) -> None:
+        self._image, self._size, self._encode = image, len(image), encode
+        self._filled: UInt8Array = np.zeros(image.shape[:2], np.uint8)
+        self._sum, self._count = np.zeros(image.shape[2]), 0
+
+    def color(self, sheet: Sheet, samples: int, report: Callable[[float], None]) -> None:
+        """Colour the texels of the charts of a mesh."""
+        own = np.zeros(self._filled.shape, np.uint8)
+        for top, bottom in self._blocks(1):
+            report(0.5 * top / self._size)
+            self._color_centers(sheet, own, top, bottom)
+        if samples > 1:
+            sizes = self._size, self._image.shape[2], FINE_STEP
+            uneven = self._launch_rows(mark_uneven, np.uint8, [own, self._image, *sizes])
+            uneven &= self._filled == 0
+            for top, bottom in self._blocks(samples):
+                report(0.5 + 0.5 * top / self._size)
+                self._refine(sheet, own, uneven, top, bottom, samples)
+        self._color_borders(sheet, own)
+        self._filled |= own
+
+    def _blocks(self, steps: int) -> Iterator[tuple[int, int]]:
+        rows = max(1, BLOCK_SAMPLES // (self._size * steps**2))
+        for top in range(0, self._size, rows):
+            yield top, min(top + rows, self._size)
+
+    def _color_centers(self, sheet: Sheet, own: UInt8Array, top: int, bottom: int) -> None:
+        found, _ = sheet.cover(top, bottom, self._size, 1)
+        rows, columns = np.nonzero((found >= 0) & (self._filled[top:bottom] == 0))
+        if not len(rows):
+            return
+        places = np.stack([columns, rows + top], axis=1).astype(np.float32) + np.float32(0.5)
+        values = sheet.values(found[rows, columns], places)
+        self._image[rows + top, columns] = self._encode(values)
+        own[rows + top, columns] = 1
+        self._sum, self._count = self._sum + values.sum(axis=0, dtype=np.float64), self._count + len(rows)
+
+    def _refine(
+        self, sheet: Sheet, own: UInt8Array, uneven: UInt8Array, top: int, bottom: int, samples: int
+    ) -> None:
+        """Take the mean of several samples at texels whose neighbours differ."""
+        texels = uneven[top:bottom]
+        if not texels.any():
+            return
+        found, _ = sheet.cover(top, bottom, self._size, samples, texels)
+        rows, columns = np.nonzero(texels)
+        faces = found.reshape(bottom - top, samples, self._size, samples)[rows, :, columns]
+        number, i, k = np.nonzero(faces >= 0)
+        if not len(number):
+            return
+        within = (np.stack([k, i], axis=1).astype(np.float32) + np.float32(0.5)) / np.float32(samples)
+        corners = np.stack([columns, rows + top], axis=1).astype(np.float32)
+        values = sheet.values(faces[number, i, k], corners[number] + within)
+        starts = np.flatnonzero(np.diff(number, prepend=-1))
+        counts = np.diff(starts, append=len(number)).astype(np.float32)
+        sums: Any = np.add.reduceat(values, starts, axis=0)
+        means: Float32Array = sums / counts[:, None]
+        rows, columns = rows[number[starts]] + top, columns[number[starts]]
+        self._image[rows, columns] = self._encode(means)
+        own[rows, columns] = 1
+
+    def _color_borders(self, sheet: Sheet, own: UInt8Array) -> None:
+        """Colour the texels of charts that no sample lies in, by points of their borders."""
+        faces, places = sheet.border_points()
+        columns, rows = np.clip(places.astype(np.int64), 0, self._size - 1).T
+        bare = np.flatnonzero((own[rows, columns] == 0) & (self._filled[rows, columns] == 0))
+        _, first = np.unique(rows[bare] * self._size + columns[bare], return_index=True)
+        chosen = bare[first]
+        if len(chosen):
+            values = sheet.values(faces[chosen], places[chosen])
+            self._image[rows[chosen], columns[chosen]] = self._encode(values)
+            own[rows[chosen], columns[chosen]] = 1
+
+    def finish(self, reach: int) -> None:
+        """Give empty texels the colour of the nearest one within reach, and the others the mean colour."""
+        size = self._size
+        columns = self._launch_rows(nearest_in_rows, np.int32, [self._filled, size, reach])
+        nearest = self._launch_rows(nearest_texels, np.int32, [self._filled, columns, size, reach])
+        nearest = nearest.reshape(-1)
+        texels = self._image.reshape(size * size, -1)
+        near = np.flatnonzero(nearest >= 0)
+        texels[near] = texels[nearest[near]]
+        if self._count:
+            mean = self._encode((self._sum[None] / self._count).astype(np.float32))
+            texels[np.flatnonzero((nearest < 0) & (self._filled.reshape(-1) == 0))] = mean
+
+    def _launch_rows(self, kernel: Any, kind: Any, inputs: list[Any]) -> Any:
+        """Return the result of a kernel for each texel, which runs once for each row."""
+        result = np.empty(self._filled.shape, kind)
+        arrays = [flat(each) if isinstance(each, np.ndarray) else each for each in inputs]
+        launch(kernel, self._size, arrays, [flat(result)], CPU)
+        return result
+
+
+def flat(values: Any) -> Any:
+    """Return a contiguous array of numbers as one of Warp that shares its memory."""
+    return wp.array(values.reshape(-1), dtype=WARP_TYPES[values.dtype.type], device=CPU, copy=False)

@@ -16,7 +16,6 @@ from decals.errors import InvalidScene, TooMuchData
 from decals.hosts.code import Form, code_of
 from decals.hosts.shader import Shader, shader
 from decals.images.load import embedded_image, opaque
-from decals.images.texels import decode_srgb
 from decals.index.decal_cells import FINEST, LEVEL_SHIFT, NO_FLOOR, NO_PARITY, REACH_WITH_SLACK
 from decals.index.index import DecalIndex
 from decals.index.lookup import HALF_RANGE, MIX_ALL, MIX_X, MIX_Y, MIX_Z, NESTING_SLACK
@@ -69,7 +68,7 @@ def page_contents(
     ]
     if not meshes:
         raise InvalidScene("scene: expected an object to show, got none; show one of its objects")
-    colors = [_vertex_colors(mesh) for _, mesh in meshes]
+    colors = [mesh.vertex_light for _, mesh in meshes]
     arrays: Arrays = {}
     for number, (_, mesh) in enumerate(meshes):
         parts = _mesh_arrays(mesh, colors[number])
@@ -117,13 +116,6 @@ def _mesh_arrays(mesh: BakeMesh, colors: NDArray[np.float32]) -> Arrays:
     if (colors != colors[0]).any():
         arrays["color"] = colors
     return arrays
-
-
-def _vertex_colors(mesh: BakeMesh) -> NDArray[np.float32]:
-    """Return the base colour of each vertex in linear light."""
-    if mesh.vertex_light is not None:
-        return mesh.vertex_light.astype(np.float32)
-    return decode_srgb(np.asarray(mesh.base_colors(mesh.vertices), np.float64)).astype(np.float32)
 
 
 def _shaders(code: Shader) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from decals.baking import surface_colors as colors_module
 from decals.baking import texture as texture_module
 from decals.baking.atlas import unwrap
 from decals.baking.meshes import bake_mesh
-from decals.baking.texture import bake_texture
+from decals.baking.texture import Channels, bake_texture
 from decals.errors import NoGraphics
 from decals.rendering import Lighting
 from decals.surfaces.mesh import MeshSurface
@@ -298,9 +298,9 @@ def textured(size: int, samples: int = 1) -> Array:
     ]
     drawing = scene.drawing.overridden(contact=decals.Contact.PRODUCT)
     colors = colors_module.SurfaceColors(meshes, scene.objects, scene.decals, scene.images, drawing)
-    return bake_texture(
-        meshes, unwrap(meshes, size, lambda *_: None), size, samples, colors.at, lambda *_: None
-    )
+    parts = unwrap(meshes, size, lambda *_: None)
+    tiles: Array = bake_texture(meshes, parts, size, samples, Channels(colors.at), lambda *_: None)
+    return np.asarray(tiles[0])
 
 
 def test_blocks_bound_the_memory_and_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
