@@ -25,6 +25,7 @@ from tests.oracles import blobtree as oracle
 Floats = NDArray[np.float64]
 Rng = np.random.Generator
 Operand = Callable[[Rng], Node]
+Draw = Callable[[Rng, Parameter], Any]
 
 EXACT = 1e-4
 """Largest relative error of values and gradients, absolute below 1."""
@@ -46,7 +47,7 @@ def _angle(rng: Rng, parameter: Parameter) -> float:
     return float(rng.uniform(max(parameter.low, -40.0), min(parameter.high, 40.0)))
 
 
-DRAWS: dict[Quantity, Callable[[Rng, Parameter], Any]] = {
+DRAWS: dict[Quantity, Draw] = {
     Quantity.POINT: lambda rng, _: triple(rng.uniform(-0.8, 0.8, 3)),
     Quantity.POINTS: lambda rng, _: tuple(map(triple, rng.uniform(-0.8, 0.8, (4, 3)))),
     Quantity.DIRECTION: lambda rng, _: triple(rng.normal(size=3)),
@@ -117,14 +118,16 @@ SPECIAL: dict[str, Callable[[Rng, Operand], Node]] = {
 """Makers of classes whose parameters depend on each other."""
 
 
-def sample(kind: type[Node], rng: Rng, operand: Operand = random_leaf) -> Node:
+def sample(
+    kind: type[Node], rng: Rng, operand: Operand = random_leaf, draws: dict[Quantity, Draw] | None = None
+) -> Node:
     """Return a valid node of a class, with drawn operands; raise `LookupError` if none is found."""
     for _ in range(ATTEMPTS):
         try:
             node = (
                 SPECIAL[kind.file_tag](rng, operand)
                 if kind.file_tag in SPECIAL
-                else _drawn(kind, rng, operand)
+                else _drawn(kind, rng, operand, draws or DRAWS)
             )
             node.tape, node.support  # noqa: B018  (they may refuse a combination of parameters)
         except InvalidNode:
@@ -133,7 +136,7 @@ def sample(kind: type[Node], rng: Rng, operand: Operand = random_leaf) -> Node:
     raise LookupError(f"no valid sample of {kind.__name__}: give it an entry in tests.conformance.SPECIAL")
 
 
-def _drawn(kind: type[Node], rng: Rng, operand: Operand) -> Node:
+def _drawn(kind: type[Node], rng: Rng, operand: Operand, draws: dict[Quantity, Draw]) -> Node:
     declared, hints = parameters_of(kind), get_type_hints(kind)
     values: dict[str, Any] = {}
     for field in fields_of(kind):
@@ -141,8 +144,8 @@ def _drawn(kind: type[Node], rng: Rng, operand: Operand) -> Node:
         if parameter is None:
             several = hints[field.name] is not Node
             values[field.name] = tuple(operand(rng) for _ in range(2)) if several else operand(rng)
-        elif OPTIONAL not in field.metadata and parameter.quantity in DRAWS:
-            values[field.name] = DRAWS[parameter.quantity](rng, parameter)
+        elif OPTIONAL not in field.metadata and parameter.quantity in draws:
+            values[field.name] = draws[parameter.quantity](rng, parameter)
     return kind(**values)
 
 

@@ -68,10 +68,11 @@ def closest_on_cone(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
         axis = wp.normalize(ab)
         w = q - wp.vec3(start[0], start[1], start[2])
         x = wp.dot(axis, w)
+        beside = w - axis * x
         k = (end[3] - start[3]) / length
         s = start[3] + k * x
         if s > 0.0:
-            t = wp.clamp((x + k * wp.max(wp.dot(w, w) - x * x, 0.0) / s) / length, 0.0, 1.0)
+            t = wp.clamp((x + k * wp.dot(beside, beside) / s) / length, 0.0, 1.0)
         elif k > 0.0:
             t = 1.0
     elif end[3] > start[3]:
