@@ -1,13 +1,32 @@
-"""Holes in pictures of sharp CSG: pixels that miss, or see through, where a ray is deep inside in float64."""
+"""Holes in pictures of sharp CSG: pixels that miss, or see through, where a ray is deep inside in float64.
 
+    python -m tests.bench.trust_csg [--seeds 1 2 3] [--workers 16] [--backend compute] [--json FILE]
+
+Each process has a renderer of its own. Each case is printed with its pixels and holes; a case is the tree and
+the camera of ``scene(seed, number)``. A campaign that was interrupted goes on with ``--first``.
+"""
+
+import argparse
+import json
+import multiprocessing
+import os
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from itertools import count
+from functools import cache, partial
+from itertools import count, islice
+from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blobtree import Node
+from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions
+from decals.rendering.pixel_pass import PassBackend
 from decals.rendering.renderer import Renderer
 from decals.scenes.camera import Camera
 from tests.blobtree.csg_trees import visible_tree
@@ -32,6 +51,8 @@ CLOSEST = 0.01
 
 TREES, QUICK_TREES = 100, 12
 SIZE, QUICK_SIZE = (160, 120), (60, 45)
+AT_ONCE = 48
+"""Cases that are given to the processes at once."""
 
 
 @dataclass(frozen=True)
@@ -43,15 +64,34 @@ class Holes:
     of_rays: int
 
 
+@dataclass(frozen=True)
+class Case:
+    """The holes of one case, and the seconds that it took."""
+
+    seed: int
+    number: int
+    holes: Holes
+    seconds: float
+
+    def __str__(self) -> str:
+        found = f"{self.holes.of_picture} holes of {self.holes.pixels} pixels, {self.holes.of_rays} of rays"
+        return f"seed {self.seed}, case {self.number}: {found}, {self.seconds:.1f} s"
+
+
+Runner: TypeAlias = Callable[[Callable[[int], Case], Iterable[int]], Iterator[Case]]
+"""Calls a function for numbers, in order; ``map``, or that of several processes."""
+
+
 def measure(seed: int = 1, *, quick: bool) -> dict[str, float]:
     """Draw random trees that are not empty from random places, and count the holes."""
-    found: list[Holes] = []
     with Renderer() as renderer:
-        for case in count():
-            holes = holes_of(*scene(seed, case), renderer, QUICK_SIZE if quick else SIZE)
-            found += [holes] if holes.pixels else []
-            if len(found) == (QUICK_TREES if quick else TREES):
-                break
+        size, trees = (QUICK_SIZE, QUICK_TREES) if quick else (SIZE, TREES)
+        cases = (holes_of(*scene(seed, case), renderer, size) for case in count())
+        return figures_of(list(islice((holes for holes in cases if holes.pixels), trees)))
+
+
+def figures_of(found: list[Holes]) -> dict[str, float]:
+    """Return the sums over the trees that show."""
     return {
         "csg_holes": sum(holes.of_picture for holes in found),
         "csg_ray_holes": sum(holes.of_rays for holes in found),
@@ -112,3 +152,67 @@ def _surrounded(hits: NDArray[np.bool_]) -> NDArray[np.bool_]:
     padded = np.pad(hits, 1, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3))
     return np.asarray(windows.all(axis=(2, 3)))
+
+
+def campaign(seed: int, trees: int, size: tuple[int, int], first: int, run: Runner) -> Iterator[Case]:
+    """Yield this many cases that show, from the number `first` on; some more are drawn at once."""
+    for start in count(first, AT_ONCE):
+        for case in run(partial(drawn, seed, size), range(start, start + AT_ONCE)):
+            trees -= case.holes.pixels > 0
+            yield case
+            if trees == 0:
+                return
+
+
+def drawn(seed: int, size: tuple[int, int], number: int) -> Case:
+    """Draw one case with the renderer of this process."""
+    start = time.perf_counter()
+    holes = holes_of(*scene(seed, number), _renderer(), size)
+    return Case(seed, number, holes, time.perf_counter() - start)
+
+
+@cache
+def _renderer() -> Renderer:
+    """Return the renderer of this process."""
+    return Renderer(Context.standalone(backend=_BACKEND.get("name")))
+
+
+_BACKEND: dict[str, str | None] = {}
+"""How the renderer of this process draws, if the command line says so."""
+
+
+def _choose(backend: str | None) -> None:
+    """Choose how this process draws."""
+    _BACKEND["name"] = backend
+
+
+def main() -> int:
+    """Draw the cases that the command line asks for; the exit code is 1 if a pixel misses."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1])
+    parser.add_argument("--trees", type=int, default=TREES, help="trees of each seed that show")
+    parser.add_argument("--first", type=int, default=0, help="number of the first case")
+    parser.add_argument("--size", default="x".join(map(str, SIZE)))
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--backend", choices=[backend.value for backend in PassBackend])
+    parser.add_argument("--json", type=Path, help="also write the figures to this file")
+    options = parser.parse_args()
+    width, height = (int(part) for part in options.size.split("x"))
+    found: list[Holes] = []
+    spawned = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(options.workers, spawned, _choose, (options.backend,)) as pool:
+        for seed in options.seeds:
+            for case in campaign(seed, options.trees, (width, height), options.first, pool.map):
+                found += [case.holes] if case.holes.pixels else []
+                print(case, file=sys.stderr, flush=True)
+    figures = figures_of(found)
+    print("\n".join(f"{key:16} {value:g}" for key, value in figures.items()))
+    if options.json:
+        options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    return int(figures["csg_holes"] + figures["csg_ray_holes"] > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

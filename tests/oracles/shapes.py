@@ -31,6 +31,9 @@ Curve = Callable[[Floats], Floats]
 """A function from parameters (m,) in [0, 1] to points and radii (m, 4)."""
 
 SAMPLES = 300
+NEAR_ENDS = np.geomspace(1e-7, 0.5 / SAMPLES, 24)
+"""Further places along curves, whose ends may be thin."""
+
 
 KINDS = (
     Arc,
@@ -197,13 +200,13 @@ def along_curve(q: Floats, curve: Curve) -> tuple[Floats, Floats]:
 
 def _closest_places(q: Floats, curve: Curve) -> tuple[Floats, Floats, Floats, NDArray[np.intp]]:
     """Least ratios and their places (n,); ratios of samples that are local minima; the least sample."""
-    t = np.linspace(0.0, 1.0, SAMPLES + 1)
+    t = np.unique([*np.linspace(0.0, 1.0, SAMPLES + 1), *NEAR_ENDS, *(1.0 - NEAR_ENDS)])
     balls = curve(t)
     ratios = np.linalg.norm(q[:, None] - balls[:, :3], axis=2) / balls[:, 3]
     padded = np.pad(ratios, ((0, 0), (1, 1)), constant_values=np.inf)
     lowest = np.where((ratios <= padded[:, :-2]) & (ratios < padded[:, 2:]), ratios, np.inf)
     best = lowest.argmin(axis=1)
-    low, high = t[np.maximum(best - 1, 0)], t[np.minimum(best + 1, SAMPLES)]
+    low, high = t[np.maximum(best - 1, 0)], t[np.minimum(best + 1, len(t) - 1)]
     for _ in range(60):
         third = (high - low) / 3.0
         falls = _ratio(q, curve, low + third) >= _ratio(q, curve, high - third)
