@@ -25,6 +25,7 @@ from .errors import (
 from .fitting import Fit, fit
 from .formulas.falloff import ISO, RIM, Falloff
 from .formulas.falloffs import FALLOFF_NAMES
+from .identity import content_hash
 from .io import from_json, load, save, to_json
 from .meshing.creases import split_creases
 from .meshing.mesh import Mesh
@@ -176,6 +177,7 @@ __all__ = [
     "UnusableFile",
     "Volume",
     "__version__",
+    "content_hash",
     "define_falloff",
     "define_field",
     "define_operator",

@@ -3,8 +3,17 @@
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blobtree.lazy import Lazy
+
+
+def read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """Return an array that nothing changes: itself if it is read-only, else a copy."""
+    if array.flags.writeable:
+        array = array.copy()
+        array.setflags(write=False)
+    return array
 
 
 class Immutable:

@@ -22,6 +22,7 @@ from .field.evaluate import evaluate
 from .field.law import ContactLaw, define_contact
 from .field.mapping import ImageMapping
 from .hosts.shader import shader
+from .identity import content_hash
 from .images import load_image
 from .model import NO_IMAGE, Decals, Interaction
 from .pages.page import save_html
@@ -61,6 +62,7 @@ __all__ = [
     "__version__",
     "animate",
     "bake",
+    "content_hash",
     "cover",
     "define_contact",
     "displace",

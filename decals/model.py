@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from blobtree._typing import BoolArray, Float32Array, Int32Array
 from blobtree.colors import Rgb
 from blobtree.formulas.falloff import RIM
-from blobtree.immutable import Immutable
+from blobtree.identity import Value
 from blobtree.validation import items
 from decals.errors import InvalidDecals, InvalidRow
 from decals.images.texels import decode_srgb
@@ -88,7 +88,7 @@ class Interaction(IntEnum):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Decals(Immutable):
+class Decals(Value):
     """n decals, one row each. Arrays are checked, copied and read-only.
 
     Each decal is a point primitive and a tangent frame (paper, section 3.1 and figure 1). Normals and

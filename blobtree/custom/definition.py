@@ -198,6 +198,11 @@ class CustomNode(metaclass=CustomKind):
     digest: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]]
 
+    @classmethod
+    def content_key(cls) -> tuple[str, ...]:
+        """Return what names the kind in content hashes: its name, and the digest of its functions."""
+        return cls.__mro__[1].__name__, cls.kind, cls.digest
+
     @property
     def values(self) -> dict[str, Any]:
         """The function's parameters by name."""

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import warp as wp
 
+from blobtree.identity import content_hash
+
 wp.set_module_options({"enable_backward": False})
 
 ISO = 0.5
@@ -134,6 +136,11 @@ class Falloff:
 
     def __repr__(self) -> str:
         return repr(self.name)
+
+    @property
+    def content_hash(self) -> str:
+        """Content hash, see `blobtree.content_hash`: that of its name, and of the source of a custom one."""
+        return content_hash((type(self).__name__, self.name, self.digest))
 
     @property
     def numbers(self) -> tuple[float, float, float]:

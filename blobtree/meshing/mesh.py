@@ -22,6 +22,7 @@ from blobtree.cells.scan import DeviceArray, arange, compact, exclusive_scan, wh
 from blobtree.cells.sparse_cells import SparseCells
 from blobtree.device import demand_memory, launch, prefaulted_array
 from blobtree.errors import InvalidFile
+from blobtree.identity import Value
 from blobtree.meshing.bisection_kernels import bisect_unconverged
 from blobtree.meshing.dual_kernels import (
     SAMPLES,
@@ -53,7 +54,7 @@ BLOCK_BYTES = 64 * 4 + 13 * (3 * 12 + 4) + 13 * 24
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
+class Mesh(Value):
     """A closed triangle mesh, as `polygonize` returns it.
 
     Attributes

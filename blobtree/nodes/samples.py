@@ -9,6 +9,8 @@ import numpy as np
 
 from blobtree._typing import Float32Array
 from blobtree.errors import InvalidNode
+from blobtree.identity import content_hash
+from blobtree.lazy import Lazy
 from blobtree.sized_cache import sized_cache
 from blobtree.validation import real
 
@@ -21,7 +23,7 @@ MAX_DECODED_BYTES = 1 << 26
 """Bytes of decoded samples that are kept for the next access, at most."""
 
 
-class Samples(msgspec.Struct, frozen=True):
+class Samples(msgspec.Struct, frozen=True, dict=True):
     """A grid of float32 numbers.
 
     In files it is its shape and a text: little-endian float32 numbers, compressed by zlib, in base64.
@@ -71,7 +73,20 @@ class Samples(msgspec.Struct, frozen=True):
         InvalidNode
             The data are damaged.
         """
-        return _decoded(self)
+        return _decoded(self.shape, self.data)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Samples):
+            return NotImplemented
+        return self.data == other.data or self.content_hash == other.content_hash
+
+    def __hash__(self) -> int:
+        return hash(self.content_hash)
+
+    @Lazy
+    def content_hash(self) -> str:
+        """Content hash of the numbers, whose compressed data depend on the compressor."""
+        return content_hash(self.array)
 
     def __repr__(self) -> str:
         nx, ny, nz = self.shape
@@ -79,19 +94,19 @@ class Samples(msgspec.Struct, frozen=True):
 
 
 @sized_cache(MAX_DECODED_BYTES)
-def _decoded(samples: Samples) -> Float32Array:
-    _check_shape(samples.shape)
-    size = 4 * math.prod(samples.shape)
+def _decoded(shape: tuple[int, int, int], data: bytes) -> Float32Array:
+    _check_shape(shape)
+    size = 4 * math.prod(shape)
     decoder = zlib.decompressobj()
     try:
-        content = decoder.decompress(samples.data, size + 1)  # damaged data might expand without end
+        content = decoder.decompress(data, size + 1)  # damaged data might expand without end
     except zlib.error as error:
         raise InvalidNode(
             f"samples: expected numbers compressed by zlib, got damaged data ({error})"
         ) from None
     if len(content) != size:
-        raise InvalidNode(f"samples: expected {size} bytes for the shape {samples.shape}, got {len(content)}")
-    array = np.frombuffer(content, "<f4").reshape(samples.shape).astype(np.float32)
+        raise InvalidNode(f"samples: expected {size} bytes for the shape {shape}, got {len(content)}")
+    array = np.frombuffer(content, "<f4").reshape(shape).astype(np.float32)
     if not np.isfinite(array).all():
         raise InvalidNode("samples: expected finite numbers, got damaged data")
     array.setflags(write=False)

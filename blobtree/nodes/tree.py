@@ -33,6 +33,7 @@ from blobtree.nodes.parameter_gradient import ParameterGradient, parameter_gradi
 from blobtree.nodes.parameters import Parameter, Quantity, documented, parameters_of
 from blobtree.nodes.values import (
     children_of,
+    content_hash_of,
     equal,
     fields_of,
     from_records,
@@ -128,6 +129,19 @@ class Node(ImplicitModel):
 
     def __hash__(self) -> int:
         return hash_of(self)
+
+    @property
+    def content_hash(self) -> str:
+        """Content hash of the tree, see `blobtree.content_hash`."""
+        return content_hash_of(self)
+
+    @classmethod
+    def content_key(cls) -> tuple[str, ...]:
+        """Return what names the class in content hashes: that of files."""
+        return (vars(cls).get("file_tag", cls.__qualname__),)
+
+    def __dask_tokenize__(self) -> str:
+        return self.content_hash
 
     def __repr__(self) -> str:
         return text_of(self)

@@ -1,4 +1,4 @@
-"""Nodes as values: equality, hash, `repr` and pickling without recursion, for trees of any depth.
+"""Nodes as values: equality, hashes, `repr` and pickling without recursion, for trees of any depth.
 
 The methods that dataclasses generate recurse once per level, so they fail some hundred levels down. These
 functions walk the tree with a list. A shared subtree is compared, hashed and pickled once.
@@ -8,15 +8,19 @@ from collections.abc import Callable
 from dataclasses import Field, fields
 from itertools import chain
 from operator import attrgetter
-from typing import Annotated, Any, get_origin, get_type_hints
+from typing import Annotated, Any, TypeVar, get_origin, get_type_hints
 
+from blobtree.identity import content_hash
 from blobtree.tape.program import ProgramNode, postorder
 
 HASH = "_hash"
-"""Attribute that caches a node's hash; it is not part of the value."""
+CONTENT_HASH = "_content_hash"
+"""Attributes that cache a node's hashes; they are not part of the value."""
 
 OPTIONAL = "optional"
 """Key in the metadata of a field that comes last, and that texts and files leave out at its default."""
+
+Cached = TypeVar("Cached", int, str)
 
 References = dict[str, int | tuple[int, ...]]
 Record = tuple[type[ProgramNode], dict[str, Any], References]
@@ -104,14 +108,40 @@ def equal(first: ProgramNode, second: ProgramNode) -> bool:
 
 
 def hash_of(root: ProgramNode) -> int:
-    """Return the hash of a tree; every node caches its values, so a larger tree costs little."""
-    for node in postorder(root, into=lambda node: HASH not in vars(node)):
-        if HASH not in vars(node):
-            below = tuple(vars(child)[HASH] for child in node.children)
-            value = hash((type(node).__qualname__, tuple(parameter_values(node).values()), below))
-            object.__setattr__(node, HASH, value)
-    result: int = vars(root)[HASH]
-    return result
+    """Return the hash of a tree; every node caches its own, so a larger tree costs little."""
+
+    def own(node: ProgramNode) -> int:
+        below = tuple(vars(child)[HASH] for child in node.children)
+        return hash((type(node).__qualname__, tuple(parameter_values(node).values()), below))
+
+    return _folded(root, HASH, own)
+
+
+def content_hash_of(root: ProgramNode) -> str:
+    """Return the content hash of a tree, see `blobtree.content_hash`; every node caches its own.
+
+    Parameters at their defaults that texts leave out do not count, so later releases may add some.
+    """
+
+    def own(node: ProgramNode) -> str:
+        kind: Any = type(node)
+        given = {name: value for name, value in _shown_fields(node).items() if name in parameter_values(node)}
+        below = {
+            name: [vars(operand)[CONTENT_HASH] for operand in operands]
+            for name, operands in operands_of(node).items()
+        }
+        return content_hash((kind.content_key(), given, below))
+
+    return _folded(root, CONTENT_HASH, own)
+
+
+def _folded(root: ProgramNode, name: str, own: Callable[[ProgramNode], Cached]) -> Cached:
+    """Return a value of a tree that each node computes from those of its operands, and keeps under a name."""
+    for node in postorder(root, into=lambda node: name not in vars(node)):
+        if name not in vars(node):
+            object.__setattr__(node, name, own(node))
+    value: Cached = vars(root)[name]
+    return value
 
 
 def text_of(root: ProgramNode) -> str:

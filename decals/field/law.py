@@ -8,6 +8,7 @@ functions in which the callees are replaced, so all backends evaluate the same f
 # mypy: disable-error-code="operator, arg-type, return-value, no-any-return"
 # (kernel code is Python only in form: its names have Warp types)
 
+import importlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -21,9 +22,10 @@ from numpy.typing import NDArray
 from blobtree.custom.checks import result_of, shown
 from blobtree.custom.falloff import check_falling, find_rim
 from blobtree.custom.source import CustomSource, custom_source, kind_name
-from blobtree.errors import InvalidDefinition
+from blobtree.errors import InvalidDefinition, UnknownKind
 from blobtree.formulas.falloff import Falloff
 from blobtree.formulas.falloffs import FALLOFF_NAMES
+from blobtree.identity import Value
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.transpile.specialize import rebind, referenced_values, warp_function
 from decals.errors import ImplicitDecalsError, InvalidScene
@@ -180,7 +182,7 @@ _FORMULAS: dict[str, Formulas] = {}
 
 
 @dataclass(frozen=True, eq=False)
-class ContactLaw:
+class ContactLaw(Value):
     """A decal field g and a contact law h in place of the paper's; `define_contact` makes one.
 
     It stands for a contact mode in `evaluate`, `render`, `bake`, `measure` and `Drawing`.
@@ -197,6 +199,8 @@ class ContactLaw:
         Digest of all of that.
     formulas : Formulas
         The formulas of decals with g and h in them.
+    module : str
+        Module that defines g or h.
 
     Examples
     --------
@@ -210,10 +214,34 @@ class ContactLaw:
     base: Contact
     rim: float
     digest: str
-    formulas: Formulas = field(repr=False)
+    formulas: Formulas = field(repr=False, compare=False)
+    module: str = field(default="", repr=False, compare=False)
 
     def __int__(self) -> int:
         return int(self.base)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpickled, (self.name, self.base.name.lower(), self.digest, self.module)
+
+
+def _unpickled(name: str, base: str, digest: str, module: str) -> ContactLaw:
+    """Return the law of this name; import its module first if it is not defined yet."""
+    if name not in LAWS and name in FALLOFF_NAMES:
+        define_contact(name, combine=base)
+    if name not in LAWS and module != "__main__":
+        try:
+            importlib.import_module(module)
+        except ImportError as error:
+            raise UnknownKind(
+                f"contact law {name!r}: module {module!r} cannot be imported: {error}"
+            ) from None
+    if name not in LAWS or LAWS[name].digest != digest:
+        known = "another contact law of this name" if name in LAWS else "none"
+        raise UnknownKind(
+            f"expected the contact law {name!r} of the pickle in this process, got {known}; import the "
+            "module that defines it first"
+        )
+    return LAWS[name]
 
 
 AnyContact = Contact | ContactLaw
@@ -295,7 +323,8 @@ def define_contact(
     }
     own = g_source.digest_with(h_source.digest)
     formulas = _FORMULAS.setdefault(own, Formulas(functions, own))
-    LAWS[kind] = ContactLaw(kind, base, rim, digest, formulas)
+    module = (g_source if law is None else h_source).python.__module__
+    LAWS[kind] = ContactLaw(kind, base, rim, digest, formulas, module)
     return LAWS[kind]
 
 

@@ -8,9 +8,8 @@ Fourier transform computes without noise.
 """
 
 import os
-from copy import copy
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, Float64Array
+from blobtree.identity import Value
+from blobtree.lazy import Lazy
 from decals.errors import InvalidImage, InvalidScene
 from decals.images.load import AnyImage, image_pixels, is_embedded, read_image
 from decals.images.texels import Pixels, linear_premultiplied
@@ -50,7 +51,7 @@ MIN_FACING = 1e-3
 """Least cosine between normal and eye, as in ``shaders/material.glsl``."""
 
 
-class Panorama:
+class Panorama(Value):
     """A picture of all directions in linear light.
 
     Parameters
@@ -82,24 +83,20 @@ class Panorama:
 
     def kept_at(self, path: str | os.PathLike[str]) -> "Panorama":
         """Return this picture with the path of a file that holds it."""
-        kept = copy(self)
-        kept.source = os.fspath(path)
+        kept = object.__new__(type(self))
+        vars(kept).update(vars(self), source=os.fspath(path))
         return kept
 
-    def __eq__(self, other: object) -> bool:
-        same = self is other
-        return same or (isinstance(other, Panorama) and np.array_equal(self.light, other.light))
-
-    def __hash__(self) -> int:
-        return hash(self.light.shape)  # equal panoramas may come from several files
+    def _contents(self) -> Float32Array:
+        return self.light  # equal panoramas may come from several files
 
     def __repr__(self) -> str:
         height, width = self.light.shape[:2]
         return repr(self.source) if self.source else f"<{width} x {height} pixels>"
 
-    @cached_property
+    @Lazy
     def texels(self) -> NDArray[np.float16]:
-        """What ``shaders/image_environment.glsl`` reads: all grids one below the other, and the table."""
+        """Return what ``shaders/image_environment.glsl`` reads: all grids, and the table below them."""
         blocks = [_mirror_grid(panorama_cells(self.light, GRID_ROWS[0]))]
         for level, rows in enumerate(GRID_ROWS[1:], 1):
             blocks.append(lobe_means(panorama_cells(self.light, rows), level_alpha(level)))

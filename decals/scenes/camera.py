@@ -129,7 +129,7 @@ class Camera:
     target: Vector = (0.0, 0.0, 0.0)
     up: Vector = (0.0, 1.0, 0.0)
     fov: float = 30.0
-    fit: Fit | None = field(default=None, repr=False, compare=False)
+    fit: Fit | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("position", "target", "up"):

@@ -10,6 +10,7 @@ import numpy as np
 
 from blobtree._typing import Float32Array, UInt8Array
 from blobtree.files import is_file
+from blobtree.immutable import read_only
 from decals.errors import InvalidImage
 from decals.images.load import AnyImage, image_pixels
 from decals.images.texels import Pixels, as_bytes, decode_srgb, unit_levels, without_excess
@@ -134,7 +135,7 @@ class DecalMaterial(DecalImage):
                     f"{self._name(name)}: expected {shape[1]} x {shape[0]} pixels as the base colour, "
                     f"got {array.shape[1]} x {array.shape[0]}; scale one of them"
                 )
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, None if array is None else read_only(array))
         object.__setattr__(self, "relief", self._checked_relief())
 
     @classmethod

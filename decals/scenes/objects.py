@@ -15,7 +15,7 @@ from blobtree import Node
 from blobtree._typing import Float32Array, Int32Array
 from blobtree.colors import ColorLike, color_rgb
 from blobtree.errors import InvalidNode
-from blobtree.immutable import Immutable
+from blobtree.identity import Value
 from blobtree.lazy import Lazy
 from blobtree.nodes.paths import Path, moved, node_at
 from blobtree.validation import truth
@@ -43,7 +43,7 @@ Box = tuple[Float32Array, Float32Array]
 
 
 @dataclass(frozen=True, eq=False)
-class MeshObject(Immutable):
+class MeshObject(Value):
     """A triangle mesh in a scene.
 
     Parameters
@@ -98,15 +98,15 @@ class MeshObject(Immutable):
     vertices: Float32Array
     faces: Int32Array
     color: Color | BaseColor = CLAY
-    source: str | None = None
+    source: str | None = field(default=None, compare=False)
     crease_angle: float = CREASE_ANGLE
     origin: Origin = None  # type: ignore[assignment]  # filled in by __post_init__
     hidden: Paths = field(default=(), repr=False)
     locked: Paths = field(default=(), repr=False)
     labels: tuple[str, ...] = ()
     named_only: bool = False
-    orientation: MeshOrientation = MeshOrientation.OUTWARD
-    surface: MeshSurface = field(init=False, repr=False)
+    orientation: MeshOrientation = field(default=MeshOrientation.OUTWARD, compare=False)
+    surface: MeshSurface = field(init=False, repr=False, compare=False)
 
     if TYPE_CHECKING:  # lists of numbers and names of colours are converted
 
@@ -164,7 +164,7 @@ class MeshObject(Immutable):
 
 
 @dataclass(frozen=True, eq=False)
-class TreeObject(Immutable):
+class TreeObject(Value):
     """A BlobTree in a scene; its colour is an attribute of its field.
 
     Parameters
@@ -325,7 +325,8 @@ def flagged(item: SceneObject, **changed: Any) -> SceneObject:
     """
     twin = object.__new__(type(item))
     vars(twin).update(vars(item))
-    vars(twin).pop("_shown_part", None)
+    for name in ("_shown_part", "content_hash"):
+        vars(twin).pop(name, None)
     vars(twin).update(changed)
     vars(twin).update(name=checked_name("an object's name", twin.name), **_by_paths(twin))
     return twin

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import decals
+from blobtree.identity import Value
+from blobtree.immutable import read_only
 from blobtree.progress import Progress
 from decals import rendering
 from decals.errors import ImplicitDecalsError, InvalidScene, NoGraphics
@@ -37,7 +39,7 @@ NOTEBOOK_SIZE = (640, 480)
 
 
 @dataclass(frozen=True, eq=False)
-class DecalImage:
+class DecalImage(Value):
     """The picture on a decal: where it comes from, and its pixels.
 
     Parameters
@@ -63,13 +65,13 @@ class DecalImage:
     (2, 2, 4)
     """
 
-    source: str
+    source: str = field(compare=False)
     pixels: Pixels = field(repr=False)
 
     def __post_init__(self) -> None:
         instance("an image's source", self.source, str, InvalidScene, "give a name or a path")
         pixels = require_rgba(f"image {self.source!r}", self.pixels, InvalidScene)
-        object.__setattr__(self, "pixels", pixels)
+        object.__setattr__(self, "pixels", read_only(pixels))
 
     @property
     def is_generated(self) -> bool:
@@ -142,7 +144,7 @@ SHOWN_NAMES = 3
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Scene:
+class Scene(Value):
     """Everything that a picture shows.
 
     Parameters
@@ -194,7 +196,7 @@ class Scene:
     decals: Decals = field(default_factory=Decals.empty)
     images: tuple[DecalImage, ...] = ()
     drawing: rendering.Drawing = field(default_factory=lambda: rendering.Drawing())
-    recipe: Recipe | None = None
+    recipe: Recipe | None = field(default=None, compare=False)
     hidden_decals: Decals = field(default_factory=Decals.empty)
     locked_layers: tuple[int, ...] = ()
     layer_names: dict[int, str] = field(default_factory=dict)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array, Float64Array, Int32Array, UInt8Array
-from blobtree.immutable import Immutable
+from blobtree.identity import Value
 from blobtree.validation import real
 from decals.errors import InvalidMesh
 from decals.images.load import AnyImage, image_pixels
@@ -69,7 +69,7 @@ class Wrap(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class BaseTexture(Immutable):
+class BaseTexture(Value):
     """An image of a surface's base colour.
 
     Parameters
@@ -129,7 +129,7 @@ class BaseTexture(Immutable):
 
 
 @dataclass(frozen=True, eq=False)
-class BaseColor(Immutable):
+class BaseColor(Value):
     """The colours of a mesh under its decals, in linear light.
 
     Colours and coordinates are rows; ``corners`` is the row of each corner of a face. Without it, there is a
@@ -171,7 +171,7 @@ class BaseColor(Immutable):
     textures: tuple[BaseTexture, ...] = ()
     texture_of_face: Int32Array | None = None
     corners: Int32Array | None = None
-    source: str | None = None
+    source: str | None = field(default=None, compare=False)
 
     if TYPE_CHECKING:
 

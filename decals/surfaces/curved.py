@@ -1,5 +1,7 @@
 """Meshes of curved surfaces whose area is that of the surface, not that of the triangles."""
 
+from typing import Any
+
 import numpy as np
 
 from blobtree import Mesh
@@ -21,10 +23,21 @@ class CurvedMesh(MeshSurface):
         super().__init__(mesh.vertices, mesh.faces, device=device, orientation=MeshOrientation.KEEP)
         self._cumulative = np.cumsum(_curved_areas(mesh)[self.sound])
 
-    def _connected(self, _triangles: Triangles, _rule: MeshOrientation) -> tuple[Int64Array, Windings]:
-        """Return each vertex as its own, and no faces to turn: the mesh is closed and winds alike."""
+    def _same_vertices(self) -> Int64Array:
+        """Return each vertex as its own."""
+        return np.arange(len(self.vertices))
+
+    def _windings(self, _triangles: Triangles, _rule: MeshOrientation) -> Windings:
+        """Return no faces to turn: the mesh is closed and winds alike."""
         none = np.zeros(len(self.faces), np.bool_)
-        return np.arange(len(self.vertices)), Windings(none, none, none, 0, 0)
+        return Windings(none, none, none, 0, 0)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return super().__getstate__() | {"areas": self._cumulative}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        self._cumulative = state["areas"]
 
 
 def _curved_areas(mesh: Mesh) -> Float64Array:

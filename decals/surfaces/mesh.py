@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import known_device, launch
-from blobtree.immutable import Immutable
+from blobtree.identity import Value
 from blobtree.lazy import Lazy
 from blobtree.validation import point_array
 from decals.errors import InvalidMesh, InvalidScattering
@@ -47,7 +47,7 @@ R2_STEPS = np.array([0.7548776662466927, 0.5698402909980532])
 """Steps of the R2 sequence (Roberts 2018): powers of the inverse of the plastic number."""
 
 
-class MeshSurface(Immutable):
+class MeshSurface(Value):
     """Triangle mesh as a `Surface`, with a bounding volume hierarchy for all queries.
 
     Degenerate faces and copies of other faces are allowed, but get no samples and no projected points. Faces
@@ -102,25 +102,52 @@ class MeshSurface(Immutable):
         self.vertices = _as_vertices(vertices)
         self.faces = _as_faces(faces, len(self.vertices))
         triangles = Triangles.of(self.vertices, self.faces)
-        self._welded, windings = self._connected(triangles, rule)
+        self._welded = self._same_vertices()
+        windings = self._windings(triangles, rule)
         if rule is not MeshOrientation.KEEP:  # else they were reported when they were read
             windings.report()
         turned = np.flatnonzero(windings.turned)
         self.faces[turned] = self.faces[turned][:, ::-1]
-        self.sound, normals, areas = _sound_faces(triangles.turned(turned), windings.copies)
+        triangles = triangles.turned(turned)
+        self._take_sound(_sound_faces(triangles, windings.copies), triangles)
         self._one_sided = windings.one_sided[self.sound]
-        self._corners = corners = np.ascontiguousarray(self.faces[self.sound])
-        self._cumulative = np.cumsum(areas)
-        self._normals = normals
+
+    def _take_sound(self, sound: Int64Array, triangles: Triangles) -> None:
+        """Compute what follows from the arrays and the rows of the faces that have a normal."""
+        self.sound = sound
+        self._corners = corners = np.ascontiguousarray(self.faces[sound])
+        doubled = np.linalg.norm(triangles.crosses[sound], axis=1)
+        self._normals = (triangles.crosses[sound] / doubled[:, None]).astype(np.float32)
+        self._cumulative = np.cumsum(0.5 * doubled)
         used = self.vertices[corners]
         self._bounds = used.min(axis=(0, 1)), used.max(axis=(0, 1))
         for array in (self.vertices, self.faces, *self._bounds):
             make_read_only(array)
 
-    def _connected(self, triangles: Triangles, rule: MeshOrientation) -> tuple[Int64Array, Windings]:
-        """Return the first vertex at the position of each, and how faces are to wind."""
-        same = welded(self.vertices)
-        return same, wind(self.faces, same, triangles, rule)
+    def _same_vertices(self) -> Int64Array:
+        """Return the first vertex at the position of each."""
+        return welded(self.vertices)
+
+    def _windings(self, triangles: Triangles, rule: MeshOrientation) -> Windings:
+        """Return how faces are to wind."""
+        return wind(self.faces, self._welded, triangles, rule)
+
+    def _contents(self) -> dict[str, Any]:
+        return {"vertices": self.vertices, "faces": self.faces}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what the other arrays follow from."""
+        sound = np.zeros(len(self.faces), np.bool_)
+        sound[self.sound] = True
+        marks = {"sound": np.packbits(sound), "one_sided": np.packbits(self._one_sided)}
+        return {"vertices": self.vertices, "faces": self.faces, "device": self.device, **marks}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.vertices, self.faces, self.device = state["vertices"], state["faces"], state["device"]
+        self._welded = self._same_vertices()
+        sound = np.flatnonzero(np.unpackbits(state["sound"], count=len(self.faces)))
+        self._take_sound(sound, Triangles.of(self.vertices, self.faces))
+        self._one_sided = np.unpackbits(state["one_sided"], count=len(sound)).astype(np.bool_)
 
     def __repr__(self) -> str:
         return f"MeshSurface({len(self.vertices)} vertices, {len(self.faces)} faces)"
@@ -326,8 +353,8 @@ def _as_faces(faces: ArrayLike, vertex_count: int) -> Int32Array:
     return np.array(indices, dtype=np.int32, order="C")
 
 
-def _sound_faces(triangles: Triangles, copies: BoolArray) -> tuple[Int64Array, Float32Array, Float64Array]:
-    """Return the rows of the faces that have a normal and are no copies, their unit normals and areas."""
+def _sound_faces(triangles: Triangles, copies: BoolArray) -> Int64Array:
+    """Return the rows of the faces that have a normal and are no copies."""
     a, b, c = np.moveaxis(triangles.corners, 1, 0)
     doubled = np.linalg.norm(triangles.crosses, axis=1)
     edges = sum(np.einsum("ij,ij->i", edge, edge) for edge in (b - a, c - a, c - b))
@@ -336,8 +363,7 @@ def _sound_faces(triangles: Triangles, copies: BoolArray) -> tuple[Int64Array, F
         raise InvalidMesh(
             f"expected a mesh with area, got {len(copies)} degenerate faces; check its units and its indices"
         )
-    normals = (triangles.crosses[sound] / doubled[sound, None]).astype(np.float32)
-    return np.flatnonzero(sound), normals, 0.5 * doubled[sound]
+    return np.flatnonzero(sound)
 
 
 def _is_closed(vertices: Float32Array, faces: Int32Array) -> bool:

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from blobtree._typing import Float32Array, Int32Array
-from blobtree.immutable import Immutable
+from blobtree.identity import Value
 from decals.images.texels import decode_srgb
 from decals.surfaces.base_color import CLAY, NO_TEXTURE, BaseColor, BaseTexture
 
 
 @dataclass(frozen=True, eq=False)
-class MeshData(Immutable):
+class MeshData(Value):
     """The arrays of a mesh on their way from a file or another library to an object.
 
     Attributes

@@ -19,8 +19,8 @@ NAMES = [
     "Camera", "Contact", "ContactLaw", "DecalImage", "DecalMaterial", "Decals", "ImageMapping",
     "ImplicitDecalsError",
     "Interaction", "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__",
-    "animate", "bake", "cover", "define_contact", "displace", "edit", "evaluate", "export", "load_image",
-    "load_model",
+    "animate", "bake", "content_hash", "cover", "define_contact", "displace", "edit", "evaluate", "export",
+    "load_image", "load_model",
     "load_scene", "measure", "pose", "render", "save_html", "save_scene", "scatter", "shader", "show", "skin",
     "turntable",
 ]  # fmt: skip
