@@ -1,45 +1,65 @@
-// A mesh with decals in a page, behind the code of decals (decals/pages/contents.py). PICK: the number of the decal
-// at a pixel, in place of its colour. MATERIAL_LIGHT: some decals have materials.
-in vec3 position;
-in vec3 normal;
-in vec3 light;  // linear base colour
-uniform bool lit;
-out vec4 color;
+// The picture of a page: decals and light on the surfaces that gbuffer.glsl holds, behind the code of decals
+// (decals/pages/programs.py). PICK: the number of the decal at one pixel in its place. Slots as those of light_pass.glsl.
+//@ include camera.glsl
+uniform sampler2D g_position;
+uniform sampler2D g_normal;
+uniform sampler2D g_color;
+uniform isampler2D object_masks;  // see decals/receivers.py
+
+void receive(vec4 position) {
+    int object = int(position.w) - 1;
+    decal_surface_receivers = texelFetch(object_masks, ivec2(object & 4095, object >> 12), 0).x;
+}
 #ifdef PICK
+uniform ivec2 corner;  // the pixel
+layout(location = 0) out int number;
 
 void main() {
-    float field;
-    vec2 uv;
-    int number = decal_owner(position, normal, field, uv) + 1;
-    color = vec4(number & 255, number >> 8 & 255, number >> 16, 255) / 255.0;
+    vec4 position = texelFetch(g_position, corner, 0);
+    number = -1;
+    if (position.w > 0.0) {
+        float field;
+        vec2 uv;
+        receive(position);
+        number = decal_owner(position.xyz, texelFetch(g_normal, corner, 0).xyz, field, uv);
+    }
 }
 #else
 //@ include color.glsl
 //@ include footprint.glsl
+layout(location = 0) out vec4 color;  // sRGB, premultiplied
+
 //@ slot material optional
-//@ include studio_shade.glsl
+
+//@ slot lighting
 
 void main() {
-    vec3 outside = normal / max(length(normal), 1e-30);
-    vec3 ray = ray_direction(gl_FragCoord.xy);
-    vec3 right = surface_step(position, outside, ray, ray_right.xyz);
-    vec3 up = surface_step(position, outside, ray, ray_up.xyz);
-    decal_Material decals = decal_material(position, outside, right, up);
-    vec3 albedo = light * (1.0 - decals.color.a) + decals.color.rgb;
-    if (!lit) {
-        color = vec4(to_srgb(albedo), 1.0);
+    ivec2 texel = ivec2(gl_FragCoord.xy);
+    vec4 position = texelFetch(g_position, texel, 0);
+    color = vec4(0.0);
+#ifdef ENVIRONMENT_SHOWN
+    color = vec4(to_srgb(environment_behind(texel)), 1.0);
+#endif
+    if (position.w <= 0.0) {
         return;
     }
-    vec3 toward_eye = -normalize(ray);
-    float side = gl_FrontFacing ? 1.0 : -1.0;
-    vec3 seen = clamp(shade(albedo, visible_normal(side * outside, toward_eye), toward_eye, 1.0), 0.0, 1.0);
+    receive(position);
+    vec4 normal = texelFetch(g_normal, texel, 0);
+    vec3 ray = ray_direction(vec2(texel) + 0.5);
+    vec3 right = surface_step(position.xyz, normal.xyz, ray, ray_right.xyz);
+    vec3 up = surface_step(position.xyz, normal.xyz, ray, ray_up.xyz);
+    decal_Material decals = decal_material(position.xyz, normal.xyz, right, up);
+    vec3 albedo = texelFetch(g_color, texel, 0).rgb * (1.0 - decals.color.a) + decals.color.rgb;
+    vec3 light = lit_color(texel, position.xyz, normal.w * normal.xyz, albedo);
 #ifdef MATERIAL_LIGHT
-    float roughness = max(decals.roughness, MIN_ROUGHNESS);
-    vec3 emission = decals.emission / max(decals.part, 1e-4);
-    Material material = Material(
-        albedo, side * decals.normal, roughness, decals.metallic, decals.occlusion, emission);
-    seen = mix(seen, shade_material(material, toward_eye, 1.0), min(decals.part, 1.0));
+    float part = min(decals.part, 1.0);
+    if (part > 0.0) {
+        float roughness = max(decals.roughness, MIN_ROUGHNESS);
+        Material material = Material(
+            albedo, normal.w * decals.normal, roughness, decals.metallic, decals.occlusion, decals.emission / part);
+        light = mix(light, material_color(texel, position.xyz, normal.w * normal.xyz, material), part);
+    }
 #endif
-    color = vec4(to_srgb(seen), 1.0);
+    color = vec4(to_srgb(light), 1.0);
 }
 #endif

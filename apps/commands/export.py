@@ -75,6 +75,7 @@ def export(
     contact: ContactName = None,
     stiffness: Stiffness = None,
     mapping: MappingName = None,
+    surface: Annotated[Literal["mesh", "traced"] | None, Parameter(show_default=False)] = None,
     resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None,
     creases: Annotated[bool, Parameter(negative=())] = False,
     crease_angle: CreaseAngle = None,
@@ -115,6 +116,8 @@ def export(
         Stiffness of elastic contact, as for render.
     mapping
         Image mapping, as for render.
+    surface
+        How a page shows implicit objects: as a mesh (default) or traced, which is exact and slower.
     resolution
         Cells along the longest side of each implicit object. Default: 64.
     creases
@@ -149,7 +152,12 @@ def export(
         if output.suffix.lower() in SUFFIXES:
             if in_file or attributes or instances or check:
                 raise InvalidInput("export: a page takes no options of mesh files; leave them out")
-            save_html(loaded, output, resolution=resolution, progress=progress, **modes)
+            shown = given(surface=surface)
+            save_html(loaded, output, resolution=resolution, progress=progress, **shown, **modes)
+        elif surface is not None:
+            raise InvalidInput(
+                f"--surface: expected an output that ends in {' or '.join(SUFFIXES)}, got {str(output)!r}"
+            )
         else:
             checks = export_scene(
                 loaded,

@@ -9,6 +9,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+KINDS = {"float32": "Float32", "float16": "Uint16", "int32": "Int32", "int16": "Int16", "uint8": "Uint8"}
+"""Beginnings of JavaScript's names of arrays; half floats go to the graphics card by their bits."""
+
 LEVEL = 9
 """Effort of the compression: pages are written once and read often."""
 
@@ -36,7 +39,12 @@ def packed(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str
         places = given.view(np.uint8).reshape(-1, width).T
         parts.append(places.tobytes())
         directory.append(
-            {"name": name, "kind": array.dtype.name, "count": array.size, "differences": bool(differences)}
+            {
+                "name": name,
+                "kind": KINDS[array.dtype.name],
+                "count": array.size,
+                "differences": bool(differences),
+            }
             | {"width": width}
         )
     text = msgspec.json.encode({**header, "arrays": directory})

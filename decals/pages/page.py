@@ -4,7 +4,7 @@ import base64
 import html
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
@@ -29,12 +29,12 @@ from decals.scenes.cover import as_scene
 from decals.scenes.objects import SceneObject
 from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model
-from decals.validation import checked_path, describe
+from decals.validation import checked_path, describe, one_of
 
 MODULES = (
-    "vectors", "packing", "index", "decals", "camera", "meshes", "link", "painter", "controls", "pointer",
-    "viewer",
-)  # fmt: skip
+    *("vectors", "packing", "texels", "index", "decals", "history", "camera", "link", "graphics", "painter"),
+    *("files", "commands", "controls", "pointer", "viewer"),
+)
 """Modules of the viewer, each after those that it imports."""
 
 PICTURE_SIZE = 480, 360
@@ -45,6 +45,9 @@ PICTURE_QUALITY = 85
 
 NOTEBOOK_HEIGHT = 520
 """Height of a page in a notebook, in pixels."""
+
+SURFACES = "mesh", "traced"
+"""Ways to show trees."""
 
 SUFFIXES = ".html", ".htm"
 """Ends of the names of pages."""
@@ -106,6 +109,7 @@ def page(
     alt: str | None = None,
     controls: bool = True,
     background: Background | ColorLike | None = None,
+    surface: str = "mesh",
     resolution: int | None = None,
     contact: Contact | str | None = None,
     stiffness: float | None = None,
@@ -116,13 +120,13 @@ def page(
 
     Decals can be picked, dragged, turned, scaled, added and deleted there; their neighbours yield at once. A
     link keeps the state, and the scene can be saved as a file for `decals.load_scene`. The page needs WebGL 2
-    and shows a picture without it. Its light is that of the studio, without the shade of corners.
+    and shows a picture without it.
 
     Parameters
     ----------
     scene : Scene, SceneObject or Model
         A scene; or a model as `decals.cover` takes it, a list of such models, or the path of a model or a
-        scene. Trees are shown as meshes.
+        scene.
     title : str, optional
         Title of the page. Default: names of the objects.
     alt : str, optional
@@ -131,8 +135,11 @@ def page(
         False leaves out the buttons. Mouse, touch and keys stay.
     background : Background or colour, optional
         In place of that of the scene.
+    surface : str
+        How trees are shown: as ``"mesh"``, which any device draws fast, or ``"traced"`` as `decals.render`
+        does, which is exact.
     resolution : int, optional
-        Cells along the longest side of trees, as for `blobtree.polygonize`.
+        Cells along the longest side of trees that are meshes, as for `blobtree.polygonize`.
     contact, stiffness, mapping : optional
         Modes, as for `decals.render`. Default: those of the scene.
     progress : callable, optional
@@ -166,21 +173,21 @@ def page(
     names = ", ".join(item.name for item in given.objects)
     title = _text("title", title, names or "Decals")
     alt = _text("alt", alt, f"{names} with {len(given.decals)} decals")
-    shown = {"title": title, "alt": alt, "controls": truth("controls", controls, InvalidScene)}
+    truth("controls", controls, InvalidScene)
+    one_of("surface", surface, SURFACES, InvalidScene)
     sky = drawing.background if background is None else as_background(background)
     with reporting(progress) as report:
-        header, arrays = page_contents(given, background=sky, resolution=resolution, report=report)
-    slots = {
-        "TITLE": html.escape(title),
-        "ALT": html.escape(alt),
-        "PICTURE": _picture(given),
-        "STYLE": (VIEWER / "page.css").read_text(encoding="utf-8"),
-        "SCRIPT": _inline(viewer_script()),
-        "DATA": (data := packed({**header, **shown}, arrays)),
-    }
-    parts = SLOT.split((VIEWER / "page.html").read_text(encoding="utf-8"))
-    parts[1::2] = [slots[name] for name in parts[1::2]]
-    return Page("".join(parts), data, title)
+        header, arrays = page_contents(
+            given, traced=surface == "traced", resolution=resolution, report=report
+        )
+    texts = {"TITLE": html.escape(title), "ALT": html.escape(alt)}
+    modes = "".join(f"<option>{mode}</option>" for mode in header["shaders"]["modes"])
+    markup = _filled("controls.html", {**texts, "MODES": modes, "BACKGROUND": _gradient(sky)})
+    data = packed({**header, "markup": markup, "controls": controls}, arrays)
+    style, start = (_read(name) for name in ("page.css", "start.js"))
+    script = _inline(viewer_script()) + start
+    slots = {**texts, "PICTURE": _picture(given), "STYLE": style, "SCRIPT": script, "DATA": data}
+    return Page(_filled("page.html", slots), data, title)
 
 
 def save_html(
@@ -203,7 +210,7 @@ def save_html(
 @cache
 def viewer_script() -> str:
     """Return the viewer as one ES module that exports `mount`."""
-    texts = [(VIEWER / f"{name}.mjs").read_text(encoding="utf-8") for name in MODULES]
+    texts = [_read(f"{name}.mjs") for name in MODULES]
     lines = "".join(texts).splitlines()
     kept = [line.removeprefix("export ") for line in lines if not line.startswith("import ")]
     return "\n".join([*kept, "export { mount };", ""])
@@ -211,7 +218,29 @@ def viewer_script() -> str:
 
 def _inline(module: str) -> str:
     """Return a module as a classic script: browsers load no modules from files."""
-    return f"const {{ mount }} = (() => {{\n{module.replace('export { mount };', 'return { mount };')}}})();"
+    return (
+        f"const {{ mount }} = (() => {{\n{module.replace('export { mount };', 'return { mount };')}}})();\n"
+    )
+
+
+def _read(name: str) -> str:
+    """Return a file of the viewer."""
+    return (VIEWER / name).read_text(encoding="utf-8")
+
+
+def _filled(name: str, slots: Mapping[str, str]) -> str:
+    """Return a file of the viewer with its slots filled."""
+    parts = SLOT.split(_read(name))
+    parts[1::2] = [slots[slot] for slot in parts[1::2]]
+    return "".join(parts)
+
+
+def _gradient(background: Background) -> str:
+    """Return a background as a value of CSS."""
+    colors = []
+    for *rgb, alpha in (background.top, background.bottom):
+        colors.append(f"rgb({' '.join(f'{100 * level:.4g}%' for level in rgb)} / {alpha:.4g})")
+    return f"linear-gradient({', '.join(colors)})"
 
 
 def _text(name: str, value: Any, default: str) -> str:

@@ -19,9 +19,8 @@ class SharedTexture:
 
     def __init__(self, context: Context, image: BaseTexture) -> None:
         self._users = 0
-        pixels = _within(image.pixels, context.max_texture_size)
-        height, width = pixels.shape[:2]
-        texels = np.dstack([pixels[::-1], np.full((height, width), 255, np.uint8)])
+        texels = texels_within(image.pixels, context.max_texture_size)
+        height, width = texels.shape[:2]
         self.texture = context.gl.texture((width, height), 4, texels.tobytes(), internal_format=_SRGB8_ALPHA8)
         self.texture.repeat_x, self.texture.repeat_y = (mode is Wrap.REPEAT for mode in image.wrap)
         self.mirrored = tuple(mode is Wrap.MIRROR for mode in image.wrap)
@@ -64,11 +63,11 @@ WHITE_TEXTURE = BaseTexture(np.full((1, 1, 3), 255, np.uint8))
 """Texture of faces without one."""
 
 
-def _within(pixels: UInt8Array, limit: int) -> UInt8Array:
-    """Return an image that is scaled down if a side is longer than the limit."""
+def texels_within(pixels: UInt8Array, limit: int) -> UInt8Array:
+    """Return an image as opaque texels, the lowest row first, with sides of a limit at most."""
     height, width = pixels.shape[:2]
-    if max(height, width) <= limit:
-        return pixels
-    scale = limit / max(height, width)
-    size = max(1, int(width * scale)), max(1, int(height * scale))
-    return np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX))
+    if max(height, width) > limit:
+        scale = limit / max(height, width)
+        width, height = max(1, int(width * scale)), max(1, int(height * scale))
+        pixels = np.asarray(Image.fromarray(pixels).resize((width, height), Image.Resampling.BOX))
+    return np.dstack([pixels[::-1], np.full((height, width), 255, np.uint8)])

@@ -134,6 +134,14 @@ def light_variant(
 
 def light_program(context: Context, file: str, *, materials: bool, relief: bool, shown: bool) -> Program:
     """Return the program of a kind of light, by its shader file; ``shown``: the environment is visible."""
+    slots, defines = light_text(file, materials=materials, relief=relief, shown=shown)
+    return attach_camera(context.pixel_program(BODY, 1, slots=slots, defines=defines))
+
+
+def light_text(
+    file: str, *, materials: bool, relief: bool, shown: bool
+) -> tuple[dict[str, str], dict[str, str | bool]]:
+    """Return the slots and the definitions of the shader of a kind of light."""
     slots, image = {"lighting": f"//@ include {file}"}, file == IMAGE_LIGHT
     if materials or image:
         kind, constants = ("image", environment_constants()) if image else ("studio", studio_constants())
@@ -146,7 +154,7 @@ def light_program(context: Context, file: str, *, materials: bool, relief: bool,
         "RELIEF": relief,
         "ENVIRONMENT_SHOWN": shown,
     }
-    return attach_camera(context.pixel_program(BODY, 1, slots=slots, defines=defines))
+    return slots, defines
 
 
 def _use_lights(program: Program, lights: Lighting) -> None:

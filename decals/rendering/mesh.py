@@ -17,7 +17,7 @@ from decals.rendering.rest_buffer import RestBuffer
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
 from decals.rendering.warmup import SHADERS, WarmupPlan, WarmupTask
 from decals.shaders import compose
-from decals.surfaces.base_color import NO_TEXTURE, BaseColor
+from decals.surfaces.base_color import BaseColor
 from decals.surfaces.normals import (
     CREASE_ANGLE,
     SplitMesh,
@@ -199,18 +199,12 @@ def _by_texture(
     context: Context, faces: Int32Array, color: BaseColor
 ) -> tuple[Int32Array, list[_TexturedFaces]]:
     """Return faces in the order of their textures, and those of each texture."""
-    of_face = np.zeros(len(faces), np.int32) if color.texture_of_face is None else color.texture_of_face
-    order = np.argsort(of_face, kind="stable")
-    numbers, starts = np.unique(of_face[order], return_index=True)
-    parts = [
-        _TexturedFaces(
-            int(start),
-            int(end),
-            shared_texture(context, WHITE_TEXTURE if number == NO_TEXTURE else color.textures[number]),
-        )
-        for number, start, end in zip(numbers, starts, [*starts[1:], len(faces)], strict=True)
+    ordered, parts = color.by_texture(faces)
+    shared = [
+        _TexturedFaces(first, last, shared_texture(context, texture or WHITE_TEXTURE))
+        for first, last, texture in parts
     ]
-    return faces[order], parts
+    return ordered, shared
 
 
 def _base_color(mesh: ColoredMesh, split: SplitMesh) -> BaseColor | None:

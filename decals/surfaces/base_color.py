@@ -349,6 +349,15 @@ class BaseColor(Value):
             corners=None if self.corners is None else self.corners[faces],
         )
 
+    def by_texture(self, faces: Int32Array) -> tuple[Int32Array, list[tuple[int, int, BaseTexture | None]]]:
+        """Return faces in the order of their textures, and first and last number of those of each texture."""
+        of_face = np.zeros(len(faces), np.int32) if self.texture_of_face is None else self.texture_of_face
+        order = np.argsort(of_face, kind="stable")
+        numbers, starts = np.unique(of_face[order], return_index=True)
+        ends = [*starts.tolist()[1:], len(faces)]
+        textures = [None if number == NO_TEXTURE else self.textures[number] for number in numbers]
+        return faces[order], list(zip(starts.tolist(), ends, textures, strict=True))
+
     @property
     def held_arrays(self) -> list[NDArray[Any] | None]:
         """All arrays, by which memory is counted."""

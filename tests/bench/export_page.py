@@ -55,7 +55,7 @@ def measure(*, quick: bool) -> dict[str, float]:
 
 
 async def _measured(*, quick: bool) -> dict[str, float]:
-    shares = [share async for share in browser.shares(modes=1 if quick else None)]
+    shares = [share async for _, share in browser.shares("chromium", quick=quick)]
     small = sphere_scene(100 if quick else 1000, faces=10_000 if quick else 100_000)
     many = sphere_scene(500 if quick else 10_000, faces=10_000 if quick else 100_000)
     figures: dict[str, float] = {"html_pixels_equal": min(shares), "html_pixel_cases": len(shares)}

@@ -37,6 +37,11 @@ def browser_path() -> str | None:
     return next((path for path in map(shutil.which, NAMES) if path), None)
 
 
+def firefox_path() -> str | None:
+    """Where Firefox is installed."""
+    return next((path for path in map(shutil.which, ("firefox", "firefox-esr")) if path), None)
+
+
 @asynccontextmanager
 async def opened(url: str, *, size: tuple[int, int] = SIZE, ends: bool = False) -> AsyncIterator[Page]:
     """A page in a browser without a screen, which must end without an error; its server may end before.

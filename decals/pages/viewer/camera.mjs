@@ -1,4 +1,4 @@
-// A perspective camera that turns about its target. Matrices are columns first, as WebGL takes them.
+// A perspective camera that turns about its target.
 import { add, cross, dot, length, scaled, subtract, tangential, turned, unit } from "./vectors.mjs";
 
 const NEAREST = 1e-4; // least distance of the near plane over that of the far one
@@ -20,77 +20,74 @@ export class Camera {
     return { position: this.position, target: this.target };
   }
 
-  // Unit vectors to the right, up, and toward the eye.
+  // Unit vectors to the right, up, and along the view.
   get axes() {
-    const back = unit(subtract(this.position, this.target));
-    const right = unit(cross(this.up, back));
-    return [right, cross(back, right), back];
+    const ahead = unit(subtract(this.target, this.position));
+    const right = unit(cross(ahead, this.up));
+    return [right, cross(right, ahead), ahead];
   }
 
   // Tangent of half the vertical angle of view; narrow pictures show as much from left to right as wide ones.
   half(aspect) {
     const half = Math.tan((this.fov * Math.PI) / 360);
-    return aspect >= this.referenceAspect ? half : (half * this.referenceAspect) / aspect;
+    return half * Math.max(1, this.referenceAspect / aspect);
   }
 
-  matrix(aspect) {
-    const [right, up, back] = this.axes;
-    const [near, far] = this.range();
-    const focal = 1 / this.half(aspect);
-    const view = [right, up, back].map((axis) => [...axis, -dot(axis, this.position)]);
-    const depth = [(far + near) / (near - far), (2 * far * near) / (near - far)];
-    const columns = [];
-    for (let i = 0; i < 4; i++) {
-      const z = view[2][i];
-      columns.push((view[0][i] * focal) / aspect, view[1][i] * focal);
-      columns.push(z * depth[0] + (i === 3 ? depth[1] : 0), -z);
-    }
-    return columns;
+  // From the middle of the picture to its right and its upper edge at distance 1, and along the view.
+  frame(aspect) {
+    const [right, up, ahead] = this.axes;
+    return [scaled(right, this.half(aspect) * aspect), scaled(up, this.half(aspect)), ahead];
   }
 
   // Distances of the near and the far plane, which enclose the model.
-  range() {
-    const back = this.axes[2];
-    const depths = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => {
-      const corner = [0, 1, 2].map((axis) => this.bounds[(k >> axis) & 1][axis]);
-      return dot(subtract(this.position, corner), back);
-    });
-    const far = Math.max(...depths) * 1.01;
+  range(ahead) {
+    const [low, high] = this.bounds;
+    const middle = dot(ahead, subtract(scaled(add(low, high), 0.5), this.position));
+    const reach = 0.5 * dot(ahead.map(Math.abs), subtract(high, low));
+    const far = 1.01 * (middle + reach);
     if (!(far > 0)) return [NEAREST * this.size, this.size];
-    return [Math.max(Math.min(...depths) * 0.99, far * NEAREST), far];
+    return [Math.max(0.99 * (middle - reach), far * NEAREST), far];
   }
 
-  // The four vectors of the uniform block of camera.glsl behind its matrix, for a picture of some pixels.
-  rays(width, height) {
-    const [right, up, back] = this.axes;
-    const pixel = (2 * this.half(width / height)) / height;
-    const corner = subtract(scaled(right, (-pixel * width) / 2), add(back, scaled(up, (pixel * height) / 2)));
-    return [this.position, corner, scaled(right, pixel), scaled(up, pixel)];
+  // The uniform block of camera.glsl for a picture of some pixels that is shifted by parts of one.
+  block(width, height, [x, y] = [0, 0]) {
+    const [right, up, ahead] = this.frame(width / height);
+    const [near, far] = this.range(ahead);
+    const rows = [scaled(right, 1 / dot(right, right)), scaled(up, 1 / dot(up, up)), ahead].map((axis) => [
+      ...axis,
+      -dot(axis, this.position),
+    ]);
+    const columns = [0, 1, 2, 3].flatMap((i) => {
+      const [across, upward, depth] = rows.map((row) => row[i]);
+      const z = ((far + near) * depth - (i === 3 ? 2 * far * near : 0)) / (far - near);
+      return [across - (2 * x * depth) / width, upward - (2 * y * depth) / height, z, depth];
+    });
+    const [column, row] = [scaled(right, 2 / width), scaled(up, 2 / height)];
+    const edge = subtract(subtract(ahead, right), up);
+    const corner = add(edge, add(scaled(column, x), scaled(row, y)));
+    return new Float32Array([...columns, ...this.position, 1, ...corner, 0, ...column, 0, ...row, 0]);
   }
 
   // The direction from the eye through a place of the picture, from −1 to 1 to the right and upward.
   direction(x, y, aspect) {
-    const [right, up, back] = this.axes;
-    const half = this.half(aspect);
-    return unit(subtract(add(scaled(right, x * half * aspect), scaled(up, y * half)), back));
+    const [right, up, ahead] = this.frame(aspect);
+    return unit(add(ahead, add(scaled(right, x), scaled(up, y))));
   }
 
   // Where a point is seen, from −1 to 1; null behind the eye.
   seen(point, aspect) {
-    const [right, up, back] = this.axes;
+    const [right, up, ahead] = this.frame(aspect);
     const from = subtract(point, this.position);
-    const depth = -dot(from, back);
-    const half = this.half(aspect);
-    return depth <= 0 ? null : [dot(from, right) / (depth * half * aspect), dot(from, up) / (depth * half)];
+    const depth = dot(from, ahead);
+    return depth <= 0 ? null : [right, up].map((edge) => dot(from, edge) / (dot(edge, edge) * depth));
   }
 
   // Turn about the target, by angles to the right and upward.
   orbit(right, up) {
     const offset = turned(subtract(this.position, this.target), this.up, -right);
-    const axis = unit(cross(this.up, offset));
-    const raised = turned(offset, axis, -up);
-    const steep = Math.abs(dot(unit(raised), this.up)) > STEEPEST;
-    this.position = add(this.target, steep ? offset : raised);
+    const raised = turned(offset, unit(cross(this.up, offset)), -up);
+    const isSteep = Math.abs(dot(unit(raised), this.up)) > STEEPEST;
+    this.position = add(this.target, isSteep ? offset : raised);
   }
 
   // Move the picture by parts of its height.
@@ -98,8 +95,7 @@ export class Camera {
     const [right, up] = this.axes;
     const step = 2 * this.half(this.referenceAspect) * length(subtract(this.position, this.target));
     const move = add(scaled(right, -x * step), scaled(up, -y * step));
-    this.position = add(this.position, move);
-    this.target = add(this.target, move);
+    this.place({ position: add(this.position, move), target: add(this.target, move) });
   }
 
   zoom(factor) {
@@ -111,7 +107,6 @@ export class Camera {
   // The direction that is upward in the picture, along a surface.
   upAlong(normal) {
     const [right, up] = this.axes;
-    const along = Math.abs(dot(up, normal)) < STEEPEST ? up : right;
-    return tangential(along, normal);
+    return tangential(Math.abs(dot(up, normal)) < STEEPEST ? up : right, normal);
   }
 }

@@ -47,6 +47,8 @@ def test_a_page_takes_no_options_of_meshes(saved: Path, capsys: Capture) -> None
     assert run(["export", "scene.json", "-o", "b.html", "--unit", "inch"]) == 2
     assert "a page takes no options of mesh files" in capsys.readouterr().err
     assert not (saved / "b.html").exists()
+    assert run(["export", "scene.json", "-o", "b.ply", "--surface", "traced"]) == 2
+    assert not (saved / "b.ply").exists()
 
 
 def test_check_prints_a_table_for_written_objects_and_for_files(saved: Path, capsys: Capture) -> None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import decals
-from blobtree import Point
+from blobtree import Point, Segment
 from decals.errors import InvalidScene, TooMuchData
 from decals.hosts.code import Form
 from decals.index import DecalIndex
@@ -27,6 +27,7 @@ from decals.pages.page import MODULES
 from decals.rendering import Environment
 from decals.scenes.camera import REFERENCE_ASPECT
 from decals.scenes.scene import Scene
+from decals.surfaces import BaseColor, BaseTexture
 from tests.decals.pages.test_viewer_index import rows_of
 from tests.decals.pages.viewer_scripts import VIEWER, needs_node, node, run_node
 
@@ -70,17 +71,55 @@ def test_a_page_is_whole_and_asks_no_host(text: str) -> None:
 def test_texts_are_escaped(text: str) -> None:
     assert NAME not in text
     assert "<title>&lt;/script&gt;" in text
-    assert header_of(text)["title"] == NAME
+    assert "Tools of &lt;/script&gt;" in header_of(text)["markup"]
 
 
 def test_options_reach_the_page(scene: Scene) -> None:
     shown = page(scene, title="Ball", alt="A ball", controls=False, background="white", resolution=16)
     header = header_of(shown.text)
-    assert (header["title"], header["alt"], header["controls"]) == ("Ball", "A ball", False)
-    assert header["background"]["top"] == [1.0, 1.0, 1.0, 1.0]
+    assert header["controls"] is False
+    assert 'aria-label="A ball"' in header["markup"]
+    assert 'aria-label="Tools of Ball"' in header["markup"]
+    assert "linear-gradient(rgb(100% 100% 100% / 1), rgb(100% 100% 100% / 1))" in header["markup"]
     assert shown.title == "Ball"
     assert 'title="Ball"' in shown._repr_html_()
     assert header_of(page(scene, contact="radial", stiffness=3.0, resolution=16).text)["mode"] == "radial"
+
+
+def test_a_traced_page_has_trees_and_no_meshes_of_them(scene: Scene) -> None:
+    header = header_of(page(scene, surface="traced").text)
+    assert [surface["program"] for surface in header["surfaces"]] == ["tree 0"]
+    assert not [array["name"] for array in header["arrays"] if array["name"].startswith("faces")]
+    (item,) = scene.objects
+    assert isinstance(item, decals.TreeObject)
+    assert np.allclose(header["bounds"], item.tree.support)
+    with pytest.raises(InvalidScene, match="surface: expected one of"):
+        page(scene, surface="solid")
+
+
+def test_trees_of_the_same_kinds_share_a_program() -> None:
+    balls = [Point((3.0 * i, 0, 0), radius=1) for i in range(3)]
+    several = decals.cover([*balls, Segment((0, 3, 0), (1, 3, 0), radius=0.5)], count=20)
+    header = header_of(page(several, surface="traced").text)
+    assert [surface["program"] for surface in header["surfaces"]] == ["tree 0"] * 3 + ["tree 3"]
+    assert set(header["shaders"]["surfaces"]) == {"tree 0", "tree 3"}
+
+
+def test_textures_of_meshes_are_kept_once_and_drawn_by_their_faces() -> None:
+    image = BaseTexture(np.arange(48, dtype=np.uint8).reshape(4, 4, 3), wrap=("mirror", "repeat"))
+    corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
+    color = BaseColor(None, [row[:2] for row in corners], (image,), [0, -1])
+    faces = [[0, 1, 2], [1, 3, 2]]
+    scene = decals.cover([decals.MeshObject(name, corners, faces, color=color) for name in "ab"], count=4)
+    header = header_of(page(scene).text)
+    first, second = header["surfaces"]
+    assert first["program"] == second["program"] == "textured"
+    assert [part["count"] for part in first["parts"]] == [3, 3]
+    white, own = (part["values"] for part in first["parts"])
+    assert own["mirrored"] == ["2i", 1, 0]
+    assert header["textures"][own["base_texture"]]["size"] == [4, 4]
+    assert header["textures"][white["base_texture"]]["size"] == [1, 1]
+    assert second["parts"][1]["values"]["base_texture"] == own["base_texture"]
 
 
 def test_the_scene_in_a_page_is_that_of_its_file(scene: Scene, text: str, tmp_path: Path) -> None:
@@ -189,21 +228,28 @@ def test_the_camera_is_that_of_the_picture(aspect: float) -> None:
     const [width, height] = [data.width, 300];
     const place = camera.seen([0.2, 0.3, 0.4], width / height);
     const direction = camera.direction(...place, width / height);
-    const found = [camera.matrix(width / height), camera.rays(width, height), place, direction];
-    console.log(JSON.stringify(found));
+    const block = Array.from(camera.block(width, height));
+    const shifted = Array.from(camera.block(width, height, [0.25, -0.5]));
+    console.log(JSON.stringify([block, shifted, place, direction]));
     """
     given = {"position": camera.position, "target": camera.target, "up": camera.up, "fov": camera.fov}
     width = round(300 * aspect)
     data = {"camera": given, "bounds": bounds, "reference": REFERENCE_ASPECT, "width": width}
-    matrix, rays, place, direction = run_node(script, data)
+    block, shifted, place, direction = run_node(script, data)
     half = np.tan(np.radians(camera.fov) / 2)
     if aspect < REFERENCE_ASPECT:
         half *= REFERENCE_ASPECT / (width / 300)
     wide = decals.Camera(camera.position, camera.target, camera.up, float(np.degrees(2 * np.arctan(half))))
     expected = wide.clip_matrix((width, 300), (np.array(bounds[0]), np.array(bounds[1])))
-    assert_allclose(np.reshape(matrix, (4, 4)).T, expected, rtol=1e-9, atol=1e-12)
+    assert_allclose(np.reshape(block[:16], (4, 4)).T, expected, rtol=1e-6, atol=1e-6)
     known = wide.rays(width, 300)
-    assert_allclose(np.ravel(rays), np.ravel([known.origin, known.corner, known.right, known.up]), atol=1e-12)
+    rows = [[*known.origin, 1], [*known.corner, 0], [*known.right, 0], [*known.up, 0]]
+    assert_allclose(np.reshape(block[16:], (4, 4)), rows, atol=1e-6)
+    corner = np.add(known.corner, 0.25 * np.array(known.right) - 0.5 * np.array(known.up))
+    assert_allclose(shifted[20:23], corner, atol=1e-6)
+    through = np.add(known.origin, 2.5 * (corner + 30 * np.array(known.right) + 40 * np.array(known.up)))
+    x, y, _, w = np.reshape(shifted[:16], (4, 4)).T @ [*through, 1]
+    assert_allclose([(x / w + 1) / 2 * width, (y / w + 1) / 2 * 300], [30, 40], atol=1e-3)
     clip = expected @ [0.2, 0.3, 0.4, 1]
     assert_allclose(place, clip[:2] / clip[3], atol=1e-12)
     toward = np.subtract([0.2, 0.3, 0.4], camera.position)
@@ -218,12 +264,12 @@ def test_links_hold_the_state_and_refuse_nonsense() -> None:
     const originals = [row(0), row(1), row(2)];
     const rows = [originals[0], null, { ...row(5), radius: 0.25 }, { ...row(7), image: 2 }];
     const camera = { position: [1, 2, 3], target: [0, 0, 0.125] };
-    const state = { camera, mode: "radial", stiffness: 2.5, decals: { rows } };
-    const link = written(state, originals);
+    const state = { camera, mode: "radial", stiffness: 2.5, decals: { rows }, originals };
+    const link = written(state);
     const many = { ...state, decals: { rows: Array.from({ length: 200 }, (_, i) => row(i)) } };
     const wrong = ["", "#", "#d=99999999x", "#d=0:1,2,3", "#d=1:NaN", "#eye=1,2&at=3", "#k=-1", "#d=7x"];
     const found = wrong.map((text) => read(text, originals));
-    console.log(JSON.stringify([read(link, originals), written(many, originals), found]));
+    console.log(JSON.stringify([read(link, originals), written(many), found]));
     """
     state, too_long, wrong = run_node(script, None)
     assert state["camera"] == {"position": [1, 2, 3], "target": [0, 0, 0.125]}
@@ -235,6 +281,37 @@ def test_links_hold_the_state_and_refuse_nonsense() -> None:
     assert changes[3]["image"] == 2
     assert too_long is None
     assert wrong == [{"changes": []}] * len(wrong)
+
+
+@needs_node
+def test_edits_are_undone_and_a_drag_is_one_step() -> None:
+    script = """
+    const { History } = await import("./history.mjs");
+    const decals = { rows: ["a", "b"], set(number, row) { this.rows[number] = row; } };
+    const history = new History(decals, () => {});
+    const seen = [];
+    const look = () => seen.push([...decals.rows]);
+    history.change([[0, "c"]]);
+    history.change([[1, "d"]]);
+    history.change([[1, "e"]], { open: true });
+    history.change([[2, "f"]]);
+    look();
+    for (const step of ["undo", "undo", "undo", "undo", "redo", "redo"]) { history[step](); look(); }
+    history.change([[0, null]]);
+    history.redo();
+    look();
+    console.log(JSON.stringify(seen));
+    """
+    assert run_node(script, None) == [
+        ["c", "e", "f"],
+        ["c", "e", None],
+        ["c", "b", None],
+        ["a", "b", None],
+        ["a", "b", None],
+        ["c", "b", None],
+        ["c", "e", None],
+        [None, "e", None],
+    ]
 
 
 @needs_node
@@ -319,39 +396,3 @@ def test_an_edit_takes_the_full_shaders_where_it_must() -> None:
     """
     found = run_node(script, {"rows": rows, "rules": rules, "edits": edits})
     assert found == {"moved": False, "nested": True, "over": True, "upper": True, "fading": True}
-
-
-@needs_node
-def test_a_ray_meets_the_first_face() -> None:
-    import pyvista as pv
-
-    from decals.surfaces import MeshSurface
-
-    ball = pv.Sphere(theta_resolution=24, phi_resolution=24)
-    faces = ball.regular_faces.astype(np.int32)
-    random = np.random.default_rng(1)
-    origins = random.normal(size=(60, 3)) * 2
-    directions = random.normal(size=(60, 3)) * 0.3 - origins
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    script = """
-    const { Mesh, firstHit } = await import("./meshes.mjs");
-    const mesh = new Mesh({ mask: -1 }, data.vertices, data.faces, data.normals);
-    const found = data.rays.map((ray) => firstHit([mesh], ...ray)?.position ?? null);
-    console.log(JSON.stringify(found));
-    """
-    data = {
-        "vertices": ball.points.ravel().tolist(),
-        "faces": faces.ravel().tolist(),
-        "normals": ball.point_normals.ravel().tolist(),
-        "rays": [
-            [origin.tolist(), direction.tolist()]
-            for origin, direction in zip(origins, directions, strict=True)
-        ],
-    }
-    distances = MeshSurface(ball.points, faces).raycast(origins, directions)
-    for origin, direction, distance, point in zip(
-        origins, directions, distances, run_node(script, data), strict=True
-    ):
-        assert (point is None) == (not np.isfinite(distance))
-        if point is not None:
-            assert_allclose(point, origin + distance * direction, atol=1e-5)

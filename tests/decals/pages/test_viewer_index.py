@@ -24,12 +24,12 @@ for (const [number, row] of data.edits) set.set(number, row);
 const { index } = set;
 const cells = [];
 for (let slot = 0; slot <= index.mask; slot++) {
-  const [x, y, z, head] = index.table.subarray(4 * slot, 4 * slot + 4);
-  const list = index.ids.subarray(head + 1, head + 1 + index.ids[head]);
+  const [x, y, z, head] = index.table.at(slot);
+  const list = index.ids.array.subarray(head + 1, head + 1 + index.ids.array[head]);
   if (x >= 0 && list.length) cells.push([x, y, z, ...list]);
 }
-const levels = Array.from(index.levels.subarray(0, 4 * index.levelCount));
-const records = Array.from(set.records.subarray(0, 16 * set.rows.length));
+const levels = Array.from(index.levels.array.subarray(0, 4 * index.levelCount));
+const records = Array.from(set.records.array.subarray(0, 16 * set.rows.length));
 console.log(JSON.stringify({ cells, levels, records }));
 """
 

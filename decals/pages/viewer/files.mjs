@@ -1,0 +1,40 @@
+// What leaves a page: a link to its state, and its scene as a file.
+import { written } from "./link.mjs";
+import { toBase64 } from "./packing.mjs";
+
+export function copyLink({ controls, ...state }) {
+  const link = written(state);
+  if (link === null)
+    return controls.say("So many decals have changed that no link can hold them: save a scene file.");
+  try {
+    history.replaceState(null, "", `#${link}`);
+  } catch {
+    return controls.say("A page inside a notebook has no link of its own: save a scene file.");
+  }
+  const say = (places) => () => controls.say(`The link of this state is in ${places}.`);
+  const copied = navigator.clipboard?.writeText(location.href) ?? Promise.reject();
+  copied.then(say("the address bar and in the clipboard"), say("the address bar"));
+}
+
+// The scene as a file that `decals.load_scene` takes.
+export function sceneText({ header, arrays, mode, stiffness, camera, home, decals }) {
+  const { scene } = header;
+  const text = (name) => toBase64(new Uint8Array(arrays[name].buffer));
+  const objects = scene.objects.map((object, i) => {
+    if (object.type !== "mesh") return object;
+    return { ...object, data: { vertices: text(`vertices of ${i}`), faces: text(`faces of ${i}`) } };
+  });
+  const drawing = { ...scene.drawing, contact: mode, stiffness };
+  const moved = camera.position !== home.position && { ...camera.pose, fit: undefined };
+  const rows = decals.rows.filter((row) => row);
+  return JSON.stringify({ ...scene, objects, drawing, camera: { ...scene.camera, ...moved }, decals: rows });
+}
+
+export function save(viewer) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([sceneText(viewer)], { type: "application/json" }));
+  link.download = "scene.json";
+  link.click();
+  URL.revokeObjectURL(link.href);
+  viewer.controls.say("The scene is saved as scene.json.");
+}
