@@ -8,6 +8,7 @@ import base64
 import hashlib
 import hmac
 import ipaddress
+import logging
 import re
 import secrets
 import socket
@@ -21,6 +22,7 @@ from pathlib import Path
 from urllib.parse import urlencode, urlsplit
 
 from aiohttp import web
+from aiohttp.http_exceptions import HttpProcessingError
 
 LOOPBACK = "127.0.0.1"
 """By default, the page is served to this machine only."""
@@ -76,6 +78,16 @@ HEADERS = {
 }
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+SERVER_LOG = "aiohttp.server"
+"""Log in which the server reports what it cannot answer."""
+
+
+def _is_no_wrong_request(record: logging.LogRecord) -> bool:
+    """Return False for the traceback of a request that is none, or too long: its sender gets status 400."""
+    error = record.exc_info[1] if record.exc_info else None
+    return not isinstance(error, HttpProcessingError)
 
 
 @dataclass(frozen=True)
@@ -146,6 +158,7 @@ class Guard:
 
     def protect(self, app: web.Application) -> None:
         """Check the requests of an application, before all its other parts and before its start."""
+        logging.getLogger(SERVER_LOG).addFilter(_is_no_wrong_request)
         app.middlewares.insert(0, self._check)
         app.on_response_prepare.append(self._add_headers)
 

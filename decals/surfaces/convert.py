@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeGuard, Union, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 import blobtree
 from blobtree import Mesh, Node
@@ -225,11 +225,17 @@ def _polygons(faces: ArrayLike | Sequence[Any], name: str) -> Any:
     if any(row.shape[-1] < 3 for row in listed) and isinstance(polygons, np.ndarray):
         raise InvalidMesh(f"{name}: expected faces of 3 or more corners, got {polygons.shape[1]}")
     _refuse_counts(listed, name)
+    if isinstance(polygons, np.ndarray):
+        _refuse_columns(polygons, name)
     return polygons
 
 
 COUNTED_ROWS = 8
 """Rows of faces up to which the same first number in all of them may be by chance."""
+
+
+TRANSPOSED_ROWS = (3, 4)
+"""Numbers of rows of an array that holds a triangle or quadrilateral in each column."""
 
 
 def _refuse_counts(listed: list[Any], name: str) -> None:
@@ -241,6 +247,22 @@ def _refuse_counts(listed: list[Any], name: str) -> None:
         raise InvalidMesh(
             f"{name}: expected faces as rows of corner indices, got rows that begin with the number of their "
             f"corners; give {advice}"
+        )
+
+
+def _refuse_columns(faces: NDArray[Any], name: str) -> None:
+    """Refuse an array whose columns are the faces: its rows share vertices as polygons never do."""
+    corners, count = faces.shape
+    if corners not in TRANSPOSED_ROWS or count <= corners or len(np.unique(faces)) > faces.size // 2:
+        return
+    repeated, column_repeated = (
+        (np.diff(np.sort(rows, axis=1)) == 0).any(axis=1) for rows in (faces, faces.T)
+    )
+    padded = (faces[:, -1] == faces[:, -2]).any()  # as polygons of fewer corners are
+    if not column_repeated.any() and (count > COUNTED_ROWS or (repeated.any() and not padded)):
+        raise InvalidMesh(
+            f"{name}: expected faces as rows of corner indices, got an array of {corners} rows whose "
+            f"{count} columns are the faces; give faces.T"
         )
 
 

@@ -1,7 +1,9 @@
 """OBJ, PLY, STL and OFF files in the forms that programs write, and broken ones."""
 
 import random
+import re
 import struct
+from itertools import chain
 
 import numpy as np
 
@@ -25,10 +27,8 @@ def obj(chance: random.Random) -> StructuredFile:
     mesh = random_mesh(chance)
     number = chance.choice(NUMBERS)
     points = [["v", *map(number, point)] for point in mesh.points.tolist()]
-    if (extra := chance.random()) < 0.3:
-        points = [
-            [*words, *(number(chance.random()) for _ in range(1 if extra < 0.1 else 3))] for words in points
-        ]
+    if count := chance.choice([0] * 14 + [1, 1, 3, 3, 4, 5]):
+        points = [[*words, *(number(chance.random()) for _ in range(count))] for words in points]
     textures, normals = chance.choice([(0, 0), (5, 0), (0, 5), (5, 5)])
     head = [["vt", number(k / 5), "0.5"] for k in range(textures)]
     head += [["vn", "0", "0", number(1.0)] for _ in range(normals)]
@@ -243,10 +243,19 @@ def stl(chance: random.Random) -> StructuredFile:
         loop = [f"vertex {' '.join(map(number, corner))}" for corner in facet.tolist()]
         lines += [f"facet normal {normal}", "outer loop", *loop, "endloop", "endfacet"]
     lines.append(chance.choice([f"endsolid {name}", "endsolid"]))
-    text = "\n".join(spaced(line.split(" "), chance) for line in lines) + chance.choice(["", "\n", "\n\n"])
+    bare = chance.choice([0.0, 0.0, 0.5, 1.0])
+    lines = [line if chance.random() >= bare else re.sub("^facet normal .*", "facet", line) for line in lines]
+    gap = "\n" if chance.random() < 0.85 or any(word in name for word in ("solid", "#")) else " "
+    text = gap.join(spaced(line.split(" "), chance) for line in lines) + chance.choice(["", "\n", "\n\n"])
     if chance.random() < 0.3:
         text = text.upper()
     return _finished(StructuredFile(".stl", encoded(text, chance), rounded), chance)
+
+
+def _rearranged(rows: list[list[str]], chance: random.Random) -> list[list[str]]:
+    """Return the words of rows as they are, on one line, or one a line."""
+    words = list(chain.from_iterable(rows))
+    return chance.choice([rows, [words], [[word] for word in words]])
 
 
 # -- OFF ------------------------------------------------------------------------------------------------
@@ -273,6 +282,9 @@ def off(chance: random.Random) -> StructuredFile:
     if keyword == "OFF" and chance.random() < 0.1:
         head = chance.choice([[counts], [f"OFF{counts}"]])
     lines = [*head, *(spaced(words, chance) for words in [*rows, *faces])]
+    if not paint and all(len(loop) > 2 for loop in mesh.polygons) and chance.random() < 0.2:
+        parts = [_rearranged(rows, chance), _rearranged(faces, chance)]
+        lines = [*head, *(spaced(words, chance) for words in chain.from_iterable(parts))]
     if chance.random() < 0.3:
         lines = [line + chance.choice(["", " # comment", "\n\n", "\n# 1 2 3"]) for line in lines]
     file = StructuredFile(".off", encoded("\n".join(lines) + chance.choice(["", "\n"]), chance), mesh)

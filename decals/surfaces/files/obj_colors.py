@@ -43,9 +43,9 @@ class ObjColors:
         """Return the base colour of triangles; None if the file has none."""
         notes = Notes()
         materials, of_polygon = self._materials(notes)
-        notes.report(self._path)
         clay = decode_srgb(np.array(CLAY, np.float64))
-        colors = self._vertex_colors(WHITE if materials else clay)
+        colors = self._vertex_colors(WHITE if materials else clay, notes)
+        notes.report(self._path)
         coordinates, mapped = self._coordinates(), self._places >= 0
         if colors is None and coordinates is None and not materials:
             return None
@@ -75,16 +75,20 @@ class ObjColors:
             colors=colors,
         )
 
-    def _vertex_colors(self, others: ArrayLike) -> Float32Array | None:
+    def _vertex_colors(self, others: ArrayLike, notes: Notes) -> Float32Array | None:
         """Return the colours of vertices, which follow their coordinates; None if no vertex has one.
 
         Vertices without a colour get another one.
         """
         words = [line.text.split() for line in self._lines[b"v"]]
-        colored = np.array([len(of_line) >= 6 for of_line in words], np.bool_)
+        first = {6: 3, 7: _first_of_seven(words, notes), 8: 4}
+        colored = np.array([len(of_line) in first for of_line in words], np.bool_)
+        if longest := max((len(of_line) for of_line in words if len(of_line) > max(first)), default=0):
+            notes.add("colours of vertices are left out", f"lines of {longest} numbers")
         if not colored.any():
             return None
-        given = (word for of_line in words if len(of_line) >= 6 for word in of_line[-3:])
+        starts = ((of_line, first[len(of_line)]) for of_line in words if len(of_line) in first)
+        given = (word for of_line, start in starts for word in of_line[start : start + 3])
         numbers = finite_numbers(given).reshape(-1, 3)
         colors = np.tile(np.asarray(others, np.float32), (len(words), 1))
         colors[colored] = linear_colors(numbers, name="colours of vertices")
@@ -126,6 +130,20 @@ class ObjColors:
                 except (Unreadable, ValueError) as fault:
                     notes.add("materials are left out", str(fault))
         return found
+
+
+def _first_of_seven(words: list[list[bytes]], notes: Notes) -> int:
+    """Return the place of red where vertices have seven numbers.
+
+    They are x y z w r g b if all w are 1 and blue varies, else x y z r g b and a seventh, as SpeedTree and
+    TreeIt write.
+    """
+    fourths, sevenths = ({float(line[place]) for line in words if len(line) == 7} for place in (3, 6))
+    if not fourths:
+        return 3
+    weighted = fourths == {1.0} and sevenths != {1.0}
+    notes.add("vertices have 7 numbers", f"read as x y z {'w r g b' if weighted else 'r g b a'}")
+    return 4 if weighted else 3
 
 
 def _name(line: Line, exists: Callable[[bytes], bool]) -> bytes:

@@ -1,6 +1,8 @@
 """Reader of OFF files (Geomview): text, with or without normals, colours and texture coordinates."""
 
 import re
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -24,7 +26,16 @@ from decals.surfaces.files.content import (
 from decals.surfaces.files.paint import Paint
 from decals.surfaces.triangulate import Polygons, Triangulation
 
-_KEYWORD = re.compile(rb"(ST)?(?P<color>C?)(?P<normal>N?)(?P<space>4?n?)OFF", re.IGNORECASE)
+_FORM = rb"(?P<place>(ST)?)(?P<color>C?)(?P<normal>N?)"
+_KEYWORDS = (
+    re.compile(_FORM + rb"(?P<space>4?n?)OFF"),
+    re.compile(_FORM + rb"(?P<space>4?)OFF", re.IGNORECASE),
+)
+"""The keyword as it is written, where a small "n" means any number of dimensions; or in other letters."""
+
+
+MAX_DIGITS = 9
+"""Digits of a number of corners, at most."""
 
 
 def read_off(path: Path) -> tuple[Float64Array, Polygons, Paint]:
@@ -49,8 +60,47 @@ def _read(content: bytes) -> tuple[Float64Array, Polygons, Paint]:
         for number, line in enumerate(text_lines(content), 1)
         if (text := line.partition(b"#")[0].strip())
     ]
-    first_color = _first_color(lines)
+    keyword, lines = _keyword(lines)
     points, faces, lines = _counts(lines)
+    if len(lines) != points + faces:
+        for rows in _of_words(keyword, points, faces, lines):
+            try:
+                return _of_lines(keyword, points, faces, rows)
+            except ValueError:
+                continue
+    return _of_lines(keyword, points, faces, lines)
+
+
+@dataclass(frozen=True)
+class _Keyword:
+    """What the lines of vertices hold: the place of the first colour, and how many numbers there may be."""
+
+    first_color: int | None = None
+    widths: tuple[int, ...] = (3,)
+
+
+def _keyword(lines: list[Line]) -> tuple[_Keyword, list[Line]]:
+    """Return what the keyword says, and the lines without it; OFF if there is none."""
+    found = next((match for form in _KEYWORDS if lines and (match := form.match(lines[0].text))), None)
+    if found is None:
+        return _Keyword(), lines
+    if found["space"]:
+        raise ValueError(f"its keyword {shown(found[0])} stands for points of other than 3 numbers")
+    rest = lines[0].text[found.end() :]  # some programs write "OFF8 6 12"
+    width = 3 + 3 * len(found["normal"])
+    places = 2 * bool(found["place"])
+    keyword = (
+        _Keyword(width, (width + 4 + places, width + 3 + places))
+        if found["color"]
+        else _Keyword(None, (width + places,))
+    )
+    return keyword, [Line(lines[0].number, rest), *lines[1:]] if rest.strip() else lines[1:]
+
+
+def _of_lines(
+    keyword: _Keyword, points: int, faces: int, lines: list[Line]
+) -> tuple[Float64Array, Polygons, Paint]:
+    """Return what lines of one vertex or face each hold."""
     if len(lines) < points + faces:
         raise ValueError(
             f"it declares {points} vertices and {faces} faces and has {len(lines)} lines for them"
@@ -58,29 +108,62 @@ def _read(content: bytes) -> tuple[Float64Array, Polygons, Paint]:
     if len(lines) > points + faces:
         raise lines[points + faces].expected(f"nothing behind the last of {faces} faces")
     polygons = _polygons(lines[points:], points)
-    colors = [line.text.split()[first_color:][:3] for line in lines[:points]] if first_color else []
+    first = keyword.first_color
+    colors = [] if first is None else [line.text.split()[first:][:3] for line in lines[:points]]
     paint = partial(_painted, colors, lines[points:], polygons.sizes)
     return points_of(lines[:points]), polygons, paint
 
 
-def _first_color(lines: list[Line]) -> int | None:
-    """Return the place of the first colour among the numbers of a vertex; None if it has none."""
-    keyword = _KEYWORD.match(lines[0].text) if lines else None
-    return None if keyword is None or not keyword["color"] else 3 + 3 * len(keyword["normal"])
+def _of_words(
+    keyword: _Keyword, points: int, faces: int, lines: list[Line], *, edges: bool = True
+) -> Iterator[list[Line]]:
+    """Yield lines of one vertex or face each, made of words that the lines of a file divide otherwise."""
+    first, _, rest = lines[0].text.strip().partition(b" ") if lines else (b"", b"", b"")
+    if edges and first.isdigit():  # the number of edges, which some programs leave out
+        behind = [Line(lines[0].number, rest), *lines[1:]] if rest else lines[1:]
+        yield behind
+        yield from _of_words(keyword, points, faces, behind, edges=False)
+    words = [Line(line.number, word) for line in lines for word in line.text.split()]
+    for width in keyword.widths:
+        end = points * width
+        if end > len(words):
+            continue
+        vertices = [_line(words[k : k + width]) for k in range(0, end, width)]
+        counts = np.cumsum([len(line.text.split()) for line in lines])
+        row = int(np.searchsorted(counts, end, side="right")) if end else 0
+        if len(lines) - row == faces and end == (counts[row - 1] if row else 0):  # they may have colours
+            yield [*vertices, *lines[row:]]
+        yield [*vertices, *_face_rows(words[end:])]
+
+
+def _face_rows(words: list[Line]) -> Iterator[Line]:
+    """Yield the words of each face: a number of corners and as many vertices."""
+    place = 0
+    while place < len(words):
+        count = words[place].text
+        size = int(count) if count.isdigit() and len(count) < MAX_DIGITS else 0
+        if size < 3:  # so that a file with a missing line is not read as another mesh
+            return
+        yield _line(words[place : place + 1 + size])
+        place += 1 + size
+
+
+def _line(words: list[Line]) -> Line:
+    """Return words as one line; an empty one if a file ends before them."""
+    return Line(words[0].number, b" ".join(word.text for word in words)) if words else Line(0, b"")
 
 
 def _counts(lines: list[Line]) -> tuple[int, int, list[Line]]:
-    """Return the numbers of vertices and of faces, and the lines behind them; check the keyword."""
-    keyword = _KEYWORD.match(lines[0].text) if lines else None
-    if keyword:
-        if keyword["space"]:
-            raise ValueError(f"its keyword {shown(keyword[0])} stands for points of other than 3 numbers")
-        rest = lines[0].text[keyword.end() :]  # some programs write "OFF8 6 12"
-        lines = [Line(lines[0].number, rest), *lines[1:]] if rest else lines[1:]
+    """Return the numbers of vertices and of faces, and the lines behind them."""
     if not lines:
         raise ValueError("it ends before its numbers of vertices and faces")
+    words = lines[0].text.split()
+    if len(words) == 1 and len(lines) > 2:  # each number has a line of its own
+        return _counts([Line(lines[0].number, words[0] + b" " + lines[1].text), *lines[2:]])
     points, faces = parsed(lines[:1], _two_counts, "'OFF', and the numbers of vertices and faces")
-    return points, faces, lines[1:]
+    if len(words) < 4 or len(lines) - 1 == points + faces:
+        return points, faces, lines[1:]
+    return points, faces, [Line(lines[0].number, b" ".join(words[2:])), *lines[1:]]
 
 
 def _two_counts(lines: list[Line]) -> tuple[int, int]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from blobtree._typing import Float64Array, Int64Array
 from decals.surfaces.files.content import decimal_numbers, encoding_of, file_bytes, refusal, without_mark
 from decals.surfaces.files.paint import Paint
-from decals.surfaces.files.ply_colors import PlyColors
+from decals.surfaces.files.ply_colors import PlyColors, PlyFaces
 from decals.surfaces.triangulate import Polygons
 
 _TYPES = {
@@ -98,33 +98,37 @@ def _read(content: bytes, path: Path) -> tuple[Float64Array, Polygons, Paint]:
     if len(vertices) != 1 or not {"x", "y", "z"} <= vertices[0].scalars.keys():
         raise ValueError("it has no element of vertices with x, y and z")
     points = np.stack([np.asarray(vertices[0].scalars[axis], np.float64) for axis in "xyz"], axis=-1)
-    faces = [_corners(table) for table in tables if table.name == "face"]
-    strips = [_corners(table) for table in tables if table.name == "tristrips"]
-    if not faces and not strips:
-        raise ValueError("it has no faces")
-    triangles = [
-        strip_triangles(strip)
-        for part in strips
-        for strip in np.split(part.corners, np.cumsum(part.sizes)[:-1])
+    parts = [
+        _faces(table, elements) for name in ("face", "tristrips") for table in tables if table.name == name
     ]
-    polygons = Polygons.joined([*faces, *map(Polygons.of, triangles)])
-    face_tables = [table for table in tables if table.name == "face"]
-    face = face_tables[0] if len(face_tables) == 1 and not triangles else None
+    if not parts:
+        raise ValueError("it has no faces")
     paint = PlyColors(
         path,
         _TEXTURE_FILE.findall(content[: len(content) - len(body)].decode("utf-8", "replace")),
         _typed(vertices[0], elements),
-        {} if face is None else _typed(face, elements),
-        polygons,
-        None if face is None else _places(face),
+        parts,
     )
-    return points, polygons, paint
+    return points, Polygons.joined([part.polygons for part in parts]), paint
 
 
-def _places(face: _Table) -> tuple[Int64Array, NDArray[np.generic]] | None:
-    """Return the lengths and entries of the lists of texture coordinates; None without such lists."""
+def _faces(table: _Table, elements: list[_Element]) -> PlyFaces:
+    """Return the polygons of an element with what it says of each; strips are divided into triangles."""
+    polygons, columns = _corners(table), _typed(table, elements)
+    if table.name == "face":
+        return PlyFaces(polygons, columns, _places(table, polygons.sizes))
+    strips = [strip_triangles(strip) for strip in np.split(polygons.corners, np.cumsum(polygons.sizes)[:-1])]
+    of_strip = np.repeat(np.arange(len(polygons)), [len(strip) for strip in strips[: len(polygons)]])
+    triangles = Polygons.joined([Polygons.of(strip) for strip in strips])
+    return PlyFaces(triangles, {name: values[of_strip] for name, values in columns.items()}, None)
+
+
+def _places(face: _Table, sizes: Int64Array) -> NDArray[np.generic] | None:
+    """Return the texture coordinates of all corners; None if faces have no such list of their length."""
     lists = next((face.lists[name] for name in _PLACES if name in face.lists), None)
-    return None if lists is None else (lists.lengths, lists.entries)
+    if lists is None or not (lists.lengths == 2 * sizes).all():
+        return None
+    return lists.entries.reshape(-1, 2)
 
 
 def _typed(table: _Table, elements: list[_Element]) -> dict[str, NDArray[np.generic]]:

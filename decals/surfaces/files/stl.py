@@ -1,5 +1,7 @@
 """Reader of STL files, ASCII and binary, of one or several solids."""
 
+import re
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -26,9 +28,17 @@ _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute
 _WORDS = b"facet normal 0 0 0 outer loop vertex 0 0 0 vertex 0 0 0 vertex 0 0 0 endloop endfacet".split()
 """Words of a facet in an ASCII file; zeros stand for numbers."""
 
-_KEYWORDS = [k for k, word in enumerate(_WORDS) if word != b"0"]
-_NUMBERS = [k for k, word in enumerate(_WORDS) if word == b"0"][3:]
-"""Places of the keywords, and of the coordinates, among the words of a facet."""
+_BARE_WORDS = [_WORDS[0], *_WORDS[5:]]
+"""Words of a facet without a normal."""
+
+_SOLID = re.compile(
+    rb"(?<!\S)(?:end)?solid(?!\S).*?"
+    rb"(?=(?<!\S)facet\s+(?:normal\s+(?:[-+.\d]|nan(?!\S)|inf(?!\S))|outer\s+loop(?!\S))|$)",
+    re.IGNORECASE | re.DOTALL,
+)
+"""Begin or end of a solid with its name, as far as a facet may follow in the same line."""
+
+_END = re.compile(rb"(?<!\S)endsolid(?!\S)", re.IGNORECASE)
 
 
 def read_stl(path: Path) -> tuple[Float64Array, Polygons, Paint]:
@@ -88,35 +98,45 @@ def _text_corners(content: bytes) -> Float64Array:
     lines = [Line(number, text) for number, text in enumerate(text_lines(content), 1) if text.strip()]
     if not lines:
         raise ValueError("it is empty")
-    if _first_word(lines[-1]) != b"endsolid":
+    if not _END.search(lines[-1].text):
         raise ValueError("it ends without 'endsolid', so it is cut off")
-    within = [line for line in lines if _first_word(line) not in (b"solid", b"endsolid")]
+    within = [
+        Line(line.number, _SOLID.sub(b" ", line.text)) if b"solid" in line.text.lower() else line
+        for line in lines
+    ]
     words = b" ".join([line.text for line in within]).split()
-    try:
-        return _corners(words)
-    except ValueError:
-        numbers = [line.number for line in within for _ in line.text.split()]
-        size = len(_WORDS)
-        facets = [Line(numbers[k], b" ".join(words[k : k + size])) for k in range(0, len(words), size)]
-        return parsed(facets, _corners_of, "a facet with a normal and a loop of three vertices")
+    for form in (_WORDS, _BARE_WORDS):
+        try:
+            return _corners(words, form)
+        except ValueError:
+            continue
+    return parsed(_facets(within, words), _corners_of, "a facet with a loop of three vertices")
+
+
+def _facets(lines: list[Line], words: list[bytes]) -> list[Line]:
+    """Return the words from each "facet" to the next one, with the line where they begin."""
+    numbers = [line.number for line in lines for _ in line.text.split()]
+    starts = [k for k, word in enumerate(words) if k == 0 or word.lower() == _WORDS[0]]
+    return [Line(numbers[a], b" ".join(words[a:b])) for a, b in pairwise([*starts, len(words)])]
 
 
 def _corners_of(facets: list[Line]) -> Float64Array:
-    return _corners([word for facet in facets for word in facet.text.split()])
+    """Return the corners of facets, of which some have normals and some have none."""
+    loops = [facet.text.split() for facet in facets]
+    bare = len(_BARE_WORDS)
+    return np.concatenate([_corners(loop, _BARE_WORDS if len(loop) == bare else _WORDS) for loop in loops])
 
 
-def _first_word(line: Line) -> bytes:
-    return line.text.split(None, 1)[0].lower()
-
-
-def _corners(words: list[bytes]) -> Float64Array:
-    """Return the corners of facets, ``float64[k, 3]``; ValueError if the words are no facets."""
-    size = len(_WORDS)
+def _corners(words: list[bytes], form: list[bytes]) -> Float64Array:
+    """Return the corners of facets of a form, ``float64[k, 3]``; ValueError for other words."""
+    size = len(form)
     if len(words) % size:
         raise ValueError
-    if any(word.lower() != _WORDS[place] for place in _KEYWORDS for word in set(words[place::size])):
+    keywords = [k for k, word in enumerate(form) if word != b"0"]
+    if any(word.lower() != form[place] for place in keywords for word in set(words[place::size])):
         raise ValueError
-    columns = [finite_numbers(words[place::size]) for place in _NUMBERS]
+    numbers = [k for k, word in enumerate(form) if word == b"0"][-9:]  # without the normal
+    columns = [finite_numbers(words[k::size]) for k in numbers]
     return np.stack(columns, axis=1).reshape(-1, 3)
 
 

@@ -81,6 +81,32 @@ def serve(check: Callable[[Site], Awaitable[None]], **options: Any) -> None:
     asyncio.run(run())
 
 
+@pytest.mark.parametrize(
+    "request_bytes",
+    [
+        b"GET /" + b"a" * 9000 + b" HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: localhost\r\nCookie: " + b"a" * 9000 + b"\r\n\r\n",
+        b"GET / HTTP/9.9.9\r\n\r\n",
+        b"GET / HTTP/1.1\r\nContent-Length: x\r\n\r\n",
+        b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n",
+    ],
+    ids=["long line", "long header", "version", "length", "TLS"],
+)
+def test_a_request_that_is_none_leaves_no_traceback(
+    request_bytes: bytes, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
+) -> None:
+    async def check(site: Site) -> None:
+        reader, writer = await asyncio.open_connection("127.0.0.1", site.port)
+        writer.write(request_bytes)
+        assert b" 400 " in await reader.readline()
+        writer.close()
+        assert (await site.get("/"))[0] == 403  # others get their answers
+
+    serve(check)
+    assert not caplog.records
+    assert capfd.readouterr() == ("", "")
+
+
 def test_a_cookie_for_the_token_opens_the_page_and_keeps_its_browser() -> None:
     async def check(site: Site) -> None:
         status, text, headers = await site.get("/", headers=VISIT)

@@ -178,7 +178,9 @@ def test_no_field_rises_or_falls_faster_along_a_ray_than_its_bounds(batch: Batch
         np.testing.assert_array_equal(value.astype(np.float32), values_at(tree.tape, starts))
         distance = reach * np.linspace(0.1, 1.0, IN_BALL)[:, None]
         places = starts.astype(np.float64) + headings.astype(np.float64) * distance[..., None]
-        change = oracle.value(tree, places.reshape(-1, 3)).reshape(distance.shape) - oracle.value(tree, starts)
+        change = oracle.value(tree, places.reshape(-1, 3)).reshape(distance.shape) - oracle.value(
+            tree, starts
+        )
         assert (change - rise * distance).max() <= 1e-5, tree
         assert (-change - fall * distance).max() <= 1e-5, tree
         balls = bounds_at(tree.tape, starts, reach)[:, 1]

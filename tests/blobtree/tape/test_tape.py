@@ -94,7 +94,9 @@ def test_a_tape_lists_the_kinds_in_use(tree: Node) -> None:
     assert set(tape.skeletons) == {code % STRETCHED for code, *_ in runs}
     combines = [header for header in found if header[0] not in (PUSH, WARP, UNWARP)]
     operators = {operator for _, operator, *_ in combines}
-    from_operand = {OPERATOR[SUM]} if not all(OPERATORS[code].starts_from_zero for code in operators) else set()
+    from_operand = (
+        {OPERATOR[SUM]} if not all(OPERATORS[code].starts_from_zero for code in operators) else set()
+    )
     assert set(tape.operators) == operators | from_operand
     assert set(tape.warps) == {kind for code, kind, *_ in found if code == WARP}
     assert tape.warp_registers == max((count + 1 for code, _, count, _ in found if code == WARP), default=0)

@@ -146,6 +146,59 @@ def test_pyvista_faces_with_their_counts() -> None:
     )
 
 
+TETRAHEDRON = ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+
+
+def arrays_of(mesh: pv.PolyData) -> tuple[Any, Any]:
+    return mesh.points, mesh.regular_faces
+
+
+def grid_of_quads(count: int) -> tuple[Any, Any]:
+    axis = np.arange(count + 1.0)
+    points = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((count + 1, count + 1))], axis=-1)
+    first = (np.arange(count)[:, None] * (count + 1) + np.arange(count)).ravel()
+    return points.reshape(-1, 3), np.stack([first, first + count + 1, first + count + 2, first + 1], axis=1)
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        arrays_of(pv.Sphere(theta_resolution=8, phi_resolution=6)),
+        arrays_of(pv.Plane(i_resolution=4, j_resolution=3).triangulate()),
+        TETRAHEDRON,
+        arrays_of(pv.Cube().clean()),
+        arrays_of(pv.Icosahedron()),
+        grid_of_quads(4),
+    ],
+    ids=["ball", "sheet", "tetrahedron", "cube", "icosahedron", "quads"],
+)
+def test_transposed_faces_are_refused(mesh: tuple[Any, Any]) -> None:
+    points, faces = np.asarray(mesh[0]), np.asarray(mesh[1])
+    as_surface((points, faces))
+    for columns in (faces.T, np.ascontiguousarray(faces.T), faces.T.tolist()):
+        with pytest.raises(
+            InvalidMesh, match=rf"{faces.shape[1]} rows whose {len(faces)} columns .*; give faces\.T"
+        ):
+            as_surface((points, columns))
+
+
+def test_a_few_polygons_with_many_corners_are_no_transposed_faces() -> None:
+    """Hexagons of a truncated tetrahedron, quads around a corner of a cube, and twelve corners each."""
+    solid = pv.Icosahedron()
+    corners = np.asarray(solid.points)
+    hexagons = [[0, 1, 2, 3, 4, 5], [0, 5, 6, 7, 8, 9], [1, 9, 8, 10, 11, 2], [3, 11, 10, 7, 6, 4]]
+    assert len(as_shape((corners, np.array(hexagons))).faces) == 4 * 4  # type: ignore[union-attr]
+    cube = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    quads = np.array([[0, 1, 3, 2], [0, 4, 5, 1], [0, 2, 6, 4]])
+    assert as_surface((cube, quads)).area == pytest.approx(3.0)
+    padded = np.array([[0, 1, 3, 3], [1, 3, 2, 2], [3, 2, 0, 0]])
+    assert len(as_shape((cube, padded)).faces) >= 3  # type: ignore[union-attr]
+    rings = np.concatenate(
+        [np.c_[np.cos(t := np.arange(12) * np.pi / 6), np.sin(t), np.full(12, z)] for z in range(3)]
+    )
+    assert as_surface((rings, np.arange(36).reshape(3, 12))).area == pytest.approx(9.0)
+
+
 def test_messages_name_the_model() -> None:
     with pytest.raises(InvalidScene, match=r"model 2: expected a model, got 5; give a BlobTree"):
         decals.cover(BALL, 5)  # type: ignore[arg-type]

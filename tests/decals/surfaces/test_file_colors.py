@@ -11,6 +11,7 @@ import trimesh
 from numpy.typing import NDArray
 from PIL import Image
 
+from decals.images.texels import decode_srgb
 from decals.scenes.objects import MeshObject, as_object
 from decals.surfaces import BaseColor, Wrap
 from decals.surfaces.base_color import CLAY
@@ -253,14 +254,16 @@ def test_a_ply_file_has_textures_at_the_corners_of_its_faces(tmp_path: Path) -> 
         assert np.abs(found[row] - right[0]).max() < 1e-5
 
 
-def test_colours_of_one_of_two_lists_of_faces_are_left_out(tmp_path: Path) -> None:
+def test_faces_of_a_list_without_colours_are_clay_beside_others(tmp_path: Path) -> None:
     columns = ["uchar red", "uchar green", "uchar blue"]
     text = ply(np.eye(3), [], ["3 0 1 2 255 0 0"], columns)
     second = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
     (tmp_path / "a.ply").write_text(text.replace("end_header\n", second) + "3 0 2 1\n")
     item = read(tmp_path / "a.ply")
     assert len(item.faces) == 2
-    assert item.color == CLAY
+    assert isinstance(item.color, BaseColor)
+    light = item.color.light_at(item.faces, [0, 1], np.full((2, 3), 1 / 3))
+    assert light == pytest.approx(np.array([[1, 0, 0], decode_srgb(np.array(CLAY))]), abs=1e-6)
 
 
 def test_colours_of_a_ply_file_out_of_range_are_left_out(

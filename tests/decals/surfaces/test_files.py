@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from decals.errors import InvalidMesh
 from decals.images.texels import decode_srgb
@@ -162,6 +163,17 @@ STL_SQUARES = {
     .replace("endsolid", "\nendsolid"),
     "tabs": STL.replace(" 0 0 1\n", "\t0\t0\t1\n").replace("vertex", "  vertex"),
     "normal of nothing": STL.replace("0 0 1", "nan nan nan"),
+    "no normals": STL.replace(" normal 0 0 1", ""),
+    "a normal here and there": STL.replace(" normal 0 0 1", "", 1),
+    "one line": STL.replace("\n", " "),
+    "one line, no name": STL.replace(" a b c", "").replace("\n", " "),
+    "one line, no normals": STL.replace(" normal 0 0 1", "").replace("\n", " "),
+    "one line, two solids": STL.replace("endfacet\nfacet", "endfacet endsolid a solid b facet").replace(
+        "\n", " "
+    ),
+    "one line, name of keywords": STL.replace("a b c", "solid facet normal vertex").replace("\n", " "),
+    "one word a line": "\n".join(STL.replace(" a b c", "").split()),
+    "facets in the line of the name": STL.replace("a b c\nfacet", "a b c facet"),
 }
 
 
@@ -193,6 +205,10 @@ def test_binary_stl(tmp_path: Path) -> None:
         (STL.replace("vertex 1 1 0\nendloop", "endloop", 1), "line 2: expected a facet"),
         (STL.replace("vertex 0 1 0", "vertex 0 x 0"), "line 9: expected a facet"),
         (STL.replace("vertex 0 1 0", "vertex 0 inf 0"), "line 9: expected a facet"),
+        (STL.replace("normal 0 0 1", "normal 0 0", 1), "line 2: expected a facet"),
+        (STL.replace("normal 0 0 1", "normal", 1), "line 2: expected a facet"),
+        (STL.replace("\n", " ").replace("vertex 0 1 0", "vertex 0 x 0"), "line 1: expected a facet"),
+        (STL.replace("\n", " ").replace(" endsolid a b c", ""), "without 'endsolid'"),
     ],
 )
 def test_a_wrong_stl_is_named(tmp_path: Path, content: str, reason: str) -> None:
@@ -211,6 +227,24 @@ OFF_SQUARES = {
     "vertex colours": "COFF\n4 1 0\n" + OFF_ROWS.replace("\n", " 255 0 0 255\n") + "4 0 1 2 3\n",
     "normals": "NOFF\n4 1 0\n" + OFF_ROWS.replace("\n", " 0 0 1\n") + "4 0 1 2 3\n",
     "texture": "STOFF\n4 1 0\n" + OFF_ROWS.replace("\n", " 0.5 0.5\n") + "4 0 1 2 3\n",
+    "counts on lines of their own": OFF.replace("4 1 0", "4\n1\n0"),
+    "edges on a line of their own": OFF.replace("4 1 0", "4 1\n0"),
+    "one line": OFF.replace("\n", " "),
+    "one line, no edges": "OFF 4 1 " + OFF_ROWS.replace("\n", " ") + "4 0 1 2 3",
+    "one word a line": OFF.replace(" ", "\n"),
+    "vertices on one line": "OFF\n4 1 0\n" + OFF_ROWS.replace("\n", " ") + "\n4 0 1 2 3\n",
+    "vertices on lines, a coloured face": "OFF\n4 1 0\n"
+    + OFF_ROWS.replace(" ", "\n")
+    + "4 0 1 2 3 255 0 0\n",
+    "two faces on a line": "OFF\n4 2 0\n" + OFF_ROWS + "3 0 1 2 3 0 2 3\n",
+    "coloured vertices on one line": "COFF\n4 1 0\n"
+    + OFF_ROWS.replace("\n", " 255 0 0 255 ")
+    + "4 0 1 2 3\n",
+    "three colours on one line": "COFF\n4 1 0\n" + OFF_ROWS.replace("\n", " 255 0 0 ") + "4 0 1 2 3\n",
+    "normals on one line": "NOFF\n4 1 0\n" + OFF_ROWS.replace("\n", " 0 0 1 ") + "\n4 0 1\n2 3\n",
+    "small letters": OFF.replace("OFF", "noff")
+    .replace("0\n", "0 0 0 1\n", 5)
+    .replace("4 1 0 0 0 1", "4 1 0"),
     "all": "STCNOFF\n4 1 0\n" + OFF_ROWS.replace("\n", " 0 0 1 1 1 1 1 0 0\n") + "4 0 1 2 3\n",
 }
 
@@ -231,6 +265,16 @@ def test_every_form_of_off_is_the_same_square(tmp_path: Path, name: str) -> None
         (OFF + "3 0 1 2\n", "line 8: expected nothing behind the last of 1 faces"),
         (OFF.replace("OFF", "OFF BINARY"), "binary OFF"),
         (OFF.replace("OFF", "4OFF"), "other than 3 numbers"),
+        (OFF.replace("OFF", "nOFF\n3"), "other than 3 numbers"),
+        (OFF.replace("OFF", "4nOFF\n3"), "other than 3 numbers"),
+        (OFF.replace("OFF", "NCOFF"), "line 1: expected 'OFF'"),
+        (OFF.replace("OFF", "COFF BINARY"), "binary OFF"),
+        ("OFF 4 1 0 " + OFF_ROWS.replace("\n", " ") + "4 0 1 2 4", "declares 4 vertices and 1 faces"),
+        ("OFF 4 1 0 " + OFF_ROWS.replace("\n", " ") + "4 0 1 2", "declares 4 vertices and 1 faces"),
+        (
+            "OFF 4 1000000000 0 " + OFF_ROWS.replace("\n", " ") + "4 0 1 2 3",
+            "declares 4 vertices and 1000000000",
+        ),
         (OFF.replace("4 1 0", "4 -1 0"), "line 2: "),
         ("", "ends before"),
         ("OFF\n", "ends before"),
@@ -313,6 +357,102 @@ def test_what_is_left_out_is_logged(tmp_path: Path, caplog: pytest.LogCaptureFix
     messages = "\n".join(record.getMessage() for record in caplog.records)
     for part in ("1 faces of fewer than three", "1 free-form", "1 faces cross themselves"):
         assert part in messages
+
+
+STRIPS = (
+    "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n{vertex}"
+    "element face 1\nproperty list uchar int vertex_indices\n{face}element tristrips 1\n"
+    "property list int int vertex_indices\n{strip}end_header\n{rows}4 0 1 2 3{red}\n4 4 5 7 6{blue}\n"
+)
+STRIP_ROWS = [f"{x} {y} {z}" for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+CHANNELS = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
+CLAY_LIGHT = decode_srgb(np.array(CLAY))
+
+
+@pytest.mark.parametrize(
+    ("face", "strip"),
+    [(True, False), (False, True), (True, True)],
+    ids=["colours of faces", "colours of strips", "colours of both"],
+)
+def test_ply_faces_keep_their_colours_beside_strips(tmp_path: Path, face: bool, strip: bool) -> None:
+    content = STRIPS.format(
+        vertex="",
+        face=CHANNELS if face else "",
+        strip=CHANNELS if strip else "",
+        rows="\n".join(STRIP_ROWS) + "\n",
+        red=" 255 0 0" if face else "",
+        blue=" 0 0 255" if strip else "",
+    )
+    mesh = read_mesh_data(written(tmp_path, "a.ply", content))
+    assert mesh.color is not None
+    assert mesh.color.colors is not None
+    assert mesh.color.corners is not None
+    light = mesh.color.colors[mesh.color.corners[:, 0]]
+    above = mesh.vertices[mesh.faces[:, 0], 2] > 0.5
+    assert above.sum() == 2
+    assert light[~above] == pytest.approx(np.tile([1.0, 0, 0] if face else CLAY_LIGHT, (2, 1)), abs=1e-6)
+    assert light[above] == pytest.approx(np.tile([0, 0, 1.0] if strip else CLAY_LIGHT, (2, 1)), abs=1e-6)
+
+
+def test_ply_faces_keep_their_texture_beside_strips(tmp_path: Path) -> None:
+    Image.new("RGB", (2, 2), (0, 255, 0)).save(tmp_path / "green.png")
+    content = STRIPS.format(
+        vertex="", face="property list uchar float texcoord\n", strip="", rows="\n".join(STRIP_ROWS) + "\n",
+        red=" 8 0 0 1 0 1 1 0 1", blue="",
+    ).replace("1.0\n", "1.0\ncomment TextureFile green.png\n")  # fmt: skip
+    mesh = read_mesh_data(written(tmp_path, "a.ply", content))
+    assert mesh.color is not None
+    light = mesh.color.light_at(mesh.faces, np.arange(len(mesh.faces)), np.full((len(mesh.faces), 3), 1 / 3))
+    above = mesh.vertices[mesh.faces[:, 0], 2] > 0.5
+    assert light[~above] == pytest.approx(np.tile([0.0, 1.0, 0.0], (2, 1)), abs=1e-6)
+    assert light[above] == pytest.approx(np.ones((2, 3)), abs=1e-6)
+
+
+def test_colours_of_ply_faces_under_those_of_vertices_are_named(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    content = STRIPS.format(
+        vertex=CHANNELS, face=CHANNELS, strip="", rows="".join(f"{row} 0 255 0\n" for row in STRIP_ROWS),
+        red=" 255 0 0", blue="",
+    )  # fmt: skip
+    color = read_mesh_data(written(tmp_path, "a.ply", content)).color
+    assert color is not None
+    assert color.simplified == (0.0, 1.0, 0.0)
+    assert "colours of faces are left out: those of vertices count" in caplog.text
+
+
+SEVENTH = "v 0 0 0 {0}\nv 1 0 0 {1}\nv 1 1 0 {2}\nv 0 1 0 {2}\nf 1 2 3 4\n"
+
+
+@pytest.mark.parametrize(
+    ("paints", "expected", "reading"),
+    [
+        (["1 1 0 0", "1 0 1 0", "1 0 0 1"], "red green blue", "w r g b"),
+        (["1 0 0 1", "0 1 0 1", "0 0 1 1"], "red green blue", "r g b a"),
+        (["1 0 0 0.5", "0 1 0 0.25", "0 0 1 0"], "red green blue", "r g b a"),
+        (["1.0 1 0 0"] * 3, "red red red", "w r g b"),
+        (["1 0 0 1"] * 3, "red red red", "r g b a"),
+        (["0 0 1 0"] * 3, "blue blue blue", "r g b a"),
+    ],
+)
+def test_seven_numbers_of_an_obj_vertex(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, paints: list[str], expected: str, reading: str
+) -> None:
+    mesh = read_mesh_data(written(tmp_path, "a.obj", SEVENTH.format(*paints)))
+    assert mesh.color is not None
+    light = mesh.color.at_vertices(mesh.faces, 4)
+    named = {"red": [1, 0, 0], "green": [0, 1, 0], "blue": [0, 0, 1]}
+    assert light[:3] == pytest.approx(np.array([named[name] for name in expected.split()], float), abs=1e-6)
+    assert f"vertices have 7 numbers: read as x y z {reading}" in caplog.text
+
+
+def test_eight_and_more_numbers_of_an_obj_vertex(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    mesh = read_mesh_data(written(tmp_path, "a.obj", SEVENTH.format(*["1 0 0 1 0.5"] * 3)))
+    assert mesh.color is not None
+    assert mesh.color.at_vertices(mesh.faces, 4) == pytest.approx(np.tile([0.0, 0.0, 1.0], (4, 1)))
+    assert "numbers" not in caplog.text
+    assert read_mesh_data(written(tmp_path, "b.obj", SEVENTH.format(*["1 0 0 1 0 0"] * 3))).color is None
+    assert "colours of vertices are left out: lines of 9 numbers" in caplog.text
 
 
 @pytest.mark.parametrize("paint", ["255 0 0", "255 0 0 255", "1 0 0", "1.0 0.0 0.0 1.0"])
