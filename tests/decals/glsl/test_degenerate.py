@@ -109,7 +109,7 @@ def degenerate_points(rng: Rng, node: Node) -> Array:
 
 @dataclass(frozen=True)
 class Readings:
-    """What shaders read at points: bounds (n, 3) in all directions, and values beside gradients or colours."""
+    """What shaders read at points: bounds (n, 3) in all directions, values beside gradients or colours."""
 
     bound: Array
     gradient: Array
