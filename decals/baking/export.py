@@ -17,7 +17,7 @@ from blobtree.validation import truth
 from decals.baking.atlas import unwrap
 from decals.baking.formats import FORMATS
 from decals.baking.instances import Instances, decal_instances
-from decals.baking.materials import CHANNELS, Maps, material_bytes, split_maps, vertex_tangents
+from decals.baking.materials import SRGB, Maps, material_bytes, split_maps, vertex_tangents
 from decals.baking.meshes import BakeMesh, bake_mesh
 from decals.baking.parts import METRES, UP, Baked, Part
 from decals.baking.surface_colors import ATTRIBUTES, BLOCK, SurfaceColors
@@ -311,7 +311,7 @@ class _Work:
         channels = Channels(self._colors.at)
         if self._colors.has_materials:  # maps are of the rest pose
             resting = [vertex_tangents(mesh.places, mesh.facings, part) for mesh, part in pairs]
-            channels = Channels(self._colors.at, CHANNELS, material_bytes, resting)
+            channels = Channels(self._colors.at, len(SRGB), material_bytes, resting, SRGB)
         texels = bake_texture(self._meshes, unwrapped, size, samples, channels, self._report)[0]
         parts = [_textured_part(mesh, part, size, self._colors.has_materials) for mesh, part in pairs]
         return parts, split_maps(texels)

@@ -13,8 +13,8 @@ ROUGHNESS = 0.7
 """Roughness of surface without material, about that of the studio light's highlight."""
 
 FLAT = 128, 128, 255
-CHANNELS = 12
-"""Base colour, normal, occlusion with roughness and metalness, emission."""
+SRGB = (*[True] * 3, *[False] * 6, *[True] * 3)
+"""True for channels that are sRGB: base colour, normal, occlusion with roughness and metalness, emission."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,17 +1,26 @@
 """Textures of unwrapped meshes: colours of the surface below each texel, seams that match, and gutters."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
 
-from blobtree._typing import Float32Array, Int32Array, UInt8Array
+from blobtree._typing import (
+    BoolArray,
+    Float32Array,
+    Float64Array,
+    FloatArray,
+    Int32Array,
+    Int64Array,
+    UInt8Array,
+)
 from blobtree.device import launch, start_warp
 from blobtree.progress import Progress
 from decals.baking.meshes import BakeMesh
+from decals.baking.seams import Seams, match_seams
 from decals.baking.texel_kernels import (
     cover_rows,
     encode_levels,
@@ -34,6 +43,12 @@ ROUNDING = 1e-3
 
 FINE_STEP = 3
 """Difference of two neighbours, of 255, above which a texel takes several samples."""
+
+SEAM_STEP = 1
+"""Difference of both sides of a seam, of 255, up to which the surface itself counts as smooth there."""
+
+ALIKE = 1.0 - 1e-5
+"""Cosine between the normals of both sides of a seam from which on they are one."""
 
 BORDER_STEP = 0.5
 """Distance in texels of points along the borders of charts."""
@@ -72,12 +87,15 @@ class Channels:
         Bytes ``uint8[n, count]`` of means of these values.
     tangents : sequence of float32[n, 4], optional
         Tangents at the unwrapped vertices of each mesh, if the values need them.
+    srgb : sequence of bool
+        True for channels that are sRGB; the others are linear.
     """
 
     color_at: ColorFunction
     count: int = 3
     encode: Callable[[Float32Array], UInt8Array] = color_bytes
     tangents: Sequence[Float32Array] | None = None
+    srgb: Sequence[bool] = (True, True, True)
 
 
 def bake_texture(
@@ -99,19 +117,69 @@ def bake_texture(
     tiles = 1 + max(int(part.tile_of_face.max(initial=0)) for part in unwrapped)
     image = np.zeros((tiles, size, size, channels.count), np.uint8)
     gutter = max(MIN_GUTTER, round(GUTTER_SHARE * size))
-    for tile in range(tiles):
-        page = _Page(image[tile], channels.encode)
-        for number, (mesh, part) in enumerate(zip(meshes, unwrapped, strict=True)):
-            done = (tile + number / len(meshes)) / tiles, 1.0 / (tiles * len(meshes))
-            sheet = Sheet(number, mesh, part, tile, channels)
-            if len(sheet.faces):
-                page.color(sheet, samples, partial(_report_part, report, *done))
+    pages = [_Page(of, channels.encode) for of in image]
+    sheets = {
+        (tile, number): Sheet(number, mesh, part, tile, channels)
+        for number, (mesh, part) in enumerate(zip(meshes, unwrapped, strict=True))
+        for tile in np.unique(part.tile_of_face).tolist()
+    }
+    for done, ((tile, _), sheet) in enumerate(sheets.items()):
+        pages[tile].color(sheet, samples, partial(_report_part, report, done, len(sheets)))
+    for page in pages:
         page.finish(gutter)
+    seams = Seams.of(meshes, unwrapped)
+    if len(seams.faces):
+        report("matching seams", 0.0)
+        rows, places = seams.points()
+        smooth = _smooth_points(seams, rows, places, sheets, channels)
+        changed = match_seams(
+            image, places, seams.tiles[rows], smooth, channels.srgb, partial(report, "matching seams")
+        )
+        for tile, page in enumerate(pages):
+            page.keep(changed[changed // size**2 == tile] % size**2)
+            page.finish(gutter)
     return image
 
 
-def _report_part(report: Progress, begin: float, length: float, share: float) -> None:
-    report("colouring texels", begin + length * share)
+def _report_part(report: Progress, done: int, count: int, share: float) -> None:
+    report("colouring texels", (done + share) / count)
+
+
+def _smooth_points(
+    seams: Seams,
+    rows: Int64Array,
+    places: Float64Array,
+    sheets: Mapping[tuple[int, int], "Sheet"],
+    channels: Channels,
+) -> BoolArray:
+    """Return True where the surface has no step, for points of seams and channels, ``bool[n, channels]``."""
+    parts = [
+        (side, own, sheet, sheet.surface(sheet.numbers_of(seams.faces[rows[own], side]), places[own, side]))
+        for side in (0, 1)
+        for (tile, number), sheet in sheets.items()
+        for own in [np.flatnonzero((seams.tiles[rows, side] == tile) & (seams.meshes[rows] == number))]
+    ]
+    points, units = np.zeros((2, 2, len(rows), 3), np.float32)
+    for side, own, _, at in parts:
+        points[side, own], units[side, own] = at.points, at.units
+    # at one point with one normal, rounding may not decide on which side of a rim it is
+    alike = np.einsum("na,na->n", *units) > ALIKE
+    points[1, alike], units[1, alike] = points[0, alike], units[0, alike]
+    levels = np.zeros((2, len(rows), channels.count), np.int16)
+    for side, own, sheet, at in parts:
+        shared = at._replace(points=points[side, own], units=units[side, own])
+        levels[side, own] = channels.encode(sheet.colors(shared))
+    smooth: BoolArray = np.abs(levels[0] - levels[1]) <= SEAM_STEP
+    return smooth
+
+
+class Located(NamedTuple):
+    """Points of the surface: their faces in a `Sheet`, positions, unit normals and barycentric weights."""
+
+    faces: Int32Array
+    points: Float32Array
+    units: Float32Array
+    weights: Float32Array
 
 
 class Sheet:
@@ -189,26 +257,37 @@ class Sheet:
         starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=rows))])
         return starts.astype(np.int32), np.repeat(used, counts)[order].astype(np.int32)
 
-    def values(self, faces: Int32Array, places: Float32Array) -> Float32Array:
+    def values(self, faces: Int32Array, places: FloatArray) -> Float32Array:
         """Return the values of the surface at places in faces of this sheet, ``float32[n, channels]``."""
-        count = len(faces)
+        return self.colors(self.surface(faces, places))
+
+    def surface(self, faces: Int32Array, places: FloatArray) -> Located:
+        """Return the points of the surface at places in faces of this sheet."""
         inputs: list[Any] = [
-            wp.array(places, dtype=wp.vec2, device=CPU),
+            wp.array(places.astype(np.float32, copy=False), dtype=wp.vec2, device=CPU),
             wp.array(faces, dtype=wp.int32, device=CPU),
         ]
-        outputs: list[Any] = [wp.empty(count, dtype=wp.vec3, device=CPU) for _ in range(3)]
-        launch(surface_points, count, [*inputs, *self._arrays], outputs, CPU)
+        outputs: list[Any] = [wp.empty(len(faces), dtype=wp.vec3, device=CPU) for _ in range(3)]
+        launch(surface_points, len(faces), [*inputs, *self._arrays], outputs, CPU)
         points, units, weights = (array.numpy() for array in outputs)
-        corners = self.faces[faces] if self._mesh.base is not None or self._tangents is not None else None
+        return Located(faces, points, units, weights)
+
+    def colors(self, at: Located) -> Float32Array:
+        """Return the values of the surface at points, ``float32[n, channels]``."""
+        base = self._mesh.base
+        corners = None if base is None and self._tangents is None else self.faces[at.faces]
         along: Float32Array | None = None
         light: Float32Array | None = None
         if self._tangents is not None:
-            along = np.einsum("nc,nca->na", weights, self._tangents[corners])
-        if self._mesh.base is not None:
-            wide = weights.astype(np.float64)
-            exact = self._mesh.base.light_of(self._rows[corners], self._chosen[faces], wide)
-            light = exact.astype(np.float32)
-        return self._channels.color_at(self._number, points, units, along, light)
+            along = np.einsum("nc,nca->na", at.weights, self._tangents[corners])
+        if base is not None:
+            wide = at.weights.astype(np.float64)
+            light = base.light_of(self._rows[corners], self._chosen[at.faces], wide).astype(np.float32)
+        return self._channels.color_at(self._number, at.points, at.units, along, light)
+
+    def numbers_of(self, faces: Int64Array) -> Int32Array:
+        """Return the numbers that faces of the mesh have in this sheet."""
+        return np.searchsorted(self._chosen, faces).astype(np.int32)
 
     def border_points(self) -> tuple[Int32Array, Float32Array]:
         """Return faces and places ``float32[n, 2]`` of points along the borders of charts."""
@@ -299,6 +378,10 @@ class _Page:
             values = sheet.values(faces[chosen], places[chosen])
             self._image[rows[chosen], columns[chosen]] = self._encode(values)
             own[rows[chosen], columns[chosen]] = 1
+
+    def keep(self, texels: Int64Array) -> None:
+        """Let texels keep their colours when gutters are filled."""
+        self._filled.reshape(-1)[texels] = 1
 
     def finish(self, reach: int) -> None:
         """Give empty texels the colour of the nearest one within reach, and the others the mean colour."""

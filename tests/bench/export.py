@@ -1,6 +1,6 @@
 """Export: decals in the shaders of other programs, in pages and in files.
 
-    python -m tests.bench.export [--json FILE] [--quick] [--only shader,page,files]
+    python -m tests.bench.export [--json FILE] [--quick] [--only shader,page,files,bake]
 
 The parts are modules of their own.
 """
@@ -9,7 +9,7 @@ import sys
 
 from tests.bench.parts import run
 
-PARTS = "shader", "page", "files"
+PARTS = "shader", "page", "files", "bake"
 """Names of the parts; each is the module `tests.bench.export_NAME`."""
 
 

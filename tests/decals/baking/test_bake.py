@@ -2,6 +2,7 @@
 
 import tracemalloc
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -73,7 +74,7 @@ def test_texels_have_the_colours_of_the_surface_below_them(baked: Path, name: st
     columns, rows = texels[inside].astype(int).T
     got = linear(node.texture[rows, columns] / 255)
     off = np.abs(got - want).max(axis=1) > 0.006  # half a step of sRGB in the lights, and float32
-    assert off.mean() < 0.02  # texels on a rim or a line of contact
+    assert off.mean() < 0.03  # texels on a rim, a line of contact or a seam
     assert want.std(axis=0).min() > 0.02
 
 
@@ -261,7 +262,7 @@ def test_a_tree_is_polygonized_and_keeps_its_colours(tmp_path: Path, creases: bo
     assert np.abs(lens(points.astype(np.float32)) - 0.5).max() < 0.05
     assert node.texture is not None
     colors = bilinear(node.texture / 255, uv)
-    side = np.abs(points[:, 0] - 0.6) > 0.1
+    side = np.abs(points[:, 0] - 0.6) > 0.25  # a seam that crosses the line is soft along a few texels
     want = np.where(points[:, :1] < 0.6, red, blue)
     assert np.abs(colors - want)[side].max() < 0.02
     copies = len(node.vertices) - len(np.unique(np.round(node.vertices, 5), axis=0))
@@ -305,6 +306,8 @@ def textured(size: int, samples: int = 1) -> Array:
 
 def test_blocks_bound_the_memory_and_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     need("xatlas")
+    no_seams = SimpleNamespace(of=lambda *_: SimpleNamespace(faces=()))  # they take memory by their length
+    monkeypatch.setattr(texture_module, "Seams", no_seams)
     whole = textured(512)
     monkeypatch.setattr(texture_module, "BLOCK_SAMPLES", 1 << 13)
     tracemalloc.start()
@@ -336,7 +339,7 @@ def test_stages_are_reported_in_order(tmp_path: Path, monkeypatch: pytest.Monkey
         scene, tmp_path / "a.glb", size=64, resolution=40, progress=lambda *report: seen.append(report)
     )
     stages = list(dict.fromkeys(stage for stage, _ in seen))
-    assert stages[-3:] == ["unwrapping the surface", "colouring texels", "writing the file"]
+    assert stages[-4:] == ["unwrapping the surface", "colouring texels", "matching seams", "writing the file"]
     assert seen.count(("unwrapping the surface", 0.0)) > 3
     assert seen[-1] == ("writing the file", 1.0)
     assert all(0.0 <= fraction <= 1.0 for _, fraction in seen)

@@ -1,17 +1,22 @@
 """Texels of baked textures against the surface below them, in float64: charts, means, slivers, gutters."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import pyvista as pv
 from scipy.ndimage import distance_transform_edt
 
 import decals
 from decals.baking.meshes import BakeMesh
+from decals.baking.seams import match_seams
 from decals.baking.texture import Channels, bake_texture
 from decals.baking.unwrapped import Unwrapped
 from decals.field.evaluate import ColorEvaluator
-from tests.decals.baking.glb import Array, ball_and_cube, linear
+from tests.decals.baking.glb import Array, ball_and_cube, bilinear, linear, need, read_glb
+from tests.decals.baking.seam_steps import seam_steps
+from tests.decals.baking.seam_steps import srgb as srgb_levels
 
 SIZE = 64
 STEP = 255 / SIZE
@@ -128,3 +133,82 @@ def test_colours_alone_are_those_of_evaluate() -> None:
         got = ColorEvaluator(rows, images, contact=contact).at(points, rows.normals[owners])
         assert np.array_equal(got, want)
         assert (want[:, 3] > 0.61).any()
+
+
+@pytest.mark.slow_cases("knot", "cube")
+@pytest.mark.parametrize("name", ["ball", "cube", "knot"])
+def test_both_sides_of_seams_agree_where_the_surface_has_no_step(tmp_path: Path, name: str) -> None:
+    need("trimesh", "xatlas")
+    if name == "knot":
+        knot = pv.ParametricTorus(u_res=40, v_res=20).triangulate().clean()
+        scene = decals.cover(knot, count=60, images=["scale", "eye"], seed=2)
+    else:
+        scene = ball_and_cube()
+    decals.bake(scene, tmp_path / "a.glb", size=512)
+    nodes = read_glb(tmp_path / "a.glb")
+    item = scene.objects[0] if name == "knot" else next(one for one in scene.objects if one.name == name)
+    node = nodes[item.name]
+    assert isinstance(item, decals.MeshObject)
+
+    def colors_at(points: Array, normals: Array) -> Array:
+        over = decals.evaluate(
+            scene.decals, points, normals, images=[image.pixels for image in scene.images], on=item
+        ).color
+        assert over is not None
+        return np.asarray(linear(np.asarray(item.color)) * (1 - over[:, 3:]) + over[:, :3])
+
+    steps = seam_steps(node, colors_at)
+    assert len(steps) > 500
+    assert steps.max() <= 4.0
+    assert node.texture is not None
+    assert node.texture.std() > 10
+
+
+def seams(seed: int, count: int = 40) -> tuple[Array, Array]:
+    """Places on both sides of straight seams, in one texture, and the texture of noise."""
+    rng = np.random.default_rng(seed)
+    ends = rng.uniform(4, SIZE - 4, (2, 2, 2))
+    share = np.linspace(0, 1, count)[:, None, None]
+    return ends[:, 0] * (1 - share) + ends[:, 1] * share, rng.integers(0, 256, (1, SIZE, SIZE, 1))
+
+
+@pytest.mark.parametrize("srgb", [True, False])
+@pytest.mark.parametrize("seed", range(6))
+def test_random_texels_along_a_seam_come_to_agree_and_no_others_change(seed: int, srgb: bool) -> None:
+    """Noise is the worst case: black and white texels beside each other, on both sides others."""
+    places, before = seams(seed)
+    image = before.astype(np.uint8)
+    tiles = np.zeros((len(places), 2), np.int64)
+    used = match_seams(image, places, tiles, np.ones((len(places), 1), bool), [srgb], lambda _: None)
+    decode, encode = (linear, srgb_levels) if srgb else (np.asarray, np.asarray)
+    levels = []
+    for side in (0, 1):
+        uv = places[:, side] / SIZE
+        uv[:, 1] = 1 - uv[:, 1]
+        levels.append(255 * encode(bilinear(decode(image[0] / 255.0), uv)))
+    assert np.abs(levels[0] - levels[1]).max() <= 4.0
+    changed = (image != before).reshape(-1)
+    assert changed.any()
+    assert np.isin(np.flatnonzero(changed), used).all()
+    assert len(used) < 0.2 * SIZE**2
+
+
+def test_points_at_which_the_surface_has_a_step_keep_it() -> None:
+    places, before = seams(1)
+    image = before.astype(np.uint8)
+    tiles = np.zeros((len(places), 2), np.int64)
+    match_seams(image, places, tiles, np.zeros((len(places), 1), bool), [True], lambda _: None)
+    assert np.array_equal(image, before)
+
+
+def test_a_match_of_seams_can_be_cancelled() -> None:
+    places, before = seams(3, 50_000)
+    image = before.astype(np.uint8)
+    tiles = np.zeros((len(places), 2), np.int64)
+
+    def report(share: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        match_seams(image, places, tiles, np.ones((len(places), 1), bool), [True], report)
+    assert np.array_equal(image, before)

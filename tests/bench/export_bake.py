@@ -1,0 +1,146 @@
+"""Baked textures: beside live pictures, their seams, texels without a colour, and the time they take.
+
+On a machine with a card, colours are evaluated there; `CUDA_VISIBLE_DEVICES=` measures the cores alone.
+"""
+
+import dataclasses
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from numpy.typing import NDArray
+
+import blobtree
+import decals
+from decals.images.texels import encode_srgb
+from decals.rendering import Lighting
+from tests.decals.baking.glb import bilinear, linear, read_glb
+from tests.decals.baking.seam_steps import seam_steps
+
+Array = NDArray[Any]
+
+TARGETS = {
+    "bake_psnr": ">= 40 at 4096",
+    "bake_seam": "<= 4 of 255",
+    "bake_unassigned": "0",
+    "bake_4k_s": "<= 30 on two cores, <= 1 on a card",
+}
+"""Targets; sizes stand beside them."""
+
+TEXELS, QUICK_TEXELS = 4096, 512
+DECALS, QUICK_DECALS = 1000, 40
+"""Size of the baked texture, and the decals in it."""
+
+PICTURE = (800, 600)
+"""Size of the pictures that are compared."""
+
+
+def measure(*, quick: bool) -> dict[str, float]:
+    """Return the figures of a baked texture."""
+    return baked(QUICK_TEXELS if quick else TEXELS, QUICK_DECALS if quick else DECALS)
+
+
+def baked(texels: int, count: int) -> dict[str, float]:
+    """Compare a ball and a box with baked decals, drawn by VTK without light, with the live picture."""
+    ball = blobtree.Point((0, 0, 0), radius=1.0)
+    scene = decals.cover(
+        [ball, pv.Cube(center=(1.6, 0, 0)).triangulate()], count=count, images=["scale", "eye"]
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "scene.glb"
+        decals.bake(scene, path, size=64)  # kernels are compiled
+        began = time.perf_counter()
+        decals.bake(scene, path, size=texels)
+        seconds = time.perf_counter() - began
+        nodes = read_glb(path)
+    return {
+        "bake_psnr": psnr(scene, list(nodes.values())),
+        "bake_seam": seam_worst(scene, nodes),
+        "bake_unassigned": unassigned(scene, texels),
+        "bake_texels": texels,
+        "bake_decals": count,
+        f"bake_{texels / 1024:g}k_s": seconds,
+    }
+
+
+def psnr(scene: decals.Scene, nodes: list[Any]) -> float:
+    """Return the ratio of signal to noise over the pixels in which both pictures show the surface, in dB."""
+    live = np.asarray(decals.render(scene, size=PICTURE, samples=4, lights=Lighting(()), background="white"))
+    make_texture: Any = pv.Texture
+    plotter = pv.Plotter(off_screen=True, window_size=[4 * side for side in PICTURE], lighting=None)
+    for node in nodes:
+        mesh = pv.PolyData.from_regular_faces(node.vertices, node.faces)
+        mesh.active_texture_coordinates = node.uv
+        texture = make_texture(node.texture)
+        texture.interpolate = texture.mipmap = True
+        plotter.add_mesh(mesh, texture=texture, lighting=False)
+    camera = scene.camera.at(PICTURE[0] / PICTURE[1])
+    plotter.camera_position = [camera.position, camera.target, camera.up]
+    plotter.camera.view_angle = camera.fov
+    plotter.renderer.set_background("white")
+    large = np.asarray(plotter.screenshot(return_img=True), float)
+    plotter.close()
+    height, width = PICTURE[1], PICTURE[0]
+    linear = ((large / 255 + 0.055) / 1.055) ** 2.4
+    drawn = 255 * encode_srgb(linear.reshape(height, 4, width, 4, 3).mean(axis=(1, 3)))
+    shown = [np.asarray((picture < 252).any(axis=2)) for picture in (live[..., :3], drawn)]
+    surface = inner(shown[0] & shown[1])
+    error = float(((live[..., :3].astype(float) - drawn)[surface] ** 2).mean())
+    return float(10 * np.log10(255**2 / error))
+
+
+def inner(mask: Array) -> Array:
+    """Return the pixels whose eight neighbours belong to a mask too: silhouettes are left out."""
+    kept = mask.copy()
+    for axis in (0, 1):
+        for step in (-1, 1):
+            kept &= np.roll(kept, step, axis)
+    return kept
+
+
+def seam_worst(scene: decals.Scene, nodes: dict[str, Any]) -> float:
+    """Return the largest difference, of 255, of the texture on the two sides of a seam; see `seam_steps`."""
+    worst = []
+    for item in scene.objects:
+
+        def colors_at(points: Array, normals: Array, item: Any = item) -> Array:
+            images = [image.pixels for image in scene.images]
+            over = decals.evaluate(scene.decals, points, normals, images=images, on=item).color
+            assert over is not None
+            color = item.tree.colors(points.astype(np.float32)) if hasattr(item, "tree") else item.color
+            return np.asarray(linear(np.asarray(color, float)) * (1 - over[:, 3:]) + over[:, :3])
+
+        worst.append(seam_steps(nodes[item.name], colors_at).max(initial=0.0))
+    return float(max(worst))
+
+
+def ball_mesh(scene: decals.Scene) -> tuple[Array, Array]:
+    """Return vertices and faces of the ball."""
+    (ball, _) = scene.objects
+    assert isinstance(ball, decals.TreeObject)
+    mesh = blobtree.polygonize(ball.tree)
+    return mesh.vertices, mesh.faces
+
+
+def unassigned(scene: decals.Scene, texels: int) -> int:
+    """Count points of the surface whose four texels are not of their object, in a bake of plain colours."""
+    plain = scene.replace(decals=decals.Decals.empty())
+    shades = [(0.9, 0.2, 0.1), (0.1, 0.3, 0.9)]
+    objects = [decals.MeshObject("ball", *ball_mesh(scene), shades[0])]
+    box = scene.objects[1]
+    assert isinstance(box, decals.MeshObject)
+    objects.append(dataclasses.replace(box, color=shades[1]))
+    with tempfile.TemporaryDirectory() as folder:
+        decals.bake(plain.replace(objects=objects), Path(folder) / "plain.glb", size=texels)
+        nodes = read_glb(Path(folder) / "plain.glb")
+    wrong = 0
+    for item, shade in zip(objects, shades, strict=True):
+        _, _, uv = nodes[item.name].on_surface(100_000)
+        texture = nodes[item.name].texture
+        assert texture is not None
+        off = np.abs(bilinear(texture.astype(float), uv) - 255 * np.asarray(shade)).max(axis=1)
+        wrong += int((off > 1.0).sum())
+    return wrong
