@@ -224,39 +224,65 @@ class PartCells(AdaptiveCells):
         return middle
 
 
-def mesh_of_parts(
-    tree: ImplicitModel, grid_of: Callable[[float], Grid], device: str | None, creases: bool, report: Progress
-) -> Mesh | None:
-    """Return a mesh of cells that are smaller where parts are thin; None if those of `grid_of(1.0)` do.
+@dataclass(frozen=True)
+class FirstCells:
+    """The first cells of a tree, before any is divided, and the walls that they show."""
 
-    `grid_of` returns a grid whose cells are smaller by a factor.
-    """
+    blocks: BlockTree
+    walls: Walls | None
+    """None for a tree without operators that leave walls."""
+
+
+def first_cells(
+    tree: ImplicitModel, grid_of: Callable[[float], Grid], device: str | None, report: Progress
+) -> FirstCells:
+    """Return the first cells, with the size at which thin parts take the fewest; `grid_of` scales cells."""
+    return _sampled(tree, grid_of(fitting_scale(tree, grid_of(1.0).cell_size)), device, report)
+
+
+def _sampled(tree: ImplicitModel, grid: Grid, device: str | None, report: Progress) -> FirstCells:
+    """Return cells of a grid, and the walls that they show."""
+    blocks = BlockTree(build_cells(sized_tape(tree), grid, device=device, report=report))
+    walls = Walls(tree, blocks, _least_cell(tree)) if has_walls(tree._program) else None
+    return FirstCells(blocks, walls)
+
+
+def _least_cell(tree: ImplicitModel) -> float:
+    """Return the size of the smallest cells."""
     lower, upper = tree.support
-    smallest = LEAST_CELL * float((upper - lower).max())
-    size, tape = grid_of(1.0).cell_size, sized_tape(tree)
+    return LEAST_CELL * float((upper - lower).max())
 
-    def sampled(scale: float) -> tuple[BlockTree, Walls | None]:
-        blocks = BlockTree(build_cells(tape, grid_of(scale), device=device, report=report))
-        return blocks, Walls(tree, blocks, smallest) if has_walls(tree._program) else None
 
-    scale = fitting_scale(tree, size)
-    blocks, walls = sampled(scale)
+def mesh_of_parts(
+    tree: ImplicitModel,
+    grid_of: Callable[[float], Grid],
+    device: str | None,
+    creases: bool,
+    report: Progress,
+    first: FirstCells | None = None,
+) -> tuple[Mesh | None, list[ThinPart]]:
+    """Return a mesh of cells that are smaller where parts are thin, and the parts that it does not show.
+
+    There is no mesh if the cells of `grid_of(1.0)` do. `grid_of` returns a grid whose cells are smaller by a
+    factor. `first` are the `first_cells` if these are known.
+    """
+    smallest, size = _least_cell(tree), grid_of(1.0).cell_size
+    if first is None:
+        first = first_cells(tree, grid_of, device, report)
+    blocks, walls = first.blocks, first.walls
     needed = walls.sizes if walls is not None else np.empty(0, np.float32)
     if len(needed):
-        scale = fitting_wall_scale(needed, size)
-        blocks, walls = sampled(scale)
+        first = _sampled(tree, grid_of(fitting_wall_scale(needed, size)), device, report)
+        blocks, walls = first.blocks, first.walls
     elif least_size(blocks.cells, smallest) >= BALL_CELLS * blocks.cells.grid.cell_size:
-        warn_of_thin_parts(tree, _too_thin(tree, smallest))
-        return None
+        return None, _too_thin(tree, smallest)
     unresolved = _too_thin(tree, smallest)
     parts = PartCells(blocks, 0.0, smallest, walls)
     try:
         mesh = AdaptiveMesher(parts, creases).mesh(report, MAX_PART_REPAIRS)
     except InvalidResolution:
-        warn_of_thin_parts(tree, parts.unresolved + unresolved + _all_parts(blocks.cells, walls, smallest))
-        return None
-    warn_of_thin_parts(tree, parts.unresolved + unresolved)
-    return mesh.mesh(creases)
+        return None, parts.unresolved + unresolved + _all_parts(blocks.cells, walls, smallest)
+    return mesh.mesh(creases), parts.unresolved + unresolved
 
 
 def _all_parts(cells: SparseCells, walls: Walls | None, least: float) -> list[ThinPart]:

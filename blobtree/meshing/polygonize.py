@@ -207,9 +207,7 @@ def polygonize_parts(
     if shows_small_parts(tree, resolution, BALL_CELLS, device) or has_walls(tree._program):
         size = _cell_size(tree, resolution, None)
         with reporting(progress, cancel) as report:
-            mesh = _mesh_of_thin_parts(tree, size, creases, device, report)
-        if mesh is not None:
-            return mesh
+            return _mesh_of_thin_parts(tree, size, creases, device, report)
     return Polygonizer(
         tree, resolution=resolution, creases=creases, device=device, progress=progress, cancel=cancel
     ).mesh
@@ -229,12 +227,19 @@ def shows_small_parts(tree: ImplicitModel, resolution: int, size: float, device:
 
 def _mesh_of_thin_parts(
     tree: ImplicitModel, size: float, creases: bool, device: str | None, report: Progress
-) -> Mesh | None:
-    """Return a mesh of cells that are smaller where parts are thin; None if cells of `size` resolve all."""
-    from blobtree.meshing.parts import PART_KERNELS, mesh_of_parts  # imported here, as above
+) -> Mesh:
+    """Return a mesh that shows thin parts; the cells of all others have the given size."""
+    from blobtree.meshing.parts import PART_KERNELS  # imported here, as above
+    from blobtree.meshing.thickening import mesh_of_thin_parts
+
+    def uniform(model: ImplicitModel) -> Mesh:
+        return Polygonizer(model, cell_size=size, creases=creases, device=device, progress=report).mesh
+
+    def grid_of(model: ImplicitModel, scale: float) -> Grid:
+        return _grid(model, scale * size)
 
     _load_kernels(tree, device, creases, *PART_KERNELS)
-    return mesh_of_parts(tree, lambda scale: _grid(tree, scale * size), device, creases, report)
+    return mesh_of_thin_parts(tree, grid_of, uniform, device, creases, report)
 
 
 def _load_kernels(tree: ImplicitModel, device: str | None, creases: bool, *kernels: wp.Kernel) -> None:

@@ -109,6 +109,17 @@ class _Samples:
         return low, high
 
 
+@dataclass(frozen=True)
+class ThinWall:
+    """A thin wall beside an operand."""
+
+    operand: Operand
+    facing: Operand
+    """The one on the other side; the same for walls between parts of one."""
+    thickness: float
+    """The least thickness that a sample shows."""
+
+
 class Walls:
     """The thin walls of a tree, sampled level by level as its blocks are refined."""
 
@@ -116,7 +127,7 @@ class Walls:
         self._blocks, self._least = blocks, EDGE_SHARE * least
         cells = blocks.cells
         self._device, self._kernel = cells.device, cells.tape.instruction_set.kernel_for
-        operands = operands_of(tree._program, tree.tape)
+        self._operands = operands = operands_of(tree._program, tree.tape)
         lines = [_crossed_edges(build_cells(one.tape, cells.grid, device=self._device)) for one in operands]
         self._samples = []
         for operand, (low, high), near in zip(
@@ -159,6 +170,26 @@ class Walls:
     def sizes(self) -> Float32Array:
         """Sizes of the cells that walls need, at all samples."""
         return np.concatenate([np.empty(0, np.float32), *(samples.needed for samples in self._samples)])
+
+    @property
+    def thin(self) -> list["ThinWall"]:
+        """The thin walls, each as its operands see it."""
+        from scipy.spatial import cKDTree  # most meshes have no thin walls
+
+        samples = [samples for samples in self._samples if len(samples.needed)]
+        operands = [
+            o for o, samples in zip(self._operands, self._samples, strict=True) if len(samples.needed)
+        ]
+        searches = [cKDTree(one.places) for one in samples]
+        result = []
+        for number, one in enumerate(samples):
+            far = np.split(one.both_sides, 2)[1]
+            gaps = [search.query(far)[0] for search in searches]
+            gaps[number][:] = np.inf
+            facing = np.bincount(np.argmin(gaps, axis=0)).argmax() if len(samples) > 1 else number
+            thickness = WALL_CELLS * float(one.needed.min())
+            result.append(ThinWall(operands[number], operands[facing], thickness))
+        return result
 
     @property
     def thinnest(self) -> list[tuple[float, Float64Array, ProgramLeaf]]:

@@ -23,21 +23,28 @@ class Operand:
     tape: Tape
     leaf: ProgramLeaf
     """The first of its leaves."""
-    faces_itself: bool
-    """True for a tool of several primitives, between which it may leave walls."""
+    numbers: tuple[int, ...]
+    """Its leaves, counted through the program."""
+    tool: bool
+    """True if it is removed from others."""
+
+    @property
+    def faces_itself(self) -> bool:
+        """True for a tool of several primitives, between which it may leave walls."""
+        return self.tool and len(self.numbers) > 1
 
 
 @dataclass(frozen=True)
 class _Part:
-    """Texels of instructions that leave one value in the accumulator, and the leaves among them."""
+    """Texels of instructions that leave one value in the accumulator, and the numbers of their leaves."""
 
     texels: tuple[Float32Array, ...] = ()
-    leaves: tuple[ProgramLeaf, ...] = ()
+    numbers: tuple[int, ...] = ()
     tool: bool = False
 
-    def then(self, texels: Float32Array, leaves: tuple[ProgramLeaf, ...]) -> "_Part":
+    def then(self, texels: Float32Array, numbers: tuple[int, ...]) -> "_Part":
         """Return these instructions and one more."""
-        return _Part((*self.texels, texels), self.leaves + leaves)
+        return _Part((*self.texels, texels), self.numbers + numbers)
 
     def within(self, enter: Float32Array, leave: Float32Array) -> "_Part":
         """Return these instructions inside a warp."""
@@ -77,26 +84,28 @@ def operands_of(program: list[Instruction], tape: Tape) -> list[Operand]:
     starts = tape.headers.tolist()
     pieces = [tape.data[a:b] for a, b in zip(starts, [*starts[1:], len(tape.data)], strict=True)]
     value = _Value()
+    leaves: list[ProgramLeaf] = []
     registers: dict[int, tuple[_Value, Float32Array]] = {}
     enters: dict[int, Float32Array] = {}
     for step, texels in zip(program, pieces, strict=True):
         match step:
             case Run(operator=operator, primitives=primitives):
-                leaves = tuple(placed.primitive for placed in primitives)
+                numbers = tuple(range(len(leaves), len(leaves) + len(primitives)))
+                leaves += [placed.primitive for placed in primitives]
                 more: tuple[_Part, ...] = ()
                 if removes(operator):
-                    more = tuple(_runs(step, texels, tape))
+                    more = tuple(_runs(step, texels, tape, numbers))
                 elif value.operands:
-                    more = (_Part((texels,), leaves),)
+                    more = (_Part((texels,), numbers),)
                 operands = value.parts + more if more else ()
-                value = _Value(value.whole.then(texels, leaves), operands)
+                value = _Value(value.whole.then(texels, numbers), operands)
             case Push(register):
                 registers[register], value = (value, texels), _Value()
             case Pop(register, operator, _, swapped):
                 first, push = registers[register]
                 left, right = (value, first) if swapped else (first, value)
                 both = (*first.whole.texels, push, *value.whole.texels, texels)
-                whole = _Part(both, left.whole.leaves + right.whole.leaves)
+                whole = _Part(both, left.whole.numbers + right.whole.numbers)
                 operands = ()
                 if removes(operator):
                     operands = left.parts + right.tools
@@ -109,28 +118,27 @@ def operands_of(program: list[Instruction], tape: Tape) -> list[Operand]:
                 enter = enters[entry.register]
                 within = tuple(part.within(enter, texels) for part in value.operands)
                 value = _Value(value.whole.within(enter, texels), within)
-    return [_operand(part, tape) for part in value.operands if part.leaves]
+    return [_operand(part, tape, leaves) for part in value.operands if part.numbers]
 
 
-def _runs(step: Run, texels: Float32Array, tape: Tape) -> Iterator[_Part]:
+def _runs(step: Run, texels: Float32Array, tape: Tape, numbers: tuple[int, ...]) -> Iterator[_Part]:
     """Yield the primitives of a run that removes, as operands of their own.
 
     What tools cut away lies outside all of them, so a union of tools has all of the surface that is left.
     """
     operators = tape.instruction_set.operators
-    leaves = tuple(placed.primitive for placed in step.primitives)
     if step.operator.support is Support.LEFT:
         header = [texels[0, 0], operators.index(UNION), texels[0, 2], 0.0]
-        yield _Part((np.vstack([header, texels[1:]]),), leaves, tool=True)
+        yield _Part((np.vstack([header, texels[1:]]),), numbers, tool=True)
         return
     header = [texels[0, 0], operators.index(SUM), 1.0, 0.0]
-    for leaf, own in zip(leaves, np.split(texels[1:], len(leaves)), strict=True):
-        yield _Part((np.vstack([header, own]),), (leaf,))
+    for number, own in zip(numbers, np.split(texels[1:], len(numbers)), strict=True):
+        yield _Part((np.vstack([header, own]),), (number,))
 
 
-def _operand(part: _Part, tape: Tape) -> Operand:
+def _operand(part: _Part, tape: Tape, leaves: list[ProgramLeaf]) -> Operand:
     """Return an operand with its tape, behind the data region of the whole one."""
     data = np.concatenate([tape.data[: tape.start], *part.texels]).astype(tape.data.dtype)
     starts = tape.start + np.cumsum([0, *(len(texels) for texels in part.texels[:-1])])
-    several = len(part.leaves) > 1
-    return Operand(replace(tape, data=data, headers=starts), part.leaves[0], part.tool and several)
+    own = replace(tape, data=data, headers=starts)
+    return Operand(own, leaves[part.numbers[0]], part.numbers, part.tool)

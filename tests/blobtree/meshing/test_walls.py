@@ -94,17 +94,17 @@ def test_sharp_edges_are_no_walls() -> None:
 @pytest.mark.slow
 def test_a_wall_too_thin_for_memory_is_named_once(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING):
-        mesh = polygonize(BALL.translate((4, 0, 0)) | Shell(BALL, 5e-4))
+        mesh = polygonize(BALL.translate((4, 0, 0)) | (CUBE & CUBE.translate((0, 0, 1.1995))))
     assert is_closed(mesh.faces)
     (record,) = caplog.records
-    assert "a wall of the Shell at path (1,)" in record.getMessage()
+    assert "a wall of the Intersection at path (1,)" in record.getMessage()
     assert "resolution of" in record.getMessage()
 
 
 def test_parts_that_cells_cannot_close_leave_the_rest(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    tree = BALL.translate((4, 0, 0)) | Shell(BALL, 0.1)
+    tree = BALL.translate((4, 0, 0)) | (CUBE & CUBE.translate((0, 0, 1.1)))
 
     def failing(self: AdaptiveMesher, report: Progress, max_repairs: int) -> AdaptiveMesh:
         raise InvalidResolution("cells could not be divided")
@@ -115,4 +115,4 @@ def test_parts_that_cells_cannot_close_leave_the_rest(
     (record,) = caplog.records
     assert is_closed(mesh.faces)
     assert mesh_areas(mesh)[1].sum() > 4.0 * np.pi * 0.95
-    assert "a wall of the Shell at path (1,)" in record.getMessage()
+    assert "a wall of the Intersection at path (1,)" in record.getMessage()

@@ -1,0 +1,127 @@
+"""Gaps between the leaves of a tree, and growth that leaves them open."""
+
+import numpy as np
+
+from blobtree._typing import Float64Array
+from blobtree.formulas.falloff import RIM
+from blobtree.tape.grown import leaf_tape
+from blobtree.tape.model import ImplicitModel, gradients_at
+from blobtree.tape.part_sizes import has_warps, leaf_boxes
+from blobtree.tape.program import PlacedPrimitive, ProgramPrimitive, Run, influence_radii
+from blobtree.tape.tape import Tape
+
+GAP_SHARE = 1 / 3
+"""Largest growth of a leaf over the gap between it and another one."""
+
+GAP_STEPS = 12
+"""Steps to and fro between two skeletons, at whose end the gap is known."""
+
+SURFACE_STEPS = 4
+"""Steps of Newton's method to the surface of a leaf alone; the first one is exact in similarity maps."""
+
+GAP_STARTS = (0.0, 0.5, 1.0)
+"""Places between a skeleton's middle and the corners of its hull at which these steps start."""
+
+
+def hull_corners(placed: PlacedPrimitive) -> Float64Array:
+    """Return the corners (n, 3) of the hull of a leaf's skeleton, in the space around its map."""
+    leaf = placed.primitive
+    assert isinstance(leaf, ProgramPrimitive)
+    matrix = placed.placement.matrix
+    corners: Float64Array = type(leaf).hulls([leaf])[0] @ matrix[:3, :3].T + matrix[:3, 3]
+    return corners
+
+
+def limit_by_gaps(
+    tree: ImplicitModel, leaves: list[tuple[Run, PlacedPrimitive]], lengths: Float64Array
+) -> None:
+    """Lower growths at gaps between leaves, so that these stay open; below warps, gaps are not known."""
+    if not lengths.any() or has_warps(tree):
+        return
+    lower, upper = leaf_boxes(tree)
+    for number in np.flatnonzero(lengths).tolist():
+        placed = leaves[number][1]
+        if not isinstance(placed.primitive, ProgramPrimitive):
+            continue
+        reach = lengths[number] / GAP_SHARE
+        apart = np.maximum(lower - upper[number], lower[number] - upper).max(axis=1)
+        near = np.flatnonzero(apart < reach)
+        one = _Skeleton(tree, placed, number, reach)
+        starts = one.closest(_starts(placed))
+        for other in near[near != number].tolist():
+            gap = _gap(one, _Skeleton(tree, leaves[other][1], other, reach), starts)
+            if gap > 0.0:
+                lengths[number] = min(lengths[number], GAP_SHARE * gap)
+
+
+class _Skeleton:
+    """The closest points of a leaf's skeleton, by the field of the leaf once it has grown enough."""
+
+    def __init__(self, tree: ImplicitModel, placed: PlacedPrimitive, number: int, reach: float) -> None:
+        scale = float(np.linalg.svd(placed.placement.matrix[:3, :3], compute_uv=False)[-1])
+        lower, upper = tree.support
+        box = float(np.linalg.norm(upper - lower))
+        self.radius = 0.0
+        if isinstance(placed.primitive, ProgramPrimitive):
+            self.radius = RIM * float(influence_radii([placed]).min()) * scale
+        program = tree._program
+        self._tapes = [leaf_tape(program, number, length / scale) for length in (box, 4.0 * reach)]
+
+    def closest(self, points: Float64Array) -> Float64Array:
+        """Return the closest points; from afar they are less exact, until another step from there."""
+        far, near = (_at_distance(tape, points, 0.0) for tape in self._tapes)
+        return np.where(np.isfinite(near), near, far)
+
+
+def _at_distance(tape: Tape, points: Float64Array, aim: float) -> Float64Array:
+    """Return where distances from a skeleton, over the influence, are `aim` by a step of Newton's method.
+
+    The result is NaN outside the field.
+    """
+    rows = gradients_at(tape, points).astype(np.float64)
+    rest = np.cbrt(rows[:, 0].clip(0.0, 1.0))
+    distance = np.sqrt(1.0 - rest)
+    slope = 6.0 * distance * rest**2
+    squared = (rows[:, 1:] ** 2).sum(axis=1)
+    step = rows[:, 1:] * ((distance - aim) * slope / np.maximum(squared, 1e-300))[:, None]
+    result: Float64Array = np.where((rest > 0.0)[:, None], points + step, np.nan)
+    return result
+
+
+def _starts(placed: PlacedPrimitive) -> Float64Array:
+    """Return points throughout the hull of a leaf's skeleton (n, 3)."""
+    corners = hull_corners(placed)
+    middle = corners.mean(axis=0)
+    pairs = 0.5 * (corners[:, None] + corners[None]).reshape(-1, 3)
+    starts: Float64Array = np.concatenate([middle + share * (pairs - middle) for share in GAP_STARTS])
+    return starts
+
+
+def surface_points(tree: ImplicitModel, placed: PlacedPrimitive, number: int) -> Float64Array:
+    """Return points (n, 3) all over the surface of a leaf alone."""
+    if not isinstance(placed.primitive, ProgramPrimitive) or has_warps(tree):
+        return np.empty((0, 3))
+    skeleton = _Skeleton(tree, placed, number, 0.0)
+    beside = 1.5 * skeleton.radius * np.concatenate([np.eye(3), -np.eye(3)])
+    points = (_starts(placed) + beside[:, None]).reshape(-1, 3)
+    tape = leaf_tape(tree._program, number)
+    for _step in range(SURFACE_STEPS):
+        points = _at_distance(tape, points, RIM)
+        points = points[np.isfinite(points).all(axis=1)]
+    return points
+
+
+def _gap(one: "_Skeleton", other: "_Skeleton", starts: Float64Array) -> float:
+    """Return the distance between the surfaces of two leaves; it is below 0 where they meet.
+
+    Steps to and fro between two convex sets end where these are nearest (von Neumann 1933).
+    """
+    points, gap = starts, np.inf
+    for _step in range(GAP_STEPS):
+        across = other.closest(points)
+        points = one.closest(across[np.isfinite(across).all(axis=1)])
+        distances = np.linalg.norm(points - other.closest(points), axis=1)
+        gap = float(np.min(distances, initial=np.inf)) - one.radius - other.radius
+        if gap <= 0.0 or not len(points):
+            break
+    return gap

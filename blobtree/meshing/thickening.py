@@ -1,0 +1,500 @@
+"""Thickening: plates and walls far thinner than cells, meshed as thicker ones.
+
+Cells as small as a plate is thin would fill both of its sides, although these are flat. So thin plates grow
+until the cells of the base resolve them, and so do the bodies around thin walls. The mesh of the grown tree
+has the shape of the surface, in few triangles. Then its vertices go back to the surface of the tree itself:
+
+* A vertex of a plate moves toward its foot, the closest point of the plate's skeleton. The plate's surface
+  lies between both, however thin it is.
+* A vertex of a wall moves toward the middle of the wall, at a distance from its leaf's skeleton.
+* Where both fail, or lead farther, Newton's method finds the surface.
+
+Growth must not close gaps, or open walls. Skeletons that are near each other limit it. At last, rays from the
+vertices look for the other sides of plates, walls and gaps: each side must have vertices nearby. A tree that
+fails is meshed again with less growth, and at last with cells as small as its parts are thin (`parts`).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+import warp as wp
+
+from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray, Int32Array
+from blobtree.cells.grid import Grid
+from blobtree.device import known_device, launch
+from blobtree.errors import InvalidNode
+from blobtree.formulas.falloff import ISO, RIM
+from blobtree.formulas.skeletons import BALL_CELLS, PLATE_CELLS, Skeleton
+from blobtree.kernels import load_together
+from blobtree.lazy import Lazy
+from blobtree.meshing.block_tree import on_device
+from blobtree.meshing.leaf_gaps import hull_corners, limit_by_gaps, surface_points
+from blobtree.meshing.mesh import Mesh, vertex_arrays
+from blobtree.meshing.parts import FirstCells, ThinPart, first_cells, mesh_of_parts, warn_of_thin_parts
+from blobtree.meshing.thickening_kernels import (
+    NO_SIDE,
+    find_feet,
+    find_other_sides,
+    improve_feet,
+    return_to_surface,
+)
+from blobtree.meshing.walls import WALL_CELLS
+from blobtree.progress import Progress
+from blobtree.tape.grown import GrownModel, leaf_tape, runs_of_leaves
+from blobtree.tape.model import ImplicitModel, gradients_at, values_at
+from blobtree.tape.part_sizes import has_warps, leaf_boxes, part_sizes
+from blobtree.tape.program import PlacedPrimitive, ProgramPrimitive, Run, influence_radii
+
+MAX_ATTEMPTS = 6
+"""Most meshes of grown trees."""
+
+LESS = 0.25
+"""Largest growth of a part after it failed, over that before."""
+
+GROWS = 3.0
+"""Least growth of a part over the size of cells that it needs: less saves few cells."""
+
+THIN = 0.5
+"""Size of cells that a part needs, over those of the base, below which it grows."""
+
+MARGIN, WARP_MARGIN = 1.1, 1.6
+"""Thickness of grown parts over what cells need, without warps and with warps, which make parts thinner."""
+
+PLATE_LENGTHS = 4.0
+"""Least length and width of a plate over half its grown thickness; those of a thin one are twice as much."""
+
+MAX_STRETCH = 4.0
+"""Largest ratio of the factors by which a plate's map scales lengths."""
+
+MAX_SHRINKAGE = 0.5
+"""Largest part of a tool's radius by which it shrinks."""
+
+SAGITTA_CELLS = 2.0
+"""Size of cells over √(thickness · radius of curvature), up to which both sides of a wall stay apart."""
+
+MAX_FIELD_ERROR = 0.05
+"""Largest error of the field at a vertex that is back on the surface of the thinnest parts."""
+
+MAX_WAY = 2.5
+"""Longest way back of a vertex, over the growth; longer ones lead to other parts."""
+
+MENDINGS = 3
+"""Rounds in which faulty vertices start from their neighbours."""
+
+FOOT_GROWTH = 0.03
+"""Growth of a plate with which feet are found exactly, over its growth."""
+
+ON_SURFACE = 1e-3
+"""Difference of a field to ISO, below which a point is on a surface."""
+
+RAY_REACH = 3.0
+"""Length of rays from vertices over the growth."""
+
+SHORTEST_RAY = 1e-6
+"""Length of rays from which on float32 tells sides apart, over the largest coordinate."""
+
+OPPOSED = 0.9
+"""Cosine between a normal and the opposite one on the other side of a plate, a wall or a gap."""
+
+MISSING_SHARE = 0.02
+"""Share of a leaf's vertices whose other side may lack a vertex: at rims, edges and corners."""
+
+LEAST_FOUND = 0.9
+"""Share of the points all over a leaf's surface that must have vertices on their side."""
+
+ROUGHNESS = 2.0
+"""How much farther off the surface the vertices on the other side may be than those on the same one."""
+
+NEAREST_VERTICES = 5
+"""Vertices that may lie on the side of a ray's end."""
+
+SIDE_CELLS = 4.0
+"""Distance along the surface, in cells, within which a side that a ray finds has a vertex."""
+
+
+@dataclass(frozen=True)
+class _Growth:
+    """What grows, and how: one row for each leaf, in the order of the program."""
+
+    tree: ImplicitModel
+    """Before."""
+    amounts: Float64Array
+    """Growths, in the leaves' own units (n,)."""
+    lengths: Float64Array
+    """The same in the world's (n,)."""
+    aims: Float64Array
+    """Distances from skeletons, over influences after the growth, that lie in plates and walls (n,)."""
+
+    @staticmethod
+    def none(tree: ImplicitModel) -> "_Growth":
+        """Return no growth."""
+        zeros = np.zeros(sum(1 for _ in runs_of_leaves(tree._program)))
+        return _Growth(tree, zeros, zeros, zeros)
+
+    @Lazy
+    def grown(self) -> ImplicitModel:
+        """Return the tree after."""
+        return GrownModel(self.tree, self.amounts) if self.amounts.any() else self.tree
+
+    @property
+    def reach(self) -> float:
+        """Largest growth."""
+        return float(np.abs(self.lengths).max())
+
+    def then(self, later: "_Growth") -> "_Growth":
+        """Return this growth and one of its grown tree, whose leaves are others."""
+        both = zip(
+            (self.amounts, self.lengths, self.aims), (later.amounts, later.lengths, later.aims), strict=True
+        )
+        return _Growth(self.tree, *(a + b for a, b in both))
+
+
+class _Vertices:
+    """Vertices of a mesh of a grown tree, which go back to the surface of the tree itself."""
+
+    def __init__(self, mesh: Mesh, device: str) -> None:
+        self.mesh, self.device = mesh, device
+        self.starts = mesh.vertices
+        """The vertices before they moved."""
+        self.faulty = np.zeros(len(mesh.vertices), bool)
+        """Vertices that are not on the surface."""
+        self.moved = self.faulty.copy()
+        self.owners = np.full(len(mesh.vertices), -1, np.int32)
+        """The leaf to whose surface each vertex belonged; −1 for others than those that grew."""
+
+    def go_back(self, growth: _Growth) -> None:
+        """Move the vertices to the surface of the tree before it grew; all others keep what they have."""
+        before, owners, nearness, feet = self.mesh, *self._feet(growth)
+        off = np.abs(values_at(growth.tree.tape, self.starts) - ISO) > ON_SURFACE
+        on_grown = nearness < ON_SURFACE
+        listed = np.flatnonzero(off | on_grown)
+        self.owners = owners
+        self.moved[listed] = True
+        self._place(growth.tree, self.starts[listed], listed, growth.reach, owners[listed], feet[listed])
+        ways = np.linalg.norm(self.mesh.vertices - before.vertices, axis=1)
+        self.faulty |= ways > MAX_WAY * growth.reach
+        self._mend(growth)
+
+    def _mend(self, growth: _Growth) -> None:
+        """Place faulty vertices again, from the middle of their neighbours that are not."""
+        for _round in range(MENDINGS):
+            if not self.faulty.any():
+                return
+            start, end = self.mesh.faces.ravel(), np.roll(self.mesh.faces, -1, axis=1).ravel()
+            used = self.faulty[start] & ~self.faulty[end]
+            sums, counts = np.zeros((len(self.starts), 3)), np.zeros(len(self.starts))
+            np.add.at(sums, start[used], self.mesh.vertices[end[used]])
+            np.add.at(counts, start[used], 1.0)
+            listed = np.flatnonzero(counts)
+            places = (sums[listed] / counts[listed, None]).astype(np.float32)
+            self._place(growth.tree, places, listed, growth.reach)
+
+    def _place(
+        self,
+        tree: ImplicitModel,
+        points: Float32Array,
+        listed: IndexArray,
+        reach: float,
+        owners: Int32Array | None = None,
+        feet: Float32Array | None = None,
+    ) -> None:
+        """Place some of the vertices on the surface of a tree, from points near it."""
+        tape, count, device = tree.tape, len(points), self.device
+        whole = tape.on(device)
+        if owners is None or feet is None:
+            owners, feet = np.full(count, -1, np.int32), points
+        arrays = [wp.empty(count, dtype=wp.vec3, device=device) for _ in range(3)]
+        errors = wp.empty(count, dtype=wp.float32, device=device)
+        inputs = [on_device(points, wp.vec3, device), on_device(owners, wp.int32, device)]
+        inputs += [on_device(feet, wp.vec3, device), reach, whole.data, whole.span]
+        kernel = tape.instruction_set.kernel_for(return_to_surface)
+        launch(kernel, count, inputs, [vertex_arrays(*arrays), errors], device)
+        mesh = self.mesh
+        columns = [mesh.vertices.copy(), mesh.normals.copy(), mesh.colors.copy()]
+        for column, array in zip(columns, arrays, strict=True):
+            column[listed] = array.numpy()
+        self.mesh = Mesh(columns[0], mesh.faces, columns[1], columns[2], mesh.sheet_counts)
+        self.faulty[listed] = errors.numpy() > MAX_FIELD_ERROR
+
+    def _feet(self, growth: _Growth) -> tuple[Int32Array, Float32Array, Float32Array]:
+        """Return the owners of the vertices, the differences of their owners' fields to ISO, and the feet."""
+        count, device = len(self.starts), self.device
+        points = on_device(self.starts, wp.vec3, device)
+        nearness = wp.full(count, value=float(ISO), dtype=wp.float32, device=device)
+        owners = wp.full(count, value=-1, dtype=wp.int32, device=device)
+        feet = wp.zeros(count, dtype=wp.vec3, device=device)
+        lower, upper = leaf_boxes(growth.grown)
+        warped = has_warps(growth.tree)
+        for number in np.flatnonzero((growth.aims >= 0.0) & (growth.amounts != 0.0)).tolist():
+            near = ((self.starts >= lower[number]) & (self.starts <= upper[number])).all(axis=1) | warped
+            listed = on_device(np.flatnonzero(near), wp.int32, device)
+            aim, reach = float(growth.aims[number]), 4.0 * growth.reach
+            tape = leaf_tape(growth.grown._program, number)
+            own = tape.on(device)
+            inputs = [points, listed, number, aim, reach, own.data, own.span]
+            kernel = tape.instruction_set.kernel_for(find_feet)
+            launch(kernel, len(listed), inputs, [nearness, owners, feet], device)
+            if aim == 0.0:
+                tape = leaf_tape(growth.tree._program, number, FOOT_GROWTH * growth.amounts[number])
+                own = tape.on(device)
+                inputs = [listed, number, reach, own.data, own.span, owners]
+                kernel = tape.instruction_set.kernel_for(improve_feet)
+                launch(kernel, len(listed), inputs, [feet], device)
+        return owners.numpy(), nearness.numpy(), feet.numpy()
+
+    def finished(self) -> Mesh:
+        """Return the mesh; creases that moved count as parts whose sheets do not meet nearby."""
+        counts = self.mesh.sheet_counts
+        if counts is None:
+            return self.mesh
+        return replace(
+            self.mesh, sheet_counts=np.where(self.moved & (counts > 1), 0, counts).astype(np.uint8)
+        )
+
+
+def mesh_of_thin_parts(
+    tree: ImplicitModel,
+    grid_of: Callable[[ImplicitModel, float], Grid],
+    uniform: Callable[[ImplicitModel], Mesh],
+    device: str | None,
+    creases: bool,
+    report: Progress,
+) -> Mesh:
+    """Return a mesh that shows thin parts: thickened where they are plates or walls, else with small cells.
+
+    `grid_of` returns a grid for a model whose cells are smaller by a factor, and `uniform` a mesh of the
+    cells of the factor 1.
+    """
+
+    def with_small_cells(
+        model: ImplicitModel, first: FirstCells | None = None
+    ) -> tuple[Mesh, list[ThinPart]]:
+        mesh, unresolved = mesh_of_parts(model, partial(grid_of, model), device, creases, report, first)
+        return mesh or uniform(model), unresolved
+
+    size = grid_of(tree, 1.0).cell_size
+    limits, first = np.full(len(part_sizes(tree)[0]), np.inf), None
+    for _attempt in range(MAX_ATTEMPTS):
+        plates = _grown_plates(tree, size, limits)
+        first = first_cells(plates.grown, partial(grid_of, plates.grown), device, report)
+        growth = plates.then(_grown_walls(plates.grown, first, size, limits))
+        if growth.grown is tree:
+            break
+        walls_grow = not np.array_equal(growth.amounts, plates.amounts)
+        mesh, unresolved = with_small_cells(growth.grown, None if walls_grow else first)
+        first = None
+        kernels = (return_to_surface, find_feet, improve_feet, find_other_sides)
+        load_together(map(tree.tape.instruction_set.kernel_for, kernels), known_device(device))
+        vertices = _Vertices(mesh, known_device(device))
+        vertices.go_back(growth)
+        wrong = _wrong_leaves(tree, vertices, size, growth)
+        if not len(wrong):
+            warn_of_thin_parts(growth.grown, unresolved)
+            return vertices.finished()
+        limits[wrong] = LESS * np.abs(growth.lengths[wrong])
+    mesh, unresolved = with_small_cells(tree, first)
+    warn_of_thin_parts(tree, unresolved)
+    return mesh
+
+
+def _grown_plates(tree: ImplicitModel, size: float, limits: Float64Array) -> _Growth:
+    """Return the growth of plates that are too thin for cells of a size, up to limits."""
+    needed = part_sizes(tree)[0] / BALL_CELLS
+    lengths, scales = np.zeros(len(needed)), np.ones(len(needed))
+    half = PLATE_CELLS * size * (WARP_MARGIN if has_warps(tree) else MARGIN)
+    leaves = list(runs_of_leaves(tree._program))
+    for number in np.flatnonzero(needed < THIN * size):
+        run, placed = leaves[number]
+        if not _may_be_plate(run, placed):
+            continue
+        spectrum = np.linalg.svd(placed.placement.matrix[:3, :3], compute_uv=False)
+        width = _width(placed)
+        if width < 2.0 * PLATE_LENGTHS * needed[number] or spectrum[0] > MAX_STRETCH * spectrum[-1]:
+            continue
+        scales[number] = spectrum[-1]
+        lengths[number] = min(half, width / PLATE_LENGTHS, limits[number])
+    limit_by_gaps(tree, leaves, lengths)
+    lengths[lengths < GROWS * needed] = 0.0
+    return _Growth(tree, lengths / scales, lengths, np.zeros(len(lengths)))
+
+
+def _may_be_plate(run: Run, placed: PlacedPrimitive) -> bool:
+    """Return True for flat skeletons and solids with the default profile."""
+    leaf = placed.primitive
+    if not isinstance(leaf, ProgramPrimitive) or leaf.signed or leaf.profiled:
+        return False
+    assert isinstance(run.kind, Skeleton)
+    return run.kind.cells == PLATE_CELLS or float(type(leaf).inradii([leaf])[0]) > 0.0
+
+
+def _width(placed: PlacedPrimitive) -> float:
+    """Return the second of the three lengths of a leaf's skeleton."""
+    corners = hull_corners(placed)
+    axes = np.linalg.svd(corners - corners.mean(axis=0))[2]
+    return float(np.sort(np.ptp(corners @ axes.T, axis=0))[1])
+
+
+def _grown_walls(tree: ImplicitModel, first: FirstCells, size: float, limits: Float64Array) -> _Growth:
+    """Return the growth of bodies whose tools leave thin walls, and of tools between which there are some.
+
+    What two bodies have in common is a lens: it would grow far beyond its rim.
+    """
+    leaves = list(runs_of_leaves(tree._program))
+    lengths, scales, depths = np.zeros(len(leaves)), np.ones(len(leaves)), np.zeros(len(leaves))
+    for wall in first.walls.thin if first.walls is not None else ():
+        if wall.thickness > WALL_CELLS * THIN * size or not wall.facing.tool:
+            continue
+        for number in wall.operand.numbers:
+            run, placed = leaves[number]
+            scale = float(np.linalg.svd(placed.placement.matrix[:3, :3], compute_uv=False)[-1])
+            radius = _radius_of_curvature(run, placed) * scale
+            cell = min(size, SAGITTA_CELLS * float(np.sqrt(wall.thickness * radius)))
+            growth = min(max(WALL_CELLS * MARGIN * cell - wall.thickness, 0.0), limits[number])
+            depth = 0.5 * wall.thickness
+            if wall.operand.tool:
+                growth, depth = -0.5 * growth, -depth
+            if placed.primitive.signed or -growth > MAX_SHRINKAGE * radius:
+                return _Growth.none(tree)
+            if abs(growth) > abs(lengths[number]):
+                lengths[number], scales[number], depths[number] = growth, scale, depth
+    signs, lengths = np.sign(lengths), np.abs(lengths)
+    limit_by_gaps(tree, leaves, lengths)
+    lengths[lengths < GROWS * np.abs(depths)] = 0.0
+    amounts = signs * lengths / scales
+    aims = [
+        _aim(*leaf, amount, depth)
+        for leaf, amount, depth in zip(leaves, amounts.tolist(), (depths / scales).tolist(), strict=True)
+    ]
+    try:
+        growth_of_all = _Growth(tree, amounts, signs * lengths, np.array(aims))
+        _ = growth_of_all.grown.tape
+    except InvalidNode:  # nothing is left of a tool
+        return _Growth.none(tree)
+    return growth_of_all
+
+
+def _aim(run: Run, placed: PlacedPrimitive, growth: float, depth: float) -> float:
+    """Return the distance from a skeleton, over the influence after a growth, at a depth in a wall.
+
+    It is −1 for leaves whose distance is not known.
+    """
+    if growth == 0.0:
+        return 0.0
+    if not isinstance(run.kind, Skeleton) or placed.primitive.profiled:
+        return -1.0
+    influence = float(influence_radii([placed]).min())
+    return max(RIM * influence - depth, 0.0) / (influence + growth / RIM)
+
+
+def _radius_of_curvature(run: Run, placed: PlacedPrimitive) -> float:
+    """Return the radius of a leaf around a point or a curve, in its own units; infinite for all others."""
+    if not isinstance(run.kind, Skeleton) or _may_be_plate(run, placed):
+        return float(np.inf)
+    return RIM * float(influence_radii([placed]).min())
+
+
+def _wrong_leaves(tree: ImplicitModel, vertices: _Vertices, size: float, growth: _Growth) -> IndexArray:
+    """Return the leaves that grew too much: vertices are not on the surface, or parts of it have none."""
+    sides = _Sides(vertices.mesh, SIDE_CELLS * size)
+    missing, count = vertices.faulty.copy(), len(growth.amounts)
+    for sign in (-1.0, 1.0):
+        missing |= _without_other_side(tree, vertices, sides, growth.reach, sign)
+    owners = vertices.owners + 1
+    checked = np.bincount(owners[vertices.moved], minlength=count + 1)
+    failed = np.bincount(owners[missing & ~vertices.faulty], minlength=count + 1) > MISSING_SHARE * checked
+    failed[owners[vertices.faulty]] = True
+    failed[1:] |= _without_vertices(tree, sides, growth)
+    if failed[0]:
+        return np.flatnonzero(growth.amounts)
+    return np.flatnonzero(failed[1:])
+
+
+class _Sides:
+    """The vertices of a mesh by place and normal: which are on the side of a point of the surface."""
+
+    def __init__(self, mesh: Mesh, reach: float) -> None:
+        from scipy.spatial import cKDTree  # most meshes have no thin plates or walls
+
+        self._mesh, self._reach = mesh, reach
+        self._search = cKDTree(np.concatenate([mesh.vertices, reach * mesh.normals], axis=1))
+
+    def have_vertex(self, places: Float64Array, normals: Float64Array, depths: Float64Array) -> BoolArray:
+        """Return True for points whose side has a vertex nearby, no farther off the surface than a depth."""
+        gaps, offsets = self._nearest(places, normals)
+        return np.asarray(((gaps < self._reach) & (offsets < depths[:, None])).any(axis=1))
+
+    def roughness(self, listed: IndexArray) -> Float64Array:
+        """Return how far the nearest vertices of some vertices are off the surface, by the same measure."""
+        gaps, offsets = self._nearest(self._mesh.vertices[listed], self._mesh.normals[listed])
+        roughness: Float64Array = np.where(gaps < self._reach, offsets, 0.0).max(axis=1)
+        return roughness
+
+    def _nearest(
+        self, places: Float64Array | Float32Array, normals: Float64Array | Float32Array
+    ) -> tuple[Float64Array, Float64Array]:
+        """Return distances of vertices near points with normals, and how far they are off the surface.
+
+        A vertex on the same side has a similar normal, and lies in the plane between both normals.
+        """
+        mesh = self._mesh
+        rows = np.concatenate([places, self._reach * normals], axis=1)
+        gaps, nearest = self._search.query(rows, k=NEAREST_VERTICES)
+        between = normals[:, None] + mesh.normals[nearest]
+        between /= np.maximum(np.linalg.norm(between, axis=2, keepdims=True), 1e-30)
+        return gaps, np.abs((between * (mesh.vertices[nearest] - places[:, None])).sum(axis=2))
+
+
+def _without_vertices(tree: ImplicitModel, sides: _Sides, growth: _Growth) -> BoolArray:
+    """Return the leaves that grew where the surface of a leaf has no vertices (n,)."""
+    grown, leaves = growth.amounts != 0.0, list(runs_of_leaves(tree._program))
+    lower, upper = leaf_boxes(growth.grown)
+    failed = np.zeros(len(grown), bool)
+    for number, (_, placed) in enumerate(leaves):
+        beside = grown & ((lower <= upper[number]) & (upper >= lower[number])).all(axis=1)
+        if not beside.any():
+            continue
+        points = surface_points(tree, placed, number)
+        rows = gradients_at(tree.tape, points).astype(np.float64)
+        visible = np.abs(rows[:, 0] - ISO) < MAX_FIELD_ERROR
+        points, normals = points[visible], _outward(rows[visible])
+        if len(points):
+            found = sides.have_vertex(points, normals, np.full(len(points), np.inf))
+            if found.mean() < LEAST_FOUND:
+                failed[[number] if grown[number] else beside] = True
+    return failed
+
+
+def _outward(rows: Float64Array) -> Float64Array:
+    """Return the normals at points with values and gradients (n, 4)."""
+    lengths = np.linalg.norm(rows[:, 1:], axis=1, keepdims=True)
+    normals: Float64Array = -rows[:, 1:] / np.maximum(lengths, 1e-300)
+    return normals
+
+
+def _without_other_side(
+    tree: ImplicitModel, vertices: _Vertices, sides: _Sides, reach: float, sign: float
+) -> BoolArray:
+    """Return the vertices from which rays find sides of plates, walls or gaps that have no vertices.
+
+    Rays go along normals, or against them.
+    """
+    mesh, device, tape = vertices.mesh, vertices.device, tree.tape
+    whole, listed = tape.on(device), np.flatnonzero(vertices.moved)
+    shortest = SHORTEST_RAY * float(np.abs(mesh.vertices).max(initial=0.0))
+    rays = sign * mesh.normals[listed]
+    found = wp.empty(len(listed), dtype=wp.float32, device=device)
+    inputs = [on_device(rows, wp.vec3, device) for rows in (mesh.vertices[listed], rays)]
+    inputs += [shortest, RAY_REACH * reach, whole.data, whole.span]
+    launch(tape.instruction_set.kernel_for(find_other_sides), len(listed), inputs, [found], device)
+    distances = found.numpy().astype(np.float64)
+    hit = np.flatnonzero(distances < NO_SIDE)
+    places = mesh.vertices[listed[hit]] + distances[hit, None] * rays[hit]
+    normals = _outward(gradients_at(tape, places).astype(np.float64))
+    opposed = -sign * (normals * rays[hit]).sum(axis=1) > OPPOSED
+    depths = 0.5 * distances[hit] + ROUGHNESS * sides.roughness(listed[hit])
+    there = sides.have_vertex(places, normals, depths)
+    result = np.zeros(len(mesh.vertices), bool)
+    result[listed[hit[opposed & ~there]]] = True
+    return result

@@ -1,0 +1,80 @@
+"""Trees whose leaves have grown, and tapes of single leaves."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from blobtree._typing import Float64Array
+from blobtree.formulas.operators import SUM
+from blobtree.lazy import Lazy
+from blobtree.tape.model import ImplicitModel
+from blobtree.tape.program import (
+    EnterWarp,
+    Instruction,
+    LeaveWarp,
+    PlacedPrimitive,
+    ProgramNode,
+    Run,
+)
+from blobtree.tape.tape import Tape, compile_tape
+
+
+class GrownModel(ImplicitModel):
+    """A tree in which the visible radii of leaves are larger, each by a length of its own.
+
+    The growths are in the leaves' own units, in the order of the program.
+    """
+
+    def __init__(self, tree: ImplicitModel, growths: Float64Array) -> None:
+        self._tree, self._growths = tree, growths
+
+    @property
+    def children(self) -> tuple[ProgramNode, ...]:
+        """The operands of the tree."""
+        return self._tree.children
+
+    @property
+    def program_children(self) -> tuple[ProgramNode, ...]:
+        """The nodes below the tree in programs."""
+        return self._tree.program_children
+
+    @Lazy
+    def _program(self) -> list[Instruction]:
+        growths = iter(self._growths.tolist())
+        return [
+            replace(step, primitives=[grown(placed, next(growths)) for placed in step.primitives])
+            if isinstance(step, Run)
+            else step
+            for step in self._tree._program
+        ]
+
+
+def grown(placed: PlacedPrimitive, growth: float) -> PlacedPrimitive:
+    """Return a leaf whose visible radii are larger by a length in its own units."""
+    if growth == 0.0:
+        return placed
+    placement = replace(placed.placement, growth=placed.placement.growth + growth)
+    return PlacedPrimitive(placed.primitive, placement)
+
+
+def runs_of_leaves(program: list[Instruction]) -> Iterator[tuple[Run, PlacedPrimitive]]:
+    """Yield the leaves of a program in its order, each with its run."""
+    return ((step, placed) for step in program if isinstance(step, Run) for placed in step.primitives)
+
+
+def leaf_tape(program: list[Instruction], number: int, growth: float = 0.0) -> Tape:
+    """Return the tape of one leaf alone, within the warps around it."""
+    warps: list[EnterWarp] = []
+    first = 0
+    for step in program:
+        match step:
+            case EnterWarp():
+                warps.append(step)
+            case LeaveWarp():
+                warps.pop()
+            case Run(primitives=primitives):
+                if first <= number < first + len(primitives):
+                    leaf = grown(primitives[number - first], growth)
+                    run = Run(step.kind, step.stretched, SUM, (), [leaf])
+                    return compile_tape([*warps, run, *map(LeaveWarp, reversed(warps))])
+                first += len(primitives)
+    raise IndexError(f"expected the number of a leaf below {first}, got {number}")

@@ -1,0 +1,138 @@
+"""Plates and walls far thinner than cells: closed meshes of few triangles, with the area of the surface."""
+
+import logging
+
+import numpy as np
+import pytest
+
+from blobtree import Box, Disc, Node, Point, Segment, Shell, polygonize
+from blobtree._typing import Float64Array
+from blobtree.meshing.leaf_gaps import limit_by_gaps
+from blobtree.meshing.polygonize import polygonize_parts
+from blobtree.tape.grown import runs_of_leaves
+from tests.thin_trees import is_closed, mesh_areas
+
+BALL = Point((0, 0, 0), radius=1.0)
+CUBE = Box((0, 0, 0), (2, 2, 2), radius=0.1)
+CUBE_AREA = 24.0 + 1.2 * np.pi + 0.04 * np.pi
+LARGEST_ERROR = 0.02
+"""Error of the field at a vertex of the thinnest parts here, which are a hundred-thousandth of their box."""
+
+
+def plate(radius: float, axis: tuple[float, float, float] = (1, 2, 3)) -> Disc:
+    """Return a plate with an extent of 1."""
+    return Disc((0, 0, 0), axis, 1.0, radius=radius)
+
+
+def plate_area(radius: float) -> float:
+    """Return its area."""
+    return 2.0 * np.pi + 2.0 * np.pi**2 * radius + 4.0 * np.pi * radius**2
+
+
+def checked_area(tree: Node, resolution: int = 32, most: int = 60_000) -> float:
+    """Return the area of the mesh of a tree, once it is closed, small and on the surface."""
+    mesh = polygonize_parts(tree, resolution=resolution)
+    assert is_closed(mesh.faces)
+    assert len(mesh.faces) < most
+    assert np.abs(tree(mesh.vertices) - 0.5).max() < LARGEST_ERROR
+    cosines = (mesh.normals * tree.gradient(mesh.vertices)).sum(axis=1)
+    assert (cosines < 0.0).all()
+    return float(mesh_areas(mesh)[1].sum())
+
+
+@pytest.mark.parametrize("radius", [1e-2, 1e-3, 1e-4])
+def test_a_plate_at_an_angle_has_its_area(radius: float) -> None:
+    assert checked_area(plate(radius)) == pytest.approx(plate_area(radius), rel=0.01)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_plates_at_random_angles_are_whole(seed: int) -> None:
+    axis = np.random.default_rng(seed).normal(size=3)
+    tree = BALL | plate(1e-4, (axis[0], axis[1], axis[2])).translate((4, 0, 0))
+    assert checked_area(tree, 64) == pytest.approx(4.0 * np.pi + 2.0 * np.pi, rel=0.02)
+
+
+def twisted_area(degrees: float) -> float:
+    """Return the area of both sides of a disc in the plane x = 0 that is twisted about the z axis."""
+    y = np.linspace(-1.0, 1.0, 100_001)
+    return float(4.0 * (np.sqrt(1.0 - y**2) * np.sqrt(1.0 + (np.radians(degrees) * y) ** 2)).mean() * 2.0)
+
+
+FLAT: dict[str, tuple[Node, float]] = {
+    "box": (Box((0, 0, 0), (1, 2, 1e-3), radius=1e-4).rotate((1, 2, 3), 40), 4.0),
+    "twisted": (plate(1e-4, (1, 0, 0)).twist(40.0), twisted_area(40.0)),
+    "stretched": (plate(1e-3, (0, 0, 1)).scale((0.1, 0.2, 0.1)), 0.04 * np.pi),
+    "shell": (Shell(BALL, 1e-3), 4.0 * np.pi * (1.0 + 0.999**2)),
+    "pipe": (
+        Segment((0, 0, 0), (0, 1, 2), radius=0.5) - Segment((0, 0, 0), (0, 1, 2), radius=0.499),
+        2.0 * np.pi * 0.999 * 5.0**0.5 + 4.0 * np.pi * (0.25 + 0.499**2),
+    ),
+    "case": (CUBE - Box((0, 0, 0), (1.999, 1.999, 1.999), radius=0.1), 2.0 * CUBE_AREA),
+    "slit": (CUBE - Disc((0, 0, 0), (1, 2, 3), 0.7, radius=1e-4), CUBE_AREA + 0.98 * np.pi),
+}
+"""Trees with a thin plate or wall, and their areas."""
+
+
+@pytest.mark.slow_cases("twisted", "stretched", "shell", "pipe", "case")
+@pytest.mark.parametrize("name", FLAT)
+def test_each_kind_has_the_area_of_both_sides(name: str) -> None:
+    tree, area = FLAT[name]
+    assert checked_area(tree) == pytest.approx(area, rel=0.04)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("joined", ["union", "sum"])
+@pytest.mark.parametrize("radius", [1e-2, 1e-4])
+def test_a_plate_that_grows_out_of_a_ball_is_whole(joined: str, radius: float) -> None:
+    fin = Disc((1.9, 0, 0), (0, 1, 0.3), 1.0, radius=radius)
+    tree = BALL | fin if joined == "union" else BALL + fin
+    mesh = polygonize(tree)
+    centers, areas = mesh_areas(mesh)
+    beyond = centers[:, 0] > 1.9
+    assert is_closed(mesh.faces)
+    assert areas[beyond].sum() == pytest.approx(np.pi * (1.0 + np.pi * radius), rel=0.03)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gap", [0.05, 0.02])
+def test_gaps_beside_plates_stay_open(gap: float) -> None:
+    thin = Disc((0, 0, 1.1 + gap), (0, 0, 1), 0.6, radius=1e-3)
+    assert checked_area(CUBE | thin, 48, 400_000) == pytest.approx(CUBE_AREA + 0.72 * np.pi, rel=0.02)
+    beside = Disc((2.0 + gap, 0, 0), (0, 1, 0.3), 1.0, radius=1e-4)
+    assert checked_area(BALL | beside, 48, 400_000) == pytest.approx(6.0 * np.pi, rel=0.02)
+
+
+@pytest.mark.slow
+def test_a_gap_that_does_not_fit_into_memory_is_named(caplog: pytest.LogCaptureFixture) -> None:
+    over = Disc((0, 0, 1.1 + 1e-3), (0, 0, 1), 0.6, radius=2e-5)
+    with caplog.at_level(logging.WARNING):
+        mesh = polygonize(CUBE | over)
+    (record,) = caplog.records
+    assert is_closed(mesh.faces)
+    assert "Disc at path (1,)" in record.getMessage()
+
+
+def gap_limit(first: Node, second: Node) -> float:
+    """Return the largest growth of the first of two leaves, up to 1."""
+    tree = first | second
+    lengths: Float64Array = np.array([1.0, 0.0])
+    limit_by_gaps(tree, list(runs_of_leaves(tree._program)), lengths)
+    return float(lengths[0])
+
+
+def test_growth_is_a_third_of_a_gap() -> None:
+    disc = Disc((0, 0, 0), (0, 0, 1), 1.0, radius=1e-3)
+    assert gap_limit(disc, disc.translate((0.3, 0, 0.102))) == pytest.approx(0.1 / 3, rel=0.05)
+    assert gap_limit(disc, disc.translate((2.102, 0, 0))) == pytest.approx(0.1 / 3, rel=0.05)
+    assert gap_limit(disc, disc.rotate((1, 0, 0), 90)) == 1.0
+    assert gap_limit(disc, Point((0, 0, 5), radius=1.0)) == 1.0
+
+
+@pytest.mark.slow
+def test_creases_away_from_thin_plates_stay_sharp() -> None:
+    cut = (BALL - Point((0.9, 0, 0), radius=0.5)) | Disc((-2.5, 0, 0), (1, 1, 0), 1.0, radius=1e-4)
+    mesh = polygonize(cut, creases=True)
+    assert is_closed(mesh.faces)
+    assert mesh.sheet_counts is not None
+    assert (mesh.sheet_counts == 2).sum() > 50
+    assert np.abs(cut(mesh.vertices) - 0.5).max() < LARGEST_ERROR
