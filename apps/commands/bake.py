@@ -11,6 +11,7 @@ from decals.apps.commands.options import (
     ContactName,
     CreaseAngle,
     Definitions,
+    LayoutName,
     MappingName,
     OptionalWhole,
     Stiffness,
@@ -31,6 +32,7 @@ def bake(
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
     size: Whole = 2048,
     samples: Whole = 2,
+    layout: LayoutName = "auto",
     vertex_colors: Annotated[bool, Parameter(negative=())] = False,
     contact: ContactName = None,
     stiffness: Stiffness = None,
@@ -53,6 +55,9 @@ def bake(
         Width and height of the texture in texels, from 16 to 8192.
     samples
         Samples per texel along each axis: 1 is fast, 2 smooth, 4 fine.
+    layout
+        How surfaces lie on the texture: box, xatlas, own (texture coordinates of the meshes), or auto, the
+        one with the shortest seams.
     vertex_colors
         Write colours at the vertices instead of a texture.
     contact
@@ -75,6 +80,7 @@ def bake(
             output,
             size=size,
             samples=samples,
+            layout=layout,
             vertex_colors=vertex_colors,
             resolution=resolution,
             creases=creases,

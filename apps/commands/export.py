@@ -19,6 +19,7 @@ from decals.apps.commands.options import (
     ContactName,
     CreaseAngle,
     Definitions,
+    LayoutName,
     MappingName,
     OptionalWhole,
     Stiffness,
@@ -72,6 +73,7 @@ def export(
     up: Annotated[Literal["y", "z"] | None, Parameter(show_default=False)] = None,
     size: Whole = 2048,
     samples: Whole = 2,
+    layout: LayoutName = "auto",
     contact: ContactName = None,
     stiffness: Stiffness = None,
     mapping: MappingName = None,
@@ -110,6 +112,9 @@ def export(
         Width and height of the texture in texels, from 16 to 8192.
     samples
         Samples per texel along each axis: 1 is fast, 2 smooth, 4 fine.
+    layout
+        How surfaces lie on the texture: box, xatlas, own (texture coordinates of the meshes), or auto, the
+        one with the shortest seams.
     contact
         Contact mode, as for render.
     stiffness
@@ -166,6 +171,7 @@ def export(
                 instances=instances,
                 size=size,
                 samples=samples,
+                layout=layout,
                 resolution=resolution,
                 creases=creases,
                 progress=progress,

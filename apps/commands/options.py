@@ -82,6 +82,9 @@ Stiffness = Annotated[float | None, Parameter(show_default=False)]
 MappingName = Annotated[Literal["corrected", "chord", "walked"] | None, Parameter(show_default=False)]
 """An optional image mapping on the command line."""
 
+LayoutName = Literal["auto", "box", "xatlas", "own"]
+"""A layout of textures on the command line."""
+
 CreaseAngle = Annotated[
     float | None,
     Parameter(

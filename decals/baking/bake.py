@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from blobtree.progress import Cancel, Progress
 from blobtree.validation import truth
 from decals.baking.export import TEXTURE, VERTICES, export
+from decals.baking.layouts import AUTO
 from decals.errors import InvalidScene
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
@@ -23,6 +24,7 @@ def bake(
     *,
     size: int = 2048,
     samples: int = 2,
+    layout: str = AUTO,
     vertex_colors: bool = False,
     contact: AnyContact | str | None = None,
     stiffness: float | None = None,
@@ -49,7 +51,9 @@ def bake(
     size : int
         Width and height of the texture in texels, from 16 to 8192.
     samples : int
-        Samples along each axis of a texel; 2 means 4 samples a texel.
+        Samples along each axis of a texel whose neighbours differ; 2 means 4 samples a texel.
+    layout : str
+        How surfaces lie on the texture: ``"auto"``, ``"box"``, ``"xatlas"`` or ``"own"``; see `export`.
     vertex_colors : bool
         Write the colours at the vertices instead of a texture. Only fine meshes then show images; xatlas is
         not needed.
@@ -95,6 +99,7 @@ def bake(
         colors=VERTICES if truth("vertex_colors", vertex_colors, InvalidScene) else TEXTURE,
         size=size,
         samples=samples,
+        layout=layout,
         contact=contact,
         stiffness=stiffness,
         mapping=mapping,

@@ -14,9 +14,9 @@ from blobtree.errors import InvalidResolution
 from blobtree.files import write_together
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.validation import truth
-from decals.baking.atlas import unwrap
 from decals.baking.formats import FORMATS
 from decals.baking.instances import Instances, decal_instances
+from decals.baking.layouts import AUTO, LAYOUTS, XATLAS, lay_out
 from decals.baking.materials import SRGB, Maps, material_bytes, split_maps, vertex_tangents
 from decals.baking.meshes import BakeMesh, bake_mesh
 from decals.baking.parts import METRES, UP, Baked, Part
@@ -60,6 +60,7 @@ def export(
     up: str | None = None,
     size: int = 2048,
     samples: int = 2,
+    layout: str = AUTO,
     contact: AnyContact | str | None = None,
     stiffness: float | None = None,
     mapping: ImageMapping | str | None = None,
@@ -100,7 +101,11 @@ def export(
     size : int
         Width and height of the texture in texels, from 16 to 8192.
     samples : int
-        Samples along each axis of a texel; 2 means 4 samples a texel.
+        Samples along each axis of a texel whose neighbours differ; 2 means 4 samples a texel.
+    layout : str
+        How surfaces lie on the texture: ``"box"`` (as the six sides of a box see them), ``"xatlas"`` (needs
+        the extra ``bake``), ``"own"`` (the texture coordinates of the meshes) or ``"auto"``, by default, the
+        one with the shortest seams; docs/baking.md has its rule.
     contact, stiffness, mapping : optional
         Modes, as for `decals.evaluate`. Default: those of the scene.
     resolution : int, optional
@@ -157,7 +162,9 @@ def export(
     modes = {"contact": contact, "mapping": mapping, "stiffness": stiffness}
     Drawing().overridden(**modes)  # checked before a model is read
     creases = truth("creases", creases, InvalidScene)
-    for package, extra in (*rules.packages, *([("xatlas", "bake")] if place == TEXTURE else [])):
+    one_of("layout", layout, LAYOUTS, InvalidScene)
+    needs_xatlas = place == TEXTURE and layout == XATLAS
+    for package, extra in (*rules.packages, *([("xatlas", "bake")] if needs_xatlas else [])):
         optional_package(package, extra)
     with reporting(progress, cancel) as report:
         baked = bake_parts(
@@ -168,6 +175,7 @@ def export(
             instances=instances,
             size=size,
             samples=samples,
+            layout=layout,
             resolution=resolution,
             creases=creases,
             **modes,
@@ -196,6 +204,7 @@ def bake_parts(
     instances: bool = False,
     size: int = 2048,
     samples: int = 2,
+    layout: str = AUTO,
     resolution: int | None = None,
     creases: bool = False,
     **modes: Any,
@@ -210,7 +219,7 @@ def bake_parts(
         Place of the colours: `TEXTURE`, `VERTICES` or `NO_COLORS`.
     report
         Called with the stage and the fraction done.
-    attributes, instances, size, samples, resolution, creases, **modes
+    attributes, instances, size, samples, layout, resolution, creases, **modes
         See `export`.
 
     Raises
@@ -227,7 +236,7 @@ def bake_parts(
         copies = decal_instances(rows, source.images, [getattr(item, "name", "") for item in source.objects])
         source = replace(source, decals=Decals.empty())
     work = _Work(source, source.drawing.overridden(**modes), resolution, creases, report)
-    parts, maps = work.textured(size, samples) if place == TEXTURE else (work.plain(place), None)
+    parts, maps = work.textured(size, samples, layout) if place == TEXTURE else (work.plain(place), None)
     parts = [work.with_attributes(number, part, attributes) for number, part in enumerate(parts)]
     return Baked(parts, maps, source.origin, recipe=source.recipe, instances=copies)
 
@@ -303,9 +312,9 @@ class _Work:
         self._rows = [np.arange(len(mesh.vertices)) for mesh in self._meshes]
         self._report = report
 
-    def textured(self, size: int, samples: int) -> tuple[list[Part], Maps]:
+    def textured(self, size: int, samples: int, layout: str) -> tuple[list[Part], Maps]:
         """Return all meshes with coordinates in one texture, and its maps."""
-        unwrapped = unwrap(self._meshes, size, self._report)
+        unwrapped = lay_out(self._meshes, size, layout, 1, self._report)
         self._rows = [part.rows for part in unwrapped]
         pairs = list(zip(self._meshes, unwrapped, strict=True))
         channels = Channels(self._colors.at)

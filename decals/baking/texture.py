@@ -98,6 +98,11 @@ class Channels:
     srgb: Sequence[bool] = (True, True, True)
 
 
+def gutter_width(size: int) -> int:
+    """Return the width of the gutters of a texture, in texels."""
+    return max(MIN_GUTTER, round(GUTTER_SHARE * size))
+
+
 def bake_texture(
     meshes: Sequence[BakeMesh],
     unwrapped: Sequence[Unwrapped],
@@ -116,7 +121,7 @@ def bake_texture(
     start_warp()
     tiles = 1 + max(int(part.tile_of_face.max(initial=0)) for part in unwrapped)
     image = np.zeros((tiles, size, size, channels.count), np.uint8)
-    gutter = max(MIN_GUTTER, round(GUTTER_SHARE * size))
+    gutter = gutter_width(size)
     pages = [_Page(of, channels.encode) for of in image]
     sheets = {
         (tile, number): Sheet(number, mesh, part, tile, channels)
@@ -185,12 +190,16 @@ class Located(NamedTuple):
 class Sheet:
     """The charts of one mesh on one tile."""
 
-    def __init__(self, number: int, mesh: BakeMesh, part: Unwrapped, tile: int, channels: Channels) -> None:
-        self._number, self._mesh, self._channels = number, mesh, channels
+    def __init__(
+        self, number: int, mesh: BakeMesh, part: Unwrapped, tile: int, channels: Channels | None = None
+    ) -> None:
+        self._number, self._mesh = number, mesh
+        self._color_at = None if channels is None else channels.color_at
         self._chosen = np.flatnonzero(part.tile_of_face == tile)
         self.faces, self.places = part.faces[self._chosen], part.places
         self._rows = part.rows
-        self._tangents = None if channels.tangents is None else channels.tangents[number]
+        every = None if channels is None else channels.tangents
+        self._tangents = None if every is None else every[number]
         self._arrays: list[Any] = [
             wp.array(np.ascontiguousarray(values), dtype=kind, device=CPU)
             for values, kind in (
@@ -283,7 +292,8 @@ class Sheet:
         if base is not None:
             wide = at.weights.astype(np.float64)
             light = base.light_of(self._rows[corners], self._chosen[at.faces], wide).astype(np.float32)
-        return self._channels.color_at(self._number, at.points, at.units, along, light)
+        assert self._color_at is not None  # else the sheet has no channels
+        return self._color_at(self._number, at.points, at.units, along, light)
 
     def numbers_of(self, faces: Int64Array) -> Int32Array:
         """Return the numbers that faces of the mesh have in this sheet."""

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from functools import wraps
-from importlib.util import find_spec
 from typing import Any
 
 import pyvista as pv
@@ -16,6 +15,7 @@ from blobtree.progress import reporting
 from decals.baking.export import TEXTURE, VERTICES, bake_parts
 from decals.baking.parts import Baked
 from decals.baking.plain_files import as_polydata
+from decals.errors import MissingPackage
 from decals.rendering.options import drawn_objects
 
 WATCHED = "add_on_render_callback"
@@ -72,12 +72,6 @@ def _exporter(name: str, method: Any) -> Any:
 def _baking_exporter(name: str, method: Any) -> Any:
     @wraps(method)
     def export(*arguments: Any, **options: Any) -> Any:
-        place = TEXTURE if find_spec("xatlas") else VERTICES
-        if place == VERTICES:
-            _warn(
-                f"{name} writes decals as colours of vertices, as the package xatlas is not installed; for a "
-                "texture run pip install 'implicit-decals[bake]'"
-            )
         with ExitStack() as stack:
             for subplot in method.__self__.decals.subplots:
                 if len(subplot.applied):
@@ -85,23 +79,33 @@ def _baking_exporter(name: str, method: Any) -> Any:
                         f"{name} writes actors of VTK without the decals that plotter.decals.apply shows on "
                         "them; add their meshes with plotter.decals.add_mesh instead"
                     )
-                stack.enter_context(_baked(subplot, place))
+                baked = _baked_scene(name, subplot)
+                if baked is not None:
+                    stack.enter_context(_shown(baked, subplot))
             stack.enter_context(_silent_views())
             return method(*arguments, **options)
 
     return export
 
 
-@contextmanager
-def _baked(subplot: Any, place: str) -> Iterator[None]:
-    """Show the objects of a subplot as an actor with baked decals, in a texture or at the vertices."""
+def _baked_scene(name: str, subplot: Any) -> Baked | None:
+    """Return the objects of a subplot with baked decals; None without objects."""
     scene = subplot.scene
     if scene is None or not drawn_objects(scene):
-        yield
-        return
-    modes = {mode: getattr(subplot, mode) for mode in ("contact", "mapping", "stiffness")}
+        return None
+    options = {mode: getattr(subplot, mode) for mode in ("contact", "mapping", "stiffness")}
+    options |= {"size": TEXTURE_SIZE, "samples": TEXTURE_SAMPLES}
     with reporting() as report:
-        baked = bake_parts(scene, place, report, size=TEXTURE_SIZE, samples=TEXTURE_SAMPLES, **modes)
+        try:
+            return bake_parts(scene, TEXTURE, report, **options)
+        except MissingPackage as error:
+            _warn(f"{name} writes decals as colours of vertices: {error}", stacklevel=4)
+            return bake_parts(scene, VERTICES, report, **options)
+
+
+@contextmanager
+def _shown(baked: Baked, subplot: Any) -> Iterator[None]:
+    """Show what is baked as an actor in place of the objects of a subplot."""
     renderer, proxy = subplot.vtk_renderer, subplot.actor
     visible = proxy.GetVisibility()
     proxy.SetVisibility(False)
@@ -130,8 +134,8 @@ def _actor(baked: Baked) -> pv.Actor:
     return actor
 
 
-def _warn(text: str) -> None:
-    warnings.warn(text, stacklevel=3)
+def _warn(text: str, stacklevel: int = 3) -> None:
+    warnings.warn(text, stacklevel=stacklevel)
 
 
 @contextmanager

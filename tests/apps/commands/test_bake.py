@@ -48,7 +48,7 @@ def test_vertex_colours_replace_the_texture(saved: Path, capsys: Capture) -> Non
 
 def test_a_missing_package_is_one_line(saved: Path, monkeypatch: pytest.MonkeyPatch, capfd: Capture) -> None:
     monkeypatch.setitem(__import__("sys").modules, "xatlas", None)
-    assert run(["bake", "scene.json", "-o", "model.glb"]) == 2
+    assert run(["bake", "scene.json", "--layout", "xatlas", "-o", "model.glb"]) == 2
     lines = capfd.readouterr().err.strip().splitlines()
     assert len(lines) == 1
     assert "pip install 'implicit-decals[bake]'" in lines[0]

@@ -336,7 +336,12 @@ def test_stages_are_reported_in_order(tmp_path: Path, monkeypatch: pytest.Monkey
         objects=(TreeObject("ball", Point((0, 0, 0), radius=1.0)),), camera=decals.Camera((0, 0, 5))
     )
     decals.bake(
-        scene, tmp_path / "a.glb", size=64, resolution=40, progress=lambda *report: seen.append(report)
+        scene,
+        tmp_path / "a.glb",
+        size=64,
+        resolution=40,
+        layout="xatlas",
+        progress=lambda *report: seen.append(report),
     )
     stages = list(dict.fromkeys(stage for stage, _ in seen))
     assert stages[-4:] == ["unwrapping the surface", "colouring texels", "matching seams", "writing the file"]

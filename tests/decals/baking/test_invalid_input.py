@@ -32,6 +32,9 @@ BALL = Point((0, 0, 0), radius=1.0)
         ({"size": (64, 64)}, "size: expected"),
         ({"samples": 0}, "samples: expected a whole number from 1 to 16"),
         ({"samples": 1000}, "samples: expected"),
+        ({"layout": "sphere"}, "layout: expected one of auto, box, xatlas, own, got 'sphere'"),
+        ({"layout": 3}, "layout: expected one of"),
+        ({"layout": "own"}, "expected texture coordinates, object 'model 1' has none; use layout='box'"),
         ({"contact": 9}, "contact: expected one of"),
         ({"mapping": "planar"}, "mapping: expected one of"),
         ({"resolution": 0}, "resolution"),
@@ -78,15 +81,16 @@ def test_a_folder_that_cannot_be_written_is_named_before_the_work() -> None:
 
 
 @pytest.mark.parametrize(
-    ("package", "vertex_colors"), [("xatlas", False), ("trimesh", False), ("trimesh", True)]
+    ("package", "options"),
+    [("xatlas", {"layout": "xatlas"}), ("trimesh", {}), ("trimesh", {"vertex_colors": True})],
 )
 def test_a_missing_package_is_named_with_the_command(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str, vertex_colors: bool
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str, options: dict[str, Any]
 ) -> None:
     for name in ("trimesh", "xatlas"):
         monkeypatch.setitem(sys.modules, name, None if name == package else type(sys)(name))
     with pytest.raises(MissingPackage, match=rf"{package}.*pip install 'implicit-decals\[bake\]'"):
-        decals.bake(BALL, tmp_path / "a.glb", vertex_colors=vertex_colors)
+        decals.bake(BALL, tmp_path / "a.glb", **options)
     assert not list(tmp_path.iterdir())
 
 

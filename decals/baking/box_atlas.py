@@ -1,0 +1,146 @@
+"""Box atlas: charts that are projections of a surface along the six axes, as the sides of a box see it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from blobtree._typing import Float64Array, Int64Array
+from decals.baking.meshes import BakeMesh
+from decals.baking.packing import pack
+from decals.baking.unwrapped import Unwrapped
+from decals.surfaces.topology import components, edge_twins, welded
+
+AXES = np.array([sign * row for sign in (1.0, -1.0) for row in np.eye(3)])
+
+MIN_COSINE = 0.35
+"""Least cosine between a face and the axis along which it is projected, unless no axis is closer."""
+
+SMOOTHING = 0.3
+"""What a neighbour with the same axis counts beside the cosine."""
+
+SMOOTHING_ROUNDS = 12
+
+MAX_CHARTS = 1000
+"""Most charts of an atlas; surfaces that need more are too rugged for it."""
+
+ANGLES = np.arange(0.0, 90.0, 5.0)
+"""Turns of a chart, in degrees, of which that with the smallest rectangle is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Charts:
+    """Charts of one mesh in its own units.
+
+    Attributes
+    ----------
+    rows : int64[k]
+        Vertices of the mesh, a copy for each chart.
+    faces : int64[m, 3]
+    places : float64[k, 2]
+        From the lower corner of the chart's rectangle.
+    chart_of_row : int64[k]
+    sides : float64[c, 2]
+        Of the rectangles.
+    """
+
+    rows: Int64Array
+    faces: Int64Array
+    places: Float64Array
+    chart_of_row: Int64Array
+    sides: Float64Array
+
+
+def box_atlas(
+    meshes: Sequence[BakeMesh], groups: Sequence[Int64Array], size: int, tiles: int, padding: float
+) -> list[Unwrapped] | None:
+    """Return places for meshes on textures ``size`` texels wide, or None if there are too many charts.
+
+    All charts have about the same number of texels per area. A chart has faces of one group. Charts may lie
+    over themselves, see `decals.baking.layouts`.
+    """
+    made = [_charts(mesh, group) for mesh, group in zip(meshes, groups, strict=True)]
+    sides = np.concatenate([charts.sides for charts in made])
+    if len(sides) > MAX_CHARTS:
+        return None
+    scale = 0.0
+    while scale == 0.0 and padding >= 0.25:
+        scale, corners, squares = pack(sides, padding / size, tiles)
+        padding /= 2.0
+    if scale == 0.0:
+        return None
+    unwrapped, first = [], 0
+    for charts in made:
+        own = charts.chart_of_row + first
+        first += len(charts.sides)
+        places = (charts.places * scale + corners[own]) * size
+        tile = squares[own[charts.faces[:, 0]]].astype(np.int32)
+        faces = charts.faces.astype(np.int32)
+        unwrapped.append(Unwrapped(charts.rows, faces, places.astype(np.float32), tile))
+    return unwrapped
+
+
+def _charts(mesh: BakeMesh, group: Int64Array) -> _Charts:
+    faces = mesh.faces.astype(np.int64)
+    corners = mesh.vertices[faces].astype(np.float64)
+    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    doubled = np.linalg.norm(crosses, axis=1)
+    twins = edge_twins(welded(mesh.vertices)[faces]).reshape(-1, 3)
+    neighbors = np.where(twins >= 0, twins // 3, -1)
+    cosines = crosses / np.maximum(doubled, 1e-300)[:, None] @ AXES.T
+    axis = _smoothed(cosines, neighbors)
+    label = group * len(AXES) + axis
+    face, side = np.nonzero((neighbors >= 0) & (label[neighbors] == label[:, None]))
+    links = np.stack([face, neighbors[face, side]], axis=1)
+    chart = np.unique(components(links, len(faces)), return_inverse=True)[1].reshape(-1)
+    keys = chart[:, None] * len(mesh.vertices) + faces
+    used, copies = np.unique(keys, return_inverse=True)
+    rows, chart_of_row = used % len(mesh.vertices), used // len(mesh.vertices)
+    axis_of_chart = np.zeros(int(chart.max()) + 1, np.int64)
+    axis_of_chart[chart] = axis
+    flat = np.bincount(chart, doubled * np.abs(cosines[np.arange(len(faces)), axis]))
+    stretch = np.sqrt(np.bincount(chart, doubled) / np.maximum(flat, 1e-300))
+    places = _projected(mesh.vertices[rows].astype(np.float64), axis_of_chart[chart_of_row])
+    places *= np.minimum(stretch, 1.0 / MIN_COSINE)[chart_of_row, None]
+    places, sides = _turned(places, chart_of_row)
+    return _Charts(rows, copies.reshape(-1, 3), places, chart_of_row, sides)
+
+
+def _smoothed(cosines: Float64Array, neighbors: Int64Array) -> Int64Array:
+    """Return the axis of each face: close to its normal, and alike among neighbours."""
+    allowed = (cosines >= MIN_COSINE) | (cosines >= cosines.max(axis=1, keepdims=True))
+    axis: Int64Array = cosines.argmax(axis=1)
+    for _ in range(SMOOTHING_ROUNDS):
+        votes = np.where(neighbors >= 0, axis[neighbors], -1)
+        counts = (votes[:, :, None] == np.arange(len(AXES))).sum(axis=1)
+        before, axis = axis, np.where(allowed, cosines + SMOOTHING * counts, -np.inf).argmax(axis=1)
+        if np.array_equal(before, axis):
+            break
+    return axis
+
+
+def _projected(points: Float64Array, axis: Int64Array) -> Float64Array:
+    """Return points as an eye sees them that looks against an axis, ``float64[n, 2]``, y downward."""
+    along, negative = axis % 3, axis >= 3
+    rows = np.arange(len(points))
+    right, up = points[rows, (along + 1) % 3], points[rows, (along + 2) % 3]
+    return np.stack([np.where(negative, -right, right), -up], axis=1)
+
+
+def _turned(places: Float64Array, chart: Int64Array) -> tuple[Float64Array, Float64Array]:
+    """Return places from the corners of the smallest rectangles around charts, and these rectangles."""
+    order = np.argsort(chart, kind="stable")
+    starts = np.flatnonzero(np.diff(chart[order], prepend=-1))
+    best = np.full(len(starts), np.inf)
+    turned, low, sides = places.copy(), np.zeros((len(starts), 2)), np.zeros((len(starts), 2))
+    for angle in np.radians(ANGLES):
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        now = places @ turn.T
+        lower, upper = (fold.reduceat(now[order], starts) for fold in (np.minimum, np.maximum))
+        area = (upper - lower).prod(axis=1)
+        better = area < best * (1.0 - 1e-6)
+        best[better], low[better] = area[better], lower[better]
+        sides[better] = (upper - lower)[better]
+        mine = better[chart]
+        turned[mine] = now[mine]
+    return turned - low[chart], sides

@@ -1,0 +1,217 @@
+"""Layouts of textures: charts keep areas, overlap nowhere, and the shortest seams are chosen."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+import blobtree
+import decals
+from decals.baking import layouts as layouts_module
+from decals.baking.layouts import lay_out
+from decals.baking.meshes import BakeMesh, bake_mesh
+from decals.baking.packing import pack
+from decals.baking.seams import Seams
+from decals.baking.texture import Sheet
+from decals.baking.unwrapped import Unwrapped
+from decals.errors import Cancelled, InvalidMesh
+from decals.surfaces import BaseColor, BaseTexture
+from tests.decals.baking.glb import Array, ball_and_cube, bilinear, linear, need, read_glb
+
+SIZE = 512
+
+
+def silent(*_: Any) -> None:
+    """Report nothing."""
+
+
+def bake_meshes(*objects: Any) -> list[BakeMesh]:
+    scene = decals.cover([*objects], count=2)
+    return [bake_mesh(item, resolution=24, creases=True, report=silent) for item in scene.objects]
+
+
+def blob(seed: int) -> Any:
+    """Random points that blend, some cut away."""
+    rng = np.random.default_rng(seed)
+    parts = [
+        blobtree.Point(tuple(rng.uniform(-1, 1, 3)), radius=float(rng.uniform(0.4, 0.9))) for _ in range(4)
+    ]
+    tree: Any = parts[0] + parts[1] | parts[2]
+    return tree - parts[3] if seed % 2 else tree & blobtree.Point((0, 0, 0), radius=1.2)
+
+
+def spiral(turns: float = 2.5) -> pv.PolyData:
+    """A ramp that lies over itself, seen along its axis."""
+    angle, radius = np.meshgrid(np.linspace(0, turns * 2 * np.pi, 120), np.linspace(0.5, 1.0, 6))
+    grid: Any = pv.StructuredGrid(radius * np.cos(angle), radius * np.sin(angle), 0.1 * angle)
+    surface: pv.PolyData = grid.extract_surface(algorithm="dataset_surface").triangulate()
+    return surface
+
+
+def total_areas(mesh: BakeMesh, part: Unwrapped) -> tuple[Array, Array]:
+    corners, places = mesh.vertices[mesh.faces].astype(float), part.places[part.faces].astype(float)
+    solid = 0.5 * np.linalg.norm(np.cross(*np.moveaxis(np.diff(corners, axis=1), 1, 0)), axis=1)
+    return solid, 0.5 * np.linalg.det(np.diff(places, axis=1))
+
+
+def check(mesh: BakeMesh, part: Unwrapped, size: int) -> None:
+    """All faces once, upright, about as large as on the surface, within the texture, none over another."""
+    assert np.array_equal(part.rows[part.faces], mesh.faces)
+    assert part.places.min() >= 0
+    assert part.places.max() <= size
+    solid, flat = total_areas(mesh, part)
+    assert (flat < 0).all() or (flat > 0).all()  # no face is mirrored
+    density = np.sqrt(np.abs(flat) / solid * solid.sum() / np.abs(flat).sum())
+    assert np.quantile(density, [0.02, 0.98]).min() > 0.4
+    sheet = Sheet(0, mesh, part, 0)
+    found, overlaps = sheet.cover(0, size, size, 1, margin=-0.05)
+    assert overlaps == 0
+    assert (found >= 0).mean() > 0.2
+
+
+@pytest.mark.slow_cases("1", "2", "3")
+@pytest.mark.parametrize("seed", range(4))
+def test_box_atlases_of_blobs(seed: int) -> None:
+    (mesh,) = bake_meshes(blob(seed))
+    (part,) = lay_out([mesh], SIZE, "box", 1, silent)
+    check(mesh, part, SIZE)
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [pv.Cube().triangulate(), pv.ParametricTorus(u_res=30, v_res=30).triangulate().clean(), spiral()],
+    ids=["cube", "torus", "spiral"],
+)
+def test_box_atlases_of_meshes(surface: Any) -> None:
+    (mesh,) = bake_meshes(surface)
+    (part,) = lay_out([mesh], SIZE, "box", 1, silent)
+    check(mesh, part, SIZE)
+
+
+def test_the_seams_of_a_box_are_its_edges_and_those_of_charts_are_cut_once() -> None:
+    (mesh,) = bake_meshes(pv.Cube().triangulate())
+    (part,) = lay_out([mesh], SIZE, "box", 1, silent)
+    seams = Seams.of([mesh], [part])
+    assert seams.length == pytest.approx(12.0, rel=1e-5)
+    assert len(seams.faces) == 12
+    lengths = np.linalg.norm(seams.ends[:, :, 1] - seams.ends[:, :, 0], axis=2)
+    assert np.ptp(lengths) < 0.01 * lengths.mean()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_rectangles_are_packed_apart(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    sides, tiles = rng.uniform(0.1, 1.0, (30, 2)), 1 + seed % 2
+    scale, corners, squares = pack(sides, 0.01, tiles)
+    upper = corners + scale * sides
+    assert corners.min() >= 0.01
+    assert upper.max() <= 0.99
+    assert scale**2 * sides.prod(axis=1).sum() > 0.5 * tiles
+    for a in range(len(sides)):
+        for b in range(a):
+            gap = np.maximum(corners[a] - upper[b], corners[b] - upper[a]).max()
+            assert squares[a] != squares[b] or gap >= 0.01 - 1e-9
+
+
+def test_rectangles_that_do_not_fit_have_no_scale() -> None:
+    assert pack(np.ones((300, 2)), 0.1, 1)[0] == 0.0
+
+
+def textured_grid(offset: float = 0.0, fold: bool = False) -> decals.MeshObject:
+    """A square with texture coordinates: its own plane, moved, or folded over itself."""
+    plane = pv.Plane(i_resolution=8, j_resolution=8).triangulate()
+    uv = plane.points[:, :2] + 0.5 + offset
+    if fold:
+        uv[:, 0] = np.abs(uv[:, 0] - 0.5)
+    color = BaseColor(coordinates=uv, textures=(BaseTexture("tile"),))
+    return decals.MeshObject("plane", plane.points, plane.regular_faces, color)
+
+
+def test_own_coordinates_stay_as_they_are(tmp_path: Path) -> None:
+    need("trimesh")
+    item = textured_grid()
+    decals.bake(item, tmp_path / "a.glb", size=64, layout="own")
+    node = read_glb(tmp_path / "a.glb")["plane"]
+    assert node.uv is not None
+    assert node.texture is not None
+    np.testing.assert_allclose(node.uv, node.vertices[:, :2] + 0.5, atol=1e-6)
+    tile = decals.surfaces.BaseTexture("tile")
+    uv = np.random.default_rng(1).uniform(0.05, 0.95, (400, 2))
+    off = np.abs(bilinear(linear(node.texture / 255.0), uv) - tile.light_at(uv)).max(axis=1)
+    assert np.median(off) < 0.02
+
+
+def test_several_objects_share_a_texture_by_their_own_coordinates() -> None:
+    meshes = bake_meshes(textured_grid(), textured_grid(), textured_grid())
+    parts = lay_out(meshes, SIZE, "own", 1, silent)
+    cells = {tuple((part.places.mean(axis=0) // (SIZE / 2)).tolist()) for part in parts}
+    assert len(cells) == 3
+    parts = lay_out(meshes, SIZE, "own", 3, silent)
+    assert [part.tile_of_face[0] for part in parts] == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("item", "says"),
+    [
+        (textured_grid(offset=0.3), "those of object 'plane' go from 0.3 to 1.3; use layout='box'"),
+        (textured_grid(fold=True), "faces of object 'plane' lie over others in its texture coordinates"),
+    ],
+    ids=["outside", "folded"],
+)
+def test_own_coordinates_that_cannot_be_used_are_refused(tmp_path: Path, item: Any, says: str) -> None:
+    need("trimesh")
+    with pytest.raises(InvalidMesh, match=says):
+        decals.bake(item, tmp_path / "a.glb", size=64, layout="own")
+    decals.bake(item, tmp_path / "b.glb", size=64)
+    assert [path.name for path in tmp_path.iterdir()] == ["b.glb"]
+
+
+def test_own_coordinates_without_area_are_refused() -> None:
+    item = textured_grid()
+    assert isinstance(item.color, BaseColor)
+    flat = BaseColor(coordinates=np.zeros((len(item.vertices), 2)), textures=item.color.textures)
+    meshes = bake_meshes(decals.MeshObject("plane", item.vertices, item.faces, flat))
+    with pytest.raises(InvalidMesh, match="128 of 128 faces of object 'plane' have no area"):
+        lay_out(meshes, SIZE, "own", 1, silent)
+
+
+def test_auto_takes_the_shorter_seams(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Own coordinates of a plane have none; a box atlas of a ball has fewer than xatlas."""
+    meshes = bake_meshes(textured_grid())
+    (part,) = lay_out(meshes, SIZE, "auto", 1, silent)
+    assert np.array_equal(part.places, lay_out(meshes, SIZE, "own", 1, silent)[0].places)
+    ball = bake_meshes(blobtree.Point((0, 0, 0), radius=1.0))
+    made = lay_out(ball, SIZE, "auto", 1, silent)
+    assert np.array_equal(made[0].places, lay_out(ball, SIZE, "box", 1, silent)[0].places)
+    need("xatlas")
+    xatlas = lay_out(ball, SIZE, "xatlas", 1, silent)
+    assert Seams.of(ball, made).length < Seams.of(ball, xatlas).length
+    monkeypatch.setattr(layouts_module, "_boxes", lambda *_: None)
+    assert np.array_equal(lay_out(ball, SIZE, "auto", 1, silent)[0].places, xatlas[0].places)
+    with pytest.raises(InvalidMesh, match="layout 'box': expected a surface that needs at most 1000 charts"):
+        lay_out(ball, SIZE, "box", 1, silent)
+
+
+def test_layouts_end_when_they_are_cancelled(tmp_path: Path) -> None:
+    need("trimesh", "xatlas")
+    for layout in ("box", "xatlas"):
+        stages: list[str] = []
+
+        def note(stage: str, _: float, stages: list[str] = stages) -> None:
+            stages.append(stage)
+
+        def cancel(stages: list[str] = stages) -> bool:
+            return "unwrapping the surface" in stages
+
+        with pytest.raises(Cancelled, match="unwrapping the surface"):
+            decals.bake(
+                ball_and_cube(count=4),
+                tmp_path / "a.glb",
+                size=32,
+                layout=layout,
+                progress=note,
+                cancel=cancel,
+            )
+    assert not list(tmp_path.iterdir())
