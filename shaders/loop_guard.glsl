@@ -1,18 +1,26 @@
 // The software rasteriser ends all loops of a pixel after a number of turns, without an error: then a loop of two
-// turns has one. Such a pixel is drawn again from where it was, until it is complete (decals/rendering/loop_guard.py).
+// turns has one. Such a pixel is left out and reported, and drawn again by a RESUMING shader from where it was,
+// until it is complete (decals/rendering/loop_guard.py). Images take time on each pixel, so other shaders have few.
 #ifdef GUARDED
 layout(binding = 3, r32ui) writeonly uniform uimage2D ended_loops;
-layout(binding = 4, r32f) uniform image2D resumed_ways;  // of each pixel: where its ray goes on; -1: complete
 uniform int guard_turns;  // 2; a number here would be unrolled
-uniform bool resumed;     // false: all rays begin at their start
 
 bool loops_ended() {
     int turns = 0;
     while (turns < guard_turns) {
         turns += 1;
     }
-    return turns != guard_turns;
+    bool ended = turns != guard_turns;
+    if (ended) {
+        imageStore(ended_loops, ivec2(0), uvec4(1u));
+    }
+    return ended;
 }
+#endif
+
+#ifdef RESUMING
+layout(binding = 4, r32f) uniform image2D resumed_ways;  // of each pixel: where its ray goes on; -1: complete
+uniform bool resumed;                                    // false: all rays begin at their start
 
 // The way along its ray at which a pixel begins; -1 if the pixel is complete.
 float resumed_way(ivec2 pixel) {
@@ -22,9 +30,6 @@ float resumed_way(ivec2 pixel) {
 // Return whether a pixel is complete; `way` is known to be free of surface.
 bool complete(ivec2 pixel, float way) {
     bool ended = loops_ended();
-    if (ended) {
-        imageStore(ended_loops, ivec2(0), uvec4(1u));
-    }
     if (ended || resumed) {
         imageStore(resumed_ways, pixel, vec4(ended ? way : -1.0));
     }
@@ -36,6 +41,10 @@ float resumed_way(ivec2 pixel) {
 }
 
 bool complete(ivec2 pixel, float way) {
+#ifdef GUARDED
+    return !loops_ended();
+#else
     return true;
+#endif
 }
 #endif

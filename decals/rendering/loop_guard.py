@@ -2,11 +2,13 @@
 
 Mesa's software rasteriser ends all loops of a pixel, and of the pixels beside it, after
 `context.SOFTWARE_LOOP_ITERATIONS` turns, without an error. Such a pixel has no right value. A shader with
-``shaders/loop_guard.glsl`` leaves it out, reports it, and keeps how far its ray was traced. Further drawings
-go on there. Each of them takes every ray on by one step at least.
+``shaders/loop_guard.glsl`` leaves it out and reports it. Then a slower shader draws all pixels again, and
+keeps how far the rays of such pixels were traced. Further drawings go on there. Each of them takes every ray
+on by one step at least.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import moderngl
 import numpy as np
@@ -27,6 +29,16 @@ COMPLETE = -1.0
 """Entry of a pixel that is complete, in place of the way along its ray."""
 
 
+@dataclass
+class GuardedProgram:
+    """A program that reports ended loops, and how to make the one that goes on where they were ended."""
+
+    first: Program
+    resuming: Callable[[], Program]
+    ends_loops: bool = False
+    """True if loops were ended in the last drawings, which then begin with the second program."""
+
+
 class LoopGuard:
     """The incomplete pixels of one target, on drivers that end loops; on others all are complete.
 
@@ -41,28 +53,42 @@ class LoopGuard:
     def __init__(self, context: Context, size: tuple[int, int]) -> None:
         self._context, self._size = context, size
         self._textures: list[moderngl.Texture] = []
-        self._all_complete = False
+        self._ways_are_complete = False
 
-    def drawings(self, program: Program) -> Iterator[None]:
-        """Yield before each drawing with a program, until all pixels are complete."""
+    def drawings(self, programs: GuardedProgram) -> Iterator[Program]:
+        """Yield the program of each drawing, until all pixels are complete."""
         if not is_guarded(self._context):
-            yield
+            yield programs.first
             return
         report, ways = self._textures = self._textures or self._new_textures()
-        if not self._all_complete:  # new, or a drawing was given up
+        if not programs.ends_loops:
+            yield from self._drawing(programs.first, report)
+            if self._is_complete(report):
+                return
+        program = programs.resuming()
+        if not self._ways_are_complete:  # new, or a drawing was given up
             ways.write(np.full(self._size, COMPLETE, np.float32).tobytes())
-        set_uniform(program, "guard_turns", 2)
+        self._ways_are_complete = False
         for number in range(MAX_DRAWINGS):
-            report.write(np.zeros(1, np.uint32).tobytes())
-            report.bind_to_image(REPORT_UNIT, read=False, write=True)
             ways.bind_to_image(WAYS_UNIT, read=True, write=True)
             set_uniform(program, "resumed", number > 0)
-            self._all_complete = False
-            yield
-            self._context.gl.memory_barrier()
-            self._all_complete = not np.frombuffer(report.read(), np.uint32)[0]
-            if self._all_complete:
+            yield from self._drawing(program, report)
+            self._ways_are_complete = self._is_complete(report)
+            if self._ways_are_complete:
+                programs.ends_loops = number > 0
                 return
+
+    def _drawing(self, program: Program, report: moderngl.Texture) -> Iterator[Program]:
+        """Yield a program that is ready to report ended loops."""
+        report.write(np.zeros(1, np.uint32).tobytes())
+        report.bind_to_image(REPORT_UNIT, read=False, write=True)
+        set_uniform(program, "guard_turns", 2)
+        yield program
+        self._context.gl.memory_barrier()
+
+    def _is_complete(self, report: moderngl.Texture) -> bool:
+        """Return True if the last drawing ended no loops."""
+        return not np.frombuffer(report.read(), np.uint32)[0]
 
     def _new_textures(self) -> list[moderngl.Texture]:
         """Return the textures: whether loops were ended, and how far the ray of each pixel was traced."""

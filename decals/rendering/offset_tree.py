@@ -109,10 +109,9 @@ class OffsetTreeDrawable(TreeDrawable):
     """A tree's tracing cells on the GPU, and for scenes with relief its shell."""
 
     _shell: tuple[Shell, moderngl.Texture3D] | None = None
-    _programs: tuple[object, tuple[Program, Program]] | None = None
+    _offset_programs: tuple[object, tuple[Program, Program]] | None = None
     _starts: moderngl.Texture | None = None
     _start_pass: PixelPass | None = None
-    _box_of: tuple[Program, moderngl.VertexArray] | None = None
 
     def prepare(self, source: DecalSource) -> None:
         """Make everything that `draw_offset` needs at the first call."""
@@ -144,7 +143,7 @@ class OffsetTreeDrawable(TreeDrawable):
         set_uniform(program, "starts", unit)
         if isinstance(program, moderngl.Program):
             rest.use_with_surface(tile.width, tile.height, part)
-            draw_box(self._gl, program, self._vertices(program), bounds)
+            draw_box(self._gl, program, self._box(program), bounds)
             return
         rest.bind_images(first_unit=3)
         self.trace_rows(program, rows, gbuffer)
@@ -190,11 +189,11 @@ class OffsetTreeDrawable(TreeDrawable):
     def _programs_for(self, source: DecalSource) -> tuple[Program, Program]:
         """Return the programs that find where rays begin and trace them; composing takes long."""
         variant = source.constants(), source.law, source.limited
-        if self._programs is None or self._programs[0] != variant:
+        if self._offset_programs is None or self._offset_programs[0] != variant:
             makers = start_program, offset_program
             start, offset = (make(self._context, self.kinds, source) for make in makers)
-            self._programs = variant, (start, offset)
-        return self._programs[1]
+            self._offset_programs = variant, (start, offset)
+        return self._offset_programs[1]
 
     def _shell_for(self, reach: float) -> tuple[Shell, moderngl.Texture3D]:
         if self._shell is None or not reach <= self._shell[0].reach <= 4.0 * max(reach, 1e-30):
@@ -205,13 +204,6 @@ class OffsetTreeDrawable(TreeDrawable):
             texture.repeat_x = texture.repeat_y = texture.repeat_z = False
             self._shell = shell, texture
         return self._shell
-
-    def _vertices(self, program: moderngl.Program) -> moderngl.VertexArray:
-        if self._box_of is None or self._box_of[0] is not program:
-            if self._box_of is not None:
-                self._box_of[1].release()
-            self._box_of = program, self._gl.vertex_array(program, [])
-        return self._box_of[1]
 
     def _release_starts(self) -> None:
         for resource in (self._start_pass, self._starts):
@@ -225,8 +217,6 @@ class OffsetTreeDrawable(TreeDrawable):
         self._release_starts()
         if self._shell is not None:
             self._shell[1].release()
-        if self._box_of is not None:
-            self._box_of[1].release()
 
 
 def offset_program(context: Context, kinds: Kinds, source: DecalSource) -> Program:

@@ -114,10 +114,17 @@ class Kinds:
 
 @lru_cache(maxsize=32)
 def tracing_shader(
-    kinds: Kinds, backend: PassBackend = PassBackend.FRAGMENT, *, guarded: bool = False
+    kinds: Kinds,
+    backend: PassBackend = PassBackend.FRAGMENT,
+    *,
+    guarded: bool = False,
+    resuming: bool = False,
 ) -> Source:
-    """``trace.frag`` or ``trace.comp`` with the cases of `kinds`; `guarded` ones report ended loops."""
-    slots, defines = tracing_slots(kinds), {"GUARDED": guarded}
+    """``trace.frag`` or ``trace.comp`` with the cases of `kinds`.
+
+    `guarded` ones report ended loops, and those that are `resuming` go on where loops were ended.
+    """
+    slots, defines = tracing_slots(kinds), {"GUARDED": guarded, "RESUMING": resuming}
     if backend is PassBackend.COMPUTE:
         return compose("trace.comp", slots=slots, defines={"GROUP": GROUP, **defines}, version="430 core")
     return compose("trace.frag", slots=slots, defines=defines, version="420 core" if guarded else "330 core")

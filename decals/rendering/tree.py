@@ -11,7 +11,7 @@ from blobtree.tracing.tree_cells import TracingCells, tracing_cells
 from decals.rendering.context import Context
 from decals.rendering.data_texture import DataTexture
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.loop_guard import is_guarded
+from decals.rendering.loop_guard import GuardedProgram, is_guarded
 from decals.rendering.pixel_pass import GROUP, PassBackend, Program, attach_camera, draw, set_uniform
 from decals.rendering.tracing_shader import Kinds, tracing_shader
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile
@@ -49,10 +49,11 @@ class TreeDrawable:
         self._textures = (DataTexture(context, cells.tape), DataTexture(context, cells.blocks))
         self._uniforms = {**tracing_uniforms(cells), "tape": 0, "blocks": 1}
         self._gl = context.gl
-        self._program = tracing_program(context, self.kinds)
-        self._box: moderngl.VertexArray | None = None
-        if isinstance(self._program, moderngl.Program):
-            self._box = context.gl.vertex_array(self._program, [])
+        self._programs = GuardedProgram(
+            tracing_program(context, self.kinds),
+            lambda: tracing_program(context, self.kinds, resuming=True),
+        )
+        self._boxes: dict[Program, moderngl.VertexArray] = {}
 
     @staticmethod
     def warmup(context: Context, item: TreeHolder) -> WarmupPlan:
@@ -73,24 +74,30 @@ class TreeDrawable:
     @property
     def rasterised(self) -> bool:
         """True if a fragment shader traces the rays."""
-        return self._box is not None
+        return isinstance(self._programs.first, moderngl.Program)
 
     def draw(self, object_id: int, tile: Tile, gbuffer: GBuffer, part: Part = WHOLE) -> None:
         """Trace the rays of all pixels that the box covers, or of a part of their rows."""
         for unit, texture in enumerate(self._textures):
             texture.use(unit)
-        for name, value in {**self._uniforms, "object_id": object_id}.items():
-            set_uniform(self._program, name, value)
-        for _ in gbuffer.guard.drawings(self._program):
-            self._trace(tile, gbuffer, part)
+        for program in gbuffer.guard.drawings(self._programs):
+            for name, value in {**self._uniforms, "object_id": object_id}.items():
+                set_uniform(program, name, value)
+            self._trace(program, tile, gbuffer, part)
 
-    def _trace(self, tile: Tile, gbuffer: GBuffer, part: Part) -> None:
+    def _trace(self, program: Program, tile: Tile, gbuffer: GBuffer, part: Part) -> None:
         """Trace these rays once; hits behind others are hidden."""
-        if self._box is not None:
+        if isinstance(program, moderngl.Program):
             gbuffer.use(tile.width, tile.height, part)
-            draw_box(self._gl, self._program, self._box, self._bounds)
+            draw_box(self._gl, program, self._box(program), self._bounds)
         else:
-            self.trace_rows(self._program, covered_rectangle(self._bounds, tile).rows(part), gbuffer)
+            self.trace_rows(program, covered_rectangle(self._bounds, tile).rows(part), gbuffer)
+
+    def _box(self, program: moderngl.Program) -> moderngl.VertexArray:
+        """Return the vertices of ``box.vert`` for a program."""
+        if program not in self._boxes:
+            self._boxes[program] = self._gl.vertex_array(program, [])
+        return self._boxes[program]
 
     def trace_rows(self, program: Program, rows: Rectangle, gbuffer: GBuffer) -> None:
         """Trace a ray for every pixel of a rectangle, in a compute shader."""
@@ -109,8 +116,8 @@ class TreeDrawable:
         """Release the memory."""
         for texture in self._textures:
             texture.release()
-        if self._box is not None:
-            self._box.release()
+        for box in self._boxes.values():
+            box.release()
 
 
 def draw_box(gl: moderngl.Context, program: Program, box: moderngl.VertexArray, bounds: Bounds) -> None:
@@ -126,16 +133,16 @@ def draw_box(gl: moderngl.Context, program: Program, box: moderngl.VertexArray, 
         gl.disable(moderngl.CULL_FACE)
 
 
-def tracing_program(context: Context, kinds: Kinds) -> Program:
+def tracing_program(context: Context, kinds: Kinds, *, resuming: bool = False) -> Program:
     """Return the program that traces trees of these kinds, for the context's backend."""
-    source = _source(context, kinds)
+    source = _source(context, kinds, resuming=resuming)
     if context.backend is PassBackend.COMPUTE:
         return attach_camera(context.compute_program(source))
     return attach_camera(context.program(compose("box.vert"), source))
 
 
-def _source(context: Context, kinds: Kinds) -> Source:
-    return tracing_shader(kinds, context.backend, guarded=is_guarded(context))
+def _source(context: Context, kinds: Kinds, *, resuming: bool = False) -> Source:
+    return tracing_shader(kinds, context.backend, guarded=is_guarded(context), resuming=resuming)
 
 
 def tracing_uniforms(cells: TracingCells) -> dict[str, object]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from blobtree import Box, Node, Point, Union
-from decals.rendering.loop_guard import LoopGuard
+from decals.rendering.loop_guard import GuardedProgram, LoopGuard
 from decals.rendering.options import RenderOptions
 from decals.rendering.pixel_pass import Program
 from decals.rendering.renderer import Renderer
@@ -48,11 +48,11 @@ def drawings(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     numbers: list[int] = []
     plain = LoopGuard.drawings
 
-    def counted(guard: LoopGuard, program: Program) -> Iterator[None]:
+    def counted(guard: LoopGuard, programs: GuardedProgram) -> Iterator[Program]:
         numbers.append(0)
-        for _ in plain(guard, program):
+        for program in plain(guard, programs):
             numbers[-1] += 1
-            yield
+            yield program
 
     monkeypatch.setattr(LoopGuard, "drawings", counted)
     return numbers
@@ -70,8 +70,13 @@ def test_rays_go_on_where_loops_were_ended(
     renderer: Renderer = request.getfixturevalue(backend)
     skip_without_limit(renderer)
     tree = bored()
+    model, options = Model(tree), RenderOptions(size=SIZE)
     assert missing(tree, renderer) == 0
     assert drawings[-1] > 2
+    for direction in ((0.3, 0.5, 1.1), (0.3, 0.5, 1.2)):  # the second picture knows that loops will be ended
+        camera = Camera.framing(tree.support, direction=direction)
+        renderer.buffers(View((model,), camera), options)
+    assert 1 < drawings[-1] < drawings[-2]
     renderer.buffers(View((Model(Point((0, 0, 0), radius=1.0)),), camera_of(tree)), RenderOptions(size=SIZE))
     assert drawings[-1] == 1
 
