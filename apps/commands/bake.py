@@ -33,6 +33,7 @@ def bake(
     size: Whole = 2048,
     samples: Whole = 2,
     layout: LayoutName = "auto",
+    tiles: Whole = 1,
     vertex_colors: Annotated[bool, Parameter(negative=())] = False,
     contact: ContactName = None,
     stiffness: Stiffness = None,
@@ -58,6 +59,8 @@ def bake(
     layout
         How surfaces lie on the texture: box, xatlas, own (texture coordinates of the meshes), or auto, the
         one with the shortest seams.
+    tiles
+        Textures of that size over which the surfaces are spread, as UDIM tiles (glb, gltf, obj).
     vertex_colors
         Write colours at the vertices instead of a texture.
     contact
@@ -81,6 +84,7 @@ def bake(
             size=size,
             samples=samples,
             layout=layout,
+            tiles=tiles,
             vertex_colors=vertex_colors,
             resolution=resolution,
             creases=creases,

@@ -74,6 +74,7 @@ def export(
     size: Whole = 2048,
     samples: Whole = 2,
     layout: LayoutName = "auto",
+    tiles: Whole = 1,
     contact: ContactName = None,
     stiffness: Stiffness = None,
     mapping: MappingName = None,
@@ -115,6 +116,8 @@ def export(
     layout
         How surfaces lie on the texture: box, xatlas, own (texture coordinates of the meshes), or auto, the
         one with the shortest seams.
+    tiles
+        Textures of that size over which the surfaces are spread, as UDIM tiles (glb, gltf, obj).
     contact
         Contact mode, as for render.
     stiffness
@@ -172,6 +175,7 @@ def export(
                 size=size,
                 samples=samples,
                 layout=layout,
+                tiles=tiles,
                 resolution=resolution,
                 creases=creases,
                 progress=progress,

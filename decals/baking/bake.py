@@ -25,6 +25,7 @@ def bake(
     size: int = 2048,
     samples: int = 2,
     layout: str = AUTO,
+    tiles: int = 1,
     vertex_colors: bool = False,
     contact: AnyContact | str | None = None,
     stiffness: float | None = None,
@@ -54,6 +55,8 @@ def bake(
         Samples along each axis of a texel whose neighbours differ; 2 means 4 samples a texel.
     layout : str
         How surfaces lie on the texture: ``"auto"``, ``"box"``, ``"xatlas"`` or ``"own"``; see `export`.
+    tiles : int
+        Textures of that size over which the surfaces are spread; see `export`.
     vertex_colors : bool
         Write the colours at the vertices instead of a texture. Only fine meshes then show images; xatlas is
         not needed.
@@ -100,6 +103,7 @@ def bake(
         size=size,
         samples=samples,
         layout=layout,
+        tiles=tiles,
         contact=contact,
         stiffness=stiffness,
         mapping=mapping,

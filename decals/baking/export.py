@@ -16,10 +16,10 @@ from blobtree.progress import Cancel, Progress, reporting
 from blobtree.validation import truth
 from decals.baking.formats import FORMATS
 from decals.baking.instances import Instances, decal_instances
-from decals.baking.layouts import AUTO, LAYOUTS, XATLAS, lay_out
+from decals.baking.layouts import AUTO, LAYOUTS, MAX_TILES, XATLAS, lay_out
 from decals.baking.materials import SRGB, Maps, material_bytes, split_maps, vertex_tangents
 from decals.baking.meshes import BakeMesh, bake_mesh
-from decals.baking.parts import METRES, UP, Baked, Part
+from decals.baking.parts import METRES, TILE_ROW, UP, Baked, Part
 from decals.baking.surface_colors import ATTRIBUTES, BLOCK, SurfaceColors
 from decals.baking.texture import Channels, bake_texture
 from decals.baking.unwrapped import Unwrapped
@@ -61,6 +61,7 @@ def export(
     size: int = 2048,
     samples: int = 2,
     layout: str = AUTO,
+    tiles: int = 1,
     contact: AnyContact | str | None = None,
     stiffness: float | None = None,
     mapping: ImageMapping | str | None = None,
@@ -106,6 +107,9 @@ def export(
         How surfaces lie on the texture: ``"box"`` (as the six sides of a box see them), ``"xatlas"`` (needs
         the extra ``bake``), ``"own"`` (the texture coordinates of the meshes) or ``"auto"``, by default, the
         one with the shortest seams; docs/baking.md has its rule.
+    tiles : int
+        Textures of that size over which the surfaces are spread, as UDIM tiles from 1001 on; for GLB, glTF
+        and OBJ files. At most 100.
     contact, stiffness, mapping : optional
         Modes, as for `decals.evaluate`. Default: those of the scene.
     resolution : int, optional
@@ -163,6 +167,13 @@ def export(
     Drawing().overridden(**modes)  # checked before a model is read
     creases = truth("creases", creases, InvalidScene)
     one_of("layout", layout, LAYOUTS, InvalidScene)
+    tiles = whole_number("tiles", tiles, 1, MAX_TILES, InvalidScene)
+    if tiles > 1 and not (rules.tiles and place == TEXTURE):
+        others = ", ".join(suffix for suffix, each in FORMATS.items() if each.tiles)
+        raise InvalidScene(
+            f"tiles: expected 1 for {str(path)!r} with colors={place!r}, got {tiles}; "
+            f"choose one of the formats {others} with a texture"
+        )
     needs_xatlas = place == TEXTURE and layout == XATLAS
     for package, extra in (*rules.packages, *([("xatlas", "bake")] if needs_xatlas else [])):
         optional_package(package, extra)
@@ -176,6 +187,7 @@ def export(
             size=size,
             samples=samples,
             layout=layout,
+            tiles=tiles,
             resolution=resolution,
             creases=creases,
             **modes,
@@ -205,6 +217,7 @@ def bake_parts(
     size: int = 2048,
     samples: int = 2,
     layout: str = AUTO,
+    tiles: int = 1,
     resolution: int | None = None,
     creases: bool = False,
     **modes: Any,
@@ -219,7 +232,7 @@ def bake_parts(
         Place of the colours: `TEXTURE`, `VERTICES` or `NO_COLORS`.
     report
         Called with the stage and the fraction done.
-    attributes, instances, size, samples, layout, resolution, creases, **modes
+    attributes, instances, size, samples, layout, tiles, resolution, creases, **modes
         See `export`.
 
     Raises
@@ -236,7 +249,8 @@ def bake_parts(
         copies = decal_instances(rows, source.images, [getattr(item, "name", "") for item in source.objects])
         source = replace(source, decals=Decals.empty())
     work = _Work(source, source.drawing.overridden(**modes), resolution, creases, report)
-    parts, maps = work.textured(size, samples, layout) if place == TEXTURE else (work.plain(place), None)
+    textured = place == TEXTURE
+    parts, maps = work.textured(size, samples, layout, tiles) if textured else (work.plain(place), [])
     parts = [work.with_attributes(number, part, attributes) for number, part in enumerate(parts)]
     return Baked(parts, maps, source.origin, recipe=source.recipe, instances=copies)
 
@@ -312,18 +326,18 @@ class _Work:
         self._rows = [np.arange(len(mesh.vertices)) for mesh in self._meshes]
         self._report = report
 
-    def textured(self, size: int, samples: int, layout: str) -> tuple[list[Part], Maps]:
-        """Return all meshes with coordinates in one texture, and its maps."""
-        unwrapped = lay_out(self._meshes, size, layout, 1, self._report)
+    def textured(self, size: int, samples: int, layout: str, tiles: int) -> tuple[list[Part], list[Maps]]:
+        """Return all meshes with coordinates in textures, and their maps."""
+        unwrapped = lay_out(self._meshes, size, layout, tiles, self._report)
         self._rows = [part.rows for part in unwrapped]
         pairs = list(zip(self._meshes, unwrapped, strict=True))
         channels = Channels(self._colors.at)
         if self._colors.has_materials:  # maps are of the rest pose
             resting = [vertex_tangents(mesh.places, mesh.facings, part) for mesh, part in pairs]
             channels = Channels(self._colors.at, len(SRGB), material_bytes, resting, SRGB)
-        texels = bake_texture(self._meshes, unwrapped, size, samples, channels, self._report)[0]
+        texels = bake_texture(self._meshes, unwrapped, size, samples, channels, self._report)
         parts = [_textured_part(mesh, part, size, self._colors.has_materials) for mesh, part in pairs]
-        return parts, split_maps(texels)
+        return parts, [split_maps(of) for of in texels]
 
     def plain(self, place: str) -> list[Part]:
         """Return all meshes, with colours at the vertices if that is their place."""
@@ -359,6 +373,11 @@ class _Work:
 def _textured_part(mesh: BakeMesh, part: Unwrapped, size: int, tangents: bool) -> Part:
     uv = part.places / np.float32(size)
     uv[:, 1] = 1.0 - uv[:, 1]
+    tile_of_face = part.tile_of_face if part.tile_of_face.any() else None
+    if tile_of_face is not None:
+        tile = np.zeros(len(uv), np.int32)
+        tile[part.faces] = tile_of_face[:, None]
+        uv += np.stack([tile % TILE_ROW, tile // TILE_ROW], axis=1).astype(np.float32)
     vertices, normals = mesh.vertices[part.rows], mesh.normals[part.rows]
     along = vertex_tangents(mesh.vertices, mesh.normals, part) if tangents else None
-    return Part(mesh.name, vertices, part.faces, normals, uv=uv, tangents=along)
+    return Part(mesh.name, vertices, part.faces, normals, uv=uv, tangents=along, tile_of_face=tile_of_face)

@@ -28,6 +28,8 @@ class Format:
         True if vertices may have values besides their colours.
     instances : bool
         True if decals may be copies of a square.
+    tiles : bool
+        True if there may be several textures, as UDIM tiles.
     packages : tuple of (str, str)
         Packages that the writer needs, and the extras that install them.
     """
@@ -36,6 +38,7 @@ class Format:
     colors: tuple[str, ...] = ()
     attributes: bool = False
     instances: bool = False
+    tiles: bool = False
     packages: tuple[tuple[str, str], ...] = ()
 
 
@@ -47,9 +50,9 @@ def _alone(encode: Callable[[Baked], bytes]) -> Callable[[Baked, str], Files]:
 _TRIMESH = (("trimesh", "bake"),)
 
 FORMATS: dict[str, Format] = {
-    ".glb": Format(_alone(glb_bytes), ("texture", "vertices"), True, True, _TRIMESH),
-    ".gltf": Format(_alone(gltf_bytes), ("texture", "vertices"), True, True, _TRIMESH),
-    ".obj": Format(obj_files, ("texture", "vertices")),
+    ".glb": Format(_alone(glb_bytes), ("texture", "vertices"), True, True, True, _TRIMESH),
+    ".gltf": Format(_alone(gltf_bytes), ("texture", "vertices"), True, True, True, _TRIMESH),
+    ".obj": Format(obj_files, ("texture", "vertices"), tiles=True),
     ".ply": Format(ply_files, ("vertices", "texture"), True),
     ".stl": Format(_alone(stl_bytes)),
     ".3mf": Format(_alone(threemf_bytes), ("vertices", "texture")),

@@ -10,7 +10,7 @@ from PIL import Image
 
 from decals.baking.instances import SQUARE, SQUARE_FACES, add_instances
 from decals.baking.materials import ROUGHNESS, Maps
-from decals.baking.parts import Baked
+from decals.baking.parts import Baked, udim
 from decals.validation import optional_package
 
 PREFIX = "_"
@@ -20,7 +20,7 @@ LINEAR, LINEAR_MIPMAP_LINEAR, CLAMP_TO_EDGE = 9729, 9987, 33071
 
 
 def glb_bytes(baked: Baked) -> bytes:
-    """Return a GLB file, with a node for each part; all share one material.
+    """Return a GLB file, with a node for each part on each tile, whose parts share a material.
 
     Raises
     ------
@@ -28,22 +28,25 @@ def glb_bytes(baked: Baked) -> bytes:
         If trimesh is not installed.
     """
     trimesh = optional_package("trimesh", "bake")
-    material = trimesh.visual.material.PBRMaterial(
-        name="baked",
-        doubleSided=True,
-        **_textures(baked.maps),
-    )
+    pieces = [piece for part in baked.parts for piece in part.on_tiles()]
+    several = len(baked.tiles) > 1
+    materials = [
+        trimesh.visual.material.PBRMaterial(
+            name=f"baked.{udim(tile)}" if several else "baked", doubleSided=True, **_textures(maps)
+        )
+        for tile, maps in enumerate(baked.tiles or [None])
+    ]
     base = "scene"
-    while base in {*(part.name for part in baked.parts), *(group.name for group in baked.instances)}:
+    while base in {*(part.name for _, part in pieces), *(group.name for group in baked.instances)}:
         base = f"{base}-"
     scene = trimesh.Scene(base_frame=base)
     transform = baked.placement("y", metres=True)
-    for part in baked.parts:
+    for tile, part in pieces:
         mesh = trimesh.Trimesh(
             vertices=part.vertices,
             faces=part.faces,
             vertex_normals=part.normals,
-            visual=trimesh.visual.TextureVisuals(uv=part.uv, material=material),
+            visual=trimesh.visual.TextureVisuals(uv=part.uv, material=materials[tile]),
             process=False,
         )
         for name, values in (("COLOR_0", part.colors), ("TANGENT", part.tangents)):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decals.baking.materials import ROUGHNESS, Maps
-from decals.baking.parts import Baked, Part
+from decals.baking.parts import Baked, Part, udim
 from decals.baking.pictures import png_bytes
 from decals.scenes.origin import WORLD
 
@@ -17,10 +17,15 @@ def obj_files(baked: Baked, stem: str) -> dict[str, bytes]:
     """Return an OBJ file, and its materials and textures if it has any, by their names."""
     files: dict[str, bytes] = {}
     lines = ["# Implicit Decals"]
-    if baked.maps is not None:
-        library = f"{stem}.mtl"
+    if baked.tiles:
+        library, materials = f"{stem}.mtl", list[str]()
         lines.append(f"mtllib {library}")
-        files = _material_files(baked.maps, library, stem)
+        for tile, maps in enumerate(baked.tiles):
+            suffix = f".{udim(tile)}" if len(baked.tiles) > 1 else ""
+            text, pictures = _material(maps, stem, suffix)
+            materials += text
+            files |= pictures
+        files[library] = ("\n".join(materials) + "\n").encode()
     vertices = places = 0
     for part in baked.parts:
         lines += [f"o {' '.join(part.name.split()) or 'object'}"]
@@ -45,9 +50,11 @@ def _part_lines(part: Part, baked: Baked, first: int, first_place: int) -> Itera
         yield from _rows("f", numbers, form=" %d//%d %d//%d %d//%d")
         return
     yield from _rows("vt", part.uv)
-    yield f"usemtl {MATERIAL}"
     numbers = np.stack([corners + first, corners + first_place, corners + first], axis=2).reshape(-1, 9)
-    yield from _rows("f", numbers, form=" %d/%d/%d %d/%d/%d %d/%d/%d")
+    tiles = np.zeros(len(corners), np.int32) if part.tile_of_face is None else part.tile_of_face
+    for tile in np.unique(tiles).tolist():
+        yield f"usemtl {MATERIAL}" + (f".{udim(tile)}" if len(baked.tiles) > 1 else "")
+        yield from _rows("f", numbers[tiles == tile], form=" %d/%d/%d %d/%d/%d %d/%d/%d")
 
 
 def _rows(keyword: str, *arrays: NDArray[np.generic], form: str | None = None) -> Iterable[str]:
@@ -59,8 +66,8 @@ def _rows(keyword: str, *arrays: NDArray[np.generic], form: str | None = None) -
         yield line % row
 
 
-def _material_files(maps: Maps, library: str, stem: str) -> dict[str, bytes]:
-    """Return the material file and its textures."""
+def _material(maps: Maps, stem: str, suffix: str) -> tuple[list[str], dict[str, bytes]]:
+    """Return the lines of a material, whose name has a suffix, and its textures by their names."""
     surface = maps.surface
     levels = {
         "color": maps.color,
@@ -69,7 +76,7 @@ def _material_files(maps: Maps, library: str, stem: str) -> dict[str, bytes]:
         "metalness": None if surface is None else surface[..., 2],
         "emission": maps.emission,
     }
-    files = {f"{stem}_{name}.png": png_bytes(of) for name, of in levels.items() if of is not None}
+    files = {f"{stem}_{name}{suffix}.png": png_bytes(of) for name, of in levels.items() if of is not None}
     keywords = {
         "color": "map_Kd",
         "normal": "norm",
@@ -77,12 +84,12 @@ def _material_files(maps: Maps, library: str, stem: str) -> dict[str, bytes]:
         "metalness": "map_Pm",
         "emission": "map_Ke",
     }
-    lines = [f"newmtl {MATERIAL}", "Kd 1 1 1", "Ks 0 0 0", "illum 1"]
+    lines = [f"newmtl {MATERIAL}{suffix}", "Kd 1 1 1", "Ks 0 0 0", "illum 1"]
     if surface is None:
         lines += [f"Pr {ROUGHNESS}", "Pm 0"]
     else:
         lines += ["Pr 1", "Pm 1"]
     if maps.emission is not None:
         lines.append("Ke 1 1 1")
-    lines += [f"{keywords[name]} {stem}_{name}.png" for name, of in levels.items() if of is not None]
-    return {library: ("\n".join(lines) + "\n").encode(), **files}
+    lines += [f"{keywords[name]} {stem}_{name}{suffix}.png" for name, of in levels.items() if of is not None]
+    return lines, files

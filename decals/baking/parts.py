@@ -1,6 +1,6 @@
 """`Baked`: what a file of a scene holds, whatever its format."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -30,6 +30,15 @@ UP = ("y", "z")
 """Axes that may point upward."""
 
 
+TILE_ROW = 10
+"""Tiles of a row."""
+
+
+def udim(tile: int) -> int:
+    """Return the name of a tile: 1001 for the first."""
+    return 1001 + tile
+
+
 @dataclass(frozen=True, eq=False)
 class Part:
     """A named mesh of a file.
@@ -41,7 +50,9 @@ class Part:
     vertices, normals : float32[n, 3]
     faces : int32[m, 3]
     uv : float32[n, 2], optional
-        Texture coordinates, v upward.
+        Texture coordinates, v upward; those of tile t are (t % 10, t // 10) more, as UDIM has it.
+    tile_of_face : int32[m], optional
+        Number of the tile of each face, if there are several.
     colors : float64[n, 3], optional
         Linear colours.
     tangents : float32[n, 4], optional
@@ -58,6 +69,24 @@ class Part:
     colors: Float64Array | None = None
     tangents: Float32Array | None = None
     attributes: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    tile_of_face: Int32Array | None = None
+
+    def on_tiles(self) -> Iterator[tuple[int, "Part"]]:
+        """Yield the part of each tile, with texture coordinates within [0, 1]; itself if there is one."""
+        if self.tile_of_face is None:
+            yield 0, self
+            return
+        for tile in np.unique(self.tile_of_face).tolist():
+            rows, faces = np.unique(self.faces[self.tile_of_face == tile], return_inverse=True)
+            columns: dict[str, Any] = {
+                name: None if (values := getattr(self, name)) is None else values[rows]
+                for name in ("vertices", "normals", "uv", "colors", "tangents")
+            }
+            columns["uv"] = columns["uv"] - np.array([tile % TILE_ROW, tile // TILE_ROW], np.float32)
+            attributes = {name: values[rows] for name, values in self.attributes.items()}
+            corners = faces.reshape(-1, 3).astype(np.int32)
+            name = f"{self.name}.{udim(tile)}"
+            yield tile, Part(name, faces=corners, attributes=attributes, **columns)
 
     @Lazy
     def check(self) -> MeshCheck:
@@ -81,8 +110,8 @@ class Baked:
     ----------
     parts : sequence of Part
         All with ``uv`` if there are textures, all with ``colors`` or all without.
-    maps : Maps, optional
-        Textures, first row at the top.
+    tiles : sequence of Maps
+        Textures of each tile, first row at the top; none without textures.
     origin : (x, y, z)
         Point that all vertices are relative to, in float64.
     unit : str, optional
@@ -96,12 +125,17 @@ class Baked:
     """
 
     parts: Sequence[Part]
-    maps: Maps | None = None
+    tiles: Sequence[Maps] = ()
     origin: Origin = WORLD
     unit: str | None = None
     up: str | None = None
     recipe: Recipe | None = None
     instances: Sequence[Instances] = ()
+
+    @property
+    def maps(self) -> Maps | None:
+        """Textures of the first tile, which is the only one in most formats."""
+        return self.tiles[0] if self.tiles else None
 
     def placement(self, up: str, *, metres: bool) -> Float64Array:
         """Return the map of vertices to the coordinates of a format, ``float64[4, 4]``.

@@ -14,11 +14,22 @@ from decals.baking.layouts import lay_out
 from decals.baking.meshes import BakeMesh, bake_mesh
 from decals.baking.packing import pack
 from decals.baking.seams import Seams
-from decals.baking.texture import Sheet
+from decals.baking.surface_colors import SurfaceColors
+from decals.baking.texture import Channels, Sheet, bake_texture
 from decals.baking.unwrapped import Unwrapped
 from decals.errors import Cancelled, InvalidMesh
 from decals.surfaces import BaseColor, BaseTexture
-from tests.decals.baking.glb import Array, ball_and_cube, bilinear, linear, need, read_glb
+from tests.decals.baking.glb import (
+    BALL,
+    Array,
+    ball_and_cube,
+    bilinear,
+    expected_colors,
+    linear,
+    need,
+    read_glb,
+)
+from tests.decals.baking.seam_steps import srgb
 
 SIZE = 512
 
@@ -215,3 +226,70 @@ def test_layouts_end_when_they_are_cancelled(tmp_path: Path) -> None:
                 cancel=cancel,
             )
     assert not list(tmp_path.iterdir())
+
+
+def test_tiles_are_nodes_with_textures_of_their_own(tmp_path: Path) -> None:
+    need("trimesh")
+    scene = ball_and_cube()
+    checks = decals.export(scene, tmp_path / "a.glb", size=96, samples=1, tiles=3)
+    assert [check.closed for check in checks] == [True, True]
+    nodes = read_glb(tmp_path / "a.glb")
+    assert {name.split(".")[0] for name in nodes} == {"ball", "cube"}
+    assert len({name.split(".")[1] for name in nodes}) == 3
+    faces = sum(len(node.faces) for name, node in nodes.items() if name.startswith("ball"))
+    whole = decals.export(scene, tmp_path / "b.glb", size=96, samples=1)
+    single = read_glb(tmp_path / "b.glb")
+    assert faces == len(single["ball"].faces)
+    assert [check.closed for check in whole] == [True, True]
+    errors = {}
+    for key, every in (("tiles", nodes), ("one", single)):
+        found = []
+        for name, node in every.items():
+            if not name.startswith("ball"):
+                continue
+            points, normals, uv = node.on_surface(1500)
+            assert node.texture is not None
+            assert node.texture.shape == (96, 96, 3)
+            want = expected_colors(scene, BALL, points, normals)
+            found.append(np.abs(bilinear(linear(node.texture / 255), uv) - want).max(axis=1))
+        errors[key] = np.median(np.concatenate(found))
+    assert errors["tiles"] < 0.8 * errors["one"]  # three times as many texels
+
+
+def test_obj_files_name_their_tiles_as_udim_does(tmp_path: Path) -> None:
+    need("trimesh")
+    decals.export(ball_and_cube(count=4), tmp_path / "a.obj", size=32, samples=1, tiles=3)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"a.obj", "a.mtl", *(f"a_color.{number}.png" for number in (1001, 1002, 1003))}
+    lines = (tmp_path / "a.obj").read_text().splitlines()
+    used = {line.split()[1] for line in lines if line.startswith("usemtl")}
+    assert used == {"baked.1001", "baked.1002", "baked.1003"}
+    places = np.array([line.split()[1:] for line in lines if line.startswith("vt ")], float)
+    tile = None
+    for line in lines:
+        if line.startswith("usemtl"):
+            tile = int(line[-1]) - 1
+        elif line.startswith("f "):
+            corners = [int(corner.split("/")[1]) - 1 for corner in line.split()[1:]]
+            assert (np.floor(places[corners].mean(axis=0)) == [tile, 0]).all()
+
+
+def test_seams_between_tiles_agree_too() -> None:
+    scene = ball_and_cube()
+    meshes = [bake_mesh(item, resolution=None, creases=False, report=silent) for item in scene.objects[:1]]
+    colors = SurfaceColors(meshes, scene.objects[:1], scene.decals, scene.images, scene.drawing)
+    parts = lay_out(meshes, 128, "box", 2, silent)
+    image = bake_texture(meshes, parts, 128, 2, Channels(colors.at), silent)
+    assert image.shape == (2, 128, 128, 3)
+    seams = Seams.of(meshes, parts)
+    between = seams.tiles[:, 0] != seams.tiles[:, 1]
+    assert between.any()
+    rows, places = seams.points()
+    levels = []
+    for side in (0, 1):
+        uv = places[:, side] / 128
+        uv[:, 1] = 1 - uv[:, 1]
+        own = seams.tiles[rows, side]
+        light = [bilinear(linear(tile / 255.0), uv) for tile in image]
+        levels.append(255 * srgb(np.where(own[:, None] == 0, *light)))
+    assert np.abs(levels[0] - levels[1])[between[rows]].max() <= 4.0
