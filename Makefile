@@ -30,9 +30,10 @@ test-all: test test-slow  ## Run both
 
 check: lint prose types wheel  ## Check format, lint, prose, types and the built wheel
 
-lint: $(INSTALLED)  ## Check format and lint
+lint: $(INSTALLED)  ## Check format and lint, those of JavaScript where Node.js is installed
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	$(BIN)/python .ci/check_javascript.py
 
 prose: $(INSTALLED)  ## List words and docstrings that the style rules exclude
 	$(BIN)/python .ci/check_prose.py
@@ -63,6 +64,7 @@ docs: $(INSTALLED) gl  ## Build the documentation under build/docs, with the ext
 format: $(INSTALLED)  ## Format the code and apply lint's automatic corrections
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+	$(BIN)/python .ci/check_javascript.py --fix
 
 gl: | $(BIN)/python
 	@.ci/install-gl $(BIN)/python

@@ -27,6 +27,8 @@ void main() {
 #else
 //@ include color.glsl
 //@ include footprint.glsl
+uniform vec4 rim;                     // centre and radius of the decal that is marked; radius 0: none
+const vec3 RIM_COLOR = vec3(0.043, 0.341, 0.816);
 layout(location = 0) out vec4 color;  // sRGB, premultiplied
 
 //@ slot material optional
@@ -61,5 +63,9 @@ void main() {
     }
 #endif
     color = vec4(to_srgb(light), 1.0);
+    float away = abs(distance(position.xyz, rim.xyz) - rim.w);
+    if (rim.w > 0.0 && away < ray_spread(position.xyz, ray) * length(ray_right.xyz)) {
+        color.rgb = RIM_COLOR;
+    }
 }
 #endif

@@ -37,8 +37,8 @@
       const view = event.currentTarget;
       const box = view.getBoundingClientRect();
       if (view.fingers) event.stopPropagation();
-      view.style.setProperty("--x", event.clientX - box.left + "px");
-      view.style.setProperty("--y", event.clientY - box.top + "px");
+      view.style.setProperty("--x", `${event.clientX - box.left}px`);
+      view.style.setProperty("--y", `${event.clientY - box.top}px`);
     },
     pointerup(event) {
       if (!event.isPrimary) event.stopPropagation();
@@ -110,28 +110,40 @@
   ["input", "focusin"].forEach((name) => {
     document.addEventListener(name, ({ target }) => (target.taken = false), true);
   });
-  document.addEventListener("pointerdown", (event) => {
-    const field = typedIn();
-    if (field && !field.contains(event.target)) field.blur();
-  }, true);
-  document.addEventListener("keydown", (event) => {
-    const field = typedIn();
-    const value = field?.closest("[data-value]")?.dataset.value;
-    if (event.key !== "Escape" || value === undefined) return;
-    event.stopPropagation();
-    field.value = value;
-    field.dispatchEvent(new Event("input", { bubbles: true }));
-  }, true);
+  document.addEventListener(
+    "pointerdown",
+    (event) => {
+      const field = typedIn();
+      if (field && !field.contains(event.target)) field.blur();
+    },
+    true,
+  );
+  document.addEventListener(
+    "keydown",
+    (event) => {
+      const field = typedIn();
+      const value = field?.closest("[data-value]")?.dataset.value;
+      if (event.key !== "Escape" || value === undefined) return;
+      event.stopPropagation();
+      field.value = value;
+      field.dispatchEvent(new Event("input", { bubbles: true }));
+    },
+    true,
+  );
 
   // Escape ends from everywhere what it ends in the view, unless something on the page takes it.
   const OPEN = ".v-overlay--active:not(.v-tooltip)";
-  document.addEventListener("keydown", (event) => {
-    const view = document.querySelector("[role=application]");
-    const taken = event.defaultPrevented || typedIn() || document.querySelector(OPEN);
-    if (event.key === "Escape" && !taken && !view.contains(event.target)) {
-      view.dispatchEvent(new KeyboardEvent("keydown", { key: "Escape" }));
-    }
-  }, true);
+  document.addEventListener(
+    "keydown",
+    (event) => {
+      const view = document.querySelector("[role=application]");
+      const taken = event.defaultPrevented || typedIn() || document.querySelector(OPEN);
+      if (event.key === "Escape" && !taken && !view.contains(event.target)) {
+        view.dispatchEvent(new KeyboardEvent("keydown", { key: "Escape" }));
+      }
+    },
+    true,
+  );
 
   // Of the toolbar and of the outline, Tab reaches one button; arrows lead from it to the others.
   const BUTTONS = "button, [role=button]";
@@ -145,19 +157,23 @@
     const group = target.closest("[data-roving]");
     if (group && target.matches(BUTTONS)) rove(group, target);
   });
-  document.addEventListener("keydown", (event) => {
-    const { key, target } = event;
-    const group = target.matches(BUTTONS) && target.closest("[data-roving]");
-    const sideways = { ArrowLeft: -1, ArrowRight: 1 }[key];
-    const step = sideways ?? { ArrowUp: -1, ArrowDown: 1 }[key];
-    if (!group || !step) return;
-    const buttons = rove(group).filter((one) => sideways || one === target || one.matches("[role=button]"));
-    const next = buttons[buttons.indexOf(target) + step];
-    if (!next) return;
-    event.preventDefault();
-    event.stopPropagation();
-    next.focus();
-  }, true);
+  document.addEventListener(
+    "keydown",
+    (event) => {
+      const { key, target } = event;
+      const group = target.matches(BUTTONS) && target.closest("[data-roving]");
+      const sideways = { ArrowLeft: -1, ArrowRight: 1 }[key];
+      const step = sideways ?? { ArrowUp: -1, ArrowDown: 1 }[key];
+      if (!group || !step) return;
+      const buttons = rove(group).filter((one) => sideways || one === target || one.matches("[role=button]"));
+      const next = buttons[buttons.indexOf(target) + step];
+      if (!next) return;
+      event.preventDefault();
+      event.stopPropagation();
+      next.focus();
+    },
+    true,
+  );
 
   // The page begins in the colours of the system, once its templates follow the state.
   const dark = matchMedia("(prefers-color-scheme: dark)").matches;
@@ -171,7 +187,8 @@
     if (answer?.status === 403) message.textContent = CLOSED;
   };
   const CLOSED = "The server has started anew. Open the address that the terminal shows.";
-  const ENDED = "The session has ended. Unsaved changes are kept. This page opens them once the server answers.";
+  const ENDED =
+    "The session has ended. Unsaved changes are kept. This page opens them once the server answers.";
   const explainEnd = () => {
     const message = document.querySelector(".trame__message");
     if (message?.textContent.trim() !== "Connection closed") return;

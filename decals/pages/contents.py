@@ -17,17 +17,19 @@ from decals.images.load import embedded_image, opaque
 from decals.index.decal_cells import FINEST, LEVEL_SHIFT, NO_FLOOR, NO_PARITY, REACH_WITH_SLACK
 from decals.index.index import DecalIndex
 from decals.index.lookup import HALF_RANGE, MIX_ALL, MIX_X, MIX_Y, MIX_Z, NESTING_SLACK
-from decals.model import LAYER_LIMIT, MAX_COORDINATE, MIN_RADIUS
+from decals.model import LAYER_LIMIT, MAX_COORDINATE, MIN_RADIUS, Interaction
 from decals.pages.programs import PREFIX, VERSION, picture_programs
 from decals.pages.surfaces import Surfaces, mesh_objects
 from decals.pages.textures import (
     CLAMP,
     MAX_SIDE,
+    TARGETS,
     Arrays,
     PageTexture,
     decal_texture,
     matrix_uniform,
     panorama_texture,
+    targets,
     uniform,
 )
 from decals.record import MIN_KEPT_RADIUS
@@ -46,11 +48,8 @@ from decals.scenes.scene import Scene
 MAX_DECALS = 100_000
 """Most decals of a page: its index is built by the page's script."""
 
-DYNAMIC_TEXTURES = (
-    *("g_position", "g_normal", "g_color"),
-    *("decal_records", "decal_limits", "decal_index_levels", "decal_index_table", "decal_index_ids"),
-)
-"""Textures that the viewer makes."""
+SAMPLES = (0.0, 0.0), (0.125, 0.375), (0.375, -0.125), (-0.125, -0.375), (-0.375, 0.125)
+"""Places in a pixel at which a page draws it, one after the other: its picture is their mean."""
 
 
 def page_contents(
@@ -79,7 +78,6 @@ def page_contents(
     for name, texture in textures.items():
         arrays |= texture.arrays(name)
     camera = scene.camera.at(REFERENCE_ASPECT)
-    programs = picture_programs(code, scene.drawing)
     return {
         "camera": {name: getattr(camera, name) for name in ("position", "target", "up", "fov")},
         "aspect": REFERENCE_ASPECT,
@@ -87,8 +85,11 @@ def page_contents(
         "surfaces": surfaces.records,
         "textures": {name: texture.record() for name, texture in textures.items()},
         "isotropic": MESA_SOFTWARE,
-        "shaders": {**programs, "surfaces": surfaces.programs},
-        "uniforms": picture_uniforms(scene.drawing, surfaces.bounds, [*textures, *DYNAMIC_TEXTURES]),
+        "targets": targets(),
+        "samples": SAMPLES,
+        "programs": surfaces.programs,
+        "shaders": picture_programs(code, scene.drawing),
+        "uniforms": picture_uniforms(scene.drawing, surfaces.bounds, [*textures, *TARGETS]),
         "images": len(scene.images),
         "mode": code.form.contact.name.lower(),
         "stiffness": scene.drawing.stiffness,
@@ -138,6 +139,7 @@ def record_rules(receivers: Sequence[str], form: Form) -> dict[str, Any]:
         "rim": float(RIM),
         "layerLimit": LAYER_LIMIT,
         "receivers": receivers,
+        "interactions": {item.name.lower(): int(item) for item in Interaction},
         "minRadius": MIN_RADIUS,
         "maxCoordinate": MAX_COORDINATE,
         "keptRadius": MIN_KEPT_RADIUS,
@@ -147,8 +149,9 @@ def record_rules(receivers: Sequence[str], form: Form) -> dict[str, Any]:
 
 
 def index_rules(index: DecalIndex) -> dict[str, Any]:
-    """Return the constants of an index, and which sizes share levels in it."""
+    """Return the constants of an index, the sizes of its levels, and which sizes share levels in it."""
     return {
+        "exponents": np.log2(index.levels[:, 1]).astype(int).tolist(),
         "reach": REACH_WITH_SLACK,
         "finest": FINEST,
         "halfRange": int(HALF_RANGE),

@@ -16,7 +16,7 @@ from decals.pages.textures import Arrays, PageTexture, base_texture, data_textur
 from decals.receivers import object_mask
 from decals.rendering.base_textures import WHITE_TEXTURE
 from decals.rendering.tracing_shader import Kinds
-from decals.rendering.tree import tracing_uniforms
+from decals.rendering.tree import BOX_VERTICES, tracing_uniforms
 from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.scene import Scene
 from decals.surfaces.base_color import BaseTexture, Wrap
@@ -104,7 +104,7 @@ class Surfaces:
         known = [name for name, program in self.programs.items() if program == shaders]
         program = known[0] if known else f"tree {number}"
         self.programs[program] = shaders
-        self._add(program, {}, [{"values": values}])
+        self._add(program, {}, [{"box": True, "count": BOX_VERTICES, "values": values}])
 
     def _add_mesh(self, item: object, mesh: BakeMesh) -> None:
         number, base = len(self.records), mesh.base
@@ -128,7 +128,10 @@ class Surfaces:
         self.arrays |= {f"{name} {number}": array for name, array, _ in attributes}
         self.arrays[f"faces {number}"] = faces
         self.programs[program] = mesh_program(textured=program == "textured")
-        places = {name: (f"{name} {number}", size) for name, _, size in attributes}
+        places = {
+            name: (f"{name} {number}", size, "SHORT" if array.dtype == np.int16 else "FLOAT")
+            for name, array, size in attributes
+        }
         self._add(program, places, parts, faces=f"faces {number}")
 
     def _image_values(self, texture: BaseTexture | None) -> dict[str, Any]:

@@ -20,12 +20,33 @@ MAX_SIDE = 4096
 """Most texels of a side of a base texture: as many as data textures have, without which no page is shown."""
 
 CLAMP = "CLAMP_TO_EDGE"
+PLAIN = "NEAREST", "NEAREST"
 SMOOTH = "LINEAR_MIPMAP_LINEAR", "LINEAR"
 WRAPS = {Wrap.REPEAT: "REPEAT", Wrap.CLAMP: CLAMP, Wrap.MIRROR: CLAMP}
 """WebGL's words; shaders mirror the coordinates themselves."""
 
-DATA_FORMATS = {(np.dtype(np.float32), 2): "RGBA32F", (np.dtype(np.int32), 1): "R32I"}
-"""Formats of data textures, by the type of their arrays and their dimensions."""
+FORMATS = {
+    "RGBA32F": ("RGBA", "FLOAT"),
+    "RGBA16F": ("RGBA", "HALF_FLOAT"),
+    "RGB16F": ("RGB", "HALF_FLOAT"),
+    "SRGB8_ALPHA8": ("RGBA", "UNSIGNED_BYTE"),
+    "RGBA32I": ("RGBA_INTEGER", "INT"),
+    "R32I": ("RED_INTEGER", "INT"),
+}
+"""WebGL's formats of textures, and what their texels are in memory."""
+
+TARGETS = {
+    "g_position": "RGBA32F",
+    "g_normal": "RGBA32F",
+    "g_color": "RGBA16F",
+    "number": "R32I",
+    "decal_records": "RGBA32F",
+    "decal_limits": "RGBA32F",
+    "decal_index_levels": "RGBA32F",
+    "decal_index_table": "RGBA32I",
+    "decal_index_ids": "R32I",
+}
+"""Formats of the textures that the viewer makes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,35 +65,56 @@ class PageTexture:
         return {**self.description, "levels": len(self.levels)}
 
 
+def described(
+    form: str,
+    *,
+    target: str = "TEXTURE_2D",
+    filters: tuple[str, str] = PLAIN,
+    wraps: Sequence[str] = (CLAMP, CLAMP),
+    **more: Any,
+) -> dict[str, Any]:
+    """Return the description of a texture in a format, with WebGL's words."""
+    names = ("MIN_FILTER", "MAG_FILTER", "WRAP_S", "WRAP_T")
+    options = {f"TEXTURE_{name}": word for name, word in zip(names, (*filters, *wraps), strict=True)}
+    return {"target": target, "format": (form, *FORMATS[form]), "options": options, **more}
+
+
+def targets() -> dict[str, Any]:
+    """Return descriptions of the textures that the viewer makes."""
+    return {name: described(form) for name, form in TARGETS.items()}
+
+
 def data_texture(array: NDArray[Any]) -> PageTexture:
-    """Return an array of numbers as a texture that shaders read by its texels."""
+    """Return an array of numbers, ``float32[n, 4]`` or ``int32[n]``, as a texture."""
     rows = texel_rows(len(array))
-    description = {"format": DATA_FORMATS[array.dtype, array.ndim], "size": (ROW_TEXELS, rows)}
+    description = described("RGBA32F" if array.ndim == 2 else "R32I", size=(ROW_TEXELS, rows))
     return PageTexture(description, [padded_rows(array, rows)])
 
 
 def decal_texture(texture: ShaderTexture) -> PageTexture:
     """Return the images of decals, or their maps."""
     form = "SRGB8_ALPHA8" if texture.format == SRGB else texture.format.upper()
-    description = {"kind": "2D_ARRAY", "format": form, "size": texture.size, "filter": SMOOTH}
+    more: dict[str, Any] = {"size": texture.size, "anisotropy": MAX_ANISOTROPY}
     levels = [level.reshape(-1, 4) for level in texture.levels()]
-    return PageTexture({**description, "anisotropy": MAX_ANISOTROPY}, levels)
+    return PageTexture(described(form, target="TEXTURE_2D_ARRAY", filters=SMOOTH, **more), levels)
 
 
 def base_texture(image: BaseTexture) -> PageTexture:
     """Return a texture of a mesh, of which the browser makes the smaller levels as OpenGL does."""
     texels = texels_within(image.pixels, MAX_SIDE)
     height, width = texels.shape[:2]
-    wrap = [WRAPS[mode] for mode in image.wrap]
-    description = {"format": "SRGB8_ALPHA8", "size": (width, height), "filter": SMOOTH, "wrap": wrap}
-    return PageTexture({**description, "mips": True, "anisotropy": MAX_ANISOTROPY}, [texels.reshape(-1, 4)])
+    wraps = [WRAPS[mode] for mode in image.wrap]
+    more: dict[str, Any] = {"size": (width, height), "mips": True, "anisotropy": MAX_ANISOTROPY}
+    return PageTexture(
+        described("SRGB8_ALPHA8", filters=SMOOTH, wraps=wraps, **more), [texels.reshape(-1, 4)]
+    )
 
 
 def panorama_texture(texels: NDArray[np.float16], wrap: str) -> PageTexture:
     """Return light from all directions, ``float16[h, w, 3]``, that goes on at its sides as ``wrap`` says."""
     height, width = texels.shape[:2]
-    filters = {"filter": ("LINEAR", "LINEAR"), "wrap": (wrap, CLAMP)}
-    return PageTexture({"format": "RGB16F", "size": (width, height), **filters}, [texels.reshape(-1, 3)])
+    description = described("RGB16F", filters=("LINEAR", "LINEAR"), wraps=(wrap, CLAMP), size=(width, height))
+    return PageTexture(description, [texels.reshape(-1, 3)])
 
 
 def uniform(value: Any) -> list[Any]:

@@ -48,7 +48,7 @@ FIREFOX = {"webgl.force-enabled": True}
 STARTED = """() => viewer.set || document.body.textContent.includes("cannot be turned here")"""
 PIXELS = """() => {
   const { canvas, painter } = viewer;
-  painter.draw(viewer);
+  painter.draw({ ...viewer, selected: -1 });
   const bytes = new Uint8Array(4 * canvas.width * canvas.height);
   painter.gl.readPixels(0, 0, canvas.width, canvas.height, painter.gl.RGBA, painter.gl.UNSIGNED_BYTE, bytes);
   return { width: canvas.width, height: canvas.height, bytes: Array.from(bytes) };

@@ -44,8 +44,7 @@ export class Camera {
     const [low, high] = this.bounds;
     const middle = dot(ahead, subtract(scaled(add(low, high), 0.5), this.position));
     const reach = 0.5 * dot(ahead.map(Math.abs), subtract(high, low));
-    const far = 1.01 * (middle + reach);
-    if (!(far > 0)) return [NEAREST * this.size, this.size];
+    const far = middle + reach > 0 ? 1.01 * (middle + reach) : this.size;
     return [Math.max(0.99 * (middle - reach), far * NEAREST), far];
   }
 

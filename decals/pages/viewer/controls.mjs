@@ -4,20 +4,23 @@ export class Controls {
   constructor(root, { markup, controls }, viewer) {
     root.classList.add("decal-viewer");
     root.innerHTML = markup;
-    const [canvas, outline, bar, mode, stiffness, status] = [
-      ...["canvas", "polygon", ".bar", "select", "input", "[role=status]"].map((part) =>
-        root.querySelector(part),
-      ),
-    ];
-    Object.assign(this, { root, canvas, outline, mode, stiffness, status });
-    this.buttons = Array.from(bar.querySelectorAll("button"));
+    const parts = {
+      canvas: "canvas",
+      bar: ".bar",
+      mode: "select",
+      stiffness: "input",
+      status: "[role=status]",
+    };
+    for (const [name, selector] of Object.entries(parts)) this[name] = root.querySelector(selector);
+    this.root = root;
+    this.buttons = Array.from(this.bar.querySelectorAll("button"));
     for (const button of this.buttons) {
       button.setAttribute("aria-label", button.title);
       button.addEventListener("click", () => viewer.run(button.name));
     }
-    bar.hidden = !controls;
-    mode.addEventListener("change", () => viewer.set({ mode: mode.value }));
-    stiffness.addEventListener("input", () => viewer.set({ stiffness: Number(stiffness.value) }));
+    this.bar.hidden = !controls;
+    this.mode.addEventListener("change", () => viewer.set({ mode: this.mode.value }));
+    this.stiffness.addEventListener("input", () => viewer.set({ stiffness: Number(this.stiffness.value) }));
     root.addEventListener("keydown", (event) => this.press(event, viewer));
   }
 
@@ -30,15 +33,14 @@ export class Controls {
     if (viewer.run(button?.name ?? key)) event.preventDefault();
   }
 
-  // Show the state: what can be done, and the rim of the selected decal as points of the picture.
-  show({ mode, stiffness, selected, history }, rim) {
+  // Show the state, and what can be done.
+  show({ mode, stiffness, selected, history }) {
     this.mode.value = mode;
     this.stiffness.value = stiffness;
     this.stiffness.disabled = mode !== "elastic";
     const off = { undo: !history.done.length, redo: !history.undone.length };
     for (const button of this.buttons)
       button.disabled = off[button.name] ?? ("selected" in button.dataset && selected < 0);
-    this.outline.setAttribute("points", rim.map((point) => point.join(",")).join(" "));
   }
 
   say(text) {

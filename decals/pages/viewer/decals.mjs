@@ -3,8 +3,6 @@ import { DecalIndex } from "./index.mjs";
 import { Texels } from "./texels.mjs";
 import { length, subtract, tangential, unit } from "./vectors.mjs";
 
-const INTERACTIONS = { independent: 0, push: 1, contact: 1, overlap: 2 };
-
 const linear = (c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
 
 // A decal with a normal and a tangent that are perpendicular and of length 1.
@@ -26,8 +24,8 @@ export function isDecal({ position, normal, tangent, radius, image = 0 }, rules,
 export class DecalSet {
   constructor(rows, rules) {
     Object.assign(this, { rules, rows: rows.slice() });
-    this.records = new Texels("RGBA32F", 4 * rows.length);
-    this.limits = new Texels("RGBA32F", rows.length);
+    this.records = new Texels(Float32Array, 4, 4 * rows.length);
+    this.limits = new Texels(Float32Array, 4, rows.length);
     this.rows.forEach((row, number) => row && this.pack(row, number));
     this.index = new DecalIndex(rules.index, this.records, this.numbers);
     this.rank = this.numbers.length ? this.index.rank(this.numbers[0]) : null; // of all, without layers
@@ -41,23 +39,16 @@ export class DecalSet {
   // What shaders read, by the names of its textures.
   get texels() {
     const { levels, table, ids } = this.index;
-    return {
-      decal_records: this.records,
-      decal_limits: this.limits,
-      decal_index_levels: levels,
-      decal_index_table: table,
-      decal_index_ids: ids,
-    };
+    const index = { decal_index_levels: levels, decal_index_table: table, decal_index_ids: ids };
+    return { decal_records: this.records, decal_limits: this.limits, ...index };
   }
 
   pack(row, number) {
-    const { rim, layerLimit, receivers } = this.rules;
-    const interaction = INTERACTIONS[row.interaction ?? "push"];
-    const rank = 4 * ((row.layer ?? 0) + layerLimit) + interaction + (row.spill ? 0.5 : 0);
-    const place = [...row.position, Math.fround(row.radius) / rim];
-    const frame = [...row.normal, rank, ...row.tangent, row.image ?? 0];
-    const color = [...(row.tint ?? [1, 1, 1]).map(linear), row.opacity ?? 1];
-    this.records.set(4 * number, [...place, ...frame, ...color]);
+    const { rim, layerLimit, receivers, interactions } = this.rules;
+    const { layer = 0, interaction = "push", spill, image = 0, tint = [1, 1, 1], opacity = 1 } = row;
+    const rank = 4 * (layer + layerLimit) + interactions[interaction] + (spill ? 0.5 : 0);
+    const place = [...row.position, Math.fround(row.radius) / rim, ...row.normal, rank];
+    this.records.set(4 * number, [...place, ...row.tangent, image, ...tint.map(linear), opacity]);
     const angle = ((row.fade_angle ?? 0) * Math.PI) / 180;
     const fade = angle > 0 ? [Math.cos(angle / 2), Math.cos(angle)] : [0, 0];
     const receiver = Math.max(receivers.indexOf(row.receivers ?? ""), 0);
@@ -85,15 +76,16 @@ export class DecalSet {
 
   // As `are_nested_contact` of decals/index/lookup.py.
   areNested(decal, other) {
+    const { interactions, rim, nestingSlack, keptRadius } = this.rules;
     const rank = this.index.rank(decal);
-    if (decal === other || rank % 4 !== INTERACTIONS.push || this.index.rank(other) !== rank) return false;
+    if (decal === other || rank % 4 !== interactions.push || this.index.rank(other) !== rank) return false;
     const balls = [decal, other].map((number) => this.index.ball(number));
-    const [smaller, larger] = balls.map(({ influence }) => this.rules.rim * influence).sort((a, b) => a - b);
-    const outer = larger * (1 + this.rules.nestingSlack);
-    const squared = length(subtract(balls[0].centre, balls[1].centre)) ** 2;
+    const [smaller, larger] = balls.map(({ influence }) => rim * influence).sort((a, b) => a - b);
+    const outer = larger * (1 + nestingSlack);
+    const apart = length(subtract(balls[0].centre, balls[1].centre));
     const difference = (outer - smaller) * (outer + smaller);
-    const least = (2 * this.rules.keptRadius) ** 2 * squared;
-    const [near, far] = [squared - difference, squared + difference];
-    return near <= 0 || near ** 2 <= least * smaller ** 2 || far ** 2 <= least * outer ** 2;
+    const [near, far] = [apart ** 2 - difference, apart ** 2 + difference];
+    const least = 2 * keptRadius * apart;
+    return near <= 0 || near <= least * smaller || far <= least * outer;
   }
 }

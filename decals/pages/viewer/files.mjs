@@ -11,9 +11,11 @@ export function copyLink({ controls, ...state }) {
   } catch {
     return controls.say("A page inside a notebook has no link of its own: save a scene file.");
   }
-  const say = (places) => () => controls.say(`The link of this state is in ${places}.`);
-  const copied = navigator.clipboard?.writeText(location.href) ?? Promise.reject();
-  copied.then(say("the address bar and in the clipboard"), say("the address bar"));
+  controls.say("The link of this state is in the address bar.");
+  navigator.clipboard?.writeText(location.href).then(
+    () => controls.say("The link of this state is in the address bar and in the clipboard."),
+    () => {}, // refused
+  );
 }
 
 // The scene as a file that `decals.load_scene` takes.

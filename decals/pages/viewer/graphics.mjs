@@ -1,30 +1,22 @@
 // WebGL 2: programs that take their uniforms by name, textures, and targets of drawing.
 import { ROW } from "./texels.mjs";
 
-// Formats of textures: those of their texels in memory.
-const FORMATS = {
-  RGBA32F: ["RGBA", "FLOAT"],
-  RGBA16F: ["RGBA", "HALF_FLOAT"],
-  RGB16F: ["RGB", "HALF_FLOAT"],
-  SRGB8_ALPHA8: ["RGBA", "UNSIGNED_BYTE"],
-  RGBA32I: ["RGBA_INTEGER", "INT"],
-  R32I: ["RED_INTEGER", "INT"],
-};
-const PLAIN = { kind: "2D", filter: ["NEAREST", "NEAREST"], wrap: ["CLAMP_TO_EDGE", "CLAMP_TO_EDGE"] };
-
 export class Program {
   constructor(gl, vertex, fragment) {
     const program = gl.createProgram();
-    for (const [kind, text] of Object.entries({ VERTEX_SHADER: vertex, FRAGMENT_SHADER: fragment })) {
-      const shader = gl.createShader(gl[kind]);
-      gl.shaderSource(shader, text);
-      gl.compileShader(shader);
-      gl.attachShader(program, shader);
-    }
+    const shaders = Object.entries({ VERTEX_SHADER: vertex, FRAGMENT_SHADER: fragment }).map(
+      ([kind, text]) => {
+        const shader = gl.createShader(gl[kind]);
+        gl.shaderSource(shader, text);
+        gl.compileShader(shader);
+        gl.attachShader(program, shader);
+        return shader;
+      },
+    );
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
-      const logs = gl.getAttachedShaders(program).map((shader) => gl.getShaderInfoLog(shader));
-      throw new Error(`this device refuses a shader: ${[gl.getProgramInfoLog(program), ...logs].join(" ")}`);
+      const logs = [gl.getProgramInfoLog(program), ...shaders.map((shader) => gl.getShaderInfoLog(shader))];
+      throw new Error(`this device refuses a shader: ${logs.join(" ")}`);
     }
     Object.assign(this, { gl, program });
   }
@@ -47,21 +39,17 @@ export class Program {
   }
 }
 
-// Make a texture of levels of texels, each half as large as the one before; null for a level without contents.
-export function makeTexture(gl, description, levels) {
-  const { kind, format, size, filter, wrap, mips, anisotropy } = { ...PLAIN, ...description };
-  const target = gl[`TEXTURE_${kind}`];
-  const texture = gl.createTexture();
+// Make a texture as decals/pages/textures.py describes it, of levels of texels; null for one without contents.
+export function makeTexture(gl, { target: kind, format, size, options, mips, anisotropy }, levels = [null]) {
+  const [target, texture] = [gl[kind], gl.createTexture()];
+  const [internal, ...inMemory] = format.map((word) => gl[word]);
   gl.bindTexture(target, texture);
   levels.forEach((texels, level) => {
     const sides = size.map((side, axis) => (axis < 2 ? Math.max(1, side >> level) : side));
-    const inMemory = FORMATS[format].map((word) => gl[word]);
-    gl[`texImage${size.length}D`](target, level, gl[format], ...sides, 0, ...inMemory, texels);
+    gl[`texImage${size.length}D`](target, level, internal, ...sides, 0, ...inMemory, texels);
   });
   if (mips) gl.generateMipmap(target);
-  ["MIN_FILTER", "MAG_FILTER", "WRAP_S", "WRAP_T"].forEach((option, i) => {
-    gl.texParameteri(target, gl[`TEXTURE_${option}`], gl[[...filter, ...wrap][i]]);
-  });
+  for (const [option, value] of Object.entries(options)) gl.texParameteri(target, gl[option], gl[value]);
   const filtering = anisotropy && gl.getExtension("EXT_texture_filter_anisotropic");
   if (filtering) {
     const most = gl.getParameter(filtering.MAX_TEXTURE_MAX_ANISOTROPY_EXT);
@@ -70,42 +58,43 @@ export function makeTexture(gl, description, levels) {
   return { target, texture };
 }
 
-// Bring `Texels` to the graphics card, all or what changed, and return their texture.
-export function uploaded(gl, texels) {
-  const { array, format, width, changes } = texels;
-  const rows = array.length / (ROW * width);
-  if (changes) {
+// Bring `Texels` to the graphics card, all or the rows that changed, and return their texture.
+export function uploaded(gl, texels, description) {
+  const { array, changes } = texels;
+  const numbers = ROW * texels.width;
+  const size = [ROW, array.length / numbers];
+  if (!changes) {
+    if (size[1] > gl.getParameter(gl.MAX_TEXTURE_SIZE))
+      throw new Error("this device has no room for the decals");
+    gl.deleteTexture(texels.onCard?.texture ?? null);
+    texels.onCard = makeTexture(gl, { ...description, size }, [array]);
+  } else if (changes.size) {
+    const inMemory = description.format.slice(1).map((word) => gl[word]);
     gl.bindTexture(gl.TEXTURE_2D, texels.onCard.texture);
     for (const row of changes) {
-      const part = array.subarray(row * ROW * width, (row + 1) * ROW * width);
-      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, ROW, 1, ...FORMATS[format].map((word) => gl[word]), part);
+      const part = array.subarray(row * numbers, (row + 1) * numbers);
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, ROW, 1, ...inMemory, part);
     }
-  } else {
-    if (rows > gl.getParameter(gl.MAX_TEXTURE_SIZE))
-      throw new Error("there are too many decals for this device");
-    gl.deleteTexture(texels.onCard?.texture ?? null);
-    texels.onCard = makeTexture(gl, { format, size: [ROW, rows] }, [array]);
   }
   texels.changes = new Set();
   return texels.onCard;
 }
 
-// A target of drawing with textures of some formats, and with a depth buffer.
-export function makeTarget(gl, size, formats) {
-  const framebuffer = gl.createFramebuffer();
+// A target of drawing with textures, and with a depth buffer.
+export function makeTarget(gl, size, descriptions) {
+  const [framebuffer, depth] = [gl.createFramebuffer(), gl.createRenderbuffer()];
   gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
-  const places = formats.map((_, i) => gl.COLOR_ATTACHMENT0 + i);
-  const textures = formats.map((format) => makeTexture(gl, { format, size }, [null]));
+  gl.bindRenderbuffer(gl.RENDERBUFFER, depth);
+  gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT24, ...size);
+  gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
+  const textures = descriptions.map((description) => makeTexture(gl, { ...description, size }));
+  const places = textures.map((_, i) => gl.COLOR_ATTACHMENT0 + i);
   textures.forEach(({ target, texture }, i) => {
     gl.framebufferTexture2D(gl.FRAMEBUFFER, places[i], target, texture, 0);
   });
   gl.drawBuffers(places);
-  const depth = gl.createRenderbuffer();
-  gl.bindRenderbuffer(gl.RENDERBUFFER, depth);
-  gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT24, ...size);
-  gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
   const release = () => {
-    textures.forEach(({ texture }) => gl.deleteTexture(texture));
+    for (const { texture } of textures) gl.deleteTexture(texture);
     gl.deleteRenderbuffer(depth);
     gl.deleteFramebuffer(framebuffer);
   };

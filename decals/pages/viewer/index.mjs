@@ -17,22 +17,12 @@ export function exponentAbove(x) {
 export class DecalIndex {
   // `rules` holds constants of the index, and its parity and floor; `numbers` are those of the decals in `records`.
   constructor(rules, records, numbers) {
-    Object.assign(this, { rules, records, end: 0, used: 0, cells: [] });
-    this.levels = new Texels("RGBA32F", 1);
-    this.table = new Texels("RGBA32I", 1, EMPTY);
-    this.ids = new Texels("R32I", 1);
-    const ordered = numbers.toSorted((a, b) => this.compare(a, b));
-    const exponents = new Set(ordered.map((number) => this.exponent(number)));
-    this.levelOf = new Map(
-      Array.from(exponents.keys())
-        .sort((a, b) => a - b)
-        .map((e, level) => [e, level]),
-    );
-    for (const number of ordered) this.insert(number);
-  }
-
-  get levelCount() {
-    return this.levelOf.size;
+    Object.assign(this, { rules, records, end: 0 });
+    this.levels = new Texels(Float32Array, 4, 1);
+    this.ids = new Texels(Int32Array, 1, 1);
+    this.seatAll([], 1);
+    this.levelOf = new Map(rules.exponents.map((exponent, level) => [exponent, level]));
+    for (const number of numbers) this.insert(number);
   }
 
   get mask() {
@@ -48,53 +38,42 @@ export class DecalIndex {
     return this.rank(a) - this.rank(b) || a - b;
   }
 
-  // The centre of a decal, and how far it reaches.
+  // The ball that a decal reaches, and the exponent of its cells, as `cell_exponent` of decals/index/decal_cells.py.
   ball(number) {
-    const [x, y, z, influence] = this.records.at(4 * number);
-    return { centre: [x, y, z], influence, reach: influence * this.rules.reach };
-  }
-
-  // The exponent of a decal's cells, as `cell_exponent` of decals/index/decal_cells.py.
-  exponent(number) {
     const { parity, floor, finest } = this.rules;
-    const { centre, reach } = this.ball(number);
+    const [x, y, z, influence] = this.records.at(4 * number);
+    const reach = influence * this.rules.reach;
     const own = exponentAbove(reach);
     const shared = parity === null || (own & 1) === parity ? own : own - 1;
-    const farthest = Math.max(...centre.map(Math.abs)) + reach;
-    return Math.max(shared, exponentAbove(farthest) - finest, floor ?? -Infinity);
+    const farthest = Math.max(Math.abs(x), Math.abs(y), Math.abs(z)) + reach;
+    const exponent = Math.max(shared, exponentAbove(farthest) - finest, floor ?? -Infinity);
+    return { centre: [x, y, z], influence, reach, exponent };
   }
 
   // The cells that the ball of a decal touches.
   *cellsOf(number) {
-    const exponent = this.exponent(number);
-    const { centre, reach } = this.ball(number);
+    const { centre, reach, exponent } = this.ball(number);
     const width = 2 ** exponent;
+    const level = this.levelOf.get(exponent);
     const [low, high] = [-reach, reach].map((far) => centre.map((c) => Math.floor((c + far) / width)));
-    const outside = (axis, cell) =>
-      Math.max(cell * width - centre[axis], centre[axis] - (cell + 1) * width, 0) ** 2;
+    const away = (cell, c) => Math.max(cell * width - c, c - (cell + 1) * width, 0) ** 2;
     for (let x = low[0]; x <= high[0]; x++)
       for (let y = low[1]; y <= high[1]; y++)
         for (let z = low[2]; z <= high[2]; z++)
-          if (outside(0, x) + outside(1, y) + outside(2, z) <= reach * reach)
-            yield this.cell(this.levelOf.get(exponent), x, y, z);
+          if (away(x, centre[0]) + away(y, centre[1]) + away(z, centre[2]) <= reach * reach)
+            yield this.cell(level, x, y, z);
   }
 
   // The cell of a level at some coordinates: its key in the table, the numbers in it, and where their list lies.
   cell(level, x, y, z) {
     const { halfRange, levelShift } = this.rules;
     const key = [x + halfRange + level * 2 ** levelShift, y + halfRange, z + halfRange];
-    const slot = this.slotOf(key);
-    if (!this.cells[slot]) {
-      this.used += 1;
-      this.seat({ key, numbers: [], head: EMPTY, room: 0 });
-    }
-    return this.cells[slot];
+    return this.cells[this.slotOf(key)] ?? this.seat({ key, numbers: [], head: EMPTY, room: 0 });
   }
 
   // The slot of a key, or the free one where it belongs.
   slotOf([x, y, z]) {
-    const { mask } = this;
-    const { array } = this.table;
+    const [{ mask }, { array }] = [this, this.table];
     const [mixX, mixY, mixZ, mixAll] = this.rules.mix;
     let hash = Math.imul(x, mixX) ^ Math.imul(y, mixY) ^ Math.imul(z, mixZ);
     hash = Math.imul(hash ^ (hash >>> 15), mixAll);
@@ -107,8 +86,16 @@ export class DecalIndex {
   // Write a cell into the table.
   seat(cell) {
     const slot = this.slotOf(cell.key);
+    this.used += this.cells[slot] ? 0 : 1;
     this.cells[slot] = cell;
     this.table.set(slot, [...cell.key, cell.head]);
+    return cell;
+  }
+
+  // Make a table of some slots at least, with some cells.
+  seatAll(cells, slots) {
+    Object.assign(this, { table: new Texels(Int32Array, 4, slots, EMPTY), cells: [], used: 0 });
+    cells.forEach((cell) => this.seat(cell));
   }
 
   // Write the list of a cell, to another place if it has outgrown its own.
@@ -124,7 +111,7 @@ export class DecalIndex {
 
   // Insert a decal, whose record is there, into the lists of its cells.
   insert(number) {
-    const exponent = this.exponent(number);
+    const { exponent } = this.ball(number);
     if (!this.levelOf.has(exponent)) this.levelOf.set(exponent, this.levelOf.size);
     const level = this.levelOf.get(exponent);
     const [, width, lowest, highest] = this.levels.at(level);
@@ -135,7 +122,7 @@ export class DecalIndex {
       cell.numbers.splice(before + 1, 0, number);
       this.store(cell);
     }
-    if (4 * this.used > 3 * this.mask) this.grow();
+    if (4 * this.used > 3 * this.mask) this.seatAll(this.cells, 2 * (this.mask + 1));
   }
 
   // Remove a decal, whose record is still unchanged, from the lists of its cells.
@@ -144,13 +131,5 @@ export class DecalIndex {
       cell.numbers.splice(cell.numbers.indexOf(number), 1);
       this.store(cell);
     }
-  }
-
-  // Move all cells to a table of twice the size.
-  grow() {
-    const { cells } = this;
-    this.table = new Texels("RGBA32I", 2 * (this.mask + 1), EMPTY);
-    this.cells = [];
-    cells.forEach((cell) => this.seat(cell));
   }
 }

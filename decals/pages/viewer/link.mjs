@@ -7,7 +7,6 @@ const list = (values) => values.map(short).join(",");
 
 // Return the fragment, or null if it would be too long.
 export function written({ camera, mode, stiffness, decals, originals }) {
-  const fields = { eye: list(camera.position), at: list(camera.target), mode, k: list([stiffness]) };
   const changed = decals.rows.flatMap((row, place) => {
     const before = originals[place] ?? null;
     if (row === before) return [];
@@ -15,9 +14,8 @@ export function written({ camera, mode, stiffness, decals, originals }) {
     const parts = [...row.position, ...row.normal, ...row.tangent, row.radius];
     return [`${place}:${list(before ? parts : [...parts, row.image ?? 0])}`];
   });
-  if (changed.length) fields.d = changed.join(";");
-  const pairs = Object.entries(fields).map((pair) => pair.join("="));
-  const text = pairs.join("&");
+  const view = `eye=${list(camera.position)}&at=${list(camera.target)}&mode=${mode}&k=${short(stiffness)}`;
+  const text = changed.length ? `${view}&d=${changed.join(";")}` : view;
   return text.length <= LONGEST ? text : null;
 }
 
@@ -29,20 +27,18 @@ export function read(fragment, originals) {
     return values.length >= count && values.every(Number.isFinite) ? values : null;
   };
   const state = { changes: [] };
-  const [position, target] = [numbers(fields.get("eye"), 3), numbers(fields.get("at"), 3)];
-  if (position && target) state.camera = { position: position.slice(0, 3), target: target.slice(0, 3) };
+  const [eye, target] = ["eye", "at"].map((name) => numbers(fields.get(name), 3)?.slice(0, 3));
+  if (eye && target) state.camera = { position: eye, target };
   if (fields.has("mode")) state.mode = fields.get("mode");
   if (Number(fields.get("k")) >= 1) state.stiffness = Number(fields.get("k"));
   for (const text of (fields.get("d") ?? "").split(";")) {
-    const [, digits, kind, rest] = /^(\d{1,7})([:x])(.*)$/.exec(text) ?? [];
-    if (digits === undefined) continue;
-    const place = Number(digits);
-    const parts = numbers(rest, 10);
-    if (kind === "x" && originals[place]) state.changes.push([place, null]);
-    if (kind === ":" && parts && parts[9] > 0 && place <= originals.length + LONGEST) {
-      const [position, normal, tangent] = [0, 3, 6].map((first) => parts.slice(first, first + 3));
-      const base = originals[place] ?? { image: parts[10] ?? 0 };
-      state.changes.push([place, { ...base, position, normal, tangent, radius: parts[9] }]);
+    const [, digits, parts] = /^(\d{1,7})(?:x|:(.*))$/.exec(text) ?? [];
+    const [place, values] = [Number(digits), numbers(parts, 10)];
+    if (digits && parts === undefined && originals[place]) state.changes.push([place, null]);
+    if (values?.[9] > 0 && place <= originals.length + LONGEST) {
+      const [position, normal, tangent] = [0, 3, 6].map((first) => values.slice(first, first + 3));
+      const base = originals[place] ?? { image: values[10] ?? 0 };
+      state.changes.push([place, { ...base, position, normal, tangent, radius: values[9] }]);
     }
   }
   return state;

@@ -5,10 +5,7 @@ export function fromBase64(text) {
 }
 
 export function toBase64(bytes) {
-  const letters = [];
-  for (let first = 0; first < bytes.length; first += 8192)
-    letters.push(String.fromCharCode(...bytes.subarray(first, first + 8192)));
-  return btoa(letters.join(""));
+  return btoa(Array.from(bytes, (byte) => String.fromCharCode(byte)).join(""));
 }
 
 // Return the header and its arrays by name.

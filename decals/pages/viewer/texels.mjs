@@ -2,12 +2,10 @@
 
 export const ROW = 4096;
 
-const KINDS = { RGBA32F: [Float32Array, 4], RGBA32I: [Int32Array, 4], R32I: [Int32Array, 1] };
-
 export class Texels {
-  constructor(format, count, value = 0) {
-    const [kind, width] = KINDS[format];
-    Object.assign(this, { format, width, array: new kind(0) });
+  // `width` is the number of numbers in a texel.
+  constructor(kind, width, count, value = 0) {
+    Object.assign(this, { width, array: new kind(0) });
     this.reserve(Math.max(count, 1));
     this.array.fill(value);
   }

@@ -6,14 +6,15 @@ import { DecalSet, framed, isDecal } from "./decals.mjs";
 import { History } from "./history.mjs";
 import { read, written } from "./link.mjs";
 import { unpacked } from "./packing.mjs";
-import { Painter, SAMPLES } from "./painter.mjs";
+import { Painter } from "./painter.mjs";
 import { Pointer } from "./pointer.mjs";
-import { add, carried, cross, dot, length, scaled, subtract, turned } from "./vectors.mjs";
+import { add, carried, cross, dot, length, scaled, subtract } from "./vectors.mjs";
 
-const RIM_POINTS = 48;
 const OWN_SIZE = 0.05; // radius of the first decal, in sizes of the model
 const GRAZING = 0.05; // cosine between ray and normal below which a place within a pixel is not sought
 const NARROW = 1; // angle of view, in degrees, of a look along one ray
+const STEP = 0.25; // of a decal, in radii, at a press
+const ORBIT = Math.PI / 24; // of the model, at a press
 
 class Viewer {
   constructor(root, { header, arrays }, options) {
@@ -35,15 +36,9 @@ class Viewer {
   // -- the five functions ---------------------------------------------------------------------------------
 
   get() {
-    const { camera, mode, stiffness, selected, decals } = this;
-    return {
-      camera: camera.pose,
-      mode,
-      stiffness,
-      selected,
-      decals: decals.rows.slice(),
-      link: written(this),
-    };
+    const { mode, stiffness, selected } = this;
+    const [camera, decals] = [this.camera.pose, this.decals.rows.slice()];
+    return { camera, mode, stiffness, selected, decals, link: written(this) };
   }
 
   // Change the camera, the contact mode, the stiffness, decals ({number: row or null}), or the state of a link.
@@ -87,11 +82,8 @@ class Viewer {
 
   resize() {
     const { canvas } = this;
-    for (const [side, length] of [
-      ["width", canvas.clientWidth],
-      ["height", canvas.clientHeight],
-    ])
-      canvas[side] = Math.max(1, Math.round(length * devicePixelRatio));
+    canvas.width = Math.max(1, Math.round(canvas.clientWidth * devicePixelRatio));
+    canvas.height = Math.max(1, Math.round(canvas.clientHeight * devicePixelRatio));
     this.changed("view");
   }
 
@@ -102,50 +94,41 @@ class Viewer {
   }
 
   request() {
-    if (!this.waiting) requestAnimationFrame(() => this.draw());
+    if (!this.waiting) requestAnimationFrame(() => this.refine());
     this.waiting = true;
   }
 
-  // Draw a sample of the picture; further ones follow until it is smooth or changes.
-  draw() {
+  // Draw the next sample of the picture; further ones follow, each after the one before it, until it changes.
+  refine() {
     this.waiting = false;
-    if (!this.decals.rows[this.selected]) this.selected = -1;
-    this.painter.draw(this, this.sample);
-    this.controls.show(this, this.rim());
-    this.sample += 1;
-    if (this.sample < SAMPLES.length) this.request();
+    if (this.sample > 0 && this.painter.isBusy) this.request();
+    else this.draw();
   }
 
-  // The rim of the selected decal, in pixels of the page.
-  rim() {
-    const row = this.decals.rows[this.selected];
-    if (!row) return [];
-    const sides = [row.tangent, cross(row.normal, row.tangent)].map((side) => scaled(side, row.radius));
-    const places = Array.from({ length: RIM_POINTS }, (_, i) => {
-      const angle = (2 * Math.PI * i) / RIM_POINTS;
-      const out = add(scaled(sides[0], Math.cos(angle)), scaled(sides[1], Math.sin(angle)));
-      return this.camera.seen(add(row.position, out), this.aspect);
-    });
-    const { clientWidth, clientHeight } = this.canvas;
-    const inPixels = ([x, y]) => [((1 + x) * clientWidth) / 2, ((1 - y) * clientHeight) / 2];
-    return places.every((place) => place) ? places.map(inPixels) : [];
+  draw() {
+    if (!this.decals.rows[this.selected]) this.selected = -1;
+    this.painter.draw(this, this.sample);
+    this.controls.show(this);
+    this.sample += 1;
+    if (this.sample < this.header.samples.length) this.request();
   }
 
   // -- what lies at a place of the picture, from −1 to 1 ---------------------------------------------------
 
-  pixel(x, y) {
+  pixel(...place) {
     const { width, height } = this.canvas;
-    const clamped = (place, size) => Math.min(Math.max(Math.floor(((1 + place) * size) / 2), 0), size - 1);
-    return [clamped(x, width), clamped(y, height)];
+    return [width, height].map((side, axis) =>
+      Math.min(Math.max(Math.floor(((1 + place[axis]) * side) / 2), 0), side - 1),
+    );
   }
 
   decalAt(x, y) {
-    return this.painter.owner(this, ...this.pixel(x, y));
+    return this.painter.owner(this, this.pixel(x, y));
   }
 
   // The surface at a place: that in the middle of the pixel, moved along its tangent plane.
   surfaceAt(x, y) {
-    const hit = this.painter.surface(this.camera, ...this.pixel(x, y));
+    const hit = this.painter.surface(this.camera, this.pixel(x, y));
     if (!hit) return null;
     const eye = this.camera.position;
     const ray = this.camera.direction(x, y, this.aspect);
@@ -172,9 +155,8 @@ class Viewer {
   }
 
   // Move the selected decal to a point of the surface; its image is carried along.
-  moveTo({ position, normal }, options) {
-    const tangent = (row) => carried(row.tangent, row.normal, normal);
-    this.editSelected((row) => ({ position, normal, tangent: tangent(row) }), options);
+  moveTo(hit, options) {
+    this.editSelected((row) => ({ ...hit, tangent: carried(row.tangent, row.normal, hit.normal) }), options);
   }
 
   // Move the selected decal along the surface, by parts of its radius as seen: to where a look from above ends.
@@ -185,16 +167,8 @@ class Viewer {
     const target = add(position, step);
     const above = { position: add(target, scaled(normal, radius)), target, up: along, fov: NARROW };
     const { bounds, aspect } = this.header;
-    const hit = this.painter.surface(new Camera(above, bounds, aspect), ...this.pixel(0, 0));
+    const hit = this.painter.surface(new Camera(above, bounds, aspect), this.pixel(0, 0));
     if (hit && length(subtract(hit.position, position)) < 3 * radius) this.moveTo(hit);
-  }
-
-  turn(angle) {
-    this.editSelected((row) => ({ tangent: turned(row.tangent, row.normal, angle) }));
-  }
-
-  scale(factor) {
-    this.editSelected((row) => ({ radius: row.radius * factor }));
   }
 
   addAt(x, y) {
@@ -207,13 +181,24 @@ class Viewer {
     this.set({ selected: number });
   }
 
+  // Select the next decal, or with −1 the one before.
   select(step) {
     const { numbers } = this.decals;
-    if (!numbers.length) return;
-    const at = numbers.indexOf(this.selected);
-    const next = at < 0 ? (step > 0 ? 0 : numbers.length - 1) : at + step;
-    this.set({ selected: numbers[(next + numbers.length) % numbers.length] });
-    this.controls.say(`Decal ${this.selected} is selected.`);
+    const at = this.selected < 0 && step < 0 ? 0 : numbers.indexOf(this.selected);
+    if (numbers.length) this.set({ selected: numbers.at((at + step) % numbers.length) });
+    if (numbers.length) this.controls.say(`Decal ${this.selected} is selected.`);
+  }
+
+  // Move the selected decal, or turn the model.
+  arrow(right, up) {
+    if (this.selected >= 0) this.nudge(STEP * right, STEP * up);
+    else this.moveCamera("orbit", ORBIT * right, ORBIT * up);
+  }
+
+  // Move the camera by a function of its own.
+  moveCamera(how, ...amounts) {
+    this.camera[how](...amounts);
+    this.changed("view");
   }
 
   // Run a command of a button or a key; false if there is none.

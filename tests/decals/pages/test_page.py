@@ -102,7 +102,7 @@ def test_trees_of_the_same_kinds_share_a_program() -> None:
     several = decals.cover([*balls, Segment((0, 3, 0), (1, 3, 0), radius=0.5)], count=20)
     header = header_of(page(several, surface="traced").text)
     assert [surface["program"] for surface in header["surfaces"]] == ["tree 0"] * 3 + ["tree 3"]
-    assert set(header["shaders"]["surfaces"]) == {"tree 0", "tree 3"}
+    assert set(header["programs"]) == {"tree 0", "tree 3"}
 
 
 def test_textures_of_meshes_are_kept_once_and_drawn_by_their_faces() -> None:

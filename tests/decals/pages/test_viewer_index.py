@@ -28,7 +28,7 @@ for (let slot = 0; slot <= index.mask; slot++) {
   const list = index.ids.array.subarray(head + 1, head + 1 + index.ids.array[head]);
   if (x >= 0 && list.length) cells.push([x, y, z, ...list]);
 }
-const levels = Array.from(index.levels.array.subarray(0, 4 * index.levelCount));
+const levels = Array.from(index.levels.array.subarray(0, 4 * index.levelOf.size));
 const records = Array.from(set.records.array.subarray(0, 16 * set.rows.length));
 console.log(JSON.stringify({ cells, levels, records }));
 """
