@@ -9,24 +9,8 @@ import venv
 import zipfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("blobtree", "decals", "decals.apps", "decals.shaders")
-COMMANDS = (
-    ["--help"],
-    ["bench", "table", "--models", "knot,spheres", "--counts", "100", "--size", "160x120"],
-)
-"""Commands that an installed wheel must run without the checkout."""
-IMPORT_ALL = """
-import importlib, pathlib, pkgutil, sys
-for package in map(importlib.import_module, sys.argv[2:]):
-    names = [found.name for found in pkgutil.walk_packages(package.__path__, package.__name__ + ".")]
-    sandbox = "connections", "guard", "page", "panels", "sessions", "view"
-    browser = "lab.page", *(f"sandbox.{name}" for name in sandbox)
-    needed = [name for name in names if not name.endswith(browser)]  # those need the extra `browser`
-    for module in [package, *map(importlib.import_module, needed)]:
-        file = pathlib.Path(module.__file__).resolve()
-        assert file.is_relative_to(sys.argv[1]), f"{module.__name__} comes from {file}, not from the wheel"
-"""
+from build_distributions import COMPILED, ROOT, build_sdist, build_wheel
+from check_installed import PACKAGES
 
 PATTERNS = (
     *("*.py", "*.glsl", "*.vert", "*.frag", "*.comp", "*.css", "*.html", "*.js"),
@@ -34,28 +18,7 @@ PATTERNS = (
 )
 """Files of the packages that the wheel holds."""
 
-FIRST_MESH = """
-import blobtree, blobtree.kernels
-ball = blobtree.Point((0, 0, 0), radius=1.0)
-for tree in (ball, blobtree.GradientBlend(ball, ball.translate((1, 0, 0)), start_angle=15, full_angle=75)):
-    blobtree.polygonize(tree, resolution=8)
-assert not blobtree.kernels._state.compiled, "kernels were compiled that the wheel should hold"
-"""
 MAX_BYTES = 30_000_000
-
-
-def build(folder: Path) -> Path:
-    """Compile the kernels, then build the sdist, and the wheel from it: nothing left over can slip in."""
-    subprocess.run([sys.executable, ROOT / ".ci" / "compile_kernels.py"], check=True)
-    command = [sys.executable, "-m", "build", "--outdir", folder, ROOT]
-    built = subprocess.run(command, check=False, capture_output=True, text=True)
-    output = f"{built.stdout}{built.stderr}"
-    if built.returncode:
-        sys.exit(f"{output}the wheel could not be built")
-    if "is absent from the `packages` configuration" in output:
-        sys.exit(f"{output}setuptools warns of folders: see packages and package-data in pyproject.toml")
-    (wheel,) = folder.glob("*.whl")
-    return wheel
 
 
 def expected_files() -> set[str]:
@@ -76,6 +39,8 @@ def check_content(wheel: Path) -> None:
     missing = sorted(expected_files() - names)
     if missing:
         sys.exit(f"the wheel lacks {', '.join(missing)}: see packages and package-data in pyproject.toml")
+    if not any(name.startswith(COMPILED.as_posix()) for name in names):
+        sys.exit("the wheel holds no compiled kernels")
     if (size := wheel.stat().st_size) > MAX_BYTES:
         sys.exit(f"the wheel has {size / 1e6:.1f} MB, more than {MAX_BYTES / 1e6:.0f} MB")
     tops = {name.split("/")[0] for name in names if ".dist-info/" not in name}
@@ -84,40 +49,26 @@ def check_content(wheel: Path) -> None:
 
 
 def check_use(wheel: Path, folder: Path) -> None:
-    """Import every module from the installed wheel, make a mesh, and run commands outside the checkout."""
+    """Install the wheel into a fresh environment, and check it outside the checkout."""
     home = folder / "venv"
     venv.create(home, symlinks=os.name != "nt")
     paths = sysconfig.get_paths(vars={"base": str(home), "platbase": str(home)})
-    site, scripts = Path(paths["purelib"]), Path(paths["scripts"])
     # The dependencies come from this environment; its own editable copy of us does not, as a path
     # that a .pth file names has its .pth files ignored.
-    (site / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
-    python = scripts / "python"
-    install = [
-        sys.executable,
-        "-m",
-        "pip",
-        "--python",
-        python,
-        "install",
-        "--quiet",
-        "--no-deps",
-        "--no-index",
-    ]
-    subprocess.run([*install, wheel], check=True)
-    subprocess.run([python, "-c", IMPORT_ALL, site.resolve(), *PACKAGES], check=True, cwd=folder)
-    fresh = os.environ | {"WARP_CACHE_PATH": str(folder / "kernels")}
-    subprocess.run([python, "-c", FIRST_MESH], check=True, cwd=folder, env=fresh)
-    for arguments in COMMANDS:
-        command = [scripts / "implicit-decals", *arguments]
-        subprocess.run(command, check=True, cwd=folder, stdout=subprocess.DEVNULL)
+    dependencies = Path(paths["purelib"]) / "dependencies.pth"
+    dependencies.write_text(sysconfig.get_path("purelib") + "\n")
+    python = Path(paths["scripts"]) / "python"
+    pip = [sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", "--no-index"]
+    subprocess.run([*pip, wheel], check=True)
+    script = ROOT / ".ci" / "check_installed.py"
+    subprocess.run([python, script, "--kernels", "--drawing"], check=True, cwd=folder)
 
 
 def main() -> None:
     """Build and check the wheel."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        wheel = build(folder / "dist")
+        wheel = build_wheel(build_sdist(folder), folder, kernels=True)
         check_content(wheel)
         check_use(wheel, folder)
     print(f"{wheel.name}: complete, and works outside the checkout")

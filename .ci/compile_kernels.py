@@ -1,6 +1,8 @@
 """Compile all kernels for processors ahead of time into `blobtree/compiled`, from where the wheel takes them.
 
-    python .ci/compile_kernels.py
+    python .ci/compile_kernels.py [FOLDER]
+
+The folder holds the sources, by default those of the checkout.
 
 They fit the architecture and the system of this machine. Run it right before the wheel is built: kernels
 whose sources have changed since are carried along, but never loaded.
@@ -21,17 +23,17 @@ WITHOUT_GRADIENT_BLENDS = ("blobtree.derivatives.", "blobtree.meshing.crease")
 """Modules whose kernels are left out for gradient blends: they are large, or never used there."""
 
 
-def kernel_files() -> list[str]:
+def kernel_files(source: Path) -> list[str]:
     """Name the Python modules that define kernels."""
-    files = [file for package in ("blobtree", "decals") for file in sorted((ROOT / package).rglob("*.py"))]
+    files = [file for package in ("blobtree", "decals") for file in sorted((source / package).rglob("*.py"))]
     return [
-        ".".join(file.relative_to(ROOT).with_suffix("").parts)
+        ".".join(file.relative_to(source).with_suffix("").parts)
         for file in files
         if "\n@wp.kernel" in file.read_text(encoding="utf-8")
     ]
 
 
-def compile_all(cache: Path) -> None:
+def compile_all(source: Path, cache: Path) -> None:
     """Compile every kernel into an empty kernel cache."""
     os.environ["WARP_CACHE_PATH"] = str(cache)
     import warp as wp
@@ -43,7 +45,7 @@ def compile_all(cache: Path) -> None:
     start_warp()
     kernels = [
         value
-        for name in kernel_files()
+        for name in kernel_files(source)
         for value in vars(importlib.import_module(name)).values()
         if isinstance(value, wp.Kernel) and value.module.name == name
     ]
@@ -62,14 +64,16 @@ def compile_all(cache: Path) -> None:
 
 def main() -> None:
     """Replace `blobtree/compiled` by the kernels of the present sources."""
-    target = ROOT / "blobtree" / "compiled"
+    source = Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT
+    sys.path.insert(0, str(source))
+    target = source / "blobtree" / "compiled"
     with tempfile.TemporaryDirectory() as folder:
-        compile_all(Path(folder))
+        compile_all(source, Path(folder))
         shutil.rmtree(target, ignore_errors=True)
         shutil.copytree(folder, target, ignore=_left_out)
     files = [file for file in target.rglob("*") if file.is_file()]
     size = sum(file.stat().st_size for file in files)
-    print(f"{len(files)} files, {size / 1e6:.1f} MB in {target.relative_to(ROOT)}")
+    print(f"{len(files)} files, {size / 1e6:.1f} MB in {target}")
 
 
 def _left_out(folder: str, names: list[str]) -> list[str]:
@@ -77,5 +81,4 @@ def _left_out(folder: str, names: list[str]) -> list[str]:
 
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(ROOT))
     main()

@@ -1,6 +1,8 @@
 """The packages of the project: what each may import, and that pyproject.toml lists them all."""
 
 import re
+import shutil
+import subprocess
 import sys
 import tomllib
 from functools import cache
@@ -144,3 +146,54 @@ def test_only_files_of_kernels_are_excused_from_types() -> None:
 
 def test_files_that_begin_first_exist() -> None:
     assert [name for name in LONG_FILES if not (ROOT / "tests" / name).is_file()] == []
+
+
+def test_the_version_stands_in_pyproject_alone() -> None:
+    version = project()["project"]["version"]
+    assert metadata.version("implicit-decals") == version
+    places = [path for folder in FOLDERS for path in files(folder)]
+    places += [ROOT / "CITATION.cff", *(ROOT / ".ci").glob("*.py")]
+    texts = {path: path.read_text(encoding="utf-8") for path in places}
+    named = [
+        path
+        for path, text in texts.items()
+        if re.search(rf"(version[^\n]*|\")v?{re.escape(version)}\"", text)
+    ]
+    assert named == []
+
+
+@pytest.mark.parametrize(
+    ("tag", "changes", "words"),
+    [
+        ("v1.2.3", "## [1.2.3] - 2030-01-31\n", "in the changelog"),
+        (
+            "v1.2.4",
+            "## [1.2.3] - 2030-01-31\n",
+            "the tag is v1.2.4, but pyproject.toml has the version 1.2.3",
+        ),
+        ("1.2.3", "## [1.2.3] - 2030-01-31\n", "the tag is 1.2.3"),
+        ("v1.2.3", "## [Unreleased]\n", "no section of 1.2.3 with its date"),
+        ("v1.2.3", "## [1.2.3]\n", "no section of 1.2.3 with its date"),
+    ],
+)
+def test_a_tag_is_the_version_and_in_the_changelog(
+    tmp_path: Path, tag: str, changes: str, words: str
+) -> None:
+    (tmp_path / ".ci").mkdir()
+    script = shutil.copy(ROOT / ".ci" / "check_version.py", tmp_path / ".ci")
+    (tmp_path / "pyproject.toml").write_text('[project]\nversion = "1.2.3"\n')
+    (tmp_path / "CHANGELOG.md").write_text(f"# Changelog\n\n{changes}")
+    run = subprocess.run([sys.executable, script, tag], check=False, capture_output=True, text=True)
+    assert words in run.stdout + run.stderr
+    assert run.returncode == (words != "in the changelog")
+
+
+def test_workflows_run_scripts_that_exist() -> None:
+    workflows = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
+    named = [
+        name
+        for path in workflows
+        for name in re.findall(r"\.ci/[\w.]+\.py", path.read_text(encoding="utf-8"))
+    ]
+    assert {".ci/build_distributions.py", ".ci/check_version.py", ".ci/check_installed.py"} <= set(named)
+    assert all((ROOT / name).is_file() for name in named)
