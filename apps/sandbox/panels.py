@@ -11,7 +11,7 @@ from decals.apps.sandbox.folder import IMAGES, MODELS
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing.actions import KEYS
 from decals.editing.brushes import Brush
-from decals.editing.file_actions import Video
+from decals.editing.file_actions import EXPORT_SUFFIXES, Video
 from decals.editing.key_bindings import CAMERA, Binding, Group, format_gestures
 from decals.editing.view_actions import SIDE_KEYS
 
@@ -247,14 +247,14 @@ def build_files(sandbox: Sandbox) -> None:
         vuetify3.VBtn("Open or new ...", variant="tonal", click=(sandbox.show_start, "[true]"))
         html.P(
             "Save or export. The ending is the format: .json scene, .py script, "
-            ".ply .stl .obj .vtp mesh, .glb mesh with the decals, .png .jpg picture, .gif .mp4 video.",
+            f"{' '.join(EXPORT_SUFFIXES)} with the decals, .png .jpg picture, .gif .mp4 video.",
             classes="text-caption mt-3 mb-1",
         )
         with html.Div(classes="d-flex ga-2 align-center"):
             write = sandbox.write_file, "[file_name, replace_file, file_size, file_video]"
             vuetify3.VTextField(
                 v_model=("file_name", ""),
-                placeholder="model.stl",
+                placeholder="model.ply",
                 raw_attrs=named("'file name'"),
                 enter=write,
                 __events=[("enter", "keyup.enter")],

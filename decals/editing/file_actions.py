@@ -8,9 +8,8 @@ from pathlib import Path
 from blobtree._typing import UInt8Array
 from blobtree.files import exists, is_folder
 from blobtree.progress import Cancel, Progress
-from blobtree.pyvista_views import MESH_SUFFIXES
-from decals.baking.bake import SUFFIX as BAKED_SUFFIX
-from decals.baking.bake import bake
+from decals.baking.export import export
+from decals.baking.formats import FORMATS
 from decals.editing.action_state import ActionState, Cursor, WindowActions
 from decals.editing.commands import AddImage, ReplaceScene
 from decals.editing.file_names import name_fault
@@ -20,12 +19,13 @@ from decals.editing.recovery import RecoveryFile, numbered_paths
 from decals.editing.session import Command
 from decals.errors import InvalidEdit
 from decals.images.builtin import BUILTIN_IMAGES, is_builtin
+from decals.pages.page import SUFFIXES as PAGE_SUFFIXES
+from decals.pages.page import save_html
 from decals.rendering.options import Size
 from decals.rendering.picture import Picture
 from decals.scenes.animation import VIDEO_SUFFIXES, animate, turntable
 from decals.scenes.camera import Camera
 from decals.scenes.files import load_scene
-from decals.scenes.meshes import write_mesh
 from decals.scenes.render import render
 from decals.scenes.scene import DecalImage, Scene
 from decals.scenes.script import write_script
@@ -39,7 +39,13 @@ PICTURE_SIZE = (1280, 720)
 """Width and height of pictures and videos without a size, in pixels."""
 
 
-WRITTEN_SUFFIXES = (".json", ".py", *MESH_SUFFIXES, BAKED_SUFFIX, *PICTURE_SUFFIXES, *VIDEO_SUFFIXES)
+EXPORT_SUFFIXES = (*FORMATS, PAGE_SUFFIXES[0])
+"""Formats of other programs, and pages."""
+
+EXPORT_FIRST = ".ply"
+"""Format that is proposed: it has colours and takes one file."""
+
+WRITTEN_SUFFIXES = (".json", ".py", *EXPORT_SUFFIXES, *PICTURE_SUFFIXES, *VIDEO_SUFFIXES)
 
 
 class Video(StrEnum):
@@ -161,18 +167,18 @@ class FileActions(WindowActions):
 
     # -- other files ------------------------------------------------------------------------------------
 
-    @Group.SCENE.action("export", "Ctrl+e", summary="export the surface as a mesh file")
+    @Group.SCENE.action("export", "Ctrl+e", summary="export the scene for other programs, or as a page")
     def export(self, _cursor: Cursor) -> None:
-        """Ask for a file, and write all objects to it as one mesh; its suffix is the format."""
+        """Ask for a file, and write the scene to it with its decals; its suffix is the format."""
         if not self._state.session.document.objects:
             raise InvalidEdit("the scene has no object to export; press N to add one")
 
         def accept(text: str, repeated: bool) -> None:
-            _refuse_to_replace(self._checked_path(text, MESH_SUFFIXES), repeated)
-            self.write(text, True, suffixes=MESH_SUFFIXES)
+            _refuse_to_replace(self._checked_path(text, EXPORT_SUFFIXES), repeated)
+            self.write(text, True, suffixes=EXPORT_SUFFIXES)
 
-        first = Path(self.path or UNTITLED).with_suffix(MESH_SUFFIXES[0])
-        self._state.prompt.begin(TextPrompt(f"export to ({', '.join(MESH_SUFFIXES)})", str(first), accept))
+        first = Path(self.path or UNTITLED).with_suffix(EXPORT_FIRST)
+        self._state.prompt.begin(TextPrompt(f"export to ({', '.join(EXPORT_SUFFIXES)})", str(first), accept))
 
     def write(
         self,
@@ -183,9 +189,9 @@ class FileActions(WindowActions):
         size: Size | None = None,
         video: str = "turntable",
     ) -> None:
-        """Write a file whose suffix is the format: a scene, a script, a mesh, a picture or a video.
+        """Write a file whose suffix is the format: a scene, a script, an export, a picture or a video.
 
-        A GLB file has the decals in a texture.
+        Exports are those of `decals.export`, and pages those of `decals.save_html`.
 
         Parameters
         ----------
@@ -223,14 +229,14 @@ class FileActions(WindowActions):
                 write_script(shown, path)
             elif suffix in PICTURE_SUFFIXES:
                 render(shown, size=size).save(path)
-            elif suffix == BAKED_SUFFIX:
-                bake(shown, path, progress=progress)
+            elif suffix in PAGE_SUFFIXES:
+                save_html(shown, path, progress=progress)
             elif suffix in VIDEO_SUFFIXES:
                 turned = shows is Video.TURNTABLE
                 frames = turntable(shown) if turned else [s.replace(camera=camera) for s in fork.replay()]
                 animate(frames, path, size=size, rate=VIDEO_RATES[shows], progress=progress)
             else:
-                write_mesh(scene.objects, path, progress=progress)
+                export(shown, path, progress=progress)
 
         self._state.background.write(f"export to {text}", write, f"exported to {text}")
 

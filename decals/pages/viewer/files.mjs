@@ -2,6 +2,8 @@
 import { written } from "./link.mjs";
 import { toBase64 } from "./packing.mjs";
 
+const READING = 60_000; // milliseconds in which a browser begins to read a file
+
 export function copyLink({ controls, ...state }) {
   const link = written(state);
   if (link === null)
@@ -37,6 +39,6 @@ export function save(viewer) {
   link.href = URL.createObjectURL(new Blob([sceneText(viewer)], { type: "application/json" }));
   link.download = "scene.json";
   link.click();
-  URL.revokeObjectURL(link.href);
+  setTimeout(() => URL.revokeObjectURL(link.href), READING); // Firefox reads it later
   viewer.controls.say("The scene is saved as scene.json.");
 }

@@ -63,16 +63,16 @@ def hold_writing(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 def hold_export(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Let exports of meshes wait until they are let go; the events that say that, as above."""
+    """Let exports wait until they are let go; the events that say that, as above."""
     from decals.editing import file_actions
 
-    begun, go, write = threading.Event(), threading.Event(), vars(file_actions)["write_mesh"]
+    begun, go, write = threading.Event(), threading.Event(), vars(file_actions)["export"]
 
-    def slowly(objects: Any, path: Any, *, progress: Any) -> None:
+    def slowly(scene: Any, path: Any, *, progress: Any) -> None:
         begun.set()
         while not go.wait(0.01):
             progress("writing", 0.5)
-        write(objects, path, progress=progress)
+        write(scene, path, progress=progress)
 
-    monkeypatch.setattr(file_actions, "write_mesh", slowly)
+    monkeypatch.setattr(file_actions, "export", slowly)
     return begun, go

@@ -116,14 +116,22 @@ def test_an_export_replaces_a_file_after_a_second_return_only(typist: Typist, tm
     assert pv.read(path).n_points > 100
 
 
-def test_exported_objects_keep_their_colours(typist: Typist, tmp_path: Path) -> None:
+def test_exports_have_the_colours_of_objects_and_decals(typist: Typist, tmp_path: Path) -> None:
     typist.key("e", ctrl=True)
     typist.enter(f"{tmp_path}/mesh.ply")
-    mesh = pv.read(tmp_path / "mesh.ply")
-    colors, box = np.asarray(mesh["RGB"]), mesh.points[:, 0] < -1.4
-    expected = np.rint(255 * np.array(scene().objects[1].color))
-    assert (colors[box] == expected).all()
-    assert (colors[~box] != expected).any()
+    decals.export(typist.state.session.document.scene, tmp_path / "other.ply")
+    mesh, other = pv.read(tmp_path / "mesh.ply"), pv.read(tmp_path / "other.ply")
+    assert np.array_equal(np.asarray(mesh.points), np.asarray(other.points))
+    colors, others = np.asarray(mesh["RGB"]), np.asarray(other["RGB"])
+    assert len(np.unique(colors, axis=0)) > 2
+    assert np.array_equal(colors, others)
+
+
+def test_the_scene_can_be_exported_as_a_page(typist: Typist, tmp_path: Path) -> None:
+    typist.key("e", ctrl=True)
+    typist.enter(f"{tmp_path}/scene.html")
+    assert "exported to" in typist.state.message
+    assert (tmp_path / "scene.html").read_text(encoding="utf-8").startswith("<!doctype html>")
 
 
 def test_the_first_name_of_an_export_is_that_of_the_scene(typist: Typist, tmp_path: Path) -> None:
