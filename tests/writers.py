@@ -108,6 +108,7 @@ WRITERS: dict[str, Writer] = {
     "colored.glb": lambda path: decals.bake(scene(), path, vertex_colors=True),
     **{f"exported{end}": lambda path: decals.export(scene(), path, size=64) for end in (".obj", ".gltf")},
     **{f"plain{end}": lambda path: decals.export(scene(), path) for end in (".ply", ".stl", ".vtp", ".3mf")},
+    "page.html": lambda path: decals.save_html(scene(), path, resolution=8),
     "displaced.ply": lambda path: decals.displace(relief_scene()).save(path),
     "turn.gif": lambda path: decals.animate(decals.turntable(scene(), 2), path, size=(32, 24), samples=1),
     "table.csv": lambda path: write_table(scene().decals, path),

@@ -1,6 +1,6 @@
 """Pages of `save_html` in a real browser, as a program.
 
-    python -m tests.frontends.in_html_page picture|use [chromium|firefox]
+    python -m tests.frontends.in_html_page picture|use|refusals [chromium|firefox]
 
 Firefox needs a display, such as that of ``xvfb-run -a``, and a version of playwright that knows it.
 """
@@ -343,6 +343,35 @@ def same_surface(one: SceneObject, other: SceneObject) -> bool:
     )
 
 
+REFUSALS = {
+    "no WebGL 2": "HTMLCanvasElement.prototype.getContext = () => null",
+    "cannot draw float textures": "WebGL2RenderingContext.prototype.getExtension = () => null",
+    "textures have 7 texels here": "WebGL2RenderingContext.prototype.getParameter = () => 7",
+    "refuses a shader": "WebGL2RenderingContext.prototype.getProgramParameter = () => false",
+}
+"""What devices lack, by the words with which a page says so, and as a script that takes it away."""
+
+
+async def refusals(browser: str) -> None:
+    """A page says in one line what a device lacks, beside its picture."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "scene.html"
+        decals.save_html(decals.cover(Point((0, 0, 0), radius=1), count=10), path, resolution=CELLS)
+        async with async_playwright() as player:
+            application = await launched(player, browser)
+            for words, script in REFUSALS.items():
+                page = await application.new_page()
+                await page.add_init_script(script)
+                await page.goto(path.as_uri())
+                await page.wait_for_function(STARTED, timeout=120_000)
+                (line,) = await page.locator("main p").all_inner_texts()
+                assert line.startswith("The model cannot be turned here: "), line
+                assert words in line, line
+                assert await page.locator("main img").evaluate("image => image.naturalWidth") > 0
+                assert await page.locator("canvas").count() == 0
+            await application.close()
+
+
 async def state(page: Page) -> dict[str, Any]:
     """Return what the viewer says of itself, after the next frame."""
     await page.evaluate("new Promise(requestAnimationFrame)")
@@ -391,7 +420,7 @@ async def accessible(page: Page) -> None:
     assert serious == [], serious
 
 
-CHECKS = {"picture": picture, "use": use}
+CHECKS = {"picture": picture, "use": use, "refusals": refusals}
 
 
 if __name__ == "__main__":

@@ -151,6 +151,14 @@ def test_what_pages_do_not_have_is_refused(scene: Scene, monkeypatch: pytest.Mon
         page(scene)
 
 
+@pytest.mark.slow
+def test_a_million_decals_are_refused_with_the_size_of_the_page(scene: Scene) -> None:
+    numbers = np.zeros(1_000_000, np.int32)
+    many = scene.replace(decals=scene.decals[numbers])
+    with pytest.raises(TooMuchData, match=r"at most 100,000 decals, got 1,000,000, about 95 MB; show a part"):
+        page(many)
+
+
 def test_files_are_whole_or_not_there(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(InvalidScene, match=r"ends in \.html"):
         scene.save_html(tmp_path / "ball.txt")
