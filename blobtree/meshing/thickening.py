@@ -68,6 +68,9 @@ PLATE_LENGTHS = 4.0
 MAX_STRETCH = 4.0
 """Largest ratio of the factors by which a plate's map scales lengths."""
 
+BODY_CELLS = 0.25
+"""Size of cells around a wall, over half the least thickness of its bodies."""
+
 MAX_SHRINKAGE = 0.5
 """Largest part of a tool's radius by which it shrinks."""
 
@@ -100,6 +103,9 @@ OPPOSED = 0.9
 
 MISSING_SHARE = 0.02
 """Share of a leaf's vertices whose other side may lack a vertex: at rims, edges and corners."""
+
+MAX_FOLDED = 0.05
+"""Largest share of a leaf's triangles that may face inward, by area."""
 
 LEAST_FOUND = 0.9
 """Share of the points all over a leaf's surface that must have vertices on their side."""
@@ -341,7 +347,7 @@ def _grown_walls(tree: ImplicitModel, first: FirstCells, size: float, limits: Fl
 
     What two bodies have in common is a lens: it would grow far beyond its rim.
     """
-    leaves = list(runs_of_leaves(tree._program))
+    leaves, halves = list(runs_of_leaves(tree._program)), part_sizes(tree)[0]
     lengths, scales, depths = np.zeros(len(leaves)), np.ones(len(leaves)), np.zeros(len(leaves))
     for wall in first.walls.thin if first.walls is not None else ():
         if wall.thickness > WALL_CELLS * THIN * size or not wall.facing.tool:
@@ -351,6 +357,7 @@ def _grown_walls(tree: ImplicitModel, first: FirstCells, size: float, limits: Fl
             scale = float(np.linalg.svd(placed.placement.matrix[:3, :3], compute_uv=False)[-1])
             radius = _radius_of_curvature(run, placed) * scale
             cell = min(size, SAGITTA_CELLS * float(np.sqrt(wall.thickness * radius)))
+            cell = min(cell, BODY_CELLS * halves[number])
             growth = min(max(WALL_CELLS * MARGIN * cell - wall.thickness, 0.0), limits[number])
             depth = 0.5 * wall.thickness
             if wall.operand.tool:
@@ -405,10 +412,27 @@ def _wrong_leaves(tree: ImplicitModel, vertices: _Vertices, size: float, growth:
     checked = np.bincount(owners[vertices.moved], minlength=count + 1)
     failed = np.bincount(owners[missing & ~vertices.faulty], minlength=count + 1) > MISSING_SHARE * checked
     failed[owners[vertices.faulty]] = True
+    failed |= _folded_share(vertices.mesh, owners, count + 1) > MAX_FOLDED
     failed[1:] |= _without_vertices(tree, sides, growth)
     if failed[0]:
         return np.flatnonzero(growth.amounts)
     return np.flatnonzero(failed[1:])
+
+
+def _folded_share(mesh: Mesh, owners: Int32Array, count: int) -> Float64Array:
+    """Return by owner the share of the area of triangles that face away from the normals of their corners."""
+    corners = mesh.vertices.astype(np.float64)[mesh.faces]
+    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(crosses, axis=1)
+    folded = (crosses * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1) < 0.0
+    of_faces = owners[mesh.faces[:, 0]]
+    whole, away = (
+        np.bincount(of_faces, weights=weights, minlength=count).astype(np.float64)
+        for weights in (areas, areas * folded)
+    )
+    shares: Float64Array = away / np.maximum(whole, 1e-300)
+    shares[0] = 0.0  # triangles that did not grow
+    return shares
 
 
 class _Sides:

@@ -47,6 +47,9 @@ SMALL_PART = 2.5
 MAX_STEP = 0.5
 """Longest step of Newton's method, in cells."""
 
+LEAST_WAY = 0.2
+"""Way of a projected point, in longest steps, from which on it must not be far longer than to the mesh."""
+
 CREASED = frozenset(map(OPERATORS.index, (UNION, INTERSECTION, DIFFERENCE)))
 """Codes of the operators that leave creases; the coarse mesh of other trees needs no search for them."""
 
@@ -178,8 +181,9 @@ class ImplicitSurface(Immutable):
         """
         device = known_device(device)
         if device not in self._on_devices:
+            least_way = LEAST_WAY * self._max_step if self.has_small_parts else np.inf
             self._on_devices[device] = DeviceImplicitSurface(
-                self.tree, self._coarse.on(device), self._max_step
+                self.tree, self._coarse.on(device), self._max_step, least_way
             )
         return self._on_devices[device]
 
@@ -210,7 +214,10 @@ class ImplicitSurface(Immutable):
 class DeviceImplicitSurface:
     """Tape of a tree, and the coarse mesh from which points start again, on one device."""
 
-    def __init__(self, tree: Node, coarse: DeviceMeshSurface, max_step: float) -> None:
+    def __init__(
+        self, tree: Node, coarse: DeviceMeshSurface, max_step: float, least_way: float = np.inf
+    ) -> None:
+        self._least_way = least_way
         self.device = coarse.device
         self._tape = tree.tape.on(self.device)
         kernel_for = tree.tape.instruction_set.kernel_for
@@ -222,7 +229,7 @@ class DeviceImplicitSurface:
     def project(self, points: Vectors, reaches: Scalars, positions: Vectors, normals: Vectors) -> None:
         """Write the points that Newton's method reaches, and the normals of the field there."""
         inputs: list[Any] = [self._tape.data, self._tape.span, self._max_step, FIELD_TOLERANCE * ISO]
-        inputs += [*self._coarse.query_inputs, points]
+        inputs += [*self._coarse.query_inputs, self._least_way, points]
         launch(self._project, len(points), inputs, [positions, normals], device=self.device)
 
     def mark_inside(self, points: Vectors, flags: Scalars) -> None:

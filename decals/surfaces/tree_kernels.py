@@ -51,6 +51,7 @@ def project_with_mesh(
     face_normals: wp.array(dtype=wp.vec3),
     center: wp.vec3,
     radius: wp.float32,
+    least_way: wp.float32,
     points: wp.array(dtype=wp.vec3),
     positions: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
@@ -58,12 +59,18 @@ def project_with_mesh(
     """Project points by Newton's method: write positions and normals.
 
     A point without convergence starts again at the closest point of the coarse mesh. If that fails too, it
-    takes that closest point, and the normal of its face.
+    takes that closest point, and the normal of its face. So does a point that went farther than `least_way`
+    although the mesh is less than half as far: beside a thin part, the field is that of a larger one.
     """
     i = first + wp.tid()
     p, f = project_to_surface(points[i], max_step, tape, span)
     normal = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
-    if not has_converged(f, tolerance):
+    again = not has_converged(f, tolerance)
+    way = wp.length(p - points[i])
+    if not again and way > least_way:
+        nearer = wp.mesh_query_point_no_sign(mesh, points[i], 0.5 * way)
+        again = nearer.result
+    if again:
         far = 1.01 * (wp.length(points[i] - center) + radius)
         query = wp.mesh_query_point_no_sign(mesh, points[i], far)
         if query.result:

@@ -136,3 +136,14 @@ def test_creases_away_from_thin_plates_stay_sharp() -> None:
     assert mesh.sheet_counts is not None
     assert (mesh.sheet_counts == 2).sum() > 50
     assert np.abs(cut(mesh.vertices) - 0.5).max() < LARGEST_ERROR
+
+
+@pytest.mark.slow
+def test_a_case_smaller_than_a_few_cells_is_whole() -> None:
+    case = Box((0, 0, 0), (1, 0.8, 0.9), radius=0.02) - Box((0, 0, 0), (0.98, 0.78, 0.88), radius=0.02)
+    tree = case | BALL.translate((20, 0, 0))
+    mesh = polygonize(tree)
+    centers, areas = mesh_areas(mesh)
+    outer, inner = 2.0 * (0.8 + 0.9 + 0.72), 2.0 * (0.98 * 0.78 + 0.98 * 0.88 + 0.78 * 0.88)
+    assert is_closed(mesh.faces)
+    assert areas[centers[:, 0] < 10.0].sum() == pytest.approx(outer + inner, rel=0.15)

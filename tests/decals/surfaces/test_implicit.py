@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import Intersection, Node, Point, Segment, Union
+from blobtree import Disc, Intersection, Node, Point, Segment, Union
 from decals.errors import InvalidMesh, InvalidPoints
 from decals.surfaces.implicit import ImplicitSurface, project_without_mesh
 from decals.surfaces.surface import Surface
@@ -135,3 +135,15 @@ def test_samples_reach_creases(tree: Node, height: float) -> None:
     gaps = np.hypot(np.hypot(positions[:, 0], positions[:, 1]) - edge, positions[:, 2])
     for side in (normals[:, 2] < 0, normals[:, 2] > 0):
         assert gaps[side].min() < 0.02
+
+
+def test_points_beside_a_thin_plate_stay_on_it() -> None:
+    axis = np.array([0.0, 1.0, 0.3]) / np.sqrt(1.09)
+    fin = Disc((1.9, 0, 0), (0.0, 1.0, 0.3), 1.0, radius=1e-3)
+    surface = ImplicitSurface(Point((0, 0, 0), radius=1.0) | fin)
+    random = np.random.default_rng(0)
+    points = random.uniform([1.3, 0.0, 0.0], [1.9, 0.0, 0.0], (200, 3))
+    points += random.uniform(0.003, 0.05, (200, 1)) * axis
+    positions, normals = surface.project(points)
+    assert np.abs((positions - [1.9, 0, 0]) @ axis - 1e-3).max() < 1e-4
+    assert (normals @ axis).min() > 0.99
