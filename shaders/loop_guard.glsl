@@ -21,17 +21,28 @@ bool loops_ended() {
 #ifdef RESUMING
 layout(binding = 4, r32f) uniform image2D resumed_ways;  // of each pixel: where its ray goes on; -1: complete
 uniform bool resumed;                                    // false: all rays begin at their start
+ivec2 traced_pixel;
 
 // The way along its ray at which a pixel begins; -1 if the pixel is complete.
 float resumed_way(ivec2 pixel) {
+    traced_pixel = pixel;
+    if (!resumed) {
+        imageStore(resumed_ways, pixel, vec4(0.0));
+    }
     return resumed ? imageLoad(resumed_ways, pixel).x : 0.0;
 }
 
-// Return whether a pixel is complete; `way` is known to be free of surface.
-bool complete(ivec2 pixel, float way) {
+// Return t, and keep the way. Variables are of no use for that: behind an ended loop they may have other values.
+float passed_way(float way, float t) {
+    imageStore(resumed_ways, traced_pixel, vec4(way));
+    return t;
+}
+
+// Return whether a pixel is complete.
+bool complete(ivec2 pixel) {
     bool ended = loops_ended();
-    if (ended || resumed) {
-        imageStore(resumed_ways, pixel, vec4(ended ? way : -1.0));
+    if (!ended) {
+        imageStore(resumed_ways, pixel, vec4(-1.0));
     }
     return !ended;
 }
@@ -40,7 +51,11 @@ float resumed_way(ivec2 pixel) {
     return 0.0;
 }
 
-bool complete(ivec2 pixel, float way) {
+float passed_way(float way, float t) {
+    return t;
+}
+
+bool complete(ivec2 pixel) {
 #ifdef GUARDED
     return !loops_ended();
 #else

@@ -26,7 +26,7 @@ void main() {
     if (!missed) {
         surface = surface_of(hit);
     }
-    if (!complete(texel, hit.way) || missed) {
+    if (!complete(texel) || missed) {
         return;
     }
     imageStore(g_position, texel, surface.position);

@@ -14,7 +14,7 @@ void main() {
     if (!missed) {
         surface = surface_of(hit);
     }
-    if (!complete(texel, hit.way) || missed) {
+    if (!complete(texel) || missed) {
         discard;
     }
     write_surface(surface);

@@ -33,19 +33,18 @@ struct Hit {
     vec3 direction;  // unit
     vec3 position;
     ivec2 span;      // of the tape in the block of the hit
-    float way;       // up to which the ray was traced, see trace_ray
 };
 
 Hit trace_pixel(vec2 pixel, float start) {
     vec3 origin = ray_origin(pixel);
     vec3 direction = normalize(ray_direction(pixel));
-    vec4 hit = trace_ray(origin, direction, start);
+    vec3 hit = trace_ray(origin, direction, start);
     vec3 position = origin + direction * hit.x;
     float depth = window_depth(position);
     if (depth < 0.0 || depth > 1.0) {
         hit.x = -1.0;  // a clipping plane hides it
     }
-    return Hit(hit.x, direction, position, ivec2(hit.zw), hit.y);
+    return Hit(hit.x, direction, position, ivec2(hit.yz));
 }
 
 Surface surface_of(Hit hit) {

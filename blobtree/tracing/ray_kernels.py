@@ -71,6 +71,15 @@ class RayCells:
 
 
 @wp.func
+def passed_way(way: wp.float32, t: wp.float32) -> wp.float32:
+    """Return t; up to `way` a ray is known to be free of surface.
+
+    ``shaders/loop_guard.glsl`` has another function of this name, which keeps the way.
+    """
+    return t
+
+
+@wp.func
 def first_hit(
     origin: wp.vec3,
     direction: wp.vec3,
@@ -79,11 +88,8 @@ def first_hit(
     tolerance: wp.float32,
     tape: Texels,
     span: wp.vec2i,
-) -> wp.vec2:
+) -> wp.float32:
     """Return the distance along the unit `direction` to the first point inside in [t_min, t_max], or MISS.
-
-    The second number is the distance up to which the ray was traced before the last step. A driver that ends
-    loops (``shaders/loop_guard.glsl``) can spoil that step alone, because it ends this loop behind it.
 
     A point is a hit if it lies inside, or if Newton's method along the gradient takes it to the surface in
     few steps of at most a tolerance: ISO − f ≤ tolerance · |∇f|. One step is not enough, for a steep field
@@ -95,18 +101,17 @@ def first_hit(
     """
     t = t_min
     reach = wp.max(t_max - t_min, 4.0 * tolerance)
-    traced = float(t_min)
     last_gap = float(1.0)
     last_step = float(0.0)
     for step in range(MAX_STEPS):
-        traced = t
+        t = passed_way(t - last_step, t)
         if t > t_max:
-            return wp.vec2(MISS, traced)
+            return MISS
         bound = field_bound(origin + direction * t, direction, reach, tape, span)
         gap = ISO - bound[0]
         free = reach
         if gap <= 0.0:
-            return wp.vec2(t + last_step * gap / (last_gap - gap), traced)
+            return t + last_step * gap / (last_gap - gap)
         if bound[1] * reach > gap:
             free = gap / bound[1]
             if free <= tolerance:
@@ -126,13 +131,13 @@ def first_hit(
                         break
                     q += slope * ((ISO - f[0]) / (steepness * steepness))
                 if at_surface:
-                    return wp.vec2(t + newton_step(gap, rise, tolerance), traced)
+                    return t + newton_step(gap, rise, tolerance)
             free = wp.max(free, tolerance * wp.max(1.0, float(step) / STEPS_PER_TOLERANCE))
         t += free
         last_gap = gap
         last_step = free
         reach = 2.0 * free
-    return wp.vec2(MISS, traced)
+    return MISS
 
 
 @wp.func
@@ -183,11 +188,10 @@ def exit_distance(origin: wp.vec3, inverse: wp.vec3, lower: wp.vec3, upper: wp.v
 
 
 @wp.func
-def trace_ray(origin: wp.vec3, direction: wp.vec3, start: wp.float32, cells: RayCells) -> wp.vec4:
-    """Return the first hit of a ray: (distance or MISS, way, first texel of the tape there, end of the tape).
+def trace_ray(origin: wp.vec3, direction: wp.vec3, start: wp.float32, cells: RayCells) -> wp.vec3:
+    """Return the first hit of a ray: (distance or MISS, first texel of the tape there, end of the tape).
 
-    A way counts from where the ray enters the grid. The ray is traced from the way `start`, and was traced up
-    to the one that is returned.
+    The ray is traced from the way `start` on. A way counts from where the ray enters the grid.
     """
     counts = cells.counts
     extent = cells.block_size * wp.vec3(float(counts[0]), float(counts[1]), float(counts[2]))
@@ -196,10 +200,9 @@ def trace_ray(origin: wp.vec3, direction: wp.vec3, start: wp.float32, cells: Ray
     last = interval[1] - interval[0]
     inverse = reciprocal(direction)
     t = float(start)
-    way = float(start)
     for _block in range(MAX_BLOCKS):
         if t > last:
-            return wp.vec4(MISS, way, 0.0, 0.0)
+            return wp.vec3(MISS, 0.0, 0.0)
         p = (entry + direction * t - cells.lower) / cells.block_size
         x = wp.clamp(int(wp.floor(p[0])), 0, counts[0] - 1)
         y = wp.clamp(int(wp.floor(p[1])), 0, counts[1] - 1)
@@ -214,15 +217,14 @@ def trace_ray(origin: wp.vec3, direction: wp.vec3, start: wp.float32, cells: Ray
         leave = wp.max(leave, t) + BLOCK_OVERLAP * cells.tolerance
         if block == SURELY_INSIDE:
             whole = float(cells.start + 1)
-            return wp.vec4(interval[0] + t, t, whole, whole + cells.tape[cells.start][0])
+            return wp.vec3(interval[0] + t, whole, whole + cells.tape[cells.start][0])
         if block >= 0:
             span = wp.vec2i(block + 1, block + 1 + int(cells.tape[block][0]))
             hit = first_hit(entry, direction, t, leave, cells.tolerance, cells.tape, span)
-            way = hit[1]
-            if hit[0] >= 0.0:
-                return wp.vec4(interval[0] + hit[0], way, float(span[0]), float(span[1]))
+            if hit >= 0.0:
+                return wp.vec3(interval[0] + hit, float(span[0]), float(span[1]))
         t = leave
-    return wp.vec4(MISS, way, 0.0, 0.0)
+    return wp.vec3(MISS, 0.0, 0.0)
 
 
 @wp.kernel
@@ -242,4 +244,4 @@ def trace_rays(
     if t < 0.0:
         t = wp.inf
     distances[i] = t
-    spans[i] = wp.vec2i(int(hit[2]), int(hit[3]))
+    spans[i] = wp.vec2i(int(hit[1]), int(hit[2]))

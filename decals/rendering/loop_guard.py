@@ -3,8 +3,7 @@
 Mesa's software rasteriser ends all loops of a pixel, and of the pixels beside it, after
 `context.SOFTWARE_LOOP_ITERATIONS` turns, without an error. Such a pixel has no right value. A shader with
 ``shaders/loop_guard.glsl`` leaves it out and reports it. Then a slower shader draws all pixels again, and
-keeps how far the rays of such pixels were traced. Further drawings go on there. Each of them takes every ray
-on by one step at least.
+keeps how far their rays were traced. Further drawings go on there.
 """
 
 from collections.abc import Callable, Iterator

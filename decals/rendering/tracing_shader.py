@@ -49,7 +49,7 @@ from blobtree.tape.evaluators import (
 from blobtree.tape.instruction_set import BUILT_IN, InstructionSet
 from blobtree.tape.interpreter import field_bound, field_gradient
 from blobtree.tape.tape import Tape
-from blobtree.tracing.ray_kernels import trace_ray
+from blobtree.tracing.ray_kernels import passed_way, trace_ray
 from blobtree.transpile.derivative import directional_derivative
 from blobtree.transpile.glsl import translate_choice, translate_library
 from blobtree.transpile.specialize import row_choice
@@ -185,7 +185,7 @@ def _library(kinds: Kinds, others: Iterable[Any]) -> str:
         trace_ray,
         *others,
     ]
-    provided = [*_choices(kinds), *_flags(kinds), falloff_numbers, field_bound, field_gradient]
+    provided = [*_choices(kinds), *_flags(kinds), falloff_numbers, field_bound, field_gradient, passed_way]
     return translate_library(functions, provided=provided)
 
 

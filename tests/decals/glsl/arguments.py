@@ -103,7 +103,7 @@ BY_NAME: dict[str, Draw] = {
     "operator": whole(0, len(OPERATORS)), "origin": place,
     "profile": beside(among(1), among(0), uniform(0.3, 3.0), uniform(-2.0, 2.0)), "phi": share,
     "push": share, "q": place, "radius": uniform(0.0, 1.0), "reach": powers(-3, 0.5),
-    "rim": share,
+    "rim": share, "t": powers(-3, 0.5), "way": powers(-3, 0.5),
     "speed": uniform(0.1, 3.0), "stiffness": uniform(1.0, 6.0),
     "squared_distance": uniform(0.0, 1.5), "u": units, "upper": uniform(0.0, 1.5, 3),
     "uv": uniform(-0.2, 1.2, 2), "v": four, "w": place,

@@ -13,6 +13,7 @@ from decals.rendering.pixel_pass import Program
 from decals.rendering.renderer import Renderer
 from decals.rendering.tree import TreeDrawable
 from decals.scenes.camera import Camera
+from tests.bench.trust_csg import holes_of, scene
 from tests.blobtree.csg_trees import csg_primitive
 from tests.blobtree.custom_kinds import Brick
 from tests.decals.glsl.tapes import Model
@@ -79,6 +80,14 @@ def test_rays_go_on_where_loops_were_ended(
     assert 1 < drawings[-1] < drawings[-2]
     renderer.buffers(View((Model(Point((0, 0, 0), radius=1.0)),), camera_of(tree)), RenderOptions(size=SIZE))
     assert drawings[-1] == 1
+
+
+@pytest.mark.slow
+def test_rays_that_go_on_pass_no_surface(fragment: Renderer) -> None:
+    """Where loops were ended, variables behind them had values of other pixels, beyond the surface."""
+    skip_without_limit(fragment)
+    holes = holes_of(*scene(2, 34), fragment, (160, 120))
+    assert holes.of_picture == 0
 
 
 def test_rays_cross_an_own_convex_solid_without_many_steps(fragment: Renderer, drawings: list[int]) -> None:
