@@ -99,6 +99,24 @@ implicit-decals measure scene.json
 
 implicit-decals measure scene.json --contact elastic --json
 """,
+    "sweep": """Run an experiment: a function for each trial of a design, with results that resume.
+
+The file defines the function `experiment` and the design `design`; see the page on experiments.
+
+For example:
+
+implicit-decals sweep overlap.py --out results
+
+implicit-decals sweep overlap.py --out results --workers 8 --limit 600 --retry
+
+implicit-decals sweep overlap.py --out /shared/results --scheduler tcp://10.0.0.1:8786
+""",
+    "report": """Write the figures of an experiment's results as one HTML file.
+
+For example:
+
+implicit-decals report results -o report.html
+""",
     "polygonize": """Write the surface of an implicit model as a triangle mesh.
 
 For example:

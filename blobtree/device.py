@@ -56,6 +56,9 @@ NO_DRIVER_WARNING = "Could not find or load the NVIDIA CUDA driver"
 MEMINFO = Path("/proc/meminfo")
 """File in which Linux reports free memory."""
 
+THREADS_VARIABLE = "BLOBTREE_THREADS"
+"""Environment variable that sets the number of threads of launches."""
+
 GIGABYTE = 1e9
 
 
@@ -164,8 +167,12 @@ def core_left_free() -> Iterator[None]:
 
 @cache
 def _core_count() -> int:
-    """Return the number of cores; asking the system takes as long as a small launch."""
-    return os.cpu_count() or 1
+    """Return the number of cores for launches; asking the system takes as long as a small launch.
+
+    The variable ``BLOBTREE_THREADS`` sets it: several processes that share a machine then have a core each.
+    """
+    given = os.environ.get(THREADS_VARIABLE, "")
+    return int(given) if given.isdecimal() and int(given) else os.cpu_count() or 1
 
 
 def _thread_count() -> int:

@@ -1,6 +1,7 @@
 from . import (
     editing,
     errors,
+    experiments,
     field,
     hosts,
     images,
@@ -70,6 +71,7 @@ __all__ = [
     "editing",
     "errors",
     "evaluate",
+    "experiments",
     "export",
     "field",
     "hosts",

@@ -1,5 +1,6 @@
 """The Python of every page runs as printed, and what the pages promise of it is true."""
 
+import json
 import re
 import runpy
 import shlex
@@ -22,6 +23,7 @@ from blobtree.graphics import install_advice, missing_gl_libraries
 from blobtree.transpile.builtins import BUILTINS
 from decals import load_scene
 from decals.apps.cli import app
+from decals.experiments import Results
 from decals.rendering.options import Drawing, RenderOptions
 from tests.decals.baking.glb import need
 from tests.docs import published
@@ -181,15 +183,21 @@ def check_pyvista(session: Session) -> None:
 
 def check_many_runs(_session: Session) -> None:
     """Run the page as a script of its own, as its children import it by its name."""
+    run = subprocess.run(
+        [sys.executable, "script.py"], check=True, timeout=240, capture_output=True, text=True
+    )
+    counts = json.loads(run.stdout.splitlines()[0])
+    assert counts == sorted(counts, reverse=True)
+    assert counts[-1] > 10
+
+
+def check_experiments(_session: Session) -> None:
+    """Run the page as a script of its own, as its workers import it by its name."""
     subprocess.run([sys.executable, "script.py"], check=True, timeout=240)
-    rows = Path("sweep.csv").read_text(encoding="utf-8").splitlines()
-    assert rows[0] == "spacing,seed,count,mean_radius"
-    assert len(rows) == 7
-    for row in rows[1:]:
-        spacing, seed, count, _ = row.split(",")
-        assert len(load_scene(f"run-{spacing}-{seed}.json").decals) == int(count) > 0
-    with Image.open("count-5.png") as picture:
-        assert picture.size == (320, 240)
+    results = Results("results")
+    assert len(results) == 12
+    assert results.failed == []
+    assert results.measures == ["folded", "rho"]
 
 
 CHECKS: dict[str, Callable[[Session], None]] = {
@@ -209,6 +217,7 @@ CHECKS: dict[str, Callable[[Session], None]] = {
     "inputs": check_inputs,
     "editing": check_editing,
     "pyvista": check_pyvista,
+    "experiments": check_experiments,
     "many-runs": check_many_runs,
 }
 """Checks of what is left after a page's code has run, by the page's name."""
@@ -231,6 +240,7 @@ def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     "character",
     "contact",
     "custom-nodes",
+    "experiments",
     "decals",
     "many-runs",
     "modelling",

@@ -1,0 +1,112 @@
+"""``implicit-decals sweep``: an experiment from a file, with a table that fills while it runs."""
+
+import time
+from collections import Counter, deque
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+from rich.console import Console, Group
+from rich.live import Live
+from rich.table import Table
+
+from decals.apps.models.loading import import_module_or_file
+from decals.errors import InvalidInput
+from decals.experiments import Design, run
+from decals.experiments.outcome import COLUMNS, Row
+
+LATEST = 8
+"""Rows that the table shows."""
+
+
+def sweep(
+    file: str,
+    /,
+    *,
+    out: Annotated[str, Parameter(name=["--out", "-o"])] = "results",
+    workers: int | None = None,
+    scheduler: str | None = None,
+    limit: float | None = None,
+    memory: float | None = None,
+    retry: Annotated[bool, Parameter(negative=())] = False,
+) -> int:
+    """Run all trials of a file that have no result yet.
+
+    Parameters
+    ----------
+    file
+        A Python file with a function `experiment` and a design `design`.
+    out
+        Folder of the results.
+    workers
+        Local processes; 0 runs in this one. Default: one for each core.
+    scheduler
+        Address of a Dask scheduler.
+    limit
+        Seconds after which a trial is ended.
+    memory
+        Gigabytes of a local process after which its trial is ended.
+    retry
+        Run failed trials again.
+    """
+    module = import_module_or_file("sweep", file)
+    function, design = (getattr(module, name, None) for name in ("experiment", "design"))
+    if not callable(function) or not isinstance(design, Design):
+        expected = "a function `experiment` and a design `design`, such as Grid(count=[10])"
+        raise InvalidInput(f"{file}: expected {expected}")
+    _send_by_value(module)
+    console = Console(stderr=True)
+    options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "limit": limit, "memory": memory}
+    if console.is_interactive:
+        with Live(console=console, refresh_per_second=4) as live:
+            table = _Table(live)
+            options |= {"progress": table.advance, "on_row": table.add}
+            results = run(function, design, out, retry=retry, **options)
+    else:
+        results = run(function, design, out, retry=retry, **options)
+    Console().print(f"{results} in {results.folder}", highlight=False, soft_wrap=True)
+    return 1 if results.failed else 0
+
+
+def _send_by_value(module: Any) -> None:
+    """Let workers read functions of a file that they cannot import."""
+    try:
+        import cloudpickle
+    except ImportError:
+        return
+    cloudpickle.register_pickle_by_value(module)
+
+
+class _Table:
+    """The latest rows, how many trials ended how, and the time left."""
+
+    def __init__(self, live: Live) -> None:
+        self._live = live
+        self._latest: deque[Row] = deque(maxlen=LATEST)
+        self._counts: Counter[str] = Counter()
+        self._began = time.monotonic()
+        self._left = ""
+
+    def advance(self, _stage: str, done: float) -> None:
+        """Estimate the time left from the share that is done."""
+        if done > 0.0:
+            seconds = (time.monotonic() - self._began) * (1.0 - done) / done
+            left = f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
+            self._left = f", {done:.0%}, {left} left"
+
+    def add(self, row: Row) -> None:
+        """Show a row."""
+        self._latest.append(row)
+        self._counts[row["status"]] += 1
+        hidden = set(COLUMNS) - {"status", "error", "seconds"}
+        names = list(dict.fromkeys(name for row in self._latest for name in row if name not in hidden))
+        table = Table(*names, box=None)
+        for latest in self._latest:
+            table.add_row(*(_text(latest.get(name)) for name in names))
+        counts = ", ".join(f"{count} {status}" for status, count in self._counts.items())
+        self._live.update(Group(table, f"{counts}{self._left}"))
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

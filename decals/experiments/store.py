@@ -1,0 +1,247 @@
+"""The folder of an experiment: rows in a journal and in shards, a lock, and what the experiment is.
+
+A row is appended to the journal as soon as its trial has ended. Once the journal is long, and at the end of a
+run, its rows become a shard: a Parquet file, or a CSV file where pyarrow is not installed. Shards are written
+atomically. A kill loses at most the rows of trials that had not ended.
+"""
+
+import csv
+import io
+import json
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Self
+
+from blobtree.errors import UnusableFile
+from blobtree.file_lock import FileLock
+from blobtree.files import replacing, write_atomically
+from decals.errors import InvalidInput
+from decals.experiments.outcome import Row
+
+FORMAT = 1
+"""Format of the folder; a higher one belongs to a newer version."""
+
+SHARD_ROWS = 1000
+"""Rows of the journal that become a shard."""
+
+EXPERIMENT, JOURNAL, RUNNING, LOCK, SHARDS = (
+    "experiment.json",
+    "journal.jsonl",
+    "running.json",
+    "lock",
+    "rows",
+)
+
+
+def described(folder: Path) -> dict[str, Any]:
+    """Return what the experiment of a folder is.
+
+    Raises
+    ------
+    InvalidInput
+        The folder holds no experiment, or one of a newer version.
+    """
+    try:
+        about: dict[str, Any] = json.loads((folder / EXPERIMENT).read_text(encoding="utf-8"))
+        newer = about["format"] > FORMAT
+    except FileNotFoundError:
+        raise InvalidInput(
+            f"{folder}: expected the folder of an experiment, but it has no {EXPERIMENT}"
+        ) from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise InvalidInput(f"{folder / EXPERIMENT}: damaged ({error}); choose another folder") from error
+    if newer:
+        raise InvalidInput(f"{folder}: written by a newer version of implicit-decals; install that version")
+    return about
+
+
+def rows_in(folder: Path) -> Iterator[Row]:
+    """Yield the rows of a folder, the oldest first; a trial that ran several times has several."""
+    for shard in sorted((folder / SHARDS).glob("*.*")):
+        with suppress(FileNotFoundError):
+            yield from _parquet_rows(shard) if shard.suffix == ".parquet" else _csv_rows(shard)
+    with suppress(FileNotFoundError):
+        yield from _journal_rows(folder / JOURNAL)
+
+
+class Store:
+    """Writes the rows of an experiment; one process at a time has the folder.
+
+    Parameters
+    ----------
+    folder
+        The folder; it is made.
+    about
+        Name, parameters and digest of the function.
+
+    Raises
+    ------
+    InvalidInput
+        Another run has the folder, or it holds something else.
+    UnusableFile
+        The folder cannot be written.
+    """
+
+    def __init__(self, folder: Path, about: dict[str, Any]) -> None:
+        self._folder = folder
+        try:
+            (folder / SHARDS).mkdir(parents=True, exist_ok=True)
+            lock = FileLock.acquire(folder / LOCK)
+        except OSError as error:
+            raise UnusableFile.of(error, folder, "write") from error
+        if lock is None:
+            raise InvalidInput(
+                f"{folder}: another run writes into this folder; wait for it, or choose another folder"
+            )
+        self._lock = lock
+        try:
+            self._check(about)
+            write_atomically(folder / EXPERIMENT, json.dumps({"format": FORMAT, **about}, indent=1).encode())
+            self._pending = _shorn(folder / JOURNAL)
+            self._journal = (folder / JOURNAL).open("ab", buffering=0)
+        except BaseException:
+            lock.release()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        try:
+            self._make_shard()
+            (self._folder / RUNNING).unlink(missing_ok=True)
+        finally:
+            self._journal.close()
+            self._lock.release()
+
+    def _check(self, about: dict[str, Any]) -> None:
+        """Raise an error unless the folder is new, or holds this experiment."""
+        if (self._folder / EXPERIMENT).exists():
+            found = described(self._folder)
+            if (found.get("name"), found.get("parameters")) != (about["name"], about["parameters"]):
+                raise InvalidInput(
+                    f"{self._folder}: holds the experiment {found.get('name')} of {found.get('parameters')}, "
+                    f"not {about['name']} of {about['parameters']}; choose another folder"
+                )
+        elif others := [path.name for path in self._folder.iterdir() if path.name not in (SHARDS, LOCK)]:
+            raise InvalidInput(
+                f"{self._folder}: expected an empty folder, but it holds {others[0]}; choose another"
+            )
+
+    def begin(self, row: Row) -> None:
+        """Note the trial that starts in this process; if it ends the process, `interrupted` returns it."""
+        self._guarded(lambda: (self._folder / RUNNING).write_text(json.dumps(row)))
+
+    def interrupted(self) -> Row | None:
+        """Return the trial that ran in the process of the last run when that process ended."""
+        with suppress(FileNotFoundError, ValueError):
+            row: Row = json.loads((self._folder / RUNNING).read_text())
+            return row
+        return None
+
+    def add(self, row: Row) -> None:
+        """Append a row."""
+        line = json.dumps(row).encode() + b"\n"
+        self._guarded(lambda: self._journal.write(line))
+        with suppress(FileNotFoundError):
+            (self._folder / RUNNING).unlink()
+        self._pending += 1
+        if self._pending >= SHARD_ROWS:
+            self._make_shard()
+
+    def _guarded(self, write: Any) -> None:
+        try:
+            write()
+        except OSError as error:
+            raise UnusableFile.of(error, self._folder, "write") from error
+
+    def _make_shard(self) -> None:
+        """Move the rows of the journal into a shard; after a kill in between they are in both."""
+        rows = list(_journal_rows(self._folder / JOURNAL))
+        if rows:
+            number = len(list((self._folder / SHARDS).iterdir()))
+            _write_shard(self._folder / SHARDS / f"{number:06}", rows)
+            self._journal.truncate(0)
+        self._pending = 0
+
+
+# -- journals and shards --------------------------------------------------------------------------------
+
+
+def _journal_rows(path: Path) -> Iterator[Row]:
+    """Yield the rows of a journal; a kill can have cut the last line."""
+    with path.open("rb") as lines:
+        for line in lines:
+            if line.endswith(b"\n"):
+                yield json.loads(line)
+
+
+def _shorn(path: Path) -> int:
+    """Remove a last line that is not whole; return the number of rows."""
+    if not path.exists():
+        return 0
+    content = path.read_bytes()
+    whole = content[: content.rfind(b"\n") + 1]
+    if whole != content:
+        write_atomically(path, whole)
+    return whole.count(b"\n")
+
+
+def _names(rows: Iterable[Row]) -> list[str]:
+    return list(dict.fromkeys(name for row in rows for name in row))
+
+
+def _write_shard(stem: Path, rows: list[Row]) -> None:
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as parquet
+    except ImportError:
+        text = io.StringIO()
+        table = csv.writer(text)
+        table.writerow(_names(rows))
+        table.writerows([[_cell(row.get(name)) for name in _names(rows)] for row in rows])
+        write_atomically(stem.with_suffix(".csv"), text.getvalue().encode())
+        return
+
+    def column(name: str) -> Any:
+        values = [row.get(name) for row in rows]
+        try:
+            return pa.array(values)
+        except (pa.ArrowInvalid, pa.ArrowTypeError):  # numbers and texts in one column
+            return pa.array([None if value is None else json.dumps(value) for value in values])
+
+    with replacing(stem.with_suffix(".parquet")) as temporary:
+        parquet.write_table(pa.table({name: column(name) for name in _names(rows)}), temporary)
+
+
+def _parquet_rows(path: Path) -> list[Row]:
+    try:
+        import pyarrow.parquet as parquet
+    except ImportError:
+        raise InvalidInput(
+            f"{path}: reading Parquet needs pyarrow; install implicit-decals[experiments]"
+        ) from None
+    rows: list[Row] = parquet.read_table(path).to_pylist()
+    return rows
+
+
+def _cell(value: Any) -> str:
+    """Return a value of a CSV file; texts that look like other values are in quotes."""
+    if isinstance(value, str) and value and _value(value) == value:
+        return value
+    return "" if value is None else json.dumps(value)
+
+
+def _value(cell: str) -> Any:
+    """Return the value of a cell."""
+    try:
+        return json.loads(cell)
+    except ValueError:
+        return cell
+
+
+def _csv_rows(path: Path) -> Iterator[Row]:
+    with path.open(newline="", encoding="utf-8") as lines:
+        for row in csv.DictReader(lines):
+            yield {name: _value(cell) if cell else None for name, cell in row.items()}

@@ -1,0 +1,86 @@
+"""Functions of experiments, which worker processes import."""
+
+import os
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import decals
+from blobtree import Point
+
+
+@dataclass
+class Found:
+    """Measures as a dataclass."""
+
+    square: int
+    root: float
+
+
+def measured(x: int, seed: int = 0) -> dict[str, Any]:
+    """A number for each trial, which depends on nothing else."""
+    return {"value": float(np.random.default_rng([x, seed]).random()), "x2": x * x}
+
+
+def with_faults(x: int) -> dict[str, Any]:
+    """End the process, fail, hang or give no number for some parameters."""
+    if x == 1:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    if x == 2:
+        raise ValueError("two is\nwrong")
+    if x == 3:
+        time.sleep(600)
+    if x == 4:
+        os._exit(3)
+    if x == 5:
+        return {"y": float("nan")}
+    if x == 6:
+        hoard = [bytearray(b"x" * 2**24) for _ in range(50)]
+        time.sleep(600 if hoard else 0)
+    return {"y": float(x)}
+
+
+def slow(x: int) -> int:
+    """A trial of a tenth of a second."""
+    time.sleep(0.1)
+    return x + 1
+
+
+def noted(x: int, folder: str) -> int:
+    """Note each call."""
+    with Path(folder, "calls").open("a") as file:
+        file.write(f"{x}\n")
+    return x
+
+
+def files(x: int) -> dict[str, Any]:
+    """Values that become files."""
+    tree = Point((0, 0, 0), radius=1.0)
+    scene = decals.cover(tree, count=2 + x)
+    return {"scene": scene, "decals": scene.decals, "tree": tree, "array": np.arange(x)}
+
+
+def drawn(count: int) -> dict[str, Any]:
+    """A picture."""
+    scene = decals.cover(Point((0, 0, 0), radius=1.0), count=count)
+    return {"count2": count * 2, "picture": decals.render(scene, size=(32, 24), samples=1)}
+
+
+def summed(array: Any) -> float:
+    """A large parameter."""
+    return float(np.sum(array))
+
+
+def empty(x: int) -> int:
+    """Compute nothing."""
+    return x
+
+
+def rendered(count: int, seed: int) -> float:
+    """Draw a scene of 320 × 240 pixels; return the mean of its pixels."""
+    scene = decals.cover(Point((0, 0, 0), radius=1.0), count=count, seed=0)
+    return float(np.mean(decals.render(scene, size=(320, 240), samples=1))) + 0 * seed
