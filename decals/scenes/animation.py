@@ -76,7 +76,7 @@ def turntable(scene: Scene | PosedScene, count: int = 120, *, turns: float = 1.0
     >>> import blobtree, decals
     >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=12)
     >>> frames = decals.turntable(scene, 4)
-    >>> len(frames), frames[0].camera == scene.camera
+    >>> len(frames), frames[0].camera.position == scene.camera.position
     (4, True)
     """
     if not isinstance(scene, Scene | PosedScene):
