@@ -13,6 +13,9 @@ from blobtree.tape.tape import Tape
 GAP_SHARE = 1 / 3
 """Largest growth of a leaf over the gap between it and another one."""
 
+MAX_PAIRS = 200
+"""Most pairs of leaves that grow, and leaves near them."""
+
 GAP_STEPS = 12
 """Steps to and fro between two skeletons, at whose end the gap is known."""
 
@@ -35,17 +38,25 @@ def hull_corners(placed: PlacedPrimitive) -> Float64Array:
 def limit_by_gaps(
     tree: ImplicitModel, leaves: list[tuple[Run, PlacedPrimitive]], lengths: Float64Array
 ) -> None:
-    """Lower growths at gaps between leaves, so that these stay open; below warps, gaps are not known."""
-    if not lengths.any() or has_warps(tree):
+    """Lower growths at gaps between leaves, so that these stay open; below warps, gaps are not known.
+
+    Nothing grows where too many leaves are near each other.
+    """
+    if not lengths.any():
         return
     lower, upper = leaf_boxes(tree)
+    beside = {}
     for number in np.flatnonzero(lengths).tolist():
-        placed = leaves[number][1]
-        if not isinstance(placed.primitive, ProgramPrimitive):
-            continue
-        reach = lengths[number] / GAP_SHARE
         apart = np.maximum(lower - upper[number], lower[number] - upper).max(axis=1)
-        near = np.flatnonzero(apart < reach)
+        beside[number] = np.flatnonzero(apart < lengths[number] / GAP_SHARE)
+    if sum(map(len, beside.values())) > MAX_PAIRS:
+        lengths[:] = 0.0
+    if has_warps(tree):
+        return
+    for number, near in beside.items():
+        placed, reach = leaves[number][1], lengths[number] / GAP_SHARE
+        if reach == 0.0 or not isinstance(placed.primitive, ProgramPrimitive):
+            continue
         one = _Skeleton(tree, placed, number, reach)
         starts = one.closest(_starts(placed))
         for other in near[near != number].tolist():
