@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import moderngl
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
@@ -17,7 +18,8 @@ import blobtree
 import decals
 from decals.images.texels import encode_srgb
 from decals.rendering import Lighting
-from tests.decals.baking.glb import bilinear, linear, read_glb
+from decals.rendering.context import Context
+from tests.decals.baking.glb import ReadMesh, bilinear, linear, read_glb
 from tests.decals.baking.seam_steps import seam_steps
 
 Array = NDArray[Any]
@@ -34,8 +36,30 @@ TEXELS, QUICK_TEXELS = 4096, 512
 DECALS, QUICK_DECALS = 1000, 40
 """Size of the baked texture, and the decals in it."""
 
-PICTURE = (800, 600)
-"""Size of the pictures that are compared."""
+PICTURE, FINER = (800, 600), 4
+"""Size of the pictures that are compared, and samples along each axis of a pixel."""
+
+SRGB8_ALPHA8 = 0x8C43
+
+VERTEX = """#version 330
+uniform mat4 clip;
+in vec3 place;
+in vec2 uv;
+out vec2 at;
+void main() {
+    at = uv;
+    gl_Position = clip * vec4(place, 1.0);
+}
+"""
+
+FRAGMENT = """#version 330
+uniform sampler2D baked;
+in vec2 at;
+out vec4 color;
+void main() {
+    color = vec4(texture(baked, at).rgb, 1.0);
+}
+"""
 
 
 def measure(*, quick: bool) -> dict[str, float]:
@@ -66,30 +90,44 @@ def baked(texels: int, count: int) -> dict[str, float]:
     }
 
 
-def psnr(scene: decals.Scene, nodes: list[Any]) -> float:
+def psnr(scene: decals.Scene, nodes: list[ReadMesh]) -> float:
     """Return the ratio of signal to noise over the pixels in which both pictures show the surface, in dB."""
     live = np.asarray(decals.render(scene, size=PICTURE, samples=4, lights=Lighting(()), background="white"))
-    make_texture: Any = pv.Texture
-    plotter = pv.Plotter(off_screen=True, window_size=[4 * side for side in PICTURE], lighting=None)
-    for node in nodes:
-        mesh = pv.PolyData.from_regular_faces(node.vertices, node.faces)
-        mesh.active_texture_coordinates = node.uv
-        texture = make_texture(node.texture)
-        texture.interpolate = texture.mipmap = True
-        plotter.add_mesh(mesh, texture=texture, lighting=False)
-    camera = scene.camera.at(PICTURE[0] / PICTURE[1])
-    plotter.camera_position = [camera.position, camera.target, camera.up]
-    plotter.camera.view_angle = camera.fov
-    plotter.renderer.set_background("white")
-    large = np.asarray(plotter.screenshot(return_img=True), float)
-    plotter.close()
-    height, width = PICTURE[1], PICTURE[0]
-    linear = ((large / 255 + 0.055) / 1.055) ** 2.4
-    drawn = 255 * encode_srgb(linear.reshape(height, 4, width, 4, 3).mean(axis=(1, 3)))
-    shown = [np.asarray((picture < 252).any(axis=2)) for picture in (live[..., :3], drawn)]
-    surface = inner(shown[0] & shown[1])
+    drawn, covered = plain_picture(scene, nodes)
+    surface = inner(np.asarray((live[..., :3] < 252).any(axis=2)) & covered)
     error = float(((live[..., :3].astype(float) - drawn)[surface] ** 2).mean())
     return float(10 * np.log10(255**2 / error))
+
+
+def plain_picture(scene: decals.Scene, nodes: list[ReadMesh]) -> tuple[Array, Array]:
+    """Return textured meshes by a shader that only reads their texture, of 255, and the pixels they cover.
+
+    The card decodes texels before it mixes them, as glTF demands. A pixel is the mean of 4 × 4.
+    """
+    width, height = size = PICTURE[0] * FINER, PICTURE[1] * FINER
+    with Context.standalone() as context, context.current():
+        gl = context.gl
+        program = gl.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
+        program["clip"] = tuple(scene.camera.clip_matrix(size, scene.bounds).T.ravel().tolist())
+        target = gl.framebuffer([gl.texture(size, 4, dtype="f4")], gl.depth_renderbuffer(size))
+        target.use()
+        target.clear()
+        gl.enable_only(moderngl.DEPTH_TEST)
+        for node in nodes:
+            assert node.uv is not None
+            assert node.texture is not None
+            texels = np.dstack([node.texture, np.full(node.texture.shape[:2], 255, np.uint8)])[::-1]
+            shape = node.texture.shape[1::-1]
+            texture = gl.texture(shape, 4, np.ascontiguousarray(texels), internal_format=SRGB8_ALPHA8)
+            texture.build_mipmaps()
+            texture.use(0)
+            corners = gl.buffer(np.hstack([node.vertices, node.uv]).astype(np.float32)[node.faces].tobytes())
+            gl.vertex_array(program, [(corners, "3f 2f", "place", "uv")]).render()
+        light = np.frombuffer(target.read(components=4, dtype="f4"), np.float32).reshape(height, width, 4)[
+            ::-1
+        ]
+    means = light.reshape(PICTURE[1], FINER, PICTURE[0], FINER, 4).mean(axis=(1, 3))
+    return 255 * np.asarray(encode_srgb(means[..., :3])), means[..., 3] > 0.999
 
 
 def inner(mask: Array) -> Array:
