@@ -71,8 +71,8 @@ def measure(*, quick: bool) -> dict[str, float]:
         if before > 0.0:
             ratios.append(seconds / before)
     figures["thin_cost"] = float(np.mean(ratios))
-    figures["plain_cost"] = _plain_cost(_bumpy_trees(add), count, repeats)
-    figures["plain_cut_cost"] = _plain_cost(_bumpy_trees(sub), count, repeats)
+    figures["plain_cost"] = _plain_cost(_bumpy_trees(add, np.inf), count, repeats)
+    figures["plain_cut_cost"] = _plain_cost(_bumpy_trees(sub, 0.9), count, repeats)
     return figures
 
 
@@ -142,11 +142,15 @@ def _plain_cost(trees: Iterable[Node], count: int, repeats: int) -> float:
     return float(np.mean(ratios))
 
 
-def _bumpy_trees(combine: Callable[[Node, Node], Node]) -> Iterator[Node]:
-    """Yield bodies with a ring of balls that are joined, or that cut."""
+def _bumpy_trees(combine: Callable[[Node, Node], Node], share: float) -> Iterator[Node]:
+    """Yield bodies with a ring of balls that are joined, or that cut.
+
+    `share` bounds their radius by a part of half their distance: below 1 no ridges are left between cuts.
+    """
     for bumps in (1, 8, 32):
         tree: Node = Point((0, 0, 0), radius=1.0) + Segment((0, 0, 0), (2, 0.5, 0), radius=0.4)
         for number in range(bumps):
             angle = 2.0 * np.pi * number / bumps
-            tree = combine(tree, Point((float(np.cos(angle)), float(np.sin(angle)), 0.3), radius=0.3))
+            radius = min(0.3, share * float(np.pi) / bumps)
+            tree = combine(tree, Point((float(np.cos(angle)), float(np.sin(angle)), 0.3), radius=radius))
         yield tree
