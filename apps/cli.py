@@ -117,6 +117,14 @@ For example:
 
 implicit-decals report results -o report.html
 """,
+    "reproduce": """Make what a file holds again from its recipe, and say what differs.
+
+For example:
+
+implicit-decals reproduce scene.json
+
+implicit-decals reproduce picture.png --scene scene.json
+""",
     "polygonize": """Write the surface of an implicit model as a triangle mesh.
 
 For example:

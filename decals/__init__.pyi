@@ -40,6 +40,7 @@ from .scenes.measure import measure
 from .scenes.objects import MeshObject, TreeObject
 from .scenes.pose import pose, skin
 from .scenes.render import render
+from .scenes.reproduction import reproduce
 from .scenes.scene import DecalImage, Scene
 from .vtk import show
 from .window import edit
@@ -85,6 +86,7 @@ __all__ = [
     "pose",
     "render",
     "rendering",
+    "reproduce",
     "save_html",
     "save_scene",
     "scatter",

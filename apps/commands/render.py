@@ -31,8 +31,9 @@ from decals.apps.models.samples import axes_of
 from decals.apps.output import PICTURE_SUFFIXES, check_output, print_path
 from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
-from decals.rendering import Drawing, Environment, Picture, Renderer
+from decals.rendering import Drawing, Environment, Renderer
 from decals.scenes.camera import UPRIGHT
+from decals.scenes.render import drawn_picture
 
 
 def render(
@@ -147,7 +148,7 @@ def render(
         if save is not None:
             save_scene(scene, save)
         progress("drawing", 0.0)
-        Picture(renderer.render(scene, scene.drawing.at(pixels))).save(output)
+        drawn_picture(renderer, scene, scene.drawing.at(pixels)).save(output)
     print_path(output)
 
 

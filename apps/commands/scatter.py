@@ -145,7 +145,8 @@ def scatter(
                 camera, drawing = frame(objects, parse_view(None, axes_of(model[0])), ASPECT), Drawing()
             if painted is not None:
                 options |= {"painted": str(painted), "painted_along": painted_along, "black": black}
-            recipe = Recipe.of("decals.scatter", seed=seed, models=[item.name for item in objects], **options)
+            names = [item.name for item in objects]
+            recipe = Recipe.of("decals.scatter", seed=seed, models=names, **options).giving(decals, objects)
             kept: dict[str, Any] = {"drawing": drawing, "recipe": recipe}
             save_scene(Scene(objects=objects, camera=camera, images=pictures, decals=decals, **kept), output)
     print_path(output)

@@ -35,6 +35,13 @@ class ScatterOptions:
     def scene(self, objects: Sequence[SceneObject], view: View, size: Size, progress: Progress) -> Scene:
         """Return a scene of the objects covered with decals, and a camera that shows them."""
         progress(PREPARING, 0.0)
+        decals = scatter(
+            [item.surface for item in objects],
+            count=self.count,
+            seed=self.seed,
+            images=len(self.images),
+            progress=progress,
+        )
         recipe = Recipe.of(
             "decals.scatter",
             seed=self.seed,
@@ -43,15 +50,9 @@ class ScatterOptions:
             images=[image.source for image in self.images],
         )
         return Scene(
-            recipe=recipe,
+            recipe=recipe.giving(decals, objects),
             objects=tuple(objects),
             camera=frame(objects, view, size),
             images=self.images,
-            decals=scatter(
-                [item.surface for item in objects],
-                count=self.count,
-                seed=self.seed,
-                images=len(self.images),
-                progress=progress,
-            ),
+            decals=decals,
         )

@@ -116,4 +116,4 @@ def _finish_tree(tree: dict[str, Any], baked: Baked) -> None:
         for texture in textures:
             texture["sampler"] = 0
     if baked.recipe is not None:
-        tree["asset"]["extras"] = {"recipe": vars(baked.recipe)}
+        tree["asset"]["extras"] = {"recipe": baked.recipe.record}

@@ -66,7 +66,7 @@ def _model_lines(baked: Baked) -> Iterable[str]:
     yield _MODEL.format(unit=baked.unit or "millimeter")
     yield '<metadata name="Application">Implicit Decals</metadata>'
     if baked.recipe is not None:
-        text = escape(json.dumps(vars(baked.recipe), ensure_ascii=False))
+        text = escape(json.dumps(baked.recipe.record, ensure_ascii=False))
         yield f'<metadata name="decals:recipe" preserve="1">{_legal(text)}</metadata>'
     yield "<resources>"
     properties = yield from _color_lines(baked)

@@ -55,7 +55,7 @@ def _fill(pxr: Any, stage: Any, baked: Baked) -> None:
     stage.SetDefaultPrim(root.GetPrim())
     root.AddTransformOp().Set(pxr.Gf.Matrix4d().SetTranslate(pxr.Gf.Vec3d(*baked.origin)))
     if baked.recipe is not None:
-        stage.GetRootLayer().customLayerData = {"recipe": json.dumps(vars(baked.recipe))}
+        stage.GetRootLayer().customLayerData = {"recipe": json.dumps(baked.recipe.record)}
     material = _material(pxr, stage, baked)
     for number, part in enumerate(baked.parts):
         name = f"{pxr.Tf.MakeValidIdentifier(part.name)}_{number}"

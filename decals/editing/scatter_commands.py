@@ -166,7 +166,7 @@ class ScatterDecals:
         )
         names = [item.name for item in covered]
         given = {"models": names, "count": self.count, "images": images, **self.options}
-        recipe = Recipe.of("decals.scatter", seed=self.seed, **given)
+        recipe = Recipe.of("decals.scatter", seed=self.seed, **given).giving(decals, covered)
         return ReplaceDecals(self.objects, decals, covered, recipe)
 
     def check_values(self) -> None:

@@ -1,21 +1,29 @@
 """Pictures, the buffers behind them, and arrays that are filled tile by tile."""
 
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
+from PIL.PngImagePlugin import PngInfo
 
 from blobtree._typing import Float32Array, Int32Array, UInt8Array
+from blobtree.errors import UnusableFile
 from blobtree.files import write_atomically
 from decals.errors import InvalidScene
 from decals.rendering.options import STUDIO, Size
 from decals.rendering.targets import Targets
 from decals.rendering.viewpoint import Tile
 from decals.validation import as_path
+
+RECIPE_KEY = "implicit-decals"
+"""Keyword of the text in a PNG file that says how the picture was made."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -28,6 +36,8 @@ class Picture:
     ----------
     pixels : uint8[h, w, 4]
         sRGB and straight alpha, row 0 at the top.
+    recipe : mapping of str, optional
+        How it was made, as plain values; PNG files keep it.
 
     Examples
     --------
@@ -40,6 +50,7 @@ class Picture:
     """
 
     pixels: UInt8Array
+    recipe: Mapping[str, Any] | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -90,18 +101,49 @@ class Picture:
         try:
             if file_format in ("JPEG", "BMP", "PPM"):
                 image = on_white(image)
-            image.save(content, file_format)
+            image.save(content, file_format, **self._notes(file_format))
             write_atomically(path, content.getvalue())
         except OSError as error:
             raise InvalidScene(
                 f"could not write the picture {str(path)!r} ({error.strerror or error})"
             ) from error
 
+    def _notes(self, file_format: str) -> dict[str, Any]:
+        """Return options of Pillow that keep the recipe in a file of a format that can."""
+        if self.recipe is None or file_format != "PNG":
+            return {}
+        notes = PngInfo()
+        notes.add_itxt(RECIPE_KEY, json.dumps(self.recipe, ensure_ascii=False))
+        return {"pnginfo": notes}
+
     def _repr_png_(self) -> bytes:
         """Return the picture as a PNG file, for notebooks."""
         file = BytesIO()
         Image.fromarray(self.pixels).save(file, "png")
         return file.getvalue()
+
+
+def picture_recipe(path: Path) -> dict[str, Any] | None:
+    """Return the recipe that a PNG file keeps; None without one.
+
+    Raises
+    ------
+    UnusableFile
+        The file cannot be read.
+    InvalidScene
+        It is no PNG file.
+    """
+    try:
+        with Image.open(path, formats=["PNG"]) as image:
+            image.load()  # texts may stand behind the pixels
+            recipe = json.loads(image.info.get(RECIPE_KEY, "null"))
+    except UnidentifiedImageError:
+        raise InvalidScene(f"expected a PNG file, got {str(path)!r}; give one that `render` wrote") from None
+    except OSError as error:
+        raise UnusableFile.of(error, path, "read") from error
+    except ValueError:
+        recipe = None
+    return recipe if isinstance(recipe, dict) else None
 
 
 def on_white(image: Image.Image) -> Image.Image:

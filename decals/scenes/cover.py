@@ -147,7 +147,7 @@ def cover(
         fov=fov,
         crease_angle=crease_angle,
         orientation=rule_of_meshes,
-    )
+    ).giving(decals, objects)
     return Scene(objects=tuple(objects), camera=camera, decals=decals, images=pictures, recipe=recipe)
 
 

@@ -9,7 +9,8 @@
       "images": ["scale", "pictures/moss.png", {"name": "steel", "pixels": "steel.png", "roughness": ...}],
       "camera": {"position": [x, y, z], ...},
       "drawing": {"contact": "elastic", "stiffness": 2.0, "mapping": "corrected", "samples": 2, ...},
-      "recipe": {"function": "decals.cover", "parameters": {"count": 500, ...}, "seed": 0, "versions": {...}},
+      "recipe": {"function": "decals.cover", "parameters": {"count": 500, ...}, "seed": 0, "versions": {...},
+                 "made": {"time": ..., "device": ...}, "inputs": {"ball": HASH}, "result": HASH},
       "decals": [
         {"position": [x, y, z], "normal": ..., "tangent": ..., "radius": r, "image": 0, "spill": false,
          "interaction": "overlap", "layer": 1, "tint": [r, g, b], "opacity": 1.0,
@@ -97,6 +98,10 @@ class _RecipeRecord(Struct, forbid_unknown_fields=True):
     parameters: dict[str, Any]
     seed: int
     versions: dict[str, str]
+    made: dict[str, Any] = {}
+    missing: list[str] = []
+    inputs: dict[str, str] = {}
+    result: str = ""
 
 
 class _SceneRecord(Struct, forbid_unknown_fields=True):
@@ -216,7 +221,7 @@ def to_json(scene: Scene, *, folder: Path, progress: Progress | None = None) -> 
         "decals": decals,
     }
     if scene.recipe is not None:
-        parts["recipe"] = vars(scene.recipe)
+        parts["recipe"] = scene.recipe.record
     if len(scene.hidden_decals):
         parts["hidden_decals"] = _lines(records_of(scene.hidden_decals))
     for name in ("locked_layers", "layer_names"):

@@ -1,22 +1,43 @@
 """From a scene or a model to a picture in one call."""
 
-from collections.abc import Sequence
-from typing import cast
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from types import MappingProxyType
+from typing import Any, cast
 
 from blobtree.colors import ColorLike
+from blobtree.identity import content_hash
 from blobtree.progress import reporting
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.images.load import AnyImage
 from decals.rendering.environment import Environment, as_environment
 from decals.rendering.lights import Lighting
-from decals.rendering.options import Background, Drawing, SceneLike, Size, drawing_of, is_scene_like
+from decals.rendering.options import (
+    Background,
+    Drawing,
+    RenderOptions,
+    SceneLike,
+    Size,
+    drawing_of,
+    is_scene_like,
+)
 from decals.rendering.picture import Picture
+from decals.rendering.pixel_pass import driver_name
 from decals.rendering.renderer import Renderer
 from decals.rendering.viewpoint import Viewpoint
 from decals.scenes.cover import as_scene
 from decals.scenes.objects import SceneObject
+from decals.scenes.provenance import package_versions, provenance
+from decals.scenes.recipe import plain
+from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model
+
+SHOWN_PARTS = ("objects", "decals", "images", "camera", "drawing")
+"""Parts of a scene that a picture shows."""
+
+PICTURE_FUNCTION = "decals.render"
+"""Function in the recipes of pictures."""
 
 
 def render(
@@ -107,4 +128,41 @@ def render(
         drawn = cast(SceneLike, scene) if is_scene_like(scene) else as_scene(scene, aspect=width / height)
         options = drawing_of(drawn).overridden(**given).at(size)
         with Renderer() as renderer:
-            return Picture(renderer.render(drawn, options, viewpoint=viewpoint))
+            return drawn_picture(renderer, drawn, options, given, viewpoint)
+
+
+def drawn_picture(
+    renderer: Renderer,
+    scene: SceneLike,
+    options: RenderOptions,
+    given: Mapping[str, Any] = MappingProxyType({}),
+    viewpoint: Viewpoint | None = None,
+) -> Picture:
+    """Draw a scene, and return the picture with its recipe; ``given`` are options that the scene lacks."""
+    pixels = renderer.render(scene, options, viewpoint=viewpoint)
+    if not isinstance(scene, Scene):  # such as a posed scene, which no file holds
+        return Picture(pixels)
+    changed = {name: value for name, value in given.items() if value is not None}
+    if viewpoint is not None:
+        changed["viewpoint"] = viewpoint
+    plain_ones = {name: _option(value) for name, value in changed.items()}
+    recipe = {
+        "function": PICTURE_FUNCTION,
+        "parameters": {"size": list(options.size)} | plain_ones,
+        "missing": [name for name in changed if not isinstance(plain_ones[name], str | float | int)],
+        "scene": scene_hashes(scene),
+        "recipe": None if scene.recipe is None else scene.recipe.record,
+        "versions": package_versions(),
+        "made": provenance(driver_name(renderer.context.gl)),
+    }
+    return Picture(pixels, recipe)
+
+
+def scene_hashes(scene: Scene) -> dict[str, str]:
+    """Return the content hashes of the parts of a scene that a picture shows."""
+    return {name: content_hash(getattr(scene, name)) for name in SHOWN_PARTS}
+
+
+def _option(value: Any) -> Any:
+    """Return an option as a recipe has it: the name of a mode, or a plain value."""
+    return value.name.lower() if isinstance(value, Enum) else plain(value)

@@ -21,8 +21,8 @@ NAMES = [
     "Interaction", "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__",
     "animate", "bake", "content_hash", "cover", "define_contact", "displace", "edit", "evaluate", "export",
     "load_image", "load_model",
-    "load_scene", "measure", "pose", "render", "save_html", "save_scene", "scatter", "shader", "show", "skin",
-    "turntable",
+    "load_scene", "measure", "pose", "render", "reproduce", "save_html", "save_scene", "scatter", "shader",
+    "show", "skin", "turntable",
 ]  # fmt: skip
 OF_PACKAGES = {
     "field": ["MaterialSamples", "Neighbors", "Samples", "Walks"],

@@ -1,0 +1,87 @@
+"""The command that makes files again."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
+
+import decals
+from blobtree import Point
+from decals.apps.cli import run
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    decals.cover(Point((0, 0, 0), radius=1.0), count=5, seed=2).save("scene.json")
+    return tmp_path
+
+
+def test_a_scene_is_made_again(saved: Path, capsys: Capture) -> None:
+    assert run(["reproduce", "scene.json"]) == 0
+    assert capsys.readouterr().out == "scene.json: made again, equal bit for bit\n"
+    scene = decals.load_scene("scene.json")
+    scene.replace(decals=scene.decals[1:]).save("edited.json")
+    assert run(["reproduce", "edited.json"]) == 3
+    out = capsys.readouterr().out
+    assert out.startswith("edited.json: cannot be made again; it lacks\n  edits by hand:")
+    text = (saved / "scene.json").read_text()
+    (saved / "other.json").write_text(
+        text.replace('"seed":2', '"seed":3').replace(f'"{scene.decals.content_hash}"', '""')
+    )
+    assert run(["reproduce", "other.json"]) == 1
+    assert "positions: 5 of 5 decals differ" in capsys.readouterr().out
+
+
+def test_a_picture_is_drawn_again_with_its_scene(saved: Path, capsys: Capture) -> None:
+    assert run(["render", "scene.json", "--size", "40x30", "-o", "a.png"]) == 0
+    capsys.readouterr()
+    assert run(["reproduce", "a.png"]) == 3
+    assert "the scene: give its file with --scene" in capsys.readouterr().out
+    assert run(["reproduce", "a.png", "--scene", "scene.json"]) == 0
+    assert "equal bit for bit" in capsys.readouterr().out
+    with Image.open("a.png") as image:
+        notes, pixels = PngInfo(), np.array(image)
+        notes.add_itxt("implicit-decals", image.text["implicit-decals"])  # type: ignore[attr-defined]
+    pixels[3, 4, 0] ^= 8
+    Image.fromarray(pixels).save("b.png", pnginfo=notes)
+    assert run(["reproduce", "b.png", "--scene", "scene.json"]) == 1
+    assert "pixels: 1 of 1,200 differ, up to 8 of 255" in capsys.readouterr().out
+    scene = decals.load_scene("scene.json")
+    scene.replace(decals=scene.decals[1:]).save("edited.json")
+    assert run(["reproduce", "a.png", "--scene", "edited.json"]) == 3
+    assert "the decals of the scene that was drawn: the file has others" in capsys.readouterr().out
+
+
+def test_files_that_cannot_be_made_again(saved: Path, capsys: Capture) -> None:
+    pytest.importorskip("trimesh", reason="files of other programs need it")
+    assert run(["export", "scene.json", "-o", "a.glb", "--colors", "vertices"]) == 0
+    assert run(["reproduce", "a.glb"]) == 3
+    assert "the model 'model 1', which the file holds as a mesh" in capsys.readouterr().out
+    Image.new("RGB", (2, 2)).save("plain.png")
+    assert run(["reproduce", "plain.png"]) == 3
+    assert "a recipe: the file does not say how it was made" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["scene.json", "--scene", "scene.json"], "--scene: expected a PNG file beside it"),
+        (["none.json"], "could not read the scene 'none.json'"),
+        (["none.png"], "none.png"),
+        (["none.glb"], "none.glb"),
+        (["bad.png"], "expected a PNG file, got 'bad.png'"),
+        (["bad.glb"], "could not read 'bad.glb' as glTF"),
+    ],
+)
+def test_bad_input_gets_one_line(saved: Path, capsys: Capture, arguments: list[str], words: str) -> None:
+    for name in ("bad.png", "bad.glb"):
+        (saved / name).write_bytes(b"glTF\0\0")
+    assert run(["reproduce", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert error.count("\n") == 1
