@@ -40,10 +40,10 @@ def run(*command: object) -> str:
     return output
 
 
-def build(source: Path, kind: str, folder: Path) -> Path:
+def build(source: Path, kind: str, folder: Path, *options: str) -> Path:
     """Build an sdist or a wheel of a source folder."""
     with tempfile.TemporaryDirectory() as name:
-        run(sys.executable, "-m", "build", f"--{kind}", "--outdir", name, source)
+        run(sys.executable, "-m", "build", f"--{kind}", "--outdir", name, *options, source)
         (built,) = Path(name).iterdir()
         return Path(shutil.move(built, folder / built.name))
 
@@ -76,10 +76,7 @@ def build_wheel(sdist: Path, folder: Path, *, kernels: bool) -> Path:
         if not kernels:
             return build(source, "wheel", folder)
         run(sys.executable, ROOT / ".ci" / "compile_kernels.py", source)
-        wheel = build(source, "wheel", Path(name))
-        tags = "--platform-tag", platform_tag()
-        named = run(sys.executable, "-m", "wheel", "tags", "--remove", *tags, wheel).split()[-1]
-        return Path(shutil.move(wheel.with_name(Path(named).name), folder / Path(named).name))
+        return build(source, "wheel", folder, f"-C--build-option=--plat-name={platform_tag()}")
 
 
 def main() -> None:
