@@ -34,7 +34,8 @@ from decals.apps.output import check_output, print_path
 from decals.baking.formats import FORMATS
 from decals.errors import InvalidInput
 from decals.pages.page import SUFFIXES
-from decals.surfaces import MeshCheck, check_mesh, read_mesh
+from decals.surfaces import MeshCheck, check_mesh
+from decals.surfaces.mesh_file import read_objects
 
 LABELS = {
     "vertices": "vertices",
@@ -134,7 +135,7 @@ def export(
     if output is None:
         if not check:
             raise InvalidInput("export: missing -o FILE; or --check, to check a mesh file")
-        _print_checks([check_mesh(*read_mesh(scene), Path(scene).name)])
+        _print_checks([check_mesh(*arrays, name) for name, arrays in read_objects(scene)])
         return
     check_output(output, (*FORMATS, *GRID_FORMATS, *SUFFIXES))
     if output.suffix.lower() in GRID_FORMATS:

@@ -20,13 +20,13 @@ from decals.errors import InvalidMesh
 from decals.surfaces.base_color import checked_color
 from decals.surfaces.dataset_colors import dataset_color, has_colors
 from decals.surfaces.files.content import encoding_of, without_mark
-from decals.surfaces.files.gltf import read_gltf
-from decals.surfaces.files.obj import read_obj
+from decals.surfaces.files.gltf import gltf_objects, read_gltf
+from decals.surfaces.files.obj import obj_objects, read_obj
 from decals.surfaces.files.off import read_off
 from decals.surfaces.files.paint import Paint
 from decals.surfaces.files.ply import read_ply, strip_triangles
 from decals.surfaces.files.stl import read_stl
-from decals.surfaces.files.threemf import read_3mf
+from decals.surfaces.files.threemf import read_3mf, threemf_objects
 from decals.surfaces.mesh_data import MeshData, joined
 from decals.surfaces.triangulate import Polygons, Triangulation, triangulate
 from decals.surfaces.vtk_process import can_isolate, read_isolated
@@ -51,6 +51,13 @@ _POLYGON_READERS: dict[str, Callable[[Path], tuple[Float64Array, Polygons, Paint
 
 _SCENE_READERS = {".3mf": read_3mf, ".glb": read_gltf, ".gltf": read_gltf}
 """Those of files that place meshes in space: they return one mesh with its colours."""
+
+_OBJECT_READERS: dict[str, Callable[[Path], dict[str, MeshData]]] = {
+    ".3mf": threemf_objects,
+    ".glb": gltf_objects,
+    ".gltf": gltf_objects,
+}
+"""Those of the objects in such files, by their names."""
 
 _logger = logging.getLogger(__name__)
 
@@ -89,6 +96,27 @@ def read_mesh(path: str | PathLike[str]) -> MeshArrays:
     ((8, 3), (12, 3))
     """
     return read_mesh_data(path).arrays
+
+
+def read_objects(path: str | PathLike[str]) -> list[tuple[str, MeshArrays]]:
+    """Read the objects of a mesh file: nodes of glTF, objects of 3MF and OBJ files, else the whole file.
+
+    Parameters and errors are those of `read_mesh`.
+    """
+    path = as_path(path, InvalidMesh)
+    whole = read_mesh_data(path)
+    suffix = path.suffix.lower()
+    if suffix in _OBJECT_READERS:
+        parts = _OBJECT_READERS[suffix](path)
+        return [(name, polygon_triangles(*part.arrays, name=name)) for name, part in parts.items()]
+    if suffix == ".obj":
+        points, polygons, _ = read_obj(path)
+        faces = np.split(polygons.corners, np.cumsum(polygons.sizes)[:-1])
+        return [
+            (name, polygon_triangles(points, [faces[row] for row in rows], name=name))
+            for name, rows in obj_objects(path)
+        ]
+    return [(path.name, whole.arrays)]
 
 
 def read_mesh_data(path: str | PathLike[str]) -> MeshData:

@@ -24,6 +24,16 @@ def read_gltf(path: Path) -> MeshData:
     InvalidMesh
         If the file is damaged, refers to what it does not have, or is compressed.
     """
+    return mesh_of([piece for _, pieces in _nodes(path) for piece in pieces])
+
+
+def gltf_objects(path: Path) -> dict[str, MeshData]:
+    """Return the meshes of the nodes of a glTF or GLB file by the names of the nodes; see `read_gltf`."""
+    return {name: mesh_of(pieces) for name, pieces in _nodes(path) if pieces}
+
+
+def _nodes(path: Path) -> list[tuple[str, list[Piece]]]:
+    """Return the pieces of each node of the default scene that has a mesh."""
     with reading(path, "glTF") as notes:
         content = path.read_bytes()
         budget = Budget()
@@ -33,9 +43,9 @@ def read_gltf(path: Path) -> MeshData:
         accessors = Accessors(document, buffers, budget)
         materials = Materials(document, buffers, path.parent, notes)
         scene = _Scene(document, accessors, materials, budget, notes)
-        pieces = [piece for place in placements(document, accessors, notes) for piece in scene.pieces(place)]
+        found = [(place.name, scene.pieces(place)) for place in placements(document, accessors, notes)]
         scene.note_others()
-        return mesh_of(pieces)
+        return found
 
 
 _Key = tuple[int, tuple[float, ...], bool]

@@ -31,6 +31,9 @@ _REFERRED = {b"v": "vertex", b"vt": "texture coordinate", b"vn": "normal"}
 _MATERIAL = (b"mtllib", b"usemtl")
 """Keywords of materials."""
 
+_NAMED = (*_MATERIAL, b"o")
+"""Keywords that names follow."""
+
 _NUMBERS = (*_REFERRED, b"f", b"fo")
 """Keywords that numbers follow, of the lines that are read."""
 
@@ -54,6 +57,15 @@ def read_obj(path: Path) -> tuple[Float64Array, Polygons, Paint]:
         raise refusal(path, "OBJ", error) from error
 
 
+def obj_objects(path: Path) -> list[tuple[str, Int64Array]]:
+    """Return the names of the objects of an OBJ file, and the numbers of the faces of each that has any."""
+    lines = _lines_by_keyword(text_lines(file_bytes(path)))
+    names = [b"", *(line.text.strip() for line in lines[b"o"])]
+    of_face = np.searchsorted([line.number for line in lines[b"o"]], [line.number for line in lines[b"f"]])
+    numbered = ((name, np.flatnonzero(of_face == number)) for number, name in enumerate(names))
+    return [(name.decode("utf-8", "replace") or "unnamed", rows) for name, rows in numbered if len(rows)]
+
+
 def _read(content: bytes, path: Path) -> tuple[Float64Array, Polygons, Paint]:
     texts = text_lines(content)
     lines = _lines_by_keyword(texts)
@@ -75,14 +87,14 @@ def _read(content: bytes, path: Path) -> tuple[Float64Array, Polygons, Paint]:
 def _lines_by_keyword(texts: Sequence[bytes]) -> dict[bytes, list[Line]]:
     """Return the lines of the keywords that are read, without the keywords and without comments.
 
-    Lines of materials stay whole, since names such as "Material #25" are usual.
+    Lines with names stay whole, since names such as "Material #25" are usual.
     """
-    lines: dict[bytes, list[Line]] = {keyword: [] for keyword in (*_REFERRED, b"f", *_MATERIAL, *_FREE_FORM)}
+    lines: dict[bytes, list[Line]] = {keyword: [] for keyword in (*_REFERRED, b"f", *_NAMED, *_FREE_FORM)}
     known = {**lines, b"fo": lines[b"f"]}  # the old name of a face
     for number, text in _whole_lines(texts):
         keyword, _, rest = text.strip().replace(b"\t", b" ").partition(b" ")
         if (found := known.get(keyword)) is not None:
-            found.append(Line(number, rest if keyword in _MATERIAL else rest.partition(b"#")[0]))
+            found.append(Line(number, rest if keyword in _NAMED else rest.partition(b"#")[0]))
     return lines
 
 

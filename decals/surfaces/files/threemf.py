@@ -34,23 +34,28 @@ def read_3mf(path: Path) -> MeshData:
     InvalidMesh
         If the file is damaged, or refers to what it does not have.
     """
-    with reading(path, "3MF") as notes:
-        return _mesh(path, notes)
+    return mesh_of(list(_objects(path).values()))
 
 
-def _mesh(path: Path, notes: Notes) -> MeshData:
-    """Return the mesh of a file."""
-    with Package(path) as package:
+def threemf_objects(path: Path) -> dict[str, MeshData]:
+    """Return the meshes of the objects of a 3MF file by their numbers, each with all its copies."""
+    return {name: mesh_of([piece]) for name, piece in _objects(path).items()}
+
+
+def _objects(path: Path) -> dict[str, Piece]:
+    """Return the objects that a file builds, each with all its copies."""
+    with reading(path, "3MF") as notes, Package(path) as package:
         build = _Build(package, notes)
         _logger.info("%s: the unit is 1 %s", path, build.unit)
-        budget, pieces = Budget(), []
+        budget, pieces = Budget(), {}
         budget.grow(path.stat().st_size)
         for key, matrices in build.places().items():
             mesh = build.mesh(key)
             if mesh is not None:
-                budget.place(len(matrices), mesh, f"object {key[1]}")
-                pieces.append(placed(mesh, np.array(matrices)))
-        return mesh_of(pieces)
+                name = f"object {key[1]}" if key[0] == package.model_part else f"object {key[1]} of {key[0]}"
+                budget.place(len(matrices), mesh, name)
+                pieces[name] = placed(mesh, np.array(matrices))
+        return pieces
 
 
 class _Build:

@@ -118,3 +118,37 @@ def test_what_is_no_volume_is_one_line(saved: Path, capfd: Capture, words: list[
     (line,) = capfd.readouterr().err.strip().splitlines()
     assert says in line
     assert [path.name for path in saved.iterdir()] == ["scene.json"]
+
+
+@pytest.mark.parametrize(
+    ("suffix", "names"),
+    [
+        ("glb", ["node 0", "node 1"]),
+        ("3mf", ["object 3", "object 4"]),
+        ("obj", ["ball", "cube"]),
+        ("ply", ["a.ply"]),
+    ],
+)
+def test_check_lists_each_object_of_a_file(
+    saved: Path, capsys: Capture, suffix: str, names: list[str]
+) -> None:
+    assert run(["export", "scene.json", "-o", f"a.{suffix}", "--colors", "none", "--check"]) == 0
+    written = capsys.readouterr().out.splitlines()
+    assert run(["export", "--check", f"a.{suffix}"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert all(name in lines[0] for name in names), lines[0]
+    if len(names) == 2:
+        assert faces_of(lines) == faces_of(written)
+
+
+def faces_of(lines: list[str]) -> list[str]:
+    return next(line.split()[1:] for line in lines if line.split()[:1] == ["faces"])
+
+
+def test_faces_of_an_obj_file_before_its_first_object_have_no_name(saved: Path, capsys: Capture) -> None:
+    vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+    (saved / "a.obj").write_text(vertices + "f 1 2 3\no first #1\no second\nf 1 2 4\nf -1 -2 -3\n")
+    assert run(["export", "--check", "a.obj"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split() == ["unnamed", "second"]
+    assert faces_of(lines) == ["1", "2"]
