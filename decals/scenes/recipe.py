@@ -109,10 +109,15 @@ def is_plain(value: Any) -> bool:
     if isinstance(value, Mapping):
         return all(map(is_plain, value.values()))
     if is_dataclass(value) and not isinstance(value, type):
-        return is_plain(vars(value))
+        return is_plain(_values(value))
     if isinstance(value, list | tuple):
         return len(value) <= MAX_ITEMS and all(map(is_plain, value))
     return value is None or isinstance(value, str | bool | int | float | np.number | Enum)
+
+
+def _values(record: Any) -> dict[str, Any]:
+    """Return the values of a dataclass, which may have slots."""
+    return {part.name: getattr(record, part.name) for part in fields(record)}
 
 
 def plain(value: Any) -> Any:
@@ -131,5 +136,5 @@ def plain(value: Any) -> Any:
     if isinstance(value, Enum):
         return plain(value.value)
     if is_dataclass(value) and not isinstance(value, type):
-        return plain(vars(value))
+        return plain(_values(value))
     return getattr(value, "__qualname__", None) or describe(value)

@@ -72,7 +72,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}"
         done = subprocess.run([bash, "-c", script], capture_output=True, text=True, check=True)
         return set(done.stdout.split())
 
-    assert complete("implicit-decals", "re") == {"render", "report"}
+    assert complete("implicit-decals", "re") == {"render", "report", "reproduce"}
     assert complete("implicit-decals", "render", "--ca") == {"--camera"}
     assert complete("implicit-decals", "render", "--contact", "") == {"product", "min", "radial", "elastic"}
     assert complete("implicit-decals", "gallery", "sp") == {"sphere", "spanning"}

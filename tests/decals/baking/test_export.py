@@ -236,7 +236,7 @@ def test_the_recipe_is_in_the_extras(tmp_path: Path) -> None:
     decals.export(scene, tmp_path / "a.glb", colors="vertices", resolution=8)
     assert scene.recipe is not None
     extras = read_json(tmp_path / "a.glb")["asset"]["extras"]
-    assert extras["recipe"] == json.loads(json.dumps(vars(scene.recipe)))
+    assert extras["recipe"] == json.loads(json.dumps(scene.recipe.record))
 
 
 def test_hidden_objects_are_left_out(tmp_path: Path) -> None:

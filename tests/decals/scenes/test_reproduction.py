@@ -201,6 +201,7 @@ def test_a_posed_scene_is_refused() -> None:
         ({"a": [1, None, "x"]}, {"a": [1, None, "x"]}, True),
         (Jitter(size=0.5), {"position": 0.0, "size": 0.5, "angle": 0.0}, True),
         (decals.Contact.MIN, 1, True),
+        (decals.rendering.TRANSPARENT, {"top": [0.0] * 4, "bottom": [0.0] * 4}, True),
         (np.cross, "cross", False),
         ([np.cross], ["cross"], False),
     ],
