@@ -29,7 +29,8 @@ PYVISTA_FILES = (
 """The files of `blobtree` that use pyvista; a test checks that they import it late."""
 
 PAGES = "connections.py", "guard.py", "lab.py", "page.py", "panels.py", "sandbox.py", "sessions.py", "view.py"
-EXTRAS = dict.fromkeys(PAGES, "browser")
+RESULTS = "report.py", "results.py", "store.py", "sweep.py", "workers.py"
+EXTRAS = dict.fromkeys(PAGES, "browser") | dict.fromkeys(RESULTS, "experiments")
 """Files that need the packages of an extra, which a command imports late."""
 
 

@@ -12,8 +12,8 @@ from decals.editing import GroupOperands, RemovePrimitive
 from decals.options import described
 
 PACKAGES = [
-    "editing", "errors", "field", "hosts", "images", "index", "pages", "rendering", "scattering", "scenes",
-    "surfaces", "vtk", "window",
+    "editing", "errors", "experiments", "field", "hosts", "images", "index", "pages", "rendering",
+    "scattering", "scenes", "surfaces", "vtk", "window",
 ]  # fmt: skip
 NAMES = [
     "Camera", "Contact", "ContactLaw", "DecalImage", "DecalMaterial", "Decals", "ImageMapping",
@@ -26,6 +26,9 @@ NAMES = [
 ]  # fmt: skip
 OF_PACKAGES = {
     "field": ["MaterialSamples", "Neighbors", "Samples", "Walks"],
+    "experiments": [
+        "Design", "Grid", "LatinHypercube", "Results", "Seeds", "Sobol", "report", "run",
+    ],
     "hosts": ["Changes", "Shader", "ShaderTexture", "Upload"],
     "index": ["DecalEditor", "DecalIndex"],
     "pages": ["Page", "page", "viewer_script"],

@@ -54,9 +54,14 @@ def digest(document: Document) -> str:
         np.array(decals.decals.receivers.tolist(), np.str_),
     ]
     records = decals.arrays["decal_records"].reshape(-1, 4, 4)[decals.numbers]
-    return hashlib.sha256(
-        b"".join([repr(parts).encode(), *map(np.ndarray.tobytes, [*arrays, records])])
-    ).hexdigest()
+    content = [repr(parts).encode(), *(_bytes(array) for array in [*arrays, records])]
+    return hashlib.sha256(b"".join(content)).hexdigest()
+
+
+def _bytes(array: Any) -> bytes:
+    """Return the bytes of an array; a zero has no sign, as equal decals may differ in it."""
+    unsigned = np.where(array == 0, np.zeros_like(array), array) if array.dtype.kind == "f" else array
+    return bytes(unsigned.tobytes())
 
 
 def goes_back_and_forth(session: EditSession) -> None:
