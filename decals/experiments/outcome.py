@@ -2,6 +2,7 @@
 
 import functools
 import json
+import platform
 import sys
 import time
 import traceback
@@ -15,7 +16,7 @@ from decals.errors import ImplicitDecalsError
 from decals.experiments.artefacts import measures_of
 from decals.experiments.design import Trial
 from decals.experiments.values import whole
-from decals.scenes.recipe import Recipe
+from decals.scenes.provenance import checkout, device_text, package_versions
 
 Row = dict[str, Any]
 """Columns of one trial: its parameters, its measures, and `COLUMNS`."""
@@ -55,7 +56,7 @@ def outcome(function: Callable[..., Any], trial: Trial, folder: Path) -> Row:
         Measures and those of `COLUMNS` that a trial knows itself. An exception gives the status ``failed``.
     """
     _forget_peak()
-    row: Row = {"started": datetime.now(UTC).isoformat(timespec="milliseconds"), "provenance": _provenance()}
+    row: Row = {"started": datetime.now(UTC).isoformat(timespec="milliseconds")}
     clock, processor = time.perf_counter(), time.process_time()
     try:
         row |= {"status": "done", "error": None} | measures_of(
@@ -69,14 +70,22 @@ def outcome(function: Callable[..., Any], trial: Trial, folder: Path) -> Row:
         row |= {"status": "failed", "error": f"{text} (line {place.lineno} of {place.name})"}
     row["seconds"] = time.perf_counter() - clock
     row["processor_seconds"] = time.process_time() - processor
+    row["provenance"] = _provenance(_device())
     row["peak_mb"] = _peak() / 2**20
     return row
 
 
 @functools.cache
-def _provenance() -> str:
-    """Return the versions of this process as JSON."""
-    return json.dumps(dict(Recipe.of("trial", seed=0).versions))
+def _provenance(device: str) -> str:
+    """Return versions, checkout, platform and a device as JSON."""
+    made = {"platform": platform.platform(), "device": device_text(device), **checkout()}
+    return json.dumps({**package_versions(), **made})
+
+
+def _device() -> str:
+    """Return the name of the device on which kernels run by default; without kernels, the processor."""
+    warp = sys.modules.get("warp")
+    return "cpu" if warp is None else str(warp.get_device())
 
 
 def _forget_peak() -> None:

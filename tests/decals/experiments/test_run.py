@@ -39,7 +39,10 @@ def test_each_trial_has_the_row_of_its_call(tmp_path: Path, workers: int) -> Non
         assert row["status"] == "done"
         assert row["error"] is None
         assert 0 <= row["seconds"] < 5
-        assert json.loads(row["provenance"])["implicit-decals"] == decals.__version__
+        found = json.loads(row["provenance"])
+        assert found["implicit-decals"] == decals.__version__
+        assert found["device"].startswith(("cpu (", "cuda:"))
+        assert found.get("commit", "0" * 40).isalnum()
     assert len(list((tmp_path / "out" / "rows").iterdir())) == 1
     assert repr(results) == "Results(measured: 6 rows, 0 failed)"
 
