@@ -91,7 +91,7 @@ def defined(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     import linecache
 
     importlib.invalidate_caches()
-    linecache.clearcache()
+    linecache.checkcache(str(tmp_path / "of_a_file.py"))
     return importlib.import_module("of_a_file").f
 
 
