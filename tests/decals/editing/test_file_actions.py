@@ -90,6 +90,7 @@ def test_escape_closes_the_prompt_and_keys_are_keys_again(typist: Typist) -> Non
     assert typist.actions.help_visible
 
 
+@pytest.mark.slow_cases(".obj")
 @pytest.mark.parametrize("suffix", MESH_SUFFIXES)
 def test_export_writes_all_objects(typist: Typist, tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"mesh{suffix}"

@@ -353,6 +353,7 @@ def test_decals_of_links_are_those_that_files_may_have() -> None:
 
 
 @needs_node
+@pytest.mark.slow_cases("1", "2")
 @pytest.mark.parametrize("seed", range(3))
 def test_the_page_finds_nested_decals(seed: int) -> None:
     random = np.random.default_rng(seed)
