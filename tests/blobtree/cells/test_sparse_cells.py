@@ -65,7 +65,7 @@ def test_sparse_and_dense_give_the_same_quads(kinds: str, seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kinds", "count"), [(kinds, 12 if more else 80) for kinds, more in MORE.items()])
+@pytest.mark.parametrize(("kinds", "count"), [(kinds, 10 if more else 60) for kinds, more in MORE.items()])
 def test_sparse_and_dense_give_the_same_quads_over_many_trees(kinds: str, count: int) -> None:
     for tree in random_trees(99, count, depth=5, more=MORE[kinds]):
         assert_same_surface(tree)

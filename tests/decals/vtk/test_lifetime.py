@@ -86,7 +86,7 @@ def test_memory_stays_flat_for_long(plotter: Factory) -> None:
     plotter()
     if not STATUS.exists():
         pytest.skip("this system does not say how large the process is")
-    ours, vtks = grown(60, ours=True), grown(60, ours=False)
+    ours, vtks = grown(32, ours=True), grown(32, ours=False)
     print(f"{ours:.0f} bytes a window with decals, {vtks:.0f} without")
     assert ours < vtks + 30_000
 
