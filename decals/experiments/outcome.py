@@ -12,6 +12,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import warp as wp
+
+from blobtree.device import start_warp
 from decals.errors import ImplicitDecalsError
 from decals.experiments.artefacts import measures_of
 from decals.experiments.design import Trial
@@ -83,9 +86,9 @@ def _provenance(device: str) -> str:
 
 
 def _device() -> str:
-    """Return the name of the device on which kernels run by default; without kernels, the processor."""
-    warp = sys.modules.get("warp")
-    return "cpu" if warp is None else str(warp.get_device())
+    """Return the name of the device on which kernels run by default."""
+    start_warp()
+    return str(wp.get_device())
 
 
 def _forget_peak() -> None:
