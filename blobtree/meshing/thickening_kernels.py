@@ -208,7 +208,7 @@ def find_other_sides(
     span: wp.vec2i,
     distances: wp.array(dtype=wp.float32),
 ) -> None:
-    """Write the distance along a ray at which the surface comes again, NO_SIDE if there is none."""
+    """Write the distance along each ray to the other side of the surface, or NO_SIDE for a ray without it."""
     i = first + wp.tid()
     p = points[i]
     ray = directions[i]

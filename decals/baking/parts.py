@@ -72,7 +72,7 @@ class Part:
     tile_of_face: Int32Array | None = None
 
     def on_tiles(self) -> Iterator[tuple[int, "Part"]]:
-        """Yield the part of each tile, with texture coordinates within [0, 1]; itself if there is one."""
+        """Yield each tile and its part, with texture coordinates within [0, 1]."""
         if self.tile_of_face is None:
             yield 0, self
             return

@@ -48,6 +48,14 @@ def measures_of(returned: Any, taken: Collection[str], folder: Path) -> dict[str
     return {name: _measure(name, value, folder) for name, value in named.items()}
 
 
+def is_artefact(value: Any, folder: Path, suffix: str) -> bool:
+    """Return whether a measure is the path of a file with a suffix, which lies below `ARTEFACTS`."""
+    if not isinstance(value, str) or not value.endswith(suffix):
+        return False
+    path = (folder / value).resolve()
+    return path.is_relative_to((folder / ARTEFACTS).resolve()) and path.is_file()
+
+
 def _measure(name: str, value: Any, folder: Path) -> Any:
     if isinstance(value, np.generic):
         value = value.item()

@@ -118,8 +118,8 @@ def run(
         todo = [key for key in trials if key not in known or (retry and known[key]["status"] != "done")]
         rows = [_first_columns(key, digest, trials[key]) for key in todo]
         work = Work(function, folder, limit, megabytes)
-        sent = [light(trials[key], folder) for key in todo]
-        with _executor(work, sent, count, scheduler, lambda number: store.begin(rows[number])) as ended:
+        chosen = [trials[key] for key in todo]
+        with _executor(work, chosen, count, scheduler, lambda number: store.begin(rows[number])) as ended:
             report("running trials", 0.0)
             for done, (number, row) in enumerate(ended, 1):
                 store.add(whole := rows[number] | row)
@@ -136,9 +136,10 @@ def _executor(
     """Yield the rows of trials, by the executor that the caller chose."""
     with ExitStack() as stack:
         if scheduler is not None and trials:
-            rows = cluster(work, trials, stack.enter_context(connected(scheduler)))
+            client = stack.enter_context(connected(scheduler))
+            rows = cluster(work, [light(trial, work.folder) for trial in trials], client)
         elif workers:
-            rows = processes(work, trials, workers)
+            rows = processes(work, [light(trial, work.folder) for trial in trials], workers)
         else:
             rows = here(work, trials, begin)
         yield stack.enter_context(closing(rows))

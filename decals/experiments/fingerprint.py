@@ -78,18 +78,25 @@ def _installed() -> tuple[Path, ...]:
 
 def _is_users(value: Any) -> bool:
     """Return whether a value is a function or a class of the user's own files."""
-    if not isinstance(value, FunctionType | type) or value.__module__.partition(".")[0] in OURS:
+    module = getattr(value, "__module__", None) or ""  # functions of `exec` have none
+    if not isinstance(value, FunctionType | type) or module.partition(".")[0] in OURS:
         return False
-    file = getattr(sys.modules.get(value.__module__), "__file__", None)
+    file = getattr(sys.modules.get(module), "__file__", None)
     return file is None or not any(Path(file).resolve().is_relative_to(folder) for folder in _installed())
 
 
 def _source(value: Any) -> str:
-    """Return the source without comments and layout; the code where there is no source."""
+    """Return the source without comments and layout; the code where there is no source of its own."""
+    if getattr(value, "__name__", "") == "<lambda>":  # a line may hold several
+        return _bytecode(value)
     try:
         return ast.dump(ast.parse(textwrap.dedent(inspect.getsource(value))))
     except (OSError, TypeError, SyntaxError):
-        return "".join(f"{code.co_code.hex()} {_constants(code)}" for code in _codes(value))
+        return _bytecode(value)
+
+
+def _bytecode(value: Any) -> str:
+    return "".join(f"{code.co_code.hex()} {code.co_names} {_constants(code)}" for code in _codes(value))
 
 
 def _constants(code: CodeType) -> str:

@@ -67,7 +67,7 @@ def outcome(function: Callable[..., Any], trial: Trial, folder: Path) -> Row:
         )
     except ImplicitDecalsError as error:
         row |= {"status": "failed", "error": f"{type(error).__name__}: {error}"}
-    except Exception as error:  # of the user's function, whatever it is
+    except (Exception, SystemExit) as error:  # of the user's function, whatever it is
         place = traceback.extract_tb(error.__traceback__)[-1]
         text = " ".join(f"{type(error).__name__}: {error}".split())
         row |= {"status": "failed", "error": f"{text} (line {place.lineno} of {place.name})"}

@@ -10,6 +10,7 @@ from typing import Any
 
 from blobtree.files import write_atomically
 from decals.errors import MissingPackage
+from decals.experiments.artefacts import is_artefact
 from decals.experiments.results import Results
 
 PICTURES = 24
@@ -111,14 +112,14 @@ def _figure(results: Results, measure: str, parameter: str) -> str:
     values: list[Any] = [group[parameter] for group in groups]
     numeric = all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
     if not numeric:
-        groups, values = groups[:SHOWN_VALUES], [str(value) for value in values[:SHOWN_VALUES]]
+        groups, values = groups[:SHOWN_VALUES], [_plain(str(value)) for value in values[:SHOWN_VALUES]]
     means = [group["mean"] for group in groups]
     errors = [
         [group["mean"] - group["low"] for group in groups],
         [group["high"] - group["mean"] for group in groups],
     ]
     figure = Figure(figsize=(4.8, 3.4), layout="constrained")
-    axes = figure.add_subplot(xlabel=parameter, ylabel=measure)
+    axes = figure.add_subplot(xlabel=_plain(parameter), ylabel=_plain(measure))
     axes.errorbar(values, means, yerr=errors, fmt="o-" if numeric else "o", capsize=3)
     if numeric and min(values) > 0 and max(values) / min(values) >= 100:
         axes.set_xscale("log")
@@ -127,14 +128,19 @@ def _figure(results: Results, measure: str, parameter: str) -> str:
     return _address(drawn.getvalue(), "svg+xml")
 
 
+def _plain(text: str) -> str:
+    """Return a text that Matplotlib does not take for a formula."""
+    return text.replace("$", r"\$")
+
+
 def _pictures(results: Results) -> Iterator[str]:
     """Yield the pictures of each measure side by side."""
     for measure in results.measures:
-        drawn = [row for row in results.rows if str(row.get(measure)).endswith(".png")]
+        drawn = [row for row in results.rows if is_artefact(row.get(measure), results.folder, ".png")]
         if drawn:
             yield f"<h2>{html.escape(measure)}</h2>"
         for row in drawn[:PICTURES]:
-            caption = ", ".join(f"{name} {row[name]}" for name in results.parameters)
+            caption = ", ".join(f"{name} {row.get(name)}" for name in results.parameters)
             address = _address((results.folder / row[measure]).read_bytes(), "png")
             yield _image(address, caption, f"<figcaption>{html.escape(caption)}</figcaption>")
         if len(drawn) > PICTURES:

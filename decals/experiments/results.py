@@ -167,13 +167,16 @@ class Results:
         ]
 
 
+LARGEST = float(np.finfo(np.float64).max)
+
 RESAMPLES = 2000
 """Bootstrap samples of an interval."""
 
 
 def _summary(values: list[Any], confidence: float, seed: int) -> dict[str, Any]:
     """Return the mean of the finite numbers among some values, and its bootstrap interval."""
-    numbers = np.array([v for v in values if isinstance(v, int | float) and np.isfinite(v)], np.float64)
+    finite = [value for value in values if isinstance(value, int | float) and abs(value) <= LARGEST]
+    numbers = np.array(finite, np.float64)
     left_out = len(values) - len(numbers)
     if not len(numbers):
         return {"mean": np.nan, "low": np.nan, "high": np.nan, "count": 0, "left_out": left_out}

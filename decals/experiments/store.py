@@ -6,16 +6,20 @@ atomically. A kill loses at most the rows of trials that had not ended.
 """
 
 import csv
+import errno
 import io
 import json
-from collections.abc import Iterable, Iterator
+import os
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
+import msgspec
+
 from blobtree.errors import UnusableFile
 from blobtree.file_lock import FileLock
-from blobtree.files import replacing, write_atomically
+from blobtree.files import PREFIX, replacing, write_atomically
 from decals.errors import InvalidInput
 from decals.experiments.outcome import Row
 
@@ -24,6 +28,9 @@ FORMAT = 1
 
 SHARD_ROWS = 1000
 """Rows of the journal that become a shard."""
+
+AS_JSON = b"implicit-decals json"
+"""Mark of columns in Parquet whose cells are JSON."""
 
 EXPERIMENT, JOURNAL, RUNNING, LOCK, SHARDS = (
     "experiment.json",
@@ -45,11 +52,13 @@ def described(folder: Path) -> dict[str, Any]:
     try:
         about: dict[str, Any] = json.loads((folder / EXPERIMENT).read_text(encoding="utf-8"))
         newer = about["format"] > FORMAT
+        if not newer:
+            about = msgspec.to_builtins(msgspec.convert(about, _About))
     except FileNotFoundError:
         raise InvalidInput(
             f"{folder}: expected the folder of an experiment, but it has no {EXPERIMENT}"
         ) from None
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError) as error:  # errors of msgspec are ValueError
         raise InvalidInput(f"{folder / EXPERIMENT}: damaged ({error}); choose another folder") from error
     if newer:
         raise InvalidInput(f"{folder}: written by a newer version of implicit-decals; install that version")
@@ -58,11 +67,45 @@ def described(folder: Path) -> dict[str, Any]:
 
 def rows_in(folder: Path) -> Iterator[Row]:
     """Yield the rows of a folder, the oldest first; a trial that ran several times has several."""
-    for shard in sorted((folder / SHARDS).glob("*.*")):
-        with suppress(FileNotFoundError):
-            yield from _parquet_rows(shard) if shard.suffix == ".parquet" else _csv_rows(shard)
-    with suppress(FileNotFoundError):
-        yield from _journal_rows(folder / JOURNAL)
+    for shard in _shards(folder):
+        yield from _checked(shard, _parquet_rows if shard.suffix == ".parquet" else _csv_rows)
+    yield from _checked(folder / JOURNAL, _journal_rows)
+
+
+class _About(msgspec.Struct, rename={"format_": "format"}):
+    """What the file of an experiment holds."""
+
+    format_: int
+    name: str
+    function: str
+    parameters: list[str]
+
+
+def _shards(folder: Path) -> list[Path]:
+    """Return the shards, the oldest first; what a killed writer left has another name."""
+    return sorted((folder / SHARDS).glob("[0-9]*.*"))
+
+
+def _checked(path: Path, read: Callable[[Path], Iterable[Row]]) -> Iterator[Row]:
+    """Yield the rows of a file; none if there is no file.
+
+    Raises
+    ------
+    InvalidInput
+        The file is damaged.
+    """
+    try:
+        yield from map(_checked_row, read(path))
+    except FileNotFoundError:
+        return
+    except (ValueError, OSError, csv.Error) as error:  # errors of pyarrow are ValueError or OSError
+        raise InvalidInput(f"{path}: damaged ({error}); remove the file, and run its trials again") from error
+
+
+def _checked_row(row: Any) -> Row:
+    if not (isinstance(row, dict) and isinstance(row.get("trial"), str) and "status" in row):
+        raise ValueError("a row lacks its trial or its status")
+    return row
 
 
 class Store:
@@ -124,10 +167,12 @@ class Store:
                     f"{self._folder}: holds the experiment {found.get('name')} of {found.get('parameters')}, "
                     f"not {about['name']} of {about['parameters']}; choose another folder"
                 )
-        elif others := [path.name for path in self._folder.iterdir() if path.name not in (SHARDS, LOCK)]:
-            raise InvalidInput(
-                f"{self._folder}: expected an empty folder, but it holds {others[0]}; choose another"
-            )
+            return
+        for path in self._folder.iterdir():
+            if path.name not in (SHARDS, LOCK) and not path.name.startswith(PREFIX):
+                raise InvalidInput(
+                    f"{self._folder}: expected an empty folder, but it holds {path.name}; choose another"
+                )
 
     def begin(self, row: Row) -> None:
         """Note the trial that starts in this process; if it ends the process, `interrupted` returns it."""
@@ -143,14 +188,19 @@ class Store:
     def add(self, row: Row) -> None:
         """Append a row."""
         line = json.dumps(row).encode() + b"\n"
-        self._guarded(lambda: self._journal.write(line))
+        self._guarded(lambda: self._write(line))
         with suppress(FileNotFoundError):
             (self._folder / RUNNING).unlink()
         self._pending += 1
         if self._pending >= SHARD_ROWS:
             self._make_shard()
 
-    def _guarded(self, write: Any) -> None:
+    def _write(self, line: bytes) -> None:
+        """Append a line; a disk that becomes full takes a part of it without an error."""
+        if self._journal.write(line) != len(line):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def _guarded(self, write: Callable[[], object]) -> None:
         try:
             write()
         except OSError as error:
@@ -158,9 +208,9 @@ class Store:
 
     def _make_shard(self) -> None:
         """Move the rows of the journal into a shard; after a kill in between they are in both."""
-        rows = list(_journal_rows(self._folder / JOURNAL))
+        rows = list(_checked(self._folder / JOURNAL, _journal_rows))
         if rows:
-            number = len(list((self._folder / SHARDS).iterdir()))
+            number = 1 + max((int(path.stem) for path in _shards(self._folder)), default=-1)
             _write_shard(self._folder / SHARDS / f"{number:06}", rows)
             self._journal.truncate(0)
         self._pending = 0
@@ -204,15 +254,17 @@ def _write_shard(stem: Path, rows: list[Row]) -> None:
         write_atomically(stem.with_suffix(".csv"), text.getvalue().encode())
         return
 
-    def column(name: str) -> Any:
+    def column(name: str) -> tuple[Any, Any]:
         values = [row.get(name) for row in rows]
         try:
-            return pa.array(values)
-        except (pa.ArrowInvalid, pa.ArrowTypeError):  # numbers and texts in one column
-            return pa.array([None if value is None else json.dumps(value) for value in values])
+            array, metadata = pa.array(values), None
+        except (ValueError, TypeError, OverflowError):  # numbers and texts in one column, or huge numbers
+            array, metadata = pa.array([json.dumps(value) for value in values]), {AS_JSON: b""}
+        return array, pa.field(name, array.type, metadata=metadata)
 
+    arrays, fields = zip(*map(column, _names(rows)), strict=True)
     with replacing(stem.with_suffix(".parquet")) as temporary:
-        parquet.write_table(pa.table({name: column(name) for name in _names(rows)}), temporary)
+        parquet.write_table(pa.table(list(arrays), schema=pa.schema(fields)), temporary)
 
 
 def _parquet_rows(path: Path) -> list[Row]:
@@ -222,7 +274,11 @@ def _parquet_rows(path: Path) -> list[Row]:
         raise InvalidInput(
             f"{path}: reading Parquet needs pyarrow; install implicit-decals[experiments]"
         ) from None
-    rows: list[Row] = parquet.read_table(path).to_pylist()
+    table = parquet.read_table(path)
+    rows: list[Row] = table.to_pylist()
+    for name in [field.name for field in table.schema if AS_JSON in (field.metadata or {})]:
+        for row in rows:
+            row[name] = json.loads(row[name])
     return rows
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from blobtree.files import write_atomically
+from decals.errors import InvalidInput
 from decals.experiments.design import Trial
 
 LARGE = 50_000
@@ -24,9 +25,35 @@ class Stored:
     path: Path
 
 
+def pickled(name: str, value: Any) -> bytes:
+    """Return the pickle of a value; functions of scripts and notebooks need cloudpickle.
+
+    Raises
+    ------
+    InvalidInput
+        The value cannot be pickled; the message begins with `name`.
+    """
+    try:
+        import cloudpickle as pickler
+    except ImportError:
+        pickler = pickle
+    try:
+        return bytes(pickler.dumps(value))
+    except Exception as error:  # pickles fail in many ways
+        advice = (
+            "define functions in a file, or install implicit-decals[experiments]"
+            if pickler is pickle
+            else "leave out what cannot be pickled"
+        )
+        raise InvalidInput(
+            f"{name}: expected what other processes can read ({type(error).__name__}: {error}); {advice}, "
+            "or run the trials in this process"
+        ) from error
+
+
 def stored(content: bytes, folder: Path) -> Path:
     """Write bytes under their digest, unless they are there; return the path."""
-    path = folder / VALUES / f"{hashlib.sha256(content).hexdigest()[:32]}.pickle"
+    path = folder / VALUES / f"{_digest(content)}.pickle"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, content)
@@ -35,19 +62,32 @@ def stored(content: bytes, folder: Path) -> Path:
 
 @functools.lru_cache(maxsize=8)
 def unpickled(path: Path) -> Any:
-    """Return the value of a file, which a process reads once."""
-    return pickle.loads(path.read_bytes())
+    """Return the value of a file of `stored`, which a process reads once.
+
+    Raises
+    ------
+    InvalidInput
+        The content is not that of the name: a pickle of a stranger could run any code.
+    """
+    content = path.read_bytes()
+    if _digest(content) != path.stem:
+        raise InvalidInput(f"{path}: its content was changed; remove the file, and run again")
+    return pickle.loads(content)
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:32]
 
 
 def light(trial: Trial, folder: Path) -> Trial:
     """Return a trial whose large values are files."""
-    return {name: _light(value, folder) for name, value in trial.items()}
+    return {name: _light(name, value, folder) for name, value in trial.items()}
 
 
-def _light(value: Any, folder: Path) -> Any:
+def _light(name: str, value: Any, folder: Path) -> Any:
     if value is None or isinstance(value, bool | int | float | str):
         return value
-    content = pickle.dumps(value)
+    content = pickled(name, value)
     return Stored(stored(content, folder)) if len(content) > LARGE else value
 
 

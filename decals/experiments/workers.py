@@ -24,7 +24,7 @@ from decals._version import __version__
 from decals.errors import InvalidInput, MissingPackage
 from decals.experiments.design import Trial
 from decals.experiments.outcome import Row, outcome
-from decals.experiments.values import stored, unpickled
+from decals.experiments.values import pickled, stored, unpickled
 from decals.validation import describe
 
 Rows = Generator[tuple[int, Row], None, None]
@@ -71,7 +71,7 @@ def here(work: Work, trials: Sequence[Trial], begin: Callable[[int], object]) ->
 
 def processes(work: Work, trials: Sequence[Trial], count: int) -> Rows:
     """Run trials in local processes, each of which keeps its kernels and its OpenGL context."""
-    payload = packed(work)
+    payload = pickled("function", work)
     waiting = deque(range(len(trials)))
     workers = [_Worker(payload) for _ in range(min(count, len(trials)))]
     try:
@@ -116,9 +116,10 @@ class _Worker:
 
     def start(self, number: int, trial: Trial) -> None:
         """Send a trial."""
+        content = pickled("parameters", trial)
         self.number, self.idle, self._began = number, False, time.monotonic()
         with suppress(OSError):  # the process has ended; `poll` finds it
-            self._connection.send_bytes(pickle.dumps(trial))
+            self._connection.send_bytes(content)
 
     def poll(self, limit: float | None) -> tuple[int, Row] | None:
         """Return the row of the trial if it has ended, or end it past its limit."""
@@ -219,32 +220,6 @@ def _one_thread() -> Iterator[None]:
             del os.environ[name]
 
 
-def packed(work: Work) -> bytes:
-    """Return the pickle of a function and its limits; functions of scripts and notebooks need cloudpickle.
-
-    Raises
-    ------
-    InvalidInput
-        The function cannot be pickled.
-    """
-    try:
-        import cloudpickle as pickler
-    except ImportError:
-        pickler = pickle
-    try:
-        return bytes(pickler.dumps(work))
-    except Exception as error:  # pickles fail in many ways
-        advice = (
-            "define it in a file, or install implicit-decals[experiments]"
-            if pickler is pickle
-            else "make it of values that can be pickled"
-        )
-        raise InvalidInput(
-            f"function: expected one that other processes can read, got {describe(work.function)} "
-            f"({type(error).__name__}: {error}); {advice}, or run it in this process"
-        ) from error
-
-
 # -- Dask -----------------------------------------------------------------------------------------------
 
 
@@ -303,7 +278,7 @@ def cluster(work: Work, trials: Sequence[Trial], client: Any) -> Rows:
     """Run trials on the workers of a Dask cluster; the function lies in the folder, which they all read."""
     from dask.distributed import as_completed
 
-    path = stored(packed(work), work.folder)
+    path = stored(pickled("function", work), work.folder)
     waiting, running = deque(range(len(trials))), dict[str, int]()
 
     def submit() -> Any:

@@ -80,7 +80,7 @@ class _Keyword:
 
 
 def _keyword(lines: list[Line]) -> tuple[_Keyword, list[Line]]:
-    """Return what the keyword says, and the lines without it; OFF if there is none."""
+    """Return what the keyword says, and the lines without it; without a keyword, what OFF says."""
     found = next((match for form in _KEYWORDS if lines and (match := form.match(lines[0].text))), None)
     if found is None:
         return _Keyword(), lines

@@ -84,3 +84,13 @@ def rendered(count: int, seed: int) -> float:
     """Draw a scene of 320 × 240 pixels; return the mean of its pixels."""
     scene = decals.cover(Point((0, 0, 0), radius=1.0), count=count, seed=0)
     return float(np.mean(decals.render(scene, size=(320, 240), samples=1))) + 0 * seed
+
+
+def called(f: Any) -> int:
+    """Call a parameter."""
+    return int(f(3))
+
+
+def named(text: str) -> dict[str, Any]:
+    """Texts that look like files and formulas."""
+    return {"path": text, "cost in $": 1.0}

@@ -135,3 +135,14 @@ def test_a_report_shows_measures_pictures_errors_and_versions(tmp_path: Path) ->
     assert "warp-lang" in page
     assert "2 done, 1 failed" in page or "1 failed, 2 done" in page
     assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_texts_that_look_like_pictures_and_formulas_are_texts(tmp_path: Path) -> None:
+    (tmp_path / "secret.png").write_bytes(b"secret")
+    texts = ["none.png", "../secret.png", str(tmp_path / "secret.png"), "$\\frac$", "<script>"]
+    results = run(functions.named, Grid(text=texts), tmp_path / "out", workers=0)
+    report(results, tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text()
+    assert "data:image/png" not in page
+    assert "data:image/svg" in page
+    assert "<script" not in page

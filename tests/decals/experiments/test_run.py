@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import pickle
 import sys
 from functools import partial
 from pathlib import Path
@@ -15,9 +16,12 @@ import decals
 from blobtree import load
 from blobtree.errors import UnusableFile
 from blobtree.file_lock import FileLock
+from blobtree.files import PREFIX
 from decals.errors import Cancelled, InvalidInput
 from decals.experiments import Design, Grid, Results, Seeds, run
 from decals.experiments import store as stores
+from decals.experiments.fingerprint import fingerprint
+from decals.experiments.values import stored, unpickled
 from tests.decals.experiments import functions
 
 DESIGN = Grid(x=[3, 1, 2]) * Seeds(2)
@@ -114,6 +118,14 @@ def test_a_changed_function_runs_again_but_not_for_a_comment(
         assert [row["result"] for row in results.rows] == [(1 + plus) * times, (2 + plus) * times]
 
 
+def test_functions_of_one_line_are_different_ones() -> None:
+    plus, times, again = (lambda x: x + 1), (lambda x: x * 5), (lambda x: x + 1)
+    assert fingerprint(plus) == fingerprint(again) != fingerprint(times)
+    without_source: dict[str, Any] = {}
+    exec("def f(x): return abs(x)\ndef g(x): return len(x)", without_source)
+    assert fingerprint(without_source["f"]) != fingerprint(without_source["g"])
+
+
 def test_failed_trials_run_again_on_request(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = run(functions.with_faults, Grid(x=[0, 2]), tmp_path, workers=0)
     assert [row["x"] for row in first.failed] == [2]
@@ -177,9 +189,84 @@ def test_rows_are_the_same_without_pyarrow(tmp_path: Path, monkeypatch: pytest.M
 
 def test_columns_of_numbers_and_texts_are_kept_in_parquet(tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
-    design = Grid(x=[0, 6])
-    assert [row["m"] for row in run(odd, design, tmp_path, workers=0).rows] == [1, 2.5]
+    design = Grid(x=range(8))
+    expected = [odd(x)["m"] for x in range(8)]
+    assert [row["m"] for row in run(odd, design, tmp_path, workers=0).rows] == expected
     assert [path.suffix for path in (tmp_path / "rows").iterdir()] == [".parquet"]
+
+
+def huge(x: int) -> Any:
+    """Measures that float64 and Parquet do not hold."""
+    return {"n": [10**400, 1, "\ud800"][x]}
+
+
+def test_huge_numbers_and_odd_texts_are_kept(tmp_path: Path) -> None:
+    results = run(huge, Grid(x=range(3)), tmp_path, workers=0)
+    assert [row["n"] for row in results.rows] == [10**400, 1, "\ud800"]
+    (all_,) = results.interval("n")
+    assert (all_["mean"], all_["count"], all_["left_out"]) == (1.0, 1, 2)
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".csv"])
+def test_damaged_files_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str) -> None:
+    if suffix == ".csv":
+        monkeypatch.setitem(sys.modules, "pyarrow", None)
+    run(functions.measured, DESIGN, tmp_path, workers=0)
+    (shard,) = (tmp_path / "rows").iterdir()
+    assert shard.suffix == suffix
+    whole = shard.read_bytes()
+    for content in (b"", whole[:-20]) if suffix == ".parquet" else (b"a,b\n1,2\n", b"\xff\xfe" + whole[2:]):
+        shard.write_bytes(content)
+        with pytest.raises(InvalidInput, match="damaged"):
+            print(Results(tmp_path).rows)
+    shard.write_bytes(whole)
+    for line in ("[]", "{}", "{", '{"trial": 3, "status": "done"}'):
+        (tmp_path / stores.JOURNAL).write_text(line + "\n")
+        with pytest.raises(InvalidInput, match="damaged"):
+            print(Results(tmp_path).rows)
+    (tmp_path / stores.JOURNAL).write_text("")
+    for about in (
+        '{"format": 1}',
+        '{"format": "1"}',
+        "[]",
+        '{"format": 1, "name": 3, "function": "", "parameters": 1}',
+    ):
+        (tmp_path / stores.EXPERIMENT).write_text(about)
+        with pytest.raises(InvalidInput, match="damaged"):
+            Results(tmp_path)
+
+
+def test_files_of_killed_writers_do_no_harm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither a new folder is refused, nor a shard replaced once such a file is gone."""
+    monkeypatch.setattr(stores, "SHARD_ROWS", 2)
+    (tmp_path / f"{PREFIX}left.json").write_text("")
+    (tmp_path / "rows").mkdir()
+    left = tmp_path / "rows" / f"{PREFIX}left.parquet"
+    left.write_text("half a shard")
+    run(functions.measured, Grid(x=[0, 1, 2]), tmp_path, workers=0)
+    left.unlink(missing_ok=True)
+    assert len(run(functions.measured, Grid(x=range(9)), tmp_path, workers=0)) == 9
+
+
+def test_a_changed_pickle_is_not_read(tmp_path: Path) -> None:
+    path = stored(pickle.dumps([1, 2]), tmp_path)
+    assert unpickled(path) == [1, 2]
+    unpickled.cache_clear()
+    path.write_bytes(pickle.dumps(print))
+    with pytest.raises(InvalidInput, match="its content was changed"):
+        unpickled(path)
+
+
+def test_a_function_that_exits_fails_alone(tmp_path: Path) -> None:
+    results = run(lambda x: sys.exit(x), Grid(x=[3]), tmp_path, workers=0)
+    assert results.rows[0]["error"].startswith("SystemExit: 3")
+
+
+@pytest.mark.slow
+def test_functions_are_parameters_of_workers(tmp_path: Path) -> None:
+    pytest.importorskip("cloudpickle")
+    results = run(functions.called, Grid(f=[lambda x: x + 1, lambda x: x * 5]), tmp_path / "out", workers=1)
+    assert sorted(row["result"] for row in results.rows) == [4, 15]
 
 
 def test_values_become_files_by_their_content(tmp_path: Path) -> None:
@@ -256,7 +343,7 @@ def test_wrong_options_are_refused(tmp_path: Path, options: Any, words: str) -> 
 
 def test_unpicklable_functions_are_refused(tmp_path: Path) -> None:
     lock = open(tmp_path / "file", "w")  # noqa: PTH123, SIM115 - any object that cannot be pickled
-    with lock, pytest.raises(InvalidInput, match="function: expected one that other processes can read"):
+    with lock, pytest.raises(InvalidInput, match="function: expected what other processes can read"):
         run(lambda x: lock.write(str(x)), Grid(x=[1]), tmp_path / "out", workers=1)
 
 
