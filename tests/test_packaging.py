@@ -28,10 +28,14 @@ PYVISTA_FILES = (
 )  # fmt: skip
 """The files of `blobtree` that use pyvista; a test checks that they import it late."""
 
-PAGES = "connections.py", "guard.py", "lab.py", "page.py", "panels.py", "sandbox.py", "sessions.py", "view.py"
-RESULTS = "report.py", "results.py", "store.py", "sweep.py", "workers.py"
-EXTRAS = dict.fromkeys(PAGES, "browser") | dict.fromkeys(RESULTS, "experiments")
-"""Files that need the packages of an extra, which a command imports late."""
+EXTRAS = {
+    "apps/commands/sandbox.py": "browser",
+    "apps/commands/sweep.py": "experiments",
+    "apps/lab": "browser",
+    "apps/sandbox": "browser",
+    "decals/experiments": "experiments",
+}
+"""Files and folders that need the packages of an extra, which a command imports late."""
 
 
 @cache
@@ -101,9 +105,17 @@ def names_of(requirements: list[str]) -> set[str]:
     return {re.split(r"[\[>=<]", line)[0] for line in requirements}
 
 
+def extra_packages(path: Path) -> set[str]:
+    """Return the packages that a file may import late, because an extra installs them."""
+    optional = project()["project"]["optional-dependencies"]
+    own = path.relative_to(ROOT)
+    return names_of(
+        [line for part in (own, *own.parents) for line in optional.get(EXTRAS.get(part.as_posix()), ())]
+    )
+
+
 def test_every_imported_distribution_is_a_declared_dependency() -> None:
     declared = names_of(project()["project"]["dependencies"])
-    optional = project()["project"]["optional-dependencies"]
     providers = metadata.packages_distributions()
     for folder in FOLDERS:
         for path in files(folder):
@@ -111,7 +123,7 @@ def test_every_imported_distribution_is_a_declared_dependency() -> None:
                 top = name.split(".")[0]
                 if top in sys.stdlib_module_names or top in FOLDERS.values():
                     continue
-                extra = names_of(optional[EXTRAS[path.name]]) if path.name in EXTRAS else set()
+                extra = extra_packages(path)
                 known = (declared | extra) & set(providers.get(top, ())) or top.replace("_", "-") in extra
                 assert known, f"{path.relative_to(ROOT)} imports {top}"
 
