@@ -70,7 +70,7 @@ gl: | $(BIN)/python
 	@.ci/install-gl $(BIN)/python
 
 clean:  ## Remove all generated files, the environment included
-	rm -rf $(VENV) build dist out *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) build dist out blobtree/compiled *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:

@@ -1,6 +1,7 @@
 """Build the wheel, look into it, and use it from an environment and a folder outside the checkout."""
 
 import os
+import shutil
 import subprocess
 import sys
 import sysconfig
@@ -64,6 +65,14 @@ def check_use(wheel: Path, folder: Path) -> None:
     subprocess.run([python, script, "--kernels", "--drawing"], check=True, cwd=folder)
 
 
+def keep_kernels(wheel: Path) -> None:
+    """Leave the wheel's compiled kernels in the checkout: tests of the same sources compile few others."""
+    shutil.rmtree(ROOT / COMPILED, ignore_errors=True)
+    with zipfile.ZipFile(wheel) as archive:
+        compiled = [name for name in archive.namelist() if name.startswith(COMPILED.as_posix())]
+        archive.extractall(ROOT, compiled)
+
+
 def main() -> None:
     """Build and check the wheel."""
     with tempfile.TemporaryDirectory() as name:
@@ -71,6 +80,7 @@ def main() -> None:
         wheel = build_wheel(build_sdist(folder), folder, kernels=True)
         check_content(wheel)
         check_use(wheel, folder)
+        keep_kernels(wheel)
     print(f"{wheel.name}: complete, and works outside the checkout")
 
 
