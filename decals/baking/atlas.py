@@ -11,11 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from blobtree._typing import Int64Array
 from blobtree.progress import Progress
 from decals.baking.atlas_child import Arrays, atlas, packed, unpacked
+from decals.baking.box_atlas import BoxSides
 from decals.baking.meshes import BakeMesh
 from decals.baking.unwrapped import Unwrapped
 from decals.errors import InvalidMesh
+from decals.surfaces.topology import components
 from decals.surfaces.vtk_process import can_isolate
 from decals.validation import optional_package
 
@@ -35,11 +38,40 @@ EXPECTED_USE = 0.6
 """Part of the texture that charts are expected to cover, for the first estimate of their scale."""
 
 
-def unwrap(meshes: Sequence[BakeMesh], size: int, report: Progress) -> list[Unwrapped]:
+LEVEL_COSINE = 1.0 - 2e-4
+"""Least cosine between neighbours that xatlas may take for parts of one plane; its own is 1 − 1e-4."""
+
+MIN_PLANE_COSINE = float(np.cos(np.radians(15.0)))
+"""Least cosine between faces and their mean normal up to which they are one plane nearly enough."""
+
+
+def bent_planes(mesh: BakeMesh) -> Int64Array:
+    """Return for each face the part of a bent surface that xatlas takes for a plane, or 0, ``int64[m]``.
+
+    xatlas compares the normals of neighbouring faces alone. A ball of 200,000 faces is a plane for it: it
+    crashes, or presses both halves on one place. Parts are cut where the sides of a box meet.
+    """
+    sides = BoxSides.of(mesh)
+    face, side = np.nonzero(sides.neighbors >= 0)
+    links = np.stack([face, sides.neighbors[face, side]], axis=1)
+    links = links[(sides.normals[links[:, 0]] * sides.normals[links[:, 1]]).sum(axis=1) >= LEVEL_COSINE]
+    plane = components(links, len(sides.normals))
+    sums = np.stack([np.bincount(plane, column) for column in sides.normals.T], axis=1)
+    means = sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-30)[:, None]
+    least = np.ones(len(means))
+    np.minimum.at(least, plane, (sides.normals * means[plane]).sum(axis=1))
+    same_side = sides.axis[links[:, 0]] == sides.axis[links[:, 1]]
+    parts = components(links[same_side], len(sides.normals))
+    return np.where(least[plane] < MIN_PLANE_COSINE, parts + 1, 0)
+
+
+def unwrap(
+    meshes: Sequence[BakeMesh], size: int, report: Progress, groups: Sequence[Int64Array] | None = None
+) -> list[Unwrapped]:
     """Return places for all meshes on one texture of ``size`` × ``size`` texels.
 
-    All charts have about the same number of texels per area. Charts do not overlap, but may be mirrored.
-    While xatlas works, ``report`` is called repeatedly; an error that it raises ends the work.
+    All charts have about the same number of texels per area. Charts may be mirrored. A chart has faces of one
+    group. While xatlas works, ``report`` is called repeatedly; an error that it raises ends the work.
 
     Raises
     ------
@@ -55,19 +87,46 @@ def unwrap(meshes: Sequence[BakeMesh], size: int, report: Progress) -> list[Unwr
     scale = 1.0 / np.sqrt(0.5 * np.linalg.norm(np.cross(*sides), axis=1).mean())
     center = corners.mean(axis=(0, 1))
     arrays: list[NDArray[Any]] = []
-    for mesh in meshes:
-        scaled = np.ascontiguousarray((mesh.vertices - center) * scale, np.float32)
-        arrays += [scaled, mesh.faces.astype(np.uint32), np.ascontiguousarray(mesh.normals, np.float32)]
+    pieces = []
+    for number, mesh in enumerate(meshes):
+        scaled = ((mesh.vertices - center) * scale).astype(np.float32)
+        keys = bent_planes(mesh) + (0 if groups is None else groups[number] * (len(mesh.faces) + 1))
+        for chosen in _equal(keys):
+            if keys[chosen[0]]:
+                chosen = _central_first(mesh, chosen)
+            rows, faces = np.unique(mesh.faces[chosen], return_inverse=True)
+            arrays += [scaled[rows], faces.reshape(-1, 3).astype(np.uint32), mesh.normals[rows]]
+            pieces.append((number, chosen, rows))
     texels_per_unit = float(size * np.sqrt(EXPECTED_USE / len(corners)))
-    page, *parts = _atlas(arrays, texels_per_unit, report)
+    page, *parts = _atlas([np.ascontiguousarray(array) for array in arrays], texels_per_unit, report)
+    made = list(zip(pieces, parts[0::3], parts[1::3], parts[2::3], strict=True))
     unwrapped = []
-    for rows, faces, uv in zip(parts[0::3], parts[1::3], parts[2::3], strict=True):
-        places = uv * page * (size / page.max())
-        tiles = np.zeros(len(faces), np.int32)
+    for number, mesh in enumerate(meshes):
+        rows_of_mesh, places, faces_of_mesh, count = [], [], np.empty_like(mesh.faces), 0
+        for (owner, chosen, used), rows, faces, uv in made:
+            if owner == number:
+                rows_of_mesh.append(used[rows.astype(np.int64)])
+                places.append(uv * page * (size / page.max()))
+                faces_of_mesh[chosen] = faces.astype(np.int32) + count
+                count += len(rows)
+        tiles = np.zeros(len(faces_of_mesh), np.int32)
+        joined = np.concatenate(places).astype(np.float32)
         unwrapped.append(
-            Unwrapped(rows.astype(np.int64), faces.astype(np.int32), places.astype(np.float32), tiles)
+            Unwrapped(np.concatenate(rows_of_mesh).astype(np.int64), faces_of_mesh, joined, tiles)
         )
     return unwrapped
+
+
+def _equal(keys: Int64Array) -> list[Int64Array]:
+    """Return the rows of each key, in order."""
+    order = np.argsort(keys, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(keys[order])) + 1)
+
+
+def _central_first(mesh: BakeMesh, chosen: Int64Array) -> Int64Array:
+    """Return faces from the one whose normal is the mean: xatlas projects planes along their first normal."""
+    normals = mesh.normals[mesh.faces[chosen]].sum(axis=1)
+    return np.roll(chosen, -int((normals @ normals.sum(axis=0)).argmax()))
 
 
 def _atlas(arrays: Arrays, texels_per_unit: float, report: Progress) -> Arrays:
@@ -103,6 +162,7 @@ def _atlas(arrays: Arrays, texels_per_unit: float, report: Progress) -> Arrays:
             f"exit code {child.returncode}"
         ]
         raise InvalidMesh(
-            f"xatlas could not unwrap the surface ({reason[0]}); repair the mesh, or bake with vertex colours"
+            f"xatlas could not unwrap the surface ({reason[0]}); repair the mesh, use layout='box', "
+            "or bake with vertex colours"
         )
     return unpacked(answer)

@@ -29,6 +29,39 @@ ANGLES = np.arange(0.0, 90.0, 5.0)
 
 
 @dataclass(frozen=True, eq=False)
+class BoxSides:
+    """Side of a box that sees each face of a mesh.
+
+    Attributes
+    ----------
+    normals : float64[m, 3]
+    doubled : float64[m]
+        Twice the areas.
+    neighbors : int64[m, 3]
+        Face across each side; −1 where there is none.
+    axis : int64[m]
+        Row of `AXES`.
+    """
+
+    normals: Float64Array
+    doubled: Float64Array
+    neighbors: Int64Array
+    axis: Int64Array
+
+    @classmethod
+    def of(cls, mesh: BakeMesh) -> "BoxSides":
+        """Return the sides of a mesh: close to the normals, and alike among neighbours."""
+        faces = mesh.faces.astype(np.int64)
+        corners = mesh.vertices[faces].astype(np.float64)
+        crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        doubled = np.linalg.norm(crosses, axis=1)
+        twins = edge_twins(welded(mesh.vertices)[faces]).reshape(-1, 3).astype(np.int64)
+        neighbors = np.where(twins >= 0, twins // 3, -1)
+        normals = crosses / np.maximum(doubled, 1e-300)[:, None]
+        return cls(normals, doubled, neighbors, _smoothed(normals @ AXES.T, neighbors))
+
+
+@dataclass(frozen=True, eq=False)
 class _Charts:
     """Charts of one mesh in its own units.
 
@@ -82,13 +115,9 @@ def box_atlas(
 
 def _charts(mesh: BakeMesh, group: Int64Array) -> _Charts:
     faces = mesh.faces.astype(np.int64)
-    corners = mesh.vertices[faces].astype(np.float64)
-    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    doubled = np.linalg.norm(crosses, axis=1)
-    twins = edge_twins(welded(mesh.vertices)[faces]).reshape(-1, 3)
-    neighbors = np.where(twins >= 0, twins // 3, -1)
-    cosines = crosses / np.maximum(doubled, 1e-300)[:, None] @ AXES.T
-    axis = _smoothed(cosines, neighbors)
+    sides = BoxSides.of(mesh)
+    axis, neighbors, doubled = sides.axis, sides.neighbors, sides.doubled
+    cosines = sides.normals @ AXES.T
     label = group * len(AXES) + axis
     face, side = np.nonzero((neighbors >= 0) & (label[neighbors] == label[:, None]))
     links = np.stack([face, neighbors[face, side]], axis=1)
@@ -102,8 +131,8 @@ def _charts(mesh: BakeMesh, group: Int64Array) -> _Charts:
     stretch = np.sqrt(np.bincount(chart, doubled) / np.maximum(flat, 1e-300))
     places = _projected(mesh.vertices[rows].astype(np.float64), axis_of_chart[chart_of_row])
     places *= np.minimum(stretch, 1.0 / MIN_COSINE)[chart_of_row, None]
-    places, sides = _turned(places, chart_of_row)
-    return _Charts(rows, copies.reshape(-1, 3), places, chart_of_row, sides)
+    places, rectangles = _turned(places, chart_of_row)
+    return _Charts(rows, copies.reshape(-1, 3), places, chart_of_row, rectangles)
 
 
 def _smoothed(cosines: Float64Array, neighbors: Int64Array) -> Int64Array:

@@ -1,6 +1,6 @@
 """Layouts: how surfaces lie on textures, and which of them has the shortest seams."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -31,7 +31,7 @@ INSET = -0.05
 """Faces are narrower by so many samples where overlaps are looked for, so that neighbours have none."""
 
 MAX_OVERLAP = 1e-4
-"""Part of the texels that lie in two faces of an own layout, up to which it is used."""
+"""Part of the faces that lie over others in an own layout, or one of xatlas, up to which it is used."""
 
 MAX_UNEVENNESS = 2.0
 """Texels along a length, over those in the coarsest tenth of a surface, up to which AUTO takes own ones."""
@@ -76,19 +76,44 @@ def lay_out(
             return boxes
     if tiles > 1:
         raise InvalidScene(f"tiles: expected 1 with layout 'xatlas', got {tiles}; use layout='box' or 'own'")
-    return unwrap(meshes, size, report)
+    made = _without_overlaps(
+        meshes, size, MAX_OVERLAP, report, lambda groups: unwrap(meshes, size, report, groups)
+    )
+    if made is None:
+        raise InvalidMesh(
+            f"layout 'xatlas': parts of the surface lie over others on the texture after {TRIES} tries; "
+            "use a coarser mesh, or bake with vertex colours"
+        )
+    return made
 
 
 def _boxes(meshes: Sequence[BakeMesh], size: int, tiles: int, report: Progress) -> list[Unwrapped] | None:
     """Return a box atlas without overlaps, or None."""
+    padding = 2.0 * gutter_width(size)
+    return _without_overlaps(
+        meshes, size, 0.0, report, lambda groups: box_atlas(meshes, groups, size, tiles, padding)
+    )
+
+
+def _without_overlaps(
+    meshes: Sequence[BakeMesh],
+    size: int,
+    share: float,
+    report: Progress,
+    make: Callable[[list[Int64Array]], list[Unwrapped] | None],
+) -> list[Unwrapped] | None:
+    """Return a layout by groups of faces; those that lie over others become a group of their own.
+
+    None: there is no such layout, or more than a share of the faces lies over others after all tries.
+    """
     groups = [np.zeros(len(mesh.faces), np.int64) for mesh in meshes]
     for number in range(TRIES):
         report(UNWRAPPING, number / TRIES)
-        made = box_atlas(meshes, groups, size, tiles, 2.0 * gutter_width(size))
+        made = make(groups)
         if made is None:
             return None
         over = [_faces_over_others(mesh, part, size) for mesh, part in zip(meshes, made, strict=True)]
-        if not any(map(len, over)):
+        if sum(map(len, over)) <= share * sum(map(len, groups)):
             return made
         for group, faces in zip(groups, over, strict=True):
             group[faces] = number + 1

@@ -1,5 +1,7 @@
 """Layouts of textures: charts keep areas, overlap nowhere, and the shortest seams are chosen."""
 
+import signal
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from decals.baking.texture import Channels, Sheet, bake_texture
 from decals.baking.unwrapped import Unwrapped
 from decals.errors import Cancelled, InvalidMesh
 from decals.surfaces import BaseColor, BaseTexture
+from decals.surfaces.vtk_process import can_isolate
 from tests.decals.baking.glb import (
     BALL,
     Array,
@@ -138,6 +141,87 @@ def textured_grid(offset: float = 0.0, fold: bool = False) -> decals.MeshObject:
         uv[:, 0] = np.abs(uv[:, 0] - 0.5)
     color = BaseColor(coordinates=uv, textures=(BaseTexture("tile"),))
     return decals.MeshObject("plane", plane.points, plane.regular_faces, color)
+
+
+def revolved(radii: Array, heights: Array, sides: int) -> decals.MeshObject:
+    """A surface of revolution with many sides, open at both ends, or closed where a radius is 0."""
+    angle = np.linspace(0.0, 2.0 * np.pi, sides + 1)
+    around = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    points = np.concatenate(
+        [
+            np.pad(radius * around, ((0, 0), (0, 1)), constant_values=height)
+            for radius, height in zip(radii, heights, strict=True)
+        ]
+    )
+    first = (np.arange(len(radii) - 1)[:, None] * (sides + 1) + np.arange(sides)).reshape(-1)
+    lower, upper = (first, first + 1, first + sides + 2), (first, first + sides + 2, first + sides + 1)
+    mesh = pv.PolyData.from_regular_faces(points, np.concatenate([np.stack(lower, 1), np.stack(upper, 1)]))
+    clean: Any = mesh.clean(tolerance=1e-7)
+    return decals.MeshObject("revolved", clean.points, clean.triangulate().regular_faces)
+
+
+def smooth_surface(name: str) -> decals.MeshObject:
+    """A smooth surface whose neighbouring faces have nearly one normal."""
+    t = np.linspace(0.0, 1.0, 300)
+    if name == "tube":
+        return revolved(np.ones(2), np.array([0.0, 2.0]), 1000)
+    if name == "cone":
+        return revolved(np.array([0.0, 1.0]), np.array([0.0, 2.0]), 600)
+    if name == "ball":
+        return revolved(np.sin(np.pi * t), np.cos(np.pi * t), 240)
+    if name == "spiral":
+        surface = spiral()
+        return decals.MeshObject("spiral", surface.subdivide(2).points, surface.subdivide(2).regular_faces)
+    rng = np.random.default_rng(int(name))
+    radii = np.full(len(t), 0.7)
+    for frequency in range(1, 6):
+        radii += rng.uniform(-0.1, 0.1) * np.cos(frequency * np.pi * t + rng.uniform(0.0, 6.0))
+    return revolved(radii, 2.0 * t, int(rng.integers(200, 500)))
+
+
+@pytest.mark.slow_cases("cone", "ball", "spiral", "1", "2")
+@pytest.mark.parametrize("name", ["tube", "cone", "ball", "spiral", "1", "2"])
+def test_xatlas_presses_no_smooth_surface_flat(name: str) -> None:
+    """Neighbours with nearly one normal are a plane for xatlas: it crashes, or halves lie over each other."""
+    need("xatlas")
+    mesh = bake_mesh(smooth_surface(name), resolution=None, creases=False, report=silent)
+    (part,) = lay_out([mesh], SIZE, "xatlas", 1, silent)
+    assert np.array_equal(part.rows[part.faces], mesh.faces)
+    solid, flat = total_areas(mesh, part)
+    density = np.sqrt(np.abs(flat) / solid * solid.sum() / np.abs(flat).sum())
+    assert np.quantile(density, 0.02) > 0.4
+    _, overlaps = Sheet(0, mesh, part, 0).cover(0, SIZE, SIZE, 1, margin=-0.05)
+    assert overlaps <= 1e-4 * len(mesh.faces)
+
+
+@pytest.mark.skipif(not can_isolate(), reason="xatlas has no process of its own here")
+def test_a_crash_of_xatlas_is_an_error_of_ours(monkeypatch: pytest.MonkeyPatch) -> None:
+    need("xatlas")
+    start = subprocess.Popen
+
+    def crashed(*arguments: Any, **options: Any) -> Any:
+        child = start(*arguments, **options)
+        child.send_signal(signal.SIGSEGV)
+        return child
+
+    monkeypatch.setattr(subprocess, "Popen", crashed)
+    with pytest.raises(InvalidMesh, match=r"xatlas could not unwrap the surface \(exit code -11\); repair"):
+        lay_out(bake_meshes(pv.Cube().triangulate()), SIZE, "xatlas", 1, silent)
+
+
+def test_a_surface_that_xatlas_lays_over_itself_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    (mesh,) = bake_meshes(pv.Cube().triangulate())
+    (part,) = lay_out([mesh], SIZE, "box", 1, silent)
+    turned = part.rows[part.faces]  # each face lies where the first one does
+    flat = Unwrapped(
+        turned.reshape(-1),
+        np.arange(3 * len(turned), dtype=np.int32).reshape(-1, 3),
+        np.tile(part.places[part.faces[0]], (len(turned), 1)),
+        part.tile_of_face,
+    )
+    monkeypatch.setattr(layouts_module, "unwrap", lambda *_: [flat])
+    with pytest.raises(InvalidMesh, match="layout 'xatlas': parts of the surface lie over others"):
+        lay_out([mesh], SIZE, "xatlas", 1, silent)
 
 
 def test_own_coordinates_stay_as_they_are(tmp_path: Path) -> None:
