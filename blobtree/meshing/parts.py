@@ -56,6 +56,9 @@ SPARE_SHARE = 1 / 16
 LEAST_CELL = 3e-5
 """Smallest cells, over the longest side of the support; parts that need smaller ones are left out."""
 
+CROSSED_CELLS = 16.0
+"""Cells of a block that a plane through its middle crosses."""
+
 SHEET_GROWTH = 16.0
 """Blocks of the next level in each block that a plate crosses; a tube crosses fewer."""
 
@@ -272,7 +275,9 @@ def mesh_of_parts(
     blocks, walls = first.blocks, first.walls
     needed = walls.sizes if walls is not None else np.empty(0, np.float32)
     if len(needed):
-        first = _sampled(tree, grid_of(fitting_wall_scale(needed, size)), device, report)
+        first = _sampled(
+            tree, grid_of(fitting_wall_scale(needed, size, CROSSED_CELLS * len(blocks))), device, report
+        )
         blocks, walls = first.blocks, first.walls
     elif least_size(blocks.cells, smallest) >= BALL_CELLS * blocks.cells.grid.cell_size:
         return None, _too_thin(tree, smallest)

@@ -10,9 +10,11 @@ base wide, cells are as large as at the strip's inner side.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray
 from blobtree.cells.sparse_cells import SparseCells, build_cells
@@ -49,6 +51,12 @@ LENS_REACH = 2.0
 
 CLIMBS = 3
 """Steps of samples toward the solid, before its thickness is measured."""
+
+NEAR_CELLS = 2.0
+"""Side of bins in cells: the other side of a wall is at most WALL_CELLS away, and so in one beside."""
+
+MAX_BINS = 64
+"""Most bins along a side."""
 
 CROSSED_EDGE: IndexArray = np.array(
     [[(code >> a & 1) != (code >> b & 1) for a, b in EDGES] for code in range(256)]
@@ -143,28 +151,33 @@ class Walls:
             self._samples.append(samples)
 
     def _near_others(self, operands: list[Operand], lines: list[Ends]) -> list[BoolArray]:
-        """Return which lines of each operand lie in a block, or beside one, that another operand crosses.
+        """Return which lines of each operand are near the tree's surface, and near another operand's.
 
         A tool of several primitives counts as another one to itself.
         """
-        grid = self._blocks.cells.grid
-        all_blocks = [
-            np.floor((low - grid.origin) / (4 * grid.cell_size)).astype(np.int64) for low, _ in lines
+        grid, blocks = self._blocks.cells.grid, self._blocks.coordinates
+        lowest, highest = blocks.min(axis=0, initial=1 << 30), blocks.max(axis=0, initial=0)
+        side = max(NEAR_CELLS, 4.0 * float((highest - lowest).max(initial=0) + 1) / MAX_BINS)
+        count = np.maximum(4.0 * (highest - lowest + 1) / side, 0.0).astype(np.int64) + 5
+
+        def bins_of(cells: Float64Array) -> tuple[IndexArray, ...]:
+            return tuple((np.floor((cells - 4 * lowest) / side) + 2.0).clip(0, count - 1).astype(np.int64).T)
+
+        tree = np.zeros(count, bool)
+        for offset in np.ndindex(2, 2, 2):
+            tree[bins_of(4.0 * blocks + 2.0 * np.array(offset) + 1.0)] = True
+        first, last = np.full(count, len(lines)), np.full(count, -1)
+        of_lines = [bins_of((low - grid.origin) / grid.cell_size) for low, _ in lines]
+        for number, at in enumerate(of_lines):
+            first[at], last[at] = np.minimum(first[at], number), number
+        for axis in range(3):
+            tree = _of_neighbors(tree, np.logical_or, axis)
+            first, last = _of_neighbors(first, np.minimum, axis), _of_neighbors(last, np.maximum, axis)
+        shared, alone = tree & (first < last), tree & (first <= last)
+        return [
+            (alone if operand.faces_itself else shared)[at]
+            for operand, at in zip(operands, of_lines, strict=True)
         ]
-        count = np.array([len(blocks) for blocks in all_blocks])
-        owners = np.repeat(np.arange(len(lines)), count)
-        blocks, rows = np.unique(
-            np.concatenate([np.empty((0, 3), np.int64), *all_blocks]), axis=0, return_inverse=True
-        )
-        crossed = np.zeros((len(blocks), len(lines)), bool)
-        crossed[rows.ravel(), owners] = True
-        index, near = _Index(blocks), np.zeros_like(crossed)
-        for offset in np.ndindex(3, 3, 3):
-            beside = index.find(blocks + offset - 1)
-            near[beside >= 0] |= crossed[beside[beside >= 0]]
-        shared = near.sum(axis=1) > 1
-        shared |= near[:, [operand.faces_itself for operand in operands]].any(axis=1)
-        return np.split(shared[rows.ravel()], np.cumsum(count)[:-1])
 
     @property
     def sizes(self) -> Float32Array:
@@ -304,6 +317,15 @@ def _beside_parallel_sides(places: Float32Array, angles: Float32Array, spacing: 
         return np.zeros(len(places), bool)
     reach = LENS_REACH * spacing * float(np.sqrt(len(seeds) / np.pi)) + 2.0 * spacing
     return np.asarray(cKDTree(seeds).query(places)[0] < reach, bool)
+
+
+def _of_neighbors(values: NDArray[Any], pick: np.ufunc, axis: int) -> NDArray[Any]:
+    """Return what `pick` makes of each value of a volume and of its two neighbours along an axis."""
+    along = np.moveaxis(values, axis, 0)
+    result = along.copy()
+    result[1:] = pick(result[1:], along[:-1])
+    result[:-1] = pick(result[:-1], along[1:])
+    return np.moveaxis(result, 0, axis)
 
 
 def _spacing(size: float, level: int) -> float:

@@ -65,8 +65,8 @@ class _Value:
 
     @property
     def tools(self) -> tuple[_Part, ...]:
-        """The parts, as those of a second operand."""
-        return tuple(replace(part, tool=True) for part in self.parts)
+        """The parts, as those of an operand that is removed: what they remove themselves stays."""
+        return tuple(replace(part, tool=not part.tool) for part in self.parts)
 
 
 def removes(operator: Operator) -> bool:
@@ -108,7 +108,8 @@ def operands_of(program: list[Instruction], tape: Tape) -> list[Operand]:
                 whole = _Part(both, left.whole.numbers + right.whole.numbers)
                 operands = ()
                 if removes(operator):
-                    operands = left.parts + right.tools
+                    tools = operator.support is Support.LEFT
+                    operands = left.parts + (right.tools if tools else right.parts)
                 elif left.operands or right.operands:
                     operands = left.parts + right.parts
                 value = _Value(whole, operands)

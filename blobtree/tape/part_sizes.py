@@ -14,6 +14,7 @@ from blobtree.formulas.falloff import RIM
 from blobtree.formulas.skeletons import BALL_CELLS, PLATE_CELLS, TUBE_CELLS, Skeleton
 from blobtree.tape.bounds import field_boxes, primitive_boxes
 from blobtree.tape.model import ImplicitModel
+from blobtree.tape.operands import operands_of
 from blobtree.tape.program import EnterWarp, Run, distinct_placements, influence_radii
 from blobtree.tape.tape import Tape
 
@@ -77,6 +78,14 @@ def has_small_parts(tree: ImplicitModel, size: float) -> bool:
     return bool(least.min() < size * (WARP_MARGIN if has_warps(tree) else 1.0))
 
 
+def has_small_bodies(tree: ImplicitModel, size: float) -> bool:
+    """Do the same for leaves that are not removed from others: small tools leave no thin parts."""
+    operands = operands_of(tree._program, tree.tape)
+    tools = [number for operand in operands if operand.tool for number in operand.numbers]
+    least = np.delete(part_sizes(tree)[0], tools).min(initial=np.inf)
+    return bool(least < size * (WARP_MARGIN if has_warps(tree) else 1.0))
+
+
 def has_warps(tree: ImplicitModel) -> bool:
     """Return True if a warp changes sizes of leaves."""
     return any(isinstance(step, EnterWarp) for step in tree._program)
@@ -99,10 +108,13 @@ def fitting_scale(tree: ImplicitModel, size: float) -> float:
     return _cheapest_scale(size, sizes, lengths**powers, whole)
 
 
-def fitting_wall_scale(walls: Float32Array, size: float) -> float:
-    """Return the factor of `size` with which walls take the fewest cells; `walls` are sizes they need."""
+def fitting_wall_scale(walls: Float32Array, size: float, crossed: float) -> float:
+    """Return the factor of `size` with which walls take the fewest cells; `walls` are sizes they need.
+
+    The surface crosses `crossed` cells of the size.
+    """
     needed = walls.astype(np.float64)
-    return _cheapest_scale(size, needed, (size / needed) ** 2.0, 0.0)
+    return _cheapest_scale(size, needed, (size / needed) ** 2.0, max(crossed - len(needed), 0.0))
 
 
 def _cheapest_scale(size: float, needed: Float64Array, cells: Float64Array, whole: float) -> float:

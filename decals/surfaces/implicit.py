@@ -14,6 +14,7 @@ from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, UNI
 from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
 from blobtree.meshing.polygonize import polygonize_parts, shows_small_parts
+from blobtree.tape.part_sizes import has_small_bodies
 from blobtree.tracing.trace import trace
 from blobtree.validation import point_array
 from decals.errors import InvalidMesh, InvalidScattering
@@ -112,11 +113,12 @@ class ImplicitSurface(Immutable):
                 "its parts may be too small, or cut each other away"
             )
         self._finds_parts = resolution is None
-        self.has_small_parts = self._finds_parts and shows_small_parts(tree, cells, SMALL_PART, device)
-        """True if parts of the tree are small beside it, and the mesh has smaller cells for them."""
+        small = self._finds_parts and shows_small_parts(tree, cells, SMALL_PART, device)
+        self.has_small_parts = small and has_small_bodies(tree, SMALL_PART * _cell_size(tree, cells))
+        """True if parts of the tree are small beside it, not only what is cut out of it."""
         self._coarse = (
             CurvedMesh(coarse, device=device)
-            if self.has_small_parts
+            if small
             else MeshSurface(coarse.vertices, coarse.faces, device=device, orientation=MeshOrientation.KEEP)
         )
         self._max_step = MAX_STEP * _cell_size(tree, cells)

@@ -44,3 +44,17 @@ def test_a_tree_that_only_adds_has_no_operands() -> None:
     tree = (BALL + ROD) | BOX.twist(20.0)
     assert not has_walls(tree._program)
     assert operands_of(tree._program, tree.tape) == []
+
+
+@pytest.mark.parametrize(
+    ("tree", "tools"),
+    [
+        (BALL - ROD - BOX, ["Box", "Segment"]),
+        (BALL & (ROD + BOX), []),
+        ((BALL + ROD) - (BOX | NEAR), ["Box"]),
+        (BALL - (BOX - ROD), ["Box"]),
+    ],
+)
+def test_tools_are_what_is_removed_and_stays_removed(tree: Node, tools: list[str]) -> None:
+    operands = operands_of(tree._program, tree.tape)
+    assert sorted(type(operand.leaf).__name__ for operand in operands if operand.tool) == tools
