@@ -19,6 +19,7 @@ from .baking.bake import bake
 from .baking.displace import displace
 from .baking.export import export
 from .errors import ImplicitDecalsError
+from .field.batch import evaluate_batch
 from .field.evaluate import evaluate
 from .field.law import ContactLaw, define_contact
 from .field.mapping import ImageMapping
@@ -72,6 +73,7 @@ __all__ = [
     "editing",
     "errors",
     "evaluate",
+    "evaluate_batch",
     "experiments",
     "export",
     "field",

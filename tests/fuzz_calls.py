@@ -124,6 +124,10 @@ def call_table() -> Calls:
         "index": (DecalIndex.build, {"positions": spots.positions, "influence": spots.influence}),
         "index of": (DecalIndex.of, {"decals": spots}),
         "evaluate": (decals.evaluate, {"decals": spots, "points": points, "normals": directions}),
+        "evaluate_batch": (
+            decals.evaluate_batch,
+            {"sets": [spots, spots[:1]], "points": points, "normals": directions},
+        ),
         "bounds_of": (bounds_of, {"objects": [item]}),
         "Camera": (decals.Camera, {"position": (0, 0, 4), "target": origin, "up": (0, 1, 0), "fov": 30}),
         "framing": (decals.Camera.framing, {"bounds": item.bounds, "direction": axis, "aspect": 1.0}),

@@ -75,7 +75,8 @@ def image_jacobians(
             ends.append(np.where(alike[:, None], shifted, points).astype(np.float64))
             images.append(np.where(alike[:, None], uv, places).astype(np.float64))
         known &= same[0] | same[1]
-        ways[k] = ends[0] - ends[1]
+        with np.errstate(invalid="ignore"):  # points that are not finite have no owner
+            ways[k] = ends[0] - ends[1]
         changes[k] = images[0] - images[1]
     return np.where(known[:, None, None], _solved(ways, changes), np.nan)
 

@@ -72,6 +72,35 @@ def push_at(
     return wp.clamp((distance / end - distance) / remaining, 0.0, 1.0) if end < 1.0 else 0.0
 
 
+@wp.func
+def write_neighbors(
+    q: wp.vec3,
+    n_q: wp.vec3,
+    contact: wp.int32,
+    index: IndexedDecals,
+    owner: wp.int32,
+    offset: wp.int32,
+    decals: wp.array(dtype=wp.int32),
+    fields: wp.array(dtype=wp.float32),
+    pushes: wp.array(dtype=wp.float32),
+) -> wp.int32:
+    """Return the number of decals with a field at q; from an offset on, also write them, if it is not −1."""
+    count = wp.int32(0)
+    for level in range(index.level_count):
+        span = cell_range(q, level, index)
+        for j in range(span[0], span[1]):
+            decal = index.ids[j]
+            field = field_at(q, n_q, decal, index)
+            if field > 0.0:
+                if offset >= 0:
+                    decals[offset + count] = decal
+                    fields[offset + count] = field
+                    if owner != NO_OWNER:
+                        pushes[offset + count] = push_at(q, n_q, owner, decal, contact, index)
+                count += 1
+    return count
+
+
 @wp.kernel
 def list_neighbors(
     first: wp.int32,
@@ -88,19 +117,8 @@ def list_neighbors(
 ):
     """Count the decals with a field at each point; with offsets, also write them, their fields and pushes."""
     i = first + wp.tid()
-    q = points[i]
+    offset = wp.int32(-1)
+    if offsets.shape[0] > 0:
+        offset = offsets[i]
     n_q = wp.normalize(normals[i])
-    count = wp.int32(0)
-    for level in range(index.level_count):
-        span = cell_range(q, level, index)
-        for j in range(span[0], span[1]):
-            decal = index.ids[j]
-            field = field_at(q, n_q, decal, index)
-            if field > 0.0:
-                if offsets.shape[0] > 0:
-                    decals[offsets[i] + count] = decal
-                    fields[offsets[i] + count] = field
-                    if owners[i] != NO_OWNER:
-                        pushes[offsets[i] + count] = push_at(q, n_q, owners[i], decal, contact, index)
-                count += 1
-    counts[i] = count
+    counts[i] = write_neighbors(points[i], n_q, contact, index, owners[i], offset, decals, fields, pushes)

@@ -94,6 +94,37 @@ def sample_points(
         fields[i] = 1.0 - image[2]
 
 
+@wp.func
+def color_at(
+    q: wp.vec3,
+    n_q: wp.vec3,
+    topmost: wp.int32,
+    topmost_uv: wp.vec2,
+    is_known: wp.bool,
+    contact: wp.int32,
+    index: IndexedDecals,
+    extents: wp.array(dtype=wp.vec3i),
+    texels: wp.array(dtype=wp.vec4),
+) -> wp.vec4:
+    """Return the colour of all decals at q, from the topmost down, whose image coordinates may be known."""
+    owner = wp.int32(topmost)
+    known = wp.bool(is_known)
+    color = wp.vec4(0.0, 0.0, 0.0, 0.0)
+    while owner != NO_OWNER and color[3] < OPAQUE_ALPHA:
+        place = topmost_uv
+        if not known:
+            image = image_point(q, n_q, owner, contact, index)
+            place = wp.vec2(image[0], image[1])
+        color += (1.0 - color[3]) * decal_color(q, n_q, owner, place, index, extents, texels)
+        if not index.layered:
+            break
+        known = False
+        rank = rank_of(owner, index.records)
+        number = next_number_below(owner, index.records)
+        owner = owner_below(q, n_q, rank, number, contact, index)
+    return color
+
+
 @wp.kernel
 def color_points(
     first: wp.int32,
@@ -112,27 +143,13 @@ def color_points(
     The topmost ones and their image coordinates are those of `sample_points`, or found if there are none.
     """
     i = first + wp.tid()
-    q = points[i]
     n_q = wp.normalize(normals[i])
     known = owners.shape[0] > 0
     owner = wp.int32(NO_OWNER)
+    place = wp.vec2(0.0, 0.0)
     if known:
         owner = owners[i]
-    if not known:
-        owner = owner_at(q, n_q, contact, index)
-    color = wp.vec4(0.0, 0.0, 0.0, 0.0)
-    while owner != NO_OWNER and color[3] < OPAQUE_ALPHA:
-        place = wp.vec2(0.0, 0.0)
-        if known:
-            place = uv[i]
-        else:
-            image = image_point(q, n_q, owner, contact, index)
-            place = wp.vec2(image[0], image[1])
-        color += (1.0 - color[3]) * decal_color(q, n_q, owner, place, index, extents, texels)
-        if not index.layered:
-            break
-        known = False
-        rank = rank_of(owner, index.records)
-        number = next_number_below(owner, index.records)
-        owner = owner_below(q, n_q, rank, number, contact, index)
-    colors[i] = color
+        place = uv[i]
+    else:
+        owner = owner_at(points[i], n_q, contact, index)
+    colors[i] = color_at(points[i], n_q, owner, place, known, contact, index, extents, texels)

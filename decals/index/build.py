@@ -2,14 +2,18 @@
 
 The cells of all decals are listed in draw order. Equal cells claim the same slot of a temporary hash table. A
 stable sort by slot collects the decals of each cell. The cells then move to a table that fits their number.
+
+The indices of many sets of decals are built at once. Each set has the levels, the table and the lists that it
+would have alone; the arrays of all sets lie one after the other.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from blobtree._typing import BoolArray, Int64Array
 from blobtree.kernels import loaded
 from decals.index import build_kernels as kernels
 from decals.index.decal_cells import EMPTY, EXPONENT_OF_ONE, EXPONENTS, NO_FLOOR, NO_PARITY
@@ -37,142 +41,207 @@ class IndexArrays(NamedTuple):
     floor: int
 
 
+class BatchArrays(NamedTuple):
+    """Arrays of the indices of k sets on a device.
+
+    Rows ``level_starts[i]:level_starts[i + 1]`` of the levels are those of set i, as slots of the table.
+    Heads in the table count from the beginning of all lists.
+    """
+
+    levels: Any
+    level_starts: Int64Array
+    table: Any
+    table_starts: Int64Array
+    ids: Any
+    parities: NDArray[np.int32]
+    floors: NDArray[np.int32]
+
+
 def build_index(positions: Any, influence: Any, ranks: Any) -> IndexArrays:
     """Build the index of decals whose arrays (vec3, float32, int32) lie on one device."""
-    return _Builder(positions, influence, ranks).build()
+    arrays = build_indices(positions, influence, ranks, np.array([0, len(positions)]))
+    return IndexArrays(
+        arrays.levels, arrays.table, arrays.ids, int(arrays.parities[0]), int(arrays.floors[0])
+    )
+
+
+def build_indices(positions: Any, influence: Any, ranks: Any, starts: Int64Array) -> BatchArrays:
+    """Build the indices of k sets of decals, whose arrays lie on one device, one set after the other.
+
+    The decals of set i are ``starts[i]:starts[i + 1]``. Lists hold their numbers in their set.
+    """
+    return _Builder(positions, influence, ranks, starts).build()
 
 
 class _Sizes(NamedTuple):
-    """Cells of each decal (exponent, number, running sum), and the range of ranks of each exponent."""
+    """Cells of each decal (exponent, number, running sum), and of each set the ranks of each exponent."""
 
-    parity: int
-    floor: int
+    parities: NDArray[np.int32]
+    floors: NDArray[np.int32]
     exponents: Any
     counts: Any
     ends: Any
-    cells: int
+    cells: Int64Array
     lowest: NDArray[np.int32]
     highest: NDArray[np.int32]
+    used: BoolArray
+    """True for each exponent in use by a set, one for each of its levels: bool[k, EXPONENTS]."""
+    levels: Int64Array
+    """Number of levels of each set."""
 
-    @property
-    def used(self) -> NDArray[np.int64]:
-        """Exponents in use, one for each level."""
-        return np.flatnonzero(self.lowest != INT32.max)
+    def cheaper(self, other: "_Sizes") -> BoolArray:
+        """Return True for each set that costs less than in other sizes.
 
-    @property
-    def cost(self) -> tuple[int, int]:
-        """Cost for comparison: number of levels (time of each look-up), then cells (memory)."""
-        return len(self.used), self.cells
+        The number of levels counts first (time of each look-up), then that of cells (memory).
+        """
+        fewer_cells = (self.levels == other.levels) & (self.cells < other.cells)
+        less: BoolArray = (self.levels < other.levels) | fewer_cells
+        return less
 
 
 class _Builder:
-    def __init__(self, positions: Any, influence: Any, ranks: Any) -> None:
-        self.positions, self.influence, self.ranks = positions, influence, ranks
-        self.device, self.count = positions.device, len(positions)
+    def __init__(self, positions: Any, influence: Any, ranks: Any, starts: Int64Array) -> None:
+        self.positions, self.influence, self.ranks, self.starts = positions, influence, ranks, starts
+        self.device, self.count, self.set_count = positions.device, len(positions), len(starts) - 1
+        self.sizes_of_sets, self.several = np.diff(starts), self.set_count > 1
 
-    def build(self) -> IndexArrays:
+    def build(self) -> BatchArrays:
         if not self.count:
-            nothing = wp.zeros(0, dtype=wp.vec4, device=self.device)
-            return IndexArrays(nothing, self.empty_table(1), self.empty_ints(0), NO_PARITY, NO_FLOOR)
+            alone = np.full(self.set_count, NO_PARITY, np.int32), np.full(self.set_count, NO_FLOOR, np.int32)
+            return BatchArrays(
+                wp.zeros(0, dtype=wp.vec4, device=self.device),
+                np.zeros(self.set_count + 1, np.int64),
+                self.empty_table(self.set_count),
+                np.arange(self.set_count + 1),
+                self.empty_ints(0),
+                *alone,
+            )
+        self.sets = self.ints(np.repeat(np.arange(self.set_count), self.sizes_of_sets))
         order = self.drawing_order()
         sizes = self.choose_sizes(order)
         levels, level_of = _levels(sizes)
-        keys, owners = (
-            wp.empty(sizes.cells, dtype=wp.vec3i, device=self.device),
-            self.empty_ints(2 * sizes.cells),
-        )
-        numbers: Any = wp.array(level_of, dtype=wp.int32, device=self.device)
-        self.launch(
-            kernels.list_cells,
-            self.count,
-            [self.positions, self.influence, order, sizes.exponents, numbers, sizes.ends, sizes.counts],
-            [keys, owners],
-        )
-        table, ids = self.build_lists(keys, owners)
-        numbers = wp.array(levels, dtype=wp.vec4, device=self.device)
-        return IndexArrays(numbers, table, ids, sizes.parity, sizes.floor)
+        cells = int(sizes.cells.sum())
+        keys, owners = wp.empty(cells, dtype=wp.vec3i, device=self.device), self.empty_ints(2 * cells)
+        inputs = [self.positions, self.influence, order, self.sets, sizes.exponents, self.ints(level_of)]
+        self.launch(kernels.list_cells, self.count, [*inputs, sizes.ends, sizes.counts], [keys, owners])
+        table, table_starts, ids = self.build_lists(keys, owners)
+        rows: Any = wp.array(levels, dtype=wp.vec4, device=self.device)
+        level_starts = starts_of(sizes.levels)
+        return BatchArrays(rows, level_starts, table, table_starts, ids, sizes.parities, sizes.floors)
 
     def choose_sizes(self, order: Any) -> "_Sizes":
         """Return the sizes with the fewest levels, shared in pairs if that does not need too many cells.
 
         A few small decals use the cells of larger ones first.
         """
-        best = self.sizes(order, NO_PARITY, NO_FLOOR)
-        floor = self.floor_of(best, order)
-        if floor != NO_FLOOR:
-            best = self.sizes(order, NO_PARITY, floor)
-        used = best.used - EXPONENT_OF_ONE
+        alone = np.full(self.set_count, NO_PARITY, np.int32)
+        best = self.sizes(order, alone, np.full(self.set_count, NO_FLOOR, np.int32))
+        floors = self.floors_of(best, order)
+        if (floors != NO_FLOOR).any():
+            best = self.sizes(order, alone, floors)
+        used, parities = best.used, alone
         for parity in (0, 1):
-            if len(np.unique(used - ((used & 1) != parity))) < len(best.used):
-                other = self.sizes(order, parity, floor)
-                if other.cells <= MAX_AVERAGE_CELLS * self.count and other.cost < best.cost:
-                    best = other
+            shared = np.where(_shared_levels(used, parity) < best.levels, parity, parities)
+            if (shared != parities).any():
+                other = self.sizes(order, shared.astype(np.int32), floors)
+                fits = other.cells <= MAX_AVERAGE_CELLS * self.sizes_of_sets
+                parities = np.where(fits & other.cheaper(best), shared, parities).astype(np.int32)
+                best = other if (parities == shared).all() else self.again(order, best, parities)
         return best
 
-    def floor_of(self, sizes: "_Sizes", order: Any) -> int:
-        """Return the largest exponent that a few smaller decals can share; NO_FLOOR for none.
+    def again(self, order: Any, sizes: "_Sizes", parities: NDArray[np.int32]) -> "_Sizes":
+        """Return sizes of other parities; the same if they are those of `sizes`."""
+        same = np.array_equal(parities, sizes.parities)
+        return sizes if same else self.sizes(order, parities, sizes.floors)
+
+    def floors_of(self, sizes: "_Sizes", order: Any) -> NDArray[np.int32]:
+        """Return for each set the largest exponent that a few smaller decals can share; NO_FLOOR for none.
 
         Each level costs a look-up at every point. A decal in larger cells than its own costs one more
         candidate at the few points in these.
         """
-        used = sizes.used - EXPONENT_OF_ONE
-        if len(used) < 2:
-            return NO_FLOOR
-        exponents = sizes.exponents.numpy()
-        for exponent in used[:0:-1].tolist():
-            smaller = np.flatnonzero(exponents < exponent)
-            if MIN_LARGER * len(smaller) > np.count_nonzero(exponents == exponent):
-                continue
-            rows = order.numpy()[smaller]
-            cells = np.floor(self.positions.numpy()[rows] / 2.0**exponent)
-            if np.unique(cells, axis=0, return_counts=True)[1].max() <= MAX_SMALLER:
-                return int(exponent)
-        return NO_FLOOR
+        floors = np.full(self.set_count, NO_FLOOR, np.int32)
+        several = np.flatnonzero(sizes.levels > 1)
+        if not len(several):
+            return floors
+        exponents, rows, positions = sizes.exponents.numpy(), order.numpy(), self.positions.numpy()
+        for number in several:
+            part = slice(*self.starts[number : number + 2])
+            floors[number] = _floor_of(exponents[part], positions[rows[part]])
+        return floors
 
-    def sizes(self, order: Any, parity: int, floor: int) -> "_Sizes":
+    def sizes(self, order: Any, parities: NDArray[np.int32], floors: NDArray[np.int32]) -> "_Sizes":
         exponents, counts, ends = (self.empty_ints(self.count) for _ in range(3))
-        lowest = self.filled(EXPONENTS, INT32.max)
-        highest = self.filled(EXPONENTS, INT32.min)
+        lowest = self.filled(self.set_count * EXPONENTS, INT32.max)
+        highest = self.filled(self.set_count * EXPONENTS, INT32.min)
+        inputs = [self.positions, self.influence, self.ranks, order, self.sets]
         self.launch(
             kernels.measure_decals,
             self.count,
-            [self.positions, self.influence, self.ranks, order, parity, floor],
+            [*inputs, self.ints(parities), self.ints(floors)],
             [exponents, counts, lowest, highest],
         )
         wp.utils.array_scan(counts, ends, inclusive=True)
-        cells = int(ends[self.count - 1 :].numpy()[0])
-        return _Sizes(parity, floor, exponents, counts, ends, cells, lowest.numpy(), highest.numpy())
+        if self.several:
+            cells = np.diff(np.concatenate([[0], ends.numpy()])[self.starts])
+        else:  # without a copy of all sums from the device
+            cells = ends[self.count - 1 :].numpy().astype(np.int64)
+        low, high = (array.numpy().reshape(-1, EXPONENTS) for array in (lowest, highest))
+        used = low != INT32.max
+        return _Sizes(parities, floors, exponents, counts, ends, cells, low, high, used, used.sum(axis=1))
 
     def drawing_order(self) -> Any:
-        """Return the numbers of the decals in draw order."""
+        """Return the numbers of the decals in draw order, set after set."""
         keys, order = self.empty_ints(2 * self.count), self.empty_ints(2 * self.count)
         self.launch(kernels.number_decals, self.count, [self.ranks], [keys, order])
         wp.utils.radix_sort_pairs(keys, order, self.count)
+        if self.several:
+            self.launch(kernels.number_sets, self.count, [order, self.sets], [keys])
+            wp.utils.radix_sort_pairs(keys, order, self.count)
         return order
 
-    def build_lists(self, keys: Any, owners: Any) -> tuple[Any, Any]:
-        """Return the table and lists of the cells of all decals."""
+    def build_lists(self, keys: Any, owners: Any) -> tuple[Any, Int64Array, Any]:
+        """Return the tables of the cells of all decals, where that of each set begins, and the lists."""
         entries = len(keys)
         scratch = 1 << (entries + entries // 4).bit_length()
         claims, slots = self.filled(scratch, EMPTY), self.empty_ints(2 * entries)
-        sizes, used, numbers, heads = (self.filled(scratch, 0) for _ in range(4))
-        self.launch(kernels.claim_slots, entries, [keys, scratch - 1, claims], [slots, sizes])
-        self.launch(kernels.mark_used, scratch, [sizes], [used])
+        sizes, used, numbers, heads = (self.zeros(scratch) for _ in range(4))
+        holders = self.zeros(scratch if self.several else 0)
+        counts, starts = self.zeros(self.set_count), self.ints(self.starts[:-1])
+        self.launch(
+            kernels.claim_slots,
+            entries,
+            [keys, owners, self.sets, self.several, scratch - 1, claims],
+            [slots, sizes],
+        )
+        self.launch(
+            kernels.mark_used, scratch, [claims, owners, self.sets, self.several], [used, holders, counts]
+        )
         wp.utils.array_scan(used, numbers, inclusive=True)
-        cells = int(numbers[scratch - 1 :].numpy()[0])
+        found = counts if self.several else numbers[scratch - 1 :]
+        cells = found.numpy().astype(np.int64)
         wp.utils.radix_sort_pairs(slots, owners, entries, end_bit=max(1, scratch.bit_length() - 1))
-        ids = self.empty_ints(entries + cells)
-        self.launch(kernels.write_lists, entries, [slots, owners, sizes, numbers], [heads, ids])
-        size = table_size(cells)
-        table, taken = self.empty_table(size), self.filled(size, 0)
-        self.launch(kernels.fill_table, scratch, [claims, keys, heads, size - 1], [taken, table])
-        return table, ids
+        ids = self.empty_ints(entries + int(cells.sum()))
+        inputs = [slots, owners, sizes, numbers, self.sets, self.several, starts]
+        self.launch(kernels.write_lists, entries, inputs, [heads, ids])
+        tables = starts_of([table_size(count) for count in cells.tolist()])
+        table, taken = self.empty_table(int(tables[-1])), self.zeros(int(tables[-1]))
+        inputs = [claims, keys, holders, heads, self.ints(tables)]
+        self.launch(kernels.fill_table, scratch, inputs, [taken, table])
+        return table, tables, ids
 
     def launch(self, kernel: Any, count: int, inputs: list[Any], outputs: list[Any]) -> None:
         wp.launch(loaded(kernel, self.device), count, inputs, outputs, device=self.device)
 
+    def ints(self, values: NDArray[Any]) -> Any:
+        numbers, copy = np.asarray(values, np.int32).ravel(), not self.device.is_cpu
+        return wp.array(numbers, dtype=wp.int32, device=self.device, copy=copy)
+
     def empty_ints(self, count: int) -> Any:
         return wp.empty(count, dtype=wp.int32, device=self.device)
+
+    def zeros(self, count: int) -> Any:
+        return wp.zeros(count, dtype=wp.int32, device=self.device)
 
     def empty_table(self, slots: int) -> Any:
         return wp.full(slots, wp.vec4i(EMPTY), dtype=wp.vec4i, device=self.device)
@@ -181,16 +250,42 @@ class _Builder:
         return wp.full(count, value, dtype=wp.int32, device=self.device)
 
 
+def starts_of(counts: ArrayLike) -> Int64Array:
+    """Return where each of several parts begins, and the end."""
+    return np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.int64)
+
+
 def table_size(cells: int) -> int:
     """Return the size of a table for this many cells: a power of two, at most half full."""
     return 1 << (2 * cells).bit_length()
 
 
+def _shared_levels(used: BoolArray, parity: int) -> Int64Array:
+    """Return the number of levels of each set if sizes of the other parity share the next smaller one."""
+    shared = used.copy()
+    other = np.arange(EXPONENTS) % 2 != parity
+    shared[:, :-1] |= used[:, 1:] & other[1:]
+    shared[:, other] = False
+    counts: Int64Array = shared.sum(axis=1)
+    return counts
+
+
+def _floor_of(exponents: NDArray[np.int32], positions: NDArray[np.float32]) -> int:
+    """Return the floor of one set with several exponents; arrays are in draw order."""
+    for exponent in np.unique(exponents)[:0:-1].tolist():
+        smaller = exponents < exponent
+        if MIN_LARGER * np.count_nonzero(smaller) > np.count_nonzero(exponents == exponent):
+            continue
+        cells = np.floor(positions[smaller] / 2.0**exponent)
+        if np.unique(cells, axis=0, return_counts=True)[1].max() <= MAX_SMALLER:
+            return int(exponent)
+    return NO_FLOOR
+
+
 def _levels(sizes: _Sizes) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """Return the levels, and the level of each exponent."""
+    """Return the levels of all sets, and of each set the level of each exponent."""
     used = sizes.used
-    width = np.exp2(used.astype(np.float64) - EXPONENT_OF_ONE)
-    level_of = np.full(EXPONENTS, EMPTY, np.int32)
-    level_of[used] = np.arange(len(used))
+    width = np.exp2(np.nonzero(used)[1].astype(np.float64) - EXPONENT_OF_ONE)
+    level_of = np.where(used, np.cumsum(used, axis=1) - 1, EMPTY).astype(np.int32)
     columns = [1.0 / width, width, sizes.lowest[used], sizes.highest[used]]
     return np.column_stack(columns).astype(np.float32), level_of

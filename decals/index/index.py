@@ -108,7 +108,7 @@ class DecalIndex:
         check_range("influence", reach, 0.0, MAX_INFLUENCE)
         order = np.full(len(centres), ranks) if np.ndim(ranks) == 0 else ranks
         order = whole_array("ranks", order, len(centres), low=0, high=MAX_RANK, default=DEFAULT_RANK)
-        arrays = build_index(*_device_arrays(centres, reach, order, known_device("cpu")))
+        arrays = build_index(*device_arrays(centres, reach, order, known_device("cpu")))
         lists = arrays.levels.numpy(), arrays.table.numpy(), arrays.ids.numpy()
         return cls(*lists, count=len(centres), parity=arrays.parity, floor=arrays.floor)
 
@@ -184,7 +184,7 @@ def index_on(decals: Decals, device: Any = None, *, reach: float = 1.0) -> Any:
 
     `reach` multiplies the distance to which decals are listed, their neighbour reach.
     """
-    placed = _device_arrays(decals.positions, reach * decals.influence, decals.ranks, device)
+    placed = device_arrays(decals.positions, reach * decals.influence, decals.ranks, device)
     levels, table, ids, *_ = build_index(*placed)
     return indexed_decals(decals.packed(), levels, table, ids, layered=decals.layered, device=device)
 
@@ -217,7 +217,8 @@ def has_nested(indexed: Any, count: int) -> bool:
     return bool(found.numpy()[0])
 
 
-def _device_arrays(positions: ArrayLike, influence: ArrayLike, ranks: ArrayLike, device: Any) -> list[Any]:
+def device_arrays(positions: ArrayLike, influence: ArrayLike, ranks: ArrayLike, device: Any) -> list[Any]:
+    """Return centres, reaches and ranks as arrays on a device, as `build_index` takes them."""
     centres = np.asarray(positions, np.float32).reshape(-1, 3)
     order = np.broadcast_to(np.asarray(ranks, np.int32), len(centres))
     reach = np.asarray(influence, np.float32).reshape(-1)

@@ -19,13 +19,14 @@ NAMES = [
     "Camera", "Contact", "ContactLaw", "DecalImage", "DecalMaterial", "Decals", "ImageMapping",
     "ImplicitDecalsError",
     "Interaction", "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__",
-    "animate", "bake", "content_hash", "cover", "define_contact", "displace", "edit", "evaluate", "export",
+    "animate", "bake", "content_hash", "cover", "define_contact", "displace", "edit", "evaluate",
+    "evaluate_batch", "export",
     "load_image", "load_model",
     "load_scene", "measure", "pose", "render", "reproduce", "save_html", "save_scene", "scatter", "shader",
     "show", "skin", "turntable",
 ]  # fmt: skip
 OF_PACKAGES = {
-    "field": ["MaterialSamples", "Neighbors", "Samples", "Walks"],
+    "field": ["BatchSamples", "MaterialSamples", "Neighbors", "Samples", "Walks"],
     "experiments": [
         "Design", "Grid", "LatinHypercube", "Results", "Seeds", "Sobol", "report", "run",
     ],

@@ -140,3 +140,12 @@ def test_neighbors_of_an_editor_have_its_numbers() -> None:
 def test_refuses_other_derivatives_of_normals(wrong: Any) -> None:
     with pytest.raises(InvalidPoints, match="normal_derivatives: expected"):
         evaluate(plane([[0, 0, 0]], 1.0), [[0, 0, 0]], [UP], jacobian=True, normal_derivatives=wrong)
+
+
+def test_points_that_are_not_finite_have_no_derivative() -> None:
+    disk = Decals([[0, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], [1.0])
+    points = [[0.2, 0, 0], [np.inf, 0, 0], [np.nan, 0, 0], [0, -np.inf, 0]]
+    found = evaluate(disk, points, [[0, 0, 1]] * 4, jacobian=True).jacobian
+    assert found is not None
+    assert np.isfinite(found[0]).all()
+    assert np.isnan(found[1:]).all()

@@ -1,0 +1,387 @@
+"""Decals on a device that are evaluated at points: one set of them, or many sets at once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+import warp as wp
+
+from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
+from blobtree.device import launch
+from decals.errors import InvalidImage
+from decals.field.jacobian import image_jacobians
+from decals.field.law import AnyContact, ContactLaw
+from decals.field.sampling_kernels import color_points, sample_points
+from decals.images.texels import Pixels, unit_levels
+from decals.index.batch import DecalBatch
+from decals.index.editor import DecalEditor
+from decals.index.index import index_on
+from decals.model import NO_IMAGE, Decals
+from decals.record import NEIGHBOR_REACH, RECORD, RIM_RADIUS
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbors:
+    """All decals that act at m points, in one list; those of point i are at ``offsets[i]:offsets[i + 1]``.
+
+    Attributes
+    ----------
+    offsets : int64[m + 1]
+        First entry of each point.
+    decals : int32[k]
+        Numbers of the decals with a field above 0, ascending for each point.
+    fields : float32[k]
+        Field f of each before contact (paper, equation 1): ½ on its undeformed rim.
+    pushes : float32[k]
+        Push of each alone on the owner of the point: by which share of what is left to its rim it moves the
+        image outward. 0 without a push, 1 on their contact line. In PRODUCT and MIN this is 1 − h of equation
+        5, in RADIAL and ELASTIC a share of the way along the ray. In RADIAL a decal that has no field at the
+        point can push there too; it is not listed.
+    """
+
+    offsets: Int64Array
+    decals: Int32Array
+    fields: Float32Array
+    pushes: Float32Array
+
+
+@dataclass(frozen=True, eq=False)
+class MaterialSamples:
+    """Maps of materials at m points, mixed by the part that is seen of each decal.
+
+    Attributes
+    ----------
+    part : float32[m]
+        Part of the surface that materials cover. The other values are sums over it: 0 without materials.
+    normal : float32[m, 3]
+        Sum of unit normals. Where decals with several normals lie over each other, their maps are turned as
+        that of the topmost one.
+    roughness, metallic, occlusion : float32[m]
+        Sums of the maps.
+    emission : float32[m, 3]
+        Light that the surface sheds itself, in linear light.
+    """
+
+    part: Float32Array
+    normal: Float32Array
+    roughness: Float32Array
+    metallic: Float32Array
+    occlusion: Float32Array
+    emission: Float32Array
+
+
+class Target(Protocol):
+    """Decals on a device, as arguments of kernels.
+
+    Attributes
+    ----------
+    device : str
+        The Warp device.
+    image_count : int
+        Number of images to which the decals refer.
+    records : wp.array(dtype=vec4)
+        Records of all decals; others may take their place for a while.
+    """
+
+    device: str
+    image_count: int
+    records: Any
+
+    def kernel(self, single: Any) -> Any:
+        """Return the kernel for these decals that does the same as one for a single set."""
+
+    def arguments(self) -> list[Any]:
+        """Return the arguments of kernels that stand for the decals."""
+
+    def count(self, points: Any) -> int:
+        """Return the number of results at these points."""
+
+    def places(self, owners: Int32Array) -> Int64Array:
+        """Return the places in `records` of owners; −1 stays −1."""
+
+    def wide(self) -> "tuple[Target, Int64Array | None]":
+        """Return decals whose index lists whole influences, and the numbers of its rows if they differ."""
+
+
+class SingleTarget:
+    """One set of decals; see `Target`."""
+
+    def __init__(self, decals: Decals | DecalEditor, indexed: Any, device: str) -> None:
+        self._decals, self._indexed, self.device = decals, indexed, device
+        self.image_count = image_count(rows_of(decals))
+
+    @property
+    def records(self) -> Any:
+        """Records of all decals."""
+        return self._indexed.records
+
+    @records.setter
+    def records(self, records: Any) -> None:
+        self._indexed.records = records
+
+    def kernel(self, single: Any) -> Any:
+        """Return the kernel for these decals."""
+        return single
+
+    def arguments(self) -> list[Any]:
+        """Return the arguments of kernels that stand for the decals."""
+        return [self._indexed]
+
+    def count(self, points: Any) -> int:
+        """Return the number of results."""
+        return len(points)
+
+    def places(self, owners: Int32Array) -> Int64Array:
+        """Return the places in `records` of owners."""
+        return owners.astype(np.int64)
+
+    def wide(self) -> tuple[Target, Int64Array | None]:
+        """Return decals with a wide index, and the numbers of its rows."""
+        decals, indexed, rows = self._decals, self._indexed, rows_of(self._decals)
+        known = decals.numbers if isinstance(decals, DecalEditor) else None
+        wide = index_on(rows, self.device, reach=1.0 / NEIGHBOR_REACH)
+        wide.stiffness, wide.surface, wide.limited = indexed.stiffness, indexed.surface, indexed.limited
+        if wide.limited:
+            limits = rows.limits_of(decals.receiver_table)
+            wide.limits = wp.array(limits, dtype=wp.vec4, device=self.device)
+        return SingleTarget(rows, wide, self.device), known
+
+
+class BatchTarget:
+    """Many sets of decals, and the set of each result; see `Target`."""
+
+    def __init__(self, batch: DecalBatch, sets: Int32Array) -> None:
+        self._batch, self._sets, self.device = batch, sets, batch.device
+        self._sets_on_device: Any = wp.array(sets, dtype=wp.int32, device=batch.device)
+        self.image_count = image_count(batch.joined)
+
+    @property
+    def records(self) -> Any:
+        """Records of all decals."""
+        return self._batch.records
+
+    @records.setter
+    def records(self, records: Any) -> None:
+        self._batch.records = records
+
+    def kernel(self, single: Any) -> Any:
+        """Return the kernel for these decals."""
+        from decals.field import batch_kernels as kernels  # compiled at the first use
+
+        if single is sample_points:
+            return kernels.sample_sets
+        if single is color_points:
+            return kernels.color_sets
+        from decals.field.batch_neighbor_kernels import list_neighbors_of_sets
+
+        return list_neighbors_of_sets
+
+    def arguments(self) -> list[Any]:
+        """Return the arguments of kernels that stand for the decals."""
+        return [self._batch.rows(), self._sets_on_device]
+
+    def count(self, points: Any) -> int:
+        """Return the number of results."""
+        return len(self._sets)
+
+    def places(self, owners: Int32Array) -> Int64Array:
+        """Return the places in `records` of owners."""
+        return np.where(owners >= 0, owners + self._batch.starts[self._sets], -1)
+
+    def wide(self) -> tuple[Target, Int64Array | None]:
+        """Return decals with a wide index, and the numbers of its rows."""
+        return BatchTarget(self._batch.with_reach(1.0 / NEIGHBOR_REACH), self._sets), None
+
+
+class Query:
+    """Decals at points, in a contact mode or law.
+
+    Attributes
+    ----------
+    owners, uv, fields
+        See `Samples`; arrays on the device.
+    """
+
+    def __init__(self, target: Target, points: Any, normals: Any, contact: AnyContact) -> None:
+        self._target, self._contact, self._device = target, contact, target.device
+        self._points, self._normals = points, normals
+        self._count = target.count(points)
+        self.owners, self.uv, self.fields = self._sample(points, normals)
+
+    def _inputs(self, points: Any, normals: Any) -> list[Any]:
+        return [points, normals, int(self._contact), *self._target.arguments()]
+
+    def _launch(self, kernel: Any, inputs: list[Any], outputs: list[Any]) -> None:
+        launch(
+            with_law(self._target.kernel(kernel), self._contact), self._count, inputs, outputs, self._device
+        )
+
+    def _sample(self, points: Any, normals: Any) -> list[Any]:
+        outputs = zeros(self._device, self._count, wp.int32, wp.vec2, wp.float32)
+        self._launch(sample_points, self._inputs(points, normals), outputs)
+        return outputs
+
+    def _on_device(self, rows: Float32Array) -> Any:
+        return wp.array(rows, dtype=wp.vec3, device=self._device)
+
+    @cached_property
+    def _host_owners(self) -> Int32Array:
+        owners: Int32Array = self.owners.numpy()
+        return owners
+
+    @cached_property
+    def _host_rows(self) -> tuple[Float32Array, Float32Array]:
+        """Points and normals of all results."""
+        rows = [array.numpy() for array in (self._points, self._normals)]
+        repeats = 1 if len(rows[0]) == self._count else self._count // max(len(rows[0]), 1)
+        return np.tile(rows[0], (repeats, 1)), np.tile(rows[1], (repeats, 1))
+
+    def jacobians(self, normal_derivatives: Float64Array | None) -> Float64Array:
+        """Return derivatives of image coordinates."""
+        spheres: Float32Array = self._target.records.numpy()[::RECORD, 3]
+        radii = np.ones(self._count)
+        places = self._target.places(self._host_owners)
+        owned = places >= 0
+        radii[owned] = RIM_RADIUS * spheres[places[owned]]
+
+        def sampled(points: Float32Array, normals: Float32Array) -> tuple[Int32Array, Float32Array]:
+            owner, uv, _ = self._sample(self._on_device(points), self._on_device(normals))
+            return owner.numpy(), uv.numpy()
+
+        center = self._host_owners, self.uv.numpy()
+        return image_jacobians(sampled, *self._host_rows, radii, center, normal_derivatives)
+
+    def neighbors(self) -> Neighbors:
+        """Return all decals with a field at points; the index lists whole influences, not only reaches."""
+        from decals.field.neighbor_kernels import list_neighbors  # compiled at the first use
+
+        device, count = self._device, self._count
+        target, known = self._target.wide()
+        empty = zeros(device, 0, wp.int32, wp.float32)
+        (counts,) = zeros(device, count, wp.int32)
+        owners = self._host_owners
+        if known is not None:
+            owners = np.where(owners >= 0, np.searchsorted(known, owners), owners).astype(np.int32)
+        placed: Any = wp.array(owners, dtype=wp.int32, device=device)
+        given = [self._points, self._normals, int(self._contact), *target.arguments(), placed]
+        self._launch(list_neighbors, [*given, empty[0]], [counts, empty[0], empty[1], empty[1]])
+        offsets = np.concatenate([[0], np.cumsum(counts.numpy(), dtype=np.int64)])
+        starts: Any = wp.array(offsets[:-1], dtype=wp.int32, device=device)
+        total = int(offsets[-1])
+        lists = zeros(device, total, wp.int32, wp.float32, wp.float32)
+        if total:
+            self._launch(list_neighbors, [*given, starts], [counts, *lists])
+        found, fields, pushes = (values.numpy() for values in lists)
+        order = np.lexsort((found, np.repeat(np.arange(count), np.diff(offsets))))
+        numbers = found[order] if known is None else known[found[order]].astype(np.int32)
+        return Neighbors(offsets, numbers, fields[order], pushes[order])
+
+    def colors(self, layers: Sequence[Float32Array]) -> Any:
+        """Return the colours of images, linear and premultiplied, over each other, on the device."""
+        (colors,) = zeros(self._device, self._count, wp.vec4)
+        images = image_arrays(self._target.image_count, layers, self._device)
+        inputs = self._inputs(self._points, self._normals)
+        self._launch(color_points, [*inputs, self.owners, self.uv, *images], [colors])
+        return colors
+
+    def heights(self, reliefs: Sequence[Float32Array | None], pixels: Sequence[Pixels]) -> Float32Array:
+        """Return heights in model units, mixed as a colour is, with the radius of each decal as its tint."""
+        layers = []
+        for relief, image in zip(reliefs, pixels, strict=True):
+            layer = np.zeros(image.shape, np.float32)
+            layer[..., 3] = unit_levels(image[..., 3])
+            if relief is not None:
+                layer[..., 0] = relief
+            layers.append(layer)
+        radii = RIM_RADIUS * self._target.records.numpy()[::RECORD, 3:]
+        return self._map_sums(layers, np.repeat(radii, 3, axis=1))[:, 0]
+
+    def materials(self, images: Sequence[Any], pixels: Sequence[Pixels]) -> MaterialSamples:
+        """Return the maps of materials, mixed as colours are, with the axes of each decal as its tint."""
+        given = []  # x, y, z of normals; roughness, metalness, 1; emission; occlusion
+        for image, pixel in zip(images, pixels, strict=True):
+            maps = np.zeros((*pixel.shape[:2], 12), np.float32)
+            if hasattr(image, "surface_texels"):
+                first, second = image.surface_texels()
+                maps[..., :2], maps[..., 3:5] = first[..., :2], first[..., 2:]
+                maps[..., 2] = np.sqrt(np.maximum(1.0 - (first[..., :2] ** 2).sum(axis=-1), 0.0))
+                maps[..., 5], maps[..., 6:10] = 1.0, second
+            alpha = unit_levels(pixel[..., 3:])
+            given.append(np.concatenate([maps * alpha, alpha], axis=-1))
+
+        def sums(columns: list[int], tints: Float32Array | float) -> Float32Array:
+            layers = [np.ascontiguousarray(maps[..., [*columns, -1]]) for maps in given]
+            return self._map_sums(layers, tints)[:, :3]
+
+        records, (_, normals) = self._target.records.numpy(), self._host_rows
+        facing, axis = records[1::RECORD, :3], records[2::RECORD, :3]
+        tilt = sums([0, 0, 0], axis) + sums([1, 1, 1], np.cross(facing, axis))
+        upright, roughness, metallic = sums([2, 3, 4], 1.0).T
+        emission = sums([6, 7, 8], 1.0)
+        part, occlusion, _ = sums([5, 9, 10], 1.0).T
+        unit = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.float32(1e-30))
+        places = self._target.places(self._host_owners)
+        owner_facing = facing[np.maximum(places, 0)] if len(facing) else unit
+        # turned as the normal is on the way to the point; the inverse of `unroll_step`
+        cosine = np.maximum(1.0 + (owner_facing * unit).sum(axis=1, keepdims=True), 1e-4)
+        turned = tilt - (tilt * unit).sum(axis=1, keepdims=True) / cosine * (owner_facing + unit)
+        normal = (turned + upright[:, None] * unit).astype(np.float32)
+        return MaterialSamples(part, normal, roughness, metallic, occlusion, emission)
+
+    def _map_sums(self, layers: Sequence[Float32Array], tints: Float32Array | float) -> Float32Array:
+        """Return layers ``[h, w, 4]`` mixed as colours are, with other tints; without image, decals add 0."""
+        records = self._target.records
+        tinted = records.numpy().copy()
+        tinted[3::RECORD, :3] = np.where(tinted[2::RECORD, 3:] >= 0.0, tints, 0.0)
+        self._target.records = wp.array(tinted, dtype=wp.vec4, device=self._device)
+        try:
+            sums: Float32Array = self.colors(layers).numpy()
+            return sums
+        finally:
+            self._target.records = records
+
+
+def with_law(kernel: Any, contact: AnyContact) -> Any:
+    """Return a kernel for a contact mode, or with the formulas of a contact law."""
+    return contact.formulas.kernel(kernel) if isinstance(contact, ContactLaw) else kernel
+
+
+def zeros(device: Any, count: int, *kinds: Any) -> list[Any]:
+    """Return arrays of zeros of several types."""
+    return [wp.zeros(count, dtype=kind, device=device) for kind in kinds]
+
+
+def rows_of(decals: Decals | DecalEditor) -> Decals:
+    """Return the decals of an editor, or decals themselves."""
+    return decals.decals if isinstance(decals, DecalEditor) else decals
+
+
+def image_count(decals: Decals) -> int:
+    """Return the number of images to which decals refer."""
+    return int(decals.images.max(initial=NO_IMAGE)) + 1
+
+
+def image_arrays(min_count: int, layers: Sequence[Float32Array], device: Any) -> tuple[Any, Any]:
+    """Return at least so many images ``float32[h, w, 4]`` on a device, row after row, the upper row first.
+
+    Returns
+    -------
+    extents : vec3i[k]
+        First texel, width and height of each image.
+    texels : vec4[t]
+    """
+    if len(layers) < min_count:
+        raise InvalidImage(
+            f"images: expected {min_count} or more, got {len(layers)}; decals refer to them by number"
+        )
+    sizes = np.array([(layer.shape[1], layer.shape[0]) for layer in layers], np.int32).reshape(-1, 2)
+    counts = sizes.prod(axis=1)
+    extents = np.column_stack([np.cumsum(counts) - counts, sizes]).astype(np.int32)
+    texels = np.concatenate([np.zeros((0, 4), np.float32), *(layer.reshape(-1, 4) for layer in layers)])
+    arrays: list[Any] = [
+        wp.array(values, dtype=kind, device=device)
+        for values, kind in ((extents, wp.vec3i), (texels, wp.vec4))
+    ]
+    return arrays[0], arrays[1]

@@ -1,0 +1,113 @@
+"""Batches against loops: many sets of decals at points, in one launch on a device.
+
+python -m tests.bench.batches [--device DEVICE] [--sets N] [--only NAME] [--json FILE] [--quick]
+"""
+
+import argparse
+import json
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+import decals
+from blobtree.device import known_device
+from decals import Decals
+from decals.index import DecalIndex
+
+TARGETS = {"evaluate_speedup": "≥ 20 on a card"}
+
+SETS, DECALS, POINTS = 1000, 200, 1000
+
+
+def sphere_points(rng: np.random.Generator, count: int) -> NDArray[np.float32]:
+    """Return points on the unit sphere."""
+    ways = rng.normal(size=(count, 3))
+    points: NDArray[np.float32] = (ways / np.linalg.norm(ways, axis=1, keepdims=True)).astype(np.float32)
+    return points
+
+
+def random_sets(count: int) -> list[Decals]:
+    """Return sets of decals on a sphere, of sizes that differ threefold."""
+    sets = []
+    for seed in range(count):
+        rng = np.random.default_rng(seed)
+        centres = sphere_points(rng, DECALS)
+        tangents = np.cross(centres, rng.normal(size=(DECALS, 3)))
+        sets.append(Decals(centres, centres, tangents, rng.uniform(0.05, 0.15, DECALS)))
+    return sets
+
+
+def alternately(functions: dict[str, Callable[[], Any]], device: str, repeats: int) -> dict[str, float]:
+    """Return the median seconds of functions that run in turns, after a first run of each."""
+    seconds: dict[str, list[float]] = {name: [] for name in functions}
+    for turn in range(repeats + 1):
+        for name, function in functions.items():
+            wp.synchronize_device(device)
+            begin = time.perf_counter()
+            function()
+            wp.synchronize_device(device)
+            if turn:
+                seconds[name].append(time.perf_counter() - begin)
+    return {name: statistics.median(values) for name, values in seconds.items()}
+
+
+def evaluate_figures(device: str, count: int, repeats: int) -> dict[str, float]:
+    """Return the seconds of one batch, of a loop, and of a loop over sets with their indices."""
+    sets = random_sets(count)
+    points = sphere_points(np.random.default_rng(0), POINTS)
+    indices = [DecalIndex.of(part) for part in sets]
+    functions: dict[str, Callable[[], Any]] = {
+        "batch": lambda: decals.evaluate_batch(sets, points, points, device=device),
+        "loop": lambda: [decals.evaluate(part, points, points, device=device) for part in sets],
+        "indexed": lambda: [
+            decals.evaluate(part, points, points, index=index, device=device)
+            for part, index in zip(sets, indices, strict=True)
+        ],
+    }
+    seconds = alternately(functions, device, repeats)
+    batch = functions["batch"]()
+    loop = functions["loop"]()
+    equal = [np.array_equal(found.owner, alone.owner) for found, alone in zip(batch, loop, strict=True)]
+    bits = [found.uv.tobytes() == alone.uv.tobytes() for found, alone in zip(batch, loop, strict=True)]
+    return {
+        "evaluate_batch_s": seconds["batch"],
+        "evaluate_loop_s": seconds["loop"],
+        "evaluate_speedup": seconds["loop"] / seconds["batch"],
+        "evaluate_speedup_indexed": seconds["indexed"] / seconds["batch"],
+        "evaluate_equal_owners": float(np.mean(equal)),
+        "evaluate_equal_bits": float(np.mean(bits)),
+    }
+
+
+FIGURES: dict[str, Callable[[str, int, int], dict[str, float]]] = {"evaluate": evaluate_figures}
+
+
+def main() -> None:
+    """Print the figures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--device", help="Warp device; the default one if not given")
+    parser.add_argument("--sets", type=int, default=SETS)
+    parser.add_argument("--only", choices=tuple(FIGURES), action="append")
+    parser.add_argument("--json", type=Path)
+    parser.add_argument("--quick", action="store_true", help="a tenth of the sets")
+    options = parser.parse_args()
+    device = known_device(options.device)
+    count = options.sets // 10 if options.quick else options.sets
+    print(f"{device} ({wp.get_device(device).name}), {count} sets of {DECALS} decals at {POINTS} points")
+    figures: dict[str, float] = {}
+    for name in options.only or FIGURES:
+        figures |= FIGURES[name](device, count, 1 if options.quick else 3)
+    for name, value in figures.items():
+        print(f"{name:<26}{value:>10.4g}   {TARGETS.get(name, '')}")
+    if options.json:
+        options.json.write_text(json.dumps(figures))
+
+
+if __name__ == "__main__":
+    main()
