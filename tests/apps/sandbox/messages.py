@@ -5,8 +5,10 @@
 Browsers vanish while they drag and while they wait for answers; a third one takes 2 s for each picture.
 Strangers ask with wrong tokens and as foreign pages. A fifth of the messages goes to a page that the browsers
 share: messages of the one that only watches must change nothing. The figures are printed as JSON: errors of
-the server, what strangers and watchers got, whether undoing all restores the first scene bit for bit, and the
-growth of the memory once the first tenth has been sent and once the first half has.
+the server, what strangers and watchers got, connections that the server ended without a reason, whether
+undoing all restores the first scene bit for bit, and the growth of the memory once the first tenth has been
+sent and once the first half has. Browsers and server share a loop, so the server does not look whether
+browsers are alive: on a busy machine they would seem dead.
 
 They also say for how long the server's loop did not return to its other tasks: time on the clock, which other
 work on the machine lengthens, and processor time of the loop's thread. Those with most of that are listed
@@ -19,6 +21,7 @@ import contextlib
 import json
 import logging
 import math
+import os
 import random
 import sys
 import tempfile
@@ -31,6 +34,7 @@ from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
@@ -274,6 +278,7 @@ class Messages:
         self.changed = self.unanswered = 0
         self.restored = True
         self.intrusions: list[str] = []
+        self.lost: list[str] = []
 
     async def run(self, count: int, report: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
         """Send messages and return the figures; now and then, undo all that they did."""
@@ -285,6 +290,7 @@ class Messages:
         for number in range(1, count + 1):
             labels = self._window.session.labels
             await self._send()
+            await self._replace_lost()
             self.changed += labels != self._window.session.labels
             self._window.actions.state.prompt.close()
             if len(self._window.document.objects) > 4 or len(self._window.document.decals) > 300:
@@ -311,6 +317,8 @@ class Messages:
             "unanswered": self.unanswered,
             "intrusions": len(self.intrusions),
             "first_intrusions": self.intrusions[:3],
+            "lost": len(self.lost),
+            "first_lost": self.lost[:3],
             "memory_mb": round(self._memory[-1][1]) if self._memory else 0,
             **{name: round(growth(self._memory, part), 2) for name, part in FIRST_PARTS.items()},
             **summary("clock", self._watch.clock),
@@ -474,6 +482,8 @@ class Messages:
             await asyncio.wait_for(call, WAIT_SECONDS)
         except TimeoutError:
             self.unanswered += 1
+        except ConnectionError:
+            pass  # the server has ended the connection, which `_replace_lost` counts
         except Exception as error:  # the client raises a bare one for each refusal
             if type(error) is not Exception:
                 raise
@@ -487,6 +497,14 @@ class Messages:
             self.intrusions.append(f"stranger with {wrong!r:.50}")
             await intruder.close()
         self._browsers[number] = await self._connect()
+
+    async def _replace_lost(self) -> None:
+        """Count connections that the server has ended without a reason, and connect again."""
+        for number, browser in enumerate(self._browsers):
+            if browser.socket.closed:
+                self.lost.append(f"{self._message}: code {browser.socket.close_code}")
+                await browser.close()
+                self._browsers[number] = await self._connect()
 
     async def _tear(self, number: int) -> None:
         """Send bytes that are no message; the server ends the connection."""
@@ -542,12 +560,12 @@ def measure(
     noted = Noted(logging.ERROR)
     logging.getLogger().addHandler(noted)
     try:
-        with tempfile.TemporaryDirectory() as name:
+        with tempfile.TemporaryDirectory() as name, patch.dict(os.environ, WSLINK_HEART_BEAT="0"):
             figures = send(count - shared_count, Path(name), shared=False)
             others = send(shared_count, Path(name), shared=True)
     finally:
         logging.getLogger().removeHandler(noted)
-    for key in ("sent", "changed", "unanswered", "intrusions", "first_intrusions"):
+    for key in ("sent", "changed", "unanswered", "intrusions", "first_intrusions", "lost", "first_lost"):
         figures[key] += others[key]
     figures["restored"] &= others["restored"]
     return {**figures, "errors": len(errors), "first_errors": errors[:3]}
@@ -555,7 +573,7 @@ def measure(
 
 def faults(figures: dict[str, Any]) -> int:
     """Return the number of failures among the figures of a run."""
-    counts: list[int] = [figures[name] for name in ("errors", "unanswered", "intrusions")]
+    counts: list[int] = [figures[name] for name in ("errors", "unanswered", "intrusions", "lost")]
     return sum(counts) + (not figures["restored"])
 
 

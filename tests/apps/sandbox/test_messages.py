@@ -85,6 +85,24 @@ def test_an_edit_of_a_watcher_is_noticed(vtk_display: None, monkeypatch: pytest.
 
 
 @pytest.mark.slow
+def test_a_connection_that_the_server_ends_is_noticed(
+    vtk_display: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tests.apps.sandbox import messages
+
+    send = messages.Messages._send
+
+    async def lose(self: messages.Messages) -> None:
+        await send(self)
+        await self._browsers[0].socket.close()
+
+    monkeypatch.setattr(messages.Messages, "_send", lose)
+    figures = messages.measure(20, seed=1)
+    assert figures["lost"] == 20
+    assert messages.faults(figures) >= 20
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("open_to_all", [False, True])
 def test_strangers_get_nothing_unless_any_text_is_a_token(
     open_to_all: bool, vtk_display: None, monkeypatch: pytest.MonkeyPatch
