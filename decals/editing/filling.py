@@ -45,14 +45,17 @@ MIN_SAMPLES, MAX_SAMPLES = 20_000, 2_000_000
 CELL = 2.25
 """Area of a decal among decals without gaps, in squares of its radius."""
 
-MAX_ROUNDS, CLEAN_ROUNDS = 8, 1
-"""Most searches of `FillBarePlaces`, and number of searches without a bare place after which it ends."""
+MAX_ROUNDS = 8
+"""Most searches of `FillBarePlaces`, which ends before them where a search finds no bare place."""
 
 AROUND = 8
 """Nearest decals among which a new one finds those that it is like."""
 
 RIM = 0.3
 """Distance from surface that was bare before, in usual radii, up to which bare points do not count."""
+
+NEAR_RIM = 0.8
+"""(Distance from the middle of an image / its radius)² from which a sample is near its rim."""
 
 STREAM = 31
 """First stream of the random samples."""
@@ -84,9 +87,19 @@ class Skin:
         """Return the skin of a document."""
         return cls(document.objects, document.decals.decals, document.drawing)
 
+    @property
+    def radius(self) -> float:
+        """Median radius of the decals, inf without any."""
+        return float(np.median(self.decals.radii)) if len(self.decals) else np.inf
+
     def covers(self, points: OrientedPoints) -> BoolArray:
         """Return True for points, whose surfaces are objects, at which an image shows."""
-        result = np.zeros(len(points), np.bool_)
+        covered: BoolArray = self.reaches(points) <= 1.0
+        return covered
+
+    def reaches(self, points: OrientedPoints) -> Float64Array:
+        """Return (distance from the middle of an image / its radius)² of points, inf where none lies."""
+        result = np.full(len(points), np.inf)
         if not len(self.decals):
             return result
         walks = walks_for(self.drawing.mapping, self.decals, self.objects)
@@ -97,8 +110,8 @@ class Skin:
             if isinstance(item.surface, MeshSurface):
                 normals = item.surface.smooth_normals(positions)
             found = evaluate(self.decals, positions, normals, **modes, on=item, walks=walks)
-            inside = ((found.uv.astype(np.float64) - 0.5) ** 2).sum(axis=1) <= IMAGE_RADIUS_SQUARED
-            result[rows] = (found.owner >= 0) & inside
+            squares = ((found.uv.astype(np.float64) - 0.5) ** 2).sum(axis=1)
+            result[rows] = np.where(found.owner >= 0, squares / IMAGE_RADIUS_SQUARED, np.inf)
         return result
 
 
@@ -112,12 +125,15 @@ class BareSamples:
         The samples; their surfaces are the indices of objects.
     beside
         Further bare points around them.
+    rim
+        All samples near the rims of images, the bare ones too.
     distance
         Mean distance of all samples, bare or not.
     """
 
     points: OrientedPoints
     beside: OrientedPoints
+    rim: OrientedPoints
     distance: float
 
     @property
@@ -153,28 +169,53 @@ def bare_samples(
     finer
         Factor of the number of samples.
     """
+    areas = np.zeros(len(domain.areas))
+    areas[[*objects]] = domain.areas[[*objects]]
+    area = float(areas.sum())
+    if area == 0.0:
+        none = OrientedPoints.empty()
+        return BareSamples(none, none, none, 0.0)
+    wanted = SAMPLES_PER_CELL * area / (CELL * skin.radius**2)
+    count = int(np.clip(finer * max(wanted, MIN_SAMPLES), 0, MAX_SAMPLES))
+    counts = np.ceil(count * areas / area).astype(np.int64)
+    distance = float(np.sqrt(area / counts.sum()))
+    return _bare_among(domain.sample(counts, stream), distance, skin, domain, stream, chosen)
 
-    def bare(points: OrientedPoints) -> OrientedPoints:
-        points = points[np.flatnonzero(~skin.covers(points))]
+
+def bare_samples_again(
+    skin: Skin, domain: Domain, former: BareSamples, stream: int, chosen: Choice | None = None
+) -> BareSamples:
+    """Do the same around the rims of a former search, at as many samples for an area."""
+    rng = np.random.default_rng(stream)
+    found, allowed = domain.project(random_points_around(former.rim, 1, SPREAD * former.distance, rng))
+    return _bare_among(found[np.flatnonzero(allowed)], former.distance, skin, domain, stream, chosen)
+
+
+def _bare_among(
+    samples: OrientedPoints,
+    distance: float,
+    skin: Skin,
+    domain: Domain,
+    stream: int,
+    chosen: Choice | None,
+) -> BareSamples:
+    """Return the bare ones of some samples of a mean distance, and others beside them."""
+
+    def counting(points: OrientedPoints) -> OrientedPoints:
         if chosen is None or not len(points):
             return points
         counts = chosen(points)
-        near = _distances(points.positions, points.positions[~counts]) < RIM * radius
+        near = _distances(points.positions, points.positions[~counts]) < RIM * skin.radius
         return points[np.flatnonzero(counts & ~near)]
 
-    areas = np.zeros(len(domain.areas))
-    areas[[*objects]] = domain.areas[[*objects]]
-    area, radius = float(areas.sum()), float(np.median(skin.decals.radii)) if len(skin.decals) else np.inf
-    wanted = SAMPLES_PER_CELL * area / (CELL * radius**2)
-    count = int(np.clip(finer * max(wanted, MIN_SAMPLES), 0, MAX_SAMPLES))
-    if area == 0.0:
-        return BareSamples(OrientedPoints.empty(), OrientedPoints.empty(), 0.0)
-    counts = np.ceil(count * areas / area).astype(np.int64)
-    points, distance = bare(domain.sample(counts, stream)), float(np.sqrt(area / counts.sum()))
+    reaches = skin.reaches(samples)
+    points = counting(samples[np.flatnonzero(reaches > 1.0)])
     rng = np.random.default_rng(stream)
     around = points[rng.permutation(len(points))[:MAX_REFINED]]
     found, allowed = domain.project(random_points_around(around, BESIDE, SPREAD * distance, rng))
-    return BareSamples(points, bare(found[np.flatnonzero(allowed)]), distance)
+    found = found[np.flatnonzero(allowed)]
+    beside = counting(found[np.flatnonzero(~skin.covers(found))])
+    return BareSamples(points, beside, samples[np.flatnonzero(reaches > NEAR_RIM)], distance)
 
 
 def _distances(points: Float32Array, others: Float32Array) -> Float64Array:
@@ -306,12 +347,15 @@ class FillBarePlaces:
         models = _Models(skin, document.locked_layers)
         domain = Domain([item.surface for item in document.objects], seed)
         filling = _Filling(skin, domain, models, np.random.default_rng([seed, STREAM]))
-        clean = 0
+        fine: BareSamples | None = None
         for turn in range(MAX_ROUNDS):
-            finer = FINER if turn else 1.0
-            bare = bare_samples(filling.skin, domain, objects, STREAM + turn, chosen, finer=finer)
-            clean = clean + 1 if not filling.cover(bare) else 0
-            if clean == CLEAN_ROUNDS:
+            if fine is None:
+                finer = FINER if turn else 1.0
+                bare = bare_samples(filling.skin, domain, objects, STREAM + turn, chosen, finer=finer)
+                fine = bare if turn else None
+            else:
+                bare = bare_samples_again(filling.skin, domain, fine, STREAM + turn, chosen)
+            if not filling.cover(bare):
                 break
         return document.compute_addition(filling.added) if len(filling.added) else Edit()
 
