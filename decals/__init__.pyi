@@ -40,7 +40,7 @@ from .scenes.material import DecalMaterial
 from .scenes.measure import measure
 from .scenes.objects import MeshObject, TreeObject
 from .scenes.pose import pose, skin
-from .scenes.render import render
+from .scenes.render import render, render_batch
 from .scenes.reproduction import reproduce
 from .scenes.scene import DecalImage, Scene
 from .vtk import show
@@ -87,6 +87,7 @@ __all__ = [
     "pages",
     "pose",
     "render",
+    "render_batch",
     "rendering",
     "reproduce",
     "save_html",

@@ -320,10 +320,15 @@ def drawn_objects(scene: SceneLike) -> list[object]:
     return [part for part in parts if part is not None]
 
 
+def is_viewpoint(value: object) -> bool:
+    """Return True for a camera or a projection."""
+    return not isinstance(value, type) and hasattr(value, "clip_matrix") and hasattr(value, "rays")
+
+
 def viewpoint_of(scene: SceneLike, viewpoint: Viewpoint | None) -> Viewpoint:
     """Return the viewpoint of a picture: the scene's camera by default."""
     chosen: Any = getattr(scene, "camera", None) if viewpoint is None else viewpoint
-    if isinstance(chosen, type) or not (hasattr(chosen, "clip_matrix") and hasattr(chosen, "rays")):
+    if not is_viewpoint(chosen):
         raise InvalidScene(f"viewpoint: expected a Camera or a Projection, got {describe(chosen)}")
     checked: Viewpoint = chosen
     return checked

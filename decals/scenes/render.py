@@ -1,13 +1,18 @@
 """From a scene or a model to a picture in one call."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import Enum
+from itertools import repeat
 from types import MappingProxyType
-from typing import Any, cast
+from typing import Any, TypeAlias, cast
+
+import numpy as np
 
 from blobtree.colors import ColorLike
 from blobtree.identity import content_hash
 from blobtree.progress import reporting
+from blobtree.validation import items
+from decals.errors import InvalidScene
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.images.load import AnyImage
@@ -21,6 +26,7 @@ from decals.rendering.options import (
     Size,
     drawing_of,
     is_scene_like,
+    is_viewpoint,
 )
 from decals.rendering.picture import Picture
 from decals.rendering.pixel_pass import driver_name
@@ -33,6 +39,9 @@ from decals.scenes.recipe import plain
 from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model
 
+Drawn: TypeAlias = SceneLike | SceneObject | Model | Sequence[SceneObject | Model]
+"""What `render` draws: a scene, a model, or several models as one scene."""
+
 SHOWN_PARTS = ("objects", "decals", "images", "camera", "drawing")
 """Parts of a scene that a picture shows."""
 
@@ -41,7 +50,7 @@ PICTURE_FUNCTION = "decals.render"
 
 
 def render(
-    scene: SceneLike | SceneObject | Model | Sequence[SceneObject | Model],
+    scene: Drawn,
     *,
     size: Size = (800, 600),
     samples: int | None = None,
@@ -56,8 +65,8 @@ def render(
 ) -> Picture:
     """Draw a scene, or a model without decals.
 
-    A scene is drawn as its ``drawing`` says; options that are given are used in place of its own. Each call
-    makes an OpenGL context. For many pictures, keep a `decals.rendering.Renderer`.
+    A scene is drawn as its ``drawing`` says; options that are given are used in place of its own. For many
+    pictures, take `decals.render_batch`.
 
     Parameters
     ----------
@@ -103,7 +112,7 @@ def render(
 
     See Also
     --------
-    decals.show, decals.rendering.Renderer
+    decals.render_batch, decals.show, decals.rendering.Renderer
 
     Examples
     --------
@@ -111,6 +120,71 @@ def render(
     >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=12)
     >>> decals.render(scene, size=(64, 48))
     Picture(64 × 48 pixels)
+    """
+    (picture,) = render_batch(
+        [scene],
+        viewpoints=viewpoint,
+        size=size,
+        samples=samples,
+        contact=contact,
+        stiffness=stiffness,
+        mapping=mapping,
+        background=background,
+        lights=lights,
+        filtered=filtered,
+        environment=environment,
+    )
+    return picture
+
+
+def render_batch(
+    scenes: Drawn | Iterable[Drawn],
+    *,
+    viewpoints: Viewpoint | Iterable[Viewpoint] | None = None,
+    size: Size = (800, 600),
+    samples: int | None = None,
+    contact: AnyContact | str | None = None,
+    stiffness: float | None = None,
+    mapping: ImageMapping | str | None = None,
+    background: Background | ColorLike | None = None,
+    lights: Lighting | None = None,
+    filtered: bool | None = None,
+    environment: Environment | AnyImage | None = None,
+) -> Iterator[Picture]:
+    """Draw many scenes, or one scene from many viewpoints, in one OpenGL context.
+
+    Each picture is that of `render`. Programs and uploads are kept from picture to picture. A picture is
+    drawn when it is taken, so that any number of them needs little memory.
+
+    Parameters
+    ----------
+    scenes : Scene, SceneObject or Model, or iterable of them
+        Scenes or models as `render` takes them; a list of models as one scene lies in a list of its own. A
+        single one is drawn from each viewpoint.
+    viewpoints : Camera or Projection, or iterable of them, optional
+        One viewpoint for all scenes, or one for each, in place of their cameras.
+    size, samples, contact, stiffness, mapping, background, lights, filtered, environment
+        See `render`; they hold for all pictures.
+
+    Yields
+    ------
+    Picture
+        An array of pixels, uint8[h, w, 4], with a method ``save``.
+
+    Raises
+    ------
+    InvalidScene
+        The numbers of scenes and viewpoints differ; and the errors of `render`.
+
+    Examples
+    --------
+    >>> import blobtree, decals
+    >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=12)
+    >>> around = [decals.Camera((5, 0, 0)), decals.Camera((0, 0, 5))]
+    >>> for number, picture in enumerate(decals.render_batch(scene, viewpoints=around, size=(32, 24))):
+    ...     picture.save(f"view-{number}.png")
+    >>> [picture.shape for picture in decals.render_batch([scene, scene], size=(32, 24))]
+    [(24, 32, 4), (24, 32, 4)]
     """
     given: dict[str, object] = {
         "samples": samples,
@@ -122,13 +196,45 @@ def render(
         "filtered": filtered,
         "environment": None if environment is None else as_environment(environment),
     }
-    width, height = Drawing().overridden(**given).at(size).size  # checked before a model is read
-    with reporting() as report:
-        report("drawing", 0.0)
-        drawn = cast(SceneLike, scene) if is_scene_like(scene) else as_scene(scene, aspect=width / height)
-        options = drawing_of(drawn).overridden(**given).at(size)
-        with Renderer() as renderer:
-            return drawn_picture(renderer, drawn, options, given, viewpoint)
+    Drawing().overridden(**given).at(size)  # checked before a model is read
+    return _drawn_pictures(_paired(scenes, viewpoints), size, given)
+
+
+def _paired(scenes: Any, viewpoints: Any) -> Iterator[tuple[Drawn, Viewpoint | None]]:
+    """Return scenes with their viewpoints; one of either stands for all."""
+    views = None if viewpoints is None or is_viewpoint(viewpoints) else items(viewpoints)
+    if not _is_several(scenes):
+        return zip(repeat(scenes), (viewpoints,) if views is None else views, strict=False)
+    if views is None:
+        return zip(scenes, repeat(viewpoints), strict=False)
+    if hasattr(scenes, "__len__") and len(scenes) != len(views):
+        raise InvalidScene(
+            f"viewpoints: expected one, or one for each of {len(scenes)} scenes, got {len(views)}"
+        )
+    return zip(scenes, views, strict=False)
+
+
+def _is_several(scenes: object) -> bool:
+    """Return True for a list, a tuple or an iterator of scenes; a pair of arrays is one model."""
+    if isinstance(scenes, tuple):
+        return not (len(scenes) == 2 and all(isinstance(part, np.ndarray | list) for part in scenes))
+    return isinstance(scenes, list | Iterator)
+
+
+def _drawn_pictures(
+    pairs: Iterable[tuple[Drawn, Viewpoint | None]], size: Size, given: Mapping[str, Any]
+) -> Iterator[Picture]:
+    """Yield the picture of each scene from its viewpoint."""
+    width, height = size
+    with Renderer() as renderer:
+        for scene, viewpoint in pairs:
+            with reporting() as report:
+                report("drawing", 0.0)
+                is_scene = is_scene_like(scene)
+                drawn = cast(SceneLike, scene) if is_scene else as_scene(scene, aspect=width / height)
+                options = drawing_of(drawn).overridden(**given).at(size)
+                picture = drawn_picture(renderer, drawn, options, given, viewpoint)
+            yield picture
 
 
 def drawn_picture(

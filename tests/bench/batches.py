@@ -1,4 +1,4 @@
-"""Batches against loops: many sets of decals at points, in one launch on a device.
+"""Batches against loops: many sets of decals in one launch, many views in one context.
 
 python -m tests.bench.batches [--device DEVICE] [--sets N] [--only NAME] [--json FILE] [--quick]
 """
@@ -16,6 +16,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 import decals
+from blobtree import Point
 from blobtree.device import known_device
 from decals import Decals
 from decals.index import DecalIndex
@@ -85,7 +86,28 @@ def evaluate_figures(device: str, count: int, repeats: int) -> dict[str, float]:
     }
 
 
-FIGURES: dict[str, Callable[[str, int, int], dict[str, float]]] = {"evaluate": evaluate_figures}
+def render_figures(device: str, count: int, repeats: int) -> dict[str, float]:
+    """Return the seconds of one batch of small pictures of a scene, and of a loop of `render`."""
+    scene = decals.cover(Point((0, 0, 0), radius=1.0), count=DECALS)
+    angles = np.linspace(0.0, 2.0 * np.pi, count // 10, endpoint=False)
+    cameras = [decals.Camera((4.0 * np.cos(angle), 1.0, 4.0 * np.sin(angle))) for angle in angles]
+    functions: dict[str, Callable[[], Any]] = {
+        "batch": lambda: list(decals.render_batch(scene, viewpoints=cameras, size=(160, 120))),
+        "loop": lambda: [decals.render(scene, viewpoint=camera, size=(160, 120)) for camera in cameras],
+    }
+    seconds = alternately(functions, device, repeats)
+    pairs = zip(functions["batch"](), functions["loop"](), strict=True)
+    return {
+        "render_batch_s": seconds["batch"],
+        "render_speedup": seconds["loop"] / seconds["batch"],
+        "render_equal": float(np.mean([np.array_equal(picture, alone) for picture, alone in pairs])),
+    }
+
+
+FIGURES: dict[str, Callable[[str, int, int], dict[str, float]]] = {
+    "evaluate": evaluate_figures,
+    "render": render_figures,
+}
 
 
 def main() -> None:

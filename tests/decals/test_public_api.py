@@ -22,7 +22,8 @@ NAMES = [
     "animate", "bake", "content_hash", "cover", "define_contact", "displace", "edit", "evaluate",
     "evaluate_batch", "export",
     "load_image", "load_model",
-    "load_scene", "measure", "pose", "render", "reproduce", "save_html", "save_scene", "scatter", "shader",
+    "load_scene", "measure", "pose", "render", "render_batch",
+    "reproduce", "save_html", "save_scene", "scatter", "shader",
     "show", "skin", "turntable",
 ]  # fmt: skip
 OF_PACKAGES = {
