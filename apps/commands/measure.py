@@ -33,11 +33,24 @@ LABELS = {
     "stretch_max": "stretch, largest",
     "folded": "folded share",
     "contact_length": "length of contact lines",
+    "kept": "share of images that contact keeps",
+    "residual_overlap": "area of several images after contact",
+    "gap_mean": "distance of bare surface from images, mean",
+    "gap_cv": "variation of that distance",
+    "gap_p95": "95 % of these distances below",
+    "gap_max": "largest of these distances",
+    "least_distance": "least distance of centres",
+    "mean_distance": "mean distance to the nearest centre",
+    "bond_order": "bond order, 1 in a lattice",
     "rho": "evenness, rho",
+    "covering_radius": "largest distance of surface from a centre",
     "cv": "variation of the nearest distance",
     "cv6": "variation of six distances",
     "samples": "points",
 }
+
+HIGH_RHO, HIGH_BOND_ORDER = 0.75, 0.8
+"""Values above which centres lie as in a lattice. Blue noise of dart throwing has a rho of 0.75."""
 
 
 def measure(
@@ -89,4 +102,9 @@ def measure(
     table = Table(box=None, show_header=False)
     for name, value in found.summary().items():
         table.add_row(LABELS[name], f"{value:,}" if isinstance(value, int) else f"{value:.4g}")
-    Console().print(table, highlight=False)
+    console = Console()
+    console.print(table, highlight=False)
+    if found.rho > HIGH_RHO and found.bond_order > HIGH_BOND_ORDER:
+        console.print(
+            "A high rho with a high bond order: the centres lie as in a lattice, not as blue noise."
+        )

@@ -324,7 +324,7 @@ def _joined(parts: list[Any]) -> Any:
     return np.concatenate(parts)
 
 
-_LISTS = "decals", "fields", "pushes"
+_LISTS = tuple(field.name for field in fields(Neighbors) if field.name != "offsets")
 
 
 def _part(values: Any, first: int, last: int) -> Any:

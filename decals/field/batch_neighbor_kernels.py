@@ -29,6 +29,7 @@ def list_neighbors_of_sets(
     decals: wp.array(dtype=wp.int32),
     fields: wp.array(dtype=wp.float32),
     pushes: wp.array(dtype=wp.float32),
+    shows: wp.array(dtype=wp.int32),
 ):
     """Do the same as `list_neighbors`."""
     i = first + wp.tid()
@@ -38,4 +39,6 @@ def list_neighbors_of_sets(
         offset = offsets[i]
     index = indices[sets[i]]
     n_q = wp.normalize(normals[row])
-    counts[i] = write_neighbors(points[row], n_q, contact, index, owners[i], offset, decals, fields, pushes)
+    counts[i] = write_neighbors(
+        points[row], n_q, contact, index, owners[i], offset, decals, fields, pushes, shows
+    )

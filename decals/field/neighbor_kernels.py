@@ -1,4 +1,4 @@
-"""Warp kernel of `evaluate`: the fields of all decals at points, and their pushes on the owners."""
+"""Warp kernel of `evaluate`: fields of all decals at points, pushes on owners, and which images show."""
 
 # mypy: ignore-errors
 # (kernel code is Python only in form: its names have Warp types)
@@ -8,9 +8,11 @@ import warp as wp
 from blobtree.kernels import KERNEL_OPTIONS
 from decals.field.contact import contact_push
 from decals.field.elastic import plane_push
-from decals.field.ownership import NO_OWNER
+from decals.field.mapping import in_image
+from decals.field.ownership import NO_OWNER, owner_below, uv_at
 from decals.field.radial import MIN_ADVANCE, are_nested, plane_distance
 from decals.field.receivers import acts, complement_of
+from decals.field.sampling_kernels import image_point
 from decals.index.lookup import IndexedDecals, cell_range
 from decals.record import (
     RECORD,
@@ -28,6 +30,9 @@ wp.set_module_options(KERNEL_OPTIONS)
 
 MIN_REMAINDER = 1.0e-6
 """Smallest divisor 1 − t, which is 0 on the rim."""
+
+SHOWS_ALONE, SHOWS_IN_LAYER = 1, 2
+"""Bits of `shows_at`."""
 
 
 @wp.func
@@ -73,6 +78,25 @@ def push_at(
 
 
 @wp.func
+def shows_at(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, contact: wp.int32, index: IndexedDecals) -> wp.int32:
+    """Return the sum of SHOWS_ALONE if the undeformed image reaches q, and SHOWS_IN_LAYER after contact."""
+    e = complement_of(q, n_q, decal, index)
+    if e > 0.5:
+        return 0
+    shows = wp.int32(0)
+    if in_image(uv_at(q, n_q, decal, wp.vec3(e, 0.0, 0.0), index)):
+        shows = wp.static(SHOWS_ALONE)
+    rank = rank_of(decal, index.records)
+    if not is_contact_rank(rank):
+        return shows * wp.static(SHOWS_ALONE + SHOWS_IN_LAYER)
+    if owner_below(q, n_q, rank + 1, 0, contact, index) == decal:
+        image = image_point(q, n_q, decal, contact, index)
+        if in_image(wp.vec2(image[0], image[1])):
+            shows += wp.static(SHOWS_IN_LAYER)
+    return shows
+
+
+@wp.func
 def write_neighbors(
     q: wp.vec3,
     n_q: wp.vec3,
@@ -83,6 +107,7 @@ def write_neighbors(
     decals: wp.array(dtype=wp.int32),
     fields: wp.array(dtype=wp.float32),
     pushes: wp.array(dtype=wp.float32),
+    shows: wp.array(dtype=wp.int32),
 ) -> wp.int32:
     """Return the number of decals with a field at q; from an offset on, also write them, if it is not −1."""
     count = wp.int32(0)
@@ -95,6 +120,7 @@ def write_neighbors(
                 if offset >= 0:
                     decals[offset + count] = decal
                     fields[offset + count] = field
+                    shows[offset + count] = shows_at(q, n_q, decal, contact, index)
                     if owner != NO_OWNER:
                         pushes[offset + count] = push_at(q, n_q, owner, decal, contact, index)
                 count += 1
@@ -114,11 +140,14 @@ def list_neighbors(
     decals: wp.array(dtype=wp.int32),
     fields: wp.array(dtype=wp.float32),
     pushes: wp.array(dtype=wp.float32),
+    shows: wp.array(dtype=wp.int32),
 ):
-    """Count the decals with a field at each point; with offsets, also write them, their fields and pushes."""
+    """Count the decals with a field at each point; with offsets, also write them and all about them."""
     i = first + wp.tid()
     offset = wp.int32(-1)
     if offsets.shape[0] > 0:
         offset = offsets[i]
     n_q = wp.normalize(normals[i])
-    counts[i] = write_neighbors(points[i], n_q, contact, index, owners[i], offset, decals, fields, pushes)
+    counts[i] = write_neighbors(
+        points[i], n_q, contact, index, owners[i], offset, decals, fields, pushes, shows
+    )

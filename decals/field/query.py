@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 import warp as wp
 
-from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import launch
 from decals.errors import InvalidImage
 from decals.field.jacobian import image_jacobians
@@ -39,12 +39,18 @@ class Neighbors:
         image outward. 0 without a push, 1 on their contact line. In PRODUCT and MIN this is 1 − h of equation
         5, in RADIAL and ELASTIC a share of the way along the ray. In RADIAL a decal that has no field at the
         point can push there too; it is not listed.
+    alone : bool[k]
+        True where the undeformed image of the decal reaches the point.
+    in_layer : bool[k]
+        True where its image does after contact: without the decals above it, the decal would show.
     """
 
     offsets: Int64Array
     decals: Int32Array
     fields: Float32Array
     pushes: Float32Array
+    alone: BoolArray
+    in_layer: BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +148,12 @@ class SingleTarget:
         decals, indexed, rows = self._decals, self._indexed, rows_of(self._decals)
         known = decals.numbers if isinstance(decals, DecalEditor) else None
         wide = index_on(rows, self.device, reach=1.0 / NEIGHBOR_REACH)
-        wide.stiffness, wide.surface, wide.limited = indexed.stiffness, indexed.surface, indexed.limited
+        for name in ("stiffness", "surface", "limited", "mapping", "walked", "walks"):
+            setattr(wide, name, getattr(indexed, name))
+        if wide.walked and known is not None:  # an editor has rows that are no decals
+            texels = indexed.walks.numpy()
+            texels[: len(known)] = texels[known]
+            wide.walks = wp.array(texels, dtype=wp.vec4, device=self.device)
         if wide.limited:
             limits = rows.limits_of(decals.receiver_table)
             wide.limits = wp.array(limits, dtype=wp.vec4, device=self.device)
@@ -255,7 +266,11 @@ class Query:
 
     def neighbors(self) -> Neighbors:
         """Return all decals with a field at points; the index lists whole influences, not only reaches."""
-        from decals.field.neighbor_kernels import list_neighbors  # compiled at the first use
+        from decals.field.neighbor_kernels import (  # compiled at the first use
+            SHOWS_ALONE,
+            SHOWS_IN_LAYER,
+            list_neighbors,
+        )
 
         device, count = self._device, self._count
         target, known = self._target.wide()
@@ -266,17 +281,18 @@ class Query:
             owners = np.where(owners >= 0, np.searchsorted(known, owners), owners).astype(np.int32)
         placed: Any = wp.array(owners, dtype=wp.int32, device=device)
         given = [self._points, self._normals, int(self._contact), *target.arguments(), placed]
-        self._launch(list_neighbors, [*given, empty[0]], [counts, empty[0], empty[1], empty[1]])
+        self._launch(list_neighbors, [*given, empty[0]], [counts, empty[0], empty[1], empty[1], empty[0]])
         offsets = np.concatenate([[0], np.cumsum(counts.numpy(), dtype=np.int64)])
         starts: Any = wp.array(offsets[:-1], dtype=wp.int32, device=device)
         total = int(offsets[-1])
-        lists = zeros(device, total, wp.int32, wp.float32, wp.float32)
+        lists = zeros(device, total, wp.int32, wp.float32, wp.float32, wp.int32)
         if total:
             self._launch(list_neighbors, [*given, starts], [counts, *lists])
-        found, fields, pushes = (values.numpy() for values in lists)
-        order = np.lexsort((found, np.repeat(np.arange(count), np.diff(offsets))))
-        numbers = found[order] if known is None else known[found[order]].astype(np.int32)
-        return Neighbors(offsets, numbers, fields[order], pushes[order])
+        order = np.lexsort((lists[0].numpy(), np.repeat(np.arange(count), np.diff(offsets))))
+        found, fields, pushes, shows = (values.numpy()[order] for values in lists)
+        numbers = found if known is None else known[found].astype(np.int32)
+        alone, in_layer = ((shows & bit) > 0 for bit in (SHOWS_ALONE, SHOWS_IN_LAYER))
+        return Neighbors(offsets, numbers, fields, pushes, alone, in_layer)
 
     def colors(self, layers: Sequence[Float32Array]) -> Any:
         """Return the colours of images, linear and premultiplied, over each other, on the device."""

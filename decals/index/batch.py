@@ -77,10 +77,11 @@ class DecalBatch:
         self._values |= {"limited": limited, "surface": np.where(limited, masks, EVERYTHING)}
 
     def with_reach(self, reach: float) -> "DecalBatch":
-        """Return the same sets, listed to another distance, with the same limits and stiffness."""
+        """Return the same sets, listed to another distance, with the same limits, walks and modes."""
         wide = DecalBatch(self.sets, self.device, reach=reach)
-        wide.modes.stiffness = self.modes.stiffness
-        wide._parts |= {name: part for name, part in self._parts.items() if name == "limits"}
+        for name in ("stiffness", "mapping", "walked"):
+            setattr(wide.modes, name, getattr(self.modes, name))
+        wide._parts |= {name: self._parts[name] for name in ("limits", "walks") if name in self._parts}
         wide._values |= {name: self._values[name] for name in ("limited", "surface") if name in self._values}
         return wide
 

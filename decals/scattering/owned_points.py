@@ -64,7 +64,7 @@ class Centers:
         offsets = points.positions[rows].astype(np.float64) - decals.positions[owners]
         n_p, n_q = decals.normals[owners].astype(np.float64), points.normals[rows].astype(np.float64)
         lengths = distances.copy()
-        lengths[close] = _arc_lengths(offsets, n_p, n_q)
+        lengths[close] = arc_lengths(offsets, n_p, n_q)
         return OwnedPoints(points, lengths, distances, indices, doubts, self)
 
 
@@ -242,7 +242,7 @@ def firsts(rows: Int64Array) -> BoolArray:
     return first
 
 
-def _arc_lengths(w: Float64Array, n_p: Float64Array, n_q: Float64Array) -> Float64Array:
+def arc_lengths(w: Float64Array, n_p: Float64Array, n_q: Float64Array) -> Float64Array:
     """Return the lengths along the surface at which the corrected mapping draws offsets w, ``float64[n]``.
 
     `decals.field.mapping.unroll` states the formula.

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
 from blobtree.progress import Progress, reporting
@@ -17,8 +17,10 @@ from decals.field.mapping import IMAGE_RADIUS_SQUARED, ImageMapping
 from decals.field.walks import walks_for
 from decals.model import Decals, Interaction
 from decals.rendering.options import modes_of
-from decals.scattering.domain import Domain, apportion
-from decals.scattering.neighbors import FacingTree, ideal_spacing, spacing_of_distances
+from decals.scattering.center_normals import Centers
+from decals.scattering.domain import Domain, OrientedPoints, apportion
+from decals.scattering.neighbors import FacingTree, bond_orders, ideal_spacing, spacing_of_distances
+from decals.scenes.gaps import gap_widths
 from decals.scenes.objects import MeshObject, SceneObject
 from decals.scenes.pose import require_scene
 from decals.scenes.scene import Scene
@@ -64,7 +66,16 @@ class DecalMeasures:
     contact_length
         Length of the lines on which it meets other contact decals.
     nearest
-        Distance to the nearest decal that faces the same way; infinity without one.
+        Distance to the nearest decal that lies on surface facing the same way; infinity without one.
+    undeformed_area
+        Area that its image alone would show, without other decals.
+    kept
+        Share of the undeformed area that contact leaves to it; NaN without any.
+    residual_overlap
+        Area that it has in common with other decals after contact: those of other layers, and decals that
+        overlap or are independent. Contact decals of one layer have none in common.
+    bond_order
+        Order of the directions to its six nearest neighbours, 1 in a hexagonal lattice; NaN with fewer.
     """
 
     visible_area: Float64Array
@@ -75,6 +86,10 @@ class DecalMeasures:
     folded: Float64Array
     contact_length: Float64Array
     nearest: Float64Array
+    undeformed_area: Float64Array
+    kept: Float64Array
+    residual_overlap: Float64Array
+    bond_order: Float64Array
 
     def __repr__(self) -> str:
         """Return the number of decals."""
@@ -102,9 +117,22 @@ class Measures:
         Share of these points where the image is folded, which means mirrored.
     contact_length
         Length of all lines on which two contact decals of one layer meet.
+    kept
+        Share of the undeformed areas of all decals that contact leaves to them; NaN without any.
+    residual_overlap
+        Area on which several images lie over each other after contact.
+    gap_mean, gap_cv, gap_p95, gap_max
+        Distance of bare surface from the nearest image: mean, coefficient of variation, 95th percentile and
+        largest. NaN without gaps or decals. An even width of the gaps has a low variation.
+    least_distance, mean_distance, bond_order
+        Least and mean distance of a centre from the nearest one, and mean order of the directions to six. A
+        high least distance with a high bond order is a lattice, not blue noise.
     rho, cv, cv6
         Evenness of the centres, as `decals.scattering.Spacing` has it: least distance over that of a
         hexagonal tiling, and variations of the distances to one neighbour and to six.
+    covering_radius
+        Largest distance of the surface from the nearest centre on surface that faces the same way; infinity
+        if surface has none, NaN without decals.
     samples
         Number of points that were evaluated.
     decals
@@ -120,9 +148,19 @@ class Measures:
     stretch_max: float
     folded: float
     contact_length: float
+    kept: float
+    residual_overlap: float
+    gap_mean: float
+    gap_cv: float
+    gap_p95: float
+    gap_max: float
+    least_distance: float
+    mean_distance: float
+    bond_order: float
     rho: float
     cv: float
     cv6: float
+    covering_radius: float
     samples: int
     decals: DecalMeasures
 
@@ -160,8 +198,8 @@ def measure(
 ) -> Measures:
     """Measure how decals lie on a scene: coverage, gaps, overlaps, stretch, folds, contact lines, evenness.
 
-    Random points, uniform by area, are evaluated with the normals with which the scene is drawn. So every
-    measure is an estimate. For m points the error of a share p is about √(p (1 − p)/m), and often far less,
+    Random points, uniform by area, are evaluated with the normals with which the scene is drawn. So areas and
+    lengths are estimates. For m points the error of a share p is about √(p (1 − p)/m), and often far less,
     because the points are stratified. That of the contact length is about 3/√m of it for decals that touch
     all around; single decals have only their part of the points. Transparent images count as visible.
 
@@ -223,7 +261,8 @@ def measure(
                 sums.add(part, normals, turns, modes_of(drawing) | {"on": item, "walks": walks}, rng)
                 done += len(part)
                 report("measuring", done / samples)
-    return sums.result(domain.area, samples)
+        centers = Centers.of(scene.decals, domain.surfaces, ideal_spacing(domain.area, count))
+        return sums.result(domain.area, samples, centers, points)
 
 
 def _drawn(
@@ -263,7 +302,9 @@ class _Sums:
         self.decals, self.area = decals, area
         count = len(decals)
         self.shown, self.overlapped, self.lines = (np.zeros(count) for _ in range(3))
-        self.overlap = 0
+        self.alone, self.kept, self.residues = (np.zeros(count) for _ in range(3))
+        self.overlap = self.residue = 0
+        self._gaps: list[Float64Array] = []
         self._owners: list[Int32Array] = []
         self._stretch: list[Float64Array] = []
         self._folds: list[BoolArray] = []
@@ -291,6 +332,8 @@ class _Sums:
         shown = (found.owner >= 0) & inside
         self.shown += np.bincount(found.owner[shown], minlength=count)
         self._add_overlaps(found)
+        if count:
+            self._gaps.append(gap_widths(self.decals, points[~shown], normals[~shown]))
         assert found.jacobian is not None
         known = shown & np.isfinite(found.jacobian[:, 0, 0])
         self._owners.append(found.owner[known])
@@ -299,13 +342,19 @@ class _Sums:
         self._add_lines(found, points, normals, turns, modes, rng)
 
     def _add_overlaps(self, found: Samples) -> None:
-        near = found.neighbors
+        near, count = found.neighbors, len(self.decals)
         assert near is not None
         rows = np.repeat(np.arange(len(found.owner)), np.diff(near.offsets))
-        inside = near.fields >= 0.5
-        several = np.bincount(rows[inside], minlength=len(found.owner)) > 1
-        self.overlap += int(several.sum())
-        self.overlapped += np.bincount(near.decals[inside & several[rows]], minlength=len(self.decals))
+
+        def in_common(inside: BoolArray) -> tuple[int, NDArray[np.intp]]:
+            several = np.bincount(rows[inside], minlength=len(found.owner)) > 1
+            return int(several.sum()), np.bincount(near.decals[inside & several[rows]], minlength=count)
+
+        before, after = in_common(near.fields >= 0.5), in_common(near.in_layer)
+        self.overlap, self.overlapped = self.overlap + before[0], self.overlapped + before[1]
+        self.residue, self.residues = self.residue + after[0], self.residues + after[1]
+        self.alone += np.bincount(near.decals[near.alone], minlength=count)
+        self.kept += np.bincount(near.decals[near.in_layer], minlength=count)
 
     def _add_lines(
         self,
@@ -341,8 +390,18 @@ class _Sums:
             hits = np.bincount(owners[crossed], 1.0 / steps[crossed], minlength=len(self.decals))
             self.lines += hits * np.pi / len(ways)
 
-    def result(self, area: float, samples: int) -> Measures:
-        """Return the measures of all points that were added."""
+    def result(self, area: float, samples: int, centers: Centers, points: OrientedPoints) -> Measures:
+        """Return the measures of all points that were added.
+
+        Parameters
+        ----------
+        area, samples
+            Area of the surfaces, and number of the points.
+        centers
+            Centres of the decals, with the normals of their surfaces.
+        points
+            The points, with the normals of their surfaces.
+        """
         count = len(self.decals)
         owners = np.concatenate([np.zeros(0, np.int32), *self._owners])
         stretch = np.concatenate([np.zeros(0), *self._stretch])
@@ -353,8 +412,12 @@ class _Sums:
         percentiles = np.array([_percentiles(part) for part in parts]).reshape(-1, 3)
         known = np.bincount(owners, minlength=count)
         folded = np.bincount(owners[folds], minlength=count)
-        nearest = _nearest(self.decals)
-        spacing = spacing_of_distances(nearest, ideal_spacing(area, count))
+        nearest, around = centers.rings()
+        bonds = bond_orders(centers.positions, centers.normals, around) if count else np.zeros(0)
+        spacing = spacing_of_distances(nearest, ideal_spacing(area, count), bonds)
+        tree = FacingTree(centers.positions, centers.normals)
+        covering = tree.nearest(points.positions, points.normals)[0][:, 0]
+        gaps = np.concatenate([np.zeros(0), *self._gaps])
         lengths = self.area * self.lines
         median, high, most = _percentiles(stretch)
         return Measures(
@@ -367,9 +430,19 @@ class _Sums:
             stretch_max=most,
             folded=float(folds.mean()) if len(folds) else float("nan"),
             contact_length=0.5 * float(lengths.sum()),
+            kept=float(_shares(self.kept.sum(), self.alone.sum())),
+            residual_overlap=self.area * self.residue,
+            gap_mean=float(gaps.mean()) if len(gaps) else float("nan"),
+            gap_cv=float(_shares(gaps.std(), gaps.mean())) if len(gaps) else float("nan"),
+            gap_p95=_percentiles(gaps)[1],
+            gap_max=_percentiles(gaps)[2],
+            least_distance=spacing.least,
+            mean_distance=spacing.mean,
+            bond_order=spacing.bond_order,
             rho=spacing.rho,
             cv=spacing.cv,
             cv6=spacing.cv6,
+            covering_radius=float(covering.max()) if count else float("nan"),
             samples=samples,
             decals=DecalMeasures(
                 visible_area=self.area * self.shown,
@@ -377,9 +450,13 @@ class _Sums:
                 stretch_median=percentiles[:, 0],
                 stretch_p95=percentiles[:, 1],
                 stretch_max=percentiles[:, 2],
-                folded=np.where(known > 0, folded / np.maximum(known, 1), np.nan),
+                folded=_shares(folded, known),
                 contact_length=lengths,
                 nearest=nearest[:, 0],
+                undeformed_area=self.area * self.alone,
+                kept=_shares(self.kept, self.alone),
+                residual_overlap=self.area * self.residues,
+                bond_order=bonds,
             ),
         )
 
@@ -390,9 +467,7 @@ def _percentiles(values: NDArray[np.floating]) -> Sequence[float]:
     return [float(value) for value in np.percentile(values, PERCENTILES)]
 
 
-def _nearest(decals: Decals) -> Float64Array:
-    """Return the distances to the six nearest decals that face the same way, ascending: float64[n, 6]."""
-    if not len(decals):
-        return np.zeros((0, 6))
-    tree = FacingTree(decals.positions, decals.normals)
-    return tree.nearest(decals.positions, decals.normals, count=6, skip_self=True)[0]
+def _shares(parts: ArrayLike, wholes: ArrayLike) -> Float64Array:
+    """Return the parts over the wholes; NaN where a whole is 0."""
+    whole = np.asarray(wholes, np.float64)
+    return np.where(whole > 0.0, np.asarray(parts, np.float64) / np.where(whole > 0.0, whole, 1.0), np.nan)

@@ -9,7 +9,7 @@ from decals.errors import InvalidPoints
 from decals.field.evaluate import evaluate
 from decals.field.jacobian import folds_of, stretch_of
 from decals.index.editor import DecalEditor
-from decals.model import Decals
+from decals.model import Decals, Interaction
 from decals.record import Contact
 from tests.decals.field.test_evaluate import dress, even_sphere, on_sphere, unit
 from tests.oracles.contact import RIM, complements, falloff, log_factor
@@ -149,3 +149,40 @@ def test_points_that_are_not_finite_have_no_derivative() -> None:
     assert found is not None
     assert np.isfinite(found[0]).all()
     assert np.isnan(found[1:]).all()
+
+
+@pytest.mark.ordinary_cases("corrected-elastic", "chord-product")
+@pytest.mark.parametrize("contact", ["product", "min", "radial", "elastic"])
+@pytest.mark.parametrize("mapping", ["chord", "corrected"])
+def test_neighbors_tell_which_images_reach_a_point(contact: str, mapping: str) -> None:
+    """Alone and after contact, a decal shows where an evaluation of it, or of its layer, says so."""
+    rng = np.random.default_rng(5)
+    count, size = 12, 1500
+    layout = Decals(
+        rng.uniform(-1, 1, (count, 3)) * [1, 1, 0],
+        rng.normal(0, 0.2, (count, 3)) + UP,
+        np.tile([1, 0, 0], (count, 1)),
+        rng.uniform(0.2, 0.8, count),
+        layers=rng.integers(0, 2, count),
+        interactions=rng.integers(0, 3, count),
+    )
+    points, normals = rng.uniform(-1.5, 1.5, (size, 3)) * [1, 1, 0.1], np.tile(UP, (size, 1))
+    modes: Any = {"contact": contact, "mapping": mapping}
+    near = evaluate(layout, points, normals, **modes, neighbors=True).neighbors
+    assert near is not None
+    rows = np.repeat(np.arange(size), np.diff(near.offsets))
+
+    def showing(numbers: Any) -> Any:
+        found = evaluate(layout[numbers], points, normals, **modes)
+        inside = ((found.uv.astype(float) - 0.5) ** 2).sum(axis=1) <= 0.25001
+        return np.where((found.owner >= 0) & inside, np.asarray(numbers)[found.owner], -1)
+
+    for number in range(count):
+        alone, in_layer = (
+            np.bincount(rows[(near.decals == number) & flags], minlength=size) == 1
+            for flags in (near.alone, near.in_layer)
+        )
+        np.testing.assert_array_equal(alone, showing([number]) == number)
+        pushes = layout.interactions[number] == Interaction.PUSH
+        rank = np.flatnonzero(layout.ranks == layout.ranks[number]) if pushes else [number]
+        np.testing.assert_array_equal(in_layer, showing(rank) == number)
