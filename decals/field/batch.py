@@ -5,7 +5,8 @@ from dataclasses import dataclass, fields
 from typing import Any, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+import warp as wp
+from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import known_device
@@ -15,15 +16,26 @@ from decals.field.evaluate import (
     Modes,
     Samples,
     checked_modes,
-    checked_rows,
     checked_truths,
-    checked_turns,
-    rows_on,
     samples_of,
     walk_texels,
 )
 from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.field.points import (
+    Rows,
+    checked_rows,
+    checked_turns,
+    device_of,
+    joined_arrays,
+    joined_rows,
+    like,
+    on_host,
+    part_of,
+    place,
+    placed,
+    rows_on,
+)
 from decals.field.query import BatchTarget, MaterialSamples, Neighbors, Query
 from decals.field.walks import Walks
 from decals.images.load import AnyImage, each_image
@@ -128,7 +140,8 @@ def evaluate_batch(
     sets : iterable of Decals
         k sets, of any numbers of decals.
     points, normals : float32[m, 3], or k arrays float32[mᵢ, 3]
-        The points of all sets, or those of each set; their normals in the same form.
+        The points of all sets, or those of each set; their normals in the same form. They may stay on their
+        device, see `evaluate`.
     mapping, contact, stiffness, images, jacobian, neighbors, materials, on, device
         See `evaluate`; they hold for all sets.
     normal_derivatives : float[m, 3, 3], or k arrays float[mᵢ, 3, 3], optional
@@ -162,23 +175,21 @@ def evaluate_batch(
     >>> batch.owner.reshape(3, 3).tolist()
     [[0, -1, -1], [0, 0, -1], [0, 0, 0]]
     """
-    device = known_device(device)
     listed = _checked_sets(sets)
     modes = checked_modes(mapping, contact, stiffness)
     checked_truths(jacobian=jacobian, neighbors=neighbors, materials=materials)
     layers = None if images is None else tuple(each_image(images))
     places = _Places.of(listed, points, normals, normal_derivatives)
+    device = places.device(device)
     walked = _checked_walks(walks, listed) if modes.mapping is ImageMapping.WALKED else None
     parts = []
     for first, last in _chunks([len(part) for part in listed], np.diff(places.offsets).tolist()):
         batch = DecalBatch(listed[first:last], device)
         _set_modes(batch, modes, on, None if walked is None else walked[first:last])
         rows, owners_sets, turns = places.chunk(first, last)
-        positions, facings = rows_on(device, *rows)
-        query = Query(BatchTarget(batch, owners_sets), positions, facings, modes.contact)
-        parts.append(
-            samples_of(query, layers, turns, jacobian=jacobian, neighbors=neighbors, materials=materials)
-        )
+        query = Query(BatchTarget(batch, owners_sets), *rows_on(device, rows), modes.contact)
+        part = samples_of(query, layers, turns, jacobian=jacobian, neighbors=neighbors, materials=materials)
+        parts.append(placed(part, device, stay=places.stay))
     return BatchSamples(
         places.offsets,
         **{field.name: _joined([getattr(part, field.name) for part in parts]) for field in fields(Samples)},
@@ -189,7 +200,7 @@ def evaluate_batch(
 class _Places:
     """Points, normals and their derivatives of k sets, and which rows of a batch are those of a set."""
 
-    points: list[tuple[Float32Array, Float32Array]]
+    points: list[Rows]
     """Those of each set, or those that all sets share."""
     turns: list[Float64Array | None]
     offsets: Int64Array
@@ -212,27 +223,40 @@ class _Places:
             turns = [checked_turns(turn, len(rows[0])) for turn, rows in zip(listed, pairs, strict=True)]
         return cls(pairs, turns, starts_of([len(rows[0]) for rows in pairs]), False)
 
-    def chunk(
-        self, first: int, last: int
-    ) -> tuple[tuple[Float32Array, Float32Array], Int32Array, Float64Array | None]:
+    @property
+    def stay(self) -> bool:
+        """True if results stay on the device of the points."""
+        return any(rows.stay for rows in self.points)
+
+    def device(self, device: Any) -> str:
+        """Return the name of the device of all points; raise InvalidPoints if they lie on several."""
+        places = [place(rows.points) for rows in self.points]
+        for number, other in enumerate(places):
+            if other != places[0]:
+                raise InvalidPoints(
+                    f"points[{number}]: expected an array {places[0]} like that of the first set, got one "
+                    f"{other}; move it there"
+                )
+        return device_of(self.points[0], device) if self.points else known_device(device)
+
+    def chunk(self, first: int, last: int) -> tuple[Rows, Int32Array, Float64Array | None]:
         """Return points and normals of some sets, the set of each row, and derivatives of the normals."""
         counts = np.diff(self.offsets[first : last + 1])
         sets = np.repeat(np.arange(last - first, dtype=np.int32), counts)
         if self.shared:
             turn = self.turns[0]
             return self.points[0], sets, None if turn is None else np.tile(turn, (last - first, 1, 1))
-        none = np.zeros((0, 3), np.float32)
-        points, normals = (
-            np.concatenate([none, *(rows[side] for rows in self.points[first:last])]) for side in (0, 1)
-        )
         turns = [turn for turn in self.turns[first:last] if turn is not None]
-        return (points, normals), sets, np.concatenate(turns) if turns else None
+        rows = joined_rows(self.points[first:last])
+        return rows, sets, np.concatenate(turns) if turns else None
 
 
 def _is_each(name: str, values: Any, axes: int) -> bool:
     """Return True if values are arrays with so many axes, one for each set; False for one array."""
     if hasattr(values, "ndim"):
-        return bool(values.ndim > axes)
+        return _axes(values) > axes
+    if hasattr(values, "__dlpack__"):  # its shape is known through DLPack alone: an array for all sets
+        return False
     listed = items(values)
     if listed is None:
         raise InvalidPoints(f"{name}: expected an array [m, 3], or one for each set, got {describe(values)}")
@@ -242,13 +266,14 @@ def _is_each(name: str, values: Any, axes: int) -> bool:
 def _axes(value: Any) -> int:
     """Return the number of axes of an array or of nested lists."""
     if hasattr(value, "ndim"):
-        return int(value.ndim)
+        return int(value.ndim) + len(getattr(value.dtype, "_shape_", ()))  # of Warp's vectors
     listed = items(value) if isinstance(value, list | tuple) else None
     return 0 if listed is None else 1 + max(map(_axes, listed[:1]), default=1)
 
 
 def _each_of(name: str, values: Any, count: int) -> tuple[Any, ...]:
-    listed = items(values)
+    is_warp = isinstance(values, wp.array)  # which have no iterator
+    listed = tuple(values[row] for row in range(len(values))) if is_warp else items(values)
     if listed is None or len(listed) != count:
         got = describe(values) if listed is None else f"{len(listed)}"
         raise InvalidPoints(
@@ -314,14 +339,15 @@ def _joined(parts: list[Any]) -> Any:
     if len(parts) == 1 or parts[0] is None:
         return parts[0]
     if isinstance(parts[0], Neighbors):
-        ends = np.cumsum([part.offsets[-1] for part in parts])
-        starts = [part.offsets[1:] + end - part.offsets[-1] for part, end in zip(parts, ends, strict=True)]
-        lists = (np.concatenate([getattr(part, name) for part in parts]) for name in _LISTS)
-        return Neighbors(np.concatenate([[0], *starts]), *lists)
+        offsets = [on_host(part.offsets) for part in parts]
+        ends = np.cumsum([part[-1] for part in offsets])
+        starts = [part[1:] + end - part[-1] for part, end in zip(offsets, ends, strict=True)]
+        lists = (joined_arrays([getattr(part, name) for part in parts]) for name in _LISTS)
+        return Neighbors(like(parts[0].offsets, np.concatenate([[0], *starts])), *lists)
     if isinstance(parts[0], MaterialSamples):
         names = [field.name for field in fields(MaterialSamples)]
         return MaterialSamples(**{name: _joined([getattr(part, name) for part in parts]) for name in names})
-    return np.concatenate(parts)
+    return joined_arrays(parts)
 
 
 _LISTS = tuple(field.name for field in fields(Neighbors) if field.name != "offsets")
@@ -330,11 +356,12 @@ _LISTS = tuple(field.name for field in fields(Neighbors) if field.name != "offse
 def _part(values: Any, first: int, last: int) -> Any:
     """Return some rows of the samples of all sets."""
     if isinstance(values, Neighbors):
-        offsets = values.offsets[first : last + 1]
-        inside = slice(int(offsets[0]), int(offsets[-1]))
-        return Neighbors(offsets - offsets[0], *(getattr(values, name)[inside] for name in _LISTS))
+        offsets = on_host(values.offsets)[first : last + 1]
+        ends = int(offsets[0]), int(offsets[-1])
+        lists = (part_of(getattr(values, name), *ends) for name in _LISTS)
+        return Neighbors(like(values.offsets, offsets - offsets[0]), *lists)
     if isinstance(values, MaterialSamples):
-        parts = {field.name: getattr(values, field.name)[first:last] for field in fields(MaterialSamples)}
+        names = [field.name for field in fields(MaterialSamples)]
+        parts = {name: part_of(getattr(values, name), first, last) for name in names}
         return MaterialSamples(**parts)
-    rows: NDArray[Any] | None = None if values is None else values[first:last]
-    return rows
+    return None if values is None else part_of(values, first, last)

@@ -4,16 +4,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array, Int32Array
 from blobtree.device import known_device, launch
-from blobtree.validation import real, truth
-from decals.errors import InvalidDecals, InvalidPoints, InvalidScene
+from blobtree.validation import truth
+from decals.errors import InvalidDecals, InvalidScene
 from decals.field.law import AnyContact, contact_mode
 from decals.field.mapping import ImageMapping
+from decals.field.points import checked_rows, checked_turns, device_of, placed, rows_on
 from decals.field.query import (
     MaterialSamples,
     Neighbors,
@@ -99,9 +99,11 @@ def evaluate(
     decals : Decals or DecalEditor
         n decals. The owners of an editor's decals are its numbers.
     points : float32[m, 3]
-        Surface points in model units. A point that is not finite has no owner.
+        Surface points in model units. A point that is not finite has no owner. Arrays of Warp, and arrays of
+        other libraries on a CUDA device (torch, CuPy, JAX), stay on their device.
     normals : float32[m, 3]
-        Geometric normals of the surface there, of any length. A zero normal faces every decal.
+        Geometric normals of the surface there, of any length, where the points are. A zero normal faces every
+        decal.
     mapping : ImageMapping or str, optional
         Image mapping: CORRECTED (default), CHORD or WALKED.
     contact : Contact, str or ContactLaw, optional
@@ -127,18 +129,20 @@ def evaluate(
     walks : Walks, optional
         Log maps around the decals over their surface, which the mapping WALKED needs.
     device : optional
-        Warp device. Default: Warp's default device.
+        Warp device. Default: that of points that stay on it, else Warp's default device.
 
     Returns
     -------
     Samples
-        One row for each point.
+        One row for each point. Its arrays are those of NumPy; for points that stay on their device they are
+        Warp arrays there. ``from_dlpack`` of torch, CuPy and JAX takes either without a copy.
 
     Raises
     ------
     InvalidPoints
-        Points and normals are not two arrays of the same shape [m, 3], or the derivatives of the normals are
-        not one of shape [m, 3, 3].
+        Points and normals are not two arrays of the same shape [m, 3] on one device, or the derivatives of
+        the normals are not one of shape [m, 3, 3]. Arrays that stay on their device must be float32, with
+        three adjacent numbers in each row.
     InvalidImage
         An image of another type or shape, or fewer images than the decals refer to.
     InvalidDecals
@@ -147,7 +151,7 @@ def evaluate(
         An unknown mapping or contact mode, a stiffness out of range, ``on`` is neither object nor labels, or
         the mapping is WALKED without walks of these decals.
     InvalidDevice
-        Warp has no such device.
+        Warp has no such device, or the points stay on another one.
 
     See Also
     --------
@@ -167,15 +171,17 @@ def evaluate(
     >>> decals.evaluate(disk, [[0.5, 0, 0]], [[0, 0, 1]], jacobian=True).jacobian.round(2).tolist()
     [[[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]]
     """
-    device = known_device(device)
     modes = checked_modes(mapping, contact, stiffness)
     checked_truths(jacobian=jacobian, neighbors=neighbors, materials=materials)
-    positions, facings = rows_on(device, *checked_rows(points, normals))
-    turns = checked_turns(normal_derivatives, len(positions))
+    rows = checked_rows(points, normals)
+    device = device_of(rows, device)
+    turns = checked_turns(normal_derivatives, len(rows.points))
     indexed = _indexed(decals, index, modes, walks, device)
     _limit(indexed, decals, on, device)
-    query = Query(SingleTarget(decals, indexed, device), positions, facings, modes.contact)
-    return samples_of(query, images, turns, jacobian=jacobian, neighbors=neighbors, materials=materials)
+    query = Query(SingleTarget(decals, indexed, device), *rows_on(device, rows), modes.contact)
+    samples = samples_of(query, images, turns, jacobian=jacobian, neighbors=neighbors, materials=materials)
+    shown: Samples = placed(samples, device, stay=rows.stay)
+    return shown
 
 
 def samples_of(
@@ -187,12 +193,12 @@ def samples_of(
     neighbors: bool,
     materials: bool,
 ) -> Samples:
-    """Return what `evaluate` returns; the arguments are checked."""
+    """Return what `evaluate` returns, in arrays of NumPy and of the device; the arguments are checked."""
     color = height = maps = None
     if images is not None:
         listed = each_image(images)
         pixels = [image_pixels(image, name=f"image {number}") for number, image in enumerate(listed)]
-        color = query.colors([linear_premultiplied(image) for image in pixels]).numpy()
+        color = query.colors([linear_premultiplied(image) for image in pixels])
         reliefs = [image.relief_texels() if hasattr(image, "relief_texels") else None for image in listed]
         if any(relief is not None for relief in reliefs):
             height = query.heights(reliefs, pixels)
@@ -200,8 +206,7 @@ def samples_of(
             maps = query.materials(listed, pixels)
     derivative = query.jacobians(normal_derivatives) if jacobian else None
     near = query.neighbors() if neighbors else None
-    owners, uv, fields = (array.numpy() for array in (query.owners, query.uv, query.fields))
-    return Samples(owners, uv, fields, color, derivative, near, height, maps)
+    return Samples(query.owners, query.uv, query.fields, color, derivative, near, height, maps)
 
 
 class ColorEvaluator:
@@ -268,32 +273,6 @@ def checked_truths(**values: object) -> None:
         truth(name, value, InvalidScene)
 
 
-def checked_rows(points: ArrayLike, normals: ArrayLike) -> tuple[Float32Array, Float32Array]:
-    """Return points and normals ``float32[m, 3]``; raise InvalidPoints for arrays of other shapes."""
-    positions, facings = as_rows("points", points), as_rows("normals", normals)
-    if len(positions) != len(facings):
-        raise InvalidPoints(f"normals: expected one for each of {len(positions)} points, got {len(facings)}")
-    return positions, facings
-
-
-def checked_turns(normal_derivatives: ArrayLike | None, count: int) -> Float64Array | None:
-    """Return derivatives of normals ``float64[m, 3, 3]``; raise InvalidPoints for other shapes."""
-    if normal_derivatives is None:
-        return None
-    turns = as_rows("normal_derivatives", normal_derivatives, (3, 3)).astype(np.float64)
-    if len(turns) != count:
-        raise InvalidPoints(f"normal_derivatives: expected one for each of {count} points, got {len(turns)}")
-    return turns
-
-
-def rows_on(device: str, *arrays: Float32Array) -> list[Any]:
-    """Return rows of three numbers on a device; the processor reads the memory of the arrays."""
-    return [
-        wp.array(np.ascontiguousarray(rows), dtype=wp.vec3, device=device, copy=device != "cpu")
-        for rows in arrays
-    ]
-
-
 def _indexed(
     decals: Decals | DecalEditor,
     index: DecalIndex | None,
@@ -346,20 +325,3 @@ def _limit(
     indexed.limited = decals.limited or takes_named_only(on)
     if indexed.limited:
         indexed.limits, indexed.surface = wp.array(decals.limits, dtype=wp.vec4, device=device), mask
-
-
-def as_rows(name: str, values: ArrayLike, shape: tuple[int, ...] = (3,)) -> Float32Array:
-    """Return rows of numbers as float32; raise InvalidPoints for other values or shapes."""
-    expected = ", ".join(map(str, ("m", *shape)))
-    try:
-        with np.errstate(over="ignore"):
-            array = np.asarray(real(values), np.float32)
-    except (TypeError, ValueError, OverflowError):
-        raise InvalidPoints(
-            f"{name}: expected numbers of shape [{expected}], got {describe(values)}"
-        ) from None
-    if array.shape[1:] != shape:
-        raise InvalidPoints(
-            f"{name}: expected shape [{expected}], got {list(array.shape)}; give one row per point"
-        )
-    return array
