@@ -43,6 +43,7 @@ from .scenes.pose import pose, skin
 from .scenes.render import render, render_batch
 from .scenes.reproduction import reproduce
 from .scenes.scene import DecalImage, Scene
+from .scenes.tables import from_table, load_table, save_table, to_arrow, to_pandas
 from .vtk import show
 from .window import edit
 
@@ -77,12 +78,14 @@ __all__ = [
     "experiments",
     "export",
     "field",
+    "from_table",
     "hosts",
     "images",
     "index",
     "load_image",
     "load_model",
     "load_scene",
+    "load_table",
     "measure",
     "pages",
     "pose",
@@ -92,6 +95,7 @@ __all__ = [
     "reproduce",
     "save_html",
     "save_scene",
+    "save_table",
     "scatter",
     "scattering",
     "scenes",
@@ -99,6 +103,8 @@ __all__ = [
     "show",
     "skin",
     "surfaces",
+    "to_arrow",
+    "to_pandas",
     "turntable",
     "vtk",
     "window",

@@ -24,7 +24,6 @@ import blobtree
 import decals
 from blobtree.pyvista_views import write_polydata
 from decals.apps import cli
-from decals.apps.commands.scatter import write_table
 from decals.errors import ImplicitDecalsError, InvalidInput
 from decals.rendering import Picture
 from decals.scenes.meshes import write_mesh
@@ -111,7 +110,8 @@ WRITERS: dict[str, Writer] = {
     "page.html": lambda path: decals.save_html(scene(), path, resolution=8),
     "displaced.ply": lambda path: decals.displace(relief_scene()).save(path),
     "turn.gif": lambda path: decals.animate(decals.turntable(scene(), 2), path, size=(32, 24), samples=1),
-    "table.csv": lambda path: write_table(scene().decals, path),
+    "table.parquet": lambda path: decals.save_table(scene().decals, path),
+    "table.csv": lambda path: decals.save_table(scene().decals, path),
     "commanded.ply": command("export", "spheres", "--resolution", "8"),
     "polygonized.obj": command("polygonize", "spheres", "--resolution", "8"),
     "rendered.png": command("render", "spheres", "--size", "32x24"),

@@ -15,13 +15,14 @@ from decals.apps.commands.options import (
     Definitions,
     MappingName,
     OptionalWhole,
+    TableFile,
     Trust,
     UpAxis,
     check_count,
     parse_size,
 )
 from decals.apps.commands.progress_bars import preparing
-from decals.apps.commands.scatter_options import ScatterOptions
+from decals.apps.commands.scatter_options import ScatterOptions, refuse_scattering
 from decals.apps.models.loading import (
     call_imported,
     import_module_or_file,
@@ -63,6 +64,7 @@ def animate(
     contact: ContactName = None,
     mapping: MappingName = None,
     seed: OptionalWhole = None,
+    table: TableFile = None,
     define: Definitions = None,
     trust: Trust = False,
 ) -> None:
@@ -118,10 +120,9 @@ def animate(
     check_animation(output, VIDEO_SUFFIXES)
     with preparing(define) as progress:
         function = _pose_function(poses) if poses is not None else None
-        loaded = load_models(model, trust=trust)
+        loaded = load_models(model, trust=trust, table=table, images=image)
         if isinstance(loaded, Scene):
-            if decals is not None or image or seed is not None:
-                raise InvalidInput("a saved scene has its own decals; leave out --decals, --image and --seed")
+            refuse_scattering(decals, image, seed, table)
             scene = loaded
             if camera is not None or up is not None:
                 scene = scene.replace(camera=frame(scene.objects, view, pixels))

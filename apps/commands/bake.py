@@ -15,6 +15,7 @@ from decals.apps.commands.options import (
     MappingName,
     OptionalWhole,
     Stiffness,
+    TableFile,
     Trust,
     Whole,
     check_count,
@@ -41,6 +42,7 @@ def bake(
     resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None,
     creases: Annotated[bool, Parameter(negative=())] = False,
     crease_angle: CreaseAngle = None,
+    table: TableFile = None,
     define: Definitions = None,
     trust: Trust = False,
 ) -> None:
@@ -77,7 +79,7 @@ def bake(
     check_output(output, (".glb",))
     check_count("--samples", samples, 1, MAX_SAMPLES)
     with preparing(define) as progress:
-        loaded = load_model(scene, trust=trust, crease_angle=crease_angle)
+        loaded = load_model(scene, trust=trust, crease_angle=crease_angle, table=table)
         bake_scene(
             loaded,
             output,

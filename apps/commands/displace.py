@@ -15,6 +15,7 @@ from decals.apps.commands.options import (
     MappingName,
     OptionalWhole,
     Stiffness,
+    TableFile,
     Trust,
     given,
 )
@@ -36,6 +37,7 @@ def displace(
     resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None,
     creases: Annotated[bool, Parameter(negative=())] = False,
     crease_angle: CreaseAngle = None,
+    table: TableFile = None,
     define: Definitions = None,
     trust: Trust = False,
 ) -> None:
@@ -63,7 +65,7 @@ def displace(
     """
     check_output(output, (".glb", *MESH_SUFFIXES))
     with preparing(define) as progress:
-        loaded = load_model(scene, trust=trust, crease_angle=crease_angle)
+        loaded = load_model(scene, trust=trust, crease_angle=crease_angle, table=table)
         if not isinstance(loaded, Scene):
             raise InvalidInput(f"expected a saved scene with decals, got {scene!r}; scatter writes one")
         displaced = displace_scene(

@@ -14,6 +14,7 @@ from decals.apps.commands.options import (
     Seed,
     StartImages,
     Stiffness,
+    TableFile,
     Trust,
     UpAxis,
     parse_size,
@@ -38,6 +39,7 @@ def edit(
     mapping: MappingName = None,
     seed: Seed = None,
     save: Path | None = None,
+    table: TableFile = None,
     define: Definitions = None,
     trust: Trust = False,
 ) -> None:
@@ -72,7 +74,15 @@ def edit(
     EditWindow.require_screen()
     import_definitions(define)
     opening = opened(
-        model, decals=decals, image=image, up=up, pixels=pixels, seed=seed, save=save, trust=trust
+        model,
+        decals=decals,
+        image=image,
+        up=up,
+        pixels=pixels,
+        seed=seed,
+        save=save,
+        table=table,
+        trust=trust,
     )
     window = EditWindow(
         opening.scene,

@@ -23,6 +23,7 @@ from decals.apps.commands.options import (
     MappingName,
     OptionalWhole,
     Stiffness,
+    TableFile,
     Trust,
     Whole,
     check_count,
@@ -83,6 +84,7 @@ def export(
     resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None,
     creases: Annotated[bool, Parameter(negative=())] = False,
     crease_angle: CreaseAngle = None,
+    table: TableFile = None,
     define: Definitions = None,
     trust: Trust = False,
 ) -> None:
@@ -157,7 +159,7 @@ def export(
     in_file = given(colors=colors, unit=unit, up=up)
     checks: Sequence[MeshCheck] = ()
     with preparing(define) as progress:
-        loaded = load_model(scene, trust=trust, crease_angle=crease_angle)
+        loaded = load_model(scene, trust=trust, crease_angle=crease_angle, table=table)
         if output.suffix.lower() in SUFFIXES:
             if in_file or attributes or instances or check:
                 raise InvalidInput("export: a page takes no options of mesh files; leave them out")

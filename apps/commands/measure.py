@@ -15,6 +15,7 @@ from decals.apps.commands.options import (
     MappingName,
     OptionalWhole,
     Stiffness,
+    TableFile,
     Trust,
     Whole,
     given,
@@ -63,6 +64,7 @@ def measure(
     samples: OptionalWhole = None,
     seed: Whole = 0,
     json_output: Annotated[bool, Parameter(name="--json", negative=())] = False,
+    table: TableFile = None,
     define: Definitions = None,
     trust: Trust = False,
 ) -> None:
@@ -86,7 +88,7 @@ def measure(
         Print one JSON object in place of a table, with the measures of each decal.
     """
     with preparing(define) as progress:
-        loaded = load_models([scene], trust=trust)
+        loaded = load_models([scene], trust=trust, table=table)
         if not isinstance(loaded, Scene):
             raise InvalidInput(f"expected a saved scene in JSON, got the model {scene!r}; scatter makes one")
         found = measured(
@@ -99,11 +101,11 @@ def measure(
     if json_output:
         print(json.dumps(found.to_dict()))
         return
-    table = Table(box=None, show_header=False)
+    lines = Table(box=None, show_header=False)
     for name, value in found.summary().items():
-        table.add_row(LABELS[name], f"{value:,}" if isinstance(value, int) else f"{value:.4g}")
+        lines.add_row(LABELS[name], f"{value:,}" if isinstance(value, int) else f"{value:.4g}")
     console = Console()
-    console.print(table, highlight=False)
+    console.print(lines, highlight=False)
     if found.rho > HIGH_RHO and found.bond_order > HIGH_BOND_ORDER:
         console.print(
             "A high rho with a high bond order: the centres lie as in a lattice, not as blue noise."

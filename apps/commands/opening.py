@@ -68,25 +68,33 @@ def opened(
     pixels: tuple[int, int],
     seed: int | None,
     save: Path | None,
+    table: Path | None,
     trust: bool,
 ) -> Opened:
     """Return the scene that the arguments of a command name; see `decals.apps.commands.edit.edit`."""
     added: tuple[DecalImage, ...] = ()
     path = save
     if not model or _is_unsaved(model):
-        if decals is not None or seed is not None:
-            raise InvalidInput("an empty scene has no decals; name a model, or leave out --decals and --seed")
+        if decals is not None or seed is not None or table is not None:
+            raise InvalidInput(
+                "an empty scene has no decals; name a model, or leave out --decals, --seed and --table"
+            )
         scene = empty_scene(image or DEFAULT_IMAGES, UPRIGHT[up or "y"])
         path = path or (Path(model[0]) if model else new_file(Path(), "scene", recover=True))
     else:
         with progress_bars() as progress:
             progress(PREPARING, 0.0)
-            loaded = load_models(model, trust=trust)
+            loaded = load_models(model, trust=trust, table=table, images=image)
             if isinstance(loaded, Scene):
                 if decals is not None or seed is not None:
-                    raise InvalidInput("a saved scene has its own decals; leave out --decals and --seed")
-                scene, path = loaded, path or Path(model[0])
-                added = tuple(DecalImage.load(source) for source in image or ())
+                    raise InvalidInput(
+                        "a saved scene or table has its own decals; leave out --decals and --seed"
+                    )
+                scene = loaded
+                if table is None:
+                    path, added = path or Path(model[0]), tuple(map(DecalImage.load, image or ()))
+                else:
+                    path = path or new_file(Path(), f"{Path(model[0]).stem}-decals", recover=True)
             else:
                 options = ScatterOptions.from_arguments(decals, image, seed)
                 where = parse_view(None, axes_of(model[0]) if up is None else UPRIGHT[up])

@@ -5,6 +5,7 @@ This module imports nothing heavy, so a command that only prints a list is fast.
 
 import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter, Token
@@ -94,6 +95,17 @@ CreaseAngle = Annotated[
     ),
 ]
 """An optional crease angle of meshes, in degrees, on the command line."""
+
+TableFile = Annotated[
+    Path | None,
+    Parameter(
+        name="--table",
+        show_default=False,
+        help="Table of decals (csv or parquet), as scatter writes it: the decals of the models, in place of "
+        "those of a saved scene.",
+    ),
+]
+"""An optional table of decals on the command line."""
 
 Trust = Annotated[
     bool,

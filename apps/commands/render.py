@@ -18,6 +18,7 @@ from decals.apps.commands.options import (
     OptionalWhole,
     Seed,
     Stiffness,
+    TableFile,
     Trust,
     UpAxis,
     check_count,
@@ -25,7 +26,7 @@ from decals.apps.commands.options import (
     parse_size,
 )
 from decals.apps.commands.progress_bars import preparing
-from decals.apps.commands.scatter_options import ScatterOptions
+from decals.apps.commands.scatter_options import ScatterOptions, refuse_scattering
 from decals.apps.models.loading import load_models
 from decals.apps.models.samples import axes_of
 from decals.apps.output import PICTURE_SUFFIXES, check_output, print_path
@@ -58,6 +59,7 @@ def render(
     seed: Seed = None,
     save: Path | None = None,
     crease_angle: CreaseAngle = None,
+    table: TableFile = None,
     define: Definitions = None,
     trust: Trust = False,
 ) -> None:
@@ -130,9 +132,9 @@ def render(
         check_output(save, (".json",))
     with ExitStack() as stack:
         progress = stack.enter_context(preparing(define))
-        loaded = load_models(model, trust=trust, crease_angle=crease_angle)
-        if isinstance(loaded, Scene) and (decals is not None or image or seed is not None):
-            raise InvalidInput("a saved scene has its own decals; leave out --decals, --image and --seed")
+        loaded = load_models(model, trust=trust, crease_angle=crease_angle, table=table, images=image)
+        if isinstance(loaded, Scene):
+            refuse_scattering(decals, image, seed, table)
         drawing = (loaded.drawing if isinstance(loaded, Scene) else Drawing()).overridden(**options)
         if changes and environment is None:
             drawing = drawing.overridden(environment=_changed(drawing.environment, changes))

@@ -30,6 +30,7 @@ from decals.apps.commands.options import (
     OptionalWhole,
     Seed,
     StartImages,
+    TableFile,
     Trust,
     UpAxis,
     Whole,
@@ -61,6 +62,7 @@ def sandbox(
     up: UpAxis = None,
     seed: Seed = None,
     save: Path | None = None,
+    table: TableFile = None,
     define: Definitions = None,
     port: Whole = 8080,
     host: str = HOST,
@@ -120,7 +122,7 @@ def sandbox(
         raise InvalidInput("the lab has its own scenes; leave out the model, or --lab and --lessons")
     if desktop or not (share or done or session):
         options: dict[str, Any] = {"decals": decals, "image": image, "up": up, "seed": seed, "define": define}
-        options |= {"trust": trust, "lab": lab, "lessons": lessons}
+        options |= {"table": table, "trust": trust, "lab": lab, "lessons": lessons}
         command = _commands(model, options, save)
         if desktop:
             return _show_window(command(1))
@@ -139,7 +141,15 @@ def sandbox(
     guard = _guard(host, allow_host, given, framed=done)
     import_definitions(define)
     opening = opened(
-        model, decals=decals, image=image, up=up, pixels=FIRST_SIZE, seed=seed, save=save, trust=trust
+        model,
+        decals=decals,
+        image=image,
+        up=up,
+        pixels=FIRST_SIZE,
+        seed=seed,
+        save=save,
+        table=table,
+        trust=trust,
     )
     plotter = new_plotter(True, FIRST_SIZE)
     window = EditWindow(opening.scene, path=opening.path, plotter=plotter, recover=opening.recover)
@@ -181,7 +191,10 @@ def _commands(
             known = names.get(number)
             path = names[number] = known or _unused(first, names.values())
             if known is not None and _exists(known) and not (options["lab"] or options["lessons"]):
-                opened, given = [str(known)], {**options, "decals": None, "image": None, "seed": None}
+                opened, given = (
+                    [str(known)],
+                    {**options, "decals": None, "image": None, "seed": None, "table": None},
+                )
         given = {**given, "save": path, "port": 0, "no_browser": True, "session": True}
         return [sys.executable, "-m", "decals", "sandbox", *opened, *_as_arguments(given)]
 

@@ -1,14 +1,11 @@
 """``implicit-decals scatter``: scattered decals as a scene, or as a table."""
 
-import colorsys
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from cyclopts import Parameter
 
-from blobtree.files import write_atomically
-from decals import DecalImage, Decals, Scene, Sizing, save_scene
+from decals import Scene, Sizing, save_scene, save_table
 from decals import scatter as scatter_decals
 from decals.apps.commands.options import (
     MAX_DECALS,
@@ -23,21 +20,18 @@ from decals.apps.commands.options import (
 from decals.apps.commands.progress_bars import preparing
 from decals.apps.models.loading import load_models
 from decals.apps.models.samples import axes_of
+from decals.apps.models.tables import ASPECT, scale_images
 from decals.apps.output import check_output, print_path
 from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
 from decals.rendering import Drawing
 from decals.scattering import ImageChoice, Orientation, PaintedImage, Planar
 from decals.scattering.neighbors import ideal_spacing
-from decals.scenes.origin import WORLD, Origin
 from decals.scenes.recipe import Recipe
+from decals.scenes.tables import SUFFIXES as TABLE_SUFFIXES
 
-COLUMNS = ("x", "y", "z", "nx", "ny", "nz", "tx", "ty", "tz", "radius", "image")
-SUFFIXES = (".json", ".csv")
+SUFFIXES = (".json", *TABLE_SUFFIXES)
 MAX_IMAGES = 256
-ASPECT = (4, 3)
-"""Width and height of the picture that the camera of a written scene fits, in any unit."""
-GOLDEN_RATIO = 0.618034
 
 
 def scatter(
@@ -71,7 +65,8 @@ def scatter(
         Mesh files (ply, obj, stl, vtp, ...), BlobTrees in JSON, or samples (creature, dragon, horse, knot,
         spheres), or one saved scene, which keeps its images and camera.
     output
-        The output file: json, a scene that render and edit can open, or csv, a row for each decal.
+        The output file: json, a scene that other commands open, or csv or parquet, a table with a row for
+        each decal, which they take by --table.
     count
         Number of decals. Default: 500.
     spacing
@@ -136,8 +131,8 @@ def scatter(
             "choice": choice,
         }
         decals = scatter_decals(surfaces, density=density, seed=seed, progress=progress, **options)
-        if output.suffix.lower() == ".csv":
-            write_table(decals, output, objects[0].origin)
+        if output.suffix.lower() in TABLE_SUFFIXES:
+            save_table(decals, output, images=own, origin=objects[0].origin)
         else:
             if isinstance(loaded, Scene):
                 camera, drawing = loaded.camera, loaded.drawing
@@ -159,27 +154,3 @@ def _check_spacing(spacing: float, area: float) -> None:
         raise InvalidInput(
             f"--spacing: expected at least {least:.3g}, which makes {MAX_DECALS:,} decals, got {spacing:g}"
         )
-
-
-def write_table(decals: Decals, path: Path, origin: Origin = WORLD) -> None:
-    """Write decals as comma-separated values: one row per decal, headed by `COLUMNS`.
-
-    Positions are relative to the origin; they are written as coordinates of the models' files.
-    """
-    columns = (
-        decals.positions if origin == WORLD else decals.positions + np.array(origin),
-        decals.normals,
-        decals.tangents,
-        decals.radii[:, None],
-        decals.images[:, None],
-    )
-    rows = np.hstack([column.astype(object) for column in columns])
-    lines = [",".join(COLUMNS), *(",".join(map(str, row)) for row in rows)]
-    write_atomically(path, ("\n".join(lines) + "\n").encode())
-
-
-def scale_images(count: int) -> tuple[DecalImage, ...]:
-    """Return images of scales for a scene: the first in the default colour, the others in various hues."""
-    hues = (colorsys.hsv_to_rgb(GOLDEN_RATIO * number % 1.0, 0.55, 0.65) for number in range(1, count))
-    colors = ["".join(f"{round(255 * channel):02x}" for channel in hue) for hue in hues]
-    return tuple(DecalImage.load(source) for source in ["scale", *(f"scale#{color}" for color in colors)])

@@ -2,16 +2,31 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from blobtree import Progress
 from decals import DecalImage, Scene, scatter
 from decals.apps.commands.options import DEFAULT_IMAGES, MAX_DECALS, MAX_SEED, check_count
 from decals.apps.commands.progress_bars import PREPARING
 from decals.apps.views import Size, View, frame
+from decals.errors import InvalidInput
 from decals.scenes.objects import SceneObject
 from decals.scenes.recipe import Recipe
 
 DEFAULT_COUNT = 500
+
+
+def refuse_scattering(
+    count: int | None, images: Sequence[str] | None, seed: int | None, table: Path | None
+) -> None:
+    """Raise InvalidInput for options of scattered decals, where a scene or a table has its own decals.
+
+    Decals of a table take images.
+    """
+    if count is not None or seed is not None or (images and table is None):
+        raise InvalidInput(
+            "a saved scene or table has its own decals; leave out --decals, --seed, and --image of a scene"
+        )
 
 
 @dataclass(frozen=True)

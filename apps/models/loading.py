@@ -14,20 +14,27 @@ from blobtree.files import is_file
 from decals import ImplicitDecalsError, Scene
 from decals import load_model as load_file
 from decals.apps.models.samples import SAMPLES, sample, sample_mesh
+from decals.apps.models.tables import with_table
 from decals.errors import InvalidInput
 from decals.scenes.objects import MeshObject, SceneObject, as_crease_angle, as_objects
 
 
-def load_model(model: str, *, trust: bool = False, crease_angle: float | None = None) -> SceneObject | Scene:
+def load_model(
+    model: str, *, trust: bool = False, crease_angle: float | None = None, table: Path | None = None
+) -> SceneObject | Scene:
     """Load the sample or the file that a MODEL argument names; ``trust`` is that of `decals.load_scene`.
 
-    Meshes get the crease angle if it is given; else they keep their own.
+    Meshes get the crease angle if it is given; else they keep their own. With a table, the model has its
+    decals, as a scene.
 
     Raises
     ------
     InvalidInput
         If it is neither a sample nor a file, or the file cannot be used; the message names it.
     """
+    if table is not None:
+        loaded = load_model(model, trust=trust, crease_angle=crease_angle)
+        return with_table(loaded if isinstance(loaded, Scene) else [loaded], table, model, trust=trust)
     if crease_angle is not None:
         loaded, angle = load_model(model, trust=trust), as_crease_angle(crease_angle)
         if isinstance(loaded, Scene):
@@ -49,17 +56,25 @@ def load_model(model: str, *, trust: bool = False, crease_angle: float | None = 
 
 
 def load_models(
-    models: Sequence[str], *, trust: bool = False, crease_angle: float | None = None
+    models: Sequence[str],
+    *,
+    trust: bool = False,
+    crease_angle: float | None = None,
+    table: Path | None = None,
+    images: Sequence[str] | None = None,
 ) -> list[SceneObject] | Scene:
     """Load one whole scene, or several models, each in its own coordinates and under its own name.
 
-    Other arguments are those of `load_model`.
+    Other arguments are those of `load_model`, and images of the decals of a table.
 
     Raises
     ------
     InvalidInput
         If a scene is named together with other models.
     """
+    if table is not None:
+        loaded_models = load_models(models, trust=trust, crease_angle=crease_angle)
+        return with_table(loaded_models, table, models[0], images=images, trust=trust)
     objects: list[SceneObject] = []
     for model in models:
         loaded = load_model(model, trust=trust, crease_angle=crease_angle)

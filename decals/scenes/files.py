@@ -215,7 +215,7 @@ def to_json(scene: Scene, *, folder: Path, progress: Progress | None = None) -> 
         "format": FORMAT,
         "version": VERSION,
         "objects": _lines(record_of(item, folder) for item in scene.objects),
-        "images": [_image_record(image, folder) for image in scene.images],
+        "images": [image_record(image, folder) for image in scene.images],
         "camera": _camera_record(camera),
         "drawing": drawing_record(scene.drawing, folder),
         "decals": decals,
@@ -248,7 +248,7 @@ def from_json(
         objects=tuple(objects),
         camera=_camera(record.camera),
         decals=decals_of(record.decals),
-        images=_images(record.images, folder, trust),
+        images=images_of(record.images, folder, trust),
         drawing=drawing_of_record(record.drawing, folder),
         recipe=None if record.recipe is None else Recipe(**msgspec.structs.asdict(record.recipe)),
         hidden_decals=decals_of(record.hidden_decals),
@@ -257,7 +257,7 @@ def from_json(
     )
 
 
-def _image_record(image: DecalImage, folder: Path) -> str | MaterialRecord:
+def image_record(image: DecalImage, folder: Path) -> str | MaterialRecord:
     """Return an image as a file has it."""
     if isinstance(image, DecalMaterial):
         return material_record(image)
@@ -267,7 +267,7 @@ def _image_record(image: DecalImage, folder: Path) -> str | MaterialRecord:
     return reference or MaterialRecord(Path(image.source).stem, embedded_image(image.pixels))
 
 
-def _images(sources: list[str | MaterialRecord], folder: Path, trust: bool) -> tuple[DecalImage, ...]:
+def images_of(sources: list[str | MaterialRecord], folder: Path, trust: bool) -> tuple[DecalImage, ...]:
     """Load the images of a scene; InvalidScene if an unknown scene has too many, or too large ones."""
     images: list[DecalImage] = []
     pixels = 0

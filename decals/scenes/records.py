@@ -296,19 +296,19 @@ class DecalRecord(Struct, forbid_unknown_fields=True):
 def records_of(decals: Decals) -> Iterator[DecalRecord]:
     """Describe decals, in their order."""
     columns = (
-        _rows(_decimals(decals.positions)),
-        _rows(_decimals(decals.normals)),
-        _rows(_decimals(decals.tangents)),
-        _decimals(decals.radii).tolist(),
+        _rows(decimals(decals.positions)),
+        _rows(decimals(decals.normals)),
+        _rows(decimals(decals.tangents)),
+        decimals(decals.radii).tolist(),
         decals.images.tolist(),
         decals.spill.tolist(),
         _unless_default(decals.interactions, Interaction.PUSH, list(_INTERACTIONS)),
         _unless_default(decals.layers, 0),
-        _unless_default(_decimals(decals.tints), 1.0),
-        _unless_default(_decimals(decals.opacities), 1.0),
+        _unless_default(decimals(decals.tints), 1.0),
+        _unless_default(decimals(decals.opacities), 1.0),
         _unless_default(decals.receivers, ""),
-        _unless_default(_decimals(decals.fade_angles), 0.0),
-        _unless_default(_decimals(decals.fade_depths), 0.0),
+        _unless_default(decimals(decals.fade_angles), 0.0),
+        _unless_default(decimals(decals.fade_depths), 0.0),
     )
     return (DecalRecord(*values) for values in zip(*columns, strict=True))
 
@@ -336,7 +336,7 @@ def _rows(array: NDArray[np.float64]) -> list[Any]:
     return [tuple(row) for row in array.tolist()]
 
 
-def _decimals(array: NDArray[np.float32]) -> NDArray[np.float64]:
+def decimals(array: NDArray[np.float32]) -> NDArray[np.float64]:
     """Doubles whose shortest decimal is that of the float32, and which round to it again."""
     short = array.astype(np.str_).astype(np.float64)
     return np.where(short.astype(np.float32) == array, short, array.astype(np.float64))

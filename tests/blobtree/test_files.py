@@ -135,7 +135,6 @@ FULL_DISK = """
     import decals
     from blobtree.errors import ImplicitDecalsError
     from blobtree.pyvista_views import write_polydata
-    from decals.apps.commands.scatter import write_table
     from decals.rendering import Picture
 
     logging.getLogger("blobtree.progress").setLevel(logging.WARNING)  # a busy machine would show it
@@ -149,7 +148,7 @@ FULL_DISK = """
     writers = {
         "tree.json": lambda path: blobtree.save(tree, path),
         "scene.json": lambda path: decals.save_scene(scene, path),
-        "decals.csv": lambda path: write_table(spots, path),
+        "decals.csv": lambda path: decals.save_table(spots, path),
         "picture.png": noise.save,
         "picture.jpg": noise.save,
     }

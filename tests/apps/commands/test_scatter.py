@@ -36,6 +36,51 @@ def test_a_scene_and_a_table_hold_the_same_decals(folder: Path) -> None:
     assert np.allclose(table, np.hstack(expected), rtol=1e-6, atol=1e-7)
 
 
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_commands_take_the_written_table(suffix: str, folder: Path, capsys: Capture) -> None:
+    """A model with a table is the scene that was written beside it: pictures and measures are equal."""
+    table = f"decals.{suffix}"
+    pv.Sphere(radius=0.5, center=(7e4, 0, 0)).save(folder / "ball.ply")
+    for output in ("scene.json", table):
+        assert run(["scatter", "ball.ply", "--count", "30", "--images", "2", "-o", output]) == 0
+    size = ["--size", "64x48", "--samples", "1"]
+    assert run(["render", "scene.json", *size, "-o", "scene.png", "--save", "again.json"]) == 0
+    assert (
+        run(["render", "ball.ply", "--table", table, *size, "-o", "table.png", "--save", "taken.json"]) == 0
+    )
+    assert np.array_equal(picture(folder / "scene.png"), picture(folder / "table.png"))
+    written, read = (load_scene(folder / name) for name in ("again.json", "taken.json"))
+    assert (read.decals, read.images, read.objects) == (written.decals, written.images, written.objects)
+    capsys.readouterr()
+    for source in (["scene.json"], ["ball.ply", "--table", table]):
+        assert run(["measure", *source, "--samples", "300", "--json"]) == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert first == second
+    assert run(["export", "ball.ply", "--table", table, "-o", "ball.html"]) == 0
+    assert run(["render", "scene.json", "--table", table, *size, "-o", "replaced.png"]) == 0
+    assert np.array_equal(picture(folder / "scene.png"), picture(folder / "replaced.png"))
+    options = ["--image", "eye", "--image", "tile"]
+    assert run(["render", "ball.ply", "--table", table, *options, *size, "-o", "other.png"]) == 0
+    assert not np.array_equal(picture(folder / "scene.png"), picture(folder / "other.png"))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--table", "none.csv"], "'none.csv': expected a table of decals, found no such file"),
+        (["--table", "bad.csv"], "'bad.csv': line 2, column 'radius': expected a finite number, got 'nan'"),
+        (["--table", "good.csv", "--decals", "5"], "a saved scene or table has its own decals"),
+        (["--table", "good.csv", "--image", "eye"], "--table: decals refer to 3 images, got 1"),
+    ],
+)
+def test_tables_that_cannot_be_used(options: list[str], message: str, folder: Path, capsys: Capture) -> None:
+    header = "x,y,z,nx,ny,nz,tx,ty,tz,radius,image\n0,0,0,0,0,1,1,0,0"
+    (folder / "bad.csv").write_text(f"{header},nan,0\n")
+    (folder / "good.csv").write_text(f"{header},1,2\n")
+    assert run(["render", "spheres", *options, "-o", "a.png"]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+
+
 def test_render_draws_a_written_scene(folder: Path) -> None:
     pv.Sphere(radius=0.5).save(folder / "ball.ply")
     size = ["--size", "64x48", "--samples", "1"]
