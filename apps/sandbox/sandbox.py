@@ -157,7 +157,9 @@ class Sandbox:
             "title": window.actions.files.title,
             "status": self.status,
             "refused": bool(state.refusal),
-            "fields": self._fields.values(session.changes),
+            "fields": self._fields.values(
+                session.changes, state.refusals, state.refusal, working=state.background.busy_editing
+            ),
             "help": window.actions.help_visible,
             "busy": window.busy,
             "queue": [vars(work) for work in state.background.queue],
@@ -329,7 +331,7 @@ class Sandbox:
         if last:
             refused = self._state.refusals > refusals
             reason = self._state.refusal if refused else ""
-            self._fields.typed(panel, name, index, reason, changes)
+            self._fields.typed(panel, name, index, reason, changes, self._state.refusals)
 
     def _set_parameter(
         self, followed: FollowedNode, name: str, raw: Any, *, last: bool, index: object

@@ -22,6 +22,7 @@ from decals.editing.actions import KEYS
 from decals.editing.commands import ReplaceScene
 from decals.editing.document import Document
 from decals.editing.tree_commands import SetParameter
+from decals.errors import InvalidEdit
 from decals.scenes.camera import Camera
 from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.scene import Scene
@@ -437,6 +438,29 @@ def test_a_key_closes_no_page(window: EditWindow) -> None:
         assert sandbox.values()["refused"]
     window.actions.files.finish()
     assert not window.actions.state.prompt.open
+
+
+def test_a_value_that_is_refused_in_the_background_marks_its_field(
+    window: EditWindow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once for each refusal: a page that sees two resets together sees none."""
+
+    def refused(session: Any) -> str:
+        session.do(SetParameter(0, (1,), "weight", 2.0))
+        raise InvalidEdit("weight: expected more")
+
+    sandbox = Sandbox(window)
+    start = partial(window.background.edit, "set weight", refused)
+    monkeypatch.setattr(sandbox._trees, "set_parameter", lambda *_, **__: start())
+    sandbox.select("0/1")
+    for count in (1, 2, 3):
+        sandbox.set_control("node", "weight", "-5", index=[])
+        finish(window)
+        fields = sandbox.values()["fields"]
+        assert (fields["refused"], fields["text"]) == ("node weight", "weight: expected more")
+        assert fields["resets"]["node weight"] == count
+        assert sandbox.values()["fields"] == fields
+    assert window.session.labels == ()
 
 
 def test_the_help_is_a_list_of_the_page(window: EditWindow) -> None:
