@@ -41,7 +41,7 @@ def _report(progress: Any, cancel: Any) -> None:
 
 UNCALLED = {
     "Actions", "Cancel", "ContactLaw", "ContactSurface", "Curvatures", "CustomCombination",
-    "CustomField", "CustomPrimitive", "CustomWarp", "Document", "EditSession", "Falloff",
+    "CustomField", "CustomPrimitive", "CustomWarp", "Document", "EditSession", "Falloff", "FieldGrid",
     "FieldPrimitive", "Fit", "Hits", "Node", "NumericParameter", "ParameterGradient", "PointerTools",
     "Progress", "SignedDistances", "Tape", "UndoEntry", "edit", "show",
 }  # fmt: skip
@@ -93,6 +93,7 @@ def call_table() -> Calls:
     document, numbers = EditSession(whole).document, blobtree.numeric_parameters(tree)
     rated = Point((0, 0, 0), radius=1.0, attributes={"wetness": 1.0})
     ball = pv.Sphere(theta_resolution=6, phi_resolution=6)
+    covered = decals.cover(tree, count=3, images=["scale"])
     table: Calls = {
         "scale": (tree.scale, {"factor": 2.0}),
         "rotate": (tree.rotate, {"axis": axis, "degrees": 30.0}),
@@ -268,6 +269,37 @@ def call_table() -> Calls:
                 "size": 16,
                 "samples": 1,
                 "creases": False,
+            },
+        ),
+        "content_hash": (blobtree.content_hash, {"value": tree}),
+        "reproduce": (decals.reproduce, {"scene": covered}),
+        "save_html": (
+            decals.save_html,
+            {
+                "scene": whole,
+                "path": "a.html",
+                "title": "a",
+                "alt": "b",
+                "controls": True,
+                "background": "white",
+                "surface": "mesh",
+                "resolution": 8,
+                "contact": "elastic",
+                "stiffness": 4.0,
+                "mapping": "chord",
+            },
+        ),
+        "shader": (
+            decals.shader,
+            {
+                "scene": whole,
+                "version": "330 core",
+                "stage": "fragment",
+                "prefix": "decal_",
+                "contact": "elastic",
+                "stiffness": 4.0,
+                "mapping": "chord",
+                "editable": False,
             },
         ),
         "field_grid": (
