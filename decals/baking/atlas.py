@@ -45,17 +45,18 @@ MIN_PLANE_COSINE = float(np.cos(np.radians(15.0)))
 """Least cosine between faces and their mean normal up to which they are one plane nearly enough."""
 
 
-def bent_planes(mesh: BakeMesh) -> Int64Array:
+def bent_planes(mesh: BakeMesh, report: Progress) -> Int64Array:
     """Return for each face the part of a bent surface that xatlas takes for a plane, or 0, ``int64[m]``.
 
     xatlas compares the normals of neighbouring faces alone. A ball of 200,000 faces is a plane for it: it
     crashes, or presses both halves on one place. Parts are cut where the sides of a box meet.
     """
-    sides = BoxSides.of(mesh)
+    sides = BoxSides.of(mesh, lambda: report(UNWRAPPING, 0.0))
     face, side = np.nonzero(sides.neighbors >= 0)
     links = np.stack([face, sides.neighbors[face, side]], axis=1)
     links = links[(sides.normals[links[:, 0]] * sides.normals[links[:, 1]]).sum(axis=1) >= LEVEL_COSINE]
     plane = components(links, len(sides.normals))
+    report(UNWRAPPING, 0.0)
     sums = np.stack([np.bincount(plane, column) for column in sides.normals.T], axis=1)
     means = sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-30)[:, None]
     least = np.ones(len(means))
@@ -90,7 +91,7 @@ def unwrap(
     pieces = []
     for number, mesh in enumerate(meshes):
         scaled = ((mesh.vertices - center) * scale).astype(np.float32)
-        keys = bent_planes(mesh) + (0 if groups is None else groups[number] * (len(mesh.faces) + 1))
+        keys = bent_planes(mesh, report) + (0 if groups is None else groups[number] * (len(mesh.faces) + 1))
         for chosen in _equal(keys):
             if keys[chosen[0]]:
                 chosen = _central_first(mesh, chosen)

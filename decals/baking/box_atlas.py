@@ -1,6 +1,6 @@
 """Box atlas: charts that are projections of a surface along the six axes, as the sides of a box see it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,16 +49,21 @@ class BoxSides:
     axis: Int64Array
 
     @classmethod
-    def of(cls, mesh: BakeMesh) -> "BoxSides":
-        """Return the sides of a mesh: close to the normals, and alike among neighbours."""
+    def of(cls, mesh: BakeMesh, tick: Callable[[], None]) -> "BoxSides":
+        """Return the sides of a mesh: close to the normals, and alike among neighbours.
+
+        ``tick`` is called after each step; an error that it raises ends the work.
+        """
         faces = mesh.faces.astype(np.int64)
         corners = mesh.vertices[faces].astype(np.float64)
         crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         doubled = np.linalg.norm(crosses, axis=1)
+        tick()
         twins = edge_twins(welded(mesh.vertices)[faces]).reshape(-1, 3).astype(np.int64)
+        tick()
         neighbors = np.where(twins >= 0, twins // 3, -1)
         normals = crosses / np.maximum(doubled, 1e-300)[:, None]
-        return cls(normals, doubled, neighbors, _smoothed(normals @ AXES.T, neighbors))
+        return cls(normals, doubled, neighbors, _smoothed(normals @ AXES.T, neighbors, tick))
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,14 +90,19 @@ class _Charts:
 
 
 def box_atlas(
-    meshes: Sequence[BakeMesh], groups: Sequence[Int64Array], size: int, tiles: int, padding: float
+    meshes: Sequence[BakeMesh],
+    groups: Sequence[Int64Array],
+    size: int,
+    tiles: int,
+    padding: float,
+    tick: Callable[[], None],
 ) -> list[Unwrapped] | None:
     """Return places for meshes on textures ``size`` texels wide, or None if there are too many charts.
 
     All charts have about the same number of texels per area. A chart has faces of one group. Charts may lie
-    over themselves, see `decals.baking.layouts`.
+    over themselves, see `decals.baking.layouts`. ``tick`` is called after each step.
     """
-    made = [_charts(mesh, group) for mesh, group in zip(meshes, groups, strict=True)]
+    made = [_charts(mesh, group, tick) for mesh, group in zip(meshes, groups, strict=True)]
     sides = np.concatenate([charts.sides for charts in made])
     if len(sides) > MAX_CHARTS:
         return None
@@ -113,33 +123,37 @@ def box_atlas(
     return unwrapped
 
 
-def _charts(mesh: BakeMesh, group: Int64Array) -> _Charts:
+def _charts(mesh: BakeMesh, group: Int64Array, tick: Callable[[], None]) -> _Charts:
     faces = mesh.faces.astype(np.int64)
-    sides = BoxSides.of(mesh)
+    sides = BoxSides.of(mesh, tick)
     axis, neighbors, doubled = sides.axis, sides.neighbors, sides.doubled
     cosines = sides.normals @ AXES.T
     label = group * len(AXES) + axis
     face, side = np.nonzero((neighbors >= 0) & (label[neighbors] == label[:, None]))
     links = np.stack([face, neighbors[face, side]], axis=1)
     chart = np.unique(components(links, len(faces)), return_inverse=True)[1].reshape(-1)
+    tick()
     keys = chart[:, None] * len(mesh.vertices) + faces
     used, copies = np.unique(keys, return_inverse=True)
     rows, chart_of_row = used % len(mesh.vertices), used // len(mesh.vertices)
+    tick()
     axis_of_chart = np.zeros(int(chart.max()) + 1, np.int64)
     axis_of_chart[chart] = axis
     flat = np.bincount(chart, doubled * np.abs(cosines[np.arange(len(faces)), axis]))
     stretch = np.sqrt(np.bincount(chart, doubled) / np.maximum(flat, 1e-300))
     places = _projected(mesh.vertices[rows].astype(np.float64), axis_of_chart[chart_of_row])
     places *= np.minimum(stretch, 1.0 / MIN_COSINE)[chart_of_row, None]
+    tick()
     places, rectangles = _turned(places, chart_of_row)
     return _Charts(rows, copies.reshape(-1, 3), places, chart_of_row, rectangles)
 
 
-def _smoothed(cosines: Float64Array, neighbors: Int64Array) -> Int64Array:
+def _smoothed(cosines: Float64Array, neighbors: Int64Array, tick: Callable[[], None]) -> Int64Array:
     """Return the axis of each face: close to its normal, and alike among neighbours."""
     allowed = (cosines >= MIN_COSINE) | (cosines >= cosines.max(axis=1, keepdims=True))
     axis: Int64Array = cosines.argmax(axis=1)
     for _ in range(SMOOTHING_ROUNDS):
+        tick()
         votes = np.where(neighbors >= 0, axis[neighbors], -1)
         counts = (votes[:, :, None] == np.arange(len(AXES))).sum(axis=1)
         before, axis = axis, np.where(allowed, cosines + SMOOTHING * counts, -np.inf).argmax(axis=1)

@@ -1,6 +1,7 @@
 """Layouts: how surfaces lie on textures, and which of them has the shortest seams."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -77,7 +78,11 @@ def lay_out(
     if tiles > 1:
         raise InvalidScene(f"tiles: expected 1 with layout 'xatlas', got {tiles}; use layout='box' or 'own'")
     made = _without_overlaps(
-        meshes, size, MAX_OVERLAP, report, lambda groups: unwrap(meshes, size, report, groups)
+        meshes,
+        size,
+        MAX_OVERLAP,
+        report,
+        lambda groups, tick: unwrap(meshes, size, lambda *_: tick(), groups),
     )
     if made is None:
         raise InvalidMesh(
@@ -91,7 +96,7 @@ def _boxes(meshes: Sequence[BakeMesh], size: int, tiles: int, report: Progress) 
     """Return a box atlas without overlaps, or None."""
     padding = 2.0 * gutter_width(size)
     return _without_overlaps(
-        meshes, size, 0.0, report, lambda groups: box_atlas(meshes, groups, size, tiles, padding)
+        meshes, size, 0.0, report, lambda groups, tick: box_atlas(meshes, groups, size, tiles, padding, tick)
     )
 
 
@@ -100,7 +105,7 @@ def _without_overlaps(
     size: int,
     share: float,
     report: Progress,
-    make: Callable[[list[Int64Array]], list[Unwrapped] | None],
+    make: Callable[[list[Int64Array], Callable[[], None]], list[Unwrapped] | None],
 ) -> list[Unwrapped] | None:
     """Return a layout by groups of faces; those that lie over others become a group of their own.
 
@@ -108,8 +113,9 @@ def _without_overlaps(
     """
     groups = [np.zeros(len(mesh.faces), np.int64) for mesh in meshes]
     for number in range(TRIES):
-        report(UNWRAPPING, number / TRIES)
-        made = make(groups)
+        tick = partial(report, UNWRAPPING, number / TRIES)
+        tick()
+        made = make(groups, tick)
         if made is None:
             return None
         over = [_faces_over_others(mesh, part, size) for mesh, part in zip(meshes, made, strict=True)]

@@ -5,6 +5,7 @@ runs any more. ``cancel_stop_max_ms`` is the slowest time until the thread of th
 
     python -m tests.bench.trust_cancel
     python -m tests.bench.trust_cancel --quick
+    python -m tests.bench.trust_cancel --works mesh,bake --moments 5 --seed 3   # a part of it
 """
 
 import argparse
@@ -14,7 +15,7 @@ import random
 import sys
 import tempfile
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -155,10 +156,12 @@ class Cancelling:
         self.free: dict[str, list[float]] = {}
         self.stopped: dict[str, list[float]] = {}
 
-    async def run(self, moments: int, report: Callable[[str], None]) -> None:
-        """Cancel every work at so many random moments."""
-        rng = random.Random(7)
+    async def run(self, works: Sequence[str], moments: int, seed: int, report: Callable[[str], None]) -> None:
+        """Cancel each of some works at so many random moments."""
+        rng = random.Random(seed)
         for name, start in self._work.starts.items():
+            if name not in works:
+                continue
             began = time.perf_counter()
             await start()
             await self._until(lambda: not self._window.background.busy)
@@ -203,19 +206,29 @@ class Cancelling:
                 await asyncio.sleep(LOOK_SECONDS)
 
 
-def measure(*, quick: bool, report: Callable[[str], None] = lambda _: None) -> dict[str, float]:
-    """Cancel all work at random moments in a served page, and return the figures."""
-    moments, figures = QUICK_MOMENTS if quick else MOMENTS, dict[str, float]()
+def measure(
+    *,
+    quick: bool,
+    works: Sequence[str] = (),
+    moments: int | None = None,
+    seed: int = 7,
+    report: Callable[[str], None] = lambda _: None,
+) -> dict[str, float]:
+    """Cancel work at random moments in a served page, and return the figures; all work, if none is named."""
+    count, figures = moments or (QUICK_MOMENTS if quick else MOMENTS), dict[str, float]()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
 
         async def check(window: EditWindow, page: Any, connect: Connect) -> None:
             browser = await connect()
             work = Work(window, page, browser, folder, QUICK if quick else FULL)
+            chosen = works or tuple(work.starts)
+            if unknown := set(chosen) - set(work.starts):
+                raise SystemExit(f"expected works among {', '.join(work.starts)}, got {', '.join(unknown)}")
             cancelling = Cancelling(window, page, browser, work)
-            await cancelling.run(moments, report)
+            await cancelling.run(chosen, count, seed, report)
             await browser.close()
-            for name in work.starts:
+            for name in chosen:
                 figures[f"cancel_{name}_ms"] = max(cancelling.free[name])
                 figures[f"cancel_stop_{name}_ms"] = max(cancelling.stopped[name])
             figures["cancel_cases"] = sum(map(len, cancelling.free.values()))
@@ -231,8 +244,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--quick", action="store_true")
-    figures = measure(quick=parser.parse_args().quick, report=lambda line: print(line, file=sys.stderr))
+    parser.add_argument("--quick", action="store_true", help="small work, cancelled twice")
+    parser.add_argument("--works", default="", help="names of works, with commas between them")
+    parser.add_argument("--moments", type=int, help=f"moments of each work, {MOMENTS} unless --quick")
+    parser.add_argument("--seed", type=int, default=7)
+    options = parser.parse_args()
+    figures = measure(
+        quick=options.quick,
+        works=tuple(filter(None, options.works.split(","))),
+        moments=options.moments,
+        seed=options.seed,
+        report=lambda line: print(line, file=sys.stderr),
+    )
     print(json.dumps(figures, indent=2))
 
 
