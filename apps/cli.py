@@ -101,21 +101,28 @@ implicit-decals measure scene.json --contact elastic --json
 """,
     "sweep": """Run an experiment: a function for each trial of a design, with results that resume.
 
-The file defines the function `experiment` and the design `design`; see the page on experiments.
+A file defines the function `experiment` and the design `design`; see the page on experiments. Seven
+experiments are shipped, and found by their names.
 
 For example:
 
-implicit-decals sweep overlap.py --out results
+implicit-decals sweep --list
+
+implicit-decals sweep blends --out results
 
 implicit-decals sweep overlap.py --out results --workers 8 --limit 600 --retry
 
 implicit-decals sweep overlap.py --out /shared/results --scheduler tcp://10.0.0.1:8786
 """,
-    "report": """Write the figures of an experiment's results as one HTML file.
+    "report": """Write the results of an experiment as a page, or one figure or table of them.
 
 For example:
 
 implicit-decals report results -o report.html
+
+implicit-decals report results -o bulge.svg --measure bulge --by angle,blend
+
+implicit-decals report results -o table.md --by blend
 """,
     "reproduce": """Make what a file holds again from its recipe, and say what differs.
 

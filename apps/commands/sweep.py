@@ -1,7 +1,9 @@
-"""``implicit-decals sweep``: an experiment from a file, with a table that fills while it runs."""
+"""``implicit-decals sweep``: an experiment from a file, or a shipped one, with a table that fills."""
 
 import time
 from collections import Counter, deque
+from collections.abc import Callable
+from importlib import import_module
 from typing import Annotated, Any
 
 from cyclopts import Parameter
@@ -9,6 +11,7 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.table import Table
 
+from decals.apps import experiments as shipped
 from decals.apps.models.loading import import_module_or_file
 from decals.errors import InvalidInput
 from decals.experiments import Design, run
@@ -19,24 +22,28 @@ LATEST = 8
 
 
 def sweep(
-    file: str,
+    experiment: str | None = None,
     /,
     *,
     out: Annotated[str, Parameter(name=["--out", "-o"])] = "results",
+    full: Annotated[bool, Parameter(negative=())] = False,
     workers: int | None = None,
     scheduler: str | None = None,
     limit: float | None = None,
     memory: float | None = None,
     retry: Annotated[bool, Parameter(negative=())] = False,
+    list_: Annotated[bool, Parameter(name="--list", negative=())] = False,
 ) -> int:
-    """Run all trials of a file that have no result yet.
+    """Run all trials of an experiment that have no result yet.
 
     Parameters
     ----------
-    file
-        A Python file with a function `experiment` and a design `design`.
+    experiment
+        A Python file with a function `experiment` and a design `design`, or the name of a shipped experiment.
     out
         Folder of the results.
+    full
+        Use the larger design `full`.
     workers
         Local processes; 0 runs in this one. Default: one for each core.
     scheduler
@@ -47,13 +54,15 @@ def sweep(
         Gigabytes of a local process after which its trial is ended.
     retry
         Run failed trials again.
+    list_
+        List the shipped experiments.
     """
-    module = import_module_or_file("sweep", file)
-    function, design = (getattr(module, name, None) for name in ("experiment", "design"))
-    if not callable(function) or not isinstance(design, Design):
-        expected = "a function `experiment` and a design `design`, such as Grid(count=[10])"
-        raise InvalidInput(f"{file}: expected {expected}")
-    _send_by_value(module)
+    if list_:
+        _list_shipped()
+        return 0
+    if experiment is None:
+        raise InvalidInput("expected a Python file or the name of a shipped experiment; --list shows these")
+    function, design = _loaded(experiment, "full" if full else "design")
     console = Console(stderr=True)
     options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "limit": limit, "memory": memory}
     if console.is_interactive:
@@ -65,6 +74,28 @@ def sweep(
         results = run(function, design, out, retry=retry, **options)
     Console().print(f"{results} in {results.folder}", highlight=False, soft_wrap=True)
     return 1 if results.failed else 0
+
+
+def _list_shipped() -> None:
+    """Print the name and the title of each shipped experiment."""
+    table = Table("", "", show_header=False, box=None, padding=(0, 2, 0, 0))
+    for name in shipped.SHIPPED:
+        table.add_row(name, shipped.title(name))
+    Console().print(table)
+
+
+def _loaded(experiment: str, chosen: str) -> tuple[Callable[..., Any], Design]:
+    """Return the function of an experiment, and one of its designs."""
+    if experiment in shipped.SHIPPED:
+        module = import_module(f"{shipped.__name__}.{experiment}")
+    else:
+        module = import_module_or_file("sweep", experiment)
+        _send_by_value(module)
+    function, design = getattr(module, "experiment", None), getattr(module, chosen, None)
+    if not callable(function) or not isinstance(design, Design):
+        expected = f"a function `experiment` and a design `{chosen}`, such as Grid(count=[10])"
+        raise InvalidInput(f"{experiment}: expected {expected}")
+    return function, design
 
 
 def _send_by_value(module: Any) -> None:

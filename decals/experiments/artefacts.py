@@ -87,7 +87,7 @@ def _writers() -> Iterator[tuple[type, str, Callable[[Any, Path], object]]]:
     yield Decals, ".npz", lambda decals, path: np.savez(path, **_arrays(decals))
     yield np.ndarray, ".npy", lambda array, path: np.save(path, array)
     yield pv.PolyData, ".vtp", lambda mesh, path: mesh.save(path)
-    yield blobtree.Mesh, ".vtp", lambda mesh, path: mesh.to_pyvista().save(path)
+    yield blobtree.Mesh, ".vtp", lambda mesh, path: mesh.save(path)
     if (figure := sys.modules.get("matplotlib.figure")) is not None:
         yield figure.Figure, ".png", lambda figure, path: figure.savefig(path)
 

@@ -39,7 +39,8 @@ def fingerprint(function: Callable[..., Any]) -> str:
     """Return a digest of the source of a function, and of all that it uses from the user's own files.
 
     Comments and layout do not count. Functions, classes and values that the source names count too, if they
-    are defined outside of installed packages. Changes of these packages show in the versions of a row.
+    are defined outside of installed packages, or in the function's own module. Changes of installed packages
+    show in the versions of a row.
 
     Parameters
     ----------
@@ -56,6 +57,7 @@ def fingerprint(function: Callable[..., Any]) -> str:
     parts: set[str] = set()
     seen: set[int] = set()
     waiting: list[Any] = [function]
+    home = getattr(inspect.unwrap(getattr(function, "func", function)), "__module__", None)
     while waiting:
         value = waiting.pop()
         if id(value) in seen:
@@ -64,7 +66,7 @@ def fingerprint(function: Callable[..., Any]) -> str:
         if isinstance(value, functools.partial):
             parts.add(content_hash([value.args, value.keywords]))
             waiting.append(value.func)
-        elif _is_users(value := inspect.unwrap(value)):
+        elif _counts(value := inspect.unwrap(value), home):
             parts.add(_source(value))
             waiting += _used(value, parts)
     return content_hash(parts)
@@ -76,10 +78,14 @@ def _installed() -> tuple[Path, ...]:
     return tuple({Path(path).resolve() for path in sysconfig.get_paths().values()})
 
 
-def _is_users(value: Any) -> bool:
-    """Return whether a value is a function or a class of the user's own files."""
+def _counts(value: Any, home: str | None) -> bool:
+    """Return whether a value is a function or a class of the user's own files, or of the module `home`."""
     module = getattr(value, "__module__", None) or ""  # functions of `exec` have none
-    if not isinstance(value, FunctionType | type) or module.partition(".")[0] in OURS:
+    if not isinstance(value, FunctionType | type):
+        return False
+    if module == home:
+        return True
+    if module.partition(".")[0] in OURS:
         return False
     file = getattr(sys.modules.get(module), "__file__", None)
     return file is None or not any(Path(file).resolve().is_relative_to(folder) for folder in _installed())
@@ -118,11 +124,24 @@ def _used(value: Any, parts: set[str]) -> Iterator[Any]:
     scope = getattr(value, "__globals__", None) or vars(sys.modules[value.__module__])
     closed = inspect.getclosurevars(value).nonlocals if isinstance(value, FunctionType) else {}
     for name in {name for code in _codes(value) for name in (*code.co_names, *code.co_freevars)}:
-        used = closed.get(name, scope.get(name))
-        if isinstance(used, FunctionType | type | functools.partial):
-            yield used
-        elif used is not None and not inspect.ismodule(used):
-            try:
-                parts.add(f"{name} {content_hash(used)}")
-            except InvalidInput:
-                continue  # an object such as a logger
+        yield from _functions_of(name, closed.get(name, scope.get(name)), parts)
+
+
+def _functions_of(name: str, value: Any, parts: set[str]) -> Iterator[Any]:
+    """Yield the functions of a value or a table of them; add the hash of other values to `parts`."""
+    if isinstance(value, FunctionType):
+        parts.add(f"{name} {_source(value) if value.__name__ == '<lambda>' else value.__qualname__}")
+    if isinstance(value, FunctionType | type | functools.partial):
+        yield value
+    elif isinstance(value, dict | list | tuple) and any(map(callable, _members(value).values())):
+        for key, member in _members(value).items():
+            yield from _functions_of(f"{name}[{key!r}]", member, parts)
+    elif value is not None and not inspect.ismodule(value):
+        try:
+            parts.add(f"{name} {content_hash(value)}")
+        except InvalidInput:
+            return  # an object such as a logger
+
+
+def _members(value: dict[Any, Any] | list[Any] | tuple[Any, ...]) -> dict[Any, Any]:
+    return value if isinstance(value, dict) else dict(enumerate(value))

@@ -141,7 +141,7 @@ class Results:
         Returns
         -------
         list of dict
-            The parameters, ``mean``, ``low``, ``high``, ``count`` and ``left_out``.
+            The parameters in rising order, ``mean``, ``low``, ``high``, ``trials`` and ``left_out``.
 
         Raises
         ------
@@ -156,18 +156,23 @@ class Results:
         """
         by = [by] if isinstance(by, str) else list(by)
         for name in (measure, *by):
-            if name not in (*self.parameters, *self.measures, *COLUMNS):
+            if name not in self._columns:
                 raise InvalidInput(f"expected one of {', '.join(self._columns)}, got {describe(name)}")
         groups: dict[tuple[Any, ...], list[Any]] = {}
         for row in self.rows:
             groups.setdefault(tuple(_hashable(row.get(name)) for name in by), []).append(row.get(measure))
+        if clash := sorted(set(by) & set(SUMMARY)):
+            raise InvalidInput(f"parameter {clash[0]!r}: the name of a column of the summary; rename it")
         return [
-            dict(zip(by, key, strict=True)) | _summary(values, confidence, seed)
-            for key, values in groups.items()
+            dict(zip(by, key, strict=True)) | _summary(groups[key], confidence, seed)
+            for key in sorted(groups, key=lambda key: [_rank(value) for value in key])
         ]
 
 
 LARGEST = float(np.finfo(np.float64).max)
+
+SUMMARY = ("mean", "low", "high", "trials", "left_out")
+"""Columns of a summary beside parameters."""
 
 RESAMPLES = 2000
 """Bootstrap samples of an interval."""
@@ -179,17 +184,12 @@ def _summary(values: list[Any], confidence: float, seed: int) -> dict[str, Any]:
     numbers = np.array(finite, np.float64)
     left_out = len(values) - len(numbers)
     if not len(numbers):
-        return {"mean": np.nan, "low": np.nan, "high": np.nan, "count": 0, "left_out": left_out}
+        return dict(zip(SUMMARY, (np.nan, np.nan, np.nan, 0, left_out), strict=True))
     drawn = np.random.default_rng(seed).integers(len(numbers), size=(RESAMPLES, len(numbers)))
     tail = 50.0 * (1.0 - confidence)
     low, high = np.percentile(numbers[drawn].mean(axis=1), [tail, 100.0 - tail])
-    return {
-        "mean": float(numbers.mean()),
-        "low": float(low),
-        "high": float(high),
-        "count": len(numbers),
-        "left_out": left_out,
-    }
+    found = (float(numbers.mean()), float(low), float(high), len(numbers), left_out)
+    return dict(zip(SUMMARY, found, strict=True))
 
 
 def _rank(value: Any) -> tuple[str, Any]:

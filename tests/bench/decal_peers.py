@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from decals.apps.commands.bench import even_decals
+from decals.apps.models.figure_14 import even_decals
 from decals.apps.models.samples import axes_of, sample
 from decals.apps.models.shapes import torus_knot
 from decals.apps.views import frame, parse_view

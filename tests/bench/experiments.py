@@ -1,6 +1,8 @@
-"""Experiments: overhead of a trial, equal results of all executors, resumed runs, two workers over one.
+"""Experiments: overhead and memory, equal results of all executors, resumed runs, two workers over one.
 
-python -m tests.bench.experiments [--json FILE] [--quick]
+python -m tests.bench.experiments [--json FILE] [--quick] [--only overhead,kills,cluster,pictures,memory]
+
+The cluster is a scheduler and workers that the two commands of the page on experiments start.
 """
 
 import argparse
@@ -12,12 +14,15 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from decals.experiments import Grid, Results, Seeds, run
+from decals.experiments.workers import used_megabytes
 from tests.decals.experiments import functions
 
 TARGETS = {
@@ -27,6 +32,8 @@ TARGETS = {
     "rows_twice": "0",
     "overhead_ms": "≤ 5",
     "scaling_2": "≥ 1.8",
+    "memory_mb": "≤ 20",
+    "pictures_mb": "",
 }
 
 SCRIPT = """
@@ -62,22 +69,49 @@ def resumed(kills: int, folder: Path) -> bool:
     return table(run(functions.slow, Grid(x=range(150)), folder / "killed", workers=2)) == expected
 
 
+@contextmanager
+def cluster_of_commands(folder: Path) -> Iterator[str]:
+    """Yield the address of a scheduler and two workers, started as separate processes."""
+    file = folder / "scheduler.json"
+    dask, log = [sys.executable, "-m", "dask"], (folder / "cluster.log").open("w")
+    ports = ["--port", "0", "--dashboard-address", ":0"]
+    commands = [[*dask, "scheduler", *ports, "--scheduler-file", str(file)]]
+    commands += [
+        [*dask, "worker", "--scheduler-file", str(file), "--nthreads", "1", "--dashboard-address", ":0"]
+    ] * 2
+    children = []
+    try:
+        for command in commands:
+            settings: Any = {"env": os.environ | PYTHON_PATH, "start_new_session": True}
+            children.append(subprocess.Popen(command, cwd=folder, stdout=log, stderr=log, **settings))
+            while not file.exists():
+                time.sleep(0.1)
+        yield json.loads(file.read_text())["address"]
+    finally:
+        for child in children:
+            os.killpg(child.pid, signal.SIGKILL)
+            child.wait()
+        log.close()
+
+
+PYTHON_PATH = {"PYTHONPATH": str(Path(__file__).parents[2])}
+"""The checkout, so that workers can import the functions of the tests."""
+
+
 def clustered(folder: Path) -> dict[str, float]:
-    """Run 200 trials on a Dask cluster of processes while workers are killed."""
-    from distributed import Client, LocalCluster
+    """Run 200 trials on a Dask cluster of separate processes while workers are killed."""
+    from distributed import Client
 
     seen: list[Any] = []
-    with (
-        LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
+    with cluster_of_commands(folder) as address, Client(address, set_as_default=False) as client:
+        client.wait_for_workers(2, timeout=120)
 
         def killing(row: Any) -> None:
             seen.append((row["x"], row["seed"]))
             if len(seen) % 60 == 0:
                 os.kill(next(iter(client.run(os.getpid).values())), signal.SIGKILL)
 
-        results = run(functions.measured, DESIGN, folder / "dask", scheduler=client, on_row=killing)
+        results = run(functions.measured, DESIGN, folder / "dask", scheduler=address, on_row=killing)
     local = [table(run(functions.measured, DESIGN, folder / str(count), workers=count)) for count in (0, 2)]
     return {
         "rows_lost": len({(trial["x"], trial["seed"]) for trial in DESIGN} - set(seen)),
@@ -86,44 +120,71 @@ def clustered(folder: Path) -> dict[str, float]:
     }
 
 
-def pictures_seconds(workers: int, count: int, folder: Path) -> float:
-    """Return the clock time of many pictures, after a first one of each worker."""
-    design = Grid(count=[200]) * Seeds(count)
-    ended: list[float] = []
+def pictures(count: int, folder: Path) -> dict[str, float]:
+    """Return one worker's time for many pictures over that of two, and how its memory grows."""
+    seconds, growth = [], 0.0
+    for workers in (1, 2):
+        ended: list[float] = []
+        peaks: list[float] = []
+
+        def note(row: Any, ended: list[float] = ended, peaks: list[float] = peaks) -> None:
+            ended.append(time.perf_counter())
+            peaks.append(row["peak_mb"])
+
+        out = folder / f"pictures {workers}"
+        run(functions.rendered, Grid(count=[200]) * Seeds(count), out, workers=workers, on_row=note)
+        first = 2 * workers  # the first pictures of each worker compile and warm up
+        seconds.append((ended[-1] - ended[first]) / (len(ended) - first - 1))
+        if workers == 1:
+            growth = max(peaks[-count // 10 :]) - max(peaks[count // 10 : count // 5])
+    return {"scaling_2": seconds[0] / seconds[1], "pictures_mb": growth}
+
+
+def memory_growth(count: int, folder: Path) -> float:
+    """Return by how many megabytes this process grows from the thousandth of many empty trials on."""
+    used: list[float] = []
     run(
-        functions.rendered,
-        design,
+        functions.empty,
+        Grid(x=range(count)),
         folder,
-        workers=workers,
-        on_row=lambda _: ended.append(time.perf_counter()),
+        workers=0,
+        on_row=lambda _: used.append(used_megabytes()),
     )
-    return (ended[-1] - ended[2 * workers]) / (len(ended) - 2 * workers - 1)
+    return max(used[1000:]) - used[999]
 
 
-def measure(*, quick: bool) -> dict[str, float]:
-    """Return all figures."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        begin = time.perf_counter()
-        run(functions.empty, Grid(x=range(1000)), folder / "empty", workers=0)
-        figures = {"overhead_ms": time.perf_counter() - begin}
-        figures["resume_equal"] = float(resumed(5 if quick else 30, folder))
-        figures |= clustered(folder)
-        count = 60 if quick else 1000
-        one = pictures_seconds(1, count, folder / "one")
-        figures["scaling_2"] = one / pictures_seconds(2, count, folder / "two")
-        return figures
+def overhead(folder: Path) -> float:
+    """Return the milliseconds of an empty trial in this process."""
+    begin = time.perf_counter()
+    run(functions.empty, Grid(x=range(1000)), folder, workers=0)
+    return time.perf_counter() - begin
+
+
+def parts(folder: Path, *, quick: bool) -> dict[str, Callable[[], dict[str, float]]]:
+    """Return the parts of the benchmark by name."""
+    return {
+        "overhead": lambda: {"overhead_ms": overhead(folder / "empty")},
+        "memory": lambda: {"memory_mb": memory_growth(2_000 if quick else 10_000, folder / "memory")},
+        "kills": lambda: {"resume_equal": float(resumed(5 if quick else 30, folder))},
+        "cluster": lambda: clustered(folder),
+        "pictures": lambda: pictures(60 if quick else 1000, folder),
+    }
 
 
 def main() -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--quick", action="store_true", help="fewer kills and pictures")
+    parser.add_argument("--quick", action="store_true", help="fewer kills, pictures and trials")
+    parser.add_argument("--only", help="parts, with commas between")
     options = parser.parse_args()
-    figures = measure(quick=options.quick)
-    for name, value in figures.items():
-        print(f"{name:<18}{np.round(value, 3):>10}   {TARGETS[name]}")
+    figures: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as name:
+        every = parts(Path(name), quick=options.quick)
+        for part in options.only.split(",") if options.only else every:
+            for figure, value in every[part]().items():
+                figures[figure] = value
+                print(f"{figure:<18}{np.round(value, 3):>10}   {TARGETS[figure]}", flush=True)
     if options.json:
         options.json.write_text(json.dumps(figures))
 

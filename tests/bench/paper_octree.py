@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.apps.commands.bench import even_decals
+from decals.apps.models.figure_14 import even_decals
 from decals.apps.models.samples import sample
 from decals.errors import InvalidInput
 from decals.index.index import DecalIndex

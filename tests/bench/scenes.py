@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from decals.apps.commands.bench import even_decals
+from decals.apps.models.figure_14 import even_decals
 from decals.apps.models.samples import axes_of, sample
 from decals.apps.views import frame, parse_view
 from decals.model import Decals

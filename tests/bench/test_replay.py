@@ -9,7 +9,7 @@ import pytest
 import warp as wp
 
 from decals import Contact, DecalImage, MeshObject, Scene
-from decals.apps.commands.bench import even_decals
+from decals.apps.models.figure_14 import even_decals
 from decals.errors import NoGraphics
 from decals.rendering.context import Context
 from decals.rendering.options import RenderOptions

@@ -3,8 +3,9 @@
 import pytest
 
 from decals.apps.cli import BAD_INPUT, run
-from decals.apps.commands import bench
-from decals.apps.commands.bench import PAPER_ROWS, Row, as_table, measure, parse_counts, parse_models
+from decals.apps.commands.bench import as_table, parse_counts, parse_models
+from decals.apps.models import figure_14
+from decals.apps.models.figure_14 import PAPER_ROWS, Row, measure
 from decals.apps.models.samples import sample
 from decals.errors import InvalidInput
 from decals.rendering import Renderer
@@ -40,7 +41,7 @@ def test_samples_that_cannot_be_downloaded_are_left_out(
             raise InvalidInput(f"the sample {name!r} is downloaded by pyvista on first use, and that failed")
         return sample(name)
 
-    monkeypatch.setattr(bench, "sample", sample_without_network)
+    monkeypatch.setattr(figure_14, "sample", sample_without_network)
     arguments = ["bench", "table", "--size", "32x24", "--counts", "100"]
     assert run(arguments) == 0
     shown = capsys.readouterr()

@@ -1,5 +1,6 @@
 """Functions of experiments, which worker processes import."""
 
+import functools
 import os
 import signal
 import time
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import decals
-from blobtree import Point
+from blobtree import Point, polygonize
 
 
 @dataclass
@@ -61,7 +62,8 @@ def files(x: int) -> dict[str, Any]:
     """Values that become files."""
     tree = Point((0, 0, 0), radius=1.0)
     scene = decals.cover(tree, count=2 + x)
-    return {"scene": scene, "decals": scene.decals, "tree": tree, "array": np.arange(x)}
+    mesh = polygonize(tree, resolution=8)
+    return {"scene": scene, "decals": scene.decals, "tree": tree, "array": np.arange(x), "mesh": mesh}
 
 
 def drawn(count: int) -> dict[str, Any]:
@@ -80,10 +82,15 @@ def empty(x: int) -> int:
     return x
 
 
+@functools.cache
+def covered(count: int) -> decals.Scene:
+    """A scene that a process makes once."""
+    return decals.cover(Point((0, 0, 0), radius=1.0), count=count, seed=0)
+
+
 def rendered(count: int, seed: int) -> float:
     """Draw a scene of 320 × 240 pixels; return the mean of its pixels."""
-    scene = decals.cover(Point((0, 0, 0), radius=1.0), count=count, seed=0)
-    return float(np.mean(decals.render(scene, size=(320, 240), samples=1))) + 0 * seed
+    return float(np.mean(decals.render(covered(count), size=(320, 240), samples=1))) + 0 * seed
 
 
 def called(f: Any) -> int:

@@ -11,12 +11,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+import pyvista as pv
 
 import decals
 from blobtree import load
 from blobtree.errors import UnusableFile
 from blobtree.file_lock import FileLock
 from blobtree.files import PREFIX
+from decals.apps.experiments.blends import blends
+from decals.apps.experiments.pressed_solids import pressed_solids
 from decals.errors import Cancelled, InvalidInput
 from decals.experiments import Design, Grid, Results, Seeds, run
 from decals.experiments import store as stores
@@ -69,7 +72,7 @@ def test_bad_trials_become_rows_and_the_others_go_on(tmp_path: Path) -> None:
     assert str(found[2][1]).startswith("ValueError: two is wrong (line ")
     assert np.isnan(next(row["y"] for row in results.rows if row["x"] == 5))
     (all_,) = results.interval("y")
-    assert (all_["count"], all_["left_out"], all_["mean"]) == (3, 6, 5.0)
+    assert (all_["trials"], all_["left_out"], all_["mean"]) == (3, 6, 5.0)
 
 
 def test_a_resumed_run_leaves_out_what_has_a_row(tmp_path: Path) -> None:
@@ -112,10 +115,19 @@ def test_a_changed_function_runs_again_but_not_for_a_comment(
     commented = "# a comment\n" + helper.format(1, 1).replace("x + 1", "x  +  1  # again")
     results = run(defined(commented, tmp_path, monkeypatch), Grid(x=[1, 2]), tmp_path / "out", workers=0)
     assert [row["started"] for row in results.rows] == started
+    table = "TABLE = {'a': %s, 'b': [%s]}\n\ndef f(x):\n    return TABLE['a'](x) + TABLE['b'][0](x)\n"
+    kinds = [("lambda x: x", "lambda x: 2 * x"), ("lambda x: 2 * x", "lambda x: x"), ("abs", "lambda x: x")]
+    digests = {fingerprint(defined(table % kind, tmp_path, monkeypatch)) for kind in kinds}
+    assert len(digests) == 3, "functions in a table count, each at its place"
     for plus, times in ((5, 1), (5, 7)):
         function = defined(helper.format(plus, times), tmp_path, monkeypatch)
         results = run(function, Grid(x=[1, 2]), tmp_path / "out", workers=0)
         assert [row["result"] for row in results.rows] == [(1 + plus) * times, (2 + plus) * times]
+
+
+def test_functions_of_an_installed_module_count_for_that_of_the_same_module() -> None:
+    assert fingerprint(blends) != fingerprint(pressed_solids)
+    assert fingerprint(blends) == fingerprint(blends)
 
 
 def test_functions_of_one_line_are_different_ones() -> None:
@@ -204,7 +216,7 @@ def test_huge_numbers_and_odd_texts_are_kept(tmp_path: Path) -> None:
     results = run(huge, Grid(x=range(3)), tmp_path, workers=0)
     assert [row["n"] for row in results.rows] == [10**400, 1, "\ud800"]
     (all_,) = results.interval("n")
-    assert (all_["mean"], all_["count"], all_["left_out"]) == (1.0, 1, 2)
+    assert (all_["mean"], all_["trials"], all_["left_out"]) == (1.0, 1, 2)
 
 
 @pytest.mark.parametrize("suffix", [".parquet", ".csv"])
@@ -275,6 +287,7 @@ def test_values_become_files_by_their_content(tmp_path: Path) -> None:
     expected = functions.files(2)
     row = results.rows[1]
     assert decals.load_scene(tmp_path / row["scene"]) == expected["scene"]
+    assert pv.read(tmp_path / row["mesh"]).n_points == len(expected["mesh"].vertices)
     assert load(tmp_path / row["tree"]) == expected["tree"]
     np.testing.assert_array_equal(np.load(tmp_path / row["array"]), [0, 1])
     np.testing.assert_array_equal(np.load(tmp_path / row["decals"])["radii"], expected["decals"].radii)
