@@ -40,6 +40,9 @@ MOMENTS, QUICK_MOMENTS = 50, 2
 PATIENCE = 300.0
 """Seconds after which work that does not end is an error."""
 
+CANCELLED = "cancelled"
+"""Message of a window that has cancelled work."""
+
 LOOK_SECONDS = 0.002
 """Time between two looks at the session."""
 
@@ -170,7 +173,7 @@ class Cancelling:
             if refusal:
                 raise RuntimeError(f"{name}: {refusal}")
             self.free[name], self.stopped[name] = [], []
-            for _ in range(moments):
+            while len(self.free[name]) < moments:  # work that has ended by itself does not count
                 await self._escape()  # nothing is selected
                 await start()
                 await asyncio.sleep(rng.uniform(0.0, seconds))
@@ -182,11 +185,14 @@ class Cancelling:
         await self._browser.trigger(self._page.sandbox.perform, "deselect")
 
     async def _cancel(self, name: str) -> None:
-        """Press Escape, make another edit, and wait until the work has ended."""
+        """Press Escape, make another edit, and wait until the work has ended, unless it had ended before."""
         background, session = self._window.background, self._window.session
         entries = len(session.labels)
         began = time.perf_counter()
         await self._escape()
+        if self._window.actions.state.message != CANCELLED:
+            await self._until(lambda: not background.busy)
+            return
         self._contacts += 1
         contact = ("product", "min")[self._contacts % 2]
         await self._browser.trigger(self._page.sandbox.set_control, "drawing", "contact", contact)
