@@ -16,6 +16,7 @@ Shipped = Literal[
     "cost",
     "blends",
     "pressed_solids",
+    "devices",
 ]
 """The name of a shipped experiment."""
 
