@@ -15,6 +15,7 @@ from blobtree._typing import Int64Array
 from blobtree.progress import Progress
 from decals.baking.atlas_child import Arrays, atlas, packed, unpacked
 from decals.baking.box_atlas import BoxSides
+from decals.baking.fine_trees import EXPECTED_USE
 from decals.baking.meshes import BakeMesh
 from decals.baking.unwrapped import Unwrapped
 from decals.errors import InvalidMesh
@@ -33,9 +34,6 @@ PADDING = 4
 
 MAX_CHART_FACES = 300.0
 """Largest area of a chart, in mean areas of a face. The time for a chart grows faster than its faces."""
-
-EXPECTED_USE = 0.6
-"""Part of the texture that charts are expected to cover, for the first estimate of their scale."""
 
 
 LEVEL_COSINE = 1.0 - 2e-4

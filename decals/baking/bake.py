@@ -68,7 +68,8 @@ def bake(
     mapping : ImageMapping or str, optional
         Image mapping: how images lie on curved surface; ``"corrected"``, ``"chord"`` or ``"walked"``.
     resolution : int, optional
-        Cells along the longest side of a tree's support, for the triangles of implicit objects. Default 64.
+        Cells along the longest side of a tree's support, for the triangles of implicit objects. Default 64;
+        below textures, edges are then halved until the triangles lie within a part of a texel of the surface.
     creases : bool
         Keep the edges that unions, intersections and differences leave on implicit objects.
     progress : callable, optional

@@ -15,6 +15,7 @@ from blobtree.progress import Cancel, Progress, reporting
 from blobtree.pyvista_views import MESH_SUFFIXES
 from blobtree.validation import truth
 from decals.baking.export import VERTICES, bake_parts, export
+from decals.baking.fine_trees import middles_on
 from decals.baking.plain_files import as_polydata
 from decals.baking.surface_colors import evaluation_options
 from decals.errors import InvalidMesh, InvalidScene
@@ -30,7 +31,7 @@ from decals.surfaces import subdivide
 from decals.surfaces.base_color import BaseColor
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.normals import split_at_creases
-from decals.surfaces.subdivide import means, subdivided
+from decals.surfaces.subdivide import subdivided
 from decals.surfaces.surface import Surface, unit_rows
 from decals.surfaces.topology import welded
 from decals.surfaces.windings import MeshOrientation
@@ -44,9 +45,6 @@ EDGES_PER_RADIUS = 16
 
 ESTIMATE_SAMPLES = 2000
 """Points on each object by which the number of triangles is estimated."""
-
-MAX_MOVE = 0.25
-"""Largest distance of the middle of an edge from its place on a tree's surface, in lengths of the edge."""
 
 BLOCK = 1 << 18
 """Points that are evaluated at once."""
@@ -313,11 +311,7 @@ def _fine_tree(
     surface = ImplicitSurface(item.tree)
 
     def midpoints(rows: Float64Array, ends: Int64Array) -> Float64Array:
-        middles = means(rows, ends)[:, :3]
-        places, normals = surface.project(middles)
-        lengths = np.linalg.norm(rows[ends[:, 0], :3] - rows[ends[:, 1], :3], axis=1)
-        near = np.linalg.norm(places - middles, axis=1) <= MAX_MOVE * lengths  # so that every half is shorter
-        return np.hstack([np.where(near[:, None], places, middles), normals])
+        return np.hstack(middles_on(surface, *rows[ends.T, :3])[:2])
 
     corners = np.hstack([mesh.vertices, mesh.normals]).astype(np.float64)
     faces = mesh.faces.astype(np.int64)

@@ -14,6 +14,7 @@ from blobtree.errors import InvalidResolution
 from blobtree.files import write_together
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.validation import truth
+from decals.baking.fine_trees import below_texture
 from decals.baking.formats import FORMATS
 from decals.baking.instances import Instances, decal_instances
 from decals.baking.layouts import AUTO, LAYOUTS, MAX_TILES, XATLAS, lay_out
@@ -113,7 +114,8 @@ def export(
     contact, stiffness, mapping : optional
         Modes, as for `decals.evaluate`. Default: those of the scene.
     resolution : int, optional
-        Cells along the longest side of a tree's support, for the triangles of implicit objects. Default 64.
+        Cells along the longest side of a tree's support, for the triangles of implicit objects. Default 64;
+        below textures, edges are then halved until the triangles lie within a part of a texel of the surface.
     creases : bool
         Keep the edges that unions, intersections and differences leave on implicit objects.
     progress : callable, optional
@@ -248,8 +250,9 @@ def bake_parts(
         rows = source.decals.decals if isinstance(source.decals, DecalEditor) else source.decals
         copies = decal_instances(rows, source.images, [getattr(item, "name", "") for item in source.objects])
         source = replace(source, decals=Decals.empty())
-    work = _Work(source, source.drawing.overridden(**modes), resolution, creases, report)
     textured = place == TEXTURE
+    texels = tiles * size**2 if textured else 0
+    work = _Work(source, source.drawing.overridden(**modes), resolution, creases, texels, report)
     parts, maps = work.textured(size, samples, layout, tiles) if textured else (work.plain(place), [])
     parts = [work.with_attributes(number, part, attributes) for number, part in enumerate(parts)]
     return Baked(parts, maps, source.origin, recipe=source.recipe, instances=copies)
@@ -317,11 +320,19 @@ class _Work:
     """Makes the parts of a file."""
 
     def __init__(
-        self, source: _Source, drawing: Drawing, resolution: int | None, creases: bool, report: Progress
+        self,
+        source: _Source,
+        drawing: Drawing,
+        resolution: int | None,
+        creases: bool,
+        texels: int,
+        report: Progress,
     ) -> None:
         self._meshes = [
             bake_mesh(item, resolution=resolution, creases=creases, report=report) for item in source.objects
         ]
+        if texels and resolution is None:
+            self._meshes = below_texture(self._meshes, source.objects, texels, report)
         self._colors = SurfaceColors(self._meshes, source.objects, source.decals, source.images, drawing)
         self._rows = [np.arange(len(mesh.vertices)) for mesh in self._meshes]
         self._report = report

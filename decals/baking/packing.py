@@ -16,7 +16,7 @@ def pack(sides: Float64Array, padding: float, tiles: int) -> tuple[float, Float6
     sides : float64[n, 2]
         Widths and heights.
     padding : float
-        Distance between rectangles, and twice that to the border of a square. It is not scaled.
+        Distance between rectangles, and half of that to the border of a square. It is not scaled.
     tiles : int
         Number of squares.
 
@@ -49,11 +49,12 @@ def pack(sides: Float64Array, padding: float, tiles: int) -> tuple[float, Float6
 
 def _placed(sides: Float64Array, padding: float, tiles: int) -> tuple[Float64Array, Int64Array] | None:
     """Return lower corners and squares of rectangles in this order, or None if they do not fit."""
-    skylines = [[(padding, padding, 1.0 - padding)] for _ in range(tiles)]  # (left, height, right)
+    begin, end = 0.5 * padding, 1.0 + 0.5 * padding  # the sides have a padding that may go beyond the border
+    skylines = [[(begin, begin, end)] for _ in range(tiles)]  # (left, height, right)
     corners, squares = np.empty((len(sides), 2)), np.empty(len(sides), np.int64)
     for number, (width, height) in enumerate(sides.tolist()):
         for square, skyline in enumerate(skylines):
-            place = _lowest(skyline, width, height, 1.0 - padding)
+            place = _lowest(skyline, width, height, end)
             if place is not None:
                 corners[number], squares[number] = place, square
                 skylines[square] = _raised(skyline, *place, width, height)

@@ -68,7 +68,8 @@ def graphics() -> str:
 
 def printed(figures: Figures, targets: Mapping[str, str], machine: str, *, width: int = 28) -> Figures:
     """Print figures with their targets, and the machine on which they were measured; return them."""
-    print(f"python -m tests.bench.decals {' '.join(sys.argv[1:])}", machine, sep="\n")
+    program = getattr(sys.modules["__main__"].__spec__, "name", __name__)
+    print(f"python -m {program} {' '.join(sys.argv[1:])}", machine, sep="\n")
     for name, value in figures.items():
         print(f"{name:{width}} {value:12.4g}  {targets.get(name, '')}".rstrip())
     return figures
