@@ -131,6 +131,8 @@ For example:
 implicit-decals reproduce scene.json
 
 implicit-decals reproduce picture.png --scene scene.json
+
+implicit-decals reproduce model.glb
 """,
     "polygonize": """Write the surface of an implicit model as a triangle mesh.
 

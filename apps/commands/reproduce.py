@@ -1,9 +1,7 @@
 """``implicit-decals reproduce``: make what a file holds again from its recipe, and say what differs."""
 
-import json
-import struct
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
@@ -12,6 +10,7 @@ from rich.console import Console
 from decals import Scene, load_scene, render
 from decals.apps.commands.options import Definitions, Trust
 from decals.apps.commands.progress_bars import preparing
+from decals.baking.reproduction import NO_RECIPE, reproduce_export
 from decals.errors import InvalidInput
 from decals.images.load import load_image
 from decals.rendering.picture import picture_recipe
@@ -24,7 +23,8 @@ DIFFERENT = 1
 MISSING = 3
 """Exit codes: what was made differs; something that the recipe needs is missing."""
 
-NO_RECIPE = "a recipe: the file does not say how it was made"
+EXPORTED = (".glb", ".gltf")
+"""Suffixes of exported files that keep how they were made."""
 
 
 def reproduce(
@@ -44,16 +44,22 @@ def reproduce(
     file
         A saved scene, a PNG file that render wrote, or a glb or gltf file that export or bake wrote.
     scene
-        The scene of a picture, which the PNG file does not hold.
+        The scene of a picture, which the PNG file does not hold, or of an exported file that was too large
+        to hold it.
     """
     suffix = Path(file).suffix.lower()
-    if suffix != ".png" and scene is not None:
-        raise InvalidInput(f"--scene: expected a PNG file beside it, got {file!r}; leave it out")
+    if suffix not in (".png", *EXPORTED) and scene is not None:
+        raise InvalidInput(f"--scene: expected a PNG, GLB or glTF file beside it, got {file!r}; leave it out")
     with preparing(define) as progress:
         if suffix == ".png":
             found = _of_picture(Path(file), None if scene is None else load_scene(scene, trust=trust))
-        elif suffix in (".glb", ".gltf"):
-            found = _of_export(Path(file))
+        elif suffix in EXPORTED:
+            found = reproduce_export(
+                Path(file),
+                None if scene is None else load_scene(scene, trust=trust),
+                trust=trust,
+                progress=progress,
+            )
         else:
             found = made_again(load_scene(file, trust=trust), progress=progress)
     return _report(file, found)
@@ -85,29 +91,6 @@ def _of_picture(path: Path, scene: Scene | None) -> Reproduction:
         )
     now = picture.recipe or recipe
     return Reproduction((), scene.decals, tuple(changes), changes_since(recipe, now))
-
-
-def _of_export(path: Path) -> Reproduction:
-    """Return what a glTF or GLB file lacks: its meshes hold the models with the decals in them."""
-    recipe = _extras(path).get("recipe")
-    if not isinstance(recipe, dict):
-        return Reproduction((NO_RECIPE,))
-    models = recipe.get("parameters", {}).get("models", [])
-    missing = [f"the model {name!r}, which the file holds as a mesh with its decals alone" for name in models]
-    return Reproduction((*missing, "the scene: save it as .json, and reproduce that file"))
-
-
-def _extras(path: Path) -> dict[str, Any]:
-    """Return the extras of the asset of a glTF or GLB file."""
-    content = path.read_bytes()
-    try:
-        if content.startswith(b"glTF"):
-            (length,) = struct.unpack_from("<I", content, 12)
-            content = content[20 : 20 + length]
-        extras = json.loads(content)["asset"].get("extras", {})
-    except (ValueError, LookupError, TypeError, AttributeError, struct.error) as error:
-        raise InvalidInput(f"could not read {str(path)!r} as glTF; export it again") from error
-    return extras if isinstance(extras, dict) else {}
 
 
 def _report(file: str, found: Reproduction) -> int:

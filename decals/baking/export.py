@@ -1,8 +1,10 @@
 """`export`: a scene as a file of another program, with the decals in a texture or in vertex colours."""
 
+import base64
 import logging
 import os
-from collections.abc import Collection, Iterable, Sequence
+import zlib
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -31,9 +33,13 @@ from decals.index.editor import DecalEditor
 from decals.model import Decals
 from decals.rendering.options import Drawing, ImageLike, SceneLike, drawing_of, drawn_objects
 from decals.scenes.cover import scene_or_objects
+from decals.scenes.files import to_json
 from decals.scenes.objects import SceneObject
 from decals.scenes.origin import WORLD
-from decals.scenes.recipe import Recipe
+from decals.scenes.provenance import device_text, package_versions, provenance
+from decals.scenes.recipe import Recipe, is_plain
+from decals.scenes.render import option_value, scene_hashes
+from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model
 from decals.surfaces.mesh_check import MeshCheck
 from decals.validation import checked_path, describe, one_of, optional_package, whole_number
@@ -48,6 +54,12 @@ MIN_SIZE, MAX_SIZE = 16, 8192
 
 MAX_SAMPLES = 16
 """Samples along each axis of a texel, at most."""
+
+EXPORT_FUNCTION = "decals.export"
+"""Function in the recipes of exported files."""
+
+MAX_SOURCE = 1 << 18
+"""Characters of the compressed text of a scene, up to which a glTF file holds it."""
 
 
 def export(
@@ -195,6 +207,22 @@ def export(
             **modes,
         )
         report("writing the file", 0.0)
+        if rules.recipe:
+            given = {
+                **modes,
+                "colors": colors,
+                "attributes": list(names),
+                "instances": instances,
+                "unit": unit,
+                "up": up,
+                "size": size,
+                "samples": samples,
+                "layout": layout,
+                "tiles": tiles,
+                "resolution": resolution,
+                "creases": creases,
+            }
+            baked = replace(baked, made=_made(scene, path.parent, given))
         checks = tuple(part.check for part in baked.parts)
         content = rules.write(replace(baked, unit=unit, up=up), path.stem)
         report("writing the file", 0.5)
@@ -256,6 +284,24 @@ def bake_parts(
     parts, maps = work.textured(size, samples, layout, tiles) if textured else (work.plain(place), [])
     parts = [work.with_attributes(number, part, attributes) for number, part in enumerate(parts)]
     return Baked(parts, maps, source.origin, recipe=source.recipe, instances=copies)
+
+
+def _made(scene: object, folder: Path, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return how a file is made, as plain values, with the scene itself if it is small."""
+    source = scene_or_objects(scene)
+    if not isinstance(source, Scene):
+        return {}
+    options = {name: option_value(value) for name, value in given.items() if value is not None}
+    record = {
+        "function": EXPORT_FUNCTION,
+        "parameters": options,
+        "missing": [name for name in options if not is_plain(given[name])],
+        "scene": scene_hashes(source),
+        "versions": package_versions(),
+        "made": provenance(device_text("cpu")),
+    }
+    text = base64.b64encode(zlib.compress(to_json(source, folder=folder))).decode()
+    return record | ({"source": text} if len(text) <= MAX_SOURCE else {})
 
 
 def _color_place(colors: object, held: tuple[str, ...], path: Path) -> str:

@@ -30,6 +30,8 @@ class Format:
         True if decals may be copies of a square.
     tiles : bool
         True if there may be several textures, as UDIM tiles.
+    recipe : bool
+        True if a file keeps how it was made.
     packages : tuple of (str, str)
         Packages that the writer needs, and the extras that install them.
     """
@@ -39,6 +41,7 @@ class Format:
     attributes: bool = False
     instances: bool = False
     tiles: bool = False
+    recipe: bool = False
     packages: tuple[tuple[str, str], ...] = ()
 
 
@@ -50,8 +53,8 @@ def _alone(encode: Callable[[Baked], bytes]) -> Callable[[Baked, str], Files]:
 _TRIMESH = (("trimesh", "bake"),)
 
 FORMATS: dict[str, Format] = {
-    ".glb": Format(_alone(glb_bytes), ("texture", "vertices"), True, True, True, _TRIMESH),
-    ".gltf": Format(_alone(gltf_bytes), ("texture", "vertices"), True, True, True, _TRIMESH),
+    ".glb": Format(_alone(glb_bytes), ("texture", "vertices"), True, True, True, True, _TRIMESH),
+    ".gltf": Format(_alone(gltf_bytes), ("texture", "vertices"), True, True, True, True, _TRIMESH),
     ".obj": Format(obj_files, ("texture", "vertices"), tiles=True),
     ".ply": Format(ply_files, ("vertices", "texture"), True),
     ".stl": Format(_alone(stl_bytes)),

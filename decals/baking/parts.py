@@ -120,6 +120,8 @@ class Baked:
         The axis that points upward, "y" or "z".
     recipe : Recipe, optional
         How the decals were made.
+    made : mapping of str
+        How the file is made, in formats that keep it.
     instances : sequence of Instances
         Decals that are copies of a square.
     """
@@ -130,6 +132,7 @@ class Baked:
     unit: str | None = None
     up: str | None = None
     recipe: Recipe | None = None
+    made: Mapping[str, Any] = field(default_factory=dict)
     instances: Sequence[Instances] = ()
 
     @property

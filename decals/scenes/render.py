@@ -251,7 +251,7 @@ def drawn_picture(
     changed = {name: value for name, value in given.items() if value is not None}
     if viewpoint is not None:
         changed["viewpoint"] = viewpoint
-    plain_ones = {name: _option(value) for name, value in changed.items()}
+    plain_ones = {name: option_value(value) for name, value in changed.items()}
     recipe = {
         "function": PICTURE_FUNCTION,
         "parameters": {"size": list(options.size)} | plain_ones,
@@ -269,6 +269,6 @@ def scene_hashes(scene: Scene) -> dict[str, str]:
     return {name: content_hash(getattr(scene, name)) for name in SHOWN_PARTS}
 
 
-def _option(value: Any) -> Any:
+def option_value(value: Any) -> Any:
     """Return an option as a recipe has it: the name of a mode, or a plain value."""
     return value.name.lower() if isinstance(value, Enum) else plain(value)

@@ -58,19 +58,48 @@ def test_a_picture_is_drawn_again_with_its_scene(saved: Path, capsys: Capture) -
 
 
 def test_files_that_cannot_be_made_again(saved: Path, capsys: Capture) -> None:
-    pytest.importorskip("trimesh", reason="files of other programs need it")
-    assert run(["export", "scene.json", "-o", "a.glb", "--colors", "vertices"]) == 0
-    assert run(["reproduce", "a.glb"]) == 3
-    assert "the model 'model 1', which the file holds as a mesh" in capsys.readouterr().out
     Image.new("RGB", (2, 2)).save("plain.png")
     assert run(["reproduce", "plain.png"]) == 3
     assert "a recipe: the file does not say how it was made" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("name", ["a.glb", "a.gltf"])
+def test_an_exported_file_is_made_again(saved: Path, capsys: Capture, name: str) -> None:
+    pytest.importorskip("trimesh", reason="files of other programs need it")
+    options = ["--colors", "vertices", "--resolution", "16", "--attribute", "owner", "--contact", "radial"]
+    assert run(["export", "scene.json", "-o", name, *options]) == 0
+    capsys.readouterr()
+    Path("scene.json").rename("away.json")
+    assert run(["reproduce", name]) == 0
+    assert capsys.readouterr().out == f"{name}: made again, equal bit for bit\n"
+    content = Path(name).read_bytes()
+    Path(name).write_bytes(content.replace(b'"resolution":16', b'"resolution":18'))
+    assert run(["reproduce", name]) == 1
+    assert "accessors: not as in the file" in capsys.readouterr().out
+    Path(name).write_bytes(content.replace(b'"source":', b'"served":'))
+    assert run(["reproduce", name]) == 3
+    assert "the scene: give its file with --scene" in capsys.readouterr().out
+    assert run(["reproduce", name, "--scene", "away.json"]) == 0
+    scene = decals.load_scene("away.json")
+    scene.replace(decals=scene.decals[1:]).save("edited.json")
+    capsys.readouterr()
+    assert run(["reproduce", name, "--scene", "edited.json"]) == 3
+    assert "the decals of the scene that was exported: it has others" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_texture_is_baked_again(saved: Path, capsys: Capture) -> None:
+    pytest.importorskip("trimesh", reason="files of other programs need it")
+    assert run(["bake", "scene.json", "-o", "a.glb", "--size", "64"]) == 0
+    capsys.readouterr()
+    assert run(["reproduce", "a.glb"]) == 0
+    assert "equal bit for bit" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["scene.json", "--scene", "scene.json"], "--scene: expected a PNG file beside it"),
+        (["scene.json", "--scene", "scene.json"], "--scene: expected a PNG, GLB or glTF file beside it"),
         (["none.json"], "could not read the scene 'none.json'"),
         (["none.png"], "none.png"),
         (["none.glb"], "none.glb"),

@@ -1,0 +1,99 @@
+"""Exported glTF files made again: what they keep of how they were made, and how a new one differs."""
+
+import base64
+import json
+import struct
+import tempfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from blobtree.progress import Progress
+from decals.baking.export import EXPORT_FUNCTION, export
+from decals.errors import ImplicitDecalsError, InvalidInput
+from decals.scenes.files import from_json
+from decals.scenes.provenance import changes_since, device_text, package_versions, provenance
+from decals.scenes.render import scene_hashes
+from decals.scenes.reproduction import Reproduction
+from decals.scenes.scene import Scene
+
+NO_RECIPE = "a recipe: the file does not say how it was made"
+
+
+def reproduce_export(
+    path: Path, scene: Scene | None = None, *, trust: bool = False, progress: Progress | None = None
+) -> Reproduction:
+    """Export a scene again as a glTF or GLB file says, and compare the files.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    scene : Scene, optional
+        Its scene, if the file does not hold it.
+    trust : bool
+        Read images that lie outside of the file's folder, if its scene has some.
+    progress : callable, optional
+        Called with a stage and the fraction done.
+
+    Raises
+    ------
+    InvalidInput
+        The file cannot be read.
+    """
+    before = _Content.of(path.read_bytes(), path)
+    recipe = before.extras.get("export")
+    if not isinstance(recipe, Mapping) or recipe.get("function") != EXPORT_FUNCTION:
+        return Reproduction((NO_RECIPE,))
+    try:
+        if scene is None and isinstance(held := recipe.get("source"), str):
+            text = zlib.decompress(base64.b64decode(held))
+            scene = from_json(text, folder=path.parent, trust=trust)
+        missing = _missing(recipe, scene)
+        if missing or scene is None:
+            return Reproduction(missing)
+        with tempfile.TemporaryDirectory() as folder:
+            again = Path(folder) / path.name
+            export(scene, again, progress=progress, **recipe["parameters"])
+            after = _Content.of(again.read_bytes(), again)
+    except (ImplicitDecalsError, ValueError, LookupError, TypeError, zlib.error) as error:
+        return Reproduction((f"a recipe that this version takes: {error}",))
+    now = {"versions": package_versions(), "made": provenance(device_text("cpu"))}
+    return Reproduction((), scene.decals, before.changes(after), changes_since(recipe, now))
+
+
+def _missing(recipe: Mapping[str, Any], scene: Scene | None) -> tuple[str, ...]:
+    """Return what the recipe of a file needs besides a scene."""
+    missing = [f"the value of {name!r}, which the recipe only describes" for name in recipe["missing"]]
+    if scene is None:
+        return (*missing, "the scene: give its file with --scene")
+    hashes = scene_hashes(scene)
+    others = [name for name, value in recipe["scene"].items() if hashes.get(name) != value]
+    return (*missing, *(f"the {name} of the scene that was exported: it has others" for name in others))
+
+
+class _Content:
+    """The parts of a glTF or GLB file that are compared."""
+
+    def __init__(self, tree: dict[str, Any], buffer: bytes) -> None:
+        self.extras: dict[str, Any] = tree["asset"].pop("extras", {})
+        self._tree, self._buffer = tree, buffer
+
+    @classmethod
+    def of(cls, content: bytes, path: Path) -> "_Content":
+        """Return the parts of a file's content."""
+        try:
+            if not content.startswith(b"glTF"):
+                return cls(json.loads(content), b"")
+            (length,) = struct.unpack_from("<I", content, 12)
+            return cls(json.loads(content[20 : 20 + length]), content[28 + length :])
+        except (ValueError, LookupError, TypeError, AttributeError, struct.error) as error:
+            raise InvalidInput(f"could not read {str(path)!r} as glTF; export it again") from error
+
+    def changes(self, other: "_Content") -> tuple[str, ...]:
+        """Return how another file differs."""
+        own = {**self._tree, "binary": self._buffer}
+        theirs = {**other._tree, "binary": other._buffer}
+        names = [name for name in sorted({*own, *theirs}) if own.get(name) != theirs.get(name)]
+        return tuple(f"{name}: not as in the file" for name in names)
