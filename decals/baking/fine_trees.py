@@ -71,14 +71,15 @@ def _finer(mesh: BakeMesh, surface: Surface, texel: float, report: Progress) -> 
 
     def are_long(starts: Float64Array, ends: Float64Array) -> BoolArray:
         report("dividing triangles", 0.0)
-        long = np.linalg.norm(ends - starts, axis=1) > texel
+        long: BoolArray = np.linalg.norm(ends - starts, axis=1) > texel
         if len(long) > MAX_EDGES:
             return np.zeros(len(long), np.bool_)
         long[long] = middles_on(surface, starts[long], ends[long], SMOOTH)[2] > MAX_GAP * texel
         return long
 
     def midpoints(rows: Float64Array, ends: Int64Array) -> Float64Array:
-        places, normals, _ = middles_on(surface, *rows[ends.T, :3], SMOOTH)
+        begins, stops = rows[ends.T, :3]
+        places, normals, _ = middles_on(surface, begins, stops, SMOOTH)
         own = unit_rows(means(rows[:, 3:], ends))
         alike = np.einsum("na,na->n", own, normals) > ALIKE
         return np.hstack([places, np.where(alike[:, None], normals, own)])

@@ -115,7 +115,7 @@ def _finish_tree(tree: dict[str, Any], baked: Baked) -> None:
         tree["samplers"] = [{"magFilter": LINEAR, "minFilter": LINEAR_MIPMAP_LINEAR, **wrap}]
         for texture in textures:
             texture["sampler"] = 0
-    extras = {} if baked.recipe is None else {"recipe": baked.recipe.record}
+    extras: dict[str, Any] = {} if baked.recipe is None else {"recipe": baked.recipe.record}
     extras |= {"export": baked.made} if baked.made else {}
     if extras:
         tree["asset"]["extras"] = extras

@@ -45,7 +45,8 @@ def test_triangles_of_a_ball_lie_within_a_part_of_a_texel(radius: float) -> None
 
     def depths(mesh: BakeMesh) -> Array:
         starts, ends = edges(mesh)
-        return np.asarray(radius - np.linalg.norm(0.5 * (starts + ends), axis=1)) / texel
+        found: Array = (radius - np.linalg.norm(0.5 * (starts + ends), axis=1)) / texel
+        return found
 
     assert depths(coarse).max() > 3 * MAX_GAP
     assert depths(fine).max() < 1.01 * MAX_GAP

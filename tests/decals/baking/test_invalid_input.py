@@ -38,7 +38,10 @@ BALL = Point((0, 0, 0), radius=1.0)
         ({"tiles": 2, "vertex_colors": True}, "tiles: expected 1 for 'a.glb' with colors='vertices', got 2"),
         ({"layout": "sphere"}, "layout: expected one of auto, box, xatlas, own, got 'sphere'"),
         ({"layout": 3}, "layout: expected one of"),
-        ({"layout": "own"}, "expected texture coordinates, object 'model 1' has none; use layout='box'"),
+        (
+            {"layout": "own"},
+            "expected texture coordinates below a texture or colours, object 'model 1' has none; give",
+        ),
         ({"contact": 9}, "contact: expected one of"),
         ({"mapping": "planar"}, "mapping: expected one of"),
         ({"resolution": 0}, "resolution"),
