@@ -4,12 +4,14 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable
 from importlib import import_module
+from textwrap import shorten
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 from rich.console import Console, Group
 from rich.live import Live
 from rich.table import Table
+from rich.text import Text
 
 from decals.apps import experiments as shipped
 from decals.apps.models.loading import import_module_or_file
@@ -17,8 +19,8 @@ from decals.errors import InvalidInput
 from decals.experiments import Design, run
 from decals.experiments.outcome import COLUMNS, Row
 
-LATEST = 8
-"""Rows that the table shows."""
+LATEST, WIDTH = 8, 28
+"""Rows that the table shows, and most characters of a cell."""
 
 
 def sweep(
@@ -66,9 +68,9 @@ def sweep(
     console = Console(stderr=True)
     options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "limit": limit, "memory": memory}
     if console.is_interactive:
-        with Live(console=console, refresh_per_second=4) as live:
-            table = _Table(live)
-            options |= {"progress": table.advance, "on_row": table.add}
+        table = _Table()
+        options |= {"progress": table.advance, "on_row": table.add}
+        with Live(table, console=console, refresh_per_second=4):
             results = run(function, design, out, retry=retry, **options)
     else:
         results = run(function, design, out, retry=retry, **options)
@@ -110,8 +112,7 @@ def _send_by_value(module: Any) -> None:
 class _Table:
     """The latest rows, how many trials ended how, and the time left."""
 
-    def __init__(self, live: Live) -> None:
-        self._live = live
+    def __init__(self) -> None:
         self._latest: deque[Row] = deque(maxlen=LATEST)
         self._counts: Counter[str] = Counter()
         self._began = time.monotonic()
@@ -119,7 +120,8 @@ class _Table:
 
     def advance(self, _stage: str, done: float) -> None:
         """Estimate the time left from the share that is done."""
-        if done > 0.0:
+        self._left = ""
+        if 0.0 < done < 1.0:
             seconds = (time.monotonic() - self._began) * (1.0 - done) / done
             left = f"{seconds / 60:.0f} min" if seconds > 90 else f"{seconds:.0f} s"
             self._left = f", {done:.0%}, {left} left"
@@ -128,16 +130,22 @@ class _Table:
         """Show a row."""
         self._latest.append(row)
         self._counts[row["status"]] += 1
+
+    def __rich__(self) -> Group:
+        """Return what the terminal shows."""
         hidden = set(COLUMNS) - {"status", "error", "seconds"}
         names = list(dict.fromkeys(name for row in self._latest for name in row if name not in hidden))
-        table = Table(*names, box=None)
-        for latest in self._latest:
-            table.add_row(*(_text(latest.get(name)) for name in names))
+        table = Table(box=None)
+        for name in names:
+            table.add_column(Text(name))
+        for row in self._latest:
+            table.add_row(*(Text(_cell(row.get(name))) for name in names))
         counts = ", ".join(f"{count} {status}" for status, count in self._counts.items())
-        self._live.update(Group(table, f"{counts}{self._left}"))
+        return Group(table, f"{counts}{self._left}")
 
 
-def _text(value: Any) -> str:
+def _cell(value: Any) -> str:
+    """Return the text of a value, shortened."""
     if value is None:
         return ""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return shorten(f"{value:.4g}" if isinstance(value, float) else str(value), WIDTH, placeholder="…")

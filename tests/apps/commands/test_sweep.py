@@ -1,10 +1,13 @@
 """``implicit-decals sweep`` and ``report``: an experiment from a file, its table and its page."""
 
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from decals.apps.cli import run
+from decals.apps.commands.sweep import _Table
 from decals.experiments import Results
 
 FILE = """
@@ -53,3 +56,19 @@ def test_wrong_files_are_refused(
     Path("empty").mkdir()
     assert run(arguments) == 2
     assert words in " ".join(capsys.readouterr().err.split())
+
+
+def test_the_table_shows_texts_as_they_are_in_one_line_each() -> None:
+    table = _Table()
+    for x, error in enumerate([None, "ValueError: [bold] " + "long " * 40]):
+        table.add({"x": x, "status": "failed" if error else "done", "error": error, "seconds": 0.5})
+    table.advance("running trials", 0.5)
+    text = Console(width=60, file=StringIO(), record=True)
+    text.print(table)
+    lines = text.export_text().splitlines()
+    assert len(lines) == 4
+    assert "[bold] long" in lines[2]
+    assert "1 done, 1 failed, 50%" in lines[3]
+    table.advance("running trials", 1.0)
+    text.print(table)
+    assert text.export_text().splitlines()[-1].strip() == "1 done, 1 failed"
