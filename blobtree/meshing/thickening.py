@@ -107,6 +107,15 @@ MISSING_SHARE = 0.02
 MAX_FOLDED = 0.05
 """Largest share of a leaf's triangles that may face inward, by area."""
 
+MAX_OFF = 0.08
+"""Largest share of a leaf's triangles that may be off the surface: above, they bridge joints of parts."""
+
+CHECKED_FACES = 400
+"""Triangles of each leaf that are looked at, evenly by area."""
+
+FACE_REACH = 0.3 * np.geomspace(0.002, 1.0, 40)
+"""Distances from a triangle at which the surface is looked for, over its longest side."""
+
 LEAST_FOUND = 0.9
 """Share of the points all over a leaf's surface that must have vertices on their side."""
 
@@ -413,6 +422,7 @@ def _wrong_leaves(tree: ImplicitModel, vertices: _Vertices, size: float, growth:
     failed = np.bincount(owners[missing & ~vertices.faulty], minlength=count + 1) > MISSING_SHARE * checked
     failed[owners[vertices.faulty]] = True
     failed |= _folded_share(vertices.mesh, owners, count + 1) > MAX_FOLDED
+    failed[1:] |= _share_off_surface(tree, vertices.mesh, vertices.owners, count) > MAX_OFF
     failed[1:] |= _without_vertices(tree, sides, growth)
     if failed[0]:
         return np.flatnonzero(growth.amounts)
@@ -432,6 +442,25 @@ def _folded_share(mesh: Mesh, owners: Int32Array, count: int) -> Float64Array:
     )
     shares: Float64Array = away / np.maximum(whole, 1e-300)
     shares[0] = 0.0  # triangles that did not grow
+    return shares
+
+
+def _share_off_surface(tree: ImplicitModel, mesh: Mesh, owners: Int32Array, count: int) -> Float64Array:
+    """Return by leaf the share of triangles, by area, along whose normals is no surface nearby."""
+    leaves, shares = owners[mesh.faces].max(axis=1), np.zeros(count)
+    for leaf in np.unique(leaves[leaves >= 0]):
+        corners = mesh.vertices[mesh.faces[leaves == leaf]].astype(np.float64)
+        sides = corners - np.roll(corners, 1, axis=1)
+        crosses = np.cross(sides[:, 0], sides[:, 1])
+        doubled = np.linalg.norm(crosses, axis=1)
+        total = np.cumsum(doubled)
+        chosen = np.searchsorted(total, (np.arange(CHECKED_FACES) + 0.5) * (total[-1] / CHECKED_FACES))
+        longest = np.linalg.norm(sides[chosen], axis=2).max(axis=1)
+        ways = crosses[chosen] * (longest / np.maximum(doubled[chosen], 1e-300))[:, None]
+        steps = np.concatenate([-FACE_REACH, [0.0], FACE_REACH])[:, None, None]
+        points = corners[chosen].mean(axis=1) + steps * ways
+        inside = values_at(tree.tape, points.reshape(-1, 3)).reshape(len(steps), -1) >= ISO
+        shares[leaf] = (inside.all(axis=0) | ~inside.any(axis=0)).mean()
     return shares
 
 

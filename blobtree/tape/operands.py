@@ -2,7 +2,7 @@
 
 Differences, intersections and their smooth kin leave parts that are thinner than any primitive: a wall
 between two surfaces, a lens where two bodies overlap. Both sides of such a part belong to different operands.
-So a tree is cut into operands that remove nothing themselves.
+So a tree is cut into operands that remove nothing themselves, or into all of its leaves.
 """
 
 from collections.abc import Iterator
@@ -81,13 +81,11 @@ def has_walls(program: list[Instruction]) -> bool:
 
 def operands_of(program: list[Instruction], tape: Tape) -> list[Operand]:
     """Return the operands of a tree that removes; none for other trees."""
-    starts = tape.headers.tolist()
-    pieces = [tape.data[a:b] for a, b in zip(starts, [*starts[1:], len(tape.data)], strict=True)]
     value = _Value()
     leaves: list[ProgramLeaf] = []
     registers: dict[int, tuple[_Value, Float32Array]] = {}
     enters: dict[int, Float32Array] = {}
-    for step, texels in zip(program, pieces, strict=True):
+    for step, texels in zip(program, _pieces(tape), strict=True):
         match step:
             case Run(operator=operator, primitives=primitives):
                 numbers = tuple(range(len(leaves), len(leaves) + len(primitives)))
@@ -122,6 +120,40 @@ def operands_of(program: list[Instruction], tape: Tape) -> list[Operand]:
     return [_operand(part, tape, leaves) for part in value.operands if part.numbers]
 
 
+def leaves_of(program: list[Instruction], tape: Tape) -> Iterator[Tape]:
+    """Yield the tape of each leaf alone, within the warps around it, for the kernels of the whole tape."""
+    pieces, entries = _pieces(tape), list[int]()
+    leaves_warp: dict[int, Float32Array] = {}
+    for number, step in enumerate(program):
+        if isinstance(step, EnterWarp):
+            entries.append(number)
+        elif isinstance(step, LeaveWarp):
+            leaves_warp[entries.pop()] = pieces[number]
+    for number, (step, texels) in enumerate(zip(program, pieces, strict=True)):
+        if isinstance(step, EnterWarp):
+            entries.append(number)
+        elif isinstance(step, LeaveWarp):
+            entries.pop()
+        elif isinstance(step, Run):
+            for own in np.split(texels[1:], len(step.primitives)):
+                part = _Part((_alone(texels, own, tape),))
+                for entry in reversed(entries):
+                    part = part.within(pieces[entry], leaves_warp[entry])
+                yield _tape_of(part, tape)
+
+
+def _pieces(tape: Tape) -> list[Float32Array]:
+    """Return the texels of each instruction of a tape."""
+    starts = tape.headers.tolist()
+    return [tape.data[a:b] for a, b in zip(starts, [*starts[1:], len(tape.data)], strict=True)]
+
+
+def _alone(texels: Float32Array, own: Float32Array, tape: Tape) -> Float32Array:
+    """Return the texels of a run with one of its primitives."""
+    header = [texels[0, 0], tape.instruction_set.operators.index(SUM), 1.0, 0.0]
+    return np.vstack([header, own])
+
+
 def _runs(step: Run, texels: Float32Array, tape: Tape, numbers: tuple[int, ...]) -> Iterator[_Part]:
     """Yield the primitives of a run that removes, as operands of their own.
 
@@ -132,14 +164,17 @@ def _runs(step: Run, texels: Float32Array, tape: Tape, numbers: tuple[int, ...])
         header = [texels[0, 0], operators.index(UNION), texels[0, 2], 0.0]
         yield _Part((np.vstack([header, texels[1:]]),), numbers, tool=True)
         return
-    header = [texels[0, 0], operators.index(SUM), 1.0, 0.0]
     for number, own in zip(numbers, np.split(texels[1:], len(numbers)), strict=True):
-        yield _Part((np.vstack([header, own]),), (number,))
+        yield _Part((_alone(texels, own, tape),), (number,))
 
 
 def _operand(part: _Part, tape: Tape, leaves: list[ProgramLeaf]) -> Operand:
-    """Return an operand with its tape, behind the data region of the whole one."""
+    """Return an operand with its tape."""
+    return Operand(_tape_of(part, tape), leaves[part.numbers[0]], part.numbers, part.tool)
+
+
+def _tape_of(part: _Part, tape: Tape) -> Tape:
+    """Return the tape of a part, behind the data region of the whole one."""
     data = np.concatenate([tape.data[: tape.start], *part.texels]).astype(tape.data.dtype)
     starts = tape.start + np.cumsum([0, *(len(texels) for texels in part.texels[:-1])])
-    own = replace(tape, data=data, headers=starts)
-    return Operand(own, leaves[part.numbers[0]], part.numbers, part.tool)
+    return replace(tape, data=data, headers=starts)

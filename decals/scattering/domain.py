@@ -16,6 +16,7 @@ from decals.scattering.boundary import Boundary
 from decals.scattering.projection import SurfaceProjection, spans_of
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
+from decals.surfaces.space_curve import curve_keys
 from decals.surfaces.surface import Surface, vectors
 from decals.validation import function_or_none, function_values, real_array, real_number, whole_number
 
@@ -30,9 +31,6 @@ SAMPLES_PER_CHOICE = 8
 
 DENSITY_STEP = 1.2
 """Factor between two levels of density; a particle stays within it of the density at which it began."""
-
-CURVE_BITS = 16
-"""Bits of each coordinate along the space-filling curve (Morton's)."""
 
 MAX_PARTICLES = 100_000_000
 """Largest number of particles of one relaxation; each takes some hundred bytes."""
@@ -134,6 +132,19 @@ class Domain:
         return any(
             isinstance(surface, ImplicitSurface) and surface.has_small_parts for surface in self.surfaces
         )
+
+    def parts(self, points: OrientedPoints) -> Int64Array:
+        """Return numbers (n,) of the parts between which particles do not change: surfaces, or their leaves.
+
+        Leaves count on surfaces with small parts. How crowded particles are there says nothing: on both sides
+        of a plate or in a small box they have fewer, or nearer, neighbours.
+        """
+        numbers = points.surface_ids.astype(np.int64)
+        for index, surface in enumerate(self.surfaces):
+            if isinstance(surface, ImplicitSurface) and surface.has_small_parts:
+                rows = np.flatnonzero(points.surface_ids == index)
+                numbers[rows] += len(self.surfaces) * surface.parts(points.positions[rows])
+        return numbers
 
     @property
     def area(self) -> float:
@@ -379,14 +390,7 @@ def _stratified(positions: Float32Array, densities: Float64Array) -> Int64Array:
     Points at even steps of the density's running sum then represent each part of the surface.
     """
     levels = np.floor(np.log(densities) / np.log(DENSITY_STEP) + 0.5)
-    lower = positions.min(axis=0)
-    extent = max(float((positions.max(axis=0) - lower).max()), 1e-30)
-    cells = ((positions - lower) * ((1 << CURVE_BITS) - 1) / extent).astype(np.int64)
-    keys = np.zeros(len(positions), np.int64)
-    for bit in range(CURVE_BITS):
-        for axis in range(3):
-            keys |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
-    return np.lexsort((keys, levels))
+    return np.lexsort((curve_keys(positions), levels))
 
 
 def _choose_evenly(weights: Float64Array, count: int) -> Int64Array:

@@ -141,10 +141,10 @@ def crowded_particles(state: ParticleState) -> Int64Array:
 def relocate(
     state: ParticleState, movers: Int64Array, candidates: OrientedPoints, candidate_sizes: Float32Array
 ) -> Int64Array:
-    """Move particles to the candidates in the largest gaps of their own surfaces; return those that moved.
+    """Move particles to the candidates in the largest gaps of their own parts; return those that moved.
 
     Repulsion acts only nearby: it carries no particle to another component, round a sharp tip, or past
-    its neighbours. Counts of the surfaces stay the same. `candidate_sizes` are spacings at the candidates.
+    its neighbours. Counts of the parts stay the same. `candidate_sizes` are spacings at the candidates.
     """
     gaps = _gap_sizes(state, candidates, candidate_sizes)
     bare = np.flatnonzero(gaps > MIN_GAP)
@@ -154,9 +154,11 @@ def relocate(
     targets = targets[np.argsort(-gaps[targets], kind="stable")]
     moved: list[int] = []
     filled: list[int] = []
-    for surface in np.unique(state.surface_ids[movers]):
-        own_movers = movers[state.surface_ids[movers] == surface].tolist()
-        own_targets = targets[candidates.surface_ids[targets] == surface].tolist()
+    parts = state.domain.parts(state.points()[movers])
+    parts_of_targets = state.domain.parts(candidates[targets])
+    for part in np.unique(parts):
+        own_movers = movers[parts == part].tolist()
+        own_targets = targets[parts_of_targets == part].tolist()
         pairs = min(len(own_movers), len(own_targets))
         moved += own_movers[:pairs]
         filled += own_targets[:pairs]

@@ -1,27 +1,53 @@
 """Meshes of curved surfaces whose area is that of the surface, not that of the triangles."""
 
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from blobtree import Mesh
-from blobtree._typing import Float64Array, Int64Array
+from blobtree import ISO, Mesh
+from blobtree._typing import Float32Array, Float64Array, Int64Array
 from decals.surfaces.mesh import MeshSurface
+from decals.surfaces.space_curve import curve_keys
 from decals.surfaces.windings import MeshOrientation, Triangles, Windings
 
 LEAST_COSINE = 0.5
 """Cosine of the angle between a face and the normal of a corner, below which there is a crease between."""
 
 
+FLAT_SPAN, SHARP_SPAN = np.radians(8.0), np.radians(25.0)
+"""Angles between the normals at a face's corners: up to the first it is flat, from the second on it may cut
+off an edge."""
+
+DIVISIONS = 4
+"""Parts of the sides of faces that cut off edges, whose corners move onto the surface."""
+
+EDGE_HEIGHT = 0.6
+"""Largest distance of an edge from a face that cuts it off, over the longest side of the face."""
+
+HALVINGS = 6
+"""Bisection steps up to the surface above or below a face."""
+
+Field = Callable[[Float32Array], Float32Array]
+"""The field at points[n, 3]."""
+
+
 class CurvedMesh(MeshSurface):
     """Mesh that `polygonize` made, with the area of the surface on which its vertices lie.
 
-    Samples are uniform by that area. Small round parts lose some of it to the chords of few triangles.
+    Samples are uniform by that area: small round parts lose some of it to the chords of few triangles, and
+    sharp edges to the triangles that cut them off. Faces follow a curve through space, so each part gets its
+    share of few samples.
     """
 
-    def __init__(self, mesh: Mesh, *, device: str) -> None:
+    def __init__(self, mesh: Mesh, field: Field, *, device: str) -> None:
+        mesh = replace(mesh, faces=mesh.faces[np.argsort(curve_keys(mesh.vertices[mesh.faces[:, 0]]))])
         super().__init__(mesh.vertices, mesh.faces, device=device, orientation=MeshOrientation.KEEP)
-        self._cumulative = np.cumsum(_curved_areas(mesh)[self.sound])
+        areas = _curved_areas(mesh)
+        sharp = _edge_faces(mesh)
+        areas[sharp] = _areas_at_edges(mesh, sharp, field)
+        self._cumulative = np.cumsum(areas[self.sound])
 
     def _same_vertices(self) -> Int64Array:
         """Return each vertex as its own."""
@@ -68,6 +94,57 @@ def _curved_areas(mesh: Mesh) -> Float64Array:
         divided += _area(corners[a], middles[a], middles[a - 1])
     areas: Float64Array = divided + (divided - area) / 3.0
     return areas
+
+
+def _edge_faces(mesh: Mesh) -> Int64Array:
+    """Return the faces that bend far beside flat ones: they may cut off an edge that is no crease."""
+    normals = mesh.normals[mesh.faces].astype(np.float64)
+    spans = np.arccos(np.min([_dot(normals[:, a], normals[:, a - 1]) for a in range(3)], axis=0).clip(-1, 1))
+    least = np.full(len(mesh.vertices), np.inf)
+    np.minimum.at(least, mesh.faces, spans[:, None])
+    beside_flat = (least[mesh.faces] < FLAT_SPAN).any(axis=1)
+    return np.flatnonzero((spans > SHARP_SPAN) & beside_flat)
+
+
+def _areas_at_edges(mesh: Mesh, faces: Int64Array, field: Field) -> Float64Array:
+    """Return the areas (n,) of the surface above faces that cut off edges.
+
+    Each face is divided, and the new corners move onto the surface, at right angles to the face.
+    """
+    corners = mesh.vertices[mesh.faces[faces]].astype(np.float64)
+    longest = np.sqrt(np.max([_dot(*2 * [corners[:, a] - corners[:, a - 1]]) for a in range(3)], axis=0))
+    ways = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    ways *= (EDGE_HEIGHT * longest / np.maximum(np.sqrt(_dot(ways, ways)), 1e-300))[:, None]
+    lattice = {
+        (i, j): np.einsum("c,nci->ni", np.array([DIVISIONS - i - j, i, j]) / DIVISIONS, corners)
+        for i in range(DIVISIONS + 1)
+        for j in range(DIVISIONS + 1 - i)
+    }
+    for place in lattice.keys() - {(0, 0), (DIVISIONS, 0), (0, DIVISIONS)}:
+        lattice[place] = _onto_surface(lattice[place], ways, field)
+    total = np.zeros(len(faces))
+    for i in range(DIVISIONS):
+        for j in range(DIVISIONS - i):
+            total += _area(lattice[i, j], lattice[i + 1, j], lattice[i, j + 1])
+            if i + j < DIVISIONS - 1:
+                total += _area(lattice[i + 1, j + 1], lattice[i, j + 1], lattice[i + 1, j])
+    return total
+
+
+def _onto_surface(points: Float64Array, ways: Float64Array, field: Field) -> Float64Array:
+    """Return where ways from points inside, or against them from points outside, cross the surface.
+
+    Points whose ways cross no surface stay.
+    """
+    inside = field(points.astype(np.float32)) >= ISO
+    ways = np.where(inside[:, None], ways, -ways)
+    crosses = (field((points + ways).astype(np.float32)) >= ISO) != inside
+    low, high = np.zeros(len(points)), np.where(crosses, 1.0, 0.0)
+    for _halving in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        same = (field((points + middle[:, None] * ways).astype(np.float32)) >= ISO) == inside
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    return points + (0.5 * (low + high))[:, None] * ways
 
 
 def _dot(first: Float64Array, second: Float64Array) -> Float64Array:

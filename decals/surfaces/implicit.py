@@ -1,5 +1,6 @@
 """`ImplicitSurface`: the iso surface of a BlobTree, on the host and on devices."""
 
+from functools import partial
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -8,12 +9,15 @@ import warp as wp
 from numpy.typing import ArrayLike
 
 from blobtree import ISO, Node, polygonize
-from blobtree._typing import BoolArray, Float32Array
+from blobtree._typing import BoolArray, Float32Array, Int64Array
 from blobtree.device import known_device, launch
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, UNION
 from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
 from blobtree.meshing.polygonize import polygonize_parts, shows_small_parts
+from blobtree.tape.grown import runs_of_leaves
+from blobtree.tape.model import values_at
+from blobtree.tape.operands import leaves_of
 from blobtree.tape.part_sizes import has_small_bodies
 from blobtree.tracing.trace import trace
 from blobtree.validation import point_array
@@ -44,6 +48,9 @@ MAX_RESOLUTION = 128
 
 SMALL_PART = 2.5
 """Radius in cells below which the area of a part's triangles is not that of its surface."""
+
+MAX_PARTS = 64
+"""Leaves of a tree up to which parts are told apart."""
 
 MAX_STEP = 0.5
 """Longest step of Newton's method, in cells."""
@@ -117,7 +124,7 @@ class ImplicitSurface(Immutable):
         self.has_small_parts = small and has_small_bodies(tree, SMALL_PART * _cell_size(tree, cells))
         """True if parts of the tree are small beside it, not only what is cut out of it."""
         self._coarse = (
-            CurvedMesh(coarse, device=device)
+            CurvedMesh(coarse, partial(values_at, tree.tape), device=device)
             if small
             else MeshSurface(coarse.vertices, coarse.faces, device=device, orientation=MeshOrientation.KEEP)
         )
@@ -188,6 +195,13 @@ class ImplicitSurface(Immutable):
                 self.tree, self._coarse.on(device), self._max_step, least_way
             )
         return self._on_devices[device]
+
+    def parts(self, points: Float32Array) -> Int64Array:
+        """Return the leaf whose surface is nearest to each of the points (n,); 0 for trees of many leaves."""
+        tree, gaps = self.tree, []
+        if sum(1 for _ in runs_of_leaves(tree._program)) <= MAX_PARTS:
+            gaps = [np.abs(values_at(tape, points) - ISO) for tape in leaves_of(tree._program, tree.tape)]
+        return np.argmin(gaps, axis=0) if gaps else np.zeros(len(points), np.int64)
 
     def project(
         self, points: ArrayLike, *, within: Float32Array | None = None

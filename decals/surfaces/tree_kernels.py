@@ -13,6 +13,10 @@ from blobtree.tape.interpreter import field_value
 wp.set_module_options(KERNEL_OPTIONS)
 
 
+OFFSETS = wp.constant(6)
+"""Distances from the mesh from which points look for a part that the mesh misses by its thickness."""
+
+
 @wp.func
 def has_converged(f: wp.vec4, tolerance: wp.float32) -> wp.bool:
     """Return True if a point with this field and gradient lies on the surface and has a normal."""
@@ -58,28 +62,46 @@ def project_with_mesh(
 ) -> None:
     """Project points by Newton's method: write positions and normals.
 
-    A point without convergence starts again at the closest point of the coarse mesh. If that fails too, it
-    takes that closest point, and the normal of its face. So does a point that went farther than `least_way`
-    although the mesh is less than half as far: beside a thin part, the field is that of a larger one.
+    A point without convergence starts again at the closest point of the coarse mesh. So does a point that
+    went farther than `least_way` although the mesh is less than half as far: beside a thin part, the field is
+    that of a larger one. The way from the mesh may be no longer either. Else the point starts above and below
+    the mesh, which may miss a thin part by more than its thickness, at distances that double. If all fails,
+    it takes the closest point of the mesh, and the normal of its face.
     """
     i = first + wp.tid()
-    p, f = project_to_surface(points[i], max_step, tape, span)
-    normal = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
-    again = not has_converged(f, tolerance)
-    way = wp.length(p - points[i])
-    if not again and way > least_way:
-        nearer = wp.mesh_query_point_no_sign(mesh, points[i], 0.5 * way)
-        again = nearer.result
-    if again:
-        far = 1.01 * (wp.length(points[i] - center) + radius)
-        query = wp.mesh_query_point_no_sign(mesh, points[i], far)
-        if query.result:
-            p = wp.mesh_eval_position(mesh, query.face, query.u, query.v)
+    start = points[i]
+    p = start
+    normal = wp.vec3()
+    closest = start
+    for turn in range(2 + 2 * OFFSETS):  # one call for all starts: a copy of it compiles as long again
+        q, f = project_to_surface(start, max_step, tape, span)
+        found = has_converged(f, tolerance)
+        if turn == 0:
+            p = q
+            normal = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
+            way = wp.length(q - start)
+            if found and way > least_way:
+                nearer = wp.mesh_query_point_no_sign(mesh, start, 0.5 * way)
+                found = not nearer.result
+            if found:
+                break
+            far = 1.01 * (wp.length(start - center) + radius)
+            query = wp.mesh_query_point_no_sign(mesh, start, far)
+            if not query.result:
+                break
+            closest = wp.mesh_eval_position(mesh, query.face, query.u, query.v)
+            p = closest
             normal = face_normals[query.face]
-            q, g = project_to_surface(p, max_step, tape, span)
-            if has_converged(g, tolerance):
-                p = q
-                normal = -wp.normalize(wp.vec3(g[1], g[2], g[3]))
+            start = closest
+        elif found and wp.length(q - closest) <= least_way:
+            p = q
+            normal = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
+            break
+        elif least_way == wp.inf:
+            break
+        else:
+            side = float(1 - 2 * (turn & 1))
+            start = closest + normal * (side * least_way * wp.pow(2.0, float(turn // 2 - OFFSETS)))
     positions[i] = p
     normals[i] = normal
 

@@ -5,7 +5,7 @@ import pytest
 
 from blobtree import Box, Node, Point, Segment, Shell, SmoothDifference
 from blobtree.tape.model import values_at
-from blobtree.tape.operands import has_walls, operands_of
+from blobtree.tape.operands import has_walls, leaves_of, operands_of
 
 BALL = Point((0, 0, 0), radius=1.0)
 ROD = Segment((-1, 0, 0), (1, 0.2, 0), radius=0.4)
@@ -58,3 +58,13 @@ def test_a_tree_that_only_adds_has_no_operands() -> None:
 def test_tools_are_what_is_removed_and_stays_removed(tree: Node, tools: list[str]) -> None:
     operands = operands_of(tree._program, tree.tape)
     assert sorted(type(operand.leaf).__name__ for operand in operands if operand.tool) == tools
+
+
+def test_leaves_have_their_own_values() -> None:
+    tree = ((BALL + ROD).twist(30.0) - BOX.scale((1, 2, 0.5))) | (NEAR & ROD.translate((0, 1, 0)))
+    parts = [BALL.twist(30.0), ROD.twist(30.0), BOX.scale((1, 2, 0.5)), NEAR, ROD.translate((0, 1, 0))]
+    points = np.random.default_rng(1).uniform(-1.5, 1.5, (200, 3))
+    found = [values_at(tape, points) for tape in leaves_of(tree._program, tree.tape)]
+    assert len(found) == len(parts)
+    for part in parts:
+        assert min(float(np.abs(values - part(points)).max()) for values in found) < 1e-6
