@@ -274,14 +274,16 @@ def mesh_of_parts(
         first = first_cells(tree, grid_of, device, report)
     blocks, walls = first.blocks, first.walls
     needed = walls.sizes if walls is not None else np.empty(0, np.float32)
+    unresolved = _too_thin(tree, smallest)
+    if walls is not None:
+        unresolved += [ThinPart(*wall) for wall in walls.too_thin]
     if len(needed):
         first = _sampled(
             tree, grid_of(fitting_wall_scale(needed, size, CROSSED_CELLS * len(blocks))), device, report
         )
         blocks, walls = first.blocks, first.walls
     elif least_size(blocks.cells, smallest) >= BALL_CELLS * blocks.cells.grid.cell_size:
-        return None, _too_thin(tree, smallest)
-    unresolved = _too_thin(tree, smallest)
+        return None, unresolved
     parts = PartCells(blocks, 0.0, smallest, walls)
     try:
         mesh = AdaptiveMesher(parts, creases).mesh(report, MAX_PART_REPAIRS)

@@ -77,6 +77,10 @@ MAX_SHRINKAGE = 0.5
 SAGITTA_CELLS = 2.0
 """Size of cells over √(thickness · radius of curvature), up to which both sides of a wall stay apart."""
 
+THINNEST_BEND = 1e-5
+"""Thickness over the longest side of the support, below which triangles of both sides may cross where they
+bend."""
+
 MAX_FIELD_ERROR = 0.05
 """Largest error of the field at a vertex that is back on the surface of the thinnest parts."""
 
@@ -358,6 +362,7 @@ def _grown_walls(tree: ImplicitModel, first: FirstCells, size: float, limits: Fl
     """
     leaves, halves = list(runs_of_leaves(tree._program)), part_sizes(tree)[0]
     lengths, scales, depths = np.zeros(len(leaves)), np.ones(len(leaves)), np.zeros(len(leaves))
+    longest = float((tree.support[1] - tree.support[0]).max())
     for wall in first.walls.thin if first.walls is not None else ():
         if wall.thickness > WALL_CELLS * THIN * size or not wall.facing.tool:
             continue
@@ -365,7 +370,8 @@ def _grown_walls(tree: ImplicitModel, first: FirstCells, size: float, limits: Fl
             run, placed = leaves[number]
             scale = float(np.linalg.svd(placed.placement.matrix[:3, :3], compute_uv=False)[-1])
             radius = _radius_of_curvature(run, placed) * scale
-            cell = min(size, SAGITTA_CELLS * float(np.sqrt(wall.thickness * radius)))
+            thickness = max(wall.thickness, THINNEST_BEND * longest)
+            cell = min(size, SAGITTA_CELLS * float(np.sqrt(thickness * radius)))
             cell = min(cell, BODY_CELLS * halves[number])
             growth = min(max(WALL_CELLS * MARGIN * cell - wall.thickness, 0.0), limits[number])
             depth = 0.5 * wall.thickness

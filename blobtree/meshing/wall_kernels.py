@@ -20,8 +20,9 @@ OPPOSED = wp.constant(0.8)
 PLACE_HALVINGS = 12
 """Bisection steps between the corners of a cell."""
 
-HALVINGS = 4
-"""Bisection steps for the far side of a wall, whose distance is known to a factor of two."""
+HALVINGS = 10
+"""Bisection steps for the far side of a wall, whose distance is known to a factor of two: beyond a sharp
+side, only points very near it have a gradient."""
 
 NEWTON_STEPS = 4
 """Steps from an operand's surface to that of the tree, which lies there unless the operator is smooth."""
@@ -97,6 +98,7 @@ def measure_walls(
     size: wp.float32,
     thickest: wp.float32,
     thinnest: wp.float32,
+    flattest: wp.float32,
     rim: wp.float32,
     tree: BlockTreeArrays,
     places: wp.array(dtype=wp.vec3),
@@ -109,8 +111,10 @@ def measure_walls(
     The thickness is UNLIMITED for walls above `thickest`, and for points without a wall.
 
     Start from the tree's surface within `size`, and look along the inward normal for the other side, with
-    steps that double from `thinnest` on. The two sides of a wall face away from each other. A wedge is as
-    thick as at the distance `rim` from its edge at least, and its thickness is negative nearer to the edge.
+    steps that double from `thinnest` on. The solid begins nearer than `flattest`, as points are only nearly
+    on the surface: two sides that touch have none between them. The two sides of a wall face away from each
+    other. A wedge is as thick as at the distance `rim` from its edge at least, and its thickness is negative
+    nearer to the edge.
     """
     i = first + wp.tid()
     thicknesses[i] = UNLIMITED
@@ -122,6 +126,7 @@ def measure_walls(
     t = float(0.0)
     step = float(0.0)
     far = float(0.0)
+    solid = bool(False)
     stage = int(0)  # to the surface, then to the far side, then back and forth around it
     halvings = int(0)
     for turn in range(64):  # one call of the field for all stages: each copy of it compiles as long again
@@ -146,12 +151,13 @@ def measure_walls(
             else:
                 p += g * (wp.clamp(gap / steepness, -size, size) / steepness)
         elif stage == 1:
-            if f[0] < ISO:
+            solid = solid or f[0] >= ISO
+            if f[0] < ISO and solid:
                 stage = 2
                 far = t
                 step = 0.25 * t
                 t -= step
-            elif t >= thickest:
+            elif t >= thickest or (t >= flattest and not solid):
                 break
             else:
                 t = wp.min(2.0 * t, thickest)

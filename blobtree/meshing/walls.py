@@ -46,6 +46,12 @@ EDGE_SHARE = 1 / 4
 PARALLEL = np.radians(25.0)
 """Angle between the sides of a wall below which they are nearly parallel."""
 
+THINNEST = 1e-6
+"""Thickness of a wall over the longest side of the support, from which on float32 tells both sides apart."""
+
+FLAT = 2e-3
+"""Angle between the sides of a wall below which it is as thin all around, and no edge of a wedge."""
+
 LENS_REACH = 2.0
 """Largest radius of a lens over that of its part with nearly parallel sides, for all angles of its edge."""
 
@@ -132,7 +138,10 @@ class Walls:
     """The thin walls of a tree, sampled level by level as its blocks are refined."""
 
     def __init__(self, tree: ImplicitModel, blocks: BlockTree, least: float) -> None:
+        """Find the walls; `least` is the size of the smallest cells."""
         self._blocks, self._least = blocks, EDGE_SHARE * least
+        lower, upper = tree.support
+        self._thinnest = THINNEST * float((upper - lower).max())
         cells = blocks.cells
         self._device, self._kernel = cells.device, cells.tape.instruction_set.kernel_for
         self._operands = operands = operands_of(tree._program, tree.tape)
@@ -143,7 +152,7 @@ class Walls:
         ):
             tape = operand.tape.on(self._device)
             samples = self._thin(operand.leaf, tape, 0.0, low[near], high[near], 0)
-            if count := len(samples.needed):
+            if count := np.count_nonzero(samples.needed >= self._least):
                 radius = float(np.sqrt(count / np.pi))
                 share = RIM_SHARE if radius > SMALL_LENS else SMALL_RIM_SHARE
                 rim = share * radius * cells.grid.cell_size
@@ -181,8 +190,14 @@ class Walls:
 
     @property
     def sizes(self) -> Float32Array:
-        """Sizes of the cells that walls need, at all samples."""
-        return np.concatenate([np.empty(0, np.float32), *(samples.needed for samples in self._samples)])
+        """Sizes of the cells that walls need, at all samples, without walls that are too thin for cells."""
+        needed = np.concatenate([np.empty(0, np.float32), *(samples.needed for samples in self._samples)])
+        return needed[needed >= self._least]
+
+    @property
+    def too_thin(self) -> list[tuple[float, Float64Array, ProgramLeaf]]:
+        """The same as `thinnest` where cells cannot be as small as the wall needs."""
+        return [wall for wall in self.thinnest if wall[0] < self._least]
 
     @property
     def thin(self) -> list["ThinWall"]:
@@ -218,9 +233,9 @@ class Walls:
         """Return the sizes of cells that walls need in blocks of the finest level, from number `first` on."""
         needed = np.full(len(self._blocks) - first, UNLIMITED, np.float32)
         for samples in self._samples:
-            rows = self._rows(samples.both_sides, first)
-            found = rows >= 0
-            np.minimum.at(needed, rows[found], np.tile(samples.needed, 2)[found])
+            rows, wish = self._rows(samples.both_sides, first), np.tile(samples.needed, 2)
+            found = (rows >= 0) & (wish >= self._least)
+            np.minimum.at(needed, rows[found], wish[found])
         return self._spread_to_neighbors(needed, first)
 
     def _spread_to_neighbors(self, needed: Float32Array, first: int) -> Float32Array:
@@ -290,14 +305,15 @@ class Walls:
         for _climb in range(CLIMBS):
             launch(self._kernel(climb), count, [places, size, *of_operand, arrays], [moved], device)
             places, moved = moved, places
-        inputs = [places, size, WALL_CELLS * limit, WALL_CELLS * self._least, rim, arrays]
+        inputs = [places, size, WALL_CELLS * limit, self._thinnest, WALL_CELLS * self._least, rim, arrays]
         launch(self._kernel(measure_walls), count, inputs, [moved, normals, thicknesses, angles], device)
         needed = thicknesses.numpy() / np.float32(WALL_CELLS)
         needed = np.where(needed < 0.0, self._next_size(-needed), needed)
         samples = _Samples(leaf, tape, rim, moved.numpy(), normals.numpy(), needed)
-        thin = (needed < limit) & (needed >= self._least)
+        turns = angles.numpy()
+        thin = (needed < limit) & ((needed >= self._least) | (turns < FLAT))
         if level == 0:
-            thin[thin] = _beside_parallel_sides(samples.places[thin], angles.numpy()[thin], size)
+            thin[thin] = _beside_parallel_sides(samples.places[thin], turns[thin], size)
         samples = samples.chosen(thin)
         return samples.thinned(0.5 * _spacing(size, level))
 

@@ -101,6 +101,53 @@ def test_a_wall_too_thin_for_memory_is_named_once(caplog: pytest.LogCaptureFixtu
     assert "resolution of" in record.getMessage()
 
 
+@pytest.mark.parametrize("height", [1e-5, 3e-6])
+def test_a_wall_thinner_than_all_cells_is_named(height: float, caplog: pytest.LogCaptureFixture) -> None:
+    for tree in (CUBE & CUBE.translate((0, 0, 1.2 - 1.42 * height)), lens(4.4 * height)[0]):
+        caplog.clear()
+        with caplog.at_level(logging.WARNING):
+            polygonize_parts(tree, resolution=24)
+        (record,) = caplog.records
+        assert "a wall of the Intersection at path ()" in record.getMessage()
+
+
+@pytest.mark.parametrize(
+    "tree",
+    [
+        CUBE - CUBE,
+        BALL - Point((0.5, 0.3, 0), radius=0.9),
+        BALL - Point((0.5, 0, 0), radius=0.5),
+        CUBE - Box((0, 0, 0.6), (0.5, 0.5, 0.6), radius=0.01),
+    ],
+)
+def test_sides_that_touch_are_no_walls(tree: Node, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING):
+        polygonize_parts(tree, resolution=24)
+    assert not caplog.records
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("height", [1e-4, 2e-5, 5e-6])
+def test_a_membrane_thinner_than_all_cells_has_both_sides(height: float) -> None:
+    tree = Box((0, 0, 0), (1, 1, 1), radius=0.05) - Box(
+        (0, 0, -0.1), (0.6, 0.6, 1.2 - 2.0 * height), radius=0.05
+    )
+    mesh = polygonize(tree)
+    centers, areas = mesh_areas(mesh)
+    ceiling = (np.abs(centers[:, :2]) < 0.25).all(axis=1) & (centers[:, 2] > 0.5)
+    assert is_closed(mesh.faces)
+    assert np.abs(tree(mesh.vertices) - 0.5).max() < 1e-4
+    assert areas[ceiling].sum() == pytest.approx(0.5, rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [1e-5, 2e-6])
+def test_a_shell_thinner_than_all_cells_has_both_sides(share: float) -> None:
+    mesh = polygonize(Shell(BALL, 4.4 * share))
+    assert is_closed(mesh.faces)
+    assert mesh_areas(mesh)[1].sum() == pytest.approx(8.0 * np.pi, rel=0.01)
+
+
 def test_parts_that_cells_cannot_close_leave_the_rest(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
