@@ -120,12 +120,15 @@ class ImplicitSurface(Immutable):
                 "its parts may be too small, or cut each other away"
             )
         self._finds_parts = resolution is None
-        small = self._finds_parts and shows_small_parts(tree, cells, SMALL_PART, device)
-        self.has_small_parts = small and has_small_bodies(tree, SMALL_PART * _cell_size(tree, cells))
+        self.has_small_parts = (
+            self._finds_parts
+            and has_small_bodies(tree, SMALL_PART * _cell_size(tree, cells))
+            and shows_small_parts(tree, cells, SMALL_PART, device)
+        )
         """True if parts of the tree are small beside it, not only what is cut out of it."""
         self._coarse = (
             CurvedMesh(coarse, partial(values_at, tree.tape), device=device)
-            if small
+            if self.has_small_parts
             else MeshSurface(coarse.vertices, coarse.faces, device=device, orientation=MeshOrientation.KEEP)
         )
         self._max_step = MAX_STEP * _cell_size(tree, cells)
