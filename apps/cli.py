@@ -101,8 +101,8 @@ implicit-decals measure scene.json --contact elastic --json
 """,
     "sweep": """Run an experiment: a function for each trial of a design, with results that resume.
 
-A file defines the function `experiment` and the design `design`; see the page on experiments. Seven
-experiments are shipped, and found by their names.
+A file defines the function `experiment` and the design `design`; see the page on experiments.
+Shipped experiments are found by their names.
 
 For example:
 

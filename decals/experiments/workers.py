@@ -301,6 +301,9 @@ def cluster(work: Work, trials: Sequence[Trial], client: Any) -> Rows:
 
 def _on_cluster(path: Path, trial: Trial) -> Row:
     """Run a trial on a Dask worker; past its limit the worker ends, and Dask starts another one."""
+    if multiprocessing.parent_process() is not None:  # a process of a worker, not that of the user
+        for name in THREADS:
+            os.environ.setdefault(name, "1")
     work: Work = unpickled(path)
     timer = threading.Timer(work.seconds or 0.0, os._exit, (1,))
     timer.daemon = True

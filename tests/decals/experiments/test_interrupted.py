@@ -86,6 +86,10 @@ def test_a_cluster_gives_each_row_once_though_workers_are_killed(tmp_path: Path,
                 os.kill(process, signal.SIGKILL)
 
         results = run(functions.slow, Grid(x=range(60)), tmp_path / "out", scheduler=client, on_row=killed)
+        threads = run(
+            functions.variable, Grid(name=["BLOBTREE_THREADS"]), tmp_path / "threads", scheduler=client
+        )
+    assert threads.rows[0]["result"] == "1", "each worker has one core"
     assert Counter(row["x"] for row in seen) == Counter(range(60))
     assert rows(results) == rows(run(functions.slow, Grid(x=range(60)), tmp_path / "here", workers=0))
 

@@ -35,6 +35,15 @@ def test_means_are_in_rising_order_of_their_parameters(results: Results, tmp_pat
     assert [group["count"] for group in results.interval("size", by=["count"])] == [10, 20, 1000]
 
 
+def test_frames_of_polars_and_pandas_are_equal(results: Results) -> None:
+    pytest.importorskip("pandas")
+    pytest.importorskip("polars")
+    polars, pandas = results.to_polars(), results.to_pandas()
+    assert polars.columns == list(pandas.columns)
+    for name in (*results.parameters, *results.measures, "status"):
+        assert polars[name].to_list() == pandas[name].tolist()
+
+
 def test_rows_become_csv_without_times(results: Results, tmp_path: Path) -> None:
     report(results, tmp_path / "rows.csv")
     with (tmp_path / "rows.csv").open(newline="") as lines:
