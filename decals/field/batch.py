@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import known_device
 from blobtree.validation import items
-from decals.errors import InvalidDecals, InvalidPoints, InvalidScene
+from decals.errors import InvalidDevice, InvalidPoints, InvalidScene
 from decals.field.evaluate import (
     Modes,
     Samples,
@@ -39,7 +39,7 @@ from decals.field.points import (
 from decals.field.query import BatchTarget, MaterialSamples, Neighbors, Query
 from decals.field.walks import Walks
 from decals.images.load import AnyImage, each_image
-from decals.index.batch import DecalBatch
+from decals.index.batch import DecalBatch, checked_sets
 from decals.index.build import starts_of
 from decals.model import Decals
 from decals.receivers import mask_on, takes_named_only
@@ -113,7 +113,7 @@ class BatchSamples(Sequence[Samples]):
 
 
 def evaluate_batch(
-    sets: Iterable[Decals],
+    sets: Iterable[Decals] | DecalBatch,
     points: ArrayLike | Sequence[ArrayLike],
     normals: ArrayLike | Sequence[ArrayLike],
     *,
@@ -137,8 +137,8 @@ def evaluate_batch(
 
     Parameters
     ----------
-    sets : iterable of Decals
-        k sets, of any numbers of decals.
+    sets : iterable of Decals, or DecalBatch
+        k sets, of any numbers of decals. A `decals.index.DecalBatch` keeps their indices from call to call.
     points, normals : float32[m, 3], or k arrays float32[mᵢ, 3]
         The points of all sets, or those of each set; their normals in the same form. They may stay on their
         device, see `evaluate`.
@@ -175,19 +175,25 @@ def evaluate_batch(
     >>> batch.owner.reshape(3, 3).tolist()
     [[0, -1, -1], [0, 0, -1], [0, 0, 0]]
     """
-    listed = _checked_sets(sets)
+    listed = sets.sets if isinstance(sets, DecalBatch) else checked_sets(sets)
     modes = checked_modes(mapping, contact, stiffness)
     checked_truths(jacobian=jacobian, neighbors=neighbors, materials=materials)
     layers = None if images is None else tuple(each_image(images))
     places = _Places.of(listed, points, normals, normal_derivatives)
-    device = places.device(device)
+    device = places.device(sets.device if isinstance(sets, DecalBatch) and device is None else device)
+    if isinstance(sets, DecalBatch) and device != sets.device:
+        raise InvalidDevice(f"device: expected {sets.device!r}, where the sets lie, got {device!r}")
     walked = _checked_walks(walks, listed) if modes.mapping is ImageMapping.WALKED else None
     parts = []
-    for first, last in _chunks([len(part) for part in listed], np.diff(places.offsets).tolist()):
-        batch = DecalBatch(listed[first:last], device)
-        _set_modes(batch, modes, on, None if walked is None else walked[first:last])
-        rows, owners_sets, turns = places.chunk(first, last)
-        query = Query(BatchTarget(batch, owners_sets), *rows_on(device, rows), modes.contact)
+    counts = [0 if isinstance(sets, DecalBatch) else len(part) for part in listed]
+    for first, last in _chunks(counts, np.diff(places.offsets).tolist()):
+        rows, set_of, turns = places.chunk(first, last)
+        if isinstance(sets, DecalBatch):
+            batch, own, set_of = sets.copied(), slice(None), set_of + np.int32(first)
+        else:
+            batch, own = DecalBatch(listed[first:last], device), slice(first, last)
+        _set_modes(batch, modes, on, None if walked is None else walked[own])
+        query = Query(BatchTarget(batch, set_of), *rows_on(device, rows), modes.contact)
         part = samples_of(query, layers, turns, jacobian=jacobian, neighbors=neighbors, materials=materials)
         parts.append(placed(part, device, stay=places.stay))
     return BatchSamples(
@@ -279,20 +285,6 @@ def _each_of(name: str, values: Any, count: int) -> tuple[Any, ...]:
         raise InvalidPoints(
             f"{name}: expected one array for each of {count} sets, or one array [m, 3] for all, got {got}"
         )
-    return listed
-
-
-def _checked_sets(sets: Any) -> tuple[Decals, ...]:
-    """Return the sets; raise InvalidDecals for other values."""
-    listed = None if isinstance(sets, Decals | str) else items(sets)
-    if listed is None:
-        hint = "; evaluate takes one set" if isinstance(sets, Decals) else ""
-        raise InvalidDecals(f"sets: expected several Decals, got {describe(sets)}{hint}")
-    for number, part in enumerate(listed):
-        if not isinstance(part, Decals):
-            raise InvalidDecals(
-                f"sets[{number}]: expected Decals, got {describe(part)}; a scene or an editor has .decals"
-            )
     return listed
 
 

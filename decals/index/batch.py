@@ -1,25 +1,46 @@
 """Many sets of decals on a device: their records and indices, which one launch reads."""
 
-from collections.abc import Sequence
+import copy
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import warp as wp
 
 from blobtree._typing import Int64Array
+from blobtree.device import known_device
 from blobtree.struct_rows import Part, struct_rows
+from blobtree.validation import items
+from decals.errors import InvalidDecals
 from decals.index.build import build_indices, starts_of
 from decals.index.index import device_arrays, indexed_decals
 from decals.index.lookup import IndexedDecals
 from decals.model import Decals
 from decals.receivers import EVERYTHING
 from decals.record import RECORD
+from decals.validation import describe
 
 
 class DecalBatch:
-    """k sets of decals with their indices on one Warp device.
+    """k sets of decals with their indices on one Warp device, for several calls of `evaluate_batch`.
 
-    Each set has the records, levels, table and lists that `index_on` gives it alone.
+    Each set has the records and the index that it has alone. Two calls with a batch index the sets once.
+
+    Parameters
+    ----------
+    sets : sequence of Decals
+        The sets.
+    device : optional
+        Warp device. Default: Warp's default device.
+    reach : float, optional
+        Factor of the distance to which decals are listed.
+
+    Raises
+    ------
+    InvalidDecals
+        An item is not a set of decals.
+    InvalidDevice
+        Warp has no such device.
 
     Attributes
     ----------
@@ -33,10 +54,21 @@ class DecalBatch:
         Their records.
     modes : IndexedDecals
         Modes that all sets share: stiffness and image mapping.
+
+    Examples
+    --------
+    >>> import decals
+    >>> disk = decals.Decals([[0, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], radii=1)
+    >>> batch = decals.index.DecalBatch([disk, disk.replace(radii=0.3)])
+    >>> for x in (0.2, 0.5):
+    ...     decals.evaluate_batch(batch, [[x, 0, 0]], [[0, 0, 1]]).owner.tolist()
+    [0, 0]
+    [0, -1]
     """
 
-    def __init__(self, sets: Sequence[Decals], device: str, *, reach: float = 1.0) -> None:
-        self.sets, self.device = tuple(sets), device
+    def __init__(self, sets: Iterable[Decals], device: Any = None, *, reach: float = 1.0) -> None:
+        self.sets, self.device = checked_sets(sets), known_device(device)
+        device = self.device
         self.joined = Decals.concatenate(self.sets)
         self.starts = starts_of([len(part) for part in self.sets])
         joined = self.joined
@@ -76,6 +108,16 @@ class DecalBatch:
         self._parts["limits"] = wp.array(rows, dtype=wp.vec4, device=self.device), self.starts
         self._values |= {"limited": limited, "surface": np.where(limited, masks, EVERYTHING)}
 
+    def copied(self) -> "DecalBatch":
+        """Return the same sets with modes and limits of their own, to be set."""
+        twin = copy.copy(self)
+        (levels, _), (table, _) = self._parts["levels"], self._parts["table"]
+        twin.modes = indexed_decals(
+            self.records, levels, table, self.modes.ids, layered=False, device=self.device
+        )
+        twin._parts, twin._values = dict(self._parts), dict(self._values)
+        return twin
+
     def with_reach(self, reach: float) -> "DecalBatch":
         """Return the same sets, listed to another distance, with the same limits, walks and modes."""
         wide = DecalBatch(self.sets, self.device, reach=reach)
@@ -96,3 +138,17 @@ class DecalBatch:
         return struct_rows(
             IndexedDecals, self.modes, len(self), self.device, parts=parts, values=self._values
         )
+
+
+def checked_sets(sets: Any) -> tuple[Decals, ...]:
+    """Return several sets of decals; raise InvalidDecals for other values."""
+    listed = None if isinstance(sets, Decals | str) else items(sets)
+    if listed is None:
+        hint = "; evaluate takes one set" if isinstance(sets, Decals) else ""
+        raise InvalidDecals(f"sets: expected several Decals, got {describe(sets)}{hint}")
+    for number, part in enumerate(listed):
+        if not isinstance(part, Decals):
+            raise InvalidDecals(
+                f"sets[{number}]: expected Decals, got {describe(part)}; a scene or an editor has .decals"
+            )
+    return listed

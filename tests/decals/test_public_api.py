@@ -20,7 +20,7 @@ NAMES = [
     "ImplicitDecalsError",
     "Interaction", "MeshObject", "NO_IMAGE", "Relaxation", "Scene", "Sizing", "TreeObject", "__version__",
     "animate", "bake", "content_hash", "cover", "define_contact", "displace", "edit", "evaluate",
-    "evaluate_batch", "export",
+    "evaluate_batch", "export", "from_table", "load_table", "save_table", "to_arrow", "to_pandas",
     "load_image", "load_model",
     "load_scene", "measure", "pose", "render", "render_batch",
     "reproduce", "save_html", "save_scene", "scatter", "shader",
@@ -32,7 +32,7 @@ OF_PACKAGES = {
         "Design", "Grid", "LatinHypercube", "Results", "Seeds", "Sobol", "report", "run",
     ],
     "hosts": ["Changes", "Shader", "ShaderTexture", "Upload"],
-    "index": ["DecalEditor", "DecalIndex"],
+    "index": ["DecalBatch", "DecalEditor", "DecalIndex"],
     "pages": ["Page", "page", "viewer_script"],
     "rendering": [
         "Background", "Buffers", "Context", "Drawable", "Drawing", "Environment", "Light", "Lighting",

@@ -12,7 +12,7 @@ import decals
 from decals import Contact, DecalMaterial, Decals, evaluate, evaluate_batch
 from decals.errors import InvalidDecals, InvalidDevice, InvalidImage, InvalidPoints, InvalidScene
 from decals.field import MaterialSamples, Neighbors, Samples, Walks, batch
-from decals.index import DecalIndex
+from decals.index import DecalBatch, DecalIndex
 from decals.index.build import build_index, build_indices, starts_of
 from decals.index.index import device_arrays
 from tests.decals.meshes import plane
@@ -181,6 +181,30 @@ def lists_of(table: NDArray[np.int32], ids: NDArray[np.int32]) -> dict[tuple[int
     """Return the list of each cell of an index."""
     cells = table[table[:, 0] >= 0].tolist()
     return {(x, y, z): ids[head + 1 : head + 1 + ids[head]].tolist() for x, y, z, head in cells}
+
+
+def test_sets_that_are_indexed_before_give_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    sets = [
+        random_set(seed, count, 2.0, kind)
+        for seed, count, kind in [(0, 5, "plain"), (1, 0, "plain"), (2, 30, "layered"), (3, 40, "limited")]
+    ]
+    indexed = DecalBatch(sets, "cpu")
+    points, normals = places(1, 33)
+    for options in (
+        {"contact": "radial", "on": "hull", "neighbors": True},
+        {"stiffness": 4.0, "images": IMAGES, "jacobian": True},
+        {"contact": "min", "mapping": "chord"},
+    ):
+        given: dict[str, Any] = options
+        for _ in range(2):
+            found = evaluate_batch(indexed, points, normals, **given)
+            for part, samples in zip(sets, found, strict=True):
+                assert same_bits(samples, evaluate(part, points, normals, **given))
+            monkeypatch.setattr(batch, "MAX_ROWS", 40)
+    with pytest.raises(InvalidDevice, match="device: expected"):
+        evaluate_batch(indexed, points, normals, device="cuda:99")
+    with pytest.raises(InvalidDecals, match=r"sets\[0\]: expected Decals"):
+        DecalBatch([3])  # type: ignore[list-item]
 
 
 def test_no_sets_and_no_points_give_empty_samples() -> None:
