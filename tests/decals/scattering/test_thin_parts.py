@@ -79,7 +79,7 @@ def test_a_resolution_keeps_its_results() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 5, 9, 10, 15, 18, 19, 20, 25])
+@pytest.mark.parametrize("seed", [0, 5, 10, 15, 18, 19, 20, 25])
 def test_random_trees_give_each_part_its_share(seed: int) -> None:
     model = random_tree(seed)
     centers = scatter(model.tree, count=800).positions.astype(np.float64)
