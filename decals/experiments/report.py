@@ -144,7 +144,7 @@ def _text(value: Any) -> str:
     """Return a value of a table, numbers to three digits."""
     if isinstance(value, float):
         return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
-    return f"{value:,}" if isinstance(value, int) and not isinstance(value, bool) else str(value)
+    return f"{value:,}" if type(value) is int else str(value).replace("|", r"\|")
 
 
 def _figures(results: Results) -> Iterator[str]:
@@ -193,27 +193,24 @@ def _scale(axes: Any, values: list[Any]) -> None:
 
 
 def _draw(axes: Any, parameter: str, groups: list[dict[str, Any]], line: str | None) -> None:
-    """Draw means with their intervals, of numbers in rising order."""
-    values = [group[parameter] for group in groups]
-    numeric = _numeric(values)
-    if numeric:
-        groups = sorted(groups, key=lambda group: group[parameter])
-        values = sorted(values)
-    else:
-        groups, values = groups[:SHOWN_VALUES], [_plain(str(value)) for value in values[:SHOWN_VALUES]]
+    """Draw means with their intervals."""
+    numeric = _numeric([group[parameter] for group in groups])
+    if not numeric:
+        groups = [group | {parameter: _plain(str(group[parameter]))} for group in groups[:SHOWN_VALUES]]
     means = [group["mean"] for group in groups]
     errors = [
         [group["mean"] - group["low"] for group in groups],
         [group["high"] - group["mean"] for group in groups],
     ]
     name = None if line is None else _plain(line)
+    values = [group[parameter] for group in groups]
     axes.errorbar(
         values, means, yerr=errors, fmt="o-" if numeric else "o", capsize=3, markersize=4, label=name
     )
 
 
 def _numeric(values: list[Any]) -> bool:
-    return all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
+    return bool(values) and all(type(value) in (int, float) for value in values)
 
 
 def _plain(text: str) -> str:

@@ -91,3 +91,11 @@ def test_a_parameter_with_the_name_of_a_summary_is_refused(tmp_path: Path) -> No
     found = run(lambda mean: mean, Design([{"mean": 1.0}]), tmp_path / "out", workers=0)
     with pytest.raises(InvalidInput, match="rename it"):
         found.interval("result", by=["mean"])
+
+
+def test_measures_without_numbers_and_texts_with_bars_are_written(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    found = run(lambda kind: float("nan"), Grid(kind=["a|b", "c"]), tmp_path / "out", workers=0)
+    for name in ("page.html", "figure.svg", "table.md"):
+        report(found, tmp_path / name, measure="result", by=["kind"])
+    assert (tmp_path / "table.md").read_text().splitlines()[2:] == ["| a\\|b | nan |", "| c | nan |"]
