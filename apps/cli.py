@@ -98,6 +98,16 @@ For example:
 implicit-decals measure scene.json
 
 implicit-decals measure scene.json --contact elastic --json
+
+implicit-decals measure bunny.ply --table decals.csv
+""",
+    "figure": """Write contact lines, rims and silhouettes of a saved scene in SVG or PDF.
+
+For example:
+
+implicit-decals figure scene.json -o figure.svg
+
+implicit-decals figure scene.json -o figure.pdf --width 240 --height 180 --contact-width 1.2 --picture
 """,
     "sweep": """Run an experiment: a function for each trial of a design, with results that resume.
 

@@ -35,10 +35,12 @@ from .scattering.sizing import Sizing
 from .scenes.animation import animate, turntable
 from .scenes.camera import Camera
 from .scenes.cover import cover
+from .scenes.figure import save_figure
 from .scenes.files import load_model, load_scene, save_scene
 from .scenes.material import DecalMaterial
 from .scenes.measure import measure
 from .scenes.objects import MeshObject, TreeObject
+from .scenes.outlines import LineKind, SurfaceLine, outlines
 from .scenes.pose import pose, skin
 from .scenes.render import render, render_batch
 from .scenes.reproduction import reproduce
@@ -58,10 +60,12 @@ __all__ = [
     "ImageMapping",
     "ImplicitDecalsError",
     "Interaction",
+    "LineKind",
     "MeshObject",
     "Relaxation",
     "Scene",
     "Sizing",
+    "SurfaceLine",
     "TreeObject",
     "__version__",
     "animate",
@@ -87,12 +91,14 @@ __all__ = [
     "load_scene",
     "load_table",
     "measure",
+    "outlines",
     "pages",
     "pose",
     "render",
     "render_batch",
     "rendering",
     "reproduce",
+    "save_figure",
     "save_html",
     "save_scene",
     "save_table",

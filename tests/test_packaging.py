@@ -29,6 +29,7 @@ PYVISTA_FILES = (
 """The files of `blobtree` that use pyvista; a test checks that they import it late."""
 
 EXTRAS = {
+    "decals/scenes/figure.py": "experiments",
     "decals/scenes/tables.py": "experiments",
     "apps/commands/sandbox.py": "browser",
     "apps/commands/sweep.py": "experiments",
