@@ -107,15 +107,66 @@ def surface_points(
     weights[i] = w
 
 
+@wp.func
+def encoded(light: wp.float32) -> wp.float32:
+    """Return linear light, clamped to [0, 1], as an sRGB level from 0 to 255."""
+    x = wp.clamp(light, 0.0, 1.0)
+    if x > 0.0031308:
+        return 255.0 * (1.055 * wp.pow(x, 1.0 / 2.4) - 0.055)
+    return 255.0 * 12.92 * x
+
+
 @wp.kernel
 def encode_levels(first: wp.int32, light: wp.array(dtype=wp.float32), levels: wp.array(dtype=wp.uint8)):
-    """Write linear light, clamped to [0, 1], as sRGB bytes."""
+    """Write linear light as sRGB bytes."""
     i = first + wp.tid()
-    x = wp.clamp(light[i], 0.0, 1.0)
-    level = 12.92 * x
-    if x > 0.0031308:
-        level = 1.055 * wp.pow(x, 1.0 / 2.4) - 0.055
-    levels[i] = wp.uint8(int(255.0 * level + 0.5))
+    levels[i] = wp.uint8(int(encoded(light[i]) + 0.5))
+
+
+@wp.kernel
+def compensate(
+    first: wp.int32,
+    chosen: wp.array(dtype=wp.uint8),
+    own: wp.array(dtype=wp.uint8),
+    levels: wp.array(dtype=wp.uint8),
+    light_of: wp.array(dtype=wp.float32),
+    srgb: wp.array(dtype=wp.uint8),
+    size: wp.int32,
+    strength: wp.float32,
+    most: wp.float32,
+    sharper: wp.array(dtype=wp.uint8),
+):
+    """Sharpen the sRGB channels of chosen texels of a row, as much as programs blur them by mixing four.
+
+    ``light_of`` is the light of each level. The weights are (−s, 1 + 2 s, −s) along rows and columns, with
+    neighbours in charts alone. A level leaves the range of those around it by ``most`` at most.
+    """
+    row = first + wp.tid()
+    channels = srgb.shape[0]
+    for column in range(size):
+        slot = row * size + column
+        if chosen[slot] != wp.uint8(0) and own[slot] != wp.uint8(0):
+            for channel in range(channels):
+                if srgb[channel] != wp.uint8(0):
+                    center = float(levels[slot * channels + channel])
+                    least = center
+                    largest = center
+                    light = float(0.0)
+                    for j in range(-1, 2):
+                        for i in range(-1, 2):
+                            other = slot
+                            if row + j >= 0 and row + j < size and column + i >= 0 and column + i < size:
+                                if own[slot + j * size + i] != wp.uint8(0):
+                                    other = slot + j * size + i
+                            level = levels[other * channels + channel]
+                            weight = (1.0 + 2.0 * strength - float(wp.abs(i)) * (1.0 + 3.0 * strength)) * (
+                                1.0 + 2.0 * strength - float(wp.abs(j)) * (1.0 + 3.0 * strength)
+                            )
+                            light += weight * light_of[int(level)]
+                            least = wp.min(least, float(level))
+                            largest = wp.max(largest, float(level))
+                    result = wp.clamp(encoded(light), least - most, largest + most)
+                    sharper[slot * channels + channel] = wp.uint8(int(wp.clamp(result, 0.0, 255.0) + 0.5))
 
 
 @wp.func

@@ -22,6 +22,7 @@ from blobtree.progress import Progress
 from decals.baking.meshes import BakeMesh
 from decals.baking.seams import Seams, match_seams
 from decals.baking.texel_kernels import (
+    compensate,
     cover_rows,
     encode_levels,
     mark_uneven,
@@ -30,6 +31,7 @@ from decals.baking.texel_kernels import (
     surface_points,
 )
 from decals.baking.unwrapped import Unwrapped
+from decals.images.texels import decode_srgb
 
 BLOCK_SAMPLES = 1 << 20
 """Samples that are looked up at once, which bounds the memory besides that of the texture."""
@@ -43,6 +45,12 @@ ROUNDING = 1e-3
 
 FINE_STEP = 3
 """Difference of two neighbours, of 255, above which a texel takes several samples."""
+
+SHARPENING = 0.1
+"""Part of the difference from its neighbours that a texel gains, as programs blur by mixing four texels."""
+
+MAX_OVERSHOOT = 8.0
+"""Levels of 255 by which that may leave the range of the texels around, at most."""
 
 SEAM_STEP = 1
 """Difference of both sides of a seam, of 255, up to which the surface itself counts as smooth there."""
@@ -122,7 +130,7 @@ def bake_texture(
     tiles = 1 + max(int(part.tile_of_face.max(initial=0)) for part in unwrapped)
     image = np.zeros((tiles, size, size, channels.count), np.uint8)
     gutter = gutter_width(size)
-    pages = [_Page(of, channels.encode) for of in image]
+    pages = [_Page(of, channels) for of in image]
     sheets = {
         (tile, number): Sheet(number, mesh, part, tile, channels)
         for number, (mesh, part) in enumerate(zip(meshes, unwrapped, strict=True))
@@ -316,8 +324,9 @@ class Sheet:
 class _Page:
     """One texture while it is made."""
 
-    def __init__(self, image: UInt8Array, encode: Callable[[Float32Array], UInt8Array]) -> None:
-        self._image, self._size, self._encode = image, len(image), encode
+    def __init__(self, image: UInt8Array, channels: Channels) -> None:
+        self._image, self._size = image, len(image)
+        self._encode, self._srgb = channels.encode, channels.srgb
         self._filled: UInt8Array = np.zeros(image.shape[:2], np.uint8)
         self._sum, self._count = np.zeros(image.shape[2]), 0
 
@@ -335,6 +344,8 @@ class _Page:
                 report(0.5 + 0.5 * top / self._size)
                 self._refine(sheet, own, uneven, top, bottom, samples)
         self._color_borders(sheet, own)
+        if samples > 1:
+            self._compensate(uneven, own)
         self._filled |= own
 
     def _blocks(self, steps: int) -> Iterator[tuple[int, int]]:
@@ -388,6 +399,15 @@ class _Page:
             values = sheet.values(faces[chosen], places[chosen])
             self._image[rows[chosen], columns[chosen]] = self._encode(values)
             own[rows[chosen], columns[chosen]] = 1
+
+    def _compensate(self, uneven: UInt8Array, own: UInt8Array) -> None:
+        """Sharpen texels whose neighbours differ, as much as programs blur them."""
+        light = decode_srgb(np.arange(256) / 255.0).astype(np.float32)
+        srgb = np.asarray(self._srgb, np.uint8)
+        sharper = self._image.copy()
+        inputs = [*map(flat, (uneven, own, self._image, light, srgb)), self._size, SHARPENING, MAX_OVERSHOOT]
+        launch(compensate, self._size, inputs, [flat(sharper)], CPU)
+        self._image[...] = sharper
 
     def keep(self, texels: Int64Array) -> None:
         """Let texels keep their colours when gutters are filled."""
