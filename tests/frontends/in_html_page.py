@@ -1,6 +1,6 @@
 """Pages of `save_html` in a real browser, as a program.
 
-    python -m tests.frontends.in_html_page picture|use|refusals [chromium|firefox]
+    python -m tests.frontends.in_html_page picture|use|drags|refusals [chromium|firefox]
 
 Firefox needs a display, such as that of ``xvfb-run -a``, and a version of playwright that knows it.
 """
@@ -25,6 +25,7 @@ import decals
 from blobtree import Mirror, Point, Segment, polygonize
 from decals.apps.gallery.environments import bodies, evening
 from decals.apps.gallery.materials import lacquer, rivets
+from decals.editing import Actions, EditSession, PointerTools
 from decals.rendering import Environment, Light
 from decals.rendering.lights import Lighting
 from decals.scenes.objects import SceneObject
@@ -38,6 +39,10 @@ TOLERANCE = 2
 EQUAL = 0.995
 """Least share of surface pixels that are equal within the tolerance."""
 CELLS = 48
+CLOSE = 0.02
+"""Largest distance of decals that were dragged alike, in radii."""
+TURNED = 0.12
+"""Largest difference of their frames: the editor has normals of faces, the page smooth ones."""
 ARGUMENTS = ["--no-sandbox", "--ignore-gpu-blocklist"]
 MESA = "--use-angle=gl-egl"
 """Draws by Mesa, which our pictures use too: SwiftShader places vertices at sixteenths of pixels."""
@@ -335,6 +340,67 @@ async def used(scene: Scene, browser: str, **options: Any) -> None:
         await accessible(page)
 
 
+async def drags(browser: str) -> None:
+    """Drags of a page leave the decals where the same drags of the editor do."""
+    for scene, options in (
+        (meshed(smooth_scene()), {}),
+        (smooth_scene(), {"surface": "traced"}),
+        (cube_scene(), {}),
+    ):
+        await dragged_alike(scene, browser, **options)
+
+
+def smooth_scene() -> Scene:
+    """Return scales on a tree without creases, at which the closest surface is on either side."""
+    tree = Point((0, 0, 0), radius=1) + Segment((0.5, 0, 0), (2, 0, 0), radius=0.4)
+    return decals.cover(tree, count=60, images=["scale"])
+
+
+def cube_scene() -> Scene:
+    """Return a box with decals that go over its edges."""
+    return decals.cover(decals.MeshObject("box", *_box((0, 0, 0))), count=20, images=["tile"])
+
+
+PATHS = ((-0.1, 0.05), (0.08, -0.12)), ((0.02, -0.25), (0.2, 0.1)), ((-0.25, -0.05), (0.05, 0.1))
+"""Starts and ends of drags, in the page from −1 to 1."""
+STEPS = 5
+
+
+async def dragged_alike(scene: Scene, browser: str, **options: Any) -> None:
+    """Drag decals in a page and in the editor, and compare the scene that the page saves."""
+    async with shown(scene, (700, 600), browser=browser, controls=True, **options) as page:
+        box = await page.locator("canvas").bounding_box()
+        assert box is not None
+        width, height = box["width"], box["height"]
+        rays = scene.camera.rays(width, height)
+        actions = Actions(EditSession(scene))
+        tools = PointerTools(actions, lambda x, y: (rays.origin, rays.directions(x, y)))
+        for path in PATHS:
+            (x, y), (to_x, to_y) = (((1 + a) * width / 2, (1 + b) * height / 2) for a, b in path)
+            await drag(page, *((box["x"] + a, box["y"] + height - b) for a, b in ((x, y), (to_x, to_y))))
+            number = (await state(page))["selected"]
+            tools.press(x, y)
+            tools.release(x, y)
+            assert list(actions.state.selection) == [number]
+            tools.press(x, y)
+            for step in np.linspace(0, 1, STEPS + 1)[1:]:
+                tools.move(x + step * (to_x - x), y + step * (to_y - y))
+            tools.release(to_x, to_y)
+        saved = (await saved_scene(page, browser)).decals
+        edited = actions.state.session.document.scene.decals
+        radii = edited.radii
+        assert np.array_equal(saved.radii, radii)
+        apart = np.linalg.norm(saved.positions - edited.positions, axis=1) / radii
+        turned = np.abs(saved.normals - edited.normals).max(), np.abs(saved.tangents - edited.tangents).max()
+        print(
+            f"positions {apart.max():.2g} radii apart, normals and tangents {turned[0]:.2g}, {turned[1]:.2g}"
+        )
+        still = np.linalg.norm(scene.decals.positions - edited.positions, axis=1) / radii
+        assert still.max() > 0.5
+        assert apart.max() < CLOSE
+        assert max(turned) < TURNED
+
+
 def same_surface(one: SceneObject, other: SceneObject) -> bool:
     """Return True for two meshes with the same vertices, or two equal trees."""
     if isinstance(one, decals.MeshObject) and isinstance(other, decals.MeshObject):
@@ -434,7 +500,7 @@ async def accessible(page: Page) -> None:
     assert serious == [], serious
 
 
-CHECKS = {"picture": picture, "use": use, "refusals": refusals}
+CHECKS = {"picture": picture, "use": use, "drags": drags, "refusals": refusals}
 
 
 if __name__ == "__main__":

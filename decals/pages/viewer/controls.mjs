@@ -4,15 +4,10 @@ export class Controls {
   constructor(root, { markup, controls }, viewer) {
     root.classList.add("decal-viewer");
     root.innerHTML = markup;
-    const parts = {
-      canvas: "canvas",
-      bar: ".bar",
-      mode: "select",
-      stiffness: "input",
-      status: "[role=status]",
-    };
-    for (const [name, selector] of Object.entries(parts)) this[name] = root.querySelector(selector);
-    this.root = root;
+    const [canvas, bar, mode, stiffness, status] = ["canvas", ".bar", "select", "input", "[role=status]"].map(
+      (selector) => root.querySelector(selector),
+    );
+    Object.assign(this, { root, canvas, bar, mode, stiffness, status });
     this.buttons = Array.from(this.bar.querySelectorAll("button"));
     for (const button of this.buttons) {
       button.setAttribute("aria-label", button.title);

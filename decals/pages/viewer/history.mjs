@@ -1,4 +1,4 @@
-// Edits that can be undone. A step is a list of [number, row before, row after].
+// Edits that can be undone: the rows of all decals before each, which no edit changes.
 
 export class History {
   constructor(decals, onChange) {
@@ -7,27 +7,27 @@ export class History {
 
   // Change decals at once; `open` continues the last step, as a drag does.
   change(pairs, { open = false } = {}) {
-    const before = new Map(open ? this.done.pop() : []);
-    const rowBefore = (number) =>
-      before.has(number) ? before.get(number) : (this.decals.rows[number] ?? null);
-    this.undone = [pairs.map(([number, row]) => [number, rowBefore(number), row])];
-    this.redo();
+    if (!open) this.done.push(this.decals.rows.slice());
     this.undone = [];
+    for (const [number, row] of pairs) this.decals.set(number, row);
+    this.onChange();
   }
 
   undo() {
-    this.move(this.done, this.undone, 1);
+    this.move(this.done, this.undone);
   }
 
   redo() {
-    this.move(this.undone, this.done, 2);
+    this.move(this.undone, this.done);
   }
 
-  move(from, to, place) {
-    const steps = from.pop();
-    if (!steps) return;
-    for (const step of steps) this.decals.set(step[0], step[place]);
-    to.push(steps);
+  move(from, to) {
+    if (!from.length) return;
+    const [rows, before] = [from.pop(), this.decals.rows.slice()];
+    to.push(before);
+    for (let number = 0; number < Math.max(rows.length, before.length); number++) {
+      if (rows[number] !== before[number]) this.decals.set(number, rows[number] ?? null);
+    }
     this.onChange();
   }
 }

@@ -1,5 +1,5 @@
 // Mouse and touch: decals are dragged, the model is turned, and the picture is moved and zoomed.
-import { add, subtract } from "./vectors.mjs";
+import { add, carried, subtract } from "./vectors.mjs";
 
 export class Pointer {
   constructor(viewer) {
@@ -33,7 +33,8 @@ export class Pointer {
     const hit = number < 0 ? null : viewer.surfaceAt(x, y);
     if (!hit) return { move: this.orbit, click: { selected: -1 } };
     viewer.set({ selected: number });
-    return { move: this.dragDecal, offset: subtract(viewer.decals.rows[number].position, hit.position) };
+    const offset = subtract(viewer.decals.rows[number].position, hit.position);
+    return { move: this.dragDecal, offset, normal: hit.normal };
   }
 
   pointermove(event) {
@@ -45,13 +46,13 @@ export class Pointer {
     this.fingers.set(event.pointerId, now);
   }
 
-  // Move the decal so that the point that was taken hold of stays under the pointer.
+  // Move the decal so that the point that was taken hold of stays under the pointer, as `DecalDrag` of the editor.
   dragDecal([x, y]) {
     const { viewer, drag } = this;
-    const seen = viewer.surfaceAt(x, y);
-    if (!seen) return;
-    const middle = viewer.camera.seen(add(seen.position, drag.offset), viewer.aspect);
-    viewer.moveTo((middle && viewer.surfaceAt(...middle)) ?? seen, { open: drag.moved });
+    const hit = viewer.surfaceAt(x, y);
+    if (!hit) return;
+    const middle = add(hit.position, carried(drag.offset, drag.normal, hit.normal));
+    viewer.moveTo(viewer.closestTo(middle) ?? hit, { open: drag.moved });
   }
 
   orbit(now, [x, y]) {

@@ -12,6 +12,7 @@ import { add, carried, cross, dot, length, scaled, subtract } from "./vectors.mj
 
 const OWN_SIZE = 0.05; // radius of the first decal, in sizes of the model
 const GRAZING = 0.05; // cosine between ray and normal below which a place within a pixel is not sought
+const ROUNDS = 4; // in which the closest surface is found
 const NARROW = 1; // angle of view, in degrees, of a look along one ray
 const STEP = 0.25; // of a decal, in radii, at a press
 const ORBIT = Math.PI / 24; // of the model, at a press
@@ -136,6 +137,19 @@ class Viewer {
     if (Math.abs(facing) < GRAZING) return hit;
     const distance = dot(subtract(hit.position, eye), hit.normal) / facing;
     return { position: add(eye, scaled(ray, distance)), normal: hit.normal };
+  }
+
+  // The visible surface that is closest to a point beside it: it lies there along the normal.
+  closestTo(point) {
+    let [found, place] = [null, point];
+    for (let round = 0; round < ROUNDS; round++) {
+      const seen = this.camera.seen(place, this.aspect);
+      const hit = seen && this.surfaceAt(...seen);
+      if (!hit) break;
+      found = hit;
+      place = add(point, scaled(hit.normal, dot(subtract(hit.position, point), hit.normal)));
+    }
+    return found;
   }
 
   // -- edits ----------------------------------------------------------------------------------------------
