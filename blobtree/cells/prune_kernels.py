@@ -15,7 +15,6 @@ from blobtree.formulas.skeletons import (
     POINT,
     SKELETONS,
     box_to_point,
-    influence_near,
     squared_distances_to_ball,
 )
 from blobtree.kernels import KERNEL_OPTIONS
@@ -31,12 +30,11 @@ from blobtree.tape.codes import (
     WARP_REGISTERS,
 )
 from blobtree.tape.dispatch import (
-    clearance,
     closest,
     depth,
     direct_stride,
+    influence_around,
     is_convex,
-    min_influence,
     operator_choice,
     operator_range,
     starts_from_zero,
@@ -78,7 +76,7 @@ def ball_range(kind: wp.int32, center: wp.vec3, half: wp.float32, tape: Texels, 
     c = closest(kind, center, tape, at)
     inside = depth(kind, center, tape, at)
     radius = half * HALF_DIAGONAL
-    smallest = influence_near(center, c, min_influence(kind, tape, at), clearance(kind, center, tape, at))
+    smallest = influence_around(kind, tape, at, center, c)
     distances = squared_distances_to_ball(center, radius, c, smallest, inside)
     return falloff_range(distances[0], distances[1])
 
@@ -101,7 +99,7 @@ def distances_in_box(
     A convex skeleton lies behind the plane through its closest point across the way to it.
     """
     c = closest(kind, center, tape, at)
-    smallest = influence_near(center, c, min_influence(kind, tape, at), clearance(kind, center, tape, at))
+    smallest = influence_around(kind, tape, at, center, c)
     away = wp.abs(center - wp.vec3(c[0], c[1], c[2]))
     distance = wp.length(away)
     toward = radius

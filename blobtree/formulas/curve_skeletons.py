@@ -13,6 +13,7 @@ from blobtree.formulas.skeletons import (
     TUBE_CELLS,
     Skeleton,
     distance_to_segment,
+    influence_near,
     min_influence_of_one,
 )
 from blobtree.texels import Texels
@@ -313,6 +314,12 @@ def clearance_of_curve(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
     return wp.max(least - sag, 0.0)
 
 
+@wp.func
+def influence_near_curve(tape: Texels, at: wp.int32, q: wp.vec3, c: wp.vec4) -> wp.float32:
+    """Return `influence_near` of a curve."""
+    return influence_near(q, c, min_influence_of_curve(tape, at), clearance_of_curve(q, tape, at))
+
+
 JOINED_SEGMENT = Skeleton(
     "joined_segment",
     closest_on_joined_segment,
@@ -327,7 +334,7 @@ CURVE = Skeleton(
     closest_on_curve,
     min_influence_of_curve,
     parameters=4,
-    clearance=clearance_of_curve,
+    own_influence_near=influence_near_curve,
     cells=TUBE_CELLS,
 )
 

@@ -163,6 +163,12 @@ def clearance_of_cone(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
 
 
 @wp.func
+def influence_near_cone(tape: Texels, at: wp.int32, q: wp.vec3, c: wp.vec4) -> wp.float32:
+    """Return `influence_near` of a cone."""
+    return influence_near(q, c, min_influence_of_cone(tape, at), clearance_of_cone(q, tape, at))
+
+
+@wp.func
 def distance_to_segment(q: wp.vec3, a: wp.vec3, b: wp.vec3) -> wp.float32:
     """Return the distance of q from the line from a to b."""
     way = b - a
@@ -230,14 +236,19 @@ class Skeleton:
     """True for a convex set with one influence radius: distances along a ray are then convex."""
     cells: float = BALL_CELLS
     """Cells along the radius with which a mesh shows a thin primitive of this kind."""
-    clearance: wp.Function | float = 0.0
-    """Of a set whose influence varies: a lower bound on the distance of a point from it; 0 is unknown."""
+    own_influence_near: wp.Function | None = None
+    """Of a set whose influence varies: a function of (tape, at, q, c) that returns its `influence_near`."""
     depth: wp.Function | float = 0.0
     """Of a solid set: a lower bound on the distance of a point inside from its rim, at most 0 outside."""
     apart: wp.Function | float = 1.0
     """Of a convex set of unknown depth: (|q − closest| / influence)² of a point q; 1 is unknown."""
     digest: str = ""
     """Digest of the sources of a custom kind."""
+
+    @property
+    def influence_near(self) -> wp.Function:
+        """Function of (tape, at, q, c) that returns `influence_near`, or the smallest influence."""
+        return self.own_influence_near or self.min_influence
 
     @property
     def stride(self) -> int:
@@ -254,7 +265,7 @@ CONE = Skeleton(
     closest_on_cone,
     min_influence_of_cone,
     parameters=2,
-    clearance=clearance_of_cone,
+    own_influence_near=influence_near_cone,
     cells=TUBE_CELLS,
 )
 CIRCLE = Skeleton("circle", closest_on_circle, min_influence_of_one, parameters=2, cells=TUBE_CELLS)

@@ -47,14 +47,9 @@ def closest(kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return the closest point of a skeleton, and its influence there."""
 
 
-@of_row("skeletons")
-def min_influence(kind: wp.int32, tape: Texels, at: wp.int32) -> wp.float32:
-    """Return the smallest influence on a skeleton."""
-
-
-@of_row("skeletons")
-def clearance(kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
-    """Return `Skeleton.clearance`."""
+@of_row("skeletons", "influence_near")
+def influence_around(kind: wp.int32, tape: Texels, at: wp.int32, q: wp.vec3, c: wp.vec4) -> wp.float32:
+    """Return `influence_near` of a skeleton, c being its closest point to q."""
 
 
 @of_row("skeletons")

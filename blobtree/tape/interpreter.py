@@ -7,7 +7,6 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.formulas.skeletons import influence_near
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.codes import (
     FIELD,
@@ -22,11 +21,10 @@ from blobtree.tape.codes import (
     WARP_REGISTERS,
 )
 from blobtree.tape.dispatch import (
-    clearance,
     closest,
     direct_stride,
+    influence_around,
     is_convex,
-    min_influence,
     stride,
     warp_forward,
 )
@@ -90,8 +88,7 @@ def make_interpreter(evaluator: Evaluator) -> wp.Function:
         at = first
         for _i in range(int(header[2])):
             c = closest(code, point, tape, at)
-            smallest = min_influence(code, tape, at)
-            rate = speed / influence_near(point, c, smallest, clearance(code, point, tape, at))
+            rate = speed / influence_around(code, tape, at, point, c)
             outside = way(code, point, c, ahead, speed, tape, at)
             at += texels
             f = leaf(point, c, paint(point, c, tape[at - 1], tape), outside, rate)
@@ -122,11 +119,9 @@ def make_interpreter(evaluator: Evaluator) -> wp.Function:
             profile = tape[at + 3]
             ahead = wp.vec4(v[0], v[1], v[2], reach)
             c = closest(kind, local, tape, at + PREFIX)
-            smallest = min_influence(kind, tape, at + PREFIX)
             local_speed = speed * profile[0]
-            apart = clearance(kind, local, tape, at + PREFIX)
             ahead = way(kind, local, c, ahead, local_speed, tape, at + PREFIX)
-            rate = local_speed / influence_near(local, c, smallest, apart)
+            rate = local_speed / influence_around(kind, tape, at + PREFIX, local, c)
             end = at + PREFIX + stride(kind)
             color = paint(local, c, tape[end - 1], tape)
             f = empty()

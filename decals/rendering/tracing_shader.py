@@ -12,7 +12,7 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.formulas.skeletons import Skeleton, influence_near
+from blobtree.formulas.skeletons import Skeleton
 from blobtree.tape.codes import FIELD, POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP
 from blobtree.tape.dispatch import (
     directed_partials,
@@ -163,7 +163,7 @@ def _library(kinds: Kinds, others: Iterable[Any]) -> str:
         *(
             f
             for one in skeletons
-            for f in (one.depth, one.clearance, one.apart)
+            for f in (one.depth, one.own_influence_near, one.apart)
             if isinstance(f, wp.Function)
         ),
         *(f for choices in _choices(kinds).values() for f in choices.values()),
@@ -181,7 +181,6 @@ def _library(kinds: Kinds, others: Iterable[Any]) -> str:
         way_between,
         way_end,
         way_outside,
-        influence_near,
         trace_ray,
         *others,
     ]
@@ -309,11 +308,11 @@ def _run_cases(kinds: Kinds, *, bounds: bool) -> Iterable[str]:
         skeleton = kinds.instruction_set.skeletons[code]
         smallest = skeleton.min_influence.key
         influence, mapped_influence = f"{smallest}(tape, at)", f"{smallest}(tape, map + {PREFIX})"
-        if bounds and isinstance(skeleton.clearance, wp.Function):
-            apart = skeleton.clearance.key
-            influence = f"influence_near(point, c, {influence}, {apart}(point, tape, at))"
-            mapped_influence = (
-                f"influence_near(local, c, {mapped_influence}, {apart}(local, tape, map + {PREFIX}))"
+        if bounds and skeleton.own_influence_near is not None:
+            near = skeleton.own_influence_near.key
+            influence, mapped_influence = (
+                f"{near}(tape, at, point, c)",
+                f"{near}(tape, map + {PREFIX}, local, c)",
             )
         way, mapped_way = "vec4(0.0, 0.0, 0.0, reach)", "vec4(0.0, 0.0, 0.0, reach)"
         if skeleton.convex:

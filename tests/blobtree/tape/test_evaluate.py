@@ -152,7 +152,7 @@ def test_no_gradient_inside_a_ball_is_longer_than_its_bound(batch: Batch) -> Non
     rng = np.random.default_rng(batch.start)
     for tree, points in batch.cases:
         skeletons = (tree.tape.instruction_set.skeletons[code] for code in tree.tape.skeletons)
-        if any(skeleton.clearance for skeleton in skeletons):
+        if any(skeleton.own_influence_near for skeleton in skeletons):
             continue
         reach = (10.0 ** rng.uniform(-3.0, 0.5, POINTS)).astype(np.float32)
         direction = rng.normal(size=(POINTS, 3))
