@@ -33,6 +33,7 @@ from .scattering.relaxation import Relaxation
 from .scattering.scatter import scatter
 from .scattering.sizing import Sizing
 from .scenes.animation import animate, turntable
+from .scenes.area_gradient import AreaGradient, area_gradient
 from .scenes.camera import Camera
 from .scenes.cover import cover
 from .scenes.figure import save_figure
@@ -51,6 +52,7 @@ from .window import edit
 
 __all__ = [
     "NO_IMAGE",
+    "AreaGradient",
     "Camera",
     "Contact",
     "ContactLaw",
@@ -69,6 +71,7 @@ __all__ = [
     "TreeObject",
     "__version__",
     "animate",
+    "area_gradient",
     "bake",
     "content_hash",
     "cover",
