@@ -1,9 +1,9 @@
 """Hostile files, meshes, calls, commands and kills: ``python -m tests.fuzz --files 20000 --calls 10000 ...``.
 
 Each stage runs in a forked child, which writes the number of its case to a file. If the child dies, the case
-counts as a crash. If a case takes longer than the limit, it counts as a hang. A new child goes on with the
-next case. An exception that is not of this project, or a warning, counts as foreign. A case follows from the
-seed and its number.
+counts as a crash. If a case takes more processor time than the limit, or waits for long, it counts as a
+hang. A new child goes on with the next case. An exception that is not of this project, or a warning, counts
+as foreign. A case follows from the seed and its number.
 """
 
 import argparse
@@ -50,7 +50,10 @@ from tests.structured.model import check
 from tests.test_hostile_calls import CALLS, HUGE, PLY
 
 HANG_SECONDS = 60.0
-"""Seconds after which a case counts as hung; a process that reads by VTK has its own limits before."""
+"""Processor time after which a case counts as hung; a process that reads by VTK has limits before."""
+
+WAITING = 10.0
+"""Times this limit on the clock, after which a case that does nothing counts as hung."""
 
 START_SECONDS = 300.0
 """The same for the first case of a child, which may compile kernels."""
@@ -423,14 +426,23 @@ def _run_cases(
         os._exit(status)
 
 
+def _busy_seconds(child: int) -> float:
+    """Return the processor time of a process (Linux); 0 once it has ended."""
+    try:
+        fields = Path(f"/proc/{child}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return sum(map(int, fields[11:13])) / float(os.sysconf("SC_CLK_TCK"))
+
+
 def _watch(child: int, state: Path, first: int, outcome: Outcome) -> int:
     """Wait for a child; return the first case of the next one."""
-    number, since = "", time.monotonic()
+    number, since, busy = "", time.monotonic(), 0.0
     while True:
         ended, status = os.waitpid(child, os.WNOHANG)
         text = state.read_text(encoding="ascii").strip()
         if text != number:
-            number, since = text, time.monotonic()
+            number, since, busy = text, time.monotonic(), _busy_seconds(child)
         if ended and status == 0:
             return sys.maxsize
         case = int(number or -1)
@@ -439,7 +451,8 @@ def _watch(child: int, state: Path, first: int, outcome: Outcome) -> int:
                 raise RuntimeError("a child of the fuzzer ended before its first case")
             outcome.crashes.append(case)
             return case + 1
-        if time.monotonic() - since > (HANG_SECONDS if case > first else START_SECONDS):
+        limit = HANG_SECONDS if case > first else START_SECONDS
+        if _busy_seconds(child) - busy > limit or time.monotonic() - since > WAITING * limit:
             os.killpg(child, signal.SIGKILL)
             os.waitpid(child, 0)
             outcome.hangs.append(case)

@@ -27,13 +27,17 @@ def test_the_fuzzer_finds_nothing() -> None:
 def test_a_stage_reports_crashes_hangs_and_foreign_exceptions(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fuzz, "HANG_SECONDS", 0.5)
+    monkeypatch.setattr(fuzz, "HANG_SECONDS", 0.2)
 
     def case(number: int) -> None:
         if number == 2:
             os.kill(os.getpid(), 9)
         if number == 4:
             time.sleep(60.0)
+        while number == 6:  # works without an end
+            pass
+        if number == 7:
+            time.sleep(0.5)  # as on a busy machine
         if number == 5:
             raise LookupError("of Python")
 
@@ -42,7 +46,7 @@ def test_a_stage_reports_crashes_hangs_and_foreign_exceptions(
 
     outcome = fuzz.run_stage(make, 8, tmp_path)
     assert outcome.crashes == [2]
-    assert outcome.hangs == [4]
+    assert outcome.hangs == [4, 6]
     (line,) = outcome.foreign
     assert line.startswith("5: LookupError: of Python")
 
