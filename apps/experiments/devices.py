@@ -51,6 +51,7 @@ BY_KIND: dict[Kind, str] = {
         blobtree.Node.__call__ blobtree.Node.gradient blobtree.Node.colors blobtree.Node.raycast
         blobtree.field_grid blobtree.fit blobtree.from_mesh blobtree.polygonize blobtree.sample
         blobtree.to_sdf
+        decals.area_gradient decals.outlines decals.save_figure
         decals.evaluate decals.evaluate_batch decals.measure decals.displace decals.bake decals.export
         decals.scattering.gradient_of decals.surfaces.as_surface decals.editing.first_hit
         decals.editing.nearest_points decals.editing.outline decals.editing.pick
