@@ -36,6 +36,14 @@ class AreaGradient:
         Derivatives by the centres, while normals and surfaces stay.
     radii : float64[n]
         Derivatives by the visible radii.
+
+    Examples
+    --------
+    >>> import blobtree, decals
+    >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=12)
+    >>> gradient = decals.area_gradient(scene)
+    >>> gradient, gradient.positions.shape
+    (AreaGradient(12), (12, 3))
     """
 
     positions: Float64Array

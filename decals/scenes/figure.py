@@ -118,10 +118,10 @@ def save_figure(
 
     Examples
     --------
-    >>> import blobtree, decals
+    >>> import pathlib, blobtree, decals
     >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=12)
     >>> decals.save_figure(scene, "ball.svg", size=(120, 90), widths={"model": 0})
-    >>> open("ball.svg").read(4)
+    >>> pathlib.Path("ball.svg").read_text()[:4]
     '<svg'
     """
     require_scene("scene", scene, "draw the scene that was posed, where its decals lie")

@@ -86,6 +86,16 @@ class SurfaceLine:
         below, or −1 for bare surface.
     object : str
         Name of the object.
+
+    Examples
+    --------
+    >>> import decals
+    >>> square = decals.MeshObject("square", [[-2, -2, 0], [2, -2, 0], [0, 3, 0]], [[0, 1, 2]])
+    >>> disk = decals.Decals([[0, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], 0.5)
+    >>> scene = decals.Scene(objects=[square], camera=decals.Camera((0, 0, 5)), decals=disk, images=["eye"])
+    >>> (line,) = decals.outlines(scene)
+    >>> line.kind, line.decals, line.closed, round(line.length, 2)
+    (<LineKind.RIM: 'rim'>, (0, -1), True, 3.14)
     """
 
     points: Float32Array

@@ -131,8 +131,8 @@ def to_pandas(decals: Decals) -> "pandas.DataFrame":
     --------
     >>> import decals
     >>> disk = decals.Decals([[0, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], 0.5)
-    >>> decals.to_pandas(disk)[["x", "radius", "interaction"]].iloc[0].tolist()
-    [0.0, 0.5, 'push']
+    >>> decals.to_pandas(disk)[["radius", "interaction"]].to_dict("list")
+    {'radius': [0.5], 'interaction': ['push']}
     """
     frame: pandas.DataFrame = optional_package("pandas", "experiments").DataFrame(_columns_of(decals))
     return frame
@@ -238,10 +238,10 @@ def save_table(
 
     Examples
     --------
-    >>> import decals
+    >>> import pathlib, decals
     >>> disk = decals.Decals([[0, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], 0.1)
     >>> decals.save_table(disk, "disk.csv")
-    >>> open("disk.csv").read().split()
+    >>> pathlib.Path("disk.csv").read_text().split()
     ['x,y,z,nx,ny,nz,tx,ty,tz,radius,image', '0.0,0.0,0.0,0.0,0.0,1.0,1.0,0.0,0.0,0.1,0']
     """
     instance("decals", decals, Decals, InvalidDecals, "a scene has .decals")

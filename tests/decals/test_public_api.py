@@ -25,6 +25,7 @@ NAMES = [
     "load_scene", "measure", "pose", "render", "render_batch",
     "reproduce", "save_html", "save_scene", "scatter", "shader",
     "show", "skin", "turntable",
+    "AreaGradient", "LineKind", "SurfaceLine", "area_gradient", "outlines", "save_figure",
 ]  # fmt: skip
 OF_PACKAGES = {
     "field": ["BatchSamples", "MaterialSamples", "Neighbors", "Samples", "Walks"],
