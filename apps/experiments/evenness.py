@@ -1,6 +1,6 @@
 """How even scattered decals are against schedule, curvature and thickness, beside dart throwing and Lloyd.
 
-Published for the plane, 4,096 points: rho of dart throwing 0.750, of centroidal Voronoi tessellations 0.795.
+Published for the plane: rho of dart throwing 0.750, of centroidal Voronoi tessellations 0.795.
 """
 
 import numpy as np
