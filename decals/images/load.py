@@ -7,6 +7,7 @@ import os
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias, cast
 
@@ -345,6 +346,12 @@ def _wide_colors(path: Path, narrow: Pixels) -> Pixels:
     return np.dstack([colors, values[..., -1]]) if values.shape[2] in (2, 4) else opaque(colors)
 
 
+def _known_formats() -> list[str]:
+    """Return the formats that Pillow knows here: its releases before 11.3 have no AVIF."""
+    known = find_spec("PIL.AvifImagePlugin") is not None
+    return [name for name in PICTURE_FORMATS if known or name != "AVIF"]
+
+
 def _read_picture(
     file: Path | io.BytesIO, name: str, max_edge: int = MAX_IMAGE_EDGE, advice: str = _ADVICE
 ) -> Pixels:
@@ -354,7 +361,7 @@ def _read_picture(
         with (
             warnings.catch_warnings(action="ignore"),
             _without_log(),
-            Image.open(file, formats=PICTURE_FORMATS) as picture,
+            Image.open(file, formats=_known_formats()) as picture,
         ):
             return _picture_pixels(picture, name, max_edge)
     except UnidentifiedImageError as error:

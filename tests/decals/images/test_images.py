@@ -18,6 +18,7 @@ from decals.images import (
     load_image,
     read_image,
 )
+from decals.images import load as load_module
 from decals.images.load import each_image, embedded_image, is_embedded
 from decals.images.texels import as_bytes, linear_premultiplied
 
@@ -414,3 +415,14 @@ def test_a_decal_image_has_native_pixels(kind: str) -> None:
     image = decals.DecalImage("one", pixels)
     assert image.pixels.dtype.isnative
     np.testing.assert_array_equal(image.pixels, pixels)
+
+
+def test_a_pillow_without_avif_reads_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Image.init()
+    monkeypatch.delitem(Image.OPEN, "AVIF", raising=False)
+    monkeypatch.setattr(load_module, "find_spec", lambda _name: None)
+    Image.new("RGB", (2, 2)).save(tmp_path / "a.png")
+    assert read_image(tmp_path / "a.png").shape == (2, 2, 4)
+    (tmp_path / "text.png").write_text("no picture")
+    with pytest.raises(InvalidImage, match="is not a picture"):
+        read_image(tmp_path / "text.png")
