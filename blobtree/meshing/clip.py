@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from blobtree._typing import Float32Array, Float64Array, Int32Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 
 
 def enclosed_volume(vertices: Float32Array, faces: Int32Array) -> float:
@@ -39,28 +39,44 @@ def clipped(
     share = (ends[:, 0] / (ends[:, 0] - ends[:, 1]))[:, None]
     points = vertices.astype(np.float64)
     new = (1.0 - share) * points[cut[:, 0]] + share * points[cut[:, 1]]
-    number = {(int(a), int(b)): len(points) + i for i, (a, b) in enumerate(cut)}
-    triangles: list[tuple[int, int, int]] = []
-    for face in crossing.tolist():
-        corners: list[int] = []
-        for a, b in zip(face, face[1:] + face[:1], strict=True):
-            if inside[a]:
-                corners.append(a)
-            if inside[a] != inside[b]:
-                corners.append(number[min(a, b), max(a, b)])
-        triangles += [(corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)]
-    used, renumbered = np.unique(np.array(triangles, np.int64).reshape(-1, 3), return_inverse=True)
+    triangles, rows = _triangles_inside(crossing, inside, cut, len(points))
+    order = np.argsort(rows, kind="stable")
+    used, renumbered = np.unique(triangles[order], return_inverse=True)
     return np.concatenate([points, new])[used], renumbered.reshape(-1, 3).astype(np.int32)
+
+
+def _triangles_inside(
+    faces: Int32Array, inside: BoolArray, cut: Int64Array, count: int
+) -> tuple[Int64Array, Int64Array]:
+    """Return the triangles of the parts of faces inside, and the row of the face of each.
+
+    New vertices on the edges `cut` (k, 2), sorted, have the numbers from `count` on.
+    """
+    keys = cut[:, 0].astype(np.int64) * count + cut[:, 1]
+    triangles, rows = [np.empty((0, 3), np.int64)], [np.empty(0, np.int64)]
+    for pattern in np.ndindex(2, 2, 2):
+        here = np.flatnonzero((inside[faces] == np.array(pattern, np.bool_)).all(axis=1))
+        part = faces[here].astype(np.int64)
+        corners: list[Int64Array] = []
+        for first, second in ((0, 1), (1, 2), (2, 0)):
+            if pattern[first]:
+                corners.append(part[:, first])
+            if pattern[first] != pattern[second]:
+                ends = np.sort(part[:, [first, second]], axis=1)
+                corners.append(count + np.searchsorted(keys, ends[:, 0] * count + ends[:, 1]))
+        for second in range(1, len(corners) - 1):
+            triangles.append(np.stack([corners[0], corners[second], corners[second + 1]], axis=1))
+            rows.append(here)
+    return np.concatenate(triangles), np.concatenate(rows)
 
 
 def outlines_of(vertices: Float64Array, faces: Int32Array) -> tuple[Float64Array, ...]:
     """Return the outlines of a mesh as closed polylines (n, 3), whose last point is the first."""
-    directed = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2).tolist()
-    known = set(map(tuple, directed))
+    directed = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2).astype(np.int64)
+    keys, opposite = directed @ (len(vertices), 1), directed @ (1, len(vertices))
     following: dict[int, list[int]] = {}
-    for a, b in directed:
-        if (b, a) not in known:
-            following.setdefault(a, []).append(b)
+    for start, end in directed[~np.isin(keys, opposite)].tolist():
+        following.setdefault(start, []).append(end)
     outlines: list[Float64Array] = []
     while following:
         start = next(iter(following))
