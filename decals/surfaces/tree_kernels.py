@@ -64,15 +64,18 @@ def project_with_mesh(
 
     A point without convergence starts again at the closest point of the coarse mesh. So does a point that
     went farther than `least_way` although the mesh is less than half as far: beside a thin part, the field is
-    that of a larger one. The way from the mesh may be no longer either. Else the point starts above and below
-    the mesh, which may miss a thin part by more than its thickness, at distances that double. If all fails,
-    it takes the closest point of the mesh, and the normal of its face.
+    that of a larger one. Where the way from the mesh is longer too, the point also starts above and below the
+    mesh, which may miss a thin part by more than its thickness, at distances that double. The shortest way
+    counts, up to `max_step`. If all fails, the point takes the closest point of the mesh, and the normal of
+    its face.
     """
     i = first + wp.tid()
     start = points[i]
     p = start
     normal = wp.vec3()
     closest = start
+    mesh_normal = wp.vec3()
+    nearest = wp.where(least_way == wp.inf, least_way, max_step)
     for turn in range(2 + 2 * OFFSETS):  # one call for all starts: a copy of it compiles as long again
         q, f = project_to_surface(start, max_step, tape, span)
         found = has_converged(f, tolerance)
@@ -93,15 +96,17 @@ def project_with_mesh(
             p = closest
             normal = face_normals[query.face]
             start = closest
-        elif found and wp.length(q - closest) <= least_way:
-            p = q
-            normal = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
-            break
-        elif least_way == wp.inf:
-            break
+            mesh_normal = normal
         else:
+            distance = wp.length(q - closest)
+            if found and distance <= nearest:
+                p = q
+                normal = -wp.normalize(wp.vec3(f[1], f[2], f[3]))
+                nearest = distance
+            if least_way == wp.inf or nearest <= least_way:
+                break
             side = float(1 - 2 * (turn & 1))
-            start = closest + normal * (side * least_way * wp.pow(2.0, float(turn // 2 - OFFSETS)))
+            start = closest + mesh_normal * (side * least_way * wp.pow(2.0, float(turn // 2 - OFFSETS)))
     positions[i] = p
     normals[i] = normal
 

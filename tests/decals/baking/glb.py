@@ -174,3 +174,9 @@ def read_attribute(path: Path, mesh: int, name: str) -> Array:
 def json_bytes(path: Path) -> bytes:
     content = path.read_bytes()
     return content[20 : 20 + struct.unpack("<I", content[12:16])[0]]
+
+
+def read_numbers(path: Path) -> bytes:
+    """The binary part of a file: vertices, faces, colours and images."""
+    content = path.read_bytes()
+    return content[20 + struct.unpack("<I", content[12:16])[0] :]

@@ -56,7 +56,7 @@ def test_triangles_of_a_ball_lie_within_a_part_of_a_texel(radius: float) -> None
 
 
 def test_small_textures_keep_the_mesh() -> None:
-    coarse, fine = fine_mesh(blobtree.Point((0, 0, 0), radius=1.0), 32)
+    coarse, fine = fine_mesh(blobtree.Point((0, 0, 0), radius=1.0), 16)
     assert np.array_equal(coarse.vertices, fine.vertices)
     assert np.array_equal(coarse.faces, fine.faces)
 

@@ -16,6 +16,7 @@ from decals.errors import InvalidScene
 from decals.rendering import Background, Drawing, Environment, Light, Lighting
 from decals.scenes.recipe import Recipe
 from decals.scenes.script import write_script
+from tests.decals.baking.glb import read_numbers
 
 LOOK = Drawing(
     samples=1,
@@ -118,11 +119,15 @@ def test_pictures_follow_the_scene_and_options_override_it(tmp_path: Path) -> No
 
 
 def test_baking_and_measures_follow_the_scene(tmp_path: Path) -> None:
-    radial, product = (scene(drawing=Drawing(contact=mode)) for mode in ("radial", "product"))
-    files = [tmp_path / f"{name}.glb" for name in ("own", "given")]
-    decals.bake(radial, files[0], vertex_colors=True)
-    decals.bake(product, files[1], vertex_colors=True, contact="radial")
-    assert files[0].read_bytes() == files[1].read_bytes()
+    unequal = scene().decals.replace(radii=[0.7, 0.5])
+    radial, product = (
+        scene(drawing=Drawing(contact=mode)).replace(decals=unequal) for mode in ("radial", "product")
+    )
+    numbers = []
+    for number, (baked, contact) in enumerate([(radial, None), (product, "radial"), (product, None)]):
+        decals.bake(baked, tmp_path / f"{number}.glb", size=64, contact=contact)
+        numbers.append(read_numbers(tmp_path / f"{number}.glb"))
+    assert numbers[0] == numbers[1] != numbers[2]
     own, given = decals.measure(radial, samples=500), decals.measure(product, samples=500, contact="radial")
     assert own.to_dict() == given.to_dict()
     assert own.stretch_max != decals.measure(product, samples=500).stretch_max

@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import Disc, Intersection, Node, Point, Segment, Union
+from blobtree import ISO, Disc, Intersection, Node, Point, Segment, Union
 from decals.errors import InvalidMesh, InvalidPoints
 from decals.surfaces.implicit import ImplicitSurface, project_without_mesh
 from decals.surfaces.surface import Surface
@@ -147,3 +147,17 @@ def test_points_beside_a_thin_plate_stay_on_it() -> None:
     positions, normals = surface.project(points)
     assert np.abs((positions - [1.9, 0, 0]) @ axis - 1e-3).max() < 1e-4
     assert (normals @ axis).min() > 0.99
+
+
+@pytest.mark.parametrize("degrees", [50.0, 60.0, 70.0])
+def test_points_beside_a_bent_tree_of_small_parts_reach_it(degrees: float) -> None:
+    """Its mesh is farther from the surface than the thickness by which a mesh misses a thin part."""
+    flat = Segment((1, 0, 0), (2, 0, 0), radius=0.5) + Point((1.5, 0, 1.5), radius=0.6)
+    tree = flat.twist(degrees)
+    surface = ImplicitSurface(tree)
+    assert surface.has_small_parts
+    lower, upper = surface.bounds
+    points = np.random.default_rng(3).uniform(lower, upper, (5000, 3))
+    positions, normals = surface.project(points)
+    np.testing.assert_allclose(tree(positions), ISO, atol=1e-4)
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-5)
