@@ -66,13 +66,24 @@ def _area(mesh: BakeMesh) -> float:
     return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
 
 
+def _halvings(mesh: BakeMesh, texel: float) -> int:
+    """Return how often the longest edge is halved until its parts are shorter than a texel.
+
+    Beside creases new edges may be as long as others for ever.
+    """
+    corners = mesh.vertices[mesh.faces].astype(np.float64)
+    longest = float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(initial=0.0))
+    return max(int(np.ceil(np.log(max(longest / texel, 1.0)) / -np.log(0.5 + SMOOTH))), 0)
+
+
 def _finer(mesh: BakeMesh, surface: Surface, texel: float, report: Progress) -> BakeMesh:
     """Return a mesh whose edges have their middles near the surface, unless they are shorter than a texel."""
+    rounds = iter(range(_halvings(mesh, texel)))
 
     def are_long(starts: Float64Array, ends: Float64Array) -> BoolArray:
         report("dividing triangles", 0.0)
         long: BoolArray = np.linalg.norm(ends - starts, axis=1) > texel
-        if len(long) > MAX_EDGES:
+        if len(long) > MAX_EDGES or next(rounds, None) is None:
             return np.zeros(len(long), np.bool_)
         long[long] = middles_on(surface, starts[long], ends[long], SMOOTH)[2] > MAX_GAP * texel
         return long
