@@ -38,7 +38,7 @@ class BoxSides:
     doubled : float64[m]
         Twice the areas.
     neighbors : int64[m, 3]
-        Face across each side; −1 where there is none.
+        Index of the face on the other side of each edge; −1 at open edges.
     axis : int64[m]
         Row of `AXES`.
     """

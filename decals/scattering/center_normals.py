@@ -26,7 +26,7 @@ PROBES = 8
 """Points around a centre from which the faces beside an edge are looked for."""
 
 EXAMINED = 3
-"""Neighbours that are examined for each that is asked for."""
+"""Ratio of the neighbours that the search examines to those that it returns."""
 
 
 @dataclass(frozen=True)
