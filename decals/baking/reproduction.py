@@ -18,6 +18,9 @@ from decals.scenes.render import scene_hashes
 from decals.scenes.reproduction import Reproduction
 from decals.scenes.scene import Scene
 
+MAX_SCENE = 1 << 26
+"""Largest text, in bytes, of a scene in a file; a few kilobytes can hold any number of equal ones."""
+
 NO_RECIPE = "a recipe: the file does not say how it was made"
 
 
@@ -48,8 +51,7 @@ def reproduce_export(
         return Reproduction((NO_RECIPE,))
     try:
         if scene is None and isinstance(held := recipe.get("source"), str):
-            text = zlib.decompress(base64.b64decode(held))
-            scene = from_json(text, folder=path.parent, trust=trust)
+            scene = from_json(_unpacked(held), folder=path.parent, trust=trust)
         missing = _missing(recipe, scene)
         if missing or scene is None:
             return Reproduction(missing)
@@ -57,10 +59,19 @@ def reproduce_export(
             again = Path(folder) / path.name
             export(scene, again, progress=progress, **recipe["parameters"])
             after = _Content.of(again.read_bytes(), again)
-    except (ImplicitDecalsError, ValueError, LookupError, TypeError, zlib.error) as error:
+    except (ImplicitDecalsError, ValueError, LookupError, TypeError, AttributeError, zlib.error) as error:
         return Reproduction((f"a recipe that this version takes: {error}",))
     now = {"versions": package_versions(), "made": provenance(device_text("cpu"))}
     return Reproduction((), scene.decals, before.changes(after), changes_since(recipe, now))
+
+
+def _unpacked(held: str) -> bytes:
+    """Return the text of a scene that a file holds; raise ValueError if it is too long."""
+    reader = zlib.decompressobj()
+    text = reader.decompress(base64.b64decode(held), MAX_SCENE)
+    if not reader.eof:
+        raise ValueError(f"expected a whole scene of at most {MAX_SCENE} bytes")
+    return text
 
 
 def _missing(recipe: Mapping[str, Any], scene: Scene | None) -> tuple[str, ...]:
@@ -77,7 +88,7 @@ class _Content:
     """The parts of a glTF or GLB file that are compared."""
 
     def __init__(self, tree: dict[str, Any], buffer: bytes) -> None:
-        self.extras: dict[str, Any] = tree["asset"].pop("extras", {})
+        self.extras: dict[str, Any] = dict(tree["asset"].pop("extras", {}))
         self._tree, self._buffer = tree, buffer
 
     @classmethod
@@ -88,7 +99,7 @@ class _Content:
                 return cls(json.loads(content), b"")
             (length,) = struct.unpack_from("<I", content, 12)
             return cls(json.loads(content[20 : 20 + length]), content[28 + length :])
-        except (ValueError, LookupError, TypeError, AttributeError, struct.error) as error:
+        except (ValueError, LookupError, TypeError, AttributeError, RecursionError, struct.error) as error:
             raise InvalidInput(f"could not read {str(path)!r} as glTF; export it again") from error
 
     def changes(self, other: "_Content") -> tuple[str, ...]:

@@ -41,6 +41,9 @@ SUFFIXES = (".csv", ".parquet")
 IMAGE_SOURCE = "image_source"
 """Column of the names, paths or contents of images."""
 
+MAX_IMAGE_NUMBER = 1 << 16
+"""Bound on the numbers of images in a file; a list of images as long as the largest number is made."""
+
 SEPARATORS = ",;\t|"
 
 EXACT = Context(prec=80)
@@ -560,6 +563,10 @@ def _images(cells: NDArray[Any], decals: Decals, path: Path, trust: bool) -> tup
             raise InvalidDecals(f"{str(path)!r}: image {number}: {error}; name a picture") from error
     if not known:
         return ()
+    if max(known) >= MAX_IMAGE_NUMBER:
+        raise InvalidDecals(
+            f"{str(path)!r}: image: expected numbers below {MAX_IMAGE_NUMBER}, got {max(known)}; number anew"
+        )
     lost = sorted(set(decals.images[decals.images >= 0].tolist()) - known.keys())
     if lost:
         raise InvalidDecals(

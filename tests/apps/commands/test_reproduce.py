@@ -1,6 +1,10 @@
 """The command that makes files again."""
 
+import base64
+import json
+import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +14,8 @@ from PIL.PngImagePlugin import PngInfo
 import decals
 from blobtree import Point
 from decals.apps.cli import run
+from decals.baking.export import EXPORT_FUNCTION
+from decals.baking.reproduction import MAX_SCENE
 
 Capture = pytest.CaptureFixture[str]
 
@@ -85,6 +91,36 @@ def test_an_exported_file_is_made_again(saved: Path, capsys: Capture, name: str)
     capsys.readouterr()
     assert run(["reproduce", name, "--scene", "edited.json"]) == 3
     assert "the decals of the scene that was exported: it has others" in capsys.readouterr().out
+
+
+def held(text: bytes) -> str:
+    return base64.b64encode(zlib.compress(text)).decode()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"source": held(b" " * (MAX_SCENE + 1))},
+        {"source": held(b"{}")[:8]},
+        {"source": "no base64"},
+        {"source": held(b"[" * 100_000)},
+        {"scene": []},
+        {"scene": {"decals": 5}},
+        {"missing": None},
+        {"parameters": []},
+        {"parameters": {"path": "elsewhere.glb"}},
+        {"parameters": {"size": -1}},
+    ],
+)
+def test_recipes_of_strangers_are_refused(saved: Path, capsys: Capture, changes: dict[str, Any]) -> None:
+    source = held(Path("scene.json").read_bytes())
+    recipe = {"function": EXPORT_FUNCTION, "parameters": {}, "missing": [], "scene": {}, "source": source}
+    Path("a.gltf").write_text(json.dumps({"asset": {"extras": {"export": recipe | changes}}}))
+    assert run(["reproduce", "a.gltf"]) == 3
+    captured = capsys.readouterr()
+    assert "a.gltf" in captured.out
+    assert "Traceback" not in captured.out + captured.err
+    assert sorted(path.name for path in saved.iterdir()) == ["a.gltf", "scene.json"]
 
 
 @pytest.mark.slow

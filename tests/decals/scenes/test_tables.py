@@ -172,6 +172,7 @@ WRONG = {
     f"{HEADER}\n{ROW.replace('0,0,1,', '0,0,0,', 1)}\n": "normals: expected",
     f"{HEADER},image_source\n{ROW},{{broken\n": "image 0",
     f"{HEADER},image_source\n{ROW[:-1]}1,eye\n{ROW},\n": "expected the source of image 0",
+    f"{HEADER},image_source\n{ROW[:-1]}16000000,eye\n": "image: expected numbers below 65536",
 }
 
 
