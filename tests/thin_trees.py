@@ -14,11 +14,14 @@ import numpy as np
 
 import blobtree
 from blobtree import Box, Disc, Node, Point, Segment, Shell, Torus
-from blobtree._typing import BoolArray, Float64Array, IndexArray, Int32Array
+from blobtree._typing import BoolArray, Float64Array, IndexArray, Int32Array, Int64Array
 
 PRIMITIVES = ("ball", "hair", "rod", "ring", "plate")
 WALLS = ("lens", "shell", "pipe", "case")
 KINDS = (*PRIMITIVES, *WALLS)
+SHARE_ERROR = 0.05
+"""Allowed error of a part's number of decals, over its share."""
+
 AROUND = 48
 """Steps around the axis of a part."""
 
@@ -315,3 +318,16 @@ def is_closed(faces: Int32Array) -> bool:
 def mesh_areas(mesh: blobtree.Mesh) -> tuple[Float64Array, Float64Array]:
     """Return middles and areas of the triangles of a mesh."""
     return _triangles(mesh.vertices.astype(np.float64), mesh.faces)
+
+
+def decals_of_parts(model: ThinTree, positions: Float64Array) -> tuple[Int64Array, Float64Array]:
+    """Return how many decals have their centres in each part's own region, and the shares by area (n,)."""
+    areas = np.array([part.area for part in model.parts])
+    found = np.array([part.owns(positions).sum() for part in model.parts])
+    return found, found.sum() * areas / areas.sum()
+
+
+def has_share(found: Int64Array, expected: Float64Array) -> BoolArray:
+    """Return True for numbers of decals within SHARE_ERROR of the shares, rounded to whole decals."""
+    fewest, most = np.floor((1.0 - SHARE_ERROR) * expected), np.ceil((1.0 + SHARE_ERROR) * expected)
+    return np.asarray((fewest <= found) & (found <= most))

@@ -6,7 +6,7 @@ import pytest
 from blobtree import Box, Disc, Node, Point, Segment, Torus
 from decals import scatter
 from decals.surfaces import ImplicitSurface
-from tests.thin_trees import random_tree
+from tests.thin_trees import decals_of_parts, has_share, random_tree
 
 BALL = Point((0, 0, 0), radius=1.0)
 
@@ -83,8 +83,5 @@ def test_a_resolution_keeps_its_results() -> None:
 def test_random_trees_give_each_part_its_share(seed: int) -> None:
     model = random_tree(seed)
     centers = scatter(model.tree, count=800).positions.astype(np.float64)
-    areas = np.array([part.area for part in model.parts])
-    found = np.array([part.owns(centers).sum() for part in model.parts])
-    expected = found.sum() * areas / areas.sum()
-    many = expected >= 20.0
-    assert (np.abs(found - expected) <= 0.05 * expected + 1.0)[many].all()
+    found, expected = decals_of_parts(model, centers)
+    assert has_share(found, expected)[expected >= 20.0].all()
