@@ -26,25 +26,54 @@ def modules() -> dict[str, Path]:
 @cache
 def imported_names(module: str, path: Path) -> list[str]:
     """Return the full name of each import in a file: inside functions and for type checking too."""
+    return [name for _, name in _statements(module, path)]
+
+
+@cache
+def names_at_run_time(module: str, path: Path) -> list[str]:
+    """Return what a file imports without a statement that names it.
+
+    That are the public names of a package whose stub `blobtree.lazy.attach_stub` reads, and what
+    ``import_module`` imports: a text that names a module, or begins with ``{package.__name__}.``.
+    """
+    if path.name == "__init__.py":
+        lazy = "attach_stub(" in path.read_text(encoding="utf-8")
+        return imported_names(module, path.with_suffix(".pyi")) if lazy else []
+    packages = dict(_statements(module, path))
+    if not any(name.startswith("importlib") for name in packages.values()):
+        return []
     names: list[str] = []
-    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        match node:
+            case ast.Constant(value=str(name)) if "." in name and name in modules():
+                names.append(name)
+            case ast.FormattedValue(value=ast.Attribute(value=ast.Name(id=alias), attr="__name__")):
+                names += [name for name in modules() if name.rpartition(".")[0] == packages.get(alias)]
+    return names
+
+
+def _statements(module: str, path: Path) -> list[tuple[str, str]]:
+    """Return the import statements of a file: local names and full names."""
+    names: list[tuple[str, str]] = []
+    package = module if path.stem == "__init__" else module.rpartition(".")[0]
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            names += [alias.name for alias in node.names]
+            names += [(alias.asname or alias.name, alias.name) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             base = package.split(".")
             prefix = [".".join(base[: len(base) + 1 - node.level])] if node.level else []
             source = ".".join([*prefix, *([node.module] if node.module else [])])
-            names += [f"{source}.{alias.name}" for alias in node.names]
+            names += [(alias.asname or alias.name, f"{source}.{alias.name}") for alias in node.names]
     return names
 
 
-def module_graph() -> Graph:
-    """Return the modules that each module imports."""
+def module_graph(*, run_time: bool = True) -> Graph:
+    """Return the modules that each module imports; without `run_time`, those of its statements alone."""
     known = modules()
     graph: dict[str, set[str]] = {name: set() for name in known}
     for name, path in known.items():
-        for imported in imported_names(name, path):
+        names = imported_names(name, path) + (names_at_run_time(name, path) if run_time else [])
+        for imported in names:
             # The last part of a name is either a module or a value in one.
             target = imported if imported in known else imported.rpartition(".")[0]
             if target in known and target != name:
@@ -53,7 +82,7 @@ def module_graph() -> Graph:
 
 
 def package_graph() -> Graph:
-    """Return the packages that each package imports.
+    """Return the packages that each package imports by statements.
 
     A module that lies directly in ``blobtree`` or ``decals`` counts as a package of its own.
     """
@@ -66,7 +95,7 @@ def package_graph() -> Graph:
         )
 
     graph: dict[str, set[str]] = {}
-    for name, targets in module_graph().items():
+    for name, targets in module_graph(run_time=False).items():
         graph.setdefault(unit(name), set()).update(map(unit, targets))
     return {name: targets - {name} for name, targets in graph.items()}
 

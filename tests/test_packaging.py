@@ -13,7 +13,18 @@ from typing import Any
 import pytest
 
 from tests.conftest import LONG_FILES
-from tests.import_graph import FOLDERS, ROOT, cycles, imported_names, module_graph, modules, package_graph
+from tests.core_and_extras import EXTRAS as EXTRA_MODULES
+from tests.core_and_extras import core_to_extras
+from tests.import_graph import (
+    FOLDERS,
+    ROOT,
+    cycles,
+    imported_names,
+    module_graph,
+    modules,
+    names_at_run_time,
+    package_graph,
+)
 
 DRAWING = {"moderngl", "vtk", "vtkmodules", "pyvista"}
 FORBIDDEN = {
@@ -27,6 +38,12 @@ PYVISTA_FILES = (
     "vtk_errors.py",
 )  # fmt: skip
 """The files of `blobtree` that use pyvista; a test checks that they import it late."""
+
+CORE_TO_EXTRAS = 156
+"""Number of imports of extras by modules of the core: it may only fall."""
+
+RUN_TIME_CIRCLES = 2, 88
+"""Number of the circles of imports at run time, and of the modules in them: they may only fall."""
 
 EXTRAS = {
     "decals/scenes/figure.py": "experiments",
@@ -77,7 +94,41 @@ def test_imports_run_one_way(folder: str) -> None:
 
 
 def test_modules_import_each_other_one_way() -> None:
-    assert [sorted(names) for names in cycles(module_graph())] == []
+    assert [sorted(names) for names in cycles(module_graph(run_time=False))] == []
+
+
+def test_circles_through_imports_at_run_time_only_shrink() -> None:
+    """The circles are known: kinds of nodes, and `decals` through its own public names."""
+    circles = cycles(module_graph())
+    size = len(circles), sum(map(len, circles))
+    assert size[0] <= RUN_TIME_CIRCLES[0], [sorted(names) for names in circles]
+    assert size[1] <= RUN_TIME_CIRCLES[1], [sorted(names) for names in circles]
+
+
+def test_the_core_imports_fewer_and_fewer_extras() -> None:
+    found = core_to_extras()
+    assert len(found) <= CORE_TO_EXTRAS, found
+
+
+def test_extras_are_modules_that_exist() -> None:
+    listed = {
+        f"{package}.{name}" if name != "*" else package
+        for package, names in EXTRA_MODULES.items()
+        for name in names.split()
+    }
+    assert listed <= set(modules())
+
+
+def test_imports_at_run_time_are_followed(tmp_path: Path) -> None:
+    path = tmp_path / "late.py"
+    path.write_text(
+        "from importlib import import_module\n"
+        "from blobtree import tracing as rays\n"
+        "def late(name): return import_module('blobtree.io'), import_module(f'{rays.__name__}.{name}')\n"
+    )
+    found = names_at_run_time("blobtree.late", path)
+    assert {"blobtree.io", "blobtree.tracing.trace"} <= set(found)
+    assert "blobtree.nodes.primitives.Point" in names_at_run_time("blobtree", modules()["blobtree"])
 
 
 def test_packages_import_each_other_one_way() -> None:

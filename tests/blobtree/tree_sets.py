@@ -80,7 +80,7 @@ def _batches(trees: Sequence[Node], *errors: float, ordinary: int = ORDINARY_TRE
     return [Batch(start, end - start, trees, *errors) for start, end in zip(starts, ends, strict=True)]
 
 
-_SETS = {
+SETS = {
     "built_in": _batches(BUILT_IN_TREES, 1e-5, 2e-4),
     "solids": _batches(SOLID_TREES, 2e-5, 3e-4),
     "fields": _batches(FIELD_TREES, 2e-5, 3e-4, ordinary=10),  # of which one in three points has a colour
@@ -96,8 +96,8 @@ EVERY_BATCH = pytest.mark.parametrize(
     "batch",
     [
         pytest.param(batch, id=f"{name}-{batch.start}", marks=pytest.mark.slow if place else ())
-        for name, batches in _SETS.items()
+        for name, batches in SETS.items()
         for place, batch in enumerate(batches)
     ],
 )
-FIRST_BATCHES = pytest.mark.parametrize("batch", [batches[0] for batches in _SETS.values()], ids=_SETS)
+FIRST_BATCHES = pytest.mark.parametrize("batch", [batches[0] for batches in SETS.values()], ids=SETS)

@@ -1,0 +1,91 @@
+"""Core and extras: the files that a reader of the core may leave out, and the imports that still reach them.
+
+The core is what a BlobTree is, how it becomes a mesh, rays and particles, and one decal pass. An extra is a
+folder of the product, or a file, on which the core should not depend.
+"""
+
+from tests.import_graph import module_graph
+
+EXTRAS: dict[str, str] = {
+    "blobtree": "field_slice fitting",
+    "blobtree.custom": "bounds_kernels checks field_checks operator_checks skeleton_checks warp_checks",
+    "blobtree.derivatives": "*",
+    "blobtree.formulas": """
+        blends contact convolution curve_skeletons deformations direct_fields falloffs flat_skeletons
+        gradient_blends noise solid_skeletons volumes windows
+        """,
+    "blobtree.meshing": """
+        adaptive adaptive_cell_kernels adaptive_cells adaptive_kernels adaptive_mesh bisection_kernels
+        block_tree clip crease_branches crease_intersections crease_kernels crease_sheets creases crumbs
+        distance_kernels leaf_changes leaf_gaps part_kernels parts thickening thickening_kernels wall_kernels
+        walls
+        """,
+    "blobtree.nodes": """
+        attributes blends contact convolution curves deformations fields flats parameter_gradient samples
+        solids tree_volumes volumes
+        """,
+    "blobtree.sampling": "*",
+    "blobtree.tape": "attributes directed directed_along grown operands part_sizes poses rest_kernels",
+    "decals.baking": "*",
+    "decals.editing": """
+        background bare_watch brush_actions brushes carrying filling followers outline_actions overlays
+        recovery slicing visibility visibility_actions
+        """,
+    "decals.experiments": "*",
+    "decals.field": """
+        batch batch_kernels batch_neighbor_kernels jacobian law neighbor_kernels pixel_filter walk
+        walk_kernels walks
+        """,
+    "decals.hosts": "*",
+    "decals.images": "radiance",
+    "decals.index": "batch",
+    "decals.pages": "*",
+    "decals.rendering": """
+        base_textures environment lights loop_guard materials offset_tree rest_buffer walk_cache
+        """,
+    "decals.scattering": """
+        bare_places boundary boundary_kernels center_normals covering creases deform density gap_filling
+        image_projections mean_normals owned_points polish relocation remesh trial_points turned_normals
+        variation
+        """,
+    "decals.scenes": """
+        animation area_gradient figure gaps material material_record measure outlines pose provenance recipe
+        reproduction script tables
+        """,
+    "decals.surfaces": """
+        curved dataset_colors mesh_check mesh_file nesting space_curve triangulate trimesh_colors vtk_child
+        vtk_process windings
+        """,
+    "decals.surfaces.files": "*",
+    "decals.vtk": "exports injection mapper",
+    "decals.window": "browser notebook view_modes",
+}
+"""The modules of each package that are extras, ``*`` for all."""
+
+LISTS = ("blobtree.formulas.library", "blobtree.nodes.kinds")
+"""Modules that list all kinds; what they import does not count."""
+
+
+def is_extra(module: str) -> bool:
+    """Return True for a module of `blobtree` or `decals` that is an extra."""
+    package, _, name = module.rpartition(".")
+    return "*" in (EXTRAS.get(module), EXTRAS.get(package)) or name in EXTRAS.get(package, "").split()
+
+
+def core_to_extras() -> list[tuple[str, str]]:
+    """Return the pairs of a core module and an extra that it imports, at its own import or later.
+
+    Applications, lists of kinds and the public names of packages do not count.
+    """
+    graph = module_graph()
+    packages = {name.rpartition(".")[0] for name in graph}
+    counted = (
+        name
+        for name in graph
+        if name.split(".")[0] in ("blobtree", "decals")
+        and not name.startswith(("decals.apps", "decals.shaders"))
+        and name not in packages
+        and name not in LISTS
+        and not is_extra(name)
+    )
+    return [(name, target) for name in sorted(counted) for target in sorted(graph[name]) if is_extra(target)]
