@@ -28,7 +28,7 @@ from blobtree.nodes.parameters import Quantity
 from blobtree.nodes.tree import Node
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import checked_tree, gradients_at
-from blobtree.validation import is_whole, items, point_array, positive_number, real, shown
+from blobtree.validation import as_count, is_whole, items, point_array, positive_number, real, shown
 
 MAX_EVALUATIONS = 60
 TOLERANCE = 1e-9
@@ -166,7 +166,8 @@ def fit(
 
     checked_tree(tree)
     samples = _Samples(point_array(points), values, normals, normal_weight)
-    if not is_whole(max_evaluations) or max_evaluations < 1:
+    most = as_count(max_evaluations)
+    if not is_whole(most) or most < 1:
         raise InvalidNode(f"max_evaluations: expected a whole number from 1, got {shown(max_evaluations)}")
     free = _free(tree, fixed)
     if samples.count < len(free):
@@ -180,7 +181,7 @@ def fit(
     start = numeric_values(tree, free)
     lower, upper = _ranges(free, start)
     with reporting(progress, cancel) as report:
-        problem = _Problem(tree, free, samples, report, max_evaluations)
+        problem = _Problem(tree, free, samples, report, int(most))
         result = least_squares(
             problem.residuals,
             np.clip(start, lower, upper),
@@ -191,7 +192,7 @@ def fit(
             xtol=TOLERANCE,
             gtol=None,
             tr_solver="lsmr" if samples.size * len(free) ** 2 > LARGEST_EXACT else "exact",
-            max_nfev=max_evaluations,
+            max_nfev=int(most),
         )
     field, directions = samples.split(result.fun[: samples.size])
     return Fit(

@@ -61,6 +61,11 @@ def is_whole(value: object) -> TypeGuard[int | np.integer]:
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
+def as_count(value: object) -> object:
+    """Return a float without a fraction, such as 1e3, as an int; any other value as it is."""
+    return int(value) if isinstance(value, float | np.floating) and value.is_integer() else value
+
+
 def finite_vector(name: str, value: object) -> Vector:
     """Return `value` as three floats; raise `InvalidNode` if it is not three finite numbers."""
     try:

@@ -19,7 +19,7 @@ from blobtree.colors import Rgb, Rgba, color_rgb
 from blobtree.nodes.parameters import with_parameters
 from blobtree.validation import truth
 from decals.errors import InvalidInput
-from decals.validation import member, number_of, one_of, whole_number
+from decals.validation import describe, member, number_of, one_of, whole_number
 
 MAX_WHOLE = 1 << 53
 """Largest whole number that pages and files hold exactly."""
@@ -97,7 +97,9 @@ class Option:
             return color_rgb(self.name, raw, error)
         number = number_of(self.name, raw, error)
         if self.kind is int:
-            return whole_number(self.name, round(number), -MAX_WHOLE, MAX_WHOLE, error)
+            if not number.is_integer():
+                raise error(f"{self.name}: expected a whole number, got {describe(raw)}")
+            return whole_number(self.name, int(number), -MAX_WHOLE, MAX_WHOLE, error)
         return number
 
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from blobtree._typing import BoolArray, Float64Array, Int32Array
 from blobtree.colors import color_rgb, is_named
 from blobtree.files import is_folder, is_read_only, is_too_long
-from blobtree.validation import is_whole, real
+from blobtree.validation import as_count, is_whole, real
 from decals.errors import ImplicitDecalsError, InvalidDecals, InvalidImage, InvalidScene, MissingPackage
 
 T = TypeVar("T")
@@ -94,6 +94,11 @@ def whole_number(name: str, value: Any, low: int, high: int | None, error: type[
     else:
         expected = "no index, as the scene has none of these"
     raise error(f"{name}: expected {expected}, got {describe(value)}")
+
+
+def count_number(name: str, value: Any, low: int, high: int | None, error: type[ImplicitDecalsError]) -> int:
+    """Return a count as an int: like `whole_number`, but a float without a fraction is one, too."""
+    return whole_number(name, as_count(value), low, high, error)
 
 
 def finite_number(name: str, value: Any, error: type[ImplicitDecalsError]) -> float:

@@ -47,6 +47,8 @@ RUN_TIME_CIRCLES = 2, 88
 
 EXTRAS = {
     "decals/scenes/figure.py": "experiments",
+    "decals/scenes/parquet.py": "experiments",
+    "decals/scenes/parquet_child.py": "experiments",
     "decals/scenes/tables.py": "experiments",
     "apps/commands/sandbox.py": "browser",
     "apps/commands/sweep.py": "experiments",

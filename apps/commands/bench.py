@@ -9,7 +9,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from decals.apps.commands.options import MAX_DECALS, check_count, parse_size
+from decals.apps.commands.options import MAX_DECALS, check_count, parse_size, parse_whole
 from decals.apps.commands.progress_bars import progress_bars
 from decals.apps.models.figure_14 import KILOBYTE, MEGABYTE, Row, measure
 from decals.apps.models.samples import SAMPLES
@@ -59,7 +59,7 @@ def table(*, size: str = "1600x1200", counts: str = COUNTS, models: str | None =
 def parse_counts(text: str) -> list[int]:
     """Parse numbers of decals such as ``"100,1000"``."""
     try:
-        counts = [int(part) for part in text.split(",")]
+        counts = [parse_whole(part) for part in text.split(",")]
     except ValueError:
         raise InvalidInput(f"--counts: expected whole numbers such as 100,1000, got {text!r}") from None
     for count in counts:

@@ -26,11 +26,17 @@ DEFAULT_IMAGES = ("scale",)
 
 
 def _whole(_type: Any, tokens: Sequence[Token]) -> int:
-    """Parse a whole number; reject fractions, which Python would round."""
-    text = tokens[0].value
-    if not re.fullmatch(r"[+-]?\d+(_\d+)*", text.strip()):
+    return parse_whole(tokens[0].value)
+
+
+def parse_whole(text: str) -> int:
+    """Parse a whole number, also one such as 12.0 or 1e3; reject fractions, which Python would round."""
+    if re.fullmatch(r"[+-]?\d+(_\d+)*", text.strip()):
+        return int(text)
+    number = float(text) if re.fullmatch(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?", text.strip()) else 0.5
+    if not number.is_integer():  # infinity is none
         raise ValueError(f"expected a whole number, got {text!r}")
-    return int(text)
+    return int(number)
 
 
 Whole = Annotated[int, Parameter(converter=_whole)]

@@ -19,7 +19,9 @@ from scipy.spatial import cKDTree
 
 from blobtree._typing import BoolArray, Float64Array
 from decals import Contact, Decals, evaluate
+from decals.errors import InvalidInput
 from decals.experiments import Grid, Seeds
+from decals.validation import count_number
 
 CELLS = 256
 """Cells along a side of the square, in which areas are counted."""
@@ -66,7 +68,7 @@ def contact_peers(method: str, crowding: float, count: int = 30, seed: int = 0) 
         bare cells from the nearest shape; ``moved``, the mean distance between the centre of a shape and that
         of its disc, over the radius.
     """
-    centers, radii = discs(crowding, count, seed)
+    centers, radii = discs(crowding, count_number("count", count, 1, None, InvalidInput), seed)
     free = _inside(centers, radii)
     shapes = METHODS[method](centers, radii)
     areas, full = shapes.sum(axis=(1, 2)), free.sum(axis=(1, 2))

@@ -7,10 +7,12 @@ import numpy as np
 
 from blobtree import Point, Sum, polygonize
 from decals import DecalImage, Decals, Scene, TreeObject, evaluate, scatter
+from decals.errors import InvalidInput
 from decals.experiments import Grid
 from decals.index import DecalIndex
 from decals.rendering import Renderer, RenderOptions
 from decals.scenes.camera import Camera
+from decals.validation import count_number
 
 POINTS = 100_000
 """Points at which decals are evaluated."""
@@ -36,6 +38,7 @@ def cost(count: int, seed: int = 0) -> dict[str, float]:
         one frame of 320 × 240 pixels; ``index_kb``, memory of the index; ``vertices`` of the mesh. Times are
         the least of three, and that of `scatter` is one.
     """
+    count = count_number("count", count, 1, None, InvalidInput)
     ball = TreeObject("ball", Point((0.0, 0.0, 0.0), radius=1.0))
     scatter(ball.surface, count=10, seed=seed)  # kernels are compiled before the clock starts
     begin = time.perf_counter()

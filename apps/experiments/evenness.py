@@ -9,10 +9,12 @@ from scipy.spatial import cKDTree
 from blobtree._typing import Float32Array, Float64Array
 from decals import Decals, MeshObject, Relaxation, Scene, measure
 from decals.apps.gallery.helpers import camera_at
+from decals.errors import InvalidInput
 from decals.experiments import Grid, Seeds
 from decals.scattering.neighbors import ideal_spacing
 from decals.scattering.orientation import tangents
 from decals.surfaces import MeshSurface
+from decals.validation import count_number
 
 DIVISIONS = 5
 """Divisions of an icosahedron: 20,480 faces."""
@@ -63,6 +65,8 @@ def evenness(
         ``cv``, ``cv6`` and ``bond_order`` of `decals.measure`; ``spacing``, the ideal distance over the
         thickness.
     """
+    count = count_number("count", count, 1, None, InvalidInput)
+    steps = count_number("steps", steps, 0, None, InvalidInput)
     surface = body(bumps, thickness)
     positions = METHODS[method](surface, count, steps, seed)
     positions, normals = surface.project(positions)

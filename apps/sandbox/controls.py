@@ -217,8 +217,7 @@ def parsed(node: Node, name: str, raw: Any) -> Any:
     def numbers(part: Any) -> Any:
         if isinstance(part, list | tuple):
             return tuple(map(numbers, part))
-        number = number_of(name, part, InvalidEdit)
-        return round(number) if parameter.whole else number
+        return number_of(name, part, InvalidEdit)
 
     return numbers(raw)
 

@@ -1,11 +1,8 @@
 """Texture atlas: xatlas cuts meshes into charts and packs all charts into one square texture."""
 
-import os
 import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,9 +15,9 @@ from decals.baking.box_atlas import BoxSides
 from decals.baking.fine_trees import EXPECTED_USE
 from decals.baking.meshes import BakeMesh
 from decals.baking.unwrapped import Unwrapped
+from decals.child_process import can_isolate, kill, start_child
 from decals.errors import InvalidMesh
 from decals.surfaces.topology import components
-from decals.surfaces.vtk_process import can_isolate
 from decals.validation import optional_package
 
 UNWRAPPING = "unwrapping the surface"
@@ -134,17 +131,10 @@ def _atlas(arrays: Arrays, texels_per_unit: float, report: Progress) -> Arrays:
     options = texels_per_unit, MAX_CHART_FACES, PADDING
     if not can_isolate():
         return atlas(arrays, *options)
-    folders = os.pathsep.join(folder or str(Path.cwd()) for folder in sys.path)
     with tempfile.TemporaryFile() as request:  # `communicate` may not end if it has input and a timeout
         request.write(packed([*map(np.asarray, options), *arrays]))
         request.seek(0)
-        child = subprocess.Popen(
-            [sys.executable, "-P", "-W", "ignore", "-m", atlas.__module__],
-            stdin=request,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env={**os.environ, "PYTHONPATH": folders},
-        )
+        child = start_child(atlas.__module__, stdin=request, stderr=subprocess.PIPE)
     with child:
         try:
             while True:
@@ -154,7 +144,7 @@ def _atlas(arrays: Arrays, texels_per_unit: float, report: Progress) -> Arrays:
                 except subprocess.TimeoutExpired:
                     report(UNWRAPPING, 0.0)
         except BaseException:
-            child.kill()
+            kill(child)
             raise
     if child.returncode:
         reason = errors.decode(errors="replace").strip().splitlines()[-1:] or [

@@ -42,7 +42,7 @@ from decals.scenes.render import option_value, scene_hashes
 from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model
 from decals.surfaces.mesh_check import MeshCheck
-from decals.validation import checked_path, describe, one_of, optional_package, whole_number
+from decals.validation import checked_path, count_number, describe, one_of, optional_package, whole_number
 
 _logger = logging.getLogger(__name__)
 
@@ -174,14 +174,14 @@ def export(
         if value is not None:
             one_of(name, value, choices, InvalidScene)
     size = whole_number("size", size, MIN_SIZE, MAX_SIZE, InvalidScene)
-    samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
+    samples = count_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
     if resolution is not None:
         whole_number("resolution", resolution, 1, None, InvalidResolution)
     modes = {"contact": contact, "mapping": mapping, "stiffness": stiffness}
     Drawing().overridden(**modes)  # checked before a model is read
     creases = truth("creases", creases, InvalidScene)
     one_of("layout", layout, LAYOUTS, InvalidScene)
-    tiles = whole_number("tiles", tiles, 1, MAX_TILES, InvalidScene)
+    tiles = count_number("tiles", tiles, 1, MAX_TILES, InvalidScene)
     if tiles > 1 and not (rules.tiles and place == TEXTURE):
         others = ", ".join(suffix for suffix, each in FORMATS.items() if each.tiles)
         raise InvalidScene(

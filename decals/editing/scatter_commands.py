@@ -28,7 +28,15 @@ from decals.scenes.objects import (
     same_shape,
 )
 from decals.scenes.recipe import Recipe
-from decals.validation import describe, finite_number, finite_vector, instance, one_of, whole_number
+from decals.validation import (
+    count_number,
+    describe,
+    finite_number,
+    finite_vector,
+    instance,
+    one_of,
+    whole_number,
+)
 
 SPACING = 3.0**0.5 / 1.03
 """Distance of neighbours among decals without gaps, in radii (see `covering.RADIUS_MARGIN`)."""
@@ -165,13 +173,13 @@ class ScatterDecals:
             **self.options,
         )
         names = [item.name for item in covered]
-        given = {"models": names, "count": self.count, "images": images, **self.options}
+        given = {"models": names, "count": len(decals), "images": images, **self.options}
         recipe = Recipe.of("decals.scatter", seed=self.seed, **given).giving(decals, covered)
         return ReplaceDecals(self.objects, decals, covered, recipe)
 
     def check_values(self) -> None:
         """Raise `InvalidEdit` or `InvalidScattering` for a count, a seed or an option that is not valid."""
-        whole_number("count", self.count, 0, MAX_SCATTERED_DECALS, InvalidEdit)
+        count_number("count", self.count, 0, MAX_SCATTERED_DECALS, InvalidEdit)
         whole_number("seed", self.seed, 0, None, InvalidEdit)
         options = dict(instance("options", self.options, dict, InvalidEdit, "such as {'factor': 0.5}"))
         for name in options:

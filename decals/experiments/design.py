@@ -12,7 +12,7 @@ from typing import Any, overload
 import numpy as np
 
 from decals.errors import InvalidInput
-from decals.validation import describe, whole_number
+from decals.validation import count_number, describe, whole_number
 
 Trial = dict[str, Any]
 """Parameters of one call, by name."""
@@ -159,7 +159,7 @@ class Seeds(Grid):
 
     def __init__(self, count: int, first: int = 0) -> None:
         count, first = (
-            whole_number(*value, 0, None, InvalidInput) for value in (("count", count), ("first", first))
+            count_number(*value, 0, None, InvalidInput) for value in (("count", count), ("first", first))
         )
         super().__init__(seed=range(first, first + count))
 
@@ -212,7 +212,7 @@ def _filled(engine: str, count: int, seed: int, ranges: Mapping[str, Range]) -> 
     """Yield trials at the points of a sequence of SciPy in a box."""
     from scipy.stats import qmc
 
-    whole_number("count", count, 1, None, InvalidInput)
+    count = count_number("count", count, 1, None, InvalidInput)
     whole_number("seed", seed, 0, None, InvalidInput)
     scales = {name: _scale(name, limits) for name, limits in ranges.items()}
     if not scales:

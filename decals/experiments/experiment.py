@@ -22,7 +22,7 @@ from decals.experiments.store import Store, rows_in
 from decals.experiments.values import light
 from decals.experiments.workers import Rows, Work, cluster, connected, here, processes
 from decals.scenes.recipe import plain
-from decals.validation import describe, real_number, whole_number
+from decals.validation import count_number, describe, real_number
 
 CONVERTED = (bool, int, float, str)
 """Types of parameters to which values of a design are converted."""
@@ -106,7 +106,7 @@ def run(
     about = {"name": getattr(function, "__qualname__", describe(function)), "function": digest}
     about["parameters"] = sorted({name for trial in trials.values() for name in trial})
     count = (
-        os.cpu_count() or 1 if workers is None else whole_number("workers", workers, 0, None, InvalidInput)
+        os.cpu_count() or 1 if workers is None else count_number("workers", workers, 0, None, InvalidInput)
     )
     if limit is not None:
         real_number("limit", limit, "seconds above 0", lambda value: value > 0, InvalidInput)

@@ -21,7 +21,7 @@ from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS
 from decals.rendering.environment import Environment, as_environment
 from decals.rendering.lights import Lighting
 from decals.rendering.viewpoint import Viewpoint
-from decals.validation import describe, instance, member, stiffness_number, whole_number
+from decals.validation import count_number, describe, instance, member, stiffness_number, whole_number
 
 Size: TypeAlias = tuple[int, int]
 """Width and height."""
@@ -152,7 +152,7 @@ class Drawing:
 
     def __post_init__(self) -> None:
         checked: dict[str, object] = {
-            "samples": whole_number("samples", self.samples, 1, MAX_SAMPLES, InvalidScene),
+            "samples": count_number("samples", self.samples, 1, MAX_SAMPLES, InvalidScene),
             "contact": contact_mode(self.contact, InvalidScene),
             "mapping": member("mapping", self.mapping, ImageMapping, InvalidScene),
             "stiffness": stiffness_number(self.stiffness, InvalidScene),

@@ -18,7 +18,7 @@ from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.space_curve import curve_keys
 from decals.surfaces.surface import Surface, vectors
-from decals.validation import function_or_none, function_values, real_array, real_number, whole_number
+from decals.validation import count_number, function_or_none, function_values, real_array, real_number
 
 AREA_SAMPLES = 16384
 """Samples that estimate the visible area of a surface."""
@@ -340,7 +340,7 @@ def particle_count(count: int | None, spacing: float | None, mass: float) -> int
     if (count is None) == (spacing is None):
         raise InvalidScattering("expected either a count or a spacing, got both or none; give one of them")
     if count is not None:
-        return whole_number("count", count, 0, MAX_PARTICLES, InvalidScattering)
+        return count_number("count", count, 0, MAX_PARTICLES, InvalidScattering)
     length = real_number("spacing", spacing, "a length above 0", lambda value: value > 0, InvalidScattering)
     if length < np.sqrt(2.0 * mass / (np.sqrt(3.0) * MAX_PARTICLES)):
         raise InvalidScattering(

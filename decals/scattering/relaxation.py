@@ -31,7 +31,7 @@ from decals.scattering.repulsion import CUTOFF, law_at
 from decals.scattering.sizing import Sizing
 from decals.scattering.variation import ImageChoice, Jitter
 from decals.surfaces.surface import Surface
-from decals.validation import function_or_none, real_array, real_number, whole_number
+from decals.validation import count_number, function_or_none, real_array, real_number, whole_number
 
 RELOCATION_SCHEDULE = (0.1, 0.8, 0.05)
 """First and last part of the schedule at which crowded particles are relocated, and the interval."""
@@ -122,7 +122,7 @@ class Relaxation:
         fixed: ArrayLike | None = None,
         device: str = "cpu",
     ) -> None:
-        self.iterations = whole_number("iterations", iterations, 1, MAX_ITERATIONS, InvalidScattering)
+        self.iterations = count_number("iterations", iterations, 1, MAX_ITERATIONS, InvalidScattering)
         self.steps = self._deformed_at = 0
         self._seed = whole_number("seed", seed, 0, None, InvalidScattering)
         self.domain = Domain(surfaces, seed, density=density, mask=mask, device=device)
@@ -264,7 +264,7 @@ class Relaxation:
 
     def polish(self, rounds: int = POLISHING_ROUNDS, *, close: float = CLOSE_DISTANCE) -> None:
         """Part the pairs that are closer than `close` spacings by trial, in at most so many rounds."""
-        whole_number("rounds", rounds, 0, None, InvalidScattering)
+        rounds = count_number("rounds", rounds, 0, None, InvalidScattering)
         real_number(
             "close",
             close,

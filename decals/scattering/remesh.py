@@ -9,7 +9,7 @@ import numpy as np
 from blobtree._typing import Float32Array
 from decals.errors import InvalidScattering
 from decals.surfaces.mesh import MeshSurface
-from decals.validation import instance, whole_number
+from decals.validation import count_number, instance
 
 VERTICES_PER_CLUSTER = 12
 """Vertices that a mesh needs for each cluster; coarser meshes are subdivided first."""
@@ -53,7 +53,7 @@ def remeshed_points(surface: MeshSurface, count: int) -> Float32Array:
     >>> rivets = decals.scatter(square, fixed=points, count=len(points))
     """
     instance("surface", surface, MeshSurface, InvalidScattering, "polygonize a tree first")
-    whole_number("count", count, 4, MAX_POINTS, InvalidScattering)
+    count = count_number("count", count, 4, MAX_POINTS, InvalidScattering)
     try:
         clustering, pyvista = import_module("pyacvd").Clustering, import_module("pyvista")
     except ImportError as error:

@@ -13,7 +13,7 @@ from decals.model import MAX_IMAGES
 from decals.options import Values
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.surfaces.surface import unit_rows
-from decals.validation import real_array, real_number, whole_number
+from decals.validation import count_number, real_array, real_number
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ class ImageChoice(Enum):
 
 def image_shares(images: int, weights: ArrayLike | None) -> Float64Array:
     """Return the share of each image, ``float64[images]``, or raise `InvalidScattering`."""
-    whole_number("images", images, 1, MAX_IMAGES, InvalidScattering)
+    images = count_number("images", images, 1, MAX_IMAGES, InvalidScattering)
     if weights is None:
         return np.full(images, 1.0 / images)
     values = real_array("weights", weights, InvalidScattering)

@@ -22,11 +22,11 @@ from decals.scenes.pose import PosedScene
 from decals.scenes.scene import Scene
 from decals.validation import (
     checked_path,
+    count_number,
     describe,
     finite_number,
     optional_package,
     real_number,
-    whole_number,
 )
 
 MAX_FRAMES = 100_000
@@ -81,7 +81,7 @@ def turntable(scene: Scene | PosedScene, count: int = 120, *, turns: float = 1.0
     """
     if not isinstance(scene, Scene | PosedScene):
         raise InvalidScene(f"scene: expected a Scene or a PosedScene, got {describe(scene)}")
-    frames = whole_number("count", count, 1, MAX_FRAMES, InvalidScene)
+    frames = count_number("count", count, 1, MAX_FRAMES, InvalidScene)
     whole = finite_number("turns", turns, InvalidScene)
     camera = scene.camera
     return [replace(scene, camera=camera.turned(360.0 * whole * k / frames)) for k in range(frames)]
@@ -157,7 +157,7 @@ def animate(
     if count is None:
         expected = len(frames) if isinstance(frames, Sized) else 0
     else:
-        expected = whole_number("count", count, 1, 10 * MAX_FRAMES, InvalidScene)
+        expected = count_number("count", count, 1, 10 * MAX_FRAMES, InvalidScene)
     first = next(scenes, None)
     if first is None:
         raise InvalidScene("frames: expected at least one scene, got none")

@@ -26,7 +26,7 @@ from decals.scenes.pose import require_scene
 from decals.scenes.scene import Scene
 from decals.surfaces.normals import split_at_creases
 from decals.surfaces.surface import unit_rows
-from decals.validation import whole_number
+from decals.validation import count_number, whole_number
 
 SAMPLES_PER_DECAL = 200
 MIN_SAMPLES = 20_000
@@ -241,7 +241,7 @@ def measure(
     count = len(scene.decals)
     if samples is None:
         samples = min(max(SAMPLES_PER_DECAL * count, MIN_SAMPLES), MAX_DEFAULT_SAMPLES)
-    samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
+    samples = count_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
     seed = whole_number("seed", seed, 0, None, InvalidScene)
     if not scene.objects:
         raise InvalidScene("expected a scene with an object to measure, got none; add one")

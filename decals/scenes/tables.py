@@ -25,9 +25,11 @@ from blobtree.files import is_file, replacing, write_atomically
 from blobtree.validation import items
 from decals.errors import InvalidDecals, InvalidInput
 from decals.model import Decals, Interaction
+from decals.receivers import TEXT
 from decals.scenes.files import image_record, images_of
 from decals.scenes.material_record import MaterialRecord, sources_of
 from decals.scenes.origin import WORLD, Origin
+from decals.scenes.parquet import read_parquet
 from decals.scenes.records import check_inside, decimals
 from decals.scenes.scene import DecalImage
 from decals.validation import as_path, checked_path, describe, instance, optional_package
@@ -310,7 +312,7 @@ def load_table(path: str | os.PathLike[str], *, origin: Origin = WORLD, trust: b
     if not is_file(source):
         raise InvalidDecals(f"{str(path)!r}: expected a table of decals, found no such file")
     if source.suffix.lower() == ".parquet":
-        return _loaded(source, _parquet(source), lambda row: f"row {row + 1}", trust)
+        return _loaded(source, _arrays_of(read_parquet(source)), lambda row: f"row {row + 1}", trust)
     columns, lines = _csv_columns(source)
     for name, shift in zip("xyz", origin, strict=True):
         if shift and name in columns:
@@ -364,8 +366,14 @@ def _arrays_of(table: object) -> dict[str, NDArray[Any]]:
     columns: dict[str, NDArray[Any]] = {}
     for name in listed:
         values: Any = table[name]
-        columns[str(name)] = values.to_numpy() if hasattr(values, "to_numpy") else np.asarray(values)
+        columns[str(name)] = values.to_numpy() if hasattr(values, "to_numpy") else _array_of(values)
     return columns
+
+
+def _array_of(values: object) -> NDArray[Any]:
+    """Return the values of a column; texts stay objects, as an array of them has the longest in each row."""
+    texts = isinstance(values, list | tuple) and any(isinstance(value, str) for value in values)
+    return np.asarray(values, object if texts else None)
 
 
 def _decals_of(columns: Mapping[str, NDArray[Any]], where: Callable[[str, int], str]) -> Decals:
@@ -399,7 +407,7 @@ def _values(
 ) -> NDArray[Any]:
     """Return the checked values of a column."""
     if column.kind == "text":
-        return np.array(["" if _is_empty(value) else str(value) for value in values.tolist()], np.str_)
+        return np.array(["" if _is_empty(value) else str(value) for value in values.tolist()], TEXT)
     if column.kind in ("interaction", "truth"):
         known: dict[str, Any] = (
             _TRUTHS if column.kind == "truth" else {kind: place for place, kind in enumerate(_NAMES)}
@@ -518,16 +526,6 @@ def _long_cells() -> Any:
         yield
     finally:
         csv.field_size_limit(before)
-
-
-def _parquet(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the columns of a Parquet file."""
-    parquet = optional_package("pyarrow.parquet", "experiments")
-    try:
-        return _arrays_of(parquet.read_table(path, partitioning=None))
-    except (ValueError, OSError) as error:  # errors of pyarrow are these
-        reason = str(error).splitlines()[0]
-        raise InvalidDecals(f"{str(path)!r}: expected a Parquet file ({reason}); write it again") from error
 
 
 # -- images ----------------------------------------------------------------------------------------------

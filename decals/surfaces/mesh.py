@@ -29,7 +29,7 @@ from decals.surfaces.surface import (
 )
 from decals.surfaces.topology import edge_twins, parts_of, welded
 from decals.surfaces.windings import MeshOrientation, Triangles, Windings, wind
-from decals.validation import member, whole_number
+from decals.validation import count_number, member, whole_number
 
 MIN_FACE_QUALITY = 1e-6
 """Smallest ratio of a face's doubled area to its squared edges; faces below it have no usable normal.
@@ -240,7 +240,7 @@ class MeshSurface(Value):
         One point falls into each ``1/count`` of the area, in the order of the faces. Within a face, points
         are jittered around a sequence of low discrepancy, so that all parts of large faces get their share.
         """
-        whole_number("count", count, 0, MAX_SAMPLES, InvalidScattering)
+        count = count_number("count", count, 0, MAX_SAMPLES, InvalidScattering)
         rng = np.random.default_rng(whole_number("seed", seed, 0, None, InvalidScattering))
         levels = (np.arange(count) + rng.random(count)) * (self.area / max(count, 1))
         face = np.minimum(np.searchsorted(self._cumulative, levels, side="right"), len(self._corners) - 1)

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.files import is_file
+from decals.child_process import can_isolate
 from decals.errors import InvalidMesh
 from decals.surfaces.base_color import checked_color
 from decals.surfaces.dataset_colors import dataset_color, has_colors
@@ -29,7 +30,7 @@ from decals.surfaces.files.stl import read_stl
 from decals.surfaces.files.threemf import read_3mf, threemf_objects
 from decals.surfaces.mesh_data import MeshData, joined
 from decals.surfaces.triangulate import Polygons, Triangulation, triangulate
-from decals.surfaces.vtk_process import can_isolate, read_isolated
+from decals.surfaces.vtk_process import read_isolated
 from decals.validation import as_path, describe
 
 if TYPE_CHECKING:  # its import takes longer than ours, and meshes of arrays do without

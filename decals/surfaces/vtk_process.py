@@ -7,12 +7,9 @@ import atexit
 import json
 import math
 import os
-import signal
 import subprocess
-import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -22,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree.progress import check_cancelled, ended_by_cancel
+from decals.child_process import Child, kill, start_child, time_limit
 from decals.errors import InvalidMesh
 from decals.surfaces.base_color import BaseColor
 from decals.surfaces.mesh_data import MeshData
@@ -37,11 +35,6 @@ PATIENCE = 50.0
 
 MEMORY, MEMORY_PER_BYTE = 2 << 30, 64
 """Bytes of memory for reading: for any file, and per byte of it."""
-
-
-def can_isolate() -> bool:
-    """Return True if a Python of its own can be started; not in programs that embed or freeze Python."""
-    return bool(sys.executable) and not getattr(sys, "frozen", False)
 
 
 def read_isolated(path: Path) -> MeshData:
@@ -67,7 +60,7 @@ class _ReaderProcess:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._child: subprocess.Popen[bytes] | None = None
+        self._child: Child | None = None
         self._requests = count()
 
     def read(self, path: Path) -> MeshData:
@@ -113,7 +106,7 @@ class _ReaderProcess:
         request["number"] = next(self._requests)
         assert child.stdin is not None
         assert child.stdout is not None
-        with _time_limit(child, seconds), ended_by_cancel(partial(_kill, child)):
+        with time_limit(child, seconds), ended_by_cancel(partial(kill, child)):
             try:
                 child.stdin.write(json.dumps(request).encode() + b"\n")
                 child.stdin.flush()
@@ -128,22 +121,16 @@ class _ReaderProcess:
             return self._answer(request, seconds)
         return (header, arrays) if whole else None
 
-    def _started(self) -> "subprocess.Popen[bytes]":
+    def _started(self) -> Child:
         """Return the process, started again if it has ended."""
         if self._child is not None and self._child.poll() is None:
             return self._child
         self.stop()
-        folders = os.pathsep.join(folder or str(Path.cwd()) for folder in sys.path)
-        self._child = child = subprocess.Popen(
-            [sys.executable, "-P", "-W", "ignore", "-m", "decals.surfaces.vtk_child"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            env={**os.environ, "PYTHONPATH": folders},
-            start_new_session=True,  # Control-C is for the parent, and `_kill` reaches the forks of the child
+        self._child = child = start_child(
+            "decals.surfaces.vtk_child", stdin=subprocess.PIPE, stderr=subprocess.DEVNULL
         )
         assert child.stdout is not None
-        with _time_limit(child, START_SECONDS), ended_by_cancel(partial(_kill, child)):
+        with time_limit(child, START_SECONDS), ended_by_cancel(partial(kill, child)):
             ready = child.stdout.readline()
         check_cancelled("starting the process that reads meshes")
         if not ready:
@@ -160,7 +147,7 @@ class _ReaderProcess:
         """End the process, and with it the reading."""
         child, self._child = self._child, None
         if child is not None:
-            _kill(child)
+            kill(child)
             child.wait()
             _close_pipes(child)
 
@@ -173,28 +160,7 @@ class _ReaderProcess:
             _close_pipes(child)
 
 
-@contextmanager
-def _time_limit(child: "subprocess.Popen[bytes]", seconds: float) -> Iterator[None]:
-    """Kill a process unless the ``with`` block ends in time; a read from its pipe then ends too."""
-    timer = threading.Timer(seconds, _kill, [child])
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
-
-
-def _kill(child: "subprocess.Popen[bytes]") -> None:
-    """Kill a process and the forks that it made."""
-    with suppress(OSError):
-        if sys.platform == "win32":
-            child.kill()
-        else:
-            os.killpg(child.pid, signal.SIGKILL)
-
-
-def _close_pipes(child: "subprocess.Popen[bytes]") -> None:
+def _close_pipes(child: Child) -> None:
     for pipe in (child.stdin, child.stdout):
         if pipe is not None:
             with suppress(OSError):  # a request that could not be sent

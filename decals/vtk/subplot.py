@@ -33,7 +33,7 @@ from decals.scenes.origin import WORLD
 from decals.scenes.scene import Scene
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.surfaces.windings import MeshOrientation
-from decals.validation import finite_number, member, whole_number
+from decals.validation import count_number, finite_number, member
 from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
 from decals.vtk.attributes import KnownAttributes
 from decals.vtk.frame import FrameKey, FrameOptions, FrameRenderer, WindowContext
@@ -312,7 +312,7 @@ class SubplotRenderer(KnownAttributes):
 
     @samples.setter
     def samples(self, samples: int) -> None:
-        self._samples = whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
+        self._samples = count_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
 
     @property
     def drawing(self) -> Drawing:

@@ -27,7 +27,7 @@ from decals.scenes.files import load_scene
 from decals.scenes.objects import SceneObject
 from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model
-from decals.validation import describe, whole_number
+from decals.validation import count_number, describe
 from decals.vtk.adapters import weak_callback
 from decals.vtk.subplot import MAX_SAMPLES, SubplotRenderer
 from decals.vtk.window_title import WindowTitle
@@ -145,7 +145,7 @@ class EditWindow:
         if not isinstance(scene, Scene | EditSession):
             raise InvalidScene(f"expected a Scene or an EditSession to edit, got {type(scene).__name__}")
         size = checked_size(size)
-        whole_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
+        samples = count_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
         if path is not None and not isinstance(path, str | os.PathLike):
             raise InvalidScene(f"path: expected a path to save to, got {describe(path)}")
         require_gl()

@@ -607,13 +607,17 @@ def test_a_refused_value_marks_its_field_and_says_the_range(window: EditWindow) 
     sandbox = Sandbox(window)
     for raw, reason in (
         (-5, "count: expected a whole number from 0 to"),
+        ("12.5", "count: expected a whole number, got '12.5'"),
         ("abc", "count: expected a finite number"),
     ):
         sandbox.set_control("scattering", "count", raw)
         fields = sandbox.values()["fields"]
         assert (fields["refused"], fields["control"]) == ("scattering count",) * 2
         assert reason in fields["text"]
-    assert fields["resets"] == {"scattering count": 2}
+    assert fields["resets"] == {"scattering count": 3}
+    sandbox.set_control("scattering", "count", "1.2e1")
+    assert sandbox.values()["fields"]["refused"] == ""
+    sandbox.set_control("scattering", "count", "abc")
     for name, raw in (("factor", -1), ("regularity", 2), ("seed", -1)):
         sandbox.set_control("scattering", name, raw)
         assert sandbox.values()["fields"]["refused"] == f"scattering {name}"

@@ -19,9 +19,9 @@ from decals.baking.seams import Seams
 from decals.baking.surface_colors import SurfaceColors
 from decals.baking.texture import Channels, Sheet, bake_texture
 from decals.baking.unwrapped import Unwrapped
+from decals.child_process import can_isolate
 from decals.errors import Cancelled, InvalidMesh
 from decals.surfaces import BaseColor, BaseTexture
-from decals.surfaces.vtk_process import can_isolate
 from tests.decals.baking.glb import (
     BALL,
     Array,
