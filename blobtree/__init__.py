@@ -4,6 +4,11 @@ The pipeline: tree → program → tape → value, gradient, colour → rays (`t
 The public names are listed in `__init__.pyi` and are loaded at first use, so `import blobtree` is cheap.
 """
 
+from importlib import import_module
+
+from blobtree.declare.registry import register_library
 from blobtree.lazy import attach_stub
 
 __getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
+
+register_library(lambda: import_module("blobtree.nodes.kinds"))

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Union, cast, get_type_
 
 import msgspec
 
-from blobtree.custom.definition import find_kind
+from blobtree.custom.definition import CUSTOM_KINDS
 from blobtree.custom.field import CustomField
 from blobtree.custom.operator import CustomCombination
 from blobtree.custom.skeleton import CustomPrimitive
@@ -330,7 +330,7 @@ def _node_of(record: NodeRecord, earlier: list[Node]) -> Node:
 def _custom_node(base: type[Node], values: dict[str, Any]) -> Node:
     """Return a node of a custom kind."""
     name, parameters = values.pop("kind"), values.pop("values")
-    kind: Any = find_kind(name)
+    kind: Any = CUSTOM_KINDS.find(name)
     if not issubclass(kind, base):
         raise InvalidFile(f"kind {name!r} is defined as {kind.__mro__[1].__name__}, not {base.__name__}")
     expected = {parameter.name for parameter in kind.parameters}

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 
 import blobtree.kernels as kernels
-from blobtree.custom import definition
+from blobtree.custom.definition import CUSTOM_KINDS
 from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.graphics import missing_gl_libraries
 
@@ -154,11 +154,12 @@ def pytest_collection_finish() -> None:
 
 
 @pytest.fixture(autouse=True)
-def own_kinds(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def own_kinds() -> Iterator[None]:
     """Give each test its own registries: pages and examples define kinds under names of other tests."""
-    monkeypatch.setattr(definition, "_KINDS", dict(definition._KINDS))
-    falloffs = dict(FALLOFF_NAMES)
+    kinds, falloffs = dict(CUSTOM_KINDS), dict(FALLOFF_NAMES)
     yield
+    CUSTOM_KINDS.clear()
+    CUSTOM_KINDS.update(kinds)
     FALLOFF_NAMES.update(falloffs)
 
 

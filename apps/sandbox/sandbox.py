@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
 from blobtree import Node
-from blobtree.custom.definition import custom_kinds
+from blobtree.custom.definition import CUSTOM_KINDS
 from decals.apps.sandbox import decal_panel
 from decals.apps.sandbox.controls import KIND, controls_of, exchanged, kind_control, parsed, parsed_option
 from decals.apps.sandbox.display import PHASES, Display
@@ -221,7 +221,7 @@ class Sandbox:
         """Return the names of the kinds that can be added, by family, and what each is."""
         return {
             **new_nodes.families(),
-            "custom": [kind.__name__ for kind in custom_kinds()],
+            "custom": [kind.__name__ for kind in CUSTOM_KINDS.values()],
             "docs": {name: first_line(kind) for name, kind in new_nodes.kinds().items()},
         }
 

@@ -1,7 +1,6 @@
 """Definitions of custom kinds: parameters and claims read from typed functions, and a registry by name."""
 
 import copyreg
-import importlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar
@@ -10,7 +9,7 @@ import numpy as np
 import warp as wp
 
 from blobtree.custom.source import CustomSource, custom_source, node_class, spelled
-from blobtree.errors import UnknownKind
+from blobtree.declare.registry import Definitions
 from blobtree.nodes.parameters import Parameter, Quantity
 from blobtree.nodes.tree import Node
 
@@ -209,17 +208,11 @@ class CustomNode(metaclass=CustomKind):
         return {parameter.name: getattr(self, parameter.name) for parameter in self.parameters}
 
 
-_KINDS: dict[str, CustomKind] = {}
-
-
-def register(kind: CustomKind) -> None:
-    """Register a kind under its name, in place of an earlier one."""
-    _KINDS[kind.kind] = kind
-
-
-def registered(name: str) -> CustomKind | None:
-    """Return the kind of this name, None if it is not defined."""
-    return _KINDS.get(name)
+CUSTOM_KINDS: Definitions[CustomKind] = Definitions(
+    "custom kind",
+    "define_skeleton, define_operator, define_field or define_warp for it (on the command line: --define)",
+)
+"""All kinds that are defined in this process, in the order of their definition."""
 
 
 def defined_kind(
@@ -237,7 +230,7 @@ def defined_kind(
 
     `row` returns attributes of the class, such as the row of its table. `fields` follow the parameters.
     """
-    known = registered(kind)
+    known = CUSTOM_KINDS.get(kind)
     if known is not None and issubclass(known, base) and known.digest == digest:
         return known
     check()
@@ -245,43 +238,12 @@ def defined_kind(
     described = source.python.__doc__ or f"A node of the custom kind {kind!r}."
     namespace = {"__doc__": described, "kind": kind, "digest": digest, "parameters": parameters, **row()}
     node: Any = node_class(kind, source, [*declared, *fields], base, namespace)
-    register(node)
+    CUSTOM_KINDS[kind] = node
     return node
 
 
-def custom_kinds() -> tuple[CustomKind, ...]:
-    """Return all kinds that are defined in this process, in the order of their definition."""
-    return tuple(_KINDS.values())
-
-
-def find_kind(name: str) -> CustomKind:
-    """Return the kind of this name.
-
-    Raises
-    ------
-    UnknownKind
-        It is not defined in this process.
-    """
-    if name not in _KINDS:
-        known = ", ".join(sorted(_KINDS)) or "none"
-        raise UnknownKind(
-            f"custom kind {name!r} is not defined in this process (defined: {known}); import the module that "
-            "calls define_skeleton, define_operator, define_field or define_warp for it "
-            "(on the command line: --define), then try again"
-        )
-    return _KINDS[name]
-
-
 def _unpickled(name: str, module: str) -> CustomKind:
-    """Return the kind of this name; import its module first if it is not defined yet."""
-    if name not in _KINDS and module != "__main__":
-        try:
-            importlib.import_module(module)
-        except ImportError as error:
-            raise UnknownKind(
-                f"custom kind {name!r}: its module {module!r} cannot be imported: {error}"
-            ) from None
-    return find_kind(name)
+    return CUSTOM_KINDS.unpickled(name, module)
 
 
 def _pickled(kind: CustomKind) -> tuple[Any, ...]:

@@ -5,13 +5,12 @@ rim lies at the visible radius (`tape.evaluators.profile_distance`).
 """
 
 import copyreg
-import importlib
 import math
 from typing import Any
 
 import warp as wp
 
-from blobtree.errors import UnknownKind
+from blobtree.declare.registry import Definitions
 from blobtree.formulas.falloff import WYVILL, Falloff
 
 wp.set_module_options({"enable_backward": False})
@@ -117,25 +116,14 @@ CAUCHY = Falloff("cauchy", cauchy_value, cauchy_slope, 0.29702345561972554, 0.22
 MORE_FALLOFFS = (SOFT_OBJECT, BLANC_SCHLICK, METABALL, GAUSSIAN, CAUCHY)
 """The falloffs outside the core."""
 
-FALLOFF_NAMES: dict[str, Falloff] = {row.name: row for row in (WYVILL, *MORE_FALLOFFS)}
+FALLOFF_NAMES: Definitions[Falloff] = Definitions("falloff", "define_falloff for it")
 """Every falloff by its name in files; `define_falloff` adds to it."""
+
+FALLOFF_NAMES.update({row.name: row for row in (WYVILL, *MORE_FALLOFFS)})
 
 
 def _unpickled(name: str, module: str) -> Falloff:
-    """Return the falloff of this name; import the module that defines it first if it is not defined yet."""
-    if name not in FALLOFF_NAMES and module not in ("", "__main__"):
-        try:
-            importlib.import_module(module)
-        except ImportError as error:
-            raise UnknownKind(
-                f"falloff {name!r}: its module {module!r} cannot be imported: {error}"
-            ) from None
-    if name not in FALLOFF_NAMES:
-        raise UnknownKind(
-            f"falloff {name!r} is not defined in this process (defined: {', '.join(FALLOFF_NAMES)}); import "
-            "the module that calls define_falloff for it, then try again"
-        )
-    return FALLOFF_NAMES[name]
+    return FALLOFF_NAMES.unpickled(name, module)
 
 
 def _pickled(falloff: Falloff) -> tuple[Any, ...]:

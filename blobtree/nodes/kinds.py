@@ -1,5 +1,6 @@
 """All built-in classes of nodes: the import of each file that defines some fills `NODE_KINDS`."""
 
+from blobtree.declare.registry import NODE_KINDS
 from blobtree.nodes import (
     blends,
     contact,
@@ -12,7 +13,6 @@ from blobtree.nodes import (
     solids,
     volumes,
 )
-from blobtree.nodes.tree import NODE_KINDS
 
 __all__ = [
     "NODE_KINDS",

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import MISSING, dataclass, field, replace
 from functools import partial
-from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, get_type_hints
 
 import numpy as np
@@ -19,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array
 from blobtree.cells.prune_kernels import measure_range
+from blobtree.declare.registry import NODE_KINDS, kind_of
 from blobtree.derivatives.curvature import Curvatures, curvatures_of, hessians_at
 from blobtree.errors import InvalidNode, InvalidPoints
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
@@ -73,9 +73,6 @@ REST_RESOLUTION = 48
 
 COORDINATE_MARGIN = 2.0**-21
 """Margin around a box of `Node.interval`, over its largest coordinate, for the rounding of its centre."""
-
-NODE_KINDS: dict[str, type["Node"]] = {}
-"""Every built-in class of nodes by its name in files."""
 
 
 class Node(ImplicitModel):
@@ -300,7 +297,7 @@ class Node(ImplicitModel):
         """
         if limits is None:
             return Twist(self, degrees)
-        return _deformed("limited_twist", self, degrees, *_limits(limits))
+        return _kind("limited_twist")(self, degrees, *_limits(limits))
 
     def taper(self, factor: float, limits: tuple[float, float]) -> "Node":
         """Return this node with cross-sections that grow with the height, see `Taper`.
@@ -323,7 +320,7 @@ class Node(ImplicitModel):
         >>> Segment((0, 0, 0), (0, 0, 2), radius=0.5).taper(0.5, (0, 2))([[0.25, 0, 2]]).round(3).tolist()
         [0.5]
         """
-        return _deformed("taper", self, factor, *_limits(limits))
+        return _kind("taper")(self, factor, *_limits(limits))
 
     def bend(self, degrees: float, limits: tuple[float, float]) -> "Node":
         """Return this node bent about an axis parallel to y, see `Bend`.
@@ -348,7 +345,7 @@ class Node(ImplicitModel):
         >>> arc([[6 / 3.14159265, 0, 6 / 3.14159265]]).round(3).tolist()
         [1.0]
         """
-        return _deformed("bend", self, degrees, *_limits(limits))
+        return _kind("bend")(self, degrees, *_limits(limits))
 
     def shear(self, slope_x: float, slope_y: float, limits: tuple[float, float]) -> "Node":
         """Return this node with cross-sections that move sideways, see `Shear`.
@@ -371,7 +368,7 @@ class Node(ImplicitModel):
         >>> Point((0, 0, 1), radius=0.5).shear(0.5, 0, (0, 2))([[0.5, 0, 1]]).round(3).tolist()
         [1.0]
         """
-        return _deformed("shear", self, slope_x, slope_y, *_limits(limits))
+        return _kind("shear")(self, slope_x, slope_y, *_limits(limits))
 
     def stretch(self, factor: float, limits: tuple[float, float]) -> "Node":
         """Return this node with the part between two heights longer by a factor, see `Stretch`.
@@ -394,7 +391,7 @@ class Node(ImplicitModel):
         >>> Point((0, 0, 2), radius=0.5).stretch(3, (0, 1))([[0, 0, 4]]).round(3).tolist()
         [1.0]
         """
-        return _deformed("stretch", self, factor, *_limits(limits))
+        return _kind("stretch")(self, factor, *_limits(limits))
 
     def noise_warp(self, amplitude: float, wavelength: float, *, seed: int = 0) -> "Node":
         """Return this node displaced by smooth noise, see `NoiseWarp`.
@@ -420,7 +417,7 @@ class Node(ImplicitModel):
         >>> bool(rough([[9, 0, 0]])[0] == 0.0)
         True
         """
-        return _deformed("noise_warp", self, amplitude, wavelength, seed)
+        return _kind("noise_warp")(self, amplitude, wavelength, seed)
 
     def curve_warp(self, source: ArrayLike, target: ArrayLike, reach: float) -> "Node":
         """Return this node deformed so that points of a curve move to others, see `CurveWarp`.
@@ -445,7 +442,7 @@ class Node(ImplicitModel):
         >>> arched([[0, 0, 0.3]]).round(3).tolist()
         [1.0]
         """
-        return _deformed("curve_warp", self, source, target, reach)
+        return _kind("curve_warp")(self, source, target, reach)
 
     def offset(self, distance: float) -> "Offset":
         """Return this node with every visible radius larger by a distance, see `Offset`.
@@ -1156,6 +1153,9 @@ class Twist(Placed):
         return (math.radians(self.degrees),)
 
 
+_kind: Callable[[str], Callable[..., Node]] = kind_of
+"""`kind_of` for classes whose files import this one."""
+
 _CHECKS: dict[type[Node], list[tuple[str, Callable[[Any], Any], Any]]] = {}
 
 
@@ -1216,12 +1216,6 @@ def _nodes(operands: Iterable[Node]) -> tuple[Node, ...]:
         if not isinstance(node, Node):
             raise InvalidNode(f"operands: expected BlobTree nodes, got {node!r}")
     return nodes
-
-
-def _deformed(tag: str, *arguments: Any) -> Node:
-    """Return a node of `nodes.deformations`, whose classes derive from those of this file."""
-    import_module("blobtree.nodes.kinds")
-    return NODE_KINDS[tag](*arguments)
 
 
 def _limits(limits: tuple[float, float]) -> tuple[float, float]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from blobtree import InvalidNode, Node
 from blobtree._typing import Float64Array
-from blobtree.custom.definition import custom_kinds
+from blobtree.custom.definition import CUSTOM_KINDS
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.parameters import Parameter, Quantity, parameters_of
 from blobtree.nodes.primitives import Leaf
@@ -75,7 +75,7 @@ def built_in_kinds() -> dict[str, type[Node]]:
 
 def kinds() -> dict[str, type[Node]]:
     """Return all classes of nodes that a scene can get, by name: built-in ones, then custom ones."""
-    custom: dict[str, Any] = {kind.__name__: kind for kind in custom_kinds()}
+    custom: dict[str, Any] = {kind.__name__: kind for kind in CUSTOM_KINDS.values()}
     return built_in_kinds() | custom
 
 

@@ -8,7 +8,6 @@ functions in which the callees are replaced, so all backends evaluate the same f
 # mypy: disable-error-code="operator, arg-type, return-value, no-any-return"
 # (kernel code is Python only in form: its names have Warp types)
 
-import importlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 from blobtree.custom.checks import result_of, shown
 from blobtree.custom.falloff import check_falling, find_rim
 from blobtree.custom.source import CustomSource, custom_source, kind_name
+from blobtree.declare.registry import Definitions
 from blobtree.errors import InvalidDefinition, UnknownKind
 from blobtree.formulas.falloff import Falloff
 from blobtree.formulas.falloffs import FALLOFF_NAMES
@@ -228,13 +228,7 @@ def _unpickled(name: str, base: str, digest: str, module: str) -> ContactLaw:
     """Return the law of this name; import its module first if it is not defined yet."""
     if name not in LAWS and name in FALLOFF_NAMES:
         define_contact(name, combine=base)
-    if name not in LAWS and module != "__main__":
-        try:
-            importlib.import_module(module)
-        except ImportError as error:
-            raise UnknownKind(
-                f"contact law {name!r}: module {module!r} cannot be imported: {error}"
-            ) from None
+    LAWS.load(name, module)
     if name not in LAWS or LAWS[name].digest != digest:
         known = "another contact law of this name" if name in LAWS else "none"
         raise UnknownKind(
@@ -247,7 +241,7 @@ def _unpickled(name: str, base: str, digest: str, module: str) -> ContactLaw:
 AnyContact = Contact | ContactLaw
 """A contact mode, or a law in place of one."""
 
-LAWS: dict[str, ContactLaw] = {}
+LAWS: Definitions[ContactLaw] = Definitions("contact law", "define_contact for it")
 """The laws that were defined, by name."""
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from blobtree import InvalidFile, Node, Point, Union, from_json, load, save, to_json
 from blobtree.io import RECORD_OF_KIND
-from blobtree.nodes.tree import NODE_KINDS
+from blobtree.nodes.kinds import NODE_KINDS
 from tests.blobtree.custom_kinds import Ring, Soft
 from tests.blobtree.trees import KINDS, random_trees, trees
 
@@ -73,7 +73,7 @@ def test_every_built_in_kind_of_node_has_a_record() -> None:
     assert {kind.file_tag for kind in KINDS} <= set(NODE_KINDS)
     assert set(RECORD_OF_KIND) == set(NODE_KINDS.values())
     for kind, record in RECORD_OF_KIND.items():
-        names = {field.name for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
+        names = {field.name for field in dataclasses.fields(kind)}
         assert set(record.__struct_fields__) == names
 
 

@@ -20,7 +20,7 @@ from blobtree import (
     from_json,
     to_json,
 )
-from blobtree.custom import definition as registry
+from blobtree.custom.definition import CUSTOM_KINDS, CustomKind
 from tests.blobtree import custom_kinds
 from tests.blobtree.custom_kinds import CUSTOM_TREES, SOFTEST, Carve, Mean, Ring, Soft, Swell
 
@@ -32,8 +32,8 @@ RING_DOC = "A circle of radius `size` around `axis`."
 def names_are_ours() -> None:
     """Another test's definitions may have taken the names of these kinds."""
     for kind in vars(custom_kinds).values():
-        if isinstance(kind, registry.CustomKind):
-            registry.register(kind)
+        if isinstance(kind, CustomKind):
+            CUSTOM_KINDS[kind.kind] = kind
 
 
 def test_a_definition_gives_a_node_class() -> None:
@@ -63,7 +63,7 @@ def test_the_same_definition_twice_is_one_kind_and_another_one_takes_its_name() 
     assert first is same
     other = define_skeleton(spot, limits={"place": (0.0, 5.0)})
     assert other is not first
-    assert registry.find_kind("spot") is other
+    assert CUSTOM_KINDS.find("spot") is other
     both = first((0, 0, 0), radius=1.0) + other((1, 0, 0), radius=1.0)
     plain = Point((0, 0, 0), radius=1.0) + Point((1, 0, 0), radius=1.0)
     assert len(both.tape.skeletons) == 2
@@ -182,4 +182,4 @@ def test_another_process_imports_the_definition_or_says_that_it_cannot(
 
 def test_a_kind_that_nobody_defined() -> None:
     with pytest.raises(UnknownKind, match="'hexagon' is not defined in this process"):
-        registry.find_kind("hexagon")
+        CUSTOM_KINDS.find("hexagon")

@@ -24,10 +24,10 @@ from blobtree import (
     polygonize,
     to_json,
 )
+from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.paths import moved, primitive_at, primitive_paths, resized
 from blobtree.nodes.surgery import dominant_primitive
-from blobtree.nodes.tree import NODE_KINDS
 from blobtree.tape.codes import FIELD, PREFIX
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
 from tests.blobtree.nodes.test_primitives import PLACEMENTS

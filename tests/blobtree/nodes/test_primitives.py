@@ -41,10 +41,10 @@ from blobtree.formulas.falloff import RIM
 from blobtree.formulas.library import LIBRARY_SKELETONS
 from blobtree.formulas.skeletons import SKELETONS
 from blobtree.nodes.curves import JoinedSegment
+from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.parameters import Quantity, describe, parameters_of
 from blobtree.nodes.paths import moved, resized
 from blobtree.nodes.primitives import PROFILE, Leaf, Primitive, Profile
-from blobtree.nodes.tree import NODE_KINDS
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
 from tests.blobtree.trees import SOLIDS, points_around
 from tests.oracles import blobtree as oracle

@@ -1,0 +1,81 @@
+"""Registries: kinds of nodes by their tags in files, and users' definitions by their names.
+
+A class of nodes registers itself when it is defined. So files, panels and the nodes' own methods find a kind
+by its tag, and need not import it. The package's root says how to load the library (`register_library`);
+that happens at the first question about a kind that is not there yet.
+"""
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, TypeVar
+
+from blobtree.errors import UnknownKind
+
+Definition = TypeVar("Definition")
+
+NODE_KINDS: dict[str, type[Any]] = {}
+"""The classes of nodes that are loaded, by their tags; `blobtree.nodes.kinds` loads all."""
+
+_libraries: list[Callable[[], object]] = []
+
+
+def register_library(load: Callable[[], object]) -> None:
+    """Let `load` be called when a kind is looked up that is not loaded; it imports more kinds."""
+    _libraries.append(load)
+
+
+def kind_of(tag: str) -> type[Any]:
+    """Return the class of nodes with this tag."""
+    if tag not in NODE_KINDS:
+        for load in _libraries:
+            load()
+    return NODE_KINDS[tag]
+
+
+class Definitions(dict[str, Definition]):
+    """Definitions of one sort by their names in files.
+
+    `noun` is what messages call one, `makers` are the functions that define some.
+    """
+
+    def __init__(self, noun: str, makers: str) -> None:
+        super().__init__()
+        self.noun, self.makers = noun, makers
+
+    def find(self, name: str) -> Definition:
+        """Return the definition of this name.
+
+        Raises
+        ------
+        UnknownKind
+            It is not defined in this process.
+        """
+        if name not in self:
+            raise UnknownKind(
+                f"{self.noun} {name!r} is not defined in this process (defined: "
+                f"{', '.join(sorted(self)) or 'none'}); import the module that calls {self.makers}, "
+                "then try again"
+            )
+        return self[name]
+
+    def load(self, name: str, module: str) -> None:
+        """Import the module that defines a name, unless it is defined or no module does.
+
+        Raises
+        ------
+        UnknownKind
+            The module cannot be imported.
+        """
+        if name in self or module in ("", "__main__"):
+            return
+        try:
+            import_module(module)
+        except ImportError as error:
+            raise UnknownKind(
+                f"{self.noun} {name!r}: its module {module!r} cannot be imported: {error}"
+            ) from None
+
+    def unpickled(self, name: str, module: str) -> Definition:
+        """Return what a pickle names by its name and its module."""
+        self.load(name, module)
+        return self.find(name)
