@@ -27,6 +27,7 @@ from .formulas.falloff import ISO, RIM, Falloff
 from .formulas.falloffs import FALLOFF_NAMES
 from .identity import content_hash
 from .io import from_json, load, save, to_json
+from .meshing.batch import polygonize_batch
 from .meshing.creases import split_creases
 from .meshing.mesh import Mesh
 from .meshing.polygonize import Polygonizer, polygonize
@@ -74,6 +75,7 @@ from .progress import Cancel, Progress
 from .sampling.field_grid import FieldGrid, field_grid
 from .sampling.tree_distances import SignedDistances, to_sdf
 from .tape.tape import Tape
+from .tracing.batch import BatchHits, raycast_batch
 from .tracing.trace import Hits
 
 __all__ = [
@@ -81,6 +83,7 @@ __all__ = [
     "ISO",
     "RIM",
     "Arc",
+    "BatchHits",
     "Bend",
     "BlendGraph",
     "Box",
@@ -192,6 +195,8 @@ __all__ = [
     "numeric_parameters",
     "numeric_values",
     "polygonize",
+    "polygonize_batch",
+    "raycast_batch",
     "sample",
     "save",
     "split_creases",

@@ -38,6 +38,14 @@ def items(value: object) -> tuple[Any, ...] | None:
         return None
 
 
+def axis_count(value: Any) -> int:
+    """Return the number of axes of an array or of nested lists."""
+    if hasattr(value, "ndim"):
+        return int(value.ndim) + len(getattr(value.dtype, "_shape_", ()))  # of Warp's vectors
+    listed = items(value) if isinstance(value, list | tuple) else None
+    return 0 if listed is None else 1 + max(map(axis_count, listed[:1]), default=1)
+
+
 def real(values: Any) -> NDArray[Any]:
     """Return values as an array; raise `TypeError` for texts, truth values and complex numbers.
 

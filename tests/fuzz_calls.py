@@ -102,6 +102,14 @@ def call_table() -> Calls:
         "from_json": (blobtree.from_json, {"text": blobtree.to_json(tree)}),
         "to_json": (blobtree.to_json, {"root": tree}),
         "polygonize": (blobtree.polygonize, {"tree": tree, "resolution": 8, "device": "cpu"}),
+        "polygonize_batch": (
+            blobtree.polygonize_batch,
+            {"trees": [tree, tree], "resolution": 8, "cell_size": None, "device": "cpu"},
+        ),
+        "raycast_batch": (
+            blobtree.raycast_batch,
+            {"trees": [tree, tree], "origins": points, "directions": directions, "device": "cpu"},
+        ),
         "polygonize by size": (blobtree.polygonize, {"tree": tree, "cell_size": 0.5}),
         "Decals": (
             decals.Decals,

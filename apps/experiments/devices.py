@@ -49,8 +49,8 @@ BY_KIND: dict[Kind, str] = {
     """,
     "rounding": """
         blobtree.Node.__call__ blobtree.Node.gradient blobtree.Node.colors blobtree.Node.raycast
-        blobtree.field_grid blobtree.fit blobtree.from_mesh blobtree.polygonize blobtree.sample
-        blobtree.to_sdf
+        blobtree.field_grid blobtree.fit blobtree.from_mesh blobtree.polygonize blobtree.polygonize_batch
+        blobtree.raycast_batch blobtree.sample blobtree.to_sdf
         decals.area_gradient decals.outlines decals.save_figure
         decals.evaluate decals.evaluate_batch decals.measure decals.displace decals.bake decals.export
         decals.scattering.gradient_of decals.surfaces.as_surface decals.editing.first_hit

@@ -33,6 +33,18 @@ class ChildGrid:
 
 
 @wp.struct
+class Lattices:
+    """Lattices of many models whose blocks lie in one list; no grids if there is one model alone.
+
+    The first digits of a block's key are then the number of its model, and `grids` holds that of each.
+    """
+
+    grids: wp.array(dtype=ChildGrid)
+    shift: wp.int64
+    """Bits of a key behind the number of the model."""
+
+
+@wp.struct
 class CellBlocks:
     """The finest blocks with their pruned tapes, their lattice, and the whole tape for all other points."""
 
@@ -46,6 +58,26 @@ class CellBlocks:
     """Side of a cell."""
     whole: Texels
     whole_span: wp.vec2i
+    models: Lattices
+    """The lattices of the blocks, if they are those of many models."""
+
+
+@wp.func
+def model_of(block: wp.int32, keys: wp.array(dtype=wp.int64), models: Lattices) -> wp.int32:
+    """Return the number of the model of a block; 0 if there is one model alone."""
+    if models.grids.shape[0] == 0:
+        return 0
+    return int(keys[block] >> models.shift)
+
+
+@wp.func
+def lattice_of(
+    block: wp.int32, keys: wp.array(dtype=wp.int64), single: ChildGrid, models: Lattices
+) -> ChildGrid:
+    """Return the lattice of a block's model; `single` is that of the only one."""
+    if models.grids.shape[0] == 0:
+        return single
+    return models.grids[model_of(block, keys, models)]
 
 
 @wp.func

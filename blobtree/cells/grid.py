@@ -11,6 +11,7 @@ import numpy as np
 
 from blobtree._typing import Float64Array, FloatArray
 from blobtree.errors import InvalidResolution
+from blobtree.lazy import Lazy
 
 BRANCHING_BITS = 2
 BRANCHING = 1 << BRANCHING_BITS
@@ -52,7 +53,7 @@ class Grid:
         """The root block's lowest corner (3,)."""
         return np.array(self.corner) + np.array(self.base) * self.cell_size
 
-    @property
+    @Lazy
     def pad(self) -> float:
         """Margin for rounding around a block; a power of two, so that it seldom changes with the grid."""
         far = self.origin + self.blocks_per_side * BRANCHING * self.cell_size

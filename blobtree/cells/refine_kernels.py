@@ -8,11 +8,13 @@ import warp as wp
 
 from blobtree.cells.block_kernels import (
     ChildGrid,
+    Lattices,
     LevelBlocks,
     block_center,
     block_key,
     child_block,
     find_block,
+    lattice_of,
 )
 from blobtree.cells.grid import CHILDREN
 from blobtree.cells.prune_kernels import prune
@@ -40,7 +42,8 @@ def refine_children(
     first: wp.int32,
     parents: wp.array(dtype=wp.int32),
     above: LevelBlocks,
-    grid: ChildGrid,
+    single: ChildGrid,
+    models: Lattices,
     write: wp.bool,
     children: wp.array(dtype=wp.int32),
     slots: wp.array(dtype=wp.int32),
@@ -60,6 +63,7 @@ def refine_children(
     if write and slots[child + 1] == slot:
         return
     block = child_block(above.blocks[parent], i % CHILDREN)
+    grid = lattice_of(parent, above.keys, single, models)
     center = block_center(grid.base + block, grid.corner, grid.size)
     half = 0.5 * grid.size + grid.pad
     result = prune(center, half, above.tape, above.spans[parent], level.tape, start + 1, write)

@@ -11,16 +11,18 @@ the tapes of the blocks that its influence reaches and on no others. So an edit 
 edited node has or had influence, whatever maps, warps and operators are above it in the tree.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array, Int32Array
-from blobtree.cells.block_kernels import CellBlocks, ChildGrid, LevelBlocks
+from blobtree.cells.block_kernels import CellBlocks, ChildGrid, Lattices, LevelBlocks
 from blobtree.cells.cull_kernels import count_reaching, write_reached_children, write_reaching
-from blobtree.cells.grid import BRANCHING, CHILDREN, Grid
+from blobtree.cells.grid import BRANCHING, BRANCHING_BITS, CHILDREN, KEY_DIGITS, Grid
 from blobtree.cells.refine_kernels import (
     copy_children,
     inherit_child_texels,
@@ -33,6 +35,7 @@ from blobtree.device import demand_memory, known_device, launch
 from blobtree.errors import InvalidNode, InvalidResolution
 from blobtree.formulas.operators import DIFFERENCE, RICCI, SUM, UNION
 from blobtree.progress import Progress
+from blobtree.struct_rows import struct_rows
 from blobtree.tape.codes import UNWARP, WARP
 from blobtree.tape.tape import Tape
 
@@ -92,13 +95,18 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class SparseCells:
-    """The cells of a grid, in the blocks that the surface may cross alone."""
+    """The cells of a grid, in the blocks that the surface may cross alone.
+
+    Those of many models lie one after the other, see `joint_cells`.
+    """
 
     grid: Grid
     levels: tuple[Level, ...]
     """From the root, which is one block, to the finest."""
     device: str
     tape: Tape
+    models: tuple[Grid, ...] = ()
+    """The grid of each model, if there are several; all are as deep."""
 
     @property
     def leaves(self) -> Level:
@@ -114,8 +122,9 @@ class SparseCells:
         arrays.spans, arrays.tape = leaves.spans, leaves.tape
         arrays.base, arrays.corner = wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner)
         arrays.cell = grid.cell_size
-        whole = self.tape.on(self.device)
-        arrays.whole, arrays.whole_span = whole.data, whole.span
+        arrays.whole = self.levels[0].tape
+        arrays.whole_span = wp.vec2i(self.tape.start, len(self.tape.data))
+        arrays.models = lattices(self.models, grid.depth, self.device)
         return arrays
 
 
@@ -143,13 +152,24 @@ def build_cells(
     device = known_device(device)
     if previous is not None and not _comparable(previous, tape, grid, device):
         previous = None
-    levels = [_root(tape, grid, previous, device)]
-    for number in range(1, grid.depth + 1):
-        report("finding the surface", (number - 1) / grid.depth)
-        step = _Refinement(levels[-1], number, grid, previous, device, tape)
-        levels.append(step.level(pieces_to_cull(tape, device) if number == 1 else None))
+    root = SparseCells(grid, (_root(tape, grid, previous, device),), device, tape)
+    return refined(root, report, previous, pieces_to_cull(tape, device))
+
+
+def refined(
+    root: SparseCells,
+    report: Progress,
+    previous: SparseCells | None = None,
+    pieces: Int32Array | None = None,
+) -> SparseCells:
+    """Return cells with all levels below the root; `pieces` are those of its tape, if it is to be culled."""
+    cells, depth = root, root.grid.depth
+    for number in range(1, depth + 1):
+        report("finding the surface", (number - 1) / depth)
+        level = _Refinement(cells, previous).level(pieces if number == 1 else None)
+        cells = replace(cells, levels=(*cells.levels, level))
     report("finding the surface", 1.0)
-    return SparseCells(grid, tuple(levels), device, tape)
+    return cells
 
 
 def _comparable(previous: SparseCells, tape: Tape, grid: Grid, device: str) -> bool:
@@ -184,26 +204,20 @@ def _same_bits(first: Float32Array, second: Float32Array) -> bool:
 
 
 class _Refinement:
-    """The step from one level to the next."""
+    """The step from the last level to the next."""
 
-    def __init__(
-        self,
-        above: Level,
-        number: int,
-        grid: Grid,
-        previous: SparseCells | None,
-        device: str,
-        tape: Tape,
-    ) -> None:
-        self._above, self._device = above, device
+    def __init__(self, cells: SparseCells, previous: SparseCells | None) -> None:
+        above, number, grid, tape = cells.leaves, len(cells.levels), cells.grid, cells.tape
+        self._above, self._device = above, cells.device
         self._kernel, self._start = tape.instruction_set.kernel_for, tape.start
         self._grid = child_grid(grid, number)
+        self._models = lattices(cells.models, number, cells.device, above=number - 1)
         self._old, self._shift = _old_level(previous, grid, number)
         if self._old is not None and previous is not None and previous.grid.pad == grid.pad:
             self._changed = where_negative(above.sources)
             self._unchanged = where_negative(above.sources, negative=False)
         else:
-            self._changed, self._unchanged = arange(len(above), device), arange(0, device)
+            self._changed, self._unchanged = arange(len(above), cells.device), arange(0, cells.device)
 
     def level(self, pieces: Int32Array | None) -> Level:
         """Return the level below; `pieces` are those of the root's tape, if it is to be culled."""
@@ -262,7 +276,7 @@ class _Refinement:
 
     def _count_texels(self, outputs: list[DeviceArray]) -> None:
         """Count the texels of each child, and flag the children to keep."""
-        inputs = [self._changed, self._above.arrays, self._grid, False]
+        inputs = [self._changed, self._above.arrays, self._grid, self._models, False]
         count = len(self._changed) * CHILDREN
         launch(self._kernel(refine_children), count, inputs, [*outputs, self._above.arrays], self._device)
         if self._old is not None and len(self._unchanged):
@@ -273,7 +287,7 @@ class _Refinement:
     def _write(self, level: Level, slots: DeviceArray, starts: DeviceArray) -> None:
         """Write the blocks that are kept, their tapes and their sources."""
         above, outputs = self._above.arrays, [level.children, level.arrays]
-        inputs = [self._changed, above, self._grid, True]
+        inputs = [self._changed, above, self._grid, self._models, True]
         count = len(self._changed) * CHILDREN
         written = [level.children, slots, starts, level.arrays]
         launch(self._kernel(refine_children), count, inputs, written, self._device)
@@ -301,6 +315,40 @@ def child_grid(grid: Grid, number: int) -> Any:
     lattice.base, lattice.corner = wp.vec3i(*grid.base_of(number)), wp.vec3(*grid.corner)
     lattice.size, lattice.pad = grid.cell_size * grid.cells_along(number), grid.pad
     return lattice
+
+
+def first_blocks(count: int, level: int) -> NDArray[np.int64]:
+    """Return the coordinates (count, 3) of the first block of a level of each of many models in one list.
+
+    The root blocks of the models are the first blocks of a lattice, in the order of keys.
+    """
+    places = np.zeros((count, 3), np.int64)
+    for digit in range(KEY_DIGITS):
+        children = np.arange(count) >> (3 * BRANCHING_BITS * digit)
+        for axis, shift in enumerate((2 * BRANCHING_BITS, BRANCHING_BITS, 0)):
+            places[:, axis] += (children >> shift & (BRANCHING - 1)) << (BRANCHING_BITS * digit)
+    return places << (BRANCHING_BITS * level)
+
+
+def lattices(models: Sequence[Grid], number: int, device: str, *, above: int | None = None) -> Any:
+    """Return the lattices of a level of many models as an argument of kernels; none for one model alone.
+
+    Models are found by the keys of the blocks of this level, or of the one above.
+    """
+    result: Any = Lattices()
+    if models:
+        along = models[0].cells_along(number)  # all are as deep
+        bases = np.array([grid.base for grid in models]) // along
+        values: dict[str, ArrayLike] = {
+            "base": bases - first_blocks(len(models), number),
+            "corner": [grid.corner for grid in models],
+            "size": [grid.cell_size * along for grid in models],
+            "pad": [grid.pad for grid in models],
+        }
+        single: Any = ChildGrid()
+        result.grids = struct_rows(ChildGrid, single, len(models), device, parts={}, values=values)
+        result.shift = 3 * BRANCHING_BITS * (number if above is None else above)
+    return result
 
 
 def _old_level(

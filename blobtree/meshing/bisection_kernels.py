@@ -5,7 +5,7 @@ Most meshes have no such vertex, so that these kernels are rarely compiled.
 
 import warp as wp
 
-from blobtree.cells.block_kernels import CellBlocks
+from blobtree.cells.block_kernels import CellBlocks, model_of
 from blobtree.formulas.falloff import ISO
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.meshing.dual_kernels import SAMPLES, CellPatches, corner_sample
@@ -14,7 +14,7 @@ from blobtree.meshing.vertex_kernels import (
     EDGE_LAST,
     Patch,
     VertexArrays,
-    block_corner,
+    block_frame,
     corner_offset,
     crossing_mean,
     is_unconverged,
@@ -31,7 +31,12 @@ HALVINGS = 30
 
 @wp.func
 def bisect_edge(
-    patch: Patch, edge: wp.int32, corner: wp.vec3, cells: CellBlocks, values: wp.array(dtype=wp.float32)
+    patch: Patch,
+    edge: wp.int32,
+    corner: wp.vec3,
+    cell: wp.float32,
+    cells: CellBlocks,
+    values: wp.array(dtype=wp.float32),
 ) -> wp.vec3:
     """Return the inner end of the interval where an edge crosses the surface, in cells from `corner`."""
     a = EDGE_FIRST[edge]
@@ -41,7 +46,7 @@ def bisect_edge(
         inner, outer = outer, inner
     for _halving in range(HALVINGS):
         middle = 0.5 * (inner + outer)
-        if field_value(corner + middle * cells.cell, cells.tape, cells.spans[patch.block]) >= ISO:
+        if field_value(corner + middle * cell, cells.tape, cells.spans[patch.block]) >= ISO:
             inner = middle
         else:
             outer = middle
@@ -56,26 +61,32 @@ def bisect_unconverged(
     cells: CellBlocks,
     values: wp.array(dtype=wp.float32),
     patches: CellPatches,
+    unconverged: wp.array(dtype=wp.int32),
     vertices: VertexArrays,
 ) -> None:
-    """Move each unconverged vertex to the edge crossing of its patch nearest to the mean of these."""
+    """Move each unconverged vertex to the edge crossing of its patch nearest to the mean of these.
+
+    Models without one stay as they are: another evaluation may judge a vertex otherwise.
+    """
     patch = patch_of(identifiers[first + wp.tid()], listed, patches)
+    if unconverged[model_of(patch.block, cells.keys, cells.models)] == 0:
+        return
     span = cells.spans[patch.block]
-    corner = block_corner(patch.block, cells)
+    corner, cell = block_frame(patch.block, cells)
     mean = crossing_mean(patch, values, patches)
     position = vertices.positions[patch.vertex]
     value = field_value(position, cells.tape, span)
-    if not is_unconverged(value, position, corner + mean * cells.cell, cells.cell):
+    if not is_unconverged(value, position, corner + mean * cell, cell):
         return
     nearest = float(wp.inf)
     best = wp.vec3(0.0, 0.0, 0.0)
     for edge in range(12):
         if int(patches.patch_of_edge[patch.row * 12 + edge]) == patch.number:
-            crossing = bisect_edge(patch, edge, corner, cells, values)
+            crossing = bisect_edge(patch, edge, corner, cell, cells, values)
             distance = wp.length(crossing - mean)
             if distance < nearest:
                 nearest = distance
                 best = crossing
-    p = corner + best * cells.cell
+    p = corner + best * cell
     f = field_gradient(p, cells.tape, span)
     write_vertex(vertices, patch.vertex, p, f, field_color(p, cells.tape, span))

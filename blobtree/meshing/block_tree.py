@@ -12,7 +12,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, IndexArray, Int32Array
-from blobtree.cells.block_kernels import LevelBlocks
+from blobtree.cells.block_kernels import Lattices, LevelBlocks
 from blobtree.cells.grid import CHILDREN, KEY_DIGITS, MAX_CELL_COORDINATE, Grid
 from blobtree.cells.refine_kernels import refine_children
 from blobtree.cells.scan import DeviceArray, exclusive_scan
@@ -192,7 +192,7 @@ class BlockTree:
         of_parents = self.children.reshape(-1, CHILDREN)
         children = on_device(of_parents[parents].ravel(), wp.int32, device)
         flags, texels = (wp.zeros(count + 1, dtype=wp.int32, device=device) for _ in range(2))
-        inputs = [on_device(np.arange(len(parents)), wp.int32, device), above, lattice]
+        inputs = [on_device(np.arange(len(parents)), wp.int32, device), above, lattice, Lattices()]
         outputs = [children, flags, texels, self.level_arrays()]
         launch(self._kernel(refine_children), count, [*inputs, False], outputs, device)
         wanted = np.zeros(count + 1, np.int32)
@@ -226,8 +226,8 @@ class BlockTree:
         listed = on_device(np.arange(first, end), wp.int32, self._device)
         values: DeviceArray = wp.empty(count * SAMPLES, dtype=wp.float32, device=self._device)
         arrays = self.level_arrays()
-        inputs: list[Any] = [listed, arrays.blocks, arrays.spans, arrays.tape]
-        inputs += [wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner), grid.cell_size]
+        inputs: list[Any] = [listed, arrays.blocks, arrays.keys, arrays.spans, arrays.tape]
+        inputs += [child_grid(grid, grid.depth), Lattices()]
         launch(self._kernel(sample_blocks), count * SAMPLES, inputs, [values], self._device)
         samples: Float32Array = values.numpy().reshape(count, *(SAMPLES_PER_SIDE,) * 3)
         return samples

@@ -7,7 +7,16 @@ it, from two prunings of one tape, with the same result. Each kernel works on th
 
 import warp as wp
 
-from blobtree.cells.block_kernels import CellBlocks, child_number, child_offset, find_block, grid_point
+from blobtree.cells.block_kernels import (
+    CellBlocks,
+    ChildGrid,
+    Lattices,
+    child_number,
+    child_offset,
+    find_block,
+    grid_point,
+    lattice_of,
+)
 from blobtree.cells.grid import BRANCHING, CHILDREN
 from blobtree.formulas.falloff import ISO
 from blobtree.kernels import KERNEL_OPTIONS
@@ -18,6 +27,9 @@ from blobtree.texels import Texels
 wp.set_module_options(KERNEL_OPTIONS)
 
 SAMPLES_PER_SIDE = BRANCHING + 1
+
+CELLS = wp.constant(float(BRANCHING))
+"""Cells along a block."""
 
 SAMPLES = SAMPLES_PER_SIDE**3
 """Samples of a block."""
@@ -68,11 +80,11 @@ def sample_blocks(
     first: wp.int32,
     listed: wp.array(dtype=wp.int32),
     blocks: wp.array(dtype=wp.vec3i),
+    keys: wp.array(dtype=wp.int64),
     spans: wp.array(dtype=wp.vec2i),
     tape: Texels,
-    base: wp.vec3i,
-    corner: wp.vec3,
-    cell: wp.float32,
+    single: ChildGrid,
+    models: Lattices,
     values: wp.array(dtype=wp.float32),
 ) -> None:
     """Evaluate the field at the samples of every listed block.
@@ -84,8 +96,9 @@ def sample_blocks(
     sample = i % SAMPLES
     x = sample // (SAMPLES_PER_SIDE * SAMPLES_PER_SIDE)
     y = (sample // SAMPLES_PER_SIDE) % SAMPLES_PER_SIDE
-    index = sample_index(base + blocks[block], x, y, sample % SAMPLES_PER_SIDE)
-    values[i] = field_value(grid_point(index, corner, cell), tape, spans[block])
+    grid = lattice_of(block, keys, single, models)
+    index = sample_index(grid.base + blocks[block], x, y, sample % SAMPLES_PER_SIDE)
+    values[i] = field_value(grid_point(index, grid.corner, grid.size / CELLS), tape, spans[block])
 
 
 @wp.kernel

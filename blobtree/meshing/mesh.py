@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from blobtree._typing import Float32Array, Int32Array
 from blobtree.cells.grid import CHILDREN
 from blobtree.cells.scan import DeviceArray, arange, compact, exclusive_scan, where_negative
-from blobtree.cells.sparse_cells import SparseCells
+from blobtree.cells.sparse_cells import SparseCells, child_grid
 from blobtree.device import demand_memory, launch, prefaulted_array
 from blobtree.errors import InvalidFile
 from blobtree.identity import Value
@@ -272,8 +272,9 @@ class _Extraction:
         """Return the field at the samples of changed blocks."""
         count = len(changed) * SAMPLES
         values = self._empty(count, wp.float32)
-        cells = self._arrays
-        inputs = [changed, cells.blocks, cells.spans, cells.tape, cells.base, cells.corner, cells.cell]
+        cells, grid = self._arrays, self._cells.grid
+        inputs = [changed, cells.blocks, cells.keys, cells.spans, cells.tape]
+        inputs += [child_grid(grid, grid.depth), cells.models]
         self._launch(self._kernel(sample_blocks), count, inputs, [values], step)
         return values
 
@@ -322,10 +323,10 @@ class _Extraction:
         inputs = [changed, patches.rows, self._tables.patch_count, list_starts]
         self._launch(list_patches, len(changed), inputs, [identifiers])
         inputs = [identifiers, changed, self._arrays, values, patches]
-        unconverged = self._zeros(1)
+        unconverged = self._zeros(max(1, len(self._cells.models)))
         self._launch(self._kernel(place_vertices), total, inputs, [vertices, unconverged], step)
-        if total and unconverged.numpy()[0]:
-            self._launch(self._kernel(bisect_unconverged), total, inputs, [vertices])
+        if total and unconverged.numpy().any():
+            self._launch(self._kernel(bisect_unconverged), total, [*inputs, unconverged], [vertices])
 
     def _copy_vertices(self, unchanged: DeviceArray, starts: DeviceArray, vertices: Any) -> DeviceArray:
         """Copy the vertices of unchanged blocks, and return the new indices of old ones."""

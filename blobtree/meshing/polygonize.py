@@ -205,8 +205,8 @@ def polygonize_parts(
 ) -> Mesh:
     """Return the mesh with cells of `resolution`, and smaller ones where parts are thin, see `polygonize`."""
     truth("creases", creases, InvalidResolution)
-    if shows_small_parts(tree, resolution, BALL_CELLS, device) or has_walls(tree._program):
-        size = _cell_size(tree, resolution, None)
+    if shows_thin_parts(tree, resolution, device):
+        size = cell_size_of(tree, resolution, None)
         with reporting(progress, cancel) as report:
             return _mesh_of_thin_parts(tree, size, creases, device, report)
     return Polygonizer(
@@ -214,15 +214,20 @@ def polygonize_parts(
     ).mesh
 
 
+def shows_thin_parts(tree: ImplicitModel, resolution: int, device: str | None) -> bool:
+    """Return True if cells of `resolution` do not show a part or a wall of a tree."""
+    return shows_small_parts(tree, resolution, BALL_CELLS, device) or has_walls(tree._program)
+
+
 def shows_small_parts(tree: ImplicitModel, resolution: int, size: float, device: str | None) -> bool:
     """Return True if a part is thinner than `size` cells of `resolution`; where there are warps, look."""
-    cell = _cell_size(tree, resolution, None)
+    cell = cell_size_of(tree, resolution, None)
     if not has_small_parts(tree, size * cell) or not has_warps(tree):
         return has_small_parts(tree, size * cell)
     from blobtree.meshing.parts import PART_KERNELS, least_size  # imported here, as above
 
-    _load_kernels(tree, device, False, *PART_KERNELS)
-    cells = build_cells(sized_tape(tree), _grid(tree, cell), device=device)
+    load_kernels(tree, device, False, *PART_KERNELS)
+    cells = build_cells(sized_tape(tree), grid_around(tree, cell), device=device)
     return least_size(cells, 0.0) < size * cell
 
 
@@ -237,13 +242,13 @@ def _mesh_of_thin_parts(
         return Polygonizer(model, cell_size=size, creases=creases, device=device, progress=report).mesh
 
     def grid_of(model: ImplicitModel, scale: float) -> Grid:
-        return _grid(model, scale * size)
+        return grid_around(model, scale * size)
 
-    _load_kernels(tree, device, creases, *PART_KERNELS)
+    load_kernels(tree, device, creases, *PART_KERNELS)
     return mesh_of_thin_parts(tree, grid_of, uniform, device, creases, report)
 
 
-def _load_kernels(tree: ImplicitModel, device: str | None, creases: bool, *kernels: wp.Kernel) -> None:
+def load_kernels(tree: ImplicitModel, device: str | None, creases: bool, *kernels: wp.Kernel) -> None:
     """Load kernels of meshing, and those for cells and creases, so that they compile at the same time."""
     instruction_set = tree.tape.instruction_set
     together = [*kernels, *CELL_KERNELS]
@@ -266,8 +271,8 @@ def _within_chord_error(
     from blobtree.meshing.distance_kernels import measure_triangles  # imported here: most meshes need none
 
     passes: list[tuple[float, float]] = []
-    size = _cell_size(tree, FIRST_RESOLUTION, None)
-    _load_kernels(tree, device, creases, sample_blocks, place_vertices, measure_triangles)
+    size = cell_size_of(tree, FIRST_RESOLUTION, None)
+    load_kernels(tree, device, creases, sample_blocks, place_vertices, measure_triangles)
     for number in range(1, MAX_PASSES + 1):
         pass_report = _numbered(report, number)
         polygonizer = Polygonizer(tree, cell_size=size, creases=creases, device=device, progress=pass_report)
@@ -298,15 +303,15 @@ def _adaptive_within_chord_error(
     """Return a mesh of adaptive cells whose triangles lie within `chord_error` of the surface."""
     from blobtree.meshing.adaptive import ADAPTIVE_KERNELS, AdaptivePasses  # imported here, as above
 
-    _load_kernels(tree, device, creases, *ADAPTIVE_KERNELS)
+    load_kernels(tree, device, creases, *ADAPTIVE_KERNELS)
     wish = f"chord_error: {chord_error:g}"
-    size = _cell_size(tree, FIRST_RESOLUTION, None)
+    size = cell_size_of(tree, FIRST_RESOLUTION, None)
     passes: AdaptivePasses | None = None
     for number in range(1, MAX_ADAPTIVE_PASSES + 1):
         pass_report = _never_decreasing(_numbered(report, number))
         pass_report(_STAGES[0], 0.0)
         if passes is None:
-            cells = build_cells(tree.tape, _grid(tree, size), device=device, report=pass_report)
+            cells = build_cells(tree.tape, grid_around(tree, size), device=device, report=pass_report)
             passes = AdaptivePasses(cells, chord_error, creases)
         within = passes.run(pass_report)
         pass_report(_STAGES[-1], 1.0)
@@ -452,9 +457,9 @@ class Polygonizer:
         checked_tree(tree)
         self._device = device
         self._creases = truth("creases", creases, InvalidResolution)
-        self._cell_size = _cell_size(tree, resolution, cell_size)
+        self._cell_size = cell_size_of(tree, resolution, cell_size)
         with reporting(progress, cancel) as report:
-            _load_kernels(tree, device, self._creases, sample_blocks, place_vertices)
+            load_kernels(tree, device, self._creases, sample_blocks, place_vertices)
             self._dual_mesh, self._device_mesh, self._sheet_counts = self._extract(tree, None, report)
         self._tree = tree
         self._mesh: Mesh | None = None
@@ -508,14 +513,14 @@ class Polygonizer:
         self, tree: ImplicitModel, previous: DeviceMesh | None, report: Progress
     ) -> tuple[DeviceMesh, DeviceMesh, NDArray[np.uint8] | None]:
         """Return `dual_mesh`, `device_mesh` and the sheet counts of the vertices."""
-        grid = _grid(tree, self._cell_size)
+        grid = grid_around(tree, self._cell_size)
         old_cells = previous.cells if previous is not None else None
         cells = build_cells(tree.tape, grid, device=self._device, previous=old_cells, report=report)
         mesh = extract_mesh(cells, report, previous)
         return (mesh, *sharpened(mesh, report)) if self._creases else (mesh, mesh, None)
 
 
-def _cell_size(tree: ImplicitModel, resolution: int | None, cell_size: float | None) -> float:
+def cell_size_of(tree: ImplicitModel, resolution: int | None, cell_size: float | None) -> float:
     """Return the side of a cell from `resolution` or `cell_size`, once it is checked."""
     lower, upper = (corner.astype(np.float64) for corner in tree.support)
     longest = float((upper - lower).max())
@@ -565,7 +570,7 @@ def _above_zero(name: str, noun: str, value: object) -> float:
     return number
 
 
-def _grid(tree: ImplicitModel, cell_size: float) -> Grid:
+def grid_around(tree: ImplicitModel, cell_size: float) -> Grid:
     """Return cells around the support, and one more on every side so that the surface is closed."""
     lower, upper = (corner.astype(np.float64) for corner in tree.support)
     return aligned_grid(lower - cell_size, upper + cell_size, cell_size)

@@ -5,11 +5,11 @@ A patch is identified by (index of its block in the list · CHILDREN + cell) · 
 
 import warp as wp
 
-from blobtree.cells.block_kernels import CellBlocks, child_offset, grid_point
+from blobtree.cells.block_kernels import CellBlocks, child_offset, grid_point, model_of
 from blobtree.cells.grid import CHILDREN
 from blobtree.formulas.falloff import ISO
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.meshing.dual_kernels import SAMPLES, CellPatches, corner_sample, sample_index
+from blobtree.meshing.dual_kernels import CELLS, SAMPLES, CellPatches, corner_sample, sample_index
 from blobtree.meshing.patches import EDGES, MAX_PATCHES
 from blobtree.tape.evaluate_kernels import STALLED, project_to_surface
 from blobtree.tape.interpreter import field_color
@@ -90,9 +90,17 @@ def patch_of(identifier: wp.int32, listed: wp.array(dtype=wp.int32), patches: Ce
 
 
 @wp.func
-def block_corner(block: wp.int32, cells: CellBlocks) -> wp.vec3:
-    """Return the lowest corner of a block."""
-    return grid_point(sample_index(cells.base + cells.blocks[block], 0, 0, 0), cells.corner, cells.cell)
+def block_frame(block: wp.int32, cells: CellBlocks) -> tuple[wp.vec3, wp.float32]:
+    """Return the lowest corner of a block, and the side of its cells."""
+    base = cells.base
+    corner = cells.corner
+    cell = cells.cell
+    if cells.models.grids.shape[0] > 0:
+        model = model_of(block, cells.keys, cells.models)
+        base = cells.models.grids[model].base
+        corner = cells.models.grids[model].corner
+        cell = cells.models.grids[model].size / CELLS
+    return grid_point(sample_index(base + cells.blocks[block], 0, 0, 0), corner, cell), cell
 
 
 @wp.func
@@ -114,13 +122,14 @@ def place_vertices(
     vertices: VertexArrays,
     unconverged: wp.array(dtype=wp.int32),
 ) -> None:
-    """Project the mean of each patch's edge crossings onto the surface, and count the unconverged."""
+    """Project the mean of each patch's edge crossings onto the surface; count the unconverged by model."""
     patch = patch_of(identifiers[first + wp.tid()], listed, patches)
     span = cells.spans[patch.block]
-    start = block_corner(patch.block, cells) + crossing_mean(patch, values, patches) * cells.cell
-    p, f = project_to_surface(start, 0.5 * cells.cell, cells.tape, span)
-    if is_unconverged(f[0], p, start, cells.cell):
-        wp.atomic_add(unconverged, 0, 1)
+    corner, cell = block_frame(patch.block, cells)
+    start = corner + crossing_mean(patch, values, patches) * cell
+    p, f = project_to_surface(start, 0.5 * cell, cells.tape, span)
+    if is_unconverged(f[0], p, start, cell):
+        wp.atomic_add(unconverged, model_of(patch.block, cells.keys, cells.models), 1)
     write_vertex(vertices, patch.vertex, p, f, field_color(p, cells.tape, span))
 
 

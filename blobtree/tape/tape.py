@@ -43,6 +43,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
+from blobtree._typing import Float32Array
 from blobtree.device import known_device
 from blobtree.errors import InvalidNode
 from blobtree.formulas.falloff import WYVILL
@@ -54,6 +55,7 @@ from blobtree.tape.codes import (
     FIELD,
     POP,
     POP_SWAPPED,
+    PREFIX,
     PUSH,
     REGISTERS,
     STRETCHED,
@@ -192,6 +194,28 @@ def compile_tape(program: list[Instruction], precision: Precision = np.float32) 
         start=start,
         **instruction_set.codes_of(rows),
     )
+
+
+def shifted_texels(tape: Tape, program: list[Instruction], shift: int) -> Float32Array:
+    """Return the instructions of a tape for a place whose data region begins `shift` texels before its own.
+
+    They are read with the region of the tape behind `shift` other texels.
+    """
+    texels = tape.data[tape.start :].copy()
+    if shift == 0 or tape.start == 0:
+        return texels
+    ends = [*tape.headers[1:].tolist(), len(tape.data)]
+    for step, header, end in zip(program, tape.headers.tolist(), ends, strict=True):
+        if not isinstance(step, Run | Pop):
+            continue
+        first = header - tape.start
+        if len(step.parameters) > 1:
+            texels[first, 3] += shift
+        if isinstance(step, Run) and step.primitives[0].primitive.data is not None:
+            count, prefixed = len(step.primitives), step.stretched or isinstance(step.kind, FieldKind)
+            stride = (end - header - 1) // count
+            texels[first + 1 + PREFIX * prefixed + stride * np.arange(count), 0] += shift
+    return texels
 
 
 def _texels(

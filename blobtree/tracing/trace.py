@@ -1,5 +1,6 @@
 """Rays and a model: the distance of the first hit, and position, normal and colour there."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from blobtree.cells.sparse_cells import CELL_KERNELS
 from blobtree.device import known_device, launch
 from blobtree.errors import InvalidPoints
 from blobtree.kernels import load_together
+from blobtree.tape.instruction_set import InstructionSet
 from blobtree.tape.model import ImplicitModel
 from blobtree.tracing.ray_kernels import trace_rays
 from blobtree.tracing.shade_kernels import shade_hits
@@ -72,7 +74,7 @@ def trace(
         Origins and directions differ in number, or a direction is zero.
     """
     rays = _uploaded(origins, directions, device)
-    _load(tree, rays, trace_rays)
+    load_ray_kernels(tree, str(rays[0].device), trace_rays)
     distances: Float32Array = trace_arrays(tree, *rays)[0].numpy()
     return distances
 
@@ -82,14 +84,22 @@ def raycast(
 ) -> Hits:
     """Return the first hits of rays, with normals and colours; arguments and errors are those of `trace`."""
     rays = _uploaded(origins, directions, device)
-    _load(tree, rays, trace_rays, shade_hits)
+    device = str(rays[0].device)
+    load_ray_kernels(tree, device, trace_rays, shade_hits)
     distances, spans = trace_arrays(tree, *rays)
-    device = str(distances.device)
-    shaded = [wp.zeros(len(distances), dtype=wp.vec3, device=device) for _ in range(3)]
     cells = device_cells(tree, device=device)
-    inputs = [*rays, distances, spans, cells.tape]
-    launch(cells.instruction_set.kernel_for(shade_hits), len(distances), inputs, shaded, device)
-    return Hits(distances.numpy(), *(array.numpy() for array in shaded))
+    return Hits(*shaded(cells.instruction_set, cells.tape, rays, distances, spans))
+
+
+def shaded(
+    instruction_set: InstructionSet, tape: Any, rays: Sequence[Any], distances: Any, spans: Any
+) -> list[Any]:
+    """Return distances, positions, normals and colours of hits as NumPy arrays."""
+    device, count = str(distances.device), len(distances)
+    arrays = [wp.zeros(count, dtype=wp.vec3, device=device) for _ in range(3)]
+    inputs = [*rays, distances, spans, tape]
+    launch(instruction_set.kernel_for(shade_hits), count, inputs, arrays, device)
+    return [distances.numpy(), *(array.numpy() for array in arrays)]
 
 
 def trace_arrays(tree: ImplicitModel, origins: Any, directions: Any) -> tuple[Any, Any]:
@@ -107,14 +117,20 @@ def trace_arrays(tree: ImplicitModel, origins: Any, directions: Any) -> tuple[An
     return distances, spans
 
 
-def _load(tree: ImplicitModel, rays: list[Any], *kernels: wp.Kernel) -> None:
+def load_ray_kernels(tree: ImplicitModel, device: str, *kernels: wp.Kernel) -> None:
     """Load kernels for rays, and those for cells, so that they compile at the same time."""
     kernel_for = tree.tape.instruction_set.kernel_for
-    load_together([kernel_for(kernel) for kernel in (*kernels, *CELL_KERNELS)], rays[0].device)
+    load_together([kernel_for(kernel) for kernel in (*kernels, *CELL_KERNELS)], device)
 
 
 def _uploaded(origins: ArrayLike, directions: ArrayLike, device: str | None) -> list[Any]:
     """Return checked rays as arrays on a device."""
+    rays = checked_rays(origins, directions)
+    return [wp.array(array, dtype=wp.vec3, device=known_device(device)) for array in rays]
+
+
+def checked_rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Float32Array, Float32Array]:
+    """Return origins and directions of rays (n, 3); raise InvalidPoints if they are none."""
     starts, vectors = points_or_point(origins)[0], points_or_point(directions)[0]
     if starts.shape != vectors.shape:
         raise InvalidPoints(f"directions: expected one per origin, {len(starts)}, got {len(vectors)}")
@@ -122,6 +138,4 @@ def _uploaded(origins: ArrayLike, directions: ArrayLike, device: str | None) -> 
     if not (largest > 0.0).all():
         raise InvalidPoints("directions: expected vectors with a length, got a zero vector")
     # Squares of tiny components vanish from a length. Scaling by powers of two changes no bit of a direction.
-    vectors = np.ldexp(vectors, -np.frexp(largest)[1][:, None])
-    device = known_device(device)
-    return [wp.array(array, dtype=wp.vec3, device=device) for array in (starts, vectors)]
+    return starts, np.ldexp(vectors, -np.frexp(largest)[1][:, None])

@@ -7,7 +7,7 @@ import numpy as np
 import warp as wp
 
 from blobtree._typing import BoolArray, Float32Array, IndexArray, Int32Array
-from blobtree.cells.grid import BRANCHING, grid_from
+from blobtree.cells.grid import BRANCHING, Grid, grid_from
 from blobtree.cells.refine_kernels import SURELY_OUTSIDE
 from blobtree.cells.sparse_cells import SparseCells, build_cells
 from blobtree.device import known_device
@@ -121,6 +121,17 @@ def device_cells(tree: ImplicitModel, *, device: str | None = None) -> DeviceCel
     return tracing_cells(tree, device=device).on(known_device(device))
 
 
+def cells_grid(lower: Float32Array, upper: Float32Array) -> Grid:
+    """Return the cells for rays through a model in a box."""
+    return grid_from(lower, upper, float((upper - lower).max()) / (BLOCKS_ALONG * BRANCHING) * (1.0 + 1e-6))
+
+
+def block_counts(lower: Float32Array, upper: Float32Array, block_size: float) -> IndexArray:
+    """Return the number of finest blocks along each axis of a box (3,), one at least."""
+    counts: IndexArray = np.maximum(np.ceil((upper - lower) / block_size).astype(int), 1)
+    return counts
+
+
 def trace_tolerance(bounds: tuple[Float32Array, Float32Array]) -> float:
     """Return the distance to the surface at which a ray hits a model of these bounds."""
     return RELATIVE_TOLERANCE * float(np.linalg.norm(bounds[1] - bounds[0]))
@@ -134,13 +145,11 @@ def _corners(tree: ImplicitModel) -> tuple[Corner, Corner]:
 @sized_cache(MAX_CELLS_BYTES)
 def _tracing_cells(tape: Tape, lower: Corner, upper: Corner, device: str) -> TracingCells:
     bounds = np.array(lower, np.float32), np.array(upper, np.float32)
-    cell_size = float((bounds[1] - bounds[0]).max()) / (BLOCKS_ALONG * BRANCHING) * (1.0 + 1e-6)
-    cells = build_cells(tape, grid_from(*bounds, cell_size), device=device)
+    cells = build_cells(tape, cells_grid(*bounds), device=device)
     region, whole = np.split(tape.data, [tape.start])
     length = np.array([[len(whole), 0.0, 0.0, 0.0]], np.float32)
-    first_texels = cells.leaves.spans.numpy()[:, 0] + len(whole)
-    block_size = cell_size * BRANCHING
-    blocks = _table(cells, first_texels, np.ceil((bounds[1] - bounds[0]) / block_size).astype(int))
+    block_size = cells.grid.cell_size * BRANCHING
+    blocks = block_table(cells, len(whole) + 1, block_counts(*bounds, block_size))
     return TracingCells(
         tape=np.concatenate([region, length, whole, cells.leaves.tape.numpy()[tape.start :]]),
         start=tape.start,
@@ -153,16 +162,16 @@ def _tracing_cells(tape: Tape, lower: Corner, upper: Corner, device: str) -> Tra
     )
 
 
-def _table(cells: SparseCells, first_texels: Int32Array, counts: IndexArray) -> Int32Array:
-    """Return `TracingCells.blocks` for the finest blocks (nx, ny, nz)."""
-    known = np.zeros((1, 1, 1), np.int32)
+def block_table(cells: SparseCells, shift: int, counts: IndexArray, model: int = 0) -> Int32Array:
+    """Return `TracingCells.blocks` for the finest blocks (nx, ny, nz) of a model; tapes move by `shift`."""
+    known = np.full((1, 1, 1), model, np.int32)
     for level in cells.levels[1:]:
         known = _refined(known, level.children.numpy())
-    x, y, z = np.maximum(counts, 1)
+    x, y, z = counts
     known = known[:x, :y, :z]
     crossed, empty = known >= 0, known == SURELY_OUTSIDE
     blocks = np.where(empty, EMPTY - _layers(empty), known)
-    blocks[crossed] = first_texels[known[crossed]]
+    blocks[crossed] = cells.leaves.spans.numpy()[known[crossed], 0] - 1 + shift
     return blocks
 
 

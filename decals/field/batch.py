@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import known_device
-from blobtree.validation import items
+from blobtree.validation import axis_count, items
 from decals.errors import InvalidDevice, InvalidPoints, InvalidScene
 from decals.field.evaluate import (
     Modes,
@@ -260,21 +260,13 @@ class _Places:
 def _is_each(name: str, values: Any, axes: int) -> bool:
     """Return True if values are arrays with so many axes, one for each set; False for one array."""
     if hasattr(values, "ndim"):
-        return _axes(values) > axes
+        return axis_count(values) > axes
     if hasattr(values, "__dlpack__"):  # its shape is known through DLPack alone: an array for all sets
         return False
     listed = items(values)
     if listed is None:
         raise InvalidPoints(f"{name}: expected an array [m, 3], or one for each set, got {describe(values)}")
-    return not listed or _axes(listed[0]) >= axes
-
-
-def _axes(value: Any) -> int:
-    """Return the number of axes of an array or of nested lists."""
-    if hasattr(value, "ndim"):
-        return int(value.ndim) + len(getattr(value.dtype, "_shape_", ()))  # of Warp's vectors
-    listed = items(value) if isinstance(value, list | tuple) else None
-    return 0 if listed is None else 1 + max(map(_axes, listed[:1]), default=1)
+    return not listed or axis_count(listed[0]) >= axes
 
 
 def _each_of(name: str, values: Any, count: int) -> tuple[Any, ...]:

@@ -1,4 +1,4 @@
-"""Batches against loops: many sets of decals in one launch, many views in one context.
+"""Batches against loops: many sets of decals or trees in one launch, many views in one context.
 
 python -m tests.bench.batches [--device DEVICE] [--sets N] [--only NAME] [--json FILE] [--quick]
 """
@@ -7,7 +7,8 @@ import argparse
 import json
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,9 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+import blobtree
 import decals
-from blobtree import Point
+from blobtree import Node, Point, Segment, Sum
 from blobtree.device import known_device
 from decals import Decals
 from decals.index import DecalBatch, DecalIndex
@@ -24,6 +26,8 @@ from decals.index import DecalBatch, DecalIndex
 TARGETS = {"evaluate_speedup": "≥ 20 on a card"}
 
 SETS, DECALS, POINTS = 1000, 200, 1000
+
+PRIMITIVES, RAYS, RESOLUTION = 10, 1000, 32
 
 
 def sphere_points(rng: np.random.Generator, count: int) -> NDArray[np.float32]:
@@ -106,8 +110,68 @@ def render_figures(device: str, count: int, repeats: int) -> dict[str, float]:
     }
 
 
+def random_trees(count: int) -> list[Node]:
+    """Return trees of points and segments that blend, all of different shapes and sizes."""
+    trees: list[Node] = []
+    for seed in range(count):
+        rng = np.random.default_rng(seed)
+        starts, ends = rng.uniform(-1.0, 1.0, (2, PRIMITIVES // 2, 3))
+        points = [Point(start, radius=rng.uniform(0.2, 0.6)) for start in starts]
+        segments = [Segment(start, end, radius=0.2) for start, end in zip(starts, ends, strict=True)]
+        trees.append(Sum((*points, *segments)))
+    return trees
+
+
+def raycast_figures(device: str, count: int, repeats: int) -> dict[str, float]:
+    """Return the seconds of rays through many trees at once, and through one after the other."""
+    trees = random_trees(count)
+    origins = 5.0 * sphere_points(np.random.default_rng(0), RAYS)
+    directions = np.random.default_rng(1).normal(scale=0.3, size=(RAYS, 3)) - origins / 5.0
+    functions: dict[str, Callable[[], Any]] = {
+        "batch": lambda: blobtree.raycast_batch(trees, origins, directions, device=device),
+        "loop": lambda: [tree.raycast(origins, directions, device=device) for tree in trees],
+    }
+    seconds = alternately(functions, device, repeats)
+    names = [field.name for field in fields(blobtree.Hits)]
+    pairs = list(zip(functions["batch"](), functions["loop"](), strict=True))
+    return {
+        "raycast_batch_s": seconds["batch"],
+        "raycast_loop_s": seconds["loop"],
+        "raycast_speedup": seconds["loop"] / seconds["batch"],
+        "raycast_hits": float(np.mean([hits.hit.mean() for hits, _ in pairs])),
+        "raycast_equal_bits": share_of_equal(pairs, names),
+    }
+
+
+def polygonize_figures(device: str, count: int, repeats: int) -> dict[str, float]:
+    """Return the seconds of many meshes at once, and of one after the other."""
+    trees = random_trees(count)
+    functions: dict[str, Callable[[], Any]] = {
+        "batch": lambda: blobtree.polygonize_batch(trees, resolution=RESOLUTION, device=device),
+        "loop": lambda: [blobtree.polygonize(tree, resolution=RESOLUTION, device=device) for tree in trees],
+    }
+    seconds = alternately(functions, device, repeats)
+    pairs = list(zip(functions["batch"](), functions["loop"](), strict=True))
+    return {
+        "polygonize_batch_s": seconds["batch"],
+        "polygonize_loop_s": seconds["loop"],
+        "polygonize_speedup": seconds["loop"] / seconds["batch"],
+        "polygonize_equal_bits": share_of_equal(pairs, ["vertices", "faces", "normals", "colors"]),
+    }
+
+
+def share_of_equal(pairs: Iterable[tuple[Any, Any]], names: Sequence[str]) -> float:
+    """Return the share of pairs whose arrays have the same bits."""
+    equal = [
+        all(getattr(a, name).tobytes() == getattr(b, name).tobytes() for name in names) for a, b in pairs
+    ]
+    return float(np.mean(equal))
+
+
 FIGURES: dict[str, Callable[[str, int, int], dict[str, float]]] = {
     "evaluate": evaluate_figures,
+    "raycast": raycast_figures,
+    "polygonize": polygonize_figures,
     "render": render_figures,
 }
 
@@ -123,7 +187,9 @@ def main() -> None:
     options = parser.parse_args()
     device = known_device(options.device)
     count = options.sets // 10 if options.quick else options.sets
-    print(f"{device} ({wp.get_device(device).name}), {count} sets of {DECALS} decals at {POINTS} points")
+    print(f"{device} ({wp.get_device(device).name})")
+    print(f"{count} sets of {DECALS} decals at {POINTS} points")
+    print(f"{count} trees of {PRIMITIVES} primitives: {RAYS} rays through each, meshes of {RESOLUTION} cells")
     figures: dict[str, float] = {}
     for name in options.only or FIGURES:
         figures |= FIGURES[name](device, count, 1 if options.quick else 3)

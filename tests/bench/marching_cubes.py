@@ -14,10 +14,10 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from blobtree.cells.block_kernels import child_number, child_offset, find_block, grid_point
+from blobtree.cells.block_kernels import Lattices, child_number, child_offset, find_block, grid_point
 from blobtree.cells.grid import BRANCHING, CHILDREN
 from blobtree.cells.scan import arange, exclusive_scan
-from blobtree.cells.sparse_cells import SparseCells
+from blobtree.cells.sparse_cells import SparseCells, child_grid
 from blobtree.device import launch
 from blobtree.formulas.falloff import ISO
 from blobtree.kernels import KERNEL_OPTIONS
@@ -225,7 +225,8 @@ def marching_cubes(cells: SparseCells) -> tuple[Any, Any]:
     frame: list[Any] = [wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner), grid.cell_size]
     values: Any = wp.empty(count * SAMPLES, dtype=wp.float32, device=device)
     kernel = cells.tape.instruction_set.kernel_for(sample_blocks)
-    inputs = [listed, leaves.blocks, leaves.spans, leaves.tape, *frame]
+    inputs = [listed, leaves.blocks, leaves.keys, leaves.spans, leaves.tape]
+    inputs += [child_grid(grid, grid.depth), Lattices()]
     launch(kernel, count * SAMPLES, inputs, [values], device)
     codes, offsets = (wp.empty(count * CHILDREN, dtype=wp.uint8, device=device) for _ in range(2))
     vertex_counts, triangle_counts = (wp.zeros(count + 1, dtype=wp.int32, device=device) for _ in range(2))
