@@ -59,6 +59,7 @@ from .nodes.curves import Arc, Circle, CubicBezier, Polyline, QuadraticBezier, S
 from .nodes.deformations import Bend, CurveWarp, LimitedTwist, NoiseWarp, Shear, Stretch, Taper
 from .nodes.fields import FieldPrimitive, Gyroid, Noise, Superquadric
 from .nodes.flats import Polygon, Rectangle, Triangle
+from .nodes.node import Node
 from .nodes.numeric_parameters import (
     NumericParameter,
     numeric_parameters,
@@ -68,7 +69,7 @@ from .nodes.numeric_parameters import (
 from .nodes.parameter_gradient import ParameterGradient
 from .nodes.primitives import Box, Cone, Disc, Point, Segment, Torus
 from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
-from .nodes.tree import Difference, Intersection, Node, Offset, Ricci, Sum, Transform, Twist, Union
+from .nodes.tree import Difference, Intersection, Offset, Ricci, Sum, Transform, Twist, Union
 from .nodes.tree_volumes import sample
 from .nodes.volumes import Volume, from_mesh, from_sdf
 from .progress import Cancel, Progress

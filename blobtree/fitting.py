@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, Float64Array, IndexArray
 from blobtree.errors import InvalidNode, InvalidPoints
 from blobtree.formulas.falloff import ISO
+from blobtree.nodes.node import Node
 from blobtree.nodes.numeric_parameters import (
     NumericParameter,
     Path,
@@ -25,7 +26,6 @@ from blobtree.nodes.numeric_parameters import (
 )
 from blobtree.nodes.parameter_gradient import gradient_sensitivities, parameter_gradient_of
 from blobtree.nodes.parameters import Quantity
-from blobtree.nodes.tree import Node
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import checked_tree, gradients_at
 from blobtree.validation import as_count, is_whole, items, point_array, positive_number, real, shown

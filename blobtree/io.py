@@ -31,7 +31,7 @@ from blobtree.formulas.falloff import Falloff
 from blobtree.json_errors import json_reason
 from blobtree.nodes.attributes import Attributes, AttributeValue
 from blobtree.nodes.kinds import NODE_KINDS
-from blobtree.nodes.tree import Node
+from blobtree.nodes.node import Node
 from blobtree.nodes.values import OPTIONAL, fields_of, left_out, operand_names
 from blobtree.tape.model import checked_tree
 from blobtree.tape.program import postorder

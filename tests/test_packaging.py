@@ -34,7 +34,7 @@ FORBIDDEN = {
     "apps": {"tests"},
 }
 PYVISTA_FILES = (
-    "colors.py", "field_grid.py", "field_slice.py", "graphics.py", "pyvista_views.py", "tree.py",
+    "colors.py", "field_grid.py", "field_slice.py", "graphics.py", "model.py", "pyvista_views.py",
     "vtk_errors.py",
 )  # fmt: skip
 """The files of `blobtree` that use pyvista; a test checks that they import it late."""

@@ -10,8 +10,8 @@ import warp as wp
 
 from blobtree.custom.source import CustomSource, custom_source, node_class, spelled
 from blobtree.declare.registry import Definitions
+from blobtree.nodes.node import Node
 from blobtree.nodes.parameters import Parameter, Quantity
-from blobtree.nodes.tree import Node
 
 _SIZES: dict[Any, int] = {
     wp.float32: 1,

@@ -17,7 +17,8 @@ import numpy as np
 import warp as wp
 
 from blobtree.errors import InvalidDefinition
-from blobtree.nodes.tree import AssociativeCombination, Node
+from blobtree.nodes.node import Node
+from blobtree.nodes.tree import AssociativeCombination
 from blobtree.transpile.glsl import translate_library
 from blobtree.transpile.python import Precision, find_changed_constants, plain_python
 from blobtree.transpile.specialize import defined, rebind, referenced_values, warp_function

@@ -38,8 +38,9 @@ from blobtree.custom.source import CustomSource, generated, kind_name
 from blobtree.custom.warp_checks import WarpClaims, check_warp
 from blobtree.errors import InvalidNode
 from blobtree.formulas.warps import SpaceWarp
+from blobtree.nodes.node import Node
 from blobtree.nodes.parameters import Parameter
-from blobtree.nodes.tree import Node, Placed
+from blobtree.nodes.tree import Placed
 from blobtree.transpile.derivative import directional_derivative
 from blobtree.validation import positive_number
 

@@ -22,6 +22,7 @@ from blobtree.formulas.blends import (
 )
 from blobtree.formulas.gradient_blends import GRADIENT_BLEND
 from blobtree.lazy import Lazy
+from blobtree.nodes.node import Node
 from blobtree.nodes.parameters import Parameter, Quantity
 from blobtree.nodes.tree import (
     EXPONENT,
@@ -29,7 +30,6 @@ from blobtree.nodes.tree import (
     Intersection,
     Macro,
     ManyOperands,
-    Node,
     Sum,
     Union,
 )

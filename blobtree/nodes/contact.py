@@ -23,8 +23,14 @@ from blobtree.lazy import Lazy
 from blobtree.meshing.clip import clipped, enclosed_volume, outlines_of
 from blobtree.meshing.mesh import Mesh
 from blobtree.meshing.polygonize import polygonize
+from blobtree.nodes.node import Node
 from blobtree.nodes.parameters import Parameter, Quantity
-from blobtree.nodes.tree import Combination, Macro, ManyOperands, Node, Union
+from blobtree.nodes.tree import (
+    Combination,
+    Macro,
+    ManyOperands,
+    Union,
+)
 
 LARGEST_RATIO = 100.0
 """Largest ratio of two stiffnesses; beyond it the stiffer solid is rigid for any purpose."""

@@ -23,9 +23,13 @@ from blobtree.lazy import Lazy
 from blobtree.nodes.curves import Arc, checked_radii
 from blobtree.nodes.fields import FieldPrimitive
 from blobtree.nodes.flats import check_corners, triangle_texels
+from blobtree.nodes.node import Node
 from blobtree.nodes.parameters import Color, Parameter, Quantity, Radius, parameters_of
 from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf, beside
-from blobtree.nodes.tree import Macro, Node, Sum
+from blobtree.nodes.tree import (
+    Macro,
+    Sum,
+)
 from blobtree.validation import Vector
 
 STEEPEST_TAPER = 0.5

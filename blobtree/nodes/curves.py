@@ -13,6 +13,7 @@ from blobtree.errors import InvalidNode
 from blobtree.formulas.curve_skeletons import ARC, CURVE, JOINED_SEGMENT
 from blobtree.formulas.skeletons import CIRCLE
 from blobtree.lazy import Lazy
+from blobtree.nodes.node import Node
 from blobtree.nodes.parameters import Color, Parameter, Quantity, Radius
 from blobtree.nodes.primitives import (
     DEFAULT_COLOR,
@@ -25,7 +26,6 @@ from blobtree.nodes.primitives import (
     Segment,
     beside,
 )
-from blobtree.nodes.tree import Node
 from blobtree.validation import Vector
 
 STRAIGHTEST_ARC = 1e3

@@ -12,8 +12,9 @@ from blobtree._typing import Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.formulas.warps import SpaceWarp
 from blobtree.nodes.blends import Mirror
+from blobtree.nodes.node import Node
 from blobtree.nodes.paths import Path, nodes_along, square_matrix
-from blobtree.nodes.tree import Node, Transform
+from blobtree.nodes.tree import Transform
 from blobtree.transpile.python import plain_python, vector
 
 NEWTON_STEPS = 30

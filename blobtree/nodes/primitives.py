@@ -19,6 +19,7 @@ from blobtree.formulas.blends import DEEPEST
 from blobtree.formulas.falloff import WYVILL, Falloff
 from blobtree.formulas.skeletons import BOX, CIRCLE, CONE, DISC, POINT, SEGMENT, Skeleton
 from blobtree.nodes.attributes import NO_ATTRIBUTES, AttributeMapping
+from blobtree.nodes.node import Node
 from blobtree.nodes.parameters import (
     Color,
     Parameter,
@@ -29,7 +30,11 @@ from blobtree.nodes.parameters import (
     parameters_of,
     unit_vectors,
 )
-from blobtree.nodes.tree import AssociativeCombination, Macro, Node, Union
+from blobtree.nodes.tree import (
+    AssociativeCombination,
+    Macro,
+    Union,
+)
 from blobtree.nodes.values import OPTIONAL
 from blobtree.tape.program import ProgramPrimitive
 from blobtree.validation import Vector

@@ -10,6 +10,7 @@ from blobtree._typing import Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.formulas.solid_skeletons import CYLINDER
 from blobtree.lazy import Lazy
+from blobtree.nodes.node import Node
 from blobtree.nodes.parameters import Color, Parameter, Quantity, unit_vectors
 from blobtree.nodes.primitives import (
     DEFAULT_COLOR,
@@ -20,7 +21,6 @@ from blobtree.nodes.primitives import (
     beside,
     octagons,
 )
-from blobtree.nodes.tree import Node
 from blobtree.validation import Vector
 
 LARGEST_RATIO = 1e5

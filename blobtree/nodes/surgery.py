@@ -15,6 +15,7 @@ from blobtree._typing import Float32Array
 from blobtree.errors import InvalidNode
 from blobtree.formulas.operators import Support
 from blobtree.nodes.contact import SolidContact
+from blobtree.nodes.node import Node
 from blobtree.nodes.paths import (
     Path,
     common_transform,
@@ -32,7 +33,6 @@ from blobtree.nodes.paths import (
 from blobtree.nodes.tree import (
     Difference,
     Intersection,
-    Node,
     Ricci,
     Sum,
     Transform,

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 
 from blobtree.errors import InvalidNode
+from blobtree.nodes.node import Node
 from blobtree.nodes.primitives import DEFAULT_COLOR
 from blobtree.nodes.samples import MAX_NUMBERS
-from blobtree.nodes.tree import Node
 from blobtree.nodes.volumes import WIDTH_CELLS, Volume, from_sdf
 from blobtree.sampling.mesh_distances import grid_points
 from blobtree.sampling.tree_distances import to_sdf

@@ -151,7 +151,8 @@ def compile_seconds(folder: Path) -> dict[str, float]:
 
 def machine() -> str:
     """Return what the hashes depend on besides the code."""
-    return f"{platform.machine()}, Warp {wp.config.version}, NumPy {np.__version__}"
+    blas = os.environ.get("OPENBLAS_CORETYPE", "own choice")
+    return f"{platform.machine()}, Warp {wp.config.version}, NumPy {np.__version__}, OpenBLAS core: {blas}"
 
 
 def measured() -> Record:

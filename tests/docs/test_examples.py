@@ -12,6 +12,7 @@ import pytest
 import decals
 from blobtree import Node
 from blobtree.errors import ImplicitDecalsError
+from blobtree.nodes.model import Model
 from blobtree.tape.model import ImplicitModel
 from decals import Scene
 from tests.decals.baking.glb import need
@@ -49,8 +50,9 @@ def public_objects() -> Iterator[tuple[str, Any]]:
 
 OBJECTS = dict(public_objects())
 
-EXAMPLES = OBJECTS | {"blobtree.tape.model.ImplicitModel": ImplicitModel}
-"""Objects whose examples run: the public ones, and a base from which public classes have methods."""
+BASES = {"blobtree.tape.model.ImplicitModel": ImplicitModel, "blobtree.nodes.model.Model": Model}
+EXAMPLES = OBJECTS | BASES
+"""Objects whose examples run: the public ones, and bases from which public classes have methods."""
 
 
 @pytest.mark.parametrize("name", OBJECTS)

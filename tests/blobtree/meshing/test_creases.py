@@ -9,7 +9,17 @@ import numpy as np
 import pytest
 import warp as wp
 
-from blobtree import Mesh, Node, Point, Polygonizer, Segment, define_skeleton, polygonize, split_creases
+from blobtree import (
+    Mesh,
+    Node,
+    Point,
+    Polygonizer,
+    Segment,
+    Transform,
+    define_skeleton,
+    polygonize,
+    split_creases,
+)
 from blobtree._typing import Float64Array
 from tests.bench import creases as creases_bench
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid, crosses, volume
@@ -155,6 +165,7 @@ def test_a_box_of_large_balls_has_twelve_edges_and_eight_corners() -> None:
     centers = [tuple(sign * far * axis) for axis in np.eye(3) for sign in (-1.0, 1.0)]
     box = reduce(and_, [Point(c, radius=far + 1.0) for c in centers])
     turned = box.rotate((1, 2, 3), 25.0)
+    assert isinstance(turned, Transform)
     mesh = polygonize(turned, cell_size=0.11, creases=True)
     assert_closed(mesh)
     assert mesh.sheet_counts is not None

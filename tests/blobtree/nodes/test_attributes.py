@@ -104,6 +104,7 @@ def test_an_attribute_is_averaged_by_weight_and_has_a_default() -> None:
 
 def test_attributes_are_known_where_rays_hit() -> None:
     tree = (A + B).rotate((0, 0, 1), 30)
+    assert isinstance(tree, Transform)
     ways = np.random.default_rng(3).normal(size=(60, 3))
     hits = tree.raycast(-5.0 * ways, ways)
     places = hits.positions[hits.hit]

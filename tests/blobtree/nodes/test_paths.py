@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blobtree import Cone, InvalidNode, Point, Segment
+from blobtree import Cone, InvalidNode, Point, Segment, Transform
 from blobtree.nodes.paths import (
     moved,
     node_in_world,
@@ -44,6 +44,7 @@ def test_moving_keeps_what_a_primitive_is() -> None:
     black = Point((0, 0, 0), radius=1, color=(0, 0, 0))
     assert moved(black, (1, 2, 3)) == Point((1, 2, 3), radius=1, color=(0, 0, 0))
     turned = B.rotate((0, 0, 1), 30)
+    assert isinstance(turned, Transform)
     assert moved(moved(turned, (1, 0, 0)), (0, 2, 0)) == turned.child.transform(
         np.array(turned.matrix) + np.outer([1, 2, 0], [0, 0, 0, 1])
     )

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 
 import blobtree
-from blobtree import Difference, Intersection, InvalidNode, Node, Point, Ricci, Segment, Sum, Union
+from blobtree import Difference, Intersection, InvalidNode, Node, Point, Ricci, Segment, Sum, Transform, Union
 from tests.blobtree.trees import random_trees, trees
 
 A = Point((0, 0, 0), radius=1.0)
@@ -114,9 +114,11 @@ def test_transforms_move_the_surface() -> None:
 def test_a_turn_leaves_its_axis_alone_and_a_full_one_everything() -> None:
     turned = A.translate((1, 1, 1)).rotate((1, 1, 1), 77.0)
     surface_point(turned, [(1 + 3**-0.5,) * 3])
-    matrix = np.array(A.rotate((1, 2, 3), 360.0).matrix)
-    np.testing.assert_allclose(matrix, np.eye(4)[:3], atol=1e-15)
-    np.testing.assert_allclose(np.linalg.det(np.array(A.rotate((1, 2, 3), 50).matrix)[:, :3]), 1.0)
+    full, part = A.rotate((1, 2, 3), 360.0), A.rotate((1, 2, 3), 50)
+    assert isinstance(full, Transform)
+    assert isinstance(part, Transform)
+    np.testing.assert_allclose(np.array(full.matrix), np.eye(4)[:3], atol=1e-15)
+    np.testing.assert_allclose(np.linalg.det(np.array(part.matrix)[:, :3]), 1.0)
 
 
 def test_tape_and_bounds_are_made_once() -> None:
