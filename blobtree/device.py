@@ -263,6 +263,13 @@ def launch(
 # -- memory ---------------------------------------------------------------------------------------------
 
 
+def array_on(device: str, values: Any, kind: Any) -> Any:
+    """Return numbers as an array of Warp on a device; there it is not copied if it need not be."""
+    scalar = getattr(kind, "_wp_scalar_type_", kind)
+    rows = np.ascontiguousarray(values, wp.dtype_to_numpy(scalar))
+    return wp.array(rows, dtype=kind, device=device, copy=False)
+
+
 def prefaulted_array(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
     """Return an uninitialised array whose pages all threads have touched.
 

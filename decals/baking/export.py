@@ -388,7 +388,7 @@ class _Work:
         unwrapped = lay_out(self._meshes, size, layout, tiles, self._report)
         self._rows = [part.rows for part in unwrapped]
         pairs = list(zip(self._meshes, unwrapped, strict=True))
-        channels = Channels(self._colors.at)
+        channels = Channels(self._colors.at, on_device=self._colors.on_device)
         if self._colors.has_materials:  # maps are of the rest pose
             resting = [vertex_tangents(mesh.places, mesh.facings, part) for mesh, part in pairs]
             channels = Channels(self._colors.at, len(SRGB), material_bytes, resting, SRGB)

@@ -133,16 +133,15 @@ def _faces_over_others(mesh: BakeMesh, part: Unwrapped, size: int) -> Int64Array
     look = min(size, LOOK_SIZE)
     places = part.places * np.float32(look / size)
     for tile in np.unique(part.tile_of_face).tolist():
-        chosen = np.flatnonzero(part.tile_of_face == tile)
         first, later = (
             Sheet(0, mesh, Unwrapped(part.rows, part.faces[order], places, part.tile_of_face[order]), tile)
             for order in (slice(None), slice(None, None, -1))
         )
-        below, _ = first.cover(0, look, look, 1, margin=INSET)
-        above, _ = later.cover(0, look, look, 1, margin=INSET)
+        below, _ = first.cover(look, INSET)
+        above, _ = later.cover(look, INSET)
         covered = above >= 0
-        faces = last - np.flatnonzero(part.tile_of_face[::-1] == tile)[above[covered]]
-        over.append(np.unique(faces[faces != chosen[below[covered]]]))
+        faces = last - above[covered]
+        over.append(np.unique(faces[faces != below[covered]]).astype(np.int64))
     return np.concatenate(over)
 
 

@@ -10,14 +10,19 @@ from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 import numpy as np
+import warp as wp
 from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
-from blobtree._typing import BoolArray, Float64Array, Int64Array, UInt8Array
+from blobtree._typing import BoolArray, Float64Array, Int32Array, Int64Array, UInt8Array
+from blobtree.device import array_on, launch
 from decals.baking.meshes import BakeMesh
+from decals.baking.seam_kernels import settle
 from decals.baking.unwrapped import Unwrapped
 from decals.images.texels import decode_srgb, encode_srgb
 from decals.surfaces.topology import welded
+
+CPU = "cpu"
 
 STEP = 0.1
 """Largest distance in texels between points of a seam."""
@@ -31,10 +36,10 @@ SAME_PLACE = 1e-3
 TOLERANCE = 2.0
 """Difference of the two sides, of 255, that is aimed at; rounding adds to it."""
 
-LARGEST = 3.0
-"""Difference that remains after the least squares, from which on points are corrected one by one."""
+SETTLED, LARGEST = 1.5, 2.5
+"""Differences of 255: points that differ by more than the second are moved to the first, one by one."""
 
-ROUNDS = 8
+ROUNDS = 6
 """Steps of the least squares."""
 
 FIRST_WEIGHT, MAX_WEIGHT, MAX_GROWTH = 3.0, 300.0, 4.0
@@ -52,7 +57,7 @@ RINGS = 3
 REPORT_SECONDS = 0.1
 """Seconds between reports; a cancelled match ends after the step that is running."""
 
-ATTEMPTS, SWEEPS = 2, 80
+ATTEMPTS, SWEEPS = 20, 100
 """Times that single corrections begin, and most rounds of them."""
 
 
@@ -70,6 +75,8 @@ class Seams:
         The textures on which they lie.
     ends : float64[k, 2, 2, 2]
         For each face, the places of both ends in texels; the first ends are the same point of the surface.
+    corners : int64[k, 2, 3]
+        Corners of these faces among the unwrapped vertices: both ends, and the third one.
     length : float
         Length of all seams on the surface.
     """
@@ -78,6 +85,7 @@ class Seams:
     faces: Int64Array
     tiles: Int64Array
     ends: Float64Array
+    corners: Int64Array
     length: float
 
     @classmethod
@@ -85,8 +93,8 @@ class Seams:
         """Return the seams of unwrapped meshes."""
         parts = [_cut_edges(mesh, part) for mesh, part in zip(meshes, unwrapped, strict=True)]
         numbers = np.repeat(np.arange(len(parts)), [len(faces) for faces, *_ in parts])
-        faces, tiles, ends, lengths = (np.concatenate(rows) for rows in zip(*parts, strict=True))
-        return cls(numbers, faces, tiles, ends, float(lengths.sum()))
+        faces, tiles, ends, corners, lengths = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+        return cls(numbers, faces, tiles, ends, corners, float(lengths.sum()))
 
     def points(self) -> tuple[Int64Array, Float64Array]:
         """Return the seam of points along all seams, and their places on both sides, ``float64[n, 2, 2]``."""
@@ -99,8 +107,10 @@ class Seams:
         return seams, begin * (1.0 - share) + end * share
 
 
-def _cut_edges(mesh: BakeMesh, part: Unwrapped) -> tuple[Int64Array, Int64Array, Float64Array, Float64Array]:
-    """Return faces, tiles, ends and lengths of the edges of a mesh that lie at two places; see `Seams`."""
+def _cut_edges(
+    mesh: BakeMesh, part: Unwrapped
+) -> tuple[Int64Array, Int64Array, Float64Array, Int64Array, Float64Array]:
+    """Return faces, tiles, ends, corners and lengths of the edges that lie at two places; see `Seams`."""
     corners = part.faces.astype(np.int64)
     numbers = welded(mesh.vertices)[part.rows[corners]]
     sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
@@ -118,7 +128,9 @@ def _cut_edges(mesh: BakeMesh, part: Unwrapped) -> tuple[Int64Array, Int64Array,
     ends = part.places[sides[pairs]].astype(np.float64)
     cut = (np.abs(ends[:, 0] - ends[:, 1]).max(axis=(1, 2)) > SAME_PLACE) | (tiles[:, 0] != tiles[:, 1])
     a, b = np.moveaxis(mesh.vertices[part.rows[sides[pairs[cut, 0]]]].astype(np.float64), 1, 0)
-    return faces[cut], tiles[cut], ends[cut], np.linalg.norm(b - a, axis=1)
+    thirds = np.roll(corners, -2, axis=1).reshape(-1)[pairs[cut]]
+    each = np.concatenate([sides[pairs[cut]], thirds[:, :, None]], axis=2)
+    return faces[cut], tiles[cut], ends[cut], each, np.linalg.norm(b - a, axis=1)
 
 
 def bilinear_texels(places: Float64Array, tiles: Int64Array, size: int) -> tuple[Int64Array, Float64Array]:
@@ -165,8 +177,11 @@ def match_seams(
     size, channels = image.shape[1], image.shape[3]
     texels = image.reshape(-1, channels)
     found = [bilinear_texels(places[:, side], tiles[:, side], size) for side in (0, 1)]
-    used, inverse = np.unique(np.concatenate([of for of, _ in found]), return_inverse=True)
-    index, weights = inverse.reshape(2, -1, 4), np.stack([of for _, of in found])
+    index, weights = (np.stack(each) for each in zip(*found, strict=True))
+    used = _distinct(index, len(texels))
+    number = np.empty(len(texels), np.int32)
+    number[used] = np.arange(len(used))
+    index = number[index]
     works = []
     for channel in range(channels):
         rows = np.flatnonzero(smooth[:, channel])
@@ -187,6 +202,13 @@ def match_seams(
     return used
 
 
+def _distinct(numbers: Int64Array, count: int) -> Int64Array:
+    """Return the distinct ones of numbers below a count, in order."""
+    marked = np.zeros(count, np.bool_)
+    marked[numbers.reshape(-1)] = True
+    return np.flatnonzero(marked)
+
+
 class _Match:
     """Levels of one channel, from 0 to 1, that become alike on both sides of seams.
 
@@ -194,7 +216,7 @@ class _Match:
     ----------
     levels : float64[n]
         The texels.
-    index : int64[2, m, 4]
+    index : int32[2, m, 4]
         The texels that are mixed at points of seams, on both sides.
     weights : float64[2, m, 4]
         Their weights.
@@ -212,7 +234,7 @@ class _Match:
     share = 0.0
     stopped = False
 
-    def __init__(self, levels: Float64Array, index: Int64Array, weights: Float64Array, srgb: bool) -> None:
+    def __init__(self, levels: Float64Array, index: Int32Array, weights: Float64Array, srgb: bool) -> None:
         self.levels, self._first = levels, levels.copy()
         self._index, self._weights, self._srgb = index, weights, srgb
 
@@ -221,7 +243,7 @@ class _Match:
         rows = self._rows_around(np.abs(self._gaps()[0]) > TOLERANCE / 255.0)
         if len(rows):
             self._least_squares(rows)
-        self._correct()
+        self._settle()
 
     def _gaps(self, rows: Int64Array | slice = slice(None)) -> tuple[Float64Array, Float64Array]:
         """Return the differences of both sides at points, and the levels on both, ``float64[2, k]``."""
@@ -277,31 +299,22 @@ class _Match:
             step = np.clip(solution - levels, -MAX_CHANGE, MAX_CHANGE)
             self.levels[used] = np.clip(levels + step, 0.0, 1.0)
 
-    def _correct(self) -> None:
-        """Share out what remains of differences among their texels, point by point.
-
-        These are sweeps of the simultaneous algebraic reconstruction technique (SART).
-        """
+    def _settle(self) -> None:
+        """Move points that still differ one by one, see `settle`."""
         for _ in range(ATTEMPTS):
             wrong = np.abs(self._gaps()[0]) > LARGEST / 255.0
-            if not wrong.any():
+            if self.stopped or not wrong.any():
                 return
             rows = self._rows_around(wrong)
-            for _ in range(SWEEPS):
-                gaps, mixed = self._gaps(rows)
-                wrong = np.abs(gaps) > LARGEST / 255.0
-                if self.stopped or not wrong.any():
-                    break
-                at, w = self._index[:, rows[wrong]], self._weights[:, rows[wrong]]
-                excess = 0.5 * (gaps[wrong] - np.sign(gaps[wrong]) * TOLERANCE / 255.0)
-                goals = self._decoded(np.clip(mixed[:, wrong] + np.stack([-excess, excess]), 0.0, 1.0))
-                off = goals - self._decoded(mixed[:, wrong])
-                shares = w**2 / (w**2).sum(axis=2, keepdims=True) * off[:, :, None]
-                sums, total = (
-                    np.bincount(at.reshape(-1), each.reshape(-1), len(self.levels)) for each in (shares, w)
-                )
-                light = self._decoded(self.levels) + sums / np.maximum(total, 1e-12)
-                self.levels = self._encoded(np.clip(light, 0.0, 1.0))
+            index, weights = (np.hstack([*each[:, rows]]) for each in (self._index, self._weights))
+            inputs = [array_on(CPU, index, wp.int32), array_on(CPU, weights, wp.float32), self._srgb]
+            inputs += [SWEEPS, SETTLED / 255.0, LARGEST / 255.0]
+            states = self.levels, self._decoded(self.levels)
+            levels, light = (array_on(CPU, state, wp.float32) for state in states)
+            counts = len(self.levels), len(rows)
+            changed, seen = (wp.zeros(count, dtype=wp.int32, device=CPU) for count in counts)
+            launch(settle, 1, inputs, [levels, light, changed, seen], CPU)
+            self.levels = levels.numpy().astype(np.float64)
 
     def _decoded(self, levels: Float64Array) -> Float64Array:
         return np.asarray(decode_srgb(levels), np.float64) if self._srgb else levels

@@ -4,11 +4,14 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, Float64Array
+from blobtree.device import launch
 from decals.baking.materials import surface_values
 from decals.baking.meshes import BakeMesh
+from decals.baking.texel_kernels import over_base
 from decals.field.evaluate import ColorEvaluator, Samples, evaluate
 from decals.field.jacobian import normal_derivatives_of_triangles, stretch_of
 from decals.field.walks import walks_for
@@ -83,6 +86,16 @@ class SurfaceColors:
         assert samples.color is not None  # there are images
         assert samples.materials is not None  # there are tangents for materials alone
         return surface_values(_over(samples.color, base), samples.materials, normals, tangents)
+
+    def on_device(self, number: int, points: Any, normals: Any, base: Any) -> Any:
+        """Return what `at` returns without tangents, one channel after another, for arrays on the device.
+
+        The base colours are one, or one for each point.
+        """
+        colors = self._evaluator.on_device(points, normals, on=self._objects[number])
+        values: Any = wp.empty(3 * len(points), dtype=wp.float32, device=points.device)
+        launch(over_base, len(points), [colors, base], [values], str(points.device))
+        return values
 
     def attributes_at_vertices(self, number: int, names: Collection[str]) -> dict[str, NDArray[Any]]:
         """Return some of `ATTRIBUTES` at the vertices of mesh ``number``."""

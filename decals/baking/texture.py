@@ -17,24 +17,41 @@ from blobtree._typing import (
     Int64Array,
     UInt8Array,
 )
-from blobtree.device import launch, start_warp
+from blobtree.device import array_on, known_device, launch
 from blobtree.progress import Progress
+from decals.baking.beyond import Beyond
 from decals.baking.meshes import BakeMesh
 from decals.baking.seams import Seams, match_seams
 from decals.baking.texel_kernels import (
     compensate,
     cover_rows,
     encode_levels,
+    fill_gutters,
+    fill_listed,
+    fill_own,
+    list_marked,
+    mark_free,
+    mark_listed,
+    mark_places,
+    mark_range,
     mark_uneven,
+    mean_samples,
     nearest_in_rows,
-    nearest_texels,
+    points_beyond,
+    sample_points,
+    sum_parts,
     surface_points,
+    write_texels,
 )
 from decals.baking.unwrapped import Unwrapped
 from decals.images.texels import decode_srgb
 
 BLOCK_SAMPLES = 1 << 20
+CARD_BLOCK_SAMPLES = 1 << 23
 """Samples that are looked up at once, which bounds the memory besides that of the texture."""
+
+PART_ROWS = 1024
+"""Colours that are summed at once."""
 
 MIN_GUTTER = 4
 GUTTER_SHARE = 1 / 256
@@ -62,9 +79,10 @@ BORDER_STEP = 0.5
 """Distance in texels of points along the borders of charts."""
 
 CPU = "cpu"
-"""Device of everything but the colours: texels lie in the memory of the host."""
+"""Device on which layouts are checked; textures are made on the default device."""
 
-WARP_TYPES: dict[type, Any] = {np.uint8: wp.uint8, np.int32: wp.int32, np.float32: wp.float32}
+CHART, BEYOND = 1, 2
+"""Marks of texels: in a chart, and beyond a seam of it."""
 
 ColorFunction = Callable[
     [int, Float32Array, Float32Array, Float32Array | None, Float32Array | None], Float32Array
@@ -72,12 +90,20 @@ ColorFunction = Callable[
 """Linear colours ``float32[n, 3]`` of the surface of the mesh with a number, at points with unit normals; or
 other values, of as many channels, which need the tangents there. At last base colours, linear."""
 
+DeviceColorFunction = Callable[[int, Any, Any, Any], Any]
+"""The same on a device: arrays of Warp, and base colours, one or one for each point."""
+
 
 def color_bytes(colors: Float32Array) -> UInt8Array:
     """Return linear colours as sRGB bytes."""
-    light = np.ascontiguousarray(colors, np.float32)
-    levels = np.empty(light.shape, np.uint8)
-    launch(encode_levels, light.size, [flat(light)], [flat(levels)], CPU)
+    levels: UInt8Array = _encoded(array_on(CPU, colors.reshape(-1), wp.float32)).numpy()
+    return levels.reshape(colors.shape)
+
+
+def _encoded(light: Any) -> Any:
+    """Return linear light as sRGB bytes on the same device."""
+    levels: Any = wp.empty(len(light), dtype=wp.uint8, device=light.device)
+    launch(encode_levels, len(light), [light], [levels], str(light.device))
     return levels
 
 
@@ -87,16 +113,18 @@ class Channels:
 
     Attributes
     ----------
-    count : int
-        Number of channels.
     color_at : callable
         Values of the surface, see `ColorFunction`.
+    count : int
+        Number of channels.
     encode : callable
         Bytes ``uint8[n, count]`` of means of these values.
     tangents : sequence of float32[n, 4], optional
         Tangents at the unwrapped vertices of each mesh, if the values need them.
     srgb : sequence of bool
         True for channels that are sRGB; the others are linear.
+    on_device : callable, optional
+        The values without tangents, see `DeviceColorFunction`; they are encoded by `color_bytes`.
     """
 
     color_at: ColorFunction
@@ -104,6 +132,14 @@ class Channels:
     encode: Callable[[Float32Array], UInt8Array] = color_bytes
     tangents: Sequence[Float32Array] | None = None
     srgb: Sequence[bool] = (True, True, True)
+    on_device: DeviceColorFunction | None = None
+
+    def levels(self, values: Any) -> Any:
+        """Return values on a device as bytes there, one after another."""
+        if self.encode is color_bytes:
+            return _encoded(values)
+        rows = self.encode(values.numpy().reshape(-1, self.count))
+        return array_on(str(values.device), rows.reshape(-1), wp.uint8)
 
 
 def gutter_width(size: int) -> int:
@@ -122,35 +158,37 @@ def bake_texture(
     """Return textures ``uint8[tiles, size, size, channels]``, by default sRGB, first row at the top.
 
     A texel is the colour at its centre; where neighbours differ, the mean of those of its ``samples`` ×
-    ``samples`` points that lie in charts. Texels outside all charts take the colour of the closest one within
-    the gutter, and the mean colour of the charts beyond it, so that smaller mip levels mix in no foreign
-    colour.
+    ``samples`` points that lie in charts. Beyond a seam, texels show the surface on its other side, see
+    `decals.baking.beyond`. Other texels outside all charts take the colour of the closest one within the
+    gutter, and the mean colour of the charts beyond it, so that smaller mip levels mix in no foreign colour.
     """
-    start_warp()
+    device = known_device()
     tiles = 1 + max(int(part.tile_of_face.max(initial=0)) for part in unwrapped)
-    image = np.zeros((tiles, size, size, channels.count), np.uint8)
     gutter = gutter_width(size)
-    pages = [_Page(of, channels) for of in image]
+    pages = [_Page(size, channels, device) for _ in range(tiles)]
     sheets = {
-        (tile, number): Sheet(number, mesh, part, tile, channels)
+        (tile, number): Sheet(number, mesh, part, tile, channels, device)
         for number, (mesh, part) in enumerate(zip(meshes, unwrapped, strict=True))
         for tile in np.unique(part.tile_of_face).tolist()
     }
-    for done, ((tile, _), sheet) in enumerate(sheets.items()):
-        pages[tile].color(sheet, samples, partial(_report_part, report, done, len(sheets)))
+    seams = Seams.of(meshes, unwrapped)
+    rows, places = seams.points()
+    for done, ((tile, number), sheet) in enumerate(sheets.items()):
+        beyond = Beyond.of(seams, rows, places, number, tile, size)
+        pages[tile].color(sheet, beyond, samples, partial(_report_part, report, done, len(sheets)))
     for page in pages:
         page.finish(gutter)
-    seams = Seams.of(meshes, unwrapped)
+    image = np.stack([page.image() for page in pages])
     if len(seams.faces):
         report("matching seams", 0.0)
-        rows, places = seams.points()
         smooth = _smooth_points(seams, rows, places, sheets, channels)
         changed = match_seams(
             image, places, seams.tiles[rows], smooth, channels.srgb, partial(report, "matching seams")
         )
         for tile, page in enumerate(pages):
-            page.keep(changed[changed // size**2 == tile] % size**2)
+            page.replace(image[tile], changed[changed // size**2 == tile] % size**2)
             page.finish(gutter)
+            image[tile] = page.image()
     return image
 
 
@@ -167,69 +205,84 @@ def _smooth_points(
 ) -> BoolArray:
     """Return True where the surface has no step, for points of seams and channels, ``bool[n, channels]``."""
     parts = [
-        (side, own, sheet, sheet.surface(sheet.numbers_of(seams.faces[rows[own], side]), places[own, side]))
+        (side, own, sheet, sheet.surface(seams.faces[rows[own], side], places[own, side]))
         for side in (0, 1)
         for (tile, number), sheet in sheets.items()
         for own in [np.flatnonzero((seams.tiles[rows, side] == tile) & (seams.meshes[rows] == number))]
     ]
     points, units = np.zeros((2, 2, len(rows), 3), np.float32)
     for side, own, _, at in parts:
-        points[side, own], units[side, own] = at.points, at.units
+        points[side, own], units[side, own] = at.points.numpy(), at.units.numpy()
     # at one point with one normal, rounding may not decide on which side of a rim it is
     alike = np.einsum("na,na->n", *units) > ALIKE
     points[1, alike], units[1, alike] = points[0, alike], units[0, alike]
     levels = np.zeros((2, len(rows), channels.count), np.int16)
     for side, own, sheet, at in parts:
-        shared = at._replace(points=points[side, own], units=units[side, own])
-        levels[side, own] = channels.encode(sheet.colors(shared))
+        device = sheet.device
+        shared = [array_on(device, values[side, own], wp.vec3) for values in (points, units)]
+        values = sheet.colors(at._replace(points=shared[0], units=shared[1]))
+        levels[side, own] = channels.levels(values).numpy().reshape(-1, channels.count)
     smooth: BoolArray = np.abs(levels[0] - levels[1]) <= SEAM_STEP
     return smooth
 
 
 class Located(NamedTuple):
-    """Points of the surface: their faces in a `Sheet`, positions, unit normals and barycentric weights."""
+    """Points of the surface on a device.
 
-    faces: Int32Array
-    points: Float32Array
-    units: Float32Array
-    weights: Float32Array
+    Attributes
+    ----------
+    faces : int32[n]
+        Faces of the mesh; at −1, the point is of no use.
+    points, units : vec3[n]
+        Positions and unit normals.
+    weights : vec3[n]
+        Barycentric weights in these faces.
+    """
+
+    faces: Any
+    points: Any
+    units: Any
+    weights: Any
 
 
 class Sheet:
     """The charts of one mesh on one tile."""
 
     def __init__(
-        self, number: int, mesh: BakeMesh, part: Unwrapped, tile: int, channels: Channels | None = None
+        self,
+        number: int,
+        mesh: BakeMesh,
+        part: Unwrapped,
+        tile: int,
+        channels: Channels | None = None,
+        device: str = CPU,
     ) -> None:
-        self._number, self._mesh = number, mesh
-        self._color_at = None if channels is None else channels.color_at
+        self._number, self._mesh, self._part, self._channels = number, mesh, part, channels
+        self.device = device
         self._chosen = np.flatnonzero(part.tile_of_face == tile)
-        self.faces, self.places = part.faces[self._chosen], part.places
-        self._rows = part.rows
-        every = None if channels is None else channels.tangents
-        self._tangents = None if every is None else every[number]
         self._arrays: list[Any] = [
-            wp.array(np.ascontiguousarray(values), dtype=kind, device=CPU)
+            array_on(device, values, kind)
             for values, kind in (
-                (self.faces, wp.vec3i),
+                (part.faces, wp.vec3i),
                 (part.places, wp.vec2),
                 (mesh.places[part.rows], wp.vec3),
                 (mesh.facings[part.rows], wp.vec3),
             )
         ]
-        heights = part.places[:, 1][self.faces]
-        self._low, self._high = heights.min(axis=1), heights.max(axis=1)
+        self._lists: tuple[int, list[Any]] = (0, [])
 
-    def cover(
-        self,
-        top: int,
-        bottom: int,
-        size: int,
-        steps: int,
-        wanted: UInt8Array | None = None,
-        margin: float = ROUNDING,
-    ) -> tuple[Int32Array, int]:
-        """Return the face at each sample of rows of texels, -1 without, and how many lie in two.
+    def cover(self, size: int, margin: float) -> tuple[Int32Array, int]:
+        """Return the face at the centre of each texel, −1 without, and how many centres lie in two.
+
+        Faces are widened by ``margin`` texels.
+        """
+        found, overlaps = self.faces_at(0, size, size, 1, margin=margin)
+        return found.numpy().reshape(size, size), int(overlaps.numpy().sum())
+
+    def faces_at(
+        self, top: int, bottom: int, size: int, steps: int, wanted: Any = None, margin: float = ROUNDING
+    ) -> tuple[Any, Any]:
+        """Return the face at each sample of rows of texels, and how many samples of each row lie in two.
 
         Parameters
         ----------
@@ -239,201 +292,264 @@ class Sheet:
             Texels of a row.
         steps : int
             Samples along each axis of a texel.
-        wanted : uint8[bottom - top, size], optional
-            0 for texels that are left out.
+        wanted : array of uint8, optional
+            0 for texels of the texture that are left out.
         margin : float
             Distance in samples by which faces are widened.
-
-        Returns
-        -------
-        int32[(bottom - top) * steps, size * steps], int
         """
         rows = (bottom - top) * steps
-        starts, listed = self._faces_of_rows(top, rows, steps)
-        found: Any = wp.full(rows * size * steps, -1, dtype=wp.int32, device=CPU)
-        overlaps = wp.zeros(rows, dtype=wp.int32, device=CPU)
-        lists: list[Any] = [wp.array(values, dtype=wp.int32, device=CPU) for values in (starts, listed)]
-        texels: Any = np.zeros(0, np.uint8) if wanted is None else wanted.reshape(-1)
-        use: Any = wp.array(texels, dtype=wp.uint8, device=CPU)
+        found: Any = wp.full(rows * size * steps, -1, dtype=wp.int32, device=self.device)
+        overlaps: Any = wp.zeros(rows, dtype=wp.int32, device=self.device)
+        use: Any = wp.empty(0, dtype=wp.uint8, device=self.device) if wanted is None else wanted
+        lists = self._faces_of_rows(size)
         inputs = [*lists, *self._arrays[:2], top, steps, size * steps, margin, use]
-        launch(cover_rows, rows, inputs, [found, overlaps], CPU)
-        return found.numpy().reshape(rows, -1), int(overlaps.numpy().sum())
+        launch(cover_rows, rows, inputs, [found, overlaps], self.device)
+        return found, overlaps
 
-    def _faces_of_rows(self, top: int, rows: int, steps: int) -> tuple[Int32Array, Int32Array]:
-        """Return the faces at each row of samples, in their order."""
-        first = np.clip(np.ceil((self._low - top) * steps - 0.5), 0, rows).astype(np.int64)
-        last = np.clip(np.floor((self._high - top) * steps - 0.5), -1, rows - 1).astype(np.int64)
-        counts = np.maximum(last - first + 1, 0)
-        used = np.flatnonzero(counts)
-        counts = counts[used]
-        ends = np.cumsum(counts)
-        within = np.arange(int(counts.sum())) - np.repeat(ends - counts, counts)
-        row = np.repeat(first[used], counts) + within
-        kind = np.uint16 if rows <= 1 << 16 else np.int32  # the shorter ones are sorted by their digits
-        order = np.argsort(row.astype(kind), kind="stable")
-        starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=rows))])
-        return starts.astype(np.int32), np.repeat(used, counts)[order].astype(np.int32)
+    def _faces_of_rows(self, size: int) -> list[Any]:
+        """Return the faces at each row of texels, in their order."""
+        if self._lists[0] != size:
+            heights = self._part.places[:, 1][self._part.faces[self._chosen]]
+            first, last = (
+                np.clip(np.floor(of(axis=1)), 0, size - 1).astype(np.int64)
+                for of in (heights.min, heights.max)
+            )
+            counts = last - first + 1
+            ends = np.cumsum(counts)
+            within = np.arange(int(counts.sum())) - np.repeat(ends - counts, counts)
+            row = (np.repeat(first, counts) + within).astype(np.uint16)  # sorted by their digits
+            order = np.argsort(row, kind="stable")
+            starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=size))])
+            listed = np.repeat(self._chosen, counts)[order]
+            self._lists = size, [array_on(self.device, each, wp.int32) for each in (starts, listed)]
+        return self._lists[1]
 
-    def values(self, faces: Int32Array, places: FloatArray) -> Float32Array:
-        """Return the values of the surface at places in faces of this sheet, ``float32[n, channels]``."""
-        return self.colors(self.surface(faces, places))
+    def surface(self, faces: FloatArray | Int64Array, places: FloatArray) -> Located:
+        """Return the points of the surface at places in faces of the mesh."""
+        numbers = array_on(self.device, faces, wp.int32)
+        outputs: list[Any] = [wp.empty(len(faces), dtype=wp.vec3, device=self.device) for _ in range(3)]
+        inputs = [array_on(self.device, places, wp.vec2), numbers, *self._arrays]
+        launch(surface_points, len(faces), inputs, outputs, self.device)
+        return Located(numbers, *outputs)
 
-    def surface(self, faces: Int32Array, places: FloatArray) -> Located:
-        """Return the points of the surface at places in faces of this sheet."""
-        inputs: list[Any] = [
-            wp.array(places.astype(np.float32, copy=False), dtype=wp.vec2, device=CPU),
-            wp.array(faces, dtype=wp.int32, device=CPU),
-        ]
-        outputs: list[Any] = [wp.empty(len(faces), dtype=wp.vec3, device=CPU) for _ in range(3)]
-        launch(surface_points, len(faces), [*inputs, *self._arrays], outputs, CPU)
-        points, units, weights = (array.numpy() for array in outputs)
-        return Located(faces, points, units, weights)
+    def samples(self, texels: Any, found: Any, top: int, size: int, steps: int) -> Located:
+        """Return the points at the samples of texels, whose faces were found from a row of texels on."""
+        count = len(texels) * steps**2
+        kinds = wp.int32, wp.vec3, wp.vec3, wp.vec3
+        outputs: list[Any] = [wp.empty(count, dtype=kind, device=self.device) for kind in kinds]
+        inputs = [texels, found, top, size, steps, *self._arrays]
+        launch(sample_points, count, inputs, outputs, self.device)
+        return Located(*outputs)
 
-    def colors(self, at: Located) -> Float32Array:
-        """Return the values of the surface at points, ``float32[n, channels]``."""
-        base = self._mesh.base
-        corners = None if base is None and self._tangents is None else self.faces[at.faces]
-        along: Float32Array | None = None
+    def samples_beyond(self, beyond: Beyond, size: int, steps: int) -> tuple[Located, Float32Array | None]:
+        """Return the points at the samples of texels beyond seams, and the tangents at these texels."""
+        count = len(beyond.texels) * steps**2
+        kinds = wp.int32, wp.vec3, wp.vec3, wp.vec3, wp.vec3
+        outputs: list[Any] = [wp.empty(count, dtype=kind, device=self.device) for kind in kinds]
+        sides = zip(beyond, (wp.int32, wp.vec3i, wp.vec3i, wp.int32), strict=True)
+        inputs = [*(array_on(self.device, values, kind) for values, kind in sides), size, steps]
+        launch(points_beyond, count, [*inputs, *self._arrays], outputs, self.device)
+        *located, along = outputs
+        corners = np.repeat(beyond.here, steps**2, axis=0)
+        return Located(*located), self._mean_tangents(corners, along.numpy())
+
+    def colors(self, at: Located, tangents: Float32Array | None = None) -> Any:
+        """Return the values of the surface at points, one channel after another, on the device.
+
+        The tangents are those at the points, if values need any and they are not those of their faces.
+        """
+        channels = self._channels
+        assert channels is not None  # only sheets with channels have colours
+        if channels.on_device is not None:
+            return channels.on_device(self._number, at.points, at.units, self._base_light(at))
         light: Float32Array | None = None
-        if self._tangents is not None:
-            along = np.einsum("nc,nca->na", at.weights, self._tangents[corners])
-        if base is not None:
-            wide = at.weights.astype(np.float64)
-            light = base.light_of(self._rows[corners], self._chosen[at.faces], wide).astype(np.float32)
-        assert self._color_at is not None  # else the sheet has no channels
-        return self._color_at(self._number, at.points, at.units, along, light)
+        if tangents is None and channels.tangents is not None:
+            tangents = self._mean_tangents(self._part.faces[at.faces.numpy()], at.weights.numpy())
+        if self._mesh.base is not None:
+            light = self._textured_light(at)
+        values = channels.color_at(self._number, at.points.numpy(), at.units.numpy(), tangents, light)
+        return array_on(self.device, values.reshape(-1), wp.float32)
 
-    def numbers_of(self, faces: Int64Array) -> Int32Array:
-        """Return the numbers that faces of the mesh have in this sheet."""
-        return np.searchsorted(self._chosen, faces).astype(np.int32)
+    def _mean_tangents(self, corners: Any, weights: Float32Array) -> Float32Array | None:
+        """Return the tangents at points by those of unwrapped vertices, if the values need them."""
+        assert self._channels is not None
+        if self._channels.tangents is None:
+            return None
+        tangents: Float32Array = np.einsum(
+            "nc,nca->na", weights, self._channels.tangents[self._number][corners]
+        )
+        return tangents
 
-    def border_points(self) -> tuple[Int32Array, Float32Array]:
+    def _base_light(self, at: Located) -> Any:
+        """Return linear base colours on the device: one, or one for each point."""
+        if self._mesh.base is not None:
+            light = self._textured_light(at)
+        elif callable(self._mesh.base_colors):
+            light = self._mesh.base_light(at.points.numpy())
+        else:
+            light = self._mesh.base_light(np.zeros((1, 3), np.float32))
+        return array_on(self.device, light, wp.vec3)
+
+    def _textured_light(self, at: Located) -> Float32Array:
+        """Return linear base colours of textures and corners, ``float32[n, 3]``."""
+        assert self._mesh.base is not None
+        faces = np.maximum(at.faces.numpy(), 0)
+        corners = self._part.rows[self._part.faces[faces]]
+        light = self._mesh.base.light_of(corners, faces, at.weights.numpy().astype(np.float64))
+        return np.asarray(light, np.float32)
+
+    def border_points(self) -> tuple[Int64Array, Float32Array]:
         """Return faces and places ``float32[n, 2]`` of points along the borders of charts."""
-        sides = np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=2).reshape(-1, 2)
-        keys = np.sort(sides, axis=1).astype(np.int64) @ [len(self.places), 1]
+        faces, places = self._part.faces[self._chosen], self._part.places
+        sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+        keys = np.sort(sides, axis=1).astype(np.int64) @ [len(places), 1]
         _, first, counts = np.unique(keys, return_index=True, return_counts=True)
         rows = first[counts == 1]
-        begin, end = self.places[sides[rows, 0]], self.places[sides[rows, 1]]
+        begin, end = places[sides[rows, 0]], places[sides[rows, 1]]
         steps = np.ceil(np.linalg.norm(end - begin, axis=1) / BORDER_STEP).astype(np.int64) + 1
         edges = np.repeat(np.arange(len(rows)), steps)
         number = np.arange(len(edges)) - np.repeat(np.cumsum(steps) - steps, steps)
         share = (number / np.maximum(steps - 1, 1)[edges])[:, None].astype(np.float32)
-        return (rows[edges] // 3).astype(np.int32), begin[edges] * (1 - share) + end[edges] * share
+        return self._chosen[rows[edges] // 3], begin[edges] * (1 - share) + end[edges] * share
 
 
 class _Page:
-    """One texture while it is made."""
+    """One texture while it is made, on a device."""
 
-    def __init__(self, image: UInt8Array, channels: Channels) -> None:
-        self._image, self._size = image, len(image)
-        self._encode, self._srgb = channels.encode, channels.srgb
-        self._filled: UInt8Array = np.zeros(image.shape[:2], np.uint8)
-        self._sum, self._count = np.zeros(image.shape[2]), 0
+    def __init__(self, size: int, channels: Channels, device: str) -> None:
+        self._size, self._channels, self._device = size, channels, device
+        self._texels = size * size
+        self._image = self._zeros(self._texels * channels.count, wp.uint8)
+        self._filled = self._zeros(self._texels, wp.uint8)
+        self._sum, self._count = np.zeros(channels.count), 0
+        self._block = BLOCK_SAMPLES if wp.get_device(device).is_cpu else CARD_BLOCK_SAMPLES
 
-    def color(self, sheet: Sheet, samples: int, report: Callable[[float], None]) -> None:
+    def image(self) -> UInt8Array:
+        """Return the texture, ``uint8[size, size, channels]``."""
+        texels: UInt8Array = self._image.numpy()
+        return texels.reshape(self._size, self._size, -1)
+
+    def replace(self, image: UInt8Array, texels: Int64Array) -> None:
+        """Take another image; texels keep their colours in it when gutters are filled."""
+        self._image.assign(image.reshape(-1))
+        listed = array_on(self._device, texels, wp.int32)
+        launch(fill_listed, len(texels), [listed], [self._filled], self._device)
+
+    def color(self, sheet: Sheet, beyond: Beyond, samples: int, report: Callable[[float], None]) -> None:
         """Colour the texels of the charts of a mesh."""
-        own = np.zeros(self._filled.shape, np.uint8)
+        own = self._zeros(self._texels, wp.uint8)
         for top, bottom in self._blocks(1):
             report(0.5 * top / self._size)
             self._color_centers(sheet, own, top, bottom)
+        self._color_beyond(sheet, beyond, own, samples)
         if samples > 1:
-            sizes = self._size, self._image.shape[2], FINE_STEP
-            uneven = self._launch_rows(mark_uneven, np.uint8, [own, self._image, *sizes])
-            uneven &= self._filled == 0
+            uneven = self._zeros(self._texels, wp.uint8)
+            inputs = [own, self._filled, self._image, self._size, self._channels.count, FINE_STEP]
+            launch(mark_uneven, self._texels, inputs, [uneven], self._device)
             for top, bottom in self._blocks(samples):
                 report(0.5 + 0.5 * top / self._size)
                 self._refine(sheet, own, uneven, top, bottom, samples)
         self._color_borders(sheet, own)
         if samples > 1:
             self._compensate(uneven, own)
-        self._filled |= own
+        launch(fill_own, self._texels, [own], [self._filled], self._device)
+
+    def _zeros(self, count: int, kind: Any) -> Any:
+        return wp.zeros(count, dtype=kind, device=self._device)
 
     def _blocks(self, steps: int) -> Iterator[tuple[int, int]]:
-        rows = max(1, BLOCK_SAMPLES // (self._size * steps**2))
+        rows = max(1, self._block // (self._size * steps**2))
         for top in range(0, self._size, rows):
             yield top, min(top + rows, self._size)
 
-    def _color_centers(self, sheet: Sheet, own: UInt8Array, top: int, bottom: int) -> None:
-        found, _ = sheet.cover(top, bottom, self._size, 1)
-        rows, columns = np.nonzero((found >= 0) & (self._filled[top:bottom] == 0))
-        if not len(rows):
-            return
-        places = np.stack([columns, rows + top], axis=1).astype(np.float32) + np.float32(0.5)
-        values = sheet.values(found[rows, columns], places)
-        self._image[rows + top, columns] = self._encode(values)
-        own[rows + top, columns] = 1
-        self._sum, self._count = self._sum + values.sum(axis=0, dtype=np.float64), self._count + len(rows)
+    def _chosen(self, kernel: Any, count: int, inputs: list[Any], begin: int = 0) -> Any:
+        """Return the numbers that a kernel marks, from ``begin`` on, in order."""
+        marks, ends = (self._zeros(count, wp.int32) for _ in range(2))
+        launch(kernel, count, inputs, [marks], self._device)
+        wp.utils.array_scan(marks, ends, inclusive=True)
+        numbers = self._zeros(int(ends[-1:].numpy()[0]) if count else 0, wp.int32)
+        launch(list_marked, count, [marks, ends, begin], [numbers], self._device)
+        return numbers
 
-    def _refine(
-        self, sheet: Sheet, own: UInt8Array, uneven: UInt8Array, top: int, bottom: int, samples: int
-    ) -> None:
+    def _write(self, texels: Any, values: Any, own: Any, mark: int, counts: Any = None) -> None:
+        """Write values to texels, and mark them as own ones."""
+        if counts is None:
+            counts = self._zeros(0, wp.int32)
+        inputs = [texels, self._channels.levels(values), counts, mark, self._channels.count]
+        launch(write_texels, len(texels), inputs, [self._image, own], self._device)
+
+    def _color_centers(self, sheet: Sheet, own: Any, top: int, bottom: int) -> None:
+        found, _ = sheet.faces_at(top, bottom, self._size, 1)
+        begin = top * self._size
+        texels = self._chosen(mark_free, len(found), [found, self._filled, begin], begin)
+        if not len(texels):
+            return
+        values = sheet.colors(sheet.samples(texels, found, top, self._size, 1))
+        self._write(texels, values, own, CHART)
+        sums: Any = self._zeros(-(-len(texels) // PART_ROWS) * self._channels.count, wp.float64)
+        inputs = [values, self._channels.count, PART_ROWS]
+        launch(sum_parts, len(sums) // self._channels.count, inputs, [sums], self._device)
+        self._sum += sums.numpy().reshape(-1, self._channels.count).sum(axis=0)
+        self._count += len(texels)
+
+    def _means(self, values: Any, faces: Any, samples: int) -> tuple[Any, Any]:
+        """Return the means of the samples of texels that have a face, and how many these are."""
+        count = len(faces) // samples**2
+        means = self._zeros(count * self._channels.count, wp.float32)
+        counts = self._zeros(count, wp.int32)
+        inputs = [values, faces, samples**2, self._channels.count]
+        launch(mean_samples, count, inputs, [means, counts], self._device)
+        return means, counts
+
+    def _refine(self, sheet: Sheet, own: Any, uneven: Any, top: int, bottom: int, samples: int) -> None:
         """Take the mean of several samples at texels whose neighbours differ."""
-        texels = uneven[top:bottom]
-        if not texels.any():
+        begin, count = top * self._size, (bottom - top) * self._size
+        texels = self._chosen(mark_range, count, [uneven, begin], begin)
+        if not len(texels):
             return
-        found, _ = sheet.cover(top, bottom, self._size, samples, texels)
-        rows, columns = np.nonzero(texels)
-        faces = found.reshape(bottom - top, samples, self._size, samples)[rows, :, columns]
-        number, i, k = np.nonzero(faces >= 0)
-        if not len(number):
-            return
-        within = (np.stack([k, i], axis=1).astype(np.float32) + np.float32(0.5)) / np.float32(samples)
-        corners = np.stack([columns, rows + top], axis=1).astype(np.float32)
-        values = sheet.values(faces[number, i, k], corners[number] + within)
-        starts = np.flatnonzero(np.diff(number, prepend=-1))
-        counts = np.diff(starts, append=len(number)).astype(np.float32)
-        sums: Any = np.add.reduceat(values, starts, axis=0)
-        means: Float32Array = sums / counts[:, None]
-        rows, columns = rows[number[starts]] + top, columns[number[starts]]
-        self._image[rows, columns] = self._encode(means)
-        own[rows, columns] = 1
+        found, _ = sheet.faces_at(top, bottom, self._size, samples, uneven)
+        at = sheet.samples(texels, found, top, self._size, samples)
+        means, counts = self._means(sheet.colors(at), at.faces, samples)
+        self._write(texels, means, own, CHART, counts)
 
-    def _color_borders(self, sheet: Sheet, own: UInt8Array) -> None:
+    def _color_beyond(self, sheet: Sheet, beyond: Beyond, own: Any, samples: int) -> None:
+        """Colour the texels beyond seams."""
+        texels = array_on(self._device, beyond.texels, wp.int32)
+        chosen = self._chosen(mark_listed, len(texels), [texels, own, self._filled]).numpy()
+        if not len(chosen):
+            return
+        for rows in np.array_split(chosen, -(-len(chosen) * samples**2 // self._block)):
+            bare = beyond.chosen(rows)
+            at, tangents = sheet.samples_beyond(bare, self._size, samples)
+            means, counts = self._means(sheet.colors(at, tangents), at.faces, samples)
+            self._write(array_on(self._device, bare.texels, wp.int32), means, own, BEYOND, counts)
+
+    def _color_borders(self, sheet: Sheet, own: Any) -> None:
         """Colour the texels of charts that no sample lies in, by points of their borders."""
         faces, places = sheet.border_points()
-        columns, rows = np.clip(places.astype(np.int64), 0, self._size - 1).T
-        bare = np.flatnonzero((own[rows, columns] == 0) & (self._filled[rows, columns] == 0))
-        _, first = np.unique(rows[bare] * self._size + columns[bare], return_index=True)
-        chosen = bare[first]
-        if len(chosen):
-            values = sheet.values(faces[chosen], places[chosen])
-            self._image[rows[chosen], columns[chosen]] = self._encode(values)
-            own[rows[chosen], columns[chosen]] = 1
+        inputs = [array_on(self._device, places, wp.vec2), own, self._filled, self._size]
+        bare = self._chosen(mark_places, len(places), inputs).numpy()
+        columns, rows = np.clip(places[bare].astype(np.int64), 0, self._size - 1).T
+        texels, first = np.unique(rows * self._size + columns, return_index=True)
+        if len(texels):
+            chosen = bare[first]
+            values = sheet.colors(sheet.surface(faces[chosen], places[chosen]))
+            self._write(array_on(self._device, texels, wp.int32), values, own, CHART)
 
-    def _compensate(self, uneven: UInt8Array, own: UInt8Array) -> None:
+    def _compensate(self, uneven: Any, own: Any) -> None:
         """Sharpen texels whose neighbours differ, as much as programs blur them."""
-        light = decode_srgb(np.arange(256) / 255.0).astype(np.float32)
-        srgb = np.asarray(self._srgb, np.uint8)
-        sharper = self._image.copy()
-        inputs = [*map(flat, (uneven, own, self._image, light, srgb)), self._size, SHARPENING, MAX_OVERSHOOT]
-        launch(compensate, self._size, inputs, [flat(sharper)], CPU)
-        self._image[...] = sharper
-
-    def keep(self, texels: Int64Array) -> None:
-        """Let texels keep their colours when gutters are filled."""
-        self._filled.reshape(-1)[texels] = 1
+        light = array_on(self._device, decode_srgb(np.arange(256) / 255.0), wp.float32)
+        srgb = array_on(self._device, np.asarray(self._channels.srgb), wp.uint8)
+        sharper = wp.clone(self._image)
+        inputs = [uneven, own, self._image, light, srgb, self._size, SHARPENING, MAX_OVERSHOOT]
+        launch(compensate, self._texels, inputs, [sharper], self._device)
+        self._image = sharper
 
     def finish(self, reach: int) -> None:
         """Give empty texels the colour of the nearest one within reach, and the others the mean colour."""
-        size = self._size
-        columns = self._launch_rows(nearest_in_rows, np.int32, [self._filled, size, reach])
-        nearest = self._launch_rows(nearest_texels, np.int32, [self._filled, columns, size, reach])
-        nearest = nearest.reshape(-1)
-        texels = self._image.reshape(size * size, -1)
-        near = np.flatnonzero(nearest >= 0)
-        texels[near] = texels[nearest[near]]
-        if self._count:
-            mean = self._encode((self._sum[None] / self._count).astype(np.float32))
-            texels[np.flatnonzero((nearest < 0) & (self._filled.reshape(-1) == 0))] = mean
-
-    def _launch_rows(self, kernel: Any, kind: Any, inputs: list[Any]) -> Any:
-        """Return the result of a kernel for each texel, which runs once for each row."""
-        result = np.empty(self._filled.shape, kind)
-        arrays = [flat(each) if isinstance(each, np.ndarray) else each for each in inputs]
-        launch(kernel, self._size, arrays, [flat(result)], CPU)
-        return result
-
-
-def flat(values: Any) -> Any:
-    """Return a contiguous array of numbers as one of Warp that shares its memory."""
-    return wp.array(values.reshape(-1), dtype=WARP_TYPES[values.dtype.type], device=CPU, copy=False)
+        columns: Any = wp.empty(self._texels, dtype=wp.int32, device=self._device)
+        launch(nearest_in_rows, self._size, [self._filled, self._size, reach], [columns], self._device)
+        mean = (self._sum / max(self._count, 1)).astype(np.float32)
+        rest = self._channels.levels(array_on(self._device, mean, wp.float32))
+        inputs = [self._filled, columns, self._size, reach, rest]
+        launch(fill_gutters, self._texels, inputs, [self._image], self._device)

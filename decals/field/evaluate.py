@@ -8,7 +8,7 @@ import warp as wp
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array, Int32Array
-from blobtree.device import known_device, launch
+from blobtree.device import array_on, known_device, launch
 from blobtree.validation import truth
 from decals.errors import InvalidDecals, InvalidScene
 from decals.field.law import AnyContact, contact_mode
@@ -241,13 +241,17 @@ class ColorEvaluator:
         self, points: Float32Array, normals: Float32Array, on: object | str | Iterable[str] | None = None
     ) -> Float32Array:
         """Return colours ``float32[m, 4]``, linear and premultiplied; arguments are those of `evaluate`."""
+        at, facing = (array_on(self._device, of, wp.vec3) for of in (points, normals))
+        result: Float32Array = self.on_device(at, facing, on).numpy()
+        return result
+
+    def on_device(self, points: Any, normals: Any, on: object | str | Iterable[str] | None = None) -> Any:
+        """Return what `at` returns, for arrays of Warp on the device of the evaluator."""
         _limit(self._indexed, self._decals, on, self._device)
-        rows: list[Any] = [wp.array(of, dtype=wp.vec3, device=self._device) for of in (points, normals)]
-        inputs = [*rows, int(self._contact), self._indexed, *self._nothing, *self._images]
+        inputs = [points, normals, int(self._contact), self._indexed, *self._nothing, *self._images]
         (colors,) = zeros(self._device, len(points), wp.vec4)
         launch(with_law(color_points, self._contact), len(points), inputs, [colors], self._device)
-        result: Float32Array = colors.numpy()
-        return result
+        return colors
 
 
 class Modes(NamedTuple):

@@ -2,7 +2,6 @@
 
 import tracemalloc
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from decals import MeshObject, Scene, TreeObject
 from decals.baking import atlas as atlas_module
 from decals.baking import surface_colors as colors_module
 from decals.baking import texture as texture_module
-from decals.baking.atlas import unwrap
 from decals.baking.meshes import bake_mesh
 from decals.baking.texture import MAX_OVERSHOOT, Channels, bake_texture
 from decals.baking.unwrapped import Unwrapped
@@ -328,35 +326,6 @@ def test_degenerate_faces_and_unused_vertices_are_left_out(tmp_path: Path) -> No
         assert node.vertices.max() == 1.0
 
 
-def textured(size: int, samples: int = 1) -> Array:
-    """The texture of the ball and the cube, without a file."""
-    scene = ball_and_cube()
-    meshes = [
-        bake_mesh(item, resolution=None, creases=False, report=lambda *_: None) for item in scene.objects
-    ]
-    drawing = scene.drawing.overridden(contact=decals.Contact.PRODUCT)
-    colors = colors_module.SurfaceColors(meshes, scene.objects, scene.decals, scene.images, drawing)
-    parts = unwrap(meshes, size, lambda *_: None)
-    tiles: Array = bake_texture(meshes, parts, size, samples, Channels(colors.at), lambda *_: None)
-    return np.asarray(tiles[0])
-
-
-def test_blocks_bound_the_memory_and_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    need("xatlas")
-    no_seams = SimpleNamespace(of=lambda *_: SimpleNamespace(faces=()))  # they take memory by their length
-    monkeypatch.setattr(texture_module, "Seams", no_seams)
-    whole = textured(512)
-    monkeypatch.setattr(texture_module, "BLOCK_SAMPLES", 1 << 13)
-    tracemalloc.start()
-    try:
-        parts = textured(512)
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert np.array_equal(parts, whole)
-    assert peak < 8 * whole.nbytes
-
-
 def square(size: int, samples: int = 2) -> Array:
     """The texture of a square with decals, which covers all of it."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
@@ -371,6 +340,19 @@ def square(size: int, samples: int = 2) -> Array:
     )
     made: Array = bake_texture([mesh], [part], size, samples, Channels(colors.at), lambda *_: None)
     return np.asarray(made[0])
+
+
+def test_blocks_bound_the_memory_and_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = square(512)
+    monkeypatch.setattr(texture_module, "BLOCK_SAMPLES", 1 << 13)
+    tracemalloc.start()
+    try:
+        parts = square(512)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert np.array_equal(parts, whole)
+    assert peak < 8 * whole.nbytes
 
 
 @pytest.fixture(scope="module")

@@ -80,7 +80,7 @@ def check(mesh: BakeMesh, part: Unwrapped, size: int) -> None:
     density = np.sqrt(np.abs(flat) / solid * solid.sum() / np.abs(flat).sum())
     assert np.quantile(density, [0.02, 0.98]).min() > 0.4
     sheet = Sheet(0, mesh, part, 0)
-    found, overlaps = sheet.cover(0, size, size, 1, margin=-0.05)
+    found, overlaps = sheet.cover(size, margin=-0.05)
     assert overlaps == 0
     assert (found >= 0).mean() > 0.2
 
@@ -190,7 +190,7 @@ def test_xatlas_presses_no_smooth_surface_flat(name: str) -> None:
     solid, flat = total_areas(mesh, part)
     density = np.sqrt(np.abs(flat) / solid * solid.sum() / np.abs(flat).sum())
     assert np.quantile(density, 0.02) > 0.4
-    _, overlaps = Sheet(0, mesh, part, 0).cover(0, SIZE, SIZE, 1, margin=-0.05)
+    _, overlaps = Sheet(0, mesh, part, 0).cover(SIZE, margin=-0.05)
     assert overlaps <= 1e-4 * len(mesh.faces)
 
 
