@@ -11,6 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 import blobtree
 from blobtree import Box, Disc, Node, Point, Segment, Shell, Torus
@@ -313,6 +315,13 @@ def is_closed(faces: Int32Array) -> bool:
     count = int(faces.max(initial=-1)) + 1
     forth, back = np.sort(start * count + end), np.sort(end * count + start)
     return bool((np.diff(forth) > 0).all() and np.array_equal(forth, back))
+
+
+def pieces(mesh: blobtree.Mesh) -> IndexArray:
+    """Return for each vertex the number of its connected piece."""
+    start, end = mesh.faces[:, :2].ravel(), mesh.faces[:, 1:].ravel()
+    edges = coo_matrix((np.ones(len(start), np.int8), (start, end)), (len(mesh.vertices),) * 2)
+    return np.asarray(connected_components(edges, directed=False)[1], np.intp)
 
 
 def mesh_areas(mesh: blobtree.Mesh) -> tuple[Float64Array, Float64Array]:

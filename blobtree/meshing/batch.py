@@ -7,12 +7,14 @@ import numpy as np
 
 from blobtree.cells.grid import BRANCHING, Grid
 from blobtree.cells.joint_cells import build_joint_cells, model_starts
+from blobtree.cells.sparse_cells import build_cells
 from blobtree.device import known_device
 from blobtree.joint_work import checked_trees, is_small, of_tree, work_together
 from blobtree.meshing.dual_kernels import sample_blocks
 from blobtree.meshing.mesh import Mesh, download, extract_mesh
 from blobtree.meshing.polygonize import (
     DEFAULT_RESOLUTION,
+    bridges_gaps,
     cell_size_of,
     grid_around,
     load_kernels,
@@ -21,6 +23,7 @@ from blobtree.meshing.polygonize import (
 )
 from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, reporting
+from blobtree.tape.grown import runs_of_leaves
 from blobtree.tape.model import ImplicitModel
 
 MAX_JOINT_BLOCKS = 1 << 18
@@ -43,7 +46,7 @@ def polygonize_batch(
 
     Trees of the same kinds of nodes are meshed together, in few launches. On a graphics card that is much
     faster than a loop over small trees. On a processor the results are those of the loop bit for bit. Trees
-    with thin parts or very many primitives are meshed alone.
+    with thin parts, narrow gaps or very many primitives are meshed alone.
 
     Parameters
     ----------
@@ -93,17 +96,27 @@ def polygonize_batch(
 
     with reporting(progress, cancel) as report:
 
-        def joint(numbers: list[int]) -> list[Mesh]:
-            return _joint_meshes([models[n] for n in numbers], [grids[n] for n in numbers], device, report)
-
         def single(number: int) -> Mesh:
             return polygonize(
                 models[number], resolution=resolution, cell_size=cell_size, device=device, progress=report
             )
 
+        def joint(numbers: list[int]) -> list[Mesh]:
+            chosen = [models[n] for n in numbers], [grids[n] for n in numbers]
+            meshes = _joint_meshes(*chosen, device, report)
+            for row, (tree, grid) in enumerate(zip(*chosen, strict=True) if thin_matters else ()):
+                if _has_several_leaves(tree) and bridges_gaps(build_cells(tree.tape, grid, device=device)):
+                    meshes[row] = single(numbers[row])
+            return meshes
+
         kinds = list(map(kind, models, grids))
         blocks = list(map(_expected_blocks, models, sizes))
         return work_together(kinds, blocks, MAX_JOINT_BLOCKS, joint, single)
+
+
+def _has_several_leaves(tree: ImplicitModel) -> bool:
+    """Return True if gaps may be between leaves of a tree."""
+    return sum(1 for _ in runs_of_leaves(tree._program)) > 1
 
 
 def _expected_blocks(tree: ImplicitModel, cell_size: float) -> float:

@@ -19,6 +19,16 @@ FARTHEST_CRUMB = 2.0
 """Distance of a crumb from a larger piece, over the chord error, at most."""
 
 
+SPECK_VERTICES = 12
+"""Vertices of the closed piece around two samples; cells that resolve a part have more samples in it."""
+
+
+def without_specks(mesh: Mesh) -> Mesh:
+    """Return a mesh, whose cells resolve all parts, without the pieces around one sample or two."""
+    labels = _pieces(mesh.faces, len(mesh.vertices))
+    return _without(mesh, (np.bincount(labels) <= SPECK_VERTICES)[labels])
+
+
 def without_crumbs(mesh: Mesh, chord_error: float) -> Mesh:
     """Return a mesh without its crumbs; alone in space, a piece of any size stays."""
     labels = _pieces(mesh.faces, len(mesh.vertices))

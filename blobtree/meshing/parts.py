@@ -5,7 +5,8 @@ are: a ball, a tube or a plate by its radius, a box by its shortest side too, al
 warps that shrink them. So the blocks in which a thin primitive acts are refined until their cells resolve it,
 and all others keep their size. The result is a mesh of adaptive cells, which is closed where sizes meet.
 
-Walls that differences and intersections leave are thinner than any primitive: `walls` finds them.
+Walls that differences and intersections leave are thinner than any primitive: `walls` finds them. Gaps
+between parts may be narrower than cells: `gaps` finds these.
 """
 
 import logging
@@ -23,17 +24,19 @@ from blobtree.device import launch
 from blobtree.errors import InvalidResolution
 from blobtree.formulas.skeletons import BALL_CELLS
 from blobtree.meshing.adaptive_cell_kernels import write_polygons
-from blobtree.meshing.adaptive_cells import AdaptiveCells
+from blobtree.meshing.adaptive_cells import OCTANT_OF_CELL, AdaptiveCells
 from blobtree.meshing.adaptive_kernels import place_on_surface
 from blobtree.meshing.adaptive_mesh import AdaptiveMesher
 from blobtree.meshing.block_tree import BlockTree
+from blobtree.meshing.crumbs import without_specks
 from blobtree.meshing.dual_kernels import sample_blocks
+from blobtree.meshing.gaps import CrossingEdges, Gaps, connected_blocks
 from blobtree.meshing.mesh import Mesh
 from blobtree.meshing.part_kernels import measure_parts
 from blobtree.meshing.walls import Walls
 from blobtree.progress import Progress
-from blobtree.tape.model import ImplicitModel
-from blobtree.tape.operands import has_walls
+from blobtree.tape.model import ImplicitModel, values_at
+from blobtree.tape.operands import has_walls, leaves_of
 from blobtree.tape.part_sizes import fitting_scale, fitting_wall_scale, leaf_boxes, part_sizes, sized_tape
 from blobtree.tape.program import (
     PROGRAM_CHILDREN,
@@ -62,8 +65,14 @@ CROSSED_CELLS = 16.0
 SHEET_GROWTH = 16.0
 """Blocks of the next level in each block that a plate crosses; a tube crosses fewer."""
 
-MAX_PART_REPAIRS = 40
-"""Most rounds in which cells are divided until the mesh of thin parts is closed; most take one or two."""
+MAX_GAP_BLOCKS = MAX_PART_BLOCKS // 4
+"""Most blocks that gaps take."""
+
+GAP_GROWTH = 4.0
+"""Growth of the blocks at a gap from level to level, between surfaces that touch nearly in a point."""
+
+MAX_PART_REPAIRS = 100
+"""Most rounds in which cells are divided until the mesh is closed: a few, beside sharp rims up to 80."""
 
 LATER_GROWTH = 0.6
 """Growth of a part's blocks in later levels, over that in the last one, which is larger at ends and edges."""
@@ -87,6 +96,8 @@ class ThinPart:
     """A place in it (3,)."""
     of_wall: ProgramLeaf | None = None
     """A leaf beside a wall that no primitive is as thin as."""
+    is_gap: bool = False
+    """True for a gap between parts, which the mesh bridges."""
 
 
 def needed_sizes(
@@ -122,6 +133,12 @@ class PartCells(AdaptiveCells):
         self._in_walls = np.empty(0, bool)
         self._counts: dict[int, int] = {}
         self._dropped: list[int] = []
+        self._gaps = Gaps(tree)
+        self._in_gap = np.zeros(len(tree.cells.leaves))
+        """Edges across gaps in each block of the base, when it was last divided for them."""
+        self._given_up = np.zeros(len(tree.cells.leaves), bool)
+        """Blocks of the base at gaps for which there is no room."""
+        self._gap_blocks = 0
         self._divide_thin_parts()
 
     def _divide_thin_parts(self) -> None:
@@ -219,6 +236,48 @@ class PartCells(AdaptiveCells):
         factors: Float64Array = np.maximum(LATER_GROWTH * growth, 1.0) ** later
         return factors
 
+    def divide_gaps(self) -> bool:
+        """Divide the leaves that bridge gaps, where there is room; return False if there are none."""
+        tree, gaps, divided = self.tree, self._gaps, False
+        while True:
+            self._extend()
+            edges = gaps.edges((self.links < 0) & np.repeat(self._reached(), CHILDREN))
+            edges = edges.chosen(~self._given_up[gaps.roots(edges.blocks)])
+            if len(edges):
+                edges = edges.chosen(self._fitting(edges))
+            if not len(edges):
+                return divided
+            cells, before, divided = np.unique(edges.cells), len(tree), True
+            blocks, slots = np.divmod(cells[cells >= 0], CHILDREN)
+            merged = ~self.divided[blocks, OCTANT_OF_CELL[slots]]
+            self.divided[blocks[merged], OCTANT_OF_CELL[slots[merged]]] = True
+            self.divide(blocks[~merged], slots[~merged], np.zeros(np.count_nonzero(~merged), bool))
+            self._gap_blocks += len(tree) - before
+
+    def _fitting(self, edges: CrossingEdges) -> BoolArray:
+        """Return the edges across gaps for which there is room; gaps with the fewest blocks come first."""
+        tree, count = self.tree, len(self._given_up)
+        roots = self._gaps.roots(edges.blocks)
+        used, of_root = np.unique(roots, return_inverse=True)
+        gap = connected_blocks(tree.coordinates[used])[of_root]
+        numbers, found = np.bincount(gap), np.bincount(roots, minlength=count).astype(np.float64)
+        earlier = np.bincount(gap, weights=(self._in_gap[roots] / found[roots]))
+        self._in_gap = found
+        narrowest, sizes = (np.full(len(numbers), np.inf) for _ in range(2))
+        np.minimum.at(narrowest, gap, edges.widths)
+        np.minimum.at(sizes, gap, tree.grid(0).cell_size / 4.0 ** tree.levels[edges.blocks])
+        growth = np.where(earlier > 0.0, numbers / np.maximum(earlier, 1.0), GAP_GROWTH).clip(1.0)
+        later = np.ceil(0.5 * np.log2(sizes / narrowest)).clip(1.0) - 1.0
+        expected = np.where(sizes < 4.0 * self._least, np.inf, numbers * growth**later)
+        order = np.argsort(expected, kind="stable")
+        fits = np.empty(len(numbers), bool)
+        fits[order] = np.cumsum(expected[order]) <= MAX_GAP_BLOCKS - self._gap_blocks
+        for number in np.flatnonzero(~fits):
+            least = np.flatnonzero(gap == number)[edges.widths[gap == number].argmin()]
+            self.unresolved.append(ThinPart(float(edges.widths[least]), edges.places[least], is_gap=True))
+        self._given_up[roots[~fits[gap]]] = True
+        return np.asarray(fits[gap], bool)
+
     def _middle(self, blocks: IndexArray) -> Float64Array:
         """Return the centre of the middle one of blocks."""
         tree, block = self.tree, blocks[len(blocks) // 2]
@@ -282,14 +341,20 @@ def mesh_of_parts(
             tree, grid_of(fitting_wall_scale(needed, size, CROSSED_CELLS * len(blocks))), device, report
         )
         blocks, walls = first.blocks, first.walls
-    elif least_size(blocks.cells, smallest) >= BALL_CELLS * blocks.cells.grid.cell_size:
+    elif least_size(blocks.cells, smallest) >= BALL_CELLS * blocks.cells.grid.cell_size and not len(
+        Gaps(blocks).edges()
+    ):
         return None, unresolved
     parts = PartCells(blocks, 0.0, smallest, walls)
     try:
-        mesh = AdaptiveMesher(parts, creases).mesh(report, MAX_PART_REPAIRS)
+        parts.divide_gaps()
+        mesher = AdaptiveMesher(parts, creases)
+        mesh = mesher.mesh(report, MAX_PART_REPAIRS)
+        while parts.divide_gaps():  # repairs have made cells so small that they bridge gaps
+            mesh = mesher.mesh(report, MAX_PART_REPAIRS)
     except InvalidResolution:
         return None, parts.unresolved + unresolved + _all_parts(blocks.cells, walls, smallest)
-    return mesh.mesh(creases), parts.unresolved + unresolved
+    return without_specks(mesh.mesh(creases)), parts.unresolved + unresolved
 
 
 def _all_parts(cells: SparseCells, walls: Walls | None, least: float) -> list[ThinPart]:
@@ -325,9 +390,25 @@ def _too_thin(tree: ImplicitModel, smallest: float) -> list[ThinPart]:
 
 
 def warn_of_thin_parts(tree: ImplicitModel, unresolved: list[ThinPart]) -> None:
-    """Log one warning that names the parts that are not resolved, the thinnest first."""
-    if not unresolved:
-        return
+    """Log a warning that names the parts that are not resolved, the thinnest first, and one for gaps."""
+    gaps = [part for part in unresolved if part.is_gap]
+    parts = [part for part in unresolved if not part.is_gap]
+    if parts:
+        _logger.warning(
+            "parts are too thin for the cells that memory allows, so their meshes are not complete: %s; make "
+            "them thicker, or mesh them alone",
+            _wishes(tree, parts),
+        )
+    if gaps:
+        _logger.warning(
+            "gaps are too narrow for the cells that memory allows, so the mesh bridges them: %s; make them "
+            "wider, or mesh the parts alone",
+            _wishes(tree, gaps),
+        )
+
+
+def _wishes(tree: ImplicitModel, unresolved: list[ThinPart]) -> str:
+    """Return names of parts with the resolutions that they need, the thinnest first."""
     lower, upper = tree.support
     longest = float((upper - lower).max())
     texts: dict[str, str] = {}
@@ -337,12 +418,7 @@ def warn_of_thin_parts(tree: ImplicitModel, unresolved: list[ThinPart]) -> None:
         texts.setdefault(_name_of_part(tree, part), wish)
     named = [f"{name} {wish}" for name, wish in list(texts.items())[:MAX_NAMED_PARTS]]
     more = len(texts) - len(named)
-    _logger.warning(
-        "parts are too thin for the cells that memory allows, so their meshes are not complete: %s%s; make "
-        "them thicker, or mesh them alone",
-        ", and ".join(named),
-        f", and {more} more" if more else "",
-    )
+    return ", and ".join(named) + (f", and {more} more" if more else "")
 
 
 def _name_of_part(tree: ImplicitModel, part: ThinPart) -> str:
@@ -353,13 +429,21 @@ def _name_of_part(tree: ImplicitModel, part: ThinPart) -> str:
             tree, lambda child: _has_leaf(child, beside) and has_walls(compile_program(child))
         )
         return f"a wall of the {type(node).__name__} at path {path}"
+    leaves = [placed.primitive for run in tree._program if isinstance(run, Run) for placed in run.primitives]
+    if part.is_gap:
+        fields = [values_at(tape, part.place[None])[0] for tape in leaves_of(tree._program, tree.tape)]
+        nearest = np.argsort(fields)[::-1][:2].tolist()
+        return "one between " + " and ".join(sorted(_name_of_leaf(tree, leaves[at]) for at in nearest))
     least, most = np.log(part_sizes(tree)) - np.log(BALL_CELLS * part.size)
     misfit = np.round(np.maximum(least, -most).clip(0.0), 1)
     lower, upper = leaf_boxes(tree)
     gaps = np.linalg.norm(np.maximum(lower - part.place, part.place - upper).clip(0.0), axis=1)
-    number = np.lexsort([gaps, misfit])[0]
-    leaves = [placed.primitive for run in tree._program if isinstance(run, Run) for placed in run.primitives]
-    path, node = _last_on_way(tree, lambda child: _has_leaf(child, leaves[number]))
+    return _name_of_leaf(tree, leaves[np.lexsort([gaps, misfit])[0]])
+
+
+def _name_of_leaf(tree: ImplicitModel, leaf: ProgramLeaf) -> str:
+    """Return the class and the path of a leaf."""
+    path, node = _last_on_way(tree, lambda child: _has_leaf(child, leaf))
     return f"the {type(node).__name__} at path {path}"
 
 

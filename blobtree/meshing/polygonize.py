@@ -20,7 +20,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree.cells.grid import Grid, aligned_grid
-from blobtree.cells.sparse_cells import CELL_KERNELS, build_cells
+from blobtree.cells.sparse_cells import CELL_KERNELS, SparseCells, build_cells
 from blobtree.device import known_device, launch
 from blobtree.errors import InvalidResolution
 from blobtree.formulas.skeletons import BALL_CELLS
@@ -102,8 +102,8 @@ def polygonize(
     """Return the surface of `tree` as closed, consistently oriented triangles.
 
     Give at most one of `resolution`, `cell_size` and `chord_error`. Without any of them, the cells are those
-    of resolution 64, and smaller where primitives are thin. If these do not fit into memory, the log names
-    the part.
+    of resolution 64, and smaller where primitives are thin or nearly touch. If these do not fit into memory,
+    the log names the part or the gap.
 
     Parameters
     ----------
@@ -205,13 +205,23 @@ def polygonize_parts(
 ) -> Mesh:
     """Return the mesh with cells of `resolution`, and smaller ones where parts are thin, see `polygonize`."""
     truth("creases", creases, InvalidResolution)
-    if shows_thin_parts(tree, resolution, device):
+    with reporting(progress, cancel) as report:
+        if not shows_thin_parts(tree, resolution, device):
+            polygonizer = Polygonizer(
+                tree, resolution=resolution, creases=creases, device=device, progress=report
+            )
+            if not bridges_gaps(polygonizer.device_mesh.cells):
+                return polygonizer.mesh
         size = cell_size_of(tree, resolution, None)
-        with reporting(progress, cancel) as report:
-            return _mesh_of_thin_parts(tree, size, creases, device, report)
-    return Polygonizer(
-        tree, resolution=resolution, creases=creases, device=device, progress=progress, cancel=cancel
-    ).mesh
+        return _mesh_of_thin_parts(tree, size, creases, device, report)
+
+
+def bridges_gaps(cells: SparseCells) -> bool:
+    """Return True if the mesh of cells of one size bridges a gap."""
+    from blobtree.meshing.block_tree import BlockTree  # imported here, as above
+    from blobtree.meshing.gaps import Gaps
+
+    return len(Gaps(BlockTree(cells)).edges()) > 0
 
 
 def shows_thin_parts(tree: ImplicitModel, resolution: int, device: str | None) -> bool:

@@ -1,4 +1,4 @@
-"""Trust: files of other programs, windings, thin parts, sharp edges, framing, attacks and cancelled work.
+"""Trust: files of other programs, windings, thin parts, gaps, sharp edges, framing, attacks, cancelled work.
 
     python -m tests.bench.trust [--json FILE] [--quick] [--only windings,thin]
 
@@ -10,7 +10,7 @@ import sys
 
 from tests.bench.parts import run
 
-PARTS = ("files", "windings", "framing", "thin", "csg", "attacks", "cancel", "calls")
+PARTS = ("files", "windings", "framing", "thin", "gaps", "csg", "attacks", "cancel", "calls")
 """Names of the parts; each is the module `tests.bench.trust_NAME`."""
 
 

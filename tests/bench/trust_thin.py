@@ -17,7 +17,8 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from operator import add, sub
 from pathlib import Path
@@ -62,8 +63,8 @@ LIMIT = 120.0
 """Seconds after which a tree is ended."""
 
 
-class _Messages(logging.Handler):
-    """The warnings about thin parts."""
+class Messages(logging.Handler):
+    """The warnings about thin parts and gaps."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -72,6 +73,16 @@ class _Messages(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Keep the text."""
         self.texts.append(record.getMessage())
+
+    @contextmanager
+    def received(self) -> Iterator[None]:
+        """Within a ``with`` block, receive warnings."""
+        logger = logging.getLogger("blobtree.meshing.parts")
+        logger.addHandler(self)
+        try:
+            yield
+        finally:
+            logger.removeHandler(self)
 
 
 def measure(*, quick: bool) -> dict[str, float]:
@@ -137,11 +148,9 @@ def tree_row(number: int, count: int) -> dict[str, float | str]:
     _load_kernels()
     model = random_tree(number)
     before, _ = _scattered(model.tree, RESOLUTION, count)
-    messages = _Messages()
-    logger = logging.getLogger("blobtree.meshing.parts")
-    logger.addHandler(messages)
-    seconds, positions = _scattered(model.tree, None, count)
-    logger.removeHandler(messages)
+    messages = Messages()
+    with messages.received():
+        seconds, positions = _scattered(model.tree, None, count)
     over, counted = _named_parts(model, messages.texts), _counted_parts(model)
     bare, shares = _bare_parts(model, positions)
     mesh = polygonize(model.tree)

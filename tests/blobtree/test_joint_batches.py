@@ -71,7 +71,9 @@ def test_batches_of_library_kinds_are_loops(more: MoreKinds) -> None:
 
 def test_default_cells_show_thin_parts_too() -> None:
     thin = Point((0, 0, 0), radius=1.0) | Point((4, 0, 0), radius=0.02)
-    trees = [Point((0, 0, 0), radius=1.0), thin, Point((0, 0, 0), radius=2.0)]
+    pair = Point((0, 0, 0), radius=1.0) | Point((2.001, 0, 0.3), radius=1.0)
+    near = Point((0, 0, 0), radius=1.0) | Point((1.4146, 1.4146, 0.03), radius=1.0)
+    trees = [Point((0, 0, 0), radius=1.0), thin, Point((0, 0, 0), radius=2.0), pair, near]
     assert_same_meshes(polygonize_batch(trees), trees)
 
 

@@ -1,0 +1,218 @@
+"""Gaps: places where two surfaces are so near each other that cells would bridge the space between them.
+
+A mesh of cells joins two surfaces where an edge of a cell has both its ends inside, one beyond each surface,
+and no sample tells of the outside between. The ends belong to different primitives then, and the middle of
+the gap is as far from the one as from the other.
+
+Beside a concave crease, edges cross the outside too. There the same two samples are also joined by edges that
+stay inside. So samples and such edges are a graph, and an edge crosses a gap if it joins two of its parts.
+Cells at these edges are divided until none is left.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from blobtree._typing import BoolArray, Float64Array, IndexArray, Int32Array, Int64Array
+from blobtree.cells.grid import BRANCHING, CHILDREN
+from blobtree.device import launch
+from blobtree.formulas.falloff import ISO
+from blobtree.meshing.block_tree import BlockTree, on_device
+from blobtree.meshing.gap_kernels import find_owners, measure_gaps
+
+NEAR_BLOCKS = 2
+"""Distance, in blocks of the base, within which edges inside join two samples."""
+
+
+@dataclass(frozen=True)
+class CrossingEdges:
+    """Edges of cells with both ends inside that cross the outside."""
+
+    blocks: IndexArray
+    """The block of each (n,); an edge between blocks is in both of them."""
+    lowest: IndexArray
+    """Its lower end (n, 3), in cells from the lowest corner of the block."""
+    axes: IndexArray
+    """Its axis (n,)."""
+    widths: Float64Array
+    """Length of the part that is outside (n,)."""
+    places: Float64Array
+    """A place outside (n, 3)."""
+
+    @staticmethod
+    def none() -> "CrossingEdges":
+        """Return no edges."""
+        numbers, points = np.empty(0, np.intp), np.empty((0, 3))
+        return CrossingEdges(numbers, np.empty((0, 3), np.intp), numbers, points[:, 0], points)
+
+    def __len__(self) -> int:
+        return len(self.blocks)
+
+    def chosen(self, among: BoolArray | IndexArray) -> "CrossingEdges":
+        """Return some of the edges."""
+        return CrossingEdges(*(column[among] for column in vars(self).values()))
+
+    def then(self, more: "CrossingEdges") -> "CrossingEdges":
+        """Return these edges and others."""
+        columns = zip(vars(self).values(), vars(more).values(), strict=True)
+        return CrossingEdges(*map(np.concatenate, columns))
+
+    @property
+    def cells(self) -> IndexArray:
+        """The cells of each edge's block beside it (n, 4), −1 where the block has none."""
+        offsets = np.zeros((len(self), 4, 3), np.intp)
+        rows = np.arange(len(self))
+        for number, (first, second) in enumerate(np.ndindex(2, 2)):
+            offsets[rows, number, (self.axes + 1) % 3] = first
+            offsets[rows, number, (self.axes + 2) % 3] = second
+        at = self.lowest[:, None] - offsets
+        there = ((at >= 0) & (at < BRANCHING)).all(axis=2)
+        cells = self.blocks[:, None] * CHILDREN + at @ [BRANCHING**2, BRANCHING, 1]
+        return np.where(there, cells, -1)
+
+
+class Gaps:
+    """The edges of a tree of blocks that cross gaps, as its blocks are refined."""
+
+    def __init__(self, tree: BlockTree) -> None:
+        self._tree = tree
+        self._roots = np.arange(len(tree.cells.leaves))
+        self._crossing = CrossingEdges.none()
+        self._searched = 0
+
+    def roots(self, blocks: IndexArray) -> IndexArray:
+        """Return the blocks of the base that hold blocks."""
+        self._search()
+        return self._roots[blocks]
+
+    def edges(self, leaves: BoolArray | None = None) -> CrossingEdges:
+        """Return the edges across gaps beside cells (64 n,) that are leaves, by default all."""
+        self._search()
+        if leaves is None:
+            leaves = np.ones(len(self._tree) * CHILDREN, bool)
+        cells = self._crossing.cells
+        beside = np.asarray(((cells >= 0) & leaves[cells]).any(axis=1))
+        crossing = self._crossing.chosen(beside)
+        return crossing.chosen(self._apart(crossing)) if len(crossing) else crossing
+
+    def _search(self) -> None:
+        """Look for edges that cross the outside in new blocks."""
+        tree, first = self._tree, self._searched
+        if first == len(tree):
+            return
+        self._searched = len(tree)
+        new = np.arange(len(self._roots), len(tree))
+        self._roots = np.append(self._roots, new)
+        for level in range(1, tree.depth + 1):
+            of_level = new[tree.levels[new] == level]
+            self._roots[of_level] = self._roots[tree.parents[of_level] // CHILDREN]
+        for level in np.unique(tree.levels[first:]):
+            listed = first + np.flatnonzero(tree.levels[first:] == level)
+            rows, lowest, axes = _changes(self._owners(listed, int(level)))
+            self._crossing = self._crossing.then(self._measured(listed[rows], lowest, axes))
+
+    def _owners(self, listed: IndexArray, level: int) -> Int32Array:
+        """Return the nearest primitive (n, 5, 5, 5) at samples of blocks of a level; −1 outside."""
+        tree, device = self._tree, self._tree.cells.device
+        grid, values = tree.grid(level), tree.values[listed]
+        owners: Any = wp.empty(values.size, dtype=wp.int32, device=device)
+        inputs = [on_device(listed, wp.int32, device), tree.level_arrays()]
+        inputs += [wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner), grid.cell_size]
+        inputs += [on_device(values.ravel(), wp.float32, device)]
+        kernel = tree.cells.tape.instruction_set.kernel_for(find_owners)
+        launch(kernel, values.size, inputs, [owners], device)
+        result: Int32Array = owners.numpy().reshape(values.shape)
+        return result
+
+    def _measured(self, blocks: IndexArray, lowest: IndexArray, axes: IndexArray) -> CrossingEdges:
+        """Return those of some edges that cross the outside."""
+        tree, device, count = self._tree, self._tree.cells.device, len(blocks)
+        if not count:
+            return CrossingEdges.none()
+        sizes = tree.grid(0).cell_size / 4.0 ** tree.levels[blocks]
+        origins = np.array([tree.grid(level).origin for level in range(tree.depth + 1)])
+        starts = tree.coordinates[blocks] * BRANCHING + lowest
+        starts = origins[tree.levels[blocks]] + starts * sizes[:, None]
+        steps = np.eye(3)[axes] * sizes[:, None]
+        widths: Any = wp.zeros(count, dtype=wp.float32, device=device)
+        places: Any = wp.zeros(count, dtype=wp.vec3, device=device)
+        inputs = [on_device(array.astype(np.float32), wp.vec3, device) for array in (starts, steps)]
+        inputs += [on_device(blocks, wp.int32, device), tree.spans, tree.tape]
+        kernel = tree.cells.tape.instruction_set.kernel_for(measure_gaps)
+        launch(kernel, count, inputs, [widths, places], device)
+        lengths = widths.numpy().astype(np.float64)
+        found = CrossingEdges(blocks, lowest, axes, lengths, places.numpy().astype(np.float64))
+        return found.chosen(lengths > 0.0)
+
+    def _apart(self, crossing: CrossingEdges) -> BoolArray:
+        """Return the edges whose ends are not joined by edges that stay inside."""
+        from scipy.sparse import coo_matrix  # most meshes have no such edges
+        from scipy.sparse.csgraph import connected_components
+        from scipy.spatial import cKDTree
+
+        tree = self._tree
+        base = tree.coordinates[: len(tree.cells.leaves)]
+        centers = base[np.unique(self._roots[crossing.blocks])]
+        near = cKDTree(centers).query(base, p=np.inf, distance_upper_bound=NEAR_BLOCKS + 0.5)[0] < np.inf
+        blocks = np.flatnonzero(near[self._roots])
+        row_of = np.full(len(tree), -1)
+        row_of[blocks] = np.arange(len(blocks))
+        inside = tree.values[blocks] >= ISO
+        keys = self._sample_keys(blocks)[inside]
+        numbers = np.zeros(inside.shape, np.intp)
+        nodes, numbers[inside] = np.unique(keys, return_inverse=True)
+        known = self._crossing.chosen(row_of[self._crossing.blocks] >= 0)
+        pairs = []
+        for axis in range(3):
+            low, high = (
+                tuple(slice(*ends) if at == axis else slice(None) for at in range(3))
+                for ends in ((0, 4), (1, 5))
+            )
+            joined = inside[:, *low] & inside[:, *high]
+            of_axis = known.chosen(known.axes == axis)
+            joined[row_of[of_axis.blocks], *of_axis.lowest.T] = False
+            pairs.append(np.stack([numbers[:, *low][joined], numbers[:, *high][joined]]))
+        start, end = np.concatenate(pairs, axis=1)
+        graph = coo_matrix((np.ones(len(start), np.int8), (start, end)), (len(nodes),) * 2)
+        labels = connected_components(graph, directed=False)[1]
+        rows, ends = row_of[crossing.blocks], crossing.lowest + np.eye(3, dtype=np.intp)[crossing.axes]
+        first, second = (labels[numbers[rows, *at.T]] for at in (crossing.lowest, ends))
+        return np.asarray(first != second)
+
+    def _sample_keys(self, blocks: IndexArray) -> Int64Array:
+        """Return numbers (n, 5, 5, 5) of samples of blocks, equal for equal places."""
+        tree = self._tree
+        scale = 4 ** (tree.depth - tree.levels[blocks])
+        x, y, z = (
+            (tree.coordinates[blocks, axis].astype(np.int64) * BRANCHING)[:, None] + np.arange(BRANCHING + 1)
+            for axis in range(3)
+        )
+        x, y, z = (line * scale[:, None] for line in (x, y, z))
+        keys: Int64Array = (x << 42)[:, :, None, None] + (y << 21)[:, None, :, None] + z[:, None, None, :]
+        return keys
+
+
+def connected_blocks(coordinates: Int32Array) -> IndexArray:
+    """Return the number of its group of neighbours for each of some blocks (n, 3)."""
+    from scipy.sparse.csgraph import connected_components  # most meshes have no gaps
+    from scipy.spatial import cKDTree
+
+    search = cKDTree(coordinates)
+    beside = search.sparse_distance_matrix(search, 1.5, p=np.inf)
+    groups: IndexArray = connected_components(beside, directed=False)[1]
+    return groups
+
+
+def _changes(owners: Int32Array) -> tuple[IndexArray, IndexArray, IndexArray]:
+    """Return edges whose ends are inside and have different owners (n, 5, 5, 5): rows, lower ends, axes."""
+    found = [np.empty((0, 5), np.intp)]
+    for axis in range(3):
+        along = np.moveaxis(owners, axis + 1, 1)
+        low, high = along[:, :-1], along[:, 1:]
+        row, at, *across = np.nonzero((low != high) & (low >= 0) & (high >= 0))
+        lowest = np.stack([*across[:axis], at, *across[axis:]], axis=1)
+        found.append(np.column_stack([row, lowest, np.full(len(row), axis)]))
+    every = np.concatenate(found)
+    return every[:, 0], every[:, 1:4], every[:, 4]

@@ -1,0 +1,75 @@
+"""Gaps narrower than cells: parts that do not meet have meshes of their own, or the gap is named."""
+
+import logging
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from blobtree import Box, Node, Point, Segment, Union, polygonize
+from tests.gap_pairs import random_pair
+from tests.thin_trees import is_closed, pieces
+
+BALL = Point((0, 0, 0), radius=1.0)
+CUBE = Box((0, 0, 0), (1, 1, 1), radius=0.05)
+
+
+def count(tree: Node) -> int:
+    """Return how many pieces the closed mesh of a tree has."""
+    mesh = polygonize(tree)
+    assert is_closed(mesh.faces)
+    assert np.abs(tree(mesh.vertices) - 0.5).max() < 1e-3
+    return int(pieces(mesh).max()) + 1
+
+
+@pytest.mark.parametrize("seed", [0, 2, 4, 10, 25, 42, 43, 56])
+def test_a_pair_has_two_pieces(seed: int) -> None:
+    assert count(random_pair(seed).tree) == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(200, 240, 5))
+def test_pairs_have_two_pieces_or_are_named(first: int, caplog: pytest.LogCaptureFixture) -> None:
+    for seed in range(first, first + 5):
+        caplog.clear()
+        assert count(random_pair(seed).tree) == 2 or "gaps are too narrow" in caplog.text
+
+
+def test_the_ends_of_a_bow_stay_apart() -> None:
+    corners = [(0.003, 0, 0), (1, 0, 0), (1, 1, 0), (-1, 1, 0), (-1, 0, 0), (-0.003, 0, 0)]
+    rods = [
+        Segment(start, end, radius=0.1).translate((0.1 if start[0] > 0 else -0.1, 0, 0))
+        for start, end in pairwise(corners)
+    ]
+    tree = Union(tuple(rods))
+    mesh = polygonize(tree)
+    assert len(mesh.vertices) - len(mesh.faces) // 2 == 2  # as a ball, not as a ring
+
+
+def test_a_chain_of_balls_has_as_many_pieces() -> None:
+    assert count(Union(tuple(BALL.translate((2.002 * number, 0, 0)) for number in range(5)))) == 5
+
+
+@pytest.mark.parametrize(
+    "tree",
+    [
+        BALL | BALL.translate((1.99, 0.01, 0.03)),
+        BALL | BALL.translate((1.5, 0.01, 0.03)),
+        BALL + BALL.translate((1.99, 0, 0)),
+        CUBE | CUBE.translate((1.1, 0.1, 0.2)),
+        CUBE | BALL.translate((1.2, 0, 0)),
+    ],
+)
+def test_parts_that_meet_keep_cells_of_one_size(tree: Node, caplog: pytest.LogCaptureFixture) -> None:
+    uniform, default = polygonize(tree, resolution=64), polygonize(tree)
+    assert np.array_equal(uniform.vertices, default.vertices)
+    assert not caplog.records
+
+
+def test_a_gap_too_narrow_for_memory_is_named_once(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING):
+        mesh = polygonize(CUBE | Box((1.1 + 3e-5, 0.1, 0.2), (1, 1, 1), radius=0.05))
+    assert is_closed(mesh.faces)
+    (record,) = caplog.records
+    assert "one between the Box at path (0,) and the Box at path (1,) near (0.55," in record.getMessage()
+    assert "resolution of" in record.getMessage()
