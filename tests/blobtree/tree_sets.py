@@ -30,15 +30,15 @@ ORDINARY_TREES = 5
 
 POINTS = 150
 
-BUILT_IN_TREES = RandomTrees(seed=1, count=240)
-DEFORMED_TREES = RandomTrees(seed=51, count=80, depth=3, more=DEFORMED)
-SOLID_TREES = RandomTrees(seed=21, count=80, more=SOLIDS)
+BUILT_IN_TREES = RandomTrees(seed=1, count=160)
+DEFORMED_TREES = RandomTrees(seed=51, count=60, depth=3, more=DEFORMED)
+SOLID_TREES = RandomTrees(seed=21, count=60, more=SOLIDS)
 FIELD_TREES = RandomTrees(seed=33, count=40, more=FIELDS)
-SHAPE_TREES = RandomTrees(seed=41, count=80, more=SHAPES)
-BLEND_TREES = RandomTrees(seed=51, count=80, depth=3, more=BLENDED)
+SHAPE_TREES = RandomTrees(seed=41, count=60, more=SHAPES)
+BLEND_TREES = RandomTrees(seed=51, count=60, depth=3, more=BLENDED)
 CONTACT_TREES = RandomTrees(seed=31, count=40, depth=2, more=CONTACTS)
-PROFILED_TREES = RandomTrees(seed=22, count=80, more=PROFILED)
-SIGNED_TREES = RandomTrees(seed=23, count=80, more=SIGNED)
+PROFILED_TREES = RandomTrees(seed=22, count=60, more=PROFILED)
+SIGNED_TREES = RandomTrees(seed=23, count=60, more=SIGNED)
 ANY_ORDER = 0.05
 """Superelliptic blends are not homogeneous, so their colours depend a little on the order of the operands."""
 

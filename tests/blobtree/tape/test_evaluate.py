@@ -126,7 +126,7 @@ def oracle_slope() -> float:
 @pytest.mark.slow_cases("fields-0")
 @EVERY_BATCH
 def test_no_field_rises_faster_than_its_bound(batch: Batch) -> None:
-    """|f(x) − f(q)| ≤ L · |x − q| for all x in the ball: 77,000 pairs over all runs."""
+    """|f(x) − f(q)| ≤ L · |x − q| for all x in the ball: 320 pairs for each tree."""
     rng = np.random.default_rng(batch.start)
     worst = 0.0
     for tree, _ in batch.cases:
@@ -166,7 +166,7 @@ def test_no_gradient_inside_a_ball_is_longer_than_its_bound(batch: Batch) -> Non
 
 @EVERY_BATCH
 def test_no_field_rises_or_falls_faster_along_a_ray_than_its_bounds(batch: Batch) -> None:
-    """−L₋ · u ≤ f(q + u·d) − f(q) ≤ L₊ · u all the way, 77,000 pairs over all runs, in float64."""
+    """−L₋ · u ≤ f(q + u·d) − f(q) ≤ L₊ · u all the way, 320 pairs for each tree, in float64."""
     rng = np.random.default_rng(batch.start)
     tight = 0.0
     for tree, _ in batch.cases:
