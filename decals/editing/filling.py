@@ -25,6 +25,7 @@ from decals.scattering.orientation import tangents
 from decals.scattering.trial_points import random_points_around
 from decals.scenes.objects import SceneObject, same_shape
 from decals.surfaces.mesh import MeshSurface
+from decals.surfaces.surface import row_blocks
 from decals.validation import instance, whole_number
 
 SAMPLES_PER_CELL = 100
@@ -105,13 +106,15 @@ class Skin:
         walks = walks_for(self.drawing.mapping, self.decals, self.objects)
         modes = modes_of(self.drawing)
         for number in np.unique(points.surface_ids).tolist():
-            item, rows = self.objects[number], np.flatnonzero(points.surface_ids == number)
-            positions, normals = points.positions[rows], points.normals[rows]
-            if isinstance(item.surface, MeshSurface):
-                normals = item.surface.smooth_normals(positions)
-            found = evaluate(self.decals, positions, normals, **modes, on=item, walks=walks)
-            squares = ((found.uv.astype(np.float64) - 0.5) ** 2).sum(axis=1)
-            result[rows] = np.where(found.owner >= 0, squares / IMAGE_RADIUS_SQUARED, np.inf)
+            item, own = self.objects[number], np.flatnonzero(points.surface_ids == number)
+            for block in row_blocks(len(own), "looking for bare places"):
+                rows = own[block]
+                positions, normals = points.positions[rows], points.normals[rows]
+                if isinstance(item.surface, MeshSurface):
+                    normals = item.surface.smooth_normals(positions)
+                found = evaluate(self.decals, positions, normals, **modes, on=item, walks=walks)
+                squares = ((found.uv.astype(np.float64) - 0.5) ** 2).sum(axis=1)
+                result[rows] = np.where(found.owner >= 0, squares / IMAGE_RADIUS_SQUARED, np.inf)
         return result
 
 
@@ -204,7 +207,8 @@ def _bare_among(
     def counting(points: OrientedPoints) -> OrientedPoints:
         if chosen is None or not len(points):
             return points
-        counts = chosen(points)
+        blocks = row_blocks(len(points), "looking for bare places")
+        counts = np.concatenate([chosen(points[rows]) for rows in blocks])
         near = _distances(points.positions, points.positions[~counts]) < RIM * skin.radius
         return points[np.flatnonzero(counts & ~near)]
 

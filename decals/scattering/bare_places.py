@@ -6,6 +6,7 @@ from blobtree._typing import BoolArray, Float64Array, Int64Array
 from blobtree.progress import check_cancelled
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.neighbors import FacingTree, NearestFacing
+from decals.surfaces.surface import row_blocks
 
 LINK = 2.5
 """Distance up to which bare samples belong to one place, in mean distances of the samples."""
@@ -31,6 +32,9 @@ LARGEST = 1.15
 EVEN_ROUNDS = 5
 """Rounds that move each centre to the middle of the samples nearest to it (Lloyd 1982)."""
 
+MAX_HEAP = 16
+"""Most samples of one small cube that are linked to others."""
+
 ENCLOSING_STEPS = 20
 """Steps toward the centres of the least balls around these samples (Bădoiu and Clarkson 2003)."""
 
@@ -49,14 +53,41 @@ def places_of(samples: OrientedPoints, distance: float) -> int:
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    count = len(samples)
+    reach, count = LINK * distance, len(samples)
     if count == 0:
         return 0
-    pairs = cKDTree(samples.positions).query_pairs(LINK * distance, output_type="ndarray")
-    facing = np.einsum("ni,ni->n", *(samples.normals[pairs[:, side]] for side in (0, 1))) > 0.0
-    rows, columns = pairs[facing].T
-    links = coo_array((np.ones(len(rows), np.bool_), (rows, columns)), shape=(count, count))
-    return int(connected_components(links, directed=False, return_labels=False))
+    samples = samples[_without_heaps(samples, reach)]
+    axis = int(np.ptp(samples.positions, axis=0).argmax())
+    samples = samples[np.argsort(samples.positions[:, axis], kind="stable")]
+    along = samples.positions[:, axis].astype(np.float64)
+    places, labels = len(samples), np.arange(len(samples))
+    for rows in row_blocks(len(samples), "counting bare places"):
+        end = int(np.searchsorted(along, along[rows.stop - 1] + reach, side="right"))
+        near = samples[rows.start : end]
+        pairs = cKDTree(near.positions).query_pairs(reach, output_type="ndarray")
+        facing = np.einsum("ni,ni->n", *(near.normals[pairs[:, side]] for side in (0, 1))) > 0.0
+        linked = labels[pairs[facing] + rows.start].T
+        links = coo_array((np.ones(linked.shape[1], np.bool_), tuple(linked)), shape=(places, places))
+        places, joined = connected_components(links, directed=False)
+        labels = joined[labels]
+    return int(places)
+
+
+def _without_heaps(samples: OrientedPoints, reach: float) -> Int64Array:
+    """Return the samples without those beyond `MAX_HEAP` that are all linked to the same others.
+
+    Samples of one small cube, whose normals have the same signs, are linked to each other. Only where a
+    projection moves many of them to one place, as at a tip, are they so many; their pairs would not end.
+    """
+    cells = np.floor((samples.positions - samples.positions.min(axis=0)) * (2.0 / reach)).astype(np.int64)
+    keys = np.zeros(len(samples), np.int64)
+    for columns, size in ((cells, 1 << 19), (np.sign(samples.normals).astype(np.int64), 3)):
+        for column in columns.T:
+            keys = keys * size + column % size
+    order = np.argsort(keys, kind="stable")
+    begins = np.flatnonzero(np.diff(keys[order], prepend=-1))
+    places = np.arange(len(order)) - np.repeat(begins, np.diff(begins, append=len(order)))
+    return np.sort(order[places < MAX_HEAP])
 
 
 def filling_points(

@@ -24,6 +24,7 @@ from decals.surfaces.surface import (
     contains_host,
     make_read_only,
     project_host,
+    row_blocks,
     unit_rows,
     vectors,
 )
@@ -245,13 +246,15 @@ class MeshSurface(Value):
         levels = (np.arange(count) + rng.random(count)) * (self.area / max(count, 1))
         face = np.minimum(np.searchsorted(self._cumulative, levels, side="right"), len(self._corners) - 1)
         sequence = rng.random(2) + np.arange(count)[:, None] * R2_STEPS
-        areas = np.diff(self._cumulative, prepend=0.0)[face]
-        spread = 1.0 / np.sqrt(np.maximum(count * areas / self.area, 1.0))
-        square = (sequence + spread[:, None] * rng.uniform(-1.0, 1.0, (count, 2))) % 1.0
-        root, along = np.sqrt(square[:, :1]), square[:, 1:]
-        a, b, c = np.moveaxis(self.vertices[self._corners[face]].astype(np.float64), 1, 0)
-        positions = (1 - root) * a + root * ((1 - along) * b + along * c)
-        return positions.astype(np.float32), self._normals[face]
+        areas, jitter = np.diff(self._cumulative, prepend=0.0), rng.uniform(-1.0, 1.0, (count, 2))
+        positions = np.empty((count, 3), np.float32)
+        for rows in row_blocks(count, "sampling"):
+            spread = 1.0 / np.sqrt(np.maximum(count * areas[face[rows]] / self.area, 1.0))
+            square = (sequence[rows] + spread[:, None] * jitter[rows]) % 1.0
+            root, along = np.sqrt(square[:, :1]), square[:, 1:]
+            a, b, c = np.moveaxis(self.vertices[self._corners[face[rows]]].astype(np.float64), 1, 0)
+            positions[rows] = (1 - root) * a + root * ((1 - along) * b + along * c)
+        return positions, self._normals[face]
 
     def on(self, device: str) -> "DeviceMeshSurface":
         """Return the surface in the memory of a device; later calls return the same object.

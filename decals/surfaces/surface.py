@@ -3,6 +3,7 @@
 A `DeviceSurface` is a surface in the memory of a Warp device: it projects points without a copy to the host.
 """
 
+from collections.abc import Iterator
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -10,6 +11,7 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import BoolArray, Float32Array
+from blobtree.progress import check_cancelled
 from blobtree.validation import point_array
 from decals.errors import InvalidPoints
 
@@ -18,6 +20,23 @@ Vectors = Any
 
 Scalars = Any
 """``wp.array`` of ``float32`` or ``int32`` on the surface's device."""
+
+
+ROW_BLOCK = 1 << 17
+"""Rows of large arrays that are computed at once."""
+
+
+def row_blocks(count: int, stage: str) -> Iterator[slice]:
+    """Yield the rows of large arrays in blocks, so that what is computed of them takes little memory.
+
+    Raises
+    ------
+    Cancelled
+        The work is to stop; `stage` says at what it was.
+    """
+    for first in range(0, count, ROW_BLOCK):
+        check_cancelled(stage)
+        yield slice(first, min(first + ROW_BLOCK, count))
 
 
 @runtime_checkable
