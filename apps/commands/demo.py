@@ -4,6 +4,7 @@ Two pictures show a creature and its egg: under scales, and a close-up in tiles.
 surface, the egg a mesh. The particles spread over both at once, so scales push each other where they touch.
 """
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -24,9 +25,13 @@ from decals.apps.models.shapes import creature, egg
 from decals.apps.output import check_output, print_path
 from decals.errors import InvalidInput, NoGraphics
 from decals.rendering import Picture, Renderer
-from decals.rendering.options import RenderOptions
+from decals.rendering.options import RenderOptions, Size
+from decals.scenes.render import picture_record
 
 PICTURES = ("hero.png", "contact.png", "span.png")
+
+DEMO_FUNCTION = "implicit-decals demo"
+"""Function in the recipes of these pictures."""
 
 COUNT = 1100
 EYE_RADIUS = 0.23
@@ -83,18 +88,30 @@ def demo(
     make_folder(output, InvalidInput)
     for name in PICTURES:
         check_output(output / name, (".png",))
-    with progress_bars() as progress, Renderer(max_tile=TILE) as renderer:
-        progress(PREPARING, 0.0)
-        nest = nest_scene(progress=progress)
-        for name, scene in zip(PICTURES, (nest, tile_scene(nest), spanning.scene(fov=27.0)), strict=True):
-            progress(f"drawing {name}", 0.0)
-            Picture(renderer.render(scene, RenderOptions(size=pixels, samples=samples))).save(output / name)
+    with progress_bars() as progress:
+        for name, picture in demo_pictures(PICTURES, pixels, samples, progress):
+            picture.save(output / name)
     for name in PICTURES:
         print_path(output / name)
     lines = "\n".join(f"  {line}" for line in command_lines(next_commands()))
     Console(stderr=True).print(
         f"\nNext, type in this shell:\n\n{lines}", soft_wrap=True, highlight=False, markup=False
     )
+
+
+def demo_pictures(
+    names: Sequence[str], size: Size, samples: int, progress: Progress
+) -> Iterator[tuple[str, Picture]]:
+    """Yield some of the pictures with their recipes."""
+    progress(PREPARING, 0.0)
+    nest = nest_scene(progress=progress)
+    scenes = dict(zip(PICTURES, (nest, tile_scene(nest), spanning.scene(fov=27.0)), strict=True))
+    with Renderer(max_tile=TILE) as renderer:
+        for name in names:
+            progress(f"drawing {name}", 0.0)
+            pixels = renderer.render(scenes[name], RenderOptions(size=size, samples=samples))
+            parameters = {"picture": name, "size": list(size), "samples": samples}
+            yield name, Picture(pixels, picture_record(renderer, DEMO_FUNCTION, parameters))
 
 
 def next_commands() -> list[str]:

@@ -70,8 +70,8 @@ def _draw(pictures: dict[str, Path], side: int) -> None:
     """Draw examples into files, also if the meshes of some cannot be downloaded."""
     # The list of examples does without these imports, which take more than a second.
     from decals.apps.commands.progress_bars import progress_bars
-    from decals.apps.gallery.helpers import draw
-    from decals.rendering import Picture, Renderer
+    from decals.apps.gallery.helpers import example_picture
+    from decals.rendering import Renderer
 
     for path in pictures.values():
         check_output(path, PICTURE_SUFFIXES)
@@ -84,7 +84,7 @@ def _draw(pictures: dict[str, Path], side: int) -> None:
             except InvalidInput as error:
                 failures[name] = error
                 continue
-            Picture(draw(renderer, panels, side=side)).save(path)
+            example_picture(renderer, name, panels, side).save(path)
     for name, path in pictures.items():
         if name not in failures:
             print_path(path)

@@ -1,23 +1,33 @@
 """``implicit-decals reproduce``: make what a file holds again from its recipe, and say what differs."""
 
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
 from rich.console import Console
 
-from decals import Scene, load_scene, render
-from decals.apps.commands.options import Definitions, Trust
+from blobtree import Progress
+from decals import Decals, Scene, load_scene, render
+from decals.apps import gallery as examples
+from decals.apps.commands.demo import DEMO_FUNCTION, PICTURES, demo_pictures
+from decals.apps.commands.gallery import MAX_SIDE
+from decals.apps.commands.options import MAX_SAMPLES, Definitions, Trust, check_count, parse_size
 from decals.apps.commands.progress_bars import preparing
+from decals.apps.gallery.helpers import GALLERY_FUNCTION, example_picture
 from decals.baking.reproduction import NO_RECIPE, reproduce_export
-from decals.errors import InvalidInput
+from decals.errors import ImplicitDecalsError, InvalidInput
 from decals.images.load import load_image
+from decals.rendering import Picture, Renderer
 from decals.rendering.picture import picture_recipe
+from decals.scenes.files import camera_of_values
 from decals.scenes.provenance import changes_since
 from decals.scenes.render import scene_hashes
 from decals.scenes.reproduction import Reproduction
 from decals.scenes.reproduction import reproduce as made_again
+from decals.validation import one_of
 
 DIFFERENT = 1
 MISSING = 3
@@ -42,7 +52,8 @@ def reproduce(
     Parameters
     ----------
     file
-        A saved scene, a PNG file that render wrote, or a glb or gltf file that export or bake wrote.
+        A saved scene; a PNG file that render, animate, gallery or demo wrote; or a glb or gltf file that
+        export or bake wrote.
     scene
         The scene of a picture, which the PNG file does not hold, or of an exported file that was too large
         to hold it.
@@ -52,7 +63,8 @@ def reproduce(
         raise InvalidInput(f"--scene: expected a PNG, GLB or glTF file beside it, got {file!r}; leave it out")
     with preparing(define) as progress:
         if suffix == ".png":
-            found = _of_picture(Path(file), None if scene is None else load_scene(scene, trust=trust))
+            held = None if scene is None else load_scene(scene, trust=trust)
+            found = _of_picture(Path(file), held, progress)
         elif suffix in EXPORTED:
             found = reproduce_export(
                 Path(file),
@@ -65,22 +77,24 @@ def reproduce(
     return _report(file, found)
 
 
-def _of_picture(path: Path, scene: Scene | None) -> Reproduction:
+def _of_picture(path: Path, scene: Scene | None, progress: Progress) -> Reproduction:
     """Draw a picture again, and compare the pixels."""
     recipe = picture_recipe(path)
     if recipe is None:
         return Reproduction((NO_RECIPE,))
-    options = recipe["parameters"]
-    missing = [f"the value of {name!r}, which the recipe only describes" for name in recipe["missing"]]
-    if scene is None:
-        missing.append("the scene: give its file with --scene")
-    else:
-        hashes = scene_hashes(scene)
-        others = [name for name, value in recipe["scene"].items() if hashes.get(name) != value]
-        missing += [f"the {name} of the scene that was drawn: the file has others" for name in others]
-    if missing or scene is None:
-        return Reproduction(tuple(missing))
-    picture = render(scene, **options | {"size": tuple(options["size"])})
+    try:
+        if recipe.get("function") in (GALLERY_FUNCTION, DEMO_FUNCTION):
+            picture = _own_picture(recipe["function"], recipe["parameters"], progress)
+        else:
+            if scene is not None and "camera" in recipe:  # that of a frame is none of the file
+                scene = scene.replace(camera=camera_of_values(recipe["camera"]))
+            missing = _missing(recipe, scene)
+            if missing or scene is None:
+                return Reproduction(missing)
+            options = recipe["parameters"]
+            picture = render(scene, **options | {"size": tuple(options["size"])})
+    except (ImplicitDecalsError, ValueError, LookupError, TypeError, AttributeError) as error:
+        return Reproduction((f"a recipe that this version takes: {error}",))
     before, after = load_image(str(path)).astype(int), picture.pixels.astype(int)
     changes: list[str] = []
     if before.shape != after.shape:
@@ -90,7 +104,33 @@ def _of_picture(path: Path, scene: Scene | None) -> Reproduction:
             f"pixels: {np.count_nonzero(apart):,} of {apart.size:,} differ, up to {apart.max()} of 255"
         )
     now = picture.recipe or recipe
-    return Reproduction((), scene.decals, tuple(changes), changes_since(recipe, now))
+    decals = Decals.empty() if scene is None else scene.decals
+    return Reproduction((), decals, tuple(changes), changes_since(recipe, now))
+
+
+def _missing(recipe: Mapping[str, Any], scene: Scene | None) -> tuple[str, ...]:
+    """Return what the recipe of a picture needs besides a scene."""
+    missing = [f"the value of {name!r}, which the recipe only describes" for name in recipe["missing"]]
+    if scene is None:
+        return (*missing, "the scene: give its file with --scene")
+    hashes = scene_hashes(scene)
+    others = [name for name, value in recipe["scene"].items() if hashes.get(name) != value]
+    return (*missing, *(f"the {name} of the scene that was drawn: the file has others" for name in others))
+
+
+def _own_picture(function: str, parameters: Mapping[str, Any], progress: Progress) -> Picture:
+    """Draw a picture of a command whose scenes are its own."""
+    if function == DEMO_FUNCTION:
+        one_of("picture", parameters["picture"], PICTURES, InvalidInput)
+        check_count("samples", parameters["samples"], 1, MAX_SAMPLES)
+        size = parse_size("{}x{}".format(*parameters["size"]))
+        ((_, picture),) = demo_pictures([parameters["picture"]], size, parameters["samples"], progress)
+        return picture
+    name = one_of("example", parameters["example"], examples.EXAMPLES, InvalidInput)
+    check_count("side", parameters["side"], 1, MAX_SIDE)
+    panels = import_module(f"{examples.__name__}.{name}").panels()
+    with Renderer() as renderer:
+        return example_picture(renderer, name, panels, parameters["side"])
 
 
 def _report(file: str, found: Reproduction) -> int:

@@ -1,6 +1,7 @@
 """Test meshes, test images, cameras and the drawing of panels for the gallery's examples."""
 
 import argparse
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from decals.field.law import AnyContact
 from decals.rendering import Environment, Picture, Renderer
 from decals.rendering.options import RenderOptions
 from decals.scenes.pose import PosedScene
+from decals.scenes.render import picture_record
 
 Vector = tuple[float, float, float]
 MeshArrays = tuple[NDArray[np.float32], NDArray[np.int32]]
@@ -23,6 +25,9 @@ MeshArrays = tuple[NDArray[np.float32], NDArray[np.int32]]
 
 CLAY = (0.74, 0.71, 0.66)
 """The colour of models without decals."""
+
+GALLERY_FUNCTION = "implicit-decals gallery"
+"""Function in the recipes of examples' pictures."""
 
 GAP = 4
 """Width of the white gap between panels, in pixels."""
@@ -73,6 +78,12 @@ def draw(
     return row
 
 
+def example_picture(renderer: Renderer, name: str, panels: Sequence[Panel], side: int) -> Picture:
+    """Return the picture of an example with its recipe."""
+    parameters = {"example": name, "side": side}
+    return Picture(draw(renderer, panels, side=side), picture_record(renderer, GALLERY_FUNCTION, parameters))
+
+
 def main(panels: Callable[[], Sequence[Panel]]) -> None:
     """Draw an example into the file named on the command line."""
     parser = argparse.ArgumentParser()
@@ -80,7 +91,7 @@ def main(panels: Callable[[], Sequence[Panel]]) -> None:
     parser.add_argument("--side", type=int, default=SIDE, help="width and height of a panel, in pixels")
     options = parser.parse_args()
     with Renderer() as renderer:
-        Picture(draw(renderer, panels(), side=options.side)).save(options.output)
+        example_picture(renderer, Path(sys.argv[0]).stem, panels(), options.side).save(options.output)
 
 
 def camera_above(height: float = 4.2) -> Camera:

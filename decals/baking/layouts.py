@@ -82,7 +82,7 @@ def lay_out(
         size,
         MAX_OVERLAP,
         report,
-        lambda groups, tick: unwrap(meshes, size, lambda *_: tick(), groups),
+        lambda groups, tick: unwrap(meshes, size, lambda _, share: tick(share), groups),
     )
     if made is None:
         raise InvalidMesh(
@@ -105,7 +105,7 @@ def _without_overlaps(
     size: int,
     share: float,
     report: Progress,
-    make: Callable[[list[Int64Array], Callable[[], None]], list[Unwrapped] | None],
+    make: Callable[[list[Int64Array], Callable[..., None]], list[Unwrapped] | None],
 ) -> list[Unwrapped] | None:
     """Return a layout by groups of faces; those that lie over others become a group of their own.
 
@@ -113,7 +113,7 @@ def _without_overlaps(
     """
     groups = [np.zeros(len(mesh.faces), np.int64) for mesh in meshes]
     for number in range(TRIES):
-        tick = partial(report, UNWRAPPING, number / TRIES)
+        tick = partial(_report_try, report, number)
         tick()
         made = make(groups, tick)
         if made is None:
@@ -124,6 +124,11 @@ def _without_overlaps(
         for group, faces in zip(groups, over, strict=True):
             group[faces] = number + 1
     return None
+
+
+def _report_try(report: Progress, number: int, share: float = 0.0) -> None:
+    """Report a part of a try; each is about a half of what is left, as most layouts need one."""
+    report(UNWRAPPING, 1.0 - 0.5**number * (1.0 - 0.5 * share))
 
 
 def _faces_over_others(mesh: BakeMesh, part: Unwrapped, size: int) -> Int64Array:

@@ -18,7 +18,9 @@ from decals.errors import InvalidScene
 from decals.rendering.options import Size, check_scene, drawing_of
 from decals.rendering.picture import Picture, on_white
 from decals.rendering.renderer import Renderer
+from decals.scenes.files import camera_values
 from decals.scenes.pose import PosedScene
+from decals.scenes.render import drawn_picture
 from decals.scenes.scene import Scene
 from decals.validation import (
     checked_path,
@@ -42,9 +44,9 @@ _RATE = "a number of frames per second from 0.1 to 240"
 
 
 class _Sink(Protocol):
-    """Takes the pixels of one frame after another."""
+    """Takes the picture of one frame after another."""
 
-    def __call__(self, pixels: UInt8Array, number: int) -> None: ...
+    def __call__(self, picture: Picture, number: int) -> None: ...
 
 
 def turntable(scene: Scene | PosedScene, count: int = 120, *, turns: float = 1.0) -> list[Scene | PosedScene]:
@@ -175,8 +177,11 @@ def animate(
                 )
                 options = drawing_of(scene).overridden(samples=samples).at(pixel_size)
                 with reporting(_silent):
-                    pixels = renderer.render(scene, options)
-                write(pixels, number)
+                    picture = drawn_picture(renderer, scene, options, {"samples": samples})
+                if picture.recipe is not None:  # the camera of a frame stands in no scene file
+                    recipe = {**picture.recipe, "camera": camera_values(scene.camera)}
+                    picture = Picture(picture.pixels, recipe)
+                write(picture, number)
     return target
 
 
@@ -211,7 +216,7 @@ def _sink(target: Path, size: Size, rate: float) -> Iterator[_Sink]:
     match target.suffix.lower() if not is_folder(target) else "":
         case ".gif":
             images: list[Image.Image] = []
-            yield lambda pixels, _number: images.append(_opaque(pixels).quantize(256))
+            yield lambda picture, _number: images.append(_opaque(picture.pixels).quantize(256))
             with replacing(target) as file:
                 pause = max(round(100.0 / rate), 2) * 10  # milliseconds; the format counts hundredths
                 images[0].save(file, "GIF", save_all=True, append_images=images[1:], duration=pause, loop=0)
@@ -223,16 +228,16 @@ def _sink(target: Path, size: Size, rate: float) -> Iterator[_Sink]:
                 stream = writer.write_frames(str(file), size, fps=rate, quality=8, macro_block_size=2)
                 stream.send(None)
                 try:
-                    yield lambda pixels, _number: stream.send(_opaque(pixels).tobytes())
+                    yield lambda picture, _number: stream.send(_opaque(picture.pixels).tobytes())
                 finally:
                     stream.close()
         case _:
             make_folder(target, InvalidScene)
             count = 0
 
-            def write(pixels: UInt8Array, number: int) -> None:
+            def write(picture: Picture, number: int) -> None:
                 nonlocal count
-                Picture(pixels).save(target / f"frame_{number:04d}.png")
+                picture.save(target / f"frame_{number:04d}.png")
                 count = number
 
             yield write

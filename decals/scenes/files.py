@@ -335,6 +335,20 @@ def _lines(records: Iterator[Any]) -> Raw:
     return Raw(b"[" + b",".join(lines) + b"\n  ]") if lines else Raw(b"[]")
 
 
+def camera_values(camera: Camera) -> dict[str, Any]:
+    """Return a camera as plain values, as files have it."""
+    values: dict[str, Any] = msgspec.to_builtins(_camera_record(camera))
+    return values
+
+
+def camera_of_values(values: object) -> Camera:
+    """Return the camera of `camera_values`; raise InvalidScene for other values."""
+    try:
+        return _camera(msgspec.convert(values, _CameraRecord))
+    except msgspec.ValidationError as error:
+        raise InvalidScene(f"camera: {error}") from error
+
+
 def _camera_record(camera: Camera) -> _CameraRecord:
     fit = camera.fit
     of_fit = () if fit is None else (list(fit.points), fit.margin)

@@ -252,16 +252,19 @@ def drawn_picture(
     if viewpoint is not None:
         changed["viewpoint"] = viewpoint
     plain_ones = {name: option_value(value) for name, value in changed.items()}
-    recipe = {
-        "function": PICTURE_FUNCTION,
-        "parameters": {"size": list(options.size)} | plain_ones,
+    of_scene = {
         "missing": [name for name in changed if not isinstance(plain_ones[name], str | float | int)],
         "scene": scene_hashes(scene),
         "recipe": None if scene.recipe is None else scene.recipe.record,
-        "versions": package_versions(),
-        "made": provenance(driver_name(renderer.context.gl)),
     }
-    return Picture(pixels, recipe)
+    parameters = {"size": list(options.size)} | plain_ones
+    return Picture(pixels, picture_record(renderer, PICTURE_FUNCTION, parameters) | of_scene)
+
+
+def picture_record(renderer: Renderer, function: str, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the recipe of a picture that a function with some parameters draws."""
+    made = provenance(driver_name(renderer.context.gl))
+    return {"function": function, "parameters": parameters, "versions": package_versions(), "made": made}
 
 
 def scene_hashes(scene: Scene) -> dict[str, str]:

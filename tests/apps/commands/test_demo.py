@@ -18,3 +18,5 @@ def test_demo_draws_three_pictures(folder: Path, monkeypatch: pytest.MonkeyPatch
     assert names == ["out/hero.png", "out/contact.png", "out/span.png"]
     for name in names:
         assert picture(folder / name).shape == (60, 80, 4)
+    assert run(["reproduce", "out/contact.png"]) == 0
+    assert "out/contact.png: made again, equal bit for bit" in capsys.readouterr().out

@@ -63,6 +63,72 @@ def test_a_picture_is_drawn_again_with_its_scene(saved: Path, capsys: Capture) -
     assert "the decals of the scene that was drawn: the file has others" in capsys.readouterr().out
 
 
+def test_frames_are_drawn_again_with_their_scene(saved: Path, capsys: Capture) -> None:
+    options = ["--frames", "3", "--size", "40x30", "--samples", "1"]
+    assert run(["animate", "scene.json", "-o", "turn", *options]) == 0
+    capsys.readouterr()
+    for number in (1, 2):
+        frame = f"turn/frame_000{number}.png"
+        assert run(["reproduce", frame, "--scene", "scene.json"]) == 0
+        assert capsys.readouterr().out == f"{frame}: made again, equal bit for bit\n"
+    assert run(["reproduce", "turn/frame_0002.png"]) == 3
+
+
+def test_pictures_of_examples_are_drawn_again(saved: Path, capsys: Capture) -> None:
+    assert run(["gallery", "sphere", "-o", "a.png", "--side", "32"]) == 0
+    capsys.readouterr()
+    assert run(["reproduce", "a.png"]) == 0
+    assert capsys.readouterr().out == "a.png: made again, equal bit for bit\n"
+    with_recipe("b.png", recipe_of("a.png") | {"parameters": {"example": "sphere", "side": 24}})
+    assert run(["reproduce", "b.png"]) == 1
+    assert "size: (4, 4) in the file, (52, 24) made again" in capsys.readouterr().out
+
+
+def recipe_of(name: str) -> dict[str, Any]:
+    """The recipe that a PNG file holds."""
+    with Image.open(name) as image:
+        held: dict[str, Any] = json.loads(image.text["implicit-decals"])  # type: ignore[attr-defined]
+    return held
+
+
+def with_recipe(name: str, recipe: dict[str, Any]) -> None:
+    """Write a small picture with a recipe."""
+    notes = PngInfo()
+    notes.add_itxt("implicit-decals", json.dumps(recipe))
+    Image.new("RGBA", (4, 4)).save(name, pnginfo=notes)
+
+
+@pytest.mark.parametrize(
+    "recipe",
+    [
+        {},
+        {"function": "implicit-decals gallery"},
+        {"function": "implicit-decals gallery", "parameters": {"example": "helpers", "side": 20}},
+        {"function": "implicit-decals gallery", "parameters": {"example": "sphere", "side": 1 << 30}},
+        {"function": "implicit-decals gallery", "parameters": {"example": ["sphere"], "side": "2"}},
+        {"function": "implicit-decals demo", "parameters": {"picture": "a", "size": [9, 9], "samples": 1}},
+        {"function": "implicit-decals demo", "parameters": {"picture": "span.png", "size": [], "samples": 1}},
+        {"function": "decals.render", "parameters": 3, "missing": [], "scene": {}},
+        {"function": "decals.render", "parameters": {}, "missing": [], "scene": {}},
+        {
+            "function": "decals.render",
+            "parameters": {"size": [4, 4]},
+            "missing": [],
+            "scene": {},
+            "camera": 1,
+        },
+    ],
+)
+def test_recipes_in_pictures_of_strangers_are_refused(
+    saved: Path, capsys: Capture, recipe: dict[str, Any]
+) -> None:
+    with_recipe("a.png", recipe)
+    assert run(["reproduce", "a.png", "--scene", "scene.json"]) == 3
+    captured = capsys.readouterr()
+    assert "a.png: cannot be made again" in captured.out
+    assert "Traceback" not in captured.out + captured.err
+
+
 def test_files_that_cannot_be_made_again(saved: Path, capsys: Capture) -> None:
     Image.new("RGB", (2, 2)).save("plain.png")
     assert run(["reproduce", "plain.png"]) == 3
