@@ -12,13 +12,13 @@ EXTRAS: dict[str, str] = {
     "blobtree.derivatives": "*",
     "blobtree.formulas": """
         blends contact convolution curve_skeletons deformations direct_fields falloffs flat_skeletons
-        gradient_blends noise solid_skeletons volumes windows
+        gradient_blends noise solid_skeletons volumes
         """,
     "blobtree.meshing": """
-        adaptive adaptive_cell_kernels adaptive_cells adaptive_kernels adaptive_mesh bisection_kernels
-        block_tree clip crease_branches crease_intersections crease_kernels crease_sheets creases crumbs
-        distance_kernels leaf_changes leaf_gaps part_kernels parts thickening thickening_kernels wall_kernels
-        walls
+        adaptive adaptive_cell_kernels adaptive_cells adaptive_kernels adaptive_mesh batch
+        bisection_kernels block_tree clip crease_branches crease_intersections crease_kernels
+        crease_sheets creases crumbs distance_kernels gap_kernels gaps leaf_changes leaf_gaps
+        part_kernels parts thickening thickening_kernels wall_kernels walls
         """,
     "blobtree.nodes": """
         attributes blends contact convolution curves deformations fields flats parameter_gradient samples

@@ -1,14 +1,10 @@
-"""Custom falloffs: a falloff from two typed functions, g and its derivative.
+"""Custom falloffs: a falloff from one typed function g.
 
 @wp.func
 def linear(d: wp.float32) -> wp.float32:
     return 1.0 - d
 
-@wp.func
-def linear_slope(d: wp.float32) -> wp.float32:
-    return -1.0
-
-Linear = define_falloff(linear, linear_slope)
+Linear = define_falloff(linear)
 model = Point((0, 0, 0), radius=1.0, falloff=Linear)
 """
 
@@ -21,7 +17,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree.custom.checks import result_of
-from blobtree.custom.source import CustomSource, custom_source, kind_name
+from blobtree.custom.source import CustomSource, custom_source, derived, kind_name
 from blobtree.formulas.falloff import ISO, Falloff
 from blobtree.formulas.falloffs import FALLOFF_NAMES, MORE_FALLOFFS
 
@@ -43,8 +39,8 @@ Floats = NDArray[np.float64]
 Sampled = Callable[[Floats], Floats]
 
 
-def define_falloff(value: Any, slope: Any, *, name: str | None = None) -> Falloff:
-    """Return a falloff from a function g and its derivative g'.
+def define_falloff(value: Any, slope: Any = None, *, name: str | None = None) -> Falloff:
+    """Return a falloff from a function g.
 
     Parameters
     ----------
@@ -52,7 +48,7 @@ def define_falloff(value: Any, slope: Any, *, name: str | None = None) -> Fallof
         ``(d: wp.float32) -> wp.float32``, with or without ``@wp.func``: g(d) for 0 ≤ d ≤ 1. It falls from
         g(0) = 1 to g(1) = 0 without rising. A field is smooth where g'(0) = g'(1) = 0.
     slope
-        The derivative g'(d), a function of the same type.
+        The derivative g'(d), a function of the same type; by default it is derived from the source.
     name
         Name of the falloff in files; by default the name of `value`.
 
@@ -76,19 +72,14 @@ def define_falloff(value: Any, slope: Any, *, name: str | None = None) -> Fallof
     >>> @wp.func
     ... def linear(d: wp.float32) -> wp.float32:
     ...     return 1.0 - d
-    >>> @wp.func
-    ... def linear_slope(d: wp.float32) -> wp.float32:
-    ...     return -1.0
-    >>> falloff = define_falloff(linear, linear_slope)
+    >>> falloff = define_falloff(linear)
     >>> round(falloff.rim, 6)
     0.5
     >>> Point((0, 0, 0), radius=1.0, falloff=falloff)
     Point(center=(0.0, 0.0, 0.0), radius=1.0, color=(0.8, 0.8, 0.8), falloff='linear')
     """
-    source, derivative = (custom_source(function, returns=wp.float32) for function in (value, slope))
-    for each in (source, derivative):
-        if list(each.parameters.values()) not in ([wp.float32], [float]):
-            raise each.refusal("expected the distance `d: wp.float32` as its only parameter")
+    source = _of_distance(value)
+    derivative = derived(source, list(source.parameters), _SLOPE) if slope is None else _of_distance(slope)
     kind = kind_name(source, name)
     if kind in {row.name for row in MORE_FALLOFFS} or kind == "wyvill":
         raise source.refusal(f"name: {kind!r} is a built-in falloff; choose another name")
@@ -111,6 +102,22 @@ def define_falloff(value: Any, slope: Any, *, name: str | None = None) -> Fallof
     )
     FALLOFF_NAMES[kind] = falloff
     return falloff
+
+
+_SLOPE = '''\
+def {name}({typed}) -> wp.float32:
+    """The derivative of the user's falloff."""
+    value, slope = {partials}
+    return slope
+'''
+
+
+def _of_distance(function: Any) -> CustomSource:
+    """Return a user's function of the distance."""
+    source = custom_source(function, returns=wp.float32)
+    if list(source.parameters.values()) not in ([wp.float32], [float]):
+        raise source.refusal("expected the distance `d: wp.float32` as its only parameter")
+    return source
 
 
 def _sampled(source: CustomSource) -> Sampled:

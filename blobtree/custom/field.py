@@ -33,7 +33,7 @@ from blobtree.custom.source import CustomSource, generated, kind_name, returned_
 from blobtree.formulas.fields import FieldKind
 from blobtree.nodes.fields import BoxedField
 from blobtree.nodes.parameters import Parameter
-from blobtree.transpile.derivative import directional_derivative
+from blobtree.transpile.derivative import partial_derivatives
 from blobtree.validation import Vector, positive_number
 
 FIRST_NUMBER = 7
@@ -169,10 +169,9 @@ def _row(
     scope: dict[str, Any] = {source.function.key: source.function}
     body = _GIVEN.format(**shared)
     if claims.derived:
-        derivative = directional_derivative(source.function, [next(iter(source.parameters))])
-        scope[derivative.key] = derivative
-        rest = "".join(f", {reading}" for reading in readings)
-        body = _DERIVED.format(derivative=derivative.key, rest=rest)
+        partials = partial_derivatives(source.function, [next(iter(source.parameters))])
+        scope[partials.key] = partials
+        body = _DERIVED.format(call=f"{partials.key}({', '.join(['x', *readings])})")
     value_gradient = generated(kind, digest, "value_gradient", _VALUE, scope, body=body, **shared)
     slope, called = bound_call(claims.steepest, ("x", "radius"), readings)
     scope = {source.function.key: source.function, **called}
@@ -195,9 +194,7 @@ def {name}(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
 _GIVEN = "    f = {call}\n"
 
 _DERIVED = """\
-    value, along_x = {derivative}(x, wp.vec3(1.0, 0.0, 0.0){rest})
-    same_value, along_y = {derivative}(x, wp.vec3(0.0, 1.0, 0.0){rest})
-    again_value, along_z = {derivative}(x, wp.vec3(0.0, 0.0, 1.0){rest})
+    value, along_x, along_y, along_z = {call}
     f = wp.vec4(value, along_x, along_y, along_z)
 """
 

@@ -1,9 +1,9 @@
-"""Custom operators: a combination from one typed function that returns a value and its derivatives.
+"""Custom operators: a combination from one typed function of two operands.
 
     @wp.func
-    def soft(a: wp.float32, b: wp.float32, hardness: wp.float32) -> wp.vec3:
+    def soft(a: wp.float32, b: wp.float32, hardness: wp.float32) -> wp.float32:
         ...
-        return wp.vec3(f, df_da, df_db)
+        return f
 
     Soft = define_operator(soft, steepest=1.0, like="blend", monotone=True, limits={"hardness": (0.0, 1.0)})
     model = Soft((Point((0, 0, 0), radius=1.0), Point((1, 0, 0), radius=1.0)), 0.3)
@@ -20,9 +20,9 @@ import warp as wp
 
 from blobtree.custom.definition import CustomNode, Limits, custom_parameters, defined_kind
 from blobtree.custom.operator_checks import Claims, check_directed_operator, check_operator
-from blobtree.custom.source import CustomSource, custom_source, generated, kind_name
-from blobtree.formulas.gradient_blends import UNBOUNDED
+from blobtree.custom.source import CustomSource, custom_source, derived, generated, kind_name, returned_type
 from blobtree.formulas.operators import (
+    UNBOUNDED,
     Operator,
     Support,
     blend_choice,
@@ -38,6 +38,9 @@ from blobtree.tape.data_region import TEXEL
 from blobtree.transpile.derivative import directional_derivative
 from blobtree.validation import finite_number
 
+LEAST_OPERAND = 1e-18
+"""Operands below are raised to it where partial derivatives are derived: quotients of them stay finite."""
+
 Like = Literal["blend", "intersection", "difference"]
 
 
@@ -49,8 +52,8 @@ class CustomCombination(CustomNode, AssociativeCombination):
     >>> import warp as wp
     >>> from blobtree import CustomCombination, Point, define_operator
     >>> @wp.func
-    ... def mean(a: wp.float32, b: wp.float32) -> wp.vec3:
-    ...     return wp.vec3(0.5 * (a + b), 0.5, 0.5)
+    ... def mean(a: wp.float32, b: wp.float32) -> wp.float32:
+    ...     return 0.5 * (a + b)
     >>> Mean = define_operator(mean, steepest=0.5)
     >>> issubclass(Mean, CustomCombination)
     True
@@ -71,13 +74,15 @@ def define_operator(
     gradients: bool = False,
     envelope: Any = None,
 ) -> type[CustomCombination]:
-    """Return a class of combinations from a function that returns F(a, b), ∂F/∂a and ∂F/∂b.
+    """Return a class of combinations from a function that returns F(a, b).
 
     Parameters
     ----------
     function
-        ``(a: wp.float32, b: wp.float32) -> wp.vec3``, or with any number of wp.float32 more, its parameters;
-        with or without ``@wp.func``. F must be continuous, nowhere negative, and 0 where both operands are.
+        ``(a: wp.float32, b: wp.float32) -> wp.float32``, or with any number of wp.float32 more, its
+        parameters; with or without ``@wp.func``. F must be continuous, nowhere negative, and 0 where both
+        operands are. ∂F/∂a and ∂F/∂b are derived from its source. A function that returns
+        ``wp.vec3(F, ∂F/∂a, ∂F/∂b)`` gives them itself: faster, or more exact in single precision.
     steepest
         Upper bound of ``abs(∂F/∂a)`` and ``abs(∂F/∂b)`` for all operands; or a typed function
         ``(max_a, max_b, parameters if any) -> wp.vec2`` of the largest values that the operands may have.
@@ -94,10 +99,10 @@ def define_operator(
         ``{parameter: (smallest or None, largest or None)}``.
     gradients
         The function reads the gradients of its operands: its parameters are ``(a: wp.float32, b: wp.float32,
-        gradient_a: wp.vec3, gradient_b: wp.vec3, ...)``, and it returns F, and ∂F/∂a and ∂F/∂b for fixed
-        gradients. The gradient of the field also takes the change of the operands' gradients into account,
-        exactly. F should be continuous in the gradients too. Give `envelope` in place of `steepest`;
-        `monotone` and `order_free` cannot be claimed. Where rays cross such a blend, they take small steps.
+        gradient_a: wp.vec3, gradient_b: wp.vec3, ...)``, and ∂F/∂a and ∂F/∂b are those for fixed gradients.
+        The gradient of the field also takes the change of the operands' gradients into account, exactly. F
+        should be continuous in the gradients too. Give `envelope` in place of `steepest`; `monotone` and
+        `order_free` cannot be claimed. Where rays cross such a blend, they take small steps.
     envelope
         With `gradients`: a typed function ``(a, b, parameters if any) -> wp.vec2`` of the smallest and the
         largest F for any gradients. Neither falls as an operand grows; with ``like="difference"`` neither
@@ -121,12 +126,16 @@ def define_operator(
     >>> import warp as wp
     >>> from blobtree import define_operator
     >>> @wp.func
-    ... def average(a: wp.float32, b: wp.float32) -> wp.vec3:
-    ...     return wp.vec3(0.5 * (a + b), 0.5, 0.5)
+    ... def average(a: wp.float32, b: wp.float32) -> wp.float32:
+    ...     return 0.5 * (a + b)
     >>> Average = define_operator(average, steepest=0.5)  # doctest: +SKIP
     """
-    source = custom_source(function, returns=wp.vec3)
+    value_alone = returned_type(function) in (wp.float32, float)
+    source = custom_source(function, returns=wp.float32 if value_alone else wp.vec3)
     parameters = _parameters(source, limits, gradients)
+    if value_alone:
+        a, b = list(source.parameters)[:2]
+        source = derived(source, (a, b), _WITH_PARTIALS.replace("{a}", a).replace("{b}", b), LEAST_OPERAND)
     if like is not None and like not in get_args(Like):
         known_likes = ", ".join(map(repr, get_args(Like)))
         raise source.refusal(f"like: expected one of {known_likes} or None, got {like!r}")
@@ -274,6 +283,15 @@ def {name}(
     """|F'| ≤ |∂F/∂a| |a'| + |∂F/∂b| |b'|; an operand that falls makes no F rise that rises with it."""
     k = {steepest}
     return k[0] * wp.max(slope_a, 0.0) + k[1] * wp.max(slope_b, 0.0)
+'''
+
+_WITH_PARTIALS = '''\
+def {name}({typed}) -> wp.vec3:
+    """The user's operator and its partial derivatives."""
+    if {a} <= 0.0 and {b} <= 0.0:
+        return wp.vec3(0.0, 0.0, 0.0)
+    value, by_a, by_b = {partials}
+    return wp.vec3(value, by_a, by_b)
 '''
 
 _RANGE = '''\

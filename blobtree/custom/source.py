@@ -9,7 +9,8 @@ import hashlib
 import inspect
 import re
 import textwrap
-from dataclasses import dataclass, field, make_dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, make_dataclass, replace
 from types import FunctionType
 from typing import Any
 
@@ -19,6 +20,7 @@ import warp as wp
 from blobtree.errors import InvalidDefinition
 from blobtree.nodes.node import Node
 from blobtree.nodes.tree import AssociativeCombination
+from blobtree.transpile.derivative import partial_derivatives
 from blobtree.transpile.glsl import translate_library
 from blobtree.transpile.python import Precision, find_changed_constants, plain_python
 from blobtree.transpile.specialize import defined, rebind, referenced_values, warp_function
@@ -56,7 +58,8 @@ class CustomSource:
     def reference(self, precision: Precision = np.float64) -> FunctionType:
         """Return the function as plain Python, in a floating-point type; it is translated once."""
         if precision not in self._references:
-            self._references[precision] = plain_python(self.python, precision)
+            assert isinstance(self.function.func, FunctionType)
+            self._references[precision] = plain_python(self.function.func, precision)
         return self._references[precision]
 
 
@@ -127,6 +130,28 @@ def generated(
     name = f"custom_{kind}_{part}_{digest}"
     known = {"wp": wp, **scope, "__name__": f"blobtree.custom.{name}"}
     return warp_function(defined(name, template.format(name=name, **texts), known))
+
+
+def derived(
+    source: CustomSource, varying: Sequence[str], template: str, least: float | None = None
+) -> CustomSource:
+    """Return a function of the value and the partial derivatives of a user's function.
+
+    The template's ``{partials}`` is the call that returns both, ``{typed}`` are the typed parameters.
+    Those that vary are raised to `least` in the call.
+
+    Raises
+    ------
+    UntranslatableFunction
+        The function has no derivative here; the message names file and line.
+    """
+    partials = partial_derivatives(source.function, varying)
+    typed = ", ".join(f"{name}: {spelled(kind)}" for name, kind in source.parameters.items())
+    raised = {name: f"wp.max({name}, {least!r})" for name in varying if least is not None}
+    call = f"{partials.key}({', '.join(raised.get(name, name) for name in source.parameters)})"
+    scope = {partials.key: partials}
+    function = generated(source.name, source.digest, "derived", template, scope, typed=typed, partials=call)
+    return replace(source, function=function)
 
 
 def _python_function(function: Any) -> FunctionType:

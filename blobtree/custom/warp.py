@@ -41,7 +41,7 @@ from blobtree.formulas.warps import SpaceWarp
 from blobtree.nodes.node import Node
 from blobtree.nodes.parameters import Parameter
 from blobtree.nodes.tree import Placed
-from blobtree.transpile.derivative import directional_derivative
+from blobtree.transpile.derivative import partial_derivatives
 from blobtree.validation import positive_number
 
 FIRST_NUMBER = 1
@@ -212,9 +212,8 @@ def _row(
     function = source.function
     forward = made("forward", _FORWARD, {function.key: function}, call=f"{function.key}(q{rest})")
     if claims.pullback is None:
-        derivative = directional_derivative(function, [next(iter(source.parameters))])
-        scope = {derivative.key: derivative}
-        pullback = made("pullback", _DERIVED, scope, derivative=derivative.key, rest=rest)
+        partials = partial_derivatives(function, [next(iter(source.parameters))])
+        pullback = made("pullback", _DERIVED, {partials.key: partials}, call=f"{partials.key}(q{rest})")
     else:
         function = claims.pullback.function
         call = f"{function.key}(q, g{rest})"
@@ -238,10 +237,8 @@ def {name}(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) 
 
 _DERIVED = '''\
 def {name}(q: wp.vec3, g: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec3:
-    """The transposed Jacobian times g, from derivatives along the axes."""
-{texels}    moved, along_x = {derivative}(q, wp.vec3(1.0, 0.0, 0.0){rest})
-    same, along_y = {derivative}(q, wp.vec3(0.0, 1.0, 0.0){rest})
-    again, along_z = {derivative}(q, wp.vec3(0.0, 0.0, 1.0){rest})
+    """The transposed Jacobian times g, from the derivatives along the axes."""
+{texels}    moved, along_x, along_y, along_z = {call}
     return wp.vec3(wp.dot(along_x, g), wp.dot(along_y, g), wp.dot(along_z, g))
 '''
 

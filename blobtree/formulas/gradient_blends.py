@@ -7,13 +7,10 @@ directions changes, in radians per unit; it is `UNBOUNDED` where none is known.
 
 import warp as wp
 
-from blobtree.formulas.operators import Operator, blend_choice, union_partials, widened_range
+from blobtree.formulas.operators import UNBOUNDED, Operator, blend_choice, union_partials, widened_range
 from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
-
-UNBOUNDED = wp.constant(1e12)
-"""A slope above all slopes of fields."""
 
 FLAT = wp.constant(1.0 / 32.0)
 """Ratio of the lengths of two gradients below which the blend fades into the union."""

@@ -31,6 +31,9 @@ from blobtree.transpile.specialize import defined, parameter_count, warp_functio
 
 wp.set_module_options({"enable_backward": False})
 
+UNBOUNDED = wp.constant(1e12)
+"""A slope above all slopes of fields."""
+
 
 @wp.func
 def sum_partials(a: wp.float32, b: wp.float32, exponent: wp.float32) -> wp.vec3:

@@ -18,8 +18,7 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.formulas.gradient_blends import UNBOUNDED
-from blobtree.formulas.operators import OPERATORS, SUM
+from blobtree.formulas.operators import OPERATORS, SUM, UNBOUNDED
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.dispatch import (
     directed_partials,

@@ -26,7 +26,7 @@ from blobtree.formulas.warps import WARPS, SpaceWarp
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.lazy import Lazy
 from blobtree.tape.dispatch import CORE_TABLES
-from blobtree.transpile.derivative import differentiated, directional_derivative
+from blobtree.transpile.derivative import derivative_along, differentiated
 from blobtree.transpile.specialize import rebind, referenced_values, row_choice, warp_function
 
 Row = Skeleton | Operator | SpaceWarp | FieldKind | Falloff
@@ -114,10 +114,10 @@ class InstructionSet:
     def _instantiate(self, function: wp.Function) -> wp.Function:
         """Return `function` for this instruction set; itself if it reads no table."""
         if function not in self._functions and (primal := differentiated(function)):
-            source_function, varying = primal
+            source_function, directions = primal
             instance = self._instantiate(self._exchanged(source_function))
             self._functions[function] = (
-                function if instance is source_function else directional_derivative(instance, varying)
+                function if instance is source_function else derivative_along(instance, directions)
             )
         if function not in self._functions and (choice := row_choice(function)):
             rows, module = getattr(self, choice.table), self._module_of(choice.prototype)

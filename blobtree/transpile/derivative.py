@@ -17,9 +17,11 @@ that varies is followed by its tangent::
         value, slope = bump_derivative(z[i], 1.0)
         out[i] = slope
 
-The gradient of a function of a point is three such calls, with tangents (1, 0, 0), (0, 1, 0) and (0, 0, 1).
-Three calls of the derivative of a gradient are the Hessian. An operator that reads the gradients of its
-operands (Gourmel et al. 2013) needs it for its own gradient: the chain rule takes ∂F/∂(∇a) to H_a.
+The gradient of a function of a point is its derivative along (1, 0, 0), (0, 1, 0) and (0, 0, 1), and the
+derivative of a gradient along them is the Hessian. `partial_derivatives` follows all of them in one pass,
+which computes the value once: a variable then has a tangent for each direction in which it varies.
+An operator that reads the gradients of its operands (Gourmel et al. 2013) needs derivatives for its own
+gradient: the chain rule takes ∂F/∂(∇a) to H_a.
 
 * Each float, vector or matrix that depends on what varies has a tangent. Integers, bools and structs have
   none. Branches and loops are those of the function itself.
@@ -38,7 +40,7 @@ import hashlib
 import inspect
 import re
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from threading import RLock
 from types import FunctionType, NoneType
@@ -61,8 +63,12 @@ _SAME_TYPES = {float: wp.float32, int: wp.int32, bool: wp.bool}
 _LOCK = RLock()
 """Held while functions are registered: Warp's registry is not safe for threads."""
 
-_TRANSFORMATIONS: dict[tuple[wp.Function, frozenset[str]], "_Transformation"] = {}
-_PRIMALS: dict[wp.Function, tuple[wp.Function, tuple[str, ...]]] = {}
+Directions = tuple[frozenset[str], ...]
+"""The parameters that vary in each direction."""
+
+_TRANSFORMATIONS: dict[tuple[wp.Function, Directions], "_Transformation"] = {}
+_PRIMALS: dict[wp.Function, tuple[wp.Function, Directions]] = {}
+_PARTIALS: dict[tuple[wp.Function, tuple[str, ...]], wp.Function] = {}
 
 
 def directional_derivative(function: Any, varying: Iterable[str] | None = None) -> Any:
@@ -89,7 +95,7 @@ def directional_derivative(function: Any, varying: Iterable[str] | None = None) 
         the result is no float, vector or matrix.
     """
     hints = _hints(function)
-    numeric = [name for name, hint in hints.items() if name != "return" and is_differentiable(hint)]
+    numeric = _numeric_parameters(hints)
     names = tuple(numeric if varying is None else varying)
     arrays = [name for name, hint in hints.items() if isinstance(hint, wp.array)]
     for name in names:
@@ -100,13 +106,88 @@ def directional_derivative(function: Any, varying: Iterable[str] | None = None) 
             )
     if not names:
         raise UntranslatableFunction(f"{function.key}: expected a parameter that varies, got none; name one")
+    return derivative_along(function, (frozenset(names),))
+
+
+def derivative_along(function: Any, directions: Directions) -> wp.Function:
+    """Return the typed function of a value and its derivatives in several directions, see `Directions`.
+
+    Each parameter is followed by its tangents, one for each direction in which it varies. Each float, vector
+    or matrix of the result is followed by its derivatives in all directions.
+    """
     with _LOCK:
-        return _compiled(_transformation(function, frozenset(names)))
+        return _compiled(_transformation(function, directions))
 
 
-def differentiated(function: Any) -> tuple[wp.Function, tuple[str, ...]] | None:
-    """Return the function and the varying parameters of which this is the derivative, or None."""
+def partial_derivatives(function: Any, varying: Iterable[str] | None = None) -> Any:
+    """Return the typed function of the value and the partial derivatives of a typed function, in one pass.
+
+    Parameters
+    ----------
+    function
+        A typed function (`wp.func`) with one result.
+    varying
+        Names of the floats and vectors by whose components it is derived; by default all.
+
+    Returns
+    -------
+    wp.Function
+        It takes the parameters of `function`. It returns the value and its derivative by each component of
+        each parameter that varies, in their order.
+
+    Raises
+    ------
+    UntranslatableFunction
+        As for `directional_derivative`.
+    """
+    hints = _hints(function)
+    numeric = [name for name in _numeric_parameters(hints) if len(_shape(hints[name])) < 2]
+    names = tuple(numeric if varying is None else varying)
+    if not names or not set(names) <= set(numeric):
+        raise UntranslatableFunction(
+            f"{function.key}: expected names of floats or vectors ({', '.join(numeric) or 'it has none'}), "
+            f"got {', '.join(names) or 'none'}"
+        )
+    with _LOCK:
+        if (function, names) not in _PARTIALS:
+            _PARTIALS[function, names] = _partials(function, names, hints)
+        return _PARTIALS[function, names]
+
+
+def _partials(function: wp.Function, names: tuple[str, ...], hints: dict[str, Any]) -> wp.Function:
+    units = {name: _units(_plain(hints[name])) for name in names}
+    derivative = derivative_along(function, tuple(frozenset([name]) for name in names for _ in units[name]))
+    parameters = [name for name in hints if name != "return"]
+    arguments = ", ".join(", ".join([name, *units.get(name, ())]) for name in parameters)
+    results = ", ".join(f"result{number}" for number in range(1 + sum(map(len, units.values()))))
+    text = (
+        f"def {function.key}_partials_{'_'.join(names)}({', '.join(parameters)}):\n"
+        f'    """Return the value and the partial derivatives of {function.key}."""\n'
+        f"    {results} = {derivative.key}({arguments})\n"
+        f"    return {results}\n"
+    )
+    made = defined(text[4 : text.index("(")], text, {"wp": wp, derivative.key: derivative})
+    made.__annotations__ = {**hints, "return": _hints(derivative)["return"]}
+    made.__module__ = derivative.func.__module__
+    return warp_function(made)
+
+
+def _units(kind: Any) -> list[str]:
+    """Return the source of the unit tangents of a float or a vector."""
+    if kind is wp.float32:
+        return ["1.0"]
+    size = kind._length_
+    rows = [", ".join(f"{float(i == j)}" for j in range(size)) for i in range(size)]
+    return [f"wp.vec{size}({row})" for row in rows]
+
+
+def differentiated(function: Any) -> tuple[wp.Function, Directions] | None:
+    """Return the function and the directions of which this is the derivative, or None."""
     return _PRIMALS.get(function)
+
+
+def _numeric_parameters(hints: dict[str, Any]) -> list[str]:
+    return [name for name, hint in hints.items() if name != "return" and is_differentiable(hint)]
 
 
 def is_differentiable(kind: Any) -> bool:
@@ -115,10 +196,10 @@ def is_differentiable(kind: Any) -> bool:
     return kind is wp.float32 or getattr(kind, "_wp_scalar_type_", None) is wp.float32
 
 
-def _transformation(function: wp.Function, varying: frozenset[str]) -> "_Transformation":
-    key = (function, varying)
+def _transformation(function: wp.Function, directions: Directions) -> "_Transformation":
+    key = (function, directions)
     if key not in _TRANSFORMATIONS:
-        _TRANSFORMATIONS[key] = _Transformation(function, varying)
+        _TRANSFORMATIONS[key] = _Transformation(function, directions)
     return _TRANSFORMATIONS[key]
 
 
@@ -131,7 +212,7 @@ def _compiled(transformation: "_Transformation") -> wp.Function:
         made.__annotations__ = transformation.annotations()
         made.__module__ = f"{transformation.python.__module__}.derivatives"
         transformation.derivative = warp_function(made)
-        _PRIMALS[transformation.derivative] = transformation.function, tuple(sorted(transformation.varying))
+        _PRIMALS[transformation.derivative] = transformation.function, transformation.directions
     return transformation.derivative
 
 
@@ -141,12 +222,22 @@ def _hints(function: wp.Function) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Dual:
-    """Source of an expression and of its tangent, None if that is 0."""
+    """Source of an expression and of its tangents."""
 
     code: str
-    tangent: str | None = None
+    tangents: tuple[str | None, ...] = ()
+    """A text for each direction, None where the tangent is 0; empty if all are."""
     type: Any = None
     """Type in Warp; None where it has no part in any derivative."""
+
+    def along(self, direction: int) -> str | None:
+        """Return the tangent in a direction, None if it is 0."""
+        return self.tangents[direction] if self.tangents else None
+
+    @property
+    def varies(self) -> bool:
+        """True if a tangent is not 0."""
+        return any(tangent is not None for tangent in self.tangents)
 
 
 class _Transformation:
@@ -156,11 +247,11 @@ class _Transformation:
     its tangent late in a loop may be read before.
     """
 
-    def __init__(self, function: wp.Function, varying: frozenset[str]) -> None:
+    def __init__(self, function: wp.Function, directions: Directions) -> None:
         assert isinstance(function.func, FunctionType), f"{function.key} is built in"
         self.function = function
         self.python = function.func
-        self.varying = varying
+        self.directions = directions
         self.hints = _hints(function)
         lines, self.first_line = inspect.getsourcelines(self.python)
         definition = ast.parse(textwrap.dedent("".join(lines))).body[0]
@@ -171,14 +262,15 @@ class _Transformation:
             self.parameters
         )
         self.scope: dict[str, Any] = {**self.python.__globals__, **referenced_values(self.python)}
-        self.prefix = _fresh_prefix("d", names)
+        letters = ["d"] if len(directions) == 1 else [f"d{chr(97 + i)}" for i in range(len(directions))]
+        self.prefixes = [_fresh_prefix(letter, names) for letter in letters]
         self.temporary = _fresh_prefix("v", names)
         self.name = self.unique_name()
         self.scope["wp"] = wp
-        self.active = set(varying)
+        self.active = {(name, i) for i, varying in enumerate(directions) for name in varying}
         self.types: dict[str, Any] = {}
-        self.depends = row_choice(function) is not None
-        """The result varies. That of a switch over a table does with the rows of another instruction set."""
+        self.depends = set(range(len(directions))) if row_choice(function) else set[int]()
+        """Directions in which the result varies. That of a switch over a table does so with other rows."""
         self.lines: list[str] = []
         self.indent = "    "
         self.count = 0
@@ -189,7 +281,8 @@ class _Transformation:
 
     def unique_name(self) -> str:
         """Return the derivative's name; that of a closure tells it from others of the same source."""
-        name = f"{self.function.key}_along_{'_'.join(sorted(self.varying))}"
+        along = "_and_".join("_".join(sorted(varying)) for varying in self.directions)
+        name = f"{self.function.key}_along_{along}"
         if self.python.__closure__:
             values = referenced_values(self.python).items()
             keys = [f"{name}={getattr(value, 'key', value)}" for name, value in sorted(values)]
@@ -198,18 +291,14 @@ class _Transformation:
 
     def source(self) -> str:
         """Return the source of the derivative."""
-        known: tuple[int, bool] | None = None
-        while known != (len(self.active), self.depends):
-            known = len(self.active), self.depends
+        known: tuple[int, int] | None = None
+        while known != (len(self.active), len(self.depends)):
+            known = len(self.active), len(self.depends)
             self.lines, self.count, self.callees = [], 0, {}
             self.types = {name: _plain(hint) for name, hint in self._parameter_hints()}
             for statement in self.definition.body:
                 self.statement(statement)
-        parameters = [
-            item
-            for name in self.parameters
-            for item in ([name, self.tangent(name)] if name in self.varying else [name])
-        ]
+        parameters = [item for name in self.parameters for item in [name, *self.tangents_of_parameter(name)]]
         doc = f'    """Return the values of {self.name} and their derivatives."""'
         return "\n".join([f"def {self.name}({', '.join(parameters)}):", doc, *self.lines, ""])
 
@@ -218,12 +307,11 @@ class _Transformation:
         result: dict[str, Any] = {}
         for name, hint in self._parameter_hints():
             result[name] = hint
-            if name in self.varying:
-                result[self.tangent(name)] = hint
+            result |= dict.fromkeys(self.tangents_of_parameter(name), hint)
         results = [
             kind
             for kind in self._results()
-            for kind in ((kind, kind) if is_differentiable(kind) else (kind,))
+            for kind in [kind] * (1 + len(self.directions) * is_differentiable(kind))
         ]
         result["return"] = tuple.__class_getitem__(tuple(results))
         return result
@@ -250,9 +338,16 @@ class _Transformation:
 
     # -- names --------------------------------------------------------------------------------------
 
-    def tangent(self, name: str) -> str:
+    def tangent(self, name: str, direction: int) -> str:
         """Return the name of a variable's tangent."""
-        return f"{self.prefix}{name}"
+        return f"{self.prefixes[direction]}{name}"
+
+    def tangents_of_parameter(self, name: str) -> list[str]:
+        return [self.tangent(name, i) for i, varying in enumerate(self.directions) if name in varying]
+
+    def each_direction(self, tangent: Callable[[int], str | None]) -> tuple[str | None, ...]:
+        """Return the tangents of an expression by a function of the direction."""
+        return tuple(tangent(direction) for direction in range(len(self.directions)))
 
     def emit(self, line: str) -> None:
         self.lines.append(self.indent + line)
@@ -339,8 +434,9 @@ class _Transformation:
             dual = self.dual(item)
             codes.append(dual.code)
             if is_differentiable(kind):
-                self.depends |= dual.tangent is not None
-                codes.append(dual.tangent or self.zero(_plain(kind)))
+                tangents = self.each_direction(dual.along)
+                self.depends.update(i for i, tangent in enumerate(tangents) if tangent is not None)
+                codes += [tangent or self.zero(_plain(kind)) for tangent in tangents]
         self.emit(f"return {', '.join(codes)}")
 
     def assignment(self, target: ast.expr, value: _Dual) -> None:
@@ -348,23 +444,25 @@ class _Transformation:
             case ast.Name(id=name):
                 known = self.types.setdefault(name, value.type)
                 self.types[name] = value.type if known is None else known
-                if value.tangent is not None:
-                    self.active.add(name)
-                if name in self.active:
+                for tangent, moved in self.tangents_to_assign(name, value):
                     if value.type is None:
                         raise self.refusal(target, f"the type of {name!r} is not known")
-                    self.emit(f"{self.tangent(name)} = {value.tangent or self.zero(value.type)}")
+                    self.emit(f"{tangent} = {moved or self.zero(value.type)}")
                 self.emit(f"{name} = {value.code}")
             case ast.Subscript(value=ast.Name(id=name)) | ast.Attribute(value=ast.Name(id=name)):
                 place = ast.unparse(target)[len(name) :]
-                if value.tangent is not None:
-                    self.active.add(name)
-                if name in self.active:
+                for tangent, moved in self.tangents_to_assign(name, value):
                     kind = self.dual(target).type
-                    self.emit(f"{self.tangent(name)}{place} = {value.tangent or self.zero(kind)}")
+                    self.emit(f"{tangent}{place} = {moved or self.zero(kind)}")
                 self.emit(f"{name}{place} = {value.code}")
             case _:
                 raise self.refusal(target, f"assignment to {ast.unparse(target)}")
+
+    def tangents_to_assign(self, name: str, value: _Dual) -> list[tuple[str, str | None]]:
+        """Return the names of a variable's tangents, with those of a value that it gets."""
+        moved = self.each_direction(value.along)
+        self.active.update((name, i) for i, tangent in enumerate(moved) if tangent is not None)
+        return [(self.tangent(name, i), moved[i]) for i in range(len(moved)) if (name, i) in self.active]
 
     def unpacked(self, node: ast.Assign, targets: list[ast.expr], call: ast.Call) -> None:
         """Write the assignment of a function's several results to several variables."""
@@ -376,16 +474,25 @@ class _Transformation:
                 node, f"{ast.unparse(call.func)} does not say that it returns {len(targets)} values"
             )
         arguments = [self.dual(argument) for argument in call.args]
-        derivative = self.derivative_in(callee, arguments)
-        duals = [
-            _Dual(self.fresh(), self.fresh() if derivative and is_differentiable(kind) else None, kind)
-            for kind in kinds
-        ]
-        code = self.derivative_call(derivative, arguments) if derivative else ast.unparse(call)
-        names = [name for dual in duals for name in (dual.code, dual.tangent) if name is not None]
-        self.emit(f"{', '.join(names)} = {code}")
-        for target, dual in zip(targets, duals, strict=True):
+        for target, dual in zip(targets, self.results_of_call(call, callee, arguments, kinds), strict=True):
             self.assignment(target, dual)
+
+    def results_of_call(
+        self, call: ast.Call, callee: wp.Function, arguments: list[_Dual], kinds: list[Any]
+    ) -> list[_Dual]:
+        """Write the call of a typed function, and return its results."""
+        moving, derivative = self.derivative_in(callee, arguments)
+        names: list[str] = []
+        duals: list[_Dual] = []
+        for kind in kinds:
+            value = self.fresh()
+            changes = {i: self.fresh() for i in moving} if derivative and is_differentiable(kind) else {}
+            names += [value, *changes.values()]
+            known = {i: n for i, n in changes.items() if derivative and moving.index(i) in derivative.depends}
+            duals.append(_Dual(value, self.each_direction(known.get) if known else (), kind))
+        code = self.derivative_call(derivative, moving, arguments) if derivative else ast.unparse(call)
+        self.emit(f"{', '.join(names)} = {code}")
+        return duals
 
     # -- expressions --------------------------------------------------------------------------------
 
@@ -396,7 +503,10 @@ class _Transformation:
             case ast.Constant(value=value):
                 return _Dual(text, type=_SAME_TYPES.get(type(value)))
             case ast.Name(id=name) if name in self.types:
-                return _Dual(text, self.tangent(name) if name in self.active else None, self.types[name])
+                tangents = self.each_direction(
+                    lambda i: self.tangent(name, i) if (name, i) in self.active else None
+                )
+                return _Dual(text, tangents, self.types[name])
             case ast.Name() | ast.Attribute() if self.is_constant(node):
                 value = self.resolved(node)
                 return _Dual(text, type=_SAME_TYPES.get(type(value), type(value)))
@@ -414,8 +524,8 @@ class _Transformation:
                 vector = self.dual(value)
                 if component not in "xyzw" or not is_differentiable(vector.type):
                     return _Dual(text)
-                tangent = None if vector.tangent is None else f"{vector.tangent}.{component}"
-                return _Dual(f"{vector.code}.{component}", tangent, wp.float32)
+                tangents = tuple(tangent and f"{tangent}.{component}" for tangent in vector.tangents)
+                return _Dual(f"{vector.code}.{component}", tangents, wp.float32)
             case ast.Call():
                 return self.call(node)
             case _:
@@ -446,7 +556,7 @@ class _Transformation:
     def binary(self, node: ast.BinOp, operator: ast.operator, left: _Dual, right: _Dual) -> _Dual:
         sign = _OPERATORS.get(type(operator))
         if sign is None:
-            if left.tangent or right.tangent:
+            if left.varies or right.varies:
                 raise self.refusal(node, f"{type(operator).__name__} of {ast.unparse(node)}")
             return _Dual(f"({ast.unparse(node)})", type=left.type)
         kind = _product_type(left.type, right.type) if sign == "*" else left.type
@@ -460,15 +570,25 @@ class _Transformation:
                 if rule.scalar
                 else next((a.type for a in arguments if a.type is not wp.bool), None)
             )
-        if all(argument.tangent is None for argument in arguments):
+        if not any(argument.varies for argument in arguments):
             return _Dual(form.format(*(argument.code for argument in arguments)), type=kind)
         codes = [self.atom(argument.code) for argument in arguments]
         code = form.format(*codes)
-        tangents = [None if a.tangent is None else self.atom(a.tangent) for a in arguments]
-        if any("{r}" in partial for partial, tangent in zip(rule.partials, tangents, strict=True) if tangent):
+        moved = [
+            [tangent and self.atom(tangent) for tangent in (a.along(i) for a in arguments)]
+            for i in range(len(self.directions))
+        ]
+        varying = [partial for i, partial in enumerate(rule.partials) if arguments[i].varies]
+        if any("{r}" in partial for partial in varying):
             code = self.atom(code)
-        if rule.componentwise and kind is not wp.float32:
-            size = kind._length_
+        zero = self.zero(kind) if any("{zero}" in partial for partial in rule.partials) else ""
+
+        def tangent(direction: int) -> str | None:
+            tangents = moved[direction]
+            if not any(tangents):
+                return None
+            if not rule.componentwise or kind is wp.float32:
+                return _sum(rule, codes, tangents, code, zero)
             parts = [
                 _sum(
                     rule,
@@ -477,51 +597,54 @@ class _Transformation:
                     f"{code}[{i}]",
                     "",
                 )
-                for i in range(size)
+                for i in range(kind._length_)
             ]
-            return _Dual(code, f"{self.type_code(kind)}({', '.join(parts)})", kind)
-        zero = self.zero(kind) if any("{zero}" in partial for partial in rule.partials) else ""
-        return _Dual(code, _sum(rule, codes, tangents, code, zero), kind)
+            return f"{self.type_code(kind)}({', '.join(parts)})"
+
+        return _Dual(code, self.each_direction(tangent), kind)
 
     def choice(self, node: ast.IfExp) -> _Dual:
         """Return ``x if condition else y``, written as branches, of which only one is computed."""
-        value, tangent = self.fresh(), self.fresh()
+        value, names = self.fresh(), [self.fresh() for _ in self.directions]
         start, count = len(self.lines), self.count
         chosen = other = _Dual("")
-        for attempt in range(2):  # first to learn the type
+        tangents: dict[int, str] = {}
+        for attempt in range(2):  # first to learn the type, and what varies
             del self.lines[start:]
             self.count = count
             if attempt:
-                for name in (value, tangent):
+                for name in (value, *tangents.values()):
                     self.emit(f"{name} = {self.zero(chosen.type or other.type)}")
             self.emit(f"if {ast.unparse(node.test)}:")
-            chosen = self.branch(node.body, value, tangent)
+            chosen = self.branch(node.body, value, tangents)
             self.emit("else:")
-            other = self.branch(node.orelse, value, tangent)
-            if chosen.tangent is None and other.tangent is None:
+            other = self.branch(node.orelse, value, tangents)
+            tangents = {i: name for i, name in enumerate(names) if chosen.along(i) or other.along(i)}
+            if not tangents:
                 del self.lines[start:]
                 return _Dual(f"({ast.unparse(node)})", type=chosen.type)
-        return _Dual(value, tangent, chosen.type or other.type)
+        return _Dual(value, self.each_direction(tangents.get), chosen.type or other.type)
 
-    def branch(self, node: ast.expr, value: str, tangent: str) -> _Dual:
+    def branch(self, node: ast.expr, value: str, tangents: dict[int, str]) -> _Dual:
         outer, self.indent = self.indent, self.indent + "    "
         dual = self.dual(node)
         self.emit(f"{value} = {dual.code}")
         if dual.type is not None and is_differentiable(dual.type):
-            self.emit(f"{tangent} = {dual.tangent or self.zero(dual.type)}")
+            for direction, name in tangents.items():
+                self.emit(f"{name} = {dual.along(direction) or self.zero(dual.type)}")
         self.indent = outer
         return dual
 
     def element(self, node: ast.Subscript, value: _Dual, index: ast.expr) -> _Dual:
         kind = _element_type(value.type)
         position = ast.unparse(index)
-        if value.tangent is None:
+        if not value.varies:
             return _Dual(f"{value.code}[{position}]", type=kind)
         if isinstance(index, ast.Call):
             position = self.atom(position)
         return _Dual(
             f"{self.atom_of_vector(value.code)}[{position}]",
-            f"{self.atom_of_vector(value.tangent)}[{position}]",
+            tuple(t and f"{self.atom_of_vector(t)}[{position}]" for t in value.tangents),
             kind,
         )
 
@@ -543,53 +666,65 @@ class _Transformation:
             return self.built_in(node, callee.key, arguments, form)
         returned = _hints(callee).get("return")
         kind = _plain(returned)
-        derivative = self.derivative_in(callee, arguments) if is_differentiable(kind) else None
-        if derivative is None:
+        if not is_differentiable(kind) or self.derivative_in(callee, arguments)[1] is None:
             return _Dual(form.format(*(argument.code for argument in arguments)), type=kind)
-        value, tangent = self.fresh(), self.fresh()
-        self.emit(f"{value}, {tangent} = {self.derivative_call(derivative, arguments)}")
-        return _Dual(value, tangent, kind)
+        return self.results_of_call(node, callee, arguments, [kind])[0]
 
     def construction(self, kind: type, arguments: list[_Dual], form: str) -> _Dual:
         """Return a cast, or a vector or matrix of components."""
         kind = _plain(kind)
         code = form.format(*(argument.code for argument in arguments))
-        if not is_differentiable(kind) or all(argument.tangent is None for argument in arguments):
+        if not is_differentiable(kind):
             return _Dual(code, type=kind)
-        tangents = [
-            argument.tangent or ("0.0" if argument.type is wp.float32 else self.zero(argument.type))
-            for argument in arguments
-        ]
-        return _Dual(code, form.format(*tangents), kind)
+
+        def tangent(direction: int) -> str | None:
+            if all(argument.along(direction) is None for argument in arguments):
+                return None
+            zeros = ["0.0" if a.type is wp.float32 else self.zero(a.type) for a in arguments]
+            return form.format(
+                *(a.along(direction) or zero for a, zero in zip(arguments, zeros, strict=True))
+            )
+
+        return _Dual(code, self.each_direction(tangent), kind)
 
     def built_in(self, node: ast.Call, name: str, arguments: list[_Dual], form: str) -> _Dual:
         code = form.format(*(argument.code for argument in arguments))
         if name in CASTS:
-            tangent = arguments[0].tangent if name == "float32" else None
-            return _Dual(code, tangent, CASTS[name])
+            return _Dual(code, arguments[0].tangents if name == "float32" else (), CASTS[name])
         if name in STEPS:
             return _Dual(code, type=arguments[0].type)
         if name in RULES and len(RULES[name].partials) == len(arguments):
             return self.by_rule(name, RULES[name], arguments, form)
-        if any(argument.tangent for argument in arguments):
+        if any(argument.varies for argument in arguments):
             raise self.refusal(node, f"wp.{name}")
         return _Dual(code)
 
-    def derivative_in(self, callee: wp.Function, arguments: list[_Dual]) -> "_Transformation | None":
-        """Return the derivative of a function in those of its arguments that vary; None if it is 0."""
+    def derivative_in(
+        self, callee: wp.Function, arguments: list[_Dual]
+    ) -> "tuple[list[int], _Transformation | None]":
+        """Return the directions in which arguments vary, and the derivative, None if it is 0."""
         names = [name for name in _hints(callee) if name != "return"]
-        moving = frozenset(name for name, argument in zip(names, arguments, strict=True) if argument.tangent)
+        varying = [
+            frozenset(name for name, argument in zip(names, arguments, strict=True) if argument.along(i))
+            for i in range(len(self.directions))
+        ]
+        moving = [i for i, names_of_direction in enumerate(varying) if names_of_direction]
         if not moving:
-            return None
-        derivative = _transformation(callee, moving)
-        return derivative if derivative.depends else None
+            return moving, None
+        derivative = _transformation(callee, tuple(varying[i] for i in moving))
+        return moving, derivative if derivative.depends else None
 
-    def derivative_call(self, derivative: "_Transformation", arguments: list[_Dual]) -> str:
+    def derivative_call(
+        self, derivative: "_Transformation", moving: list[int], arguments: list[_Dual]
+    ) -> str:
         alias = derivative.name
         while self.callees.setdefault(alias, derivative) is not derivative:
             alias += "_"
         codes = [
-            code for argument in arguments for code in (argument.code, argument.tangent) if code is not None
+            code
+            for argument in arguments
+            for code in (argument.code, *(argument.along(i) for i in moving))
+            if code is not None
         ]
         return f"{alias}({', '.join(codes)})"
 

@@ -75,6 +75,15 @@ def soft(a: wp.float32, b: wp.float32, hardness: wp.float32) -> wp.vec3:
 
 
 @wp.func
+def soft_alone(a: wp.float32, b: wp.float32, hardness: wp.float32) -> wp.float32:
+    """The same without its derivatives, and without a thought of 0 / 0."""
+    larger = wp.max(a, b)
+    x = a / larger
+    y = b / larger
+    return 0.5 * (a + b + larger * wp.sqrt((x - y) * (x - y) + hardness * x * y))
+
+
+@wp.func
 def carve(a: wp.float32, b: wp.float32) -> wp.vec3:
     """A difference with soft walls."""
     rest = wp.max(1.0 - b, 0.0)

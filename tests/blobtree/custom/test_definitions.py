@@ -6,23 +6,29 @@ import sys
 from pathlib import Path as File
 from typing import Any
 
+import numpy as np
 import pytest
 import warp as wp
 
 from blobtree import (
     CustomCombination,
     CustomPrimitive,
+    InvalidDefinition,
     InvalidFile,
     InvalidNode,
     Point,
     UnknownKind,
+    define_falloff,
+    define_operator,
     define_skeleton,
     from_json,
     to_json,
 )
 from blobtree.custom.definition import CUSTOM_KINDS, CustomKind
-from tests.blobtree import custom_kinds
-from tests.blobtree.custom_kinds import CUSTOM_TREES, SOFTEST, Carve, Mean, Ring, Soft, Swell
+from blobtree.transpile.python import plain_python
+from tests.blobtree import custom_kinds, kernels
+from tests.blobtree.custom_kinds import CUSTOM_TREES, SOFTEST, Carve, Mean, Ring, Soft, Swell, Tent
+from tests.blobtree.transpile.warp_functions import python_function
 
 BALL = Point((0, 0, 0), radius=1.0)
 RING_DOC = "A circle of radius `size` around `axis`."
@@ -99,6 +105,28 @@ def test_an_order_free_operator_takes_any_number_of_operands() -> None:
     value = float(Swell(tuple(balls))([[0.5, 0.3, 0]])[0])
     assert value == pytest.approx(sum(float(ball([[0.5, 0.3, 0]])[0]) ** 2 for ball in balls) ** 0.5)
     assert Swell((balls[0],))([[0.5, 0.3, 0]]) == balls[0]([[0.5, 0.3, 0]])
+
+
+def test_derivatives_that_are_not_given_are_derived() -> None:
+    claims: dict[str, Any] = {"like": "blend", "monotone": True, "limits": {"hardness": (0.0, SOFTEST)}}
+    alone = define_operator(kernels.soft_alone, steepest=1.0, **claims)
+    given, made = (plain_python(python_function(kind.operator.partials)) for kind in (Soft, alone))
+    rng = np.random.default_rng(4)
+    absent = [(0.0, 0.7, 1.0), (0.7, 0.0, 1.0), (0.0, 0.0, 1.0)]
+    for a, b, hardness in [*rng.uniform(0.0, 1.0, (200, 3)), *absent]:
+        np.testing.assert_allclose(made(a, b, hardness), given(a, b, hardness), atol=1e-14)
+    tent = define_falloff(kernels.tent, name="tent_alone")
+    assert (tent.rim, tent.steepest_slope) == (Tent.rim, Tent.steepest_slope)
+    slope = plain_python(python_function(tent.slope))
+    assert {slope(d) for d in np.linspace(0.0, 1.0, 9)} == {-1.0}
+
+
+def test_wrong_functions_without_derivatives_are_refused() -> None:
+    limits = {"hardness": (0.1, 1.0)}
+    with pytest.raises(InvalidDefinition, match=r"more than steepest = 0\.1"):
+        define_operator(kernels.soft_alone, steepest=0.1, like="blend", limits=limits)
+    with pytest.raises(InvalidDefinition, match="but like='intersection' says 0"):
+        define_operator(kernels.soft_alone, steepest=1.0, like="intersection", limits=limits)
 
 
 def test_a_skeleton_that_the_checks_took_for_bounded_is_refused_with_its_box() -> None:

@@ -150,3 +150,15 @@ def multiplies_lists(x: wp.float32) -> wp.float32:
 @wp.func
 def counts(n: wp.int32) -> wp.int32:
     return n + 1
+
+
+@wp.func
+def inner(u: wp.float32, v: wp.float32) -> wp.float32:
+    """Return a function of two numbers."""
+    return wp.exp(u) * v
+
+
+@wp.func
+def counted(x: wp.float32, y: wp.float32) -> wp.float32:
+    """Call a function of both parameters once."""
+    return wp.exp(inner(x, y))

@@ -1,6 +1,7 @@
 """Derivatives of typed functions, against differences in float64; then in Warp, in GLSL and refused."""
 
 import importlib.util
+import inspect
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -13,9 +14,19 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree import UntranslatableFunction
+from blobtree.formulas.falloff import FALLOFFS
+from blobtree.formulas.falloffs import MORE_FALLOFFS
+from blobtree.formulas.library import LIBRARY_OPERATORS
+from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.skeletons import SKELETONS
 from blobtree.tape import interpreter
-from blobtree.transpile.derivative import differentiated, directional_derivative, is_differentiable
+from blobtree.transpile.derivative import (
+    derivative_along,
+    differentiated,
+    directional_derivative,
+    is_differentiable,
+    partial_derivatives,
+)
 from blobtree.transpile.derivative_rules import RULES
 from blobtree.transpile.glsl import translate_library
 from blobtree.transpile.python import plain_python, vector
@@ -76,7 +87,7 @@ def check(
             tangents[name][0][3] = 0.0
     plain: Callable[..., Any] = plain_python(python_function(function))
     derivative = directional_derivative(function, varying)
-    assert differentiated(derivative) == (function, tuple(sorted(names)))
+    assert differentiated(derivative) == (function, (frozenset(names),))
     both = [
         item
         for name in values
@@ -100,6 +111,49 @@ def test_derivatives_are_limits_of_differences(function: Any) -> None:
         check(function, None, seed)
 
 
+def check_partials(function: Any, names: list[str], seed: int, **arguments: Any) -> None:
+    """Compare partial derivatives in one pass with those along one axis after the other, bit by bit."""
+    rng = np.random.default_rng(seed)
+    hints = dict(python_function(function).__annotations__)
+    hints.pop("return")
+    values = {name: random_value(hint, rng) for name, hint in hints.items()} | arguments
+    plain: Callable[..., Any] = plain_python(python_function(function))
+    with np.errstate(all="ignore"):
+        value, *slopes = plain_python(python_function(partial_derivatives(function, names)))(*values.values())
+        np.testing.assert_array_equal(value, plain(*values.values()))
+        along = []
+        for name in names:
+            derivative = plain_python(python_function(directional_derivative(function, [name])))
+            size = getattr(hints[name], "_length_", 1)
+            for tangent in [vector(*row) for row in np.eye(size)] if size > 1 else [np.float64(1.0)]:
+                both = [[values[n], tangent] if n == name else [values[n]] for n in values]
+                along.append(derivative(*(item for items in both for item in items))[1])
+    np.testing.assert_array_equal(slopes, along)
+
+
+@pytest.mark.parametrize("function", SAMPLES, ids=lambda function: function.key)
+def test_partial_derivatives_are_those_along_the_axes(function: Any) -> None:
+    hints = python_function(function).__annotations__
+    names = [name for name, hint in hints.items() if name != "return" and is_differentiable(hint)]
+    for seed in SEEDS[:2]:
+        check_partials(function, names, seed)
+        check_partials(function, names[-1:], seed)
+
+
+def test_partial_derivatives_compute_the_value_once() -> None:
+    text = inspect.getsource(
+        python_function(derivative_along(samples.counted, (frozenset("x"), frozenset("y"))))
+    )
+    assert text.count("wp.exp(") == 1
+    assert text.count("inner_along_u_and_v(") == 1
+
+
+def test_partial_derivatives_by_what_has_none_are_refused() -> None:
+    for names in ([], ["turns"], ["missing"]):
+        with pytest.raises(UntranslatableFunction, match="expected names of floats or vectors"):
+            partial_derivatives(samples.loops, names)
+
+
 def test_one_parameter_may_vary_alone() -> None:
     for seed in SEEDS:
         check(samples.vectors, ("w",), seed)
@@ -120,6 +174,32 @@ def test_formulas_have_derivatives(typed: Any) -> None:
     for seed in SEEDS:
         exponent = {"exponent": 2.5} if "exponent" in typed.parameters else {}
         check(typed.function, None, seed, exponent)
+    names = [name for name, hint in typed.parameters.items() if is_differentiable(hint)]
+    check_partials(typed.function, names, SEEDS[0], **exponent)
+
+
+OPERATOR_ROWS = [row for row in (*OPERATORS, *LIBRARY_OPERATORS) if not row.gradients]
+
+
+@pytest.mark.parametrize("row", OPERATOR_ROWS, ids=lambda row: row.name)
+def test_partials_written_by_hand_are_those_of_the_engine(row: Any) -> None:
+    """The value is the first of three numbers that a row returns, so its derivatives are the other two."""
+    tape = [vector(0.4, 0.3, 0.2, 0.1)] * 4
+    partials = plain_python(python_function(partial_derivatives(row.partials, ["a", "b"])))
+    count = len(inspect.signature(python_function(row.partials)).parameters)
+    for a, b in np.random.default_rng(6).uniform(0.0, 1.0, (40, 2)):
+        for parameter in (1.0, 2.5):
+            with np.errstate(all="ignore"):
+                result, by_a, by_b = partials(*(a, b, parameter, tape)[:count])
+            np.testing.assert_allclose([by_a[0], by_b[0]], result[1:], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("row", [*FALLOFFS, *MORE_FALLOFFS], ids=lambda row: row.name)
+def test_slopes_of_falloffs_are_those_of_the_engine(row: Any) -> None:
+    derived = plain_python(python_function(partial_derivatives(row.value)))
+    slope = plain_python(python_function(row.slope))
+    for d in np.linspace(0.0, 1.0, 57)[:-1]:
+        np.testing.assert_allclose(derived(d)[1], slope(d), rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("skeleton", SKELETONS, ids=lambda skeleton: skeleton.name)
