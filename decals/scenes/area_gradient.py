@@ -5,6 +5,7 @@ outward at the speed −∂h/∂θ / |∇h|, with the gradient along the surface
 The area grows by the integral of this speed over the boundary.
 """
 
+from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,13 +18,23 @@ from decals.field.law import AnyContact, ContactLaw, contact_mode
 from decals.field.mapping import ImageMapping
 from decals.model import Decals
 from decals.record import Contact
-from decals.scenes.outlines import STEP, LineKind, outlines
+from decals.scenes.outlines import STEP, LineKind, SurfaceLine, outlines
 from decals.scenes.pose import require_scene
 from decals.scenes.scene import Scene
+from decals.surfaces.surface import Surface
 from decals.validation import real_array
 
 LEAST_SLOPE = 1e-9
 """Least slope of a level function along the surface; where it touches the surface, the speed has no end."""
+
+
+NEWTON_STEPS = 4
+
+END_REACH = 0.1
+"""Greatest distance, in visible radii, by which an end of a line moves to where it meets others."""
+
+LEAST_ANGLE = 1e-3
+"""Least angle of two lines whose meeting point is looked for along both."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,16 +128,18 @@ def area_gradient(
     surfaces = {item.name: item.surface for item in scene.objects}
     gradient = AreaGradient(np.zeros((len(decals), 3)), np.zeros(len(decals)))
     cells = mode in (Contact.RADIAL, Contact.ELASTIC)
-    for line in lines:
+    polylines = [line.points.astype(np.float64) for line in lines]
+    for name, surface in surfaces.items():
+        own = [number for number, line in enumerate(lines) if line.object == name]
+        _move_ends(decals, [lines[n] for n in own], [polylines[n] for n in own], surface, cells)
+    for line, points in zip(lines, polylines, strict=True):
         first, second = line.decals
-        points = line.points.astype(np.float64)
         middles = 0.5 * (points[1:] + points[:-1])
         normals = surfaces[line.object].project(middles.astype(np.float32))[1].astype(np.float64)
         amounts = (factors[first] - factors[second]) * np.linalg.norm(np.diff(points, axis=0), axis=1)
         levels = [_Level.rim(decals, middles, first, 1.0)]
         if line.kind is LineKind.CONTACT:
-            meeting = _Level.power if cells else _Level.ratio
-            levels += [_Level.rim(decals, middles, second, -1.0), meeting(decals, middles, first, second)]
+            levels += [_Level.rim(decals, middles, second, -1.0), _Level.of(line, decals, middles, cells)]
         _add(gradient, levels, normals, amounts)
     return gradient
 
@@ -143,6 +156,13 @@ class _Level:
     slopes: Float64Array
     moves: tuple[Float64Array, ...]
     grows: tuple[Float64Array, ...]
+
+    @staticmethod
+    def of(line: SurfaceLine, decals: Decals, points: Float64Array, cells: bool) -> "_Level":
+        """Return the level function of a rim, or of the contact line between two decals."""
+        if line.kind is LineKind.RIM:
+            return _Level.rim(decals, points, line.decals[0], 1.0)
+        return (_Level.power if cells else _Level.ratio)(decals, points, *line.decals)
 
     @staticmethod
     def rim(decals: Decals, points: Float64Array, number: int, sign: float) -> "_Level":
@@ -184,6 +204,49 @@ def _ways(decals: Decals, points: Float64Array, number: int) -> tuple[Float64Arr
     offsets = points - decals.positions[number].astype(np.float64)
     distances = np.linalg.norm(offsets, axis=1)
     return offsets / np.maximum(distances, 1e-300)[:, None], distances
+
+
+def _move_ends(
+    decals: Decals,
+    lines: list[SurfaceLine],
+    polylines: list[Float64Array],
+    surface: Surface,
+    cells: bool,
+) -> None:
+    """Move the ends of lines on a surface to where they meet, by Newton's method for their level functions.
+
+    A line finds its end by labels of points alone, and those of a thin wedge between two others are rare. An
+    end that would move farther than END_REACH stays: it is another one, such as that on a boundary. A line
+    between two ends that move to one place is a piece of such a wedge, which the others pass already.
+    """
+    meetings: dict[bytes, list[int]] = defaultdict(list)
+    for number, points in enumerate(polylines):
+        for end in (0, -1):
+            meetings[points[end].tobytes()].append(number)
+    found = {place: sorted(set(numbers)) for place, numbers in meetings.items() if len(set(numbers)) > 1}
+    if not found:
+        return
+    begun = np.array([np.frombuffer(place) for place in found])
+    places, normals = begun, surface.project(begun.astype(np.float32))[1].astype(np.float64)
+    for _ in range(NEWTON_STEPS):
+        steps = np.zeros_like(places)
+        for row, numbers in enumerate(found.values()):
+            levels = [_Level.of(lines[n], decals, places[row : row + 1], cells) for n in numbers]
+            slopes = np.concatenate([level.slopes for level in levels])
+            slopes -= np.outer(slopes @ normals[row], normals[row])
+            values = np.concatenate([level.values for level in levels])
+            steps[row] = np.linalg.lstsq(slopes, -values, rcond=LEAST_ANGLE)[0]
+        moved, ways = surface.project((places + steps).astype(np.float32))
+        places, normals = moved.astype(np.float64), ways.astype(np.float64)
+    reach = [END_REACH * decals.radii[max(lines[numbers[0]].decals)] for numbers in found.values()]
+    near = np.linalg.norm(places - begun, axis=1) < reach
+    ends = {place: row for place, row, kept in zip(found, places, near, strict=True) if kept}
+    for points in polylines:
+        first, last = (points[end].tobytes() for end in (0, -1))
+        if first != last and {first, last} <= set(ends) and np.array_equal(ends[first], ends[last]):
+            points[:] = ends[first]
+        for end, place in ((0, first), (-1, last)):
+            points[end] = ends.get(place, points[end])
 
 
 def _add(gradient: AreaGradient, levels: list[_Level], normals: Float64Array, amounts: Float64Array) -> None:

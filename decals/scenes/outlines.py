@@ -33,11 +33,17 @@ from decals.validation import real_number
 STEP = 0.05
 """Default length of the edges that find lines, in visible radii of the smallest decal there."""
 
-BISECTIONS, DIVISIONS = 20, 24
+BISECTIONS, DIVISIONS = 20, 30
 """Steps that find a point on an edge, and a point where three decals meet."""
 
 SHRINKING = 0.6
 """Factor by which the window around such a point shrinks in a step."""
+
+GROWTH = 2.0
+"""Factor by which it grows after it has lost the point."""
+
+MISSING = 2.0
+"""Distance to a label that no point of a window has, longer than all in it."""
 
 WINDOW = np.array([(i, j, 5 - i - j) for i in range(6) for j in range(6 - i)]) / 5.0
 """Barycentric coordinates of the points in a window."""
@@ -314,21 +320,24 @@ class _Tracer:
         """Return the points in triangles ``[m, 3, 3]`` near which the labels of the corners meet, ``[m, 3]``.
 
         A window of points around the best guess shrinks. The best guess is the one nearest to all labels. It
-        may lie a little outside of the triangle, if a line crosses an edge twice.
+        may lie a little outside of the triangle, if a line crosses an edge twice. A window without one of the
+        labels has lost the meeting point, and grows.
         """
         count = len(corners)
         wanted = self._labels(corners.reshape(-1, 3)).reshape(count, 3)
         apart = np.linalg.norm(WINDOW[:, None] - WINDOW, axis=2)
-        places, size = np.full((count, 3), 1.0 / 3.0), 1.0
+        places, sizes = np.full((count, 3), 1.0 / 3.0), np.ones(count)
         for _ in range(DIVISIONS if count else 0):
-            weights = places[:, None] + size * (WINDOW - 1.0 / 3.0)
+            weights = places[:, None] + sizes[:, None, None] * (WINDOW - 1.0 / 3.0)
             points = self._project(np.einsum("mkc,mci->mki", weights, corners).reshape(-1, 3))
             labels = self._labels(points).reshape(count, -1)
             off = np.stack(
-                [np.where((labels == wanted[:, [k]])[:, None], apart, 2.0).min(axis=2) for k in range(3)]
+                [np.where((labels == wanted[:, [k]])[:, None], apart, MISSING).min(axis=2) for k in range(3)]
             ).max(axis=0)
-            places = np.take_along_axis(weights, off.argmin(axis=1)[:, None, None], axis=1)[:, 0]
-            size *= SHRINKING
+            best = np.take_along_axis(weights, off.argmin(axis=1)[:, None, None], axis=1)[:, 0]
+            met = off.min(axis=1) < MISSING
+            places = np.where(met[:, None], best, places)
+            sizes *= np.where(met, SHRINKING, GROWTH)
         return self._project(np.einsum("mc,mci->mi", places, corners))
 
     def lines(self) -> Iterator[tuple[tuple[int, int], Float64Array]]:

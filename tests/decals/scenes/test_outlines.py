@@ -129,6 +129,26 @@ def test_lines_of_thin_models_stay_on_their_sides(name: str) -> None:
     assert all(len(line.points) > 1 for line in lines)
 
 
+@pytest.mark.slow_cases("3", "4", "5")
+@pytest.mark.parametrize("seed", range(6))
+def test_lines_end_where_three_labels_meet(seed: int) -> None:
+    """A ring of discs: where a contact line meets two rims, the powers of both discs are 0."""
+    rng = np.random.default_rng(seed)
+    angles = np.arange(5) * 2 * np.pi / 5 + rng.uniform(-0.2, 0.2, 5)
+    centers = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1) * rng.uniform(0.45, 0.7, (5, 1))
+    layout = flat(centers, rng.uniform(0.45, 0.6, 5))
+    found = decals.outlines(scene_of(square(4.0), layout), contact="radial", mapping="chord")
+    off = []
+    for line in of_kind(found, LineKind.CONTACT):
+        first, second = (
+            np.linalg.norm(line.points[[0, -1]] - layout.positions[n], axis=1) ** 2 - layout.radii[n] ** 2
+            for n in line.decals
+        )
+        off.extend(np.abs(first - second))
+    assert np.median(off) < 1e-5
+    assert max(off) < 2e-3
+
+
 def test_chains_of_segments() -> None:
     found = list(chains([(3, 4), (1, 2), (2, 3), (7, 8), (8, 9), (9, 7), (5, 11), (11, 6), (11, 12)]))
     assert found == [[1, 2, 3, 4], [5, 11], [6, 11], [11, 12], [7, 8, 9, 7]]
