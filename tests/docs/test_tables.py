@@ -2,9 +2,12 @@
 
 import re
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+
+from decals.apps.experiments import SHIPPED
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = ("performance", "theory", "comparison", "contact-modes", "shipped-experiments")
@@ -49,6 +52,38 @@ def test_every_table_names_its_command_and_device(page: str) -> None:
             if not pattern.search(said):
                 unnamed.append(f"{what}: {table.splitlines()[0]}")
     assert unnamed == []
+
+
+def source_of(module: str) -> str:
+    """Return the text of a benchmark and of the modules from which it imports."""
+    text = Path(find_spec(module).origin).read_text(encoding="utf-8")  # type: ignore[union-attr, arg-type]
+    others = re.findall(r"^from ((?:tests\.bench|decals\.apps)[\w.]*) import", text, re.MULTILINE)
+    return text + "".join(map(source_of, others))
+
+
+def unknown_names(text: str) -> list[str]:
+    """Return the names after ``sweep`` and ``--only`` in commands that no experiment and no benchmark has."""
+    sweeps = re.findall(r"implicit-decals sweep ([\w./-]+)", text)
+    unknown = [name for name in sweeps if not name.startswith("-") and not name.endswith(".py")]
+    unknown = [f"sweep {name}" for name in unknown if name not in SHIPPED]
+    for module, options in re.findall(r"python -m (tests\.bench\.\w+)([^\n`#]*)", text):
+        names = re.findall(r"--only ([\w,-]+(?: [a-z][\w,-]*)*)", options)
+        source = source_of(module)
+        for name in re.findall(r"[\w-]+", " ".join(names)):
+            if not re.search(rf"\b{name}\b", source):
+                unknown.append(f"{module} --only {name}")
+    return unknown
+
+
+@pytest.mark.parametrize("page", sorted(path.stem for path in DOCS.glob("*.md")))
+def test_names_in_commands_exist(page: str) -> None:
+    assert unknown_names((DOCS / f"{page}.md").read_text(encoding="utf-8")) == []
+
+
+def test_an_unknown_name_is_found() -> None:
+    text = "implicit-decals sweep blends; `python -m tests.bench.batches --only render --only opaque`"
+    assert unknown_names(text) == ["tests.bench.batches --only opaque"]
+    assert unknown_names("    implicit-decals sweep nothing --out x") == ["sweep nothing"]
 
 
 def test_a_table_without_a_command_is_found() -> None:
