@@ -116,7 +116,11 @@ class _Builder:
                 self.empty_ints(0),
                 *alone,
             )
-        self.sets = self.ints(np.repeat(np.arange(self.set_count), self.sizes_of_sets))
+        loaded(kernels.list_cells, self.device)  # with all others of their module
+        if self.several:
+            self.sets = self.ints(np.repeat(np.arange(self.set_count), self.sizes_of_sets))
+        else:  # without sums on the host, as below
+            self.sets = self.zeros(self.count)
         order = self.drawing_order()
         sizes = self.choose_sizes(order)
         levels, level_of = _levels(sizes)
@@ -140,7 +144,7 @@ class _Builder:
         if (floors != NO_FLOOR).any():
             best = self.sizes(order, alone, floors)
         used, parities = best.used, alone
-        for parity in (0, 1):
+        for parity in (0, 1) if best.levels.max() > 1 else ():
             shared = np.where(_shared_levels(used, parity) < best.levels, parity, parities)
             if (shared != parities).any():
                 other = self.sizes(order, shared.astype(np.int32), floors)
@@ -207,7 +211,8 @@ class _Builder:
         claims, slots = self.filled(scratch, EMPTY), self.empty_ints(2 * entries)
         sizes, used, numbers, heads = (self.zeros(scratch) for _ in range(4))
         holders = self.zeros(scratch if self.several else 0)
-        counts, starts = self.zeros(self.set_count), self.ints(self.starts[:-1])
+        counts = self.zeros(self.set_count) if self.several else holders
+        starts = self.ints(self.starts[:-1]) if self.several else self.sets
         self.launch(
             kernels.claim_slots,
             entries,
@@ -231,7 +236,7 @@ class _Builder:
         return table, tables, ids
 
     def launch(self, kernel: Any, count: int, inputs: list[Any], outputs: list[Any]) -> None:
-        wp.launch(loaded(kernel, self.device), count, inputs, outputs, device=self.device)
+        wp.launch(kernel, count, inputs, outputs, device=self.device)
 
     def ints(self, values: NDArray[Any]) -> Any:
         numbers, copy = np.asarray(values, np.int32).ravel(), not self.device.is_cpu
