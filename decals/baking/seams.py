@@ -51,8 +51,11 @@ BOUND_WEIGHT, BOUND_DECAY = 30.0, 0.5
 MAX_CHANGE = 0.25
 """Largest change of a texel in a step."""
 
-RINGS = 3
-"""Points of seams, by common texels, around those that differ that take part in the least squares."""
+SQUARES_FROM = 10.0
+"""Difference of 255 from which on a point takes part in the least squares; smaller ones are settled."""
+
+RINGS = 2
+"""Points of seams, by common texels, around those that differ that are changed with them."""
 
 REPORT_SECONDS = 0.1
 """Seconds between reports; a cancelled match ends after the step that is running."""
@@ -240,7 +243,7 @@ class _Match:
 
     def solve(self) -> None:
         """Change the levels, as little as the seams take."""
-        rows = self._rows_around(np.abs(self._gaps()[0]) > TOLERANCE / 255.0)
+        rows = self._rows_around(np.abs(self._gaps()[0]) > SQUARES_FROM / 255.0)
         if len(rows):
             self._least_squares(rows)
         self._settle()
