@@ -121,15 +121,20 @@ class AdaptiveMesher:
         self._changes = LeafChanges(cells)
         self._known_edges: LeafEdges
 
-    def mesh(self, report: Progress, max_repairs: int = MAX_REPAIRS) -> AdaptiveMesh:
+    def mesh(
+        self, report: Progress, max_repairs: int = MAX_REPAIRS, max_growth: float = np.inf
+    ) -> AdaptiveMesh:
         """Return the mesh of the leaves; divide those at which it would not be a manifold.
 
         Raises
         ------
         InvalidResolution
-            Cells cannot be divided any further.
+            Cells cannot be divided any further, or their blocks have grown by more than a factor.
         """
+        most = max_growth * len(self._tree)
         for repair in range(max_repairs):
+            if len(self._tree) > most:
+                break
             report("connecting vertices", repair / max_repairs)
             self._cells.settle()
             leaves = self._cells.leaves()

@@ -60,9 +60,8 @@ def smallest_part(
                     c = closest(code, point, tape, at)
                     size = RIM * c[3] + tape[last][3]
                     at = last + 1
-                size /= stretch
-                if size >= least:
-                    result = wp.min(result, size)
+                if size >= least:  # bounds of stretches are large in large cubes
+                    result = wp.min(result, wp.max(size / stretch, least))
         elif code == WARP:
             points[count] = point
             balls[count] = ball

@@ -71,8 +71,17 @@ MAX_GAP_BLOCKS = MAX_PART_BLOCKS // 4
 GAP_GROWTH = 4.0
 """Growth of the blocks at a gap from level to level, between surfaces that touch nearly in a point."""
 
-MAX_PART_REPAIRS = 100
-"""Most rounds in which cells are divided until the mesh is closed: a few, beside sharp rims up to 80."""
+MAX_PART_REPAIRS = 60
+"""Most rounds in which cells are divided until the mesh is closed: a few, but many beside sharp rims."""
+
+MAX_REPAIR_GROWTH = 1.4
+"""Most blocks after these rounds, over those before: more follow a wall that memory does not allow."""
+
+MAX_SECOND_BLOCKS = 40_000
+"""Blocks of a mesh that did not close, up to which another one is tried."""
+
+OTHER_CELLS = 0.87
+"""Size of the cells of a second mesh, over those of one that did not close: rims lie elsewhere in them."""
 
 LATER_GROWTH = 0.6
 """Growth of a part's blocks in later levels, over that in the last one, which is larger at ends and edges."""
@@ -340,30 +349,50 @@ def mesh_of_parts(
         first = _sampled(
             tree, grid_of(fitting_wall_scale(needed, size, CROSSED_CELLS * len(blocks))), device, report
         )
-        blocks, walls = first.blocks, first.walls
     elif least_size(blocks.cells, smallest) >= BALL_CELLS * blocks.cells.grid.cell_size and not len(
         Gaps(blocks).edges()
     ):
         return None, unresolved
-    parts = PartCells(blocks, 0.0, smallest, walls)
     try:
-        parts.divide_gaps()
-        mesher = AdaptiveMesher(parts, creases)
-        mesh = mesher.mesh(report, MAX_PART_REPAIRS)
-        while parts.divide_gaps():  # repairs have made cells so small that they bridge gaps
-            mesh = mesher.mesh(report, MAX_PART_REPAIRS)
+        mesh, others = _closed_mesh(first, smallest, creases, report)
     except InvalidResolution:
-        return None, parts.unresolved + unresolved + _all_parts(blocks.cells, walls, smallest)
-    return without_specks(mesh.mesh(creases)), parts.unresolved + unresolved
+        if len(first.blocks) > MAX_SECOND_BLOCKS:
+            return None, unresolved + _all_parts(first, smallest)
+        first = _sampled(
+            tree, grid_of(OTHER_CELLS * first.blocks.cells.grid.cell_size / size), device, report
+        )
+        try:
+            mesh, others = _closed_mesh(first, smallest, creases, report)
+        except InvalidResolution:
+            return None, unresolved + _all_parts(first, smallest)
+    return mesh, others + unresolved
 
 
-def _all_parts(cells: SparseCells, walls: Walls | None, least: float) -> list[ThinPart]:
+def _closed_mesh(
+    first: FirstCells, smallest: float, creases: bool, report: Progress
+) -> tuple[Mesh, list[ThinPart]]:
+    """Return a closed mesh, and the parts and gaps for whose cells there is no room.
+
+    Raises
+    ------
+    InvalidResolution
+        The mesh does not close.
+    """
+    parts = PartCells(first.blocks, 0.0, smallest, first.walls)
+    parts.divide_gaps()
+    mesher = AdaptiveMesher(parts, creases)
+    mesh = mesher.mesh(report, MAX_PART_REPAIRS, MAX_REPAIR_GROWTH)
+    while parts.divide_gaps():  # repairs have made cells so small that they bridge gaps
+        mesh = mesher.mesh(report, MAX_PART_REPAIRS, MAX_REPAIR_GROWTH)
+    return without_specks(mesh.mesh(creases)), parts.unresolved
+
+
+def _all_parts(first: FirstCells, least: float) -> list[ThinPart]:
     """Return the thinnest places: one of all primitives, and one of the walls of each operand."""
+    cells, walls = first.blocks.cells, first.walls
     found = [] if walls is None else [ThinPart(size, place, leaf) for size, place, leaf in walls.thinnest]
-    needed, grid = (
-        needed_sizes(cells, cells.grid, cells.leaves.arrays, 0, len(cells.leaves), least),
-        cells.grid,
-    )
+    needed = needed_sizes(cells, cells.grid, cells.leaves.arrays, 0, len(cells.leaves), least)
+    grid = cells.grid
     thinnest = int(needed.argmin())
     if needed[thinnest] < grid.cell_size:
         at = cells.leaves.blocks.numpy()[thinnest]

@@ -50,6 +50,9 @@ from blobtree.tape.program import PlacedPrimitive, ProgramPrimitive, Run, influe
 MAX_ATTEMPTS = 6
 """Most meshes of grown trees."""
 
+MAX_GROWN_TRIANGLES = 500_000
+"""Triangles of a mesh that failed, above which a mesh with less growth would take too many."""
+
 LESS = 0.25
 """Largest growth of a part after it failed, over that before."""
 
@@ -312,6 +315,8 @@ def mesh_of_thin_parts(
         if not len(wrong):
             warn_of_thin_parts(growth.grown, unresolved)
             return vertices.finished()
+        if len(mesh.faces) > MAX_GROWN_TRIANGLES:
+            break
         limits[wrong] = LESS * np.abs(growth.lengths[wrong])
     mesh, unresolved = with_small_cells(tree, first)
     warn_of_thin_parts(tree, unresolved)

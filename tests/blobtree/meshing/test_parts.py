@@ -150,3 +150,15 @@ def test_random_trees_stay_closed() -> None:
     rng = np.random.default_rng(5)
     for _ in range(5):
         assert is_closed(polygonize(plain_tree(rng, 6)).faces)
+
+
+def test_a_ball_that_a_warp_makes_thin_has_the_smallest_cells() -> None:
+    rate, away, radius = np.radians(15.0), np.hypot(14.0, 1.0), 0.0025
+    mesh = polygonize_parts((BALL | Point((14, 1, 3), radius=radius)).twist(15.0), resolution=32)
+    centers, areas = mesh_areas(mesh)
+    stretch = 0.5 * (rate * away + np.hypot(rate * away, 2.0))
+    ellipsoid = (
+        4.0 * np.pi * radius**2 * (sum(x**1.6075 for x in (stretch, 1.0, 1.0 / stretch)) / 3) ** (1 / 1.6075)
+    )
+    assert is_closed(mesh.faces)
+    assert areas[np.linalg.norm(centers, axis=1) > 3.0].sum() == pytest.approx(ellipsoid, rel=0.1)

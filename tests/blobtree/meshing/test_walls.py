@@ -153,7 +153,7 @@ def test_parts_that_cells_cannot_close_leave_the_rest(
 ) -> None:
     tree = BALL.translate((4, 0, 0)) | (CUBE & CUBE.translate((0, 0, 1.1)))
 
-    def failing(self: AdaptiveMesher, report: Progress, max_repairs: int) -> AdaptiveMesh:
+    def failing(self: AdaptiveMesher, report: Progress, *limits: float) -> AdaptiveMesh:
         raise InvalidResolution("cells could not be divided")
 
     monkeypatch.setattr(AdaptiveMesher, "mesh", failing)
