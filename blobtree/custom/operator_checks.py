@@ -24,6 +24,9 @@ LARGEST_JUMP = 1e-3
 STEP = 1e-5
 """Step of the operands in finite differences."""
 
+NO_SLOPE = 1e-15
+"""Slopes below it move no surface; derived ones of absent operands are that small, not 0."""
+
 MAX_KINK_SHARE = 0.2
 """Share of the samples that may lie on kinks, where finite differences are useless."""
 
@@ -251,7 +254,7 @@ def _steepest(claim: float | CustomSource) -> Callable[..., Any]:
 def _try_steepness(trial: _Trial, a: float, b: float, partials: list[float]) -> None:
     bounds = trial.bounds(a, b).tolist()
     for name, slope, bound in zip("ab", partials, bounds, strict=True):
-        if abs(slope) > bound * (1.0 + VALUE_TOLERANCE):
+        if abs(slope) > bound * (1.0 + VALUE_TOLERANCE) + NO_SLOPE:
             raise trial.source.refusal(
                 f"|∂F/∂{name}| of {trial.call(a, b)} is {abs(slope):.6g}, more than steepest = {bound:.6g}"
             )
