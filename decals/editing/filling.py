@@ -400,6 +400,11 @@ class _Models:
         New decals are in the layer and have the interaction of the decal that nearly covers the point.
         Without one that may lie there, the radius is 0.
         """
+        blocks = list(row_blocks(len(points), "filling bare places")) or [slice(0)]
+        rows, like, usual, distances = zip(*(self._near(points[block]) for block in blocks), strict=True)
+        return np.concatenate(rows), np.concatenate(like), np.concatenate(usual), np.concatenate(distances)
+
+    def _near(self, points: OrientedPoints) -> tuple[Int64Array, BoolArray, Float64Array, Float64Array]:
         distances, rows = self._tree.nearest(points.positions, points.normals, count=AROUND)
         masks = np.array(self._masks)[points.surface_ids]
         usable = (rows >= 0) & ((masks[:, None] >> self._bits[rows]) & 1 == 1)
