@@ -15,8 +15,8 @@ MOUSE = "viewport.mouse.interaction"
 TRIGGER = "trame.trigger"
 STATE = "trame.state.get"
 UPDATE = "trame.state.update"
-SIZE = "viewport.image.push.original.size"
-"""Message with the size of a browser's view."""
+SIZE, QUALITY = "viewport.image.push.original.size", "viewport.image.push.quality"
+"""Messages with the size of a browser's view, and with its pixels for each of a picture."""
 
 LIFECYCLE = "trame.lifecycle.update"
 ERROR = "trame.error.client"
@@ -44,7 +44,7 @@ DRIVES = WATCHES | {
     "viewport.image.push.enabled",
     "viewport.image.push.invalidate.cache",
     "viewport.image.push.observer.remove",
-    "viewport.image.push.quality",
+    QUALITY,
     "viewport.mouse.zoom.wheel",
 }
 """Messages of browsers that edit; trame and VTK have more, such as one that ends the server."""
@@ -73,7 +73,7 @@ HELLO_SECONDS = 15.0
 
 RANGES = {
     "viewport.image.animation.fps.max": ((1, 240),),
-    "viewport.image.push.quality": (None, (0, 100), (0.1, 8)),
+    QUALITY: (None, (0, 100), (0.1, 8)),
     SIZE: (None, (0, 16384), (0, 16384)),
 }
 """Least and greatest values of arguments that trame keeps unchecked; None for those that it checks."""
@@ -203,10 +203,21 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         One browser drives. Otherwise, all may change everything.
     end_input
         Called after a browser has left that held a button or moved a slider.
+    resized
+        Called after trame has set the size of the window.
     """
 
-    def __init__(self, server: Any, *, guard: Guard, shared: bool, end_input: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        server: Any,
+        *,
+        guard: Guard,
+        shared: bool,
+        end_input: Callable[[], None],
+        resized: Callable[[], None] = lambda: None,
+    ) -> None:
         super().__init__()
+        self._resized = resized
         self._server, self._guard, self._shared, self._end_input = server, guard, shared, end_input
         self._strangers: dict[str, tuple[bool, asyncio.Task[None]]] = {}
         self._web: Any = None
@@ -262,6 +273,8 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
                 if name in OURS:
                     raise
                 return {"error": f"refused: {error}"}
+            if name in (SIZE, QUALITY):
+                self._resized()
             if name == MOUSE:
                 self._keep_mouse(client, lambda event: call(part, event), *arguments)
             if name == STATE:
@@ -404,6 +417,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         """Draw pictures of the driver's size."""
         if self._driver in self._resizes:
             self._resizes[self._driver][1]()
+            self._resized()
 
     def _tell(self) -> None:
         """Send each browser what it shows of the driver."""

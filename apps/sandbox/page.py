@@ -152,7 +152,11 @@ class Page:
         self.sandbox = Sandbox(window, **options)
         self.guard = guard or Guard()
         self._connections = Connections(
-            server, guard=self.guard, shared=shared, end_input=self.sandbox.end_input
+            server,
+            guard=self.guard,
+            shared=shared,
+            end_input=self.sandbox.end_input,
+            resized=lambda: self.view.fit(),
         )
         self._shown: dict[str, Any] = {}
         self._task: asyncio.Task[None] | None = None

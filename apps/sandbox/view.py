@@ -21,7 +21,11 @@ QUALITY, COARSE_QUALITY = 92, 75
 """JPEG quality of a picture at rest, and of one while something moves."""
 
 MAX_PIXELS = 1 << 25
-"""Pixels of a picture for a browser that watches, at most."""
+"""Pixels of a picture that is sent, at most."""
+
+MAX_DRAWN, MAX_DRAWN_BY_PROCESSORS = 1 << 24, 1 << 22
+"""Pixels that are drawn at most; larger views show them enlarged. A pixel takes 290 bytes, which are those of
+the program where processors draw."""
 
 CAMERA_SECONDS = 1.0 / 30.0
 """Time between two looks at a camera that may move."""
@@ -118,7 +122,8 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
                 pixels = self._draw()
                 coarse = self._window.frames.state is FrameState.COARSE
                 quality, sizes = COARSE_QUALITY if coarse else QUALITY, self._sizes()
-                own = pixels.shape[1], pixels.shape[0]
+                own, drawn = self._size(), (pixels.shape[1], pixels.shape[0])
+                own = own if own[0] * own[1] <= MAX_PIXELS else drawn
                 images = await asyncio.to_thread(_encoded, pixels, quality, {own, *sizes.values()})
                 if not sizes:
                     self._publish(images[own], own)
@@ -132,7 +137,7 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
         """Draw a frame at the size of the page's view, and return its pixels."""
         target: Any = self._window.plotter.render_window
         target.GetInteractor().EnableRenderOff()
-        target.SetSize(self._size())
+        target.SetSize(self._drawable_size())
         target.Render()
         width, height = self._drawn_size = target.GetSize()
         picture = vtkWindowToImageFilter(input=target, read_front_buffer=False, should_rerender=False)
@@ -140,20 +145,39 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
         pixels: UInt8Array = pv.convert_array(picture.GetOutput().GetPointData().GetScalars())
         return np.ascontiguousarray(pixels.reshape(height, width, 3)[::-1])
 
-    def _size(self) -> tuple[int, ...]:
+    def fit(self) -> None:
+        """Limit the size of the window, which trame has set to that of the page's view."""
+        if self._delivery is not None and self._window.plotter.render_window:
+            self._window.plotter.render_window.SetSize(self._drawable_size())
+
+    def _drawable_size(self) -> tuple[int, int]:
+        """Return the size of the page's view, or a smaller one with its proportions."""
+        width, height = self._size()
+        software = self._window.subplot.renderer.context.software
+        most = MAX_DRAWN_BY_PROCESSORS if software else MAX_DRAWN
+        share = min(1.0, (most / (width * height)) ** 0.5)
+        drawn = min(max(int(share * width), 1), most)
+        return drawn, min(max(int(share * height), 1), most // drawn)
+
+    def _size(self) -> tuple[int, int]:
         """Return the size of the page's view in pixels; that of the window if the view is hidden."""
         views = {} if self._delivery is None else self._delivery.tracking_views
         tracked: dict[str, Any] = next(iter(views.values()), {})
-        size = tuple(int(side * tracked.get("ratio", 1) + 0.5) for side in tracked.get("originalSize", ()))
+        sides = [int(side * tracked.get("ratio", 1) + 0.5) for side in tracked.get("originalSize", ())]
         target: Any = self._window.plotter.render_window
-        return size if size and min(size) > 0 else target.GetSize()
+        width, height = sides if sides and min(sides) > 0 else target.GetSize()
+        return width, height
 
     def follow_size(self) -> None:
         """Send a new picture if the last one had another size than the page's view: trame asks for none.
 
         The window may have the new size already: trame sets it with the quality.
         """
-        if self._drawn_size and self._window.plotter.render_window and self._size() != self._drawn_size:
+        if (
+            self._drawn_size
+            and self._window.plotter.render_window
+            and self._drawable_size() != self._drawn_size
+        ):
             self.update()
 
     def _publish(self, image: bytes, size: tuple[int, int], **to: str) -> None:
@@ -171,13 +195,17 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
 
 
 def _encoded(pixels: UInt8Array, quality: int, sizes: set[tuple[int, int]]) -> dict[tuple[int, int], bytes]:
-    """Return a picture as JPEG in each size, with bars where the proportions differ.
+    """Return a picture as JPEG in each size, with bars where the proportions differ by more than a pixel.
 
     Browsers show no picture of another size than that of their view.
     """
     picture = Image.fromarray(pixels)
     files = {size: BytesIO() for size in sizes if 0 < size[0] * size[1] <= MAX_PIXELS}
     for size, file in files.items():
-        fitted = picture if size == picture.size else ImageOps.pad(picture, size, color="white")
+        if size != picture.size:
+            alike = abs(size[0] * picture.height - size[1] * picture.width) <= max(size)
+            fitted = picture.resize(size) if alike else ImageOps.pad(picture, size, color="white")
+        else:
+            fitted = picture
         fitted.save(file, "JPEG", quality=quality)
     return {size: file.getvalue() for size, file in files.items()}

@@ -38,6 +38,9 @@ PICTURE_SUFFIXES = (".png", ".jpg")
 PICTURE_SIZE = (1280, 720)
 """Width and height of pictures and videos without a size, in pixels."""
 
+MAX_PICTURE_PIXELS, MAX_GIF_PIXELS = 1 << 26, 1 << 28
+"""Pixels of a picture, which is in memory whole, and of all frames of a GIF file, which are, too."""
+
 
 EXPORT_SUFFIXES = (*FORMATS, PAGE_SUFFIXES[0])
 """Formats of other programs, and pages."""
@@ -218,7 +221,12 @@ class FileActions(WindowActions):
             Picture(self.screenshot()).save(path)
             self._state.show(f"exported to {text}")
             return
-        size = PICTURE_SIZE if size is None else size
+        width, height = size = PICTURE_SIZE if size is None else size
+        if width * height > MAX_PICTURE_PIXELS:
+            raise InvalidEdit(
+                f"size: expected at most {MAX_PICTURE_PIXELS:,} pixels, got {width} x {height}; take fewer, "
+                "or the command render"
+            )
         session = self._state.session
         scene = session.document.scene
         camera, fork = self.camera() or scene.camera, session.fork()
@@ -234,6 +242,11 @@ class FileActions(WindowActions):
             elif suffix in VIDEO_SUFFIXES:
                 turned = shows is Video.TURNTABLE
                 frames = turntable(shown) if turned else [s.replace(camera=camera) for s in fork.replay()]
+                if suffix == ".gif" and len(frames) * width * height > MAX_GIF_PIXELS:
+                    raise InvalidEdit(
+                        f"size: expected at most {MAX_GIF_PIXELS:,} pixels in all frames of a GIF file, got "
+                        f"{len(frames)} x {width} x {height}; take fewer, or write .mp4"
+                    )
                 animate(frames, path, size=size, rate=VIDEO_RATES[shows], progress=progress)
             else:
                 export(shown, path, progress=progress)

@@ -331,6 +331,20 @@ def test_a_link_that_comes_between_check_and_reading_is_not_followed(
     assert "could not read a.ply" in sandbox.status
 
 
+def test_pictures_too_large_for_the_memory_are_refused(
+    sandbox: Sandbox, window: EditWindow, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("a.png", "a.jpg", "a.gif", "a.mp4"):
+        for size in ("999999 x 999999", "671088 x 101", "16384 x 16384", "8192 x 8193"):
+            sandbox.write_file(name, True, size)
+            assert "size: expected at most 67,108,864 pixels, got " in sandbox.status
+    monkeypatch.setattr("decals.editing.file_actions.MAX_GIF_PIXELS", 120 * 64 * 48 - 1)
+    sandbox.write_file("a.gif", True, "64 x 48")
+    finish(window)
+    assert "pixels in all frames of a GIF file, got 120 x 64 x 48" in sandbox.status
+    assert not [*tmp_path.iterdir()]
+
+
 def test_written_files_are_read_in_parts(
     sandbox: Sandbox, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

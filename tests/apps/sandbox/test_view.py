@@ -2,7 +2,9 @@
 
 import asyncio
 import html
+import math
 import re
+from functools import partial
 from io import BytesIO
 from typing import Any
 
@@ -15,6 +17,7 @@ from decals.editing.brushes import Brush
 from decals.editing.key_bindings import format_gestures
 from decals.editing.view_actions import SIDE_KEYS
 from decals.window import EditWindow
+from tests.apps.sandbox.test_connections import Connect, serve, until
 from tests.apps.sandbox.test_sandbox import TREE, covered
 
 
@@ -106,3 +109,42 @@ def test_many_changes_are_one_picture_of_the_newest_state(vtk_display: None) -> 
     assert [picture.size for picture in pictures] == [(100, 70), (100, 70), (91, 70)]
     assert [message["id"] for message in sent] == ["7"] * 3
     assert pictures[0].tobytes() != pictures[1].tobytes()
+
+
+def test_views_of_any_size_are_drawn_in_few_pixels(
+    vtk_display: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("trame_vtk")
+    from decals.apps.sandbox import view as module
+
+    monkeypatch.setattr(module, "MAX_DRAWN_BY_PROCESSORS", 2000)
+    monkeypatch.setattr(module, "MAX_DRAWN", 2000)
+    monkeypatch.setattr(module, "MAX_PIXELS", 40_000)
+
+    async def check(window: EditWindow, page: Any, connect: Connect) -> None:
+        browser, pictures = await connect(), list[dict[str, Any]]()
+
+        def is_last(size: tuple[int, int]) -> bool:
+            return bool(pictures) and tuple(pictures[-1]["size"]) == size
+
+        browser._session.register_subscription("viewport.image.push.subscription", pictures.append)
+        view = str(page.view._delivery.get_global_id(window.plotter.render_window))
+        await browser.call("viewport.image.push.observer.add", view)
+        for size, ratio, sent in (
+            ((200, 150), 1, (200, 150)),
+            ((100, 75), 2, (200, 150)),
+            ((16384, 16384), 8, (44, 44)),
+            ((16384, 1), 1, (16384, 1)),
+            ((30, 20), 1, (30, 20)),
+        ):
+            await browser.call("viewport.image.push.original.size", view, *size)
+            await browser.call("viewport.image.push.quality", view, 85, ratio)
+            assert math.prod(window.plotter.window_size) <= 2000
+            page.view.update()
+            await until(partial(is_last, sent))
+            width, height = window.plotter.window_size
+            assert width * height <= 2000
+            assert abs(width * size[1] - height * size[0]) <= max(size) or min(width, height) == 1
+        await browser.close()
+
+    serve(check)
