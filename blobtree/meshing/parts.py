@@ -71,7 +71,7 @@ MAX_GAP_BLOCKS = MAX_PART_BLOCKS // 4
 GAP_GROWTH = 4.0
 """Growth of the blocks at a gap from level to level, between surfaces that touch nearly in a point."""
 
-MAX_PART_REPAIRS = 60
+MAX_PART_REPAIRS = 80
 """Most rounds in which cells are divided until the mesh is closed: a few, but many beside sharp rims."""
 
 MAX_REPAIR_GROWTH = 1.4
