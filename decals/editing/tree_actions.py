@@ -666,7 +666,7 @@ def _surface_check(number: int) -> Step:
 
     def step(session: EditSession) -> str:
         try:
-            session.document.objects[number].surface  # noqa: B018  (the access may raise)
+            session.document.object(number).surface  # noqa: B018  (the access may raise)
         except ImplicitDecalsError as error:
             session.cancel_stroke()
             return str(error)

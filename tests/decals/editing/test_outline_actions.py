@@ -9,6 +9,7 @@ from blobtree import Point, Segment
 from decals.editing import Actions, EditSession
 from decals.editing.commands import SetValues
 from decals.editing.outline_actions import Part
+from decals.editing.tree_actions import _surface_check
 from decals.errors import InvalidEdit, InvalidInput
 from decals.scenes.objects import TreeObject
 from tests.decals.editing.scenes import digest, goes_back_and_forth, scene, tree_of
@@ -175,3 +176,7 @@ def test_a_step_ends_a_drag() -> None:
     assert (steps, actions.state.session.stroke_open) == ([True], False)
     actions.go_to(0)
     assert tree_of(actions.state.session.document) == before
+
+
+def test_a_check_of_an_object_that_is_gone_says_so() -> None:
+    assert _surface_check(9)(EditSession(scene())).startswith("object: expected a whole number from 0 to")
