@@ -103,10 +103,10 @@ def demo_pictures(
     names: Sequence[str], size: Size, samples: int, progress: Progress
 ) -> Iterator[tuple[str, Picture]]:
     """Yield some of the pictures with their recipes."""
-    progress(PREPARING, 0.0)
-    nest = nest_scene(progress=progress)
-    scenes = dict(zip(PICTURES, (nest, tile_scene(nest), spanning.scene(fov=27.0)), strict=True))
     with Renderer(max_tile=TILE) as renderer:
+        progress(PREPARING, 0.0)
+        nest = nest_scene(progress=progress)
+        scenes = dict(zip(PICTURES, (nest, tile_scene(nest), spanning.scene(fov=27.0)), strict=True))
         for name in names:
             progress(f"drawing {name}", 0.0)
             pixels = renderer.render(scenes[name], RenderOptions(size=size, samples=samples))

@@ -198,13 +198,15 @@ class Node(Model):
         [1.0]
         """
         direction = np.array(finite_vector("axis", axis))
-        length = np.linalg.norm(direction)
+        length = math.hypot(*direction)
         if length == 0.0:
             raise InvalidNode("axis: expected a direction, got the zero vector")
         x, y, z = direction / length
         angle = math.radians(finite_number("degrees", degrees))
         cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        linear = np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross)
+        # Without BLAS, which rounds otherwise on other processors: content hashes would differ.
+        squared = (cross[:, :, None] * cross).sum(axis=1)
+        linear = np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * squared
         return self.transform(np.column_stack([linear, np.zeros(3)]))
 
     def scale(self, factor: float | ArrayLike) -> "Node":

@@ -4,6 +4,7 @@ An image is a function of continuous coordinates, lit as a height field. It is d
 result, and averaged with premultiplied alpha, so that edges are smooth in every size.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -111,16 +112,21 @@ def mix(first: Field | Color, second: Field | Color, amount: Field) -> Field:
 
 def light(canvas: Canvas, height: Field, *, ambient: float = 0.42, sun: Vector = SUN) -> Field:
     """Return the diffuse light on a height field, about 1 where it is level."""
-    normal = _normals(canvas, height)
-    level = ambient + (1.0 - ambient) * (normal @ np.asarray(sun, np.float32)) / np.float32(sun[2])
+    facing = _facing(canvas, height, np.asarray(sun, np.float32))
+    level = ambient + (1.0 - ambient) * facing / np.float32(sun[2])
     return np.asarray(np.maximum(level, 0.25 * ambient), dtype=np.float32)
 
 
 def shine(canvas: Canvas, height: Field, *, sharpness: float, sun: Vector = SUN) -> Field:
     """Return the specular highlight on a height field seen from above, from 0 to 1 (Blinn)."""
     glance = np.asarray(sun, np.float32) + np.asarray((0.0, 0.0, 1.0), np.float32)
-    facing = np.maximum(_normals(canvas, height) @ (glance / np.linalg.norm(glance)), 0.0)
+    facing = np.maximum(_facing(canvas, height, glance / np.float32(math.hypot(*glance))), 0.0)
     return np.asarray(facing ** np.float32(sharpness), dtype=np.float32)
+
+
+def _facing(canvas: Canvas, height: Field, direction: Field) -> Field:
+    """Return the cosines between normals and a direction; not by BLAS, which rounds by the processor."""
+    return np.asarray((_normals(canvas, height) * direction).sum(axis=-1), dtype=np.float32)
 
 
 def _normals(canvas: Canvas, height: Field) -> Field:

@@ -361,13 +361,15 @@ class Camera:
         toward, upward = _orientation(direction, up)
         axes_camera = cls(_triple(toward), (0.0, 0.0, 0.0), _triple(upward), fov)
         half = math.tan(math.radians(axes_camera.fov) / 2) / margin
-        x, y, z = (positions @ axes_camera.axes.T).T
+        axes = axes_camera.axes
+        # Without BLAS, which rounds otherwise on other processors: content hashes would differ.
+        x, y, z = ((positions * axis).sum(axis=1) for axis in axes)
         across, depth_of_width = _fit_axis(x, z, half * aspect)
         along, depth_of_height = _fit_axis(y, z, half)
         middle = (z.max() + z.min()) / 2
         eye = max(depth_of_width, depth_of_height, float(z.max()) + nearest * _half_diagonal(positions))
-        centre = np.array([across, along, middle]) @ axes_camera.axes
-        position = _triple(centre + (eye - middle) * axes_camera.axes[2])
+        centre = across * axes[0] + along * axes[1] + middle * axes[2]
+        position = _triple(centre + (eye - middle) * axes[2])
         return cls(position, _triple(centre), _triple(upward), fov)
 
 
@@ -398,7 +400,7 @@ def _orientation(direction: Sequence[float], up: Sequence[float]) -> tuple[Float
 def _half_diagonal(points: Float64Array) -> float:
     """Return half the diagonal of the points' box; for a box without size a small positive length."""
     low, high = points.min(axis=0), points.max(axis=0)
-    half, size = float(np.linalg.norm(high - low)) / 2, float(np.abs(points).max())
+    half, size = math.hypot(*(high - low)) / 2, float(np.abs(points).max())
     return half if half > 1e-6 * size else max(1e-3 * size, 1e-3)
 
 

@@ -30,7 +30,7 @@ from decals.baking.bake import bake
 from decals.baking.meshes import bake_mesh
 from decals.editing import RelaxDecals
 from decals.window import EditWindow
-from tests.apps.sandbox.test_connections import Browser, Connect, serve
+from tests.apps.sandbox.browsers import Browser, Connect, serve
 
 TARGETS = {"cancel_max_ms": "≤ 500", "cancel_cases": "≥ 450"}
 

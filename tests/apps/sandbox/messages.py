@@ -42,8 +42,8 @@ from decals.apps.memory import import_ahead, keep_memory_low, share_heap
 from decals.editing.actions import KEYS
 from decals.window import EditWindow
 from tests.apps.sandbox.attacks import Server
+from tests.apps.sandbox.browsers import CALLS, SIZE, Browser, Connect, serve
 from tests.apps.sandbox.misuse import ask_as_stranger, random_steps
-from tests.apps.sandbox.test_connections import CALLS, SIZE, Browser, Connect, serve
 from tests.decals.editing.scenes import digest
 from tests.endurance import growth, kept_megabytes
 

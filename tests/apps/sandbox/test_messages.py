@@ -110,8 +110,8 @@ def test_strangers_get_nothing_unless_any_text_is_a_token(
     from decals.apps.sandbox.guard import Guard
     from decals.window import EditWindow
     from tests.apps.sandbox.attacks import Server
+    from tests.apps.sandbox.browsers import Connect, serve
     from tests.apps.sandbox.misuse import ask_as_stranger
-    from tests.apps.sandbox.test_connections import Connect, serve
 
     if open_to_all:
         monkeypatch.setattr(Guard, "is_token", lambda _self, text: isinstance(text, str))

@@ -17,7 +17,7 @@ from decals.editing.brushes import Brush
 from decals.editing.key_bindings import format_gestures
 from decals.editing.view_actions import SIDE_KEYS
 from decals.window import EditWindow
-from tests.apps.sandbox.test_connections import Connect, serve, until
+from tests.apps.sandbox.browsers import Connect, serve, until
 from tests.apps.sandbox.test_sandbox import TREE, covered
 
 
