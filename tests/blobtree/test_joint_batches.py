@@ -61,7 +61,9 @@ def test_batches_are_loops(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("more", [BLENDED, CONTACTS, DEFORMED, FIELDS], ids=str)
+@pytest.mark.parametrize(
+    "more", [BLENDED, CONTACTS, DEFORMED, FIELDS], ids=("blends", "contacts", "deformed", "fields")
+)
 def test_batches_of_library_kinds_are_loops(more: MoreKinds) -> None:
     trees = random_trees(5, 6, depth=2, more=more)
     assert_same_meshes(polygonize_batch(trees, resolution=CELLS), trees, resolution=CELLS)
