@@ -25,7 +25,7 @@ UNWRAPPING = "unwrapping the surface"
 """Stage of progress reports."""
 
 FACE_SECONDS = 3e-4
-"""About the seconds of xatlas for a face; it reports nothing itself, so the fraction done is an estimate."""
+"""Usual seconds of xatlas for a face; xatlas reports nothing, so the fraction done is an estimate."""
 
 REPORT_SECONDS = 0.1
 """Seconds between reports while xatlas works; a cancelled one ends as soon."""

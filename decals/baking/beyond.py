@@ -13,7 +13,7 @@ from blobtree._typing import Float64Array, Int64Array
 from decals.baking.seams import Seams, bilinear_texels
 
 FINENESS = 1 << 10
-"""Steps of a squared distance of a texel's width."""
+"""Steps into which the square of a texel's width is divided."""
 
 
 class Beyond(NamedTuple):

@@ -11,7 +11,7 @@ from PIL import Image
 from decals.baking.instances import SQUARE, SQUARE_FACES, add_instances
 from decals.baking.materials import ROUGHNESS, Maps
 from decals.baking.parts import Baked, udim
-from decals.baking.pictures import Picture
+from decals.baking.pictures import PngTexture
 from decals.validation import optional_package
 
 PREFIX = "_"
@@ -100,7 +100,7 @@ def _textures(maps: Maps | None) -> dict[str, Any]:
         given |= {} if maps.normal is None else {"normalTexture": maps.normal}
         if maps.emission is not None:
             given["emissiveTexture"], factors["emissiveFactor"] = maps.emission, [1.0, 1.0, 1.0]
-    pictures = {id(texels): Picture(texels) for texels in given.values()}
+    pictures = {id(texels): PngTexture(texels) for texels in given.values()}
     return factors | {name: pictures[id(texels)] for name, texels in given.items()}
 
 

@@ -127,7 +127,7 @@ def _without_overlaps(
 
 
 def _report_try(report: Progress, number: int, share: float = 0.0) -> None:
-    """Report a part of a try; each is about a half of what is left, as most layouts need one."""
+    """Report a part of a try; each try counts as half of the rest of the work, as most layouts need one."""
     report(UNWRAPPING, 1.0 - 0.5**number * (1.0 - 0.5 * share))
 
 

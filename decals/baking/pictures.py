@@ -14,7 +14,7 @@ from blobtree.lazy import Lazy
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 COLOR_TYPES = {1: 0, 2: 4, 3: 2, 4: 6}
-"""Color type of so many channels."""
+"""Color type of a PNG file by its number of channels."""
 
 UP = 2
 """Filter that writes each row as its difference from the one above."""
@@ -63,8 +63,8 @@ def _chunk(name: bytes, data: bytes) -> Iterator[bytes]:
     yield zlib.crc32(data, zlib.crc32(name)).to_bytes(4, "big")
 
 
-class Picture:
-    """A texture in place of one of Pillow, for libraries that save it themselves.
+class PngTexture:
+    """A texture in place of an image of Pillow, for libraries that save their images themselves.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from decals.baking.export import EXPORT_FUNCTION, export
 from decals.errors import ImplicitDecalsError, InvalidInput
 from decals.scenes.files import from_json
 from decals.scenes.provenance import changes_since, device_text, package_versions, provenance
-from decals.scenes.render import scene_hashes
+from decals.scenes.render import missing_beside
 from decals.scenes.reproduction import Reproduction
 from decals.scenes.scene import Scene
 
@@ -52,7 +52,7 @@ def reproduce_export(
     try:
         if scene is None and isinstance(held := recipe.get("source"), str):
             scene = from_json(_unpacked(held), folder=path.parent, trust=trust)
-        missing = _missing(recipe, scene)
+        missing = missing_beside(recipe, scene)
         if missing or scene is None:
             return Reproduction(missing)
         with tempfile.TemporaryDirectory() as folder:
@@ -72,16 +72,6 @@ def _unpacked(held: str) -> bytes:
     if not reader.eof:
         raise ValueError(f"expected a whole scene of at most {MAX_SCENE} bytes")
     return text
-
-
-def _missing(recipe: Mapping[str, Any], scene: Scene | None) -> tuple[str, ...]:
-    """Return what the recipe of a file needs besides a scene."""
-    missing = [f"the value of {name!r}, which the recipe only describes" for name in recipe["missing"]]
-    if scene is None:
-        return (*missing, "the scene: give its file with --scene")
-    hashes = scene_hashes(scene)
-    others = [name for name, value in recipe["scene"].items() if hashes.get(name) != value]
-    return (*missing, *(f"the {name} of the scene that was exported: it has others" for name in others))
 
 
 class _Content:

@@ -6,6 +6,7 @@
 import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
+from decals.baking.srgb import decoded, decoded_slope, encoded
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -14,33 +15,27 @@ MIN_POWER = 1.0e-6
 
 
 @wp.func
-def decoded(level: wp.float32, srgb: wp.bool) -> wp.float32:
+def light_of(level: wp.float32, srgb: wp.bool) -> wp.float32:
     """Return the linear light of a level from 0 to 1."""
-    if not srgb:
-        return level
-    if level > 0.04045:
-        return wp.pow((level + 0.055) / 1.055, 2.4)
-    return level / 12.92
+    if srgb:
+        return decoded(level)
+    return level
 
 
 @wp.func
-def encoded(light: wp.float32, srgb: wp.bool) -> wp.float32:
+def level_of(light: wp.float32, srgb: wp.bool) -> wp.float32:
     """Return the level of linear light."""
-    if not srgb:
-        return light
-    if light > 0.0031308:
-        return 1.055 * wp.pow(light, 1.0 / 2.4) - 0.055
-    return 12.92 * light
+    if srgb:
+        return encoded(light)
+    return light
 
 
 @wp.func
 def slope(level: wp.float32, srgb: wp.bool) -> wp.float32:
     """Return the derivative of light by the level."""
-    if not srgb:
-        return wp.float32(1.0)
-    if level > 0.04045:
-        return 2.4 / 1.055 * wp.pow((level + 0.055) / 1.055, 1.4)
-    return wp.float32(1.0 / 12.92)
+    if srgb:
+        return decoded_slope(level)
+    return wp.float32(1.0)
 
 
 @wp.kernel
@@ -59,9 +54,9 @@ def settle(
 ):
     """Change texels at each point in turn, forth and back, where both sides differ by more than ``limit``.
 
-    The change is the smallest one after which they differ by ``aim``, about (the method of Kaczmarz). Points
+    The change is about the smallest after which both sides differ by ``aim`` (the method of Kaczmarz). Points
     whose texels have not changed since the sweep ``seen`` are left out; ``changed`` has the sweep of each
-    texel. One thread runs it, since each step needs those before.
+    texel. One thread runs the kernel, since each step needs the steps before.
     """
     count = index.shape[0]
     for sweep in range(sweeps):
@@ -80,8 +75,8 @@ def settle(
                 for k in range(4):
                     mixed += weights[i, k] * light[index[i, k]]
                     other += weights[i, k + 4] * light[index[i, k + 4]]
-                mixed = encoded(mixed, srgb)
-                other = encoded(other, srgb)
+                mixed = level_of(mixed, srgb)
+                other = level_of(other, srgb)
                 gap = mixed - other
                 if wp.abs(gap) > limit:
                     slopes = wp.vector(length=8, dtype=wp.float32)
@@ -104,7 +99,7 @@ def settle(
                             level = wp.clamp(levels[texel] - step * slopes[k], 0.0, 1.0)
                             if level != levels[texel]:
                                 levels[texel] = level
-                                light[texel] = decoded(level, srgb)
+                                light[texel] = light_of(level, srgb)
                                 changed[texel] = sweep
         if updates == 0:
             break

@@ -23,6 +23,7 @@ from decals.images.texels import decode_srgb, encode_srgb
 from decals.surfaces.topology import welded
 
 CPU = "cpu"
+"""Device on which seams are settled and layouts are checked; textures are made on the default device."""
 
 STEP = 0.1
 """Largest distance in texels between points of a seam."""
@@ -55,7 +56,7 @@ SQUARES_FROM = 10.0
 """Difference of 255 from which on a point takes part in the least squares; smaller ones are settled."""
 
 RINGS = 2
-"""Points of seams, by common texels, around those that differ that are changed with them."""
+"""Rings of points, linked by common texels, that are changed with the points that differ."""
 
 REPORT_SECONDS = 0.1
 """Seconds between reports; a cancelled match ends after the step that is running."""
@@ -242,7 +243,7 @@ class _Match:
         self._index, self._weights, self._srgb = index, weights, srgb
 
     def solve(self) -> None:
-        """Change the levels, as little as the seams take."""
+        """Change the levels as little as the seams need."""
         rows = self._rows_around(np.abs(self._gaps()[0]) > SQUARES_FROM / 255.0)
         if len(rows):
             self._least_squares(rows)
@@ -255,7 +256,7 @@ class _Match:
         return mixed[0] - mixed[1], mixed
 
     def _rows_around(self, wrong: BoolArray) -> Int64Array:
-        """Return some points and those around them."""
+        """Return the rows of some points and of the points around them."""
         chosen: BoolArray = wrong
         for _ in range(RINGS):
             marked = np.zeros(len(self.levels), np.bool_)

@@ -7,6 +7,7 @@
 import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
+from decals.baking.srgb import encoded
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -34,7 +35,7 @@ def cover_rows(
     """Write the first face at each sample of a row, and count the samples that lie in another one too.
 
     There are ``steps`` rows and columns of samples in a texel, from the row of texels ``top`` on. The faces
-    at the row of texels r are ``listed[starts[r]:starts[r + 1]]``. They are wider than they are by ``margin``
+    at the row of texels r are ``listed[starts[r]:starts[r + 1]]``. Each face is widened by ``margin``
     samples. If ``wanted`` has the texels of the texture, samples of those with 0 are left out. -1 stands for
     no face.
     """
@@ -91,24 +92,6 @@ def mark_free(
 
 
 @wp.kernel
-def mark_places(
-    first: wp.int32,
-    places: wp.array(dtype=wp.vec2),
-    own: wp.array(dtype=wp.uint8),
-    filled: wp.array(dtype=wp.uint8),
-    size: wp.int32,
-    marks: wp.array(dtype=wp.int32),
-):
-    """Write 1 for places in texels that are neither own ones nor filled; else 0."""
-    i = first + wp.tid()
-    column = wp.clamp(int(places[i][0]), 0, size - 1)
-    slot = wp.clamp(int(places[i][1]), 0, size - 1) * size + column
-    marks[i] = 0
-    if own[slot] == wp.uint8(0) and filled[slot] == wp.uint8(0):
-        marks[i] = 1
-
-
-@wp.kernel
 def mark_listed(
     first: wp.int32,
     texels: wp.array(dtype=wp.int32),
@@ -142,27 +125,33 @@ def list_marked(
     begin: wp.int32,
     numbers: wp.array(dtype=wp.int32),
 ):
-    """Write the numbers of the marked ones, from ``begin`` on; ``ends`` are the sums of marks."""
+    """Write the numbers of the marks that are 1, from ``begin`` on; ``ends`` are the sums of marks."""
     i = first + wp.tid()
     if marks[i] != 0:
         numbers[ends[i] - 1] = begin + i
 
 
 @wp.func
-def weights_in(at: wp.vec2, face: wp.vec3i, places: wp.array(dtype=wp.vec2)) -> wp.vec3:
-    """Return the barycentric weights of a place in a face; outside those of the closest one, about."""
+def weights_in_plane(at: wp.vec2, face: wp.vec3i, places: wp.array(dtype=wp.vec2)) -> wp.vec2:
+    """Return the weights of a face's second and third corner at a place of its plane; 0 without an area."""
     a = places[face[0]]
     e = places[face[1]] - a
     f = places[face[2]] - a
     d = at - a
     area = e[0] * f[1] - e[1] * f[0]
-    w = wp.vec3(1.0, 0.0, 0.0)
     if wp.abs(area) > MIN_AREA:
-        second = wp.clamp((d[0] * f[1] - d[1] * f[0]) / area, 0.0, 1.0)
-        third = wp.clamp((e[0] * d[1] - e[1] * d[0]) / area, 0.0, 1.0)
-        total = wp.max(second + third, 1.0)
-        w = wp.vec3(wp.max(1.0 - second - third, 0.0), second / total, third / total)
-    return w
+        return wp.vec2((d[0] * f[1] - d[1] * f[0]) / area, (e[0] * d[1] - e[1] * d[0]) / area)
+    return wp.vec2(0.0, 0.0)
+
+
+@wp.func
+def weights_in(at: wp.vec2, face: wp.vec3i, places: wp.array(dtype=wp.vec2)) -> wp.vec3:
+    """Return the barycentric weights of a place in a face, or about those of the point closest to it."""
+    w = weights_in_plane(at, face, places)
+    second = wp.clamp(w[0], 0.0, 1.0)
+    third = wp.clamp(w[1], 0.0, 1.0)
+    total = wp.max(second + third, 1.0)
+    return wp.vec3(wp.max(1.0 - second - third, 0.0), second / total, third / total)
 
 
 @wp.func
@@ -266,23 +255,14 @@ def points_beyond(
         float(texels[t] / size) + (float(number / steps) + 0.5) / float(steps),
     )
     own = here[t]
-    a = places[own[0]]
-    e = places[own[1]] - a
-    f = places[own[2]] - a
-    d = at - a
-    area = e[0] * f[1] - e[1] * f[0]
-    share = wp.float32(0.5)
-    away = wp.float32(0.0)
     begin = vertices[own[0]]
     edge = vertices[own[1]] - begin
     square = wp.max(wp.dot(edge, edge), TINY)
-    if wp.abs(area) > MIN_AREA:
-        second = (d[0] * f[1] - d[1] * f[0]) / area
-        third = (e[0] * d[1] - e[1] * d[0]) / area
-        arm = vertices[own[2]] - begin
-        foot = wp.dot(arm, edge) / square
-        share = second + third * foot
-        away = -third * wp.length(arm - foot * edge)
+    arm = vertices[own[2]] - begin
+    foot = wp.dot(arm, edge) / square
+    own_weights = weights_in_plane(at, own, places)
+    share = own_weights[0] + own_weights[1] * foot
+    away = -own_weights[1] * wp.length(arm - foot * edge)
     other = there[t]
     arm_there = vertices[other[2]] - begin
     foot_there = wp.dot(arm_there, edge) / square
@@ -398,19 +378,16 @@ def fill_listed(first: wp.int32, texels: wp.array(dtype=wp.int32), filled: wp.ar
 
 
 @wp.func
-def encoded(light: wp.float32) -> wp.float32:
+def byte_level(light: wp.float32) -> wp.float32:
     """Return linear light, clamped to [0, 1], as an sRGB level from 0 to 255."""
-    x = wp.clamp(light, 0.0, 1.0)
-    if x > 0.0031308:
-        return 255.0 * (1.055 * wp.pow(x, 1.0 / 2.4) - 0.055)
-    return 255.0 * 12.92 * x
+    return 255.0 * encoded(wp.clamp(light, 0.0, 1.0))
 
 
 @wp.kernel
 def encode_levels(first: wp.int32, light: wp.array(dtype=wp.float32), levels: wp.array(dtype=wp.uint8)):
     """Write linear light as sRGB bytes."""
     i = first + wp.tid()
-    levels[i] = wp.uint8(int(encoded(light[i]) + 0.5))
+    levels[i] = wp.uint8(int(byte_level(light[i]) + 0.5))
 
 
 @wp.kernel
@@ -455,7 +432,7 @@ def compensate(
                         light += weight * light_of[int(level)]
                         least = wp.min(least, float(level))
                         largest = wp.max(largest, float(level))
-                result = wp.clamp(encoded(light), least - most, largest + most)
+                result = wp.clamp(byte_level(light), least - most, largest + most)
                 sharper[slot * channels + channel] = wp.uint8(int(wp.clamp(result, 0.0, 255.0) + 0.5))
 
 

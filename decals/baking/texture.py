@@ -21,7 +21,7 @@ from blobtree.device import array_on, known_device, launch
 from blobtree.progress import Progress
 from decals.baking.beyond import Beyond
 from decals.baking.meshes import BakeMesh
-from decals.baking.seams import Seams, match_seams
+from decals.baking.seams import CPU, Seams, match_seams
 from decals.baking.texel_kernels import (
     compensate,
     cover_rows,
@@ -32,7 +32,6 @@ from decals.baking.texel_kernels import (
     list_marked,
     mark_free,
     mark_listed,
-    mark_places,
     mark_range,
     mark_uneven,
     mean_samples,
@@ -46,9 +45,8 @@ from decals.baking.texel_kernels import (
 from decals.baking.unwrapped import Unwrapped
 from decals.images.texels import decode_srgb
 
-BLOCK_SAMPLES = 1 << 20
-CARD_BLOCK_SAMPLES = 1 << 23
-"""Samples that are looked up at once, which bounds the memory besides that of the texture."""
+BLOCK_SAMPLES, CARD_BLOCK_SAMPLES = 1 << 20, 1 << 23
+"""Samples that a processor or a card looks up at once; they bound the memory besides that of the texture."""
 
 PART_ROWS = 1024
 """Colours that are summed at once."""
@@ -78,20 +76,20 @@ ALIKE = 1.0 - 1e-5
 BORDER_STEP = 0.5
 """Distance in texels of points along the borders of charts."""
 
-CPU = "cpu"
-"""Device on which layouts are checked; textures are made on the default device."""
-
 CHART, BEYOND = 1, 2
 """Marks of texels: in a chart, and beyond a seam of it."""
 
 ColorFunction = Callable[
     [int, Float32Array, Float32Array, Float32Array | None, Float32Array | None], Float32Array
 ]
-"""Linear colours ``float32[n, 3]`` of the surface of the mesh with a number, at points with unit normals; or
-other values, of as many channels, which need the tangents there. At last base colours, linear."""
+"""Function of the number of a mesh, points of its surface, unit normals, tangents and linear base colours.
+
+It returns linear colours ``float32[n, 3]``, or with tangents the values of all channels."""
 
 DeviceColorFunction = Callable[[int, Any, Any, Any], Any]
-"""The same on a device: arrays of Warp, and base colours, one or one for each point."""
+"""Function of the number of a mesh, points, unit normals and base colours (one, or one for each point).
+
+It takes and returns arrays of Warp on a device."""
 
 
 def color_bytes(colors: Float32Array) -> UInt8Array:
@@ -272,7 +270,7 @@ class Sheet:
         self._lists: tuple[int, list[Any]] = (0, [])
 
     def cover(self, size: int, margin: float) -> tuple[Int32Array, int]:
-        """Return the face at the centre of each texel, −1 without, and how many centres lie in two.
+        """Return the face at the centre of each texel, −1 without, and how many centres lie in two faces.
 
         Faces are widened by ``margin`` texels.
         """
@@ -282,7 +280,7 @@ class Sheet:
     def faces_at(
         self, top: int, bottom: int, size: int, steps: int, wanted: Any = None, margin: float = ROUNDING
     ) -> tuple[Any, Any]:
-        """Return the face at each sample of rows of texels, and how many samples of each row lie in two.
+        """Return the face at each sample of rows of texels, and how many samples of a row lie in two faces.
 
         Parameters
         ----------
@@ -430,7 +428,7 @@ class _Page:
         return texels.reshape(self._size, self._size, -1)
 
     def replace(self, image: UInt8Array, texels: Int64Array) -> None:
-        """Take another image; texels keep their colours in it when gutters are filled."""
+        """Take another image, of which some texels keep their colours when gutters are filled."""
         self._image.assign(image.reshape(-1))
         listed = array_on(self._device, texels, wp.int32)
         launch(fill_listed, len(texels), [listed], [self._filled], self._device)
@@ -470,6 +468,12 @@ class _Page:
         numbers = self._zeros(int(ends[-1:].numpy()[0]) if count else 0, wp.int32)
         launch(list_marked, count, [marks, ends, begin], [numbers], self._device)
         return numbers
+
+    def _bare(self, texels: Int64Array, own: Any) -> Int32Array:
+        """Return which of some texels are neither own ones nor filled."""
+        listed = array_on(self._device, texels, wp.int32)
+        rows: Int32Array = self._chosen(mark_listed, len(texels), [listed, own, self._filled]).numpy()
+        return rows
 
     def _write(self, texels: Any, values: Any, own: Any, mark: int, counts: Any = None) -> None:
         """Write values to texels, and mark them as own ones."""
@@ -514,8 +518,7 @@ class _Page:
 
     def _color_beyond(self, sheet: Sheet, beyond: Beyond, own: Any, samples: int) -> None:
         """Colour the texels beyond seams."""
-        texels = array_on(self._device, beyond.texels, wp.int32)
-        chosen = self._chosen(mark_listed, len(texels), [texels, own, self._filled]).numpy()
+        chosen = self._bare(beyond.texels, own)
         if not len(chosen):
             return
         for rows in np.array_split(chosen, -(-len(chosen) * samples**2 // self._block)):
@@ -527,10 +530,10 @@ class _Page:
     def _color_borders(self, sheet: Sheet, own: Any) -> None:
         """Colour the texels of charts that no sample lies in, by points of their borders."""
         faces, places = sheet.border_points()
-        inputs = [array_on(self._device, places, wp.vec2), own, self._filled, self._size]
-        bare = self._chosen(mark_places, len(places), inputs).numpy()
-        columns, rows = np.clip(places[bare].astype(np.int64), 0, self._size - 1).T
-        texels, first = np.unique(rows * self._size + columns, return_index=True)
+        columns, lines = np.clip(places.astype(np.int64), 0, self._size - 1).T
+        texels = lines * self._size + columns
+        bare = self._bare(texels, own)
+        texels, first = np.unique(texels[bare], return_index=True)
         if len(texels):
             chosen = bare[first]
             values = sheet.colors(sheet.surface(faces[chosen], places[chosen]))

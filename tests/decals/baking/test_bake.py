@@ -373,7 +373,8 @@ def square(size: int, samples: int = 2) -> Array:
 
 def test_blocks_bound_the_memory_and_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = square(512)
-    monkeypatch.setattr(texture_module, "BLOCK_SAMPLES", 1 << 13)
+    for name in ("BLOCK_SAMPLES", "CARD_BLOCK_SAMPLES"):
+        monkeypatch.setattr(texture_module, name, 1 << 13)
     tracemalloc.start()
     try:
         parts = square(512)

@@ -1,0 +1,34 @@
+"""sRGB in kernels; `decals.images.texels` has the same for arrays of NumPy."""
+
+# mypy: ignore-errors
+# (kernel code is Python only in form: its names have Warp types)
+
+import warp as wp
+
+from blobtree.kernels import KERNEL_OPTIONS
+
+wp.set_module_options(KERNEL_OPTIONS)
+
+
+@wp.func
+def decoded(level: wp.float32) -> wp.float32:
+    """Return the linear light of an sRGB level from 0 to 1."""
+    if level > 0.04045:
+        return wp.pow((level + 0.055) / 1.055, 2.4)
+    return level / 12.92
+
+
+@wp.func
+def encoded(light: wp.float32) -> wp.float32:
+    """Return the sRGB level from 0 to 1 of linear light."""
+    if light > 0.0031308:
+        return 1.055 * wp.pow(light, 1.0 / 2.4) - 0.055
+    return 12.92 * light
+
+
+@wp.func
+def decoded_slope(level: wp.float32) -> wp.float32:
+    """Return the derivative of linear light by the sRGB level."""
+    if level > 0.04045:
+        return 2.4 / 1.055 * wp.pow((level + 0.055) / 1.055, 1.4)
+    return wp.float32(1.0 / 12.92)
