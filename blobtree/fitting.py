@@ -28,7 +28,7 @@ from blobtree.nodes.parameter_gradient import gradient_sensitivities, parameter_
 from blobtree.nodes.parameters import Quantity
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import checked_tree, gradients_at
-from blobtree.validation import as_count, is_whole, items, point_array, positive_number, real, shown
+from blobtree.validation import items, point_array, positive_count, positive_number, real, shown
 
 MAX_EVALUATIONS = 60
 TOLERANCE = 1e-9
@@ -166,9 +166,7 @@ def fit(
 
     checked_tree(tree)
     samples = _Samples(point_array(points), values, normals, normal_weight)
-    most = as_count(max_evaluations)
-    if not is_whole(most) or most < 1:
-        raise InvalidNode(f"max_evaluations: expected a whole number from 1, got {shown(max_evaluations)}")
+    most = positive_count("max_evaluations", max_evaluations, InvalidNode)
     free = _free(tree, fixed)
     if samples.count < len(free):
         raise InvalidPoints(
@@ -181,7 +179,7 @@ def fit(
     start = numeric_values(tree, free)
     lower, upper = _ranges(free, start)
     with reporting(progress, cancel) as report:
-        problem = _Problem(tree, free, samples, report, int(most))
+        problem = _Problem(tree, free, samples, report, most)
         result = least_squares(
             problem.residuals,
             np.clip(start, lower, upper),
@@ -192,7 +190,7 @@ def fit(
             xtol=TOLERANCE,
             gtol=None,
             tr_solver="lsmr" if samples.size * len(free) ** 2 > LARGEST_EXACT else "exact",
-            max_nfev=int(most),
+            max_nfev=most,
         )
     field, directions = samples.split(result.fun[: samples.size])
     return Fit(

@@ -74,6 +74,14 @@ def as_count(value: object) -> object:
     return int(value) if isinstance(value, float | np.floating) and value.is_integer() else value
 
 
+def positive_count(name: str, value: object, error: type[ImplicitDecalsError]) -> int:
+    """Return a count from 1; raise `error` for other values."""
+    count = as_count(value)
+    if not is_whole(count) or count < 1:
+        raise error(f"{name}: expected a whole number from 1, got {shown(value)}")
+    return int(count)
+
+
 def finite_vector(name: str, value: object) -> Vector:
     """Return `value` as three floats; raise `InvalidNode` if it is not three finite numbers."""
     try:

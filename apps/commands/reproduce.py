@@ -24,7 +24,7 @@ from decals.rendering import Picture, Renderer
 from decals.rendering.picture import picture_recipe
 from decals.scenes.files import camera_of_values
 from decals.scenes.provenance import changes_since
-from decals.scenes.render import scene_hashes
+from decals.scenes.render import missing_beside
 from decals.scenes.reproduction import Reproduction
 from decals.scenes.reproduction import reproduce as made_again
 from decals.validation import one_of
@@ -86,9 +86,9 @@ def _of_picture(path: Path, scene: Scene | None, progress: Progress) -> Reproduc
         if recipe.get("function") in (GALLERY_FUNCTION, DEMO_FUNCTION):
             picture = _own_picture(recipe["function"], recipe["parameters"], progress)
         else:
-            if scene is not None and "camera" in recipe:  # that of a frame is none of the file
+            if scene is not None and "camera" in recipe:  # no scene file holds the camera of a frame
                 scene = scene.replace(camera=camera_of_values(recipe["camera"]))
-            missing = _missing(recipe, scene)
+            missing = missing_beside(recipe, scene)
             if missing or scene is None:
                 return Reproduction(missing)
             options = recipe["parameters"]
@@ -106,16 +106,6 @@ def _of_picture(path: Path, scene: Scene | None, progress: Progress) -> Reproduc
     now = picture.recipe or recipe
     decals = Decals.empty() if scene is None else scene.decals
     return Reproduction((), decals, tuple(changes), changes_since(recipe, now))
-
-
-def _missing(recipe: Mapping[str, Any], scene: Scene | None) -> tuple[str, ...]:
-    """Return what the recipe of a picture needs besides a scene."""
-    missing = [f"the value of {name!r}, which the recipe only describes" for name in recipe["missing"]]
-    if scene is None:
-        return (*missing, "the scene: give its file with --scene")
-    hashes = scene_hashes(scene)
-    others = [name for name, value in recipe["scene"].items() if hashes.get(name) != value]
-    return (*missing, *(f"the {name} of the scene that was drawn: the file has others" for name in others))
 
 
 def _own_picture(function: str, parameters: Mapping[str, Any], progress: Progress) -> Picture:

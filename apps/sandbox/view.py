@@ -24,8 +24,8 @@ MAX_PIXELS = 1 << 25
 """Pixels of a picture that is sent, at most."""
 
 MAX_DRAWN, MAX_DRAWN_BY_PROCESSORS = 1 << 24, 1 << 22
-"""Pixels that are drawn at most; larger views show them enlarged. A pixel takes 290 bytes, which are those of
-the program where processors draw."""
+"""Pixels that are drawn at most, by a card and by processors; larger views show them enlarged. A pixel takes
+290 bytes, of the program's own memory where processors draw."""
 
 CAMERA_SECONDS = 1.0 / 30.0
 """Time between two looks at a camera that may move."""
@@ -202,10 +202,7 @@ def _encoded(pixels: UInt8Array, quality: int, sizes: set[tuple[int, int]]) -> d
     picture = Image.fromarray(pixels)
     files = {size: BytesIO() for size in sizes if 0 < size[0] * size[1] <= MAX_PIXELS}
     for size, file in files.items():
-        if size != picture.size:
-            alike = abs(size[0] * picture.height - size[1] * picture.width) <= max(size)
-            fitted = picture.resize(size) if alike else ImageOps.pad(picture, size, color="white")
-        else:
-            fitted = picture
+        alike = abs(size[0] * picture.height - size[1] * picture.width) <= max(size)
+        fitted = picture.resize(size) if alike else ImageOps.pad(picture, size, color="white")
         fitted.save(file, "JPEG", quality=quality)
     return {size: file.getvalue() for size, file in files.items()}

@@ -75,13 +75,13 @@ MAX_PART_REPAIRS = 80
 """Most rounds in which cells are divided until the mesh is closed: a few, but many beside sharp rims."""
 
 MAX_REPAIR_GROWTH = 1.4
-"""Most blocks after these rounds, over those before: more follow a wall that memory does not allow."""
+"""Largest growth of the number of blocks in these rounds; a wall that memory does not allow takes more."""
 
 MAX_SECOND_BLOCKS = 40_000
-"""Blocks of a mesh that did not close, up to which another one is tried."""
+"""Most blocks of a mesh that did not close, for a second mesh to be tried."""
 
 OTHER_CELLS = 0.87
-"""Size of the cells of a second mesh, over those of one that did not close: rims lie elsewhere in them."""
+"""Size of the cells of the second mesh over that of the first; rims then lie elsewhere in cells."""
 
 LATER_GROWTH = 0.6
 """Growth of a part's blocks in later levels, over that in the last one, which is larger at ends and edges."""
@@ -353,19 +353,18 @@ def mesh_of_parts(
         Gaps(blocks).edges()
     ):
         return None, unresolved
-    try:
-        mesh, others = _closed_mesh(first, smallest, creases, report)
-    except InvalidResolution:
-        if len(first.blocks) > MAX_SECOND_BLOCKS:
-            return None, unresolved + _all_parts(first, smallest)
-        first = _sampled(
-            tree, grid_of(OTHER_CELLS * first.blocks.cells.grid.cell_size / size), device, report
-        )
+    for is_second in (False, True):
+        if is_second:
+            scale = OTHER_CELLS * first.blocks.cells.grid.cell_size / size
+            first = _sampled(tree, grid_of(scale), device, report)
         try:
             mesh, others = _closed_mesh(first, smallest, creases, report)
         except InvalidResolution:
-            return None, unresolved + _all_parts(first, smallest)
-    return mesh, others + unresolved
+            if len(first.blocks) > MAX_SECOND_BLOCKS:
+                break
+        else:
+            return mesh, others + unresolved
+    return None, unresolved + _all_parts(first, smallest)
 
 
 def _closed_mesh(

@@ -34,7 +34,7 @@ from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import ImplicitModel, checked_tree
 from blobtree.tape.operands import has_walls
 from blobtree.tape.part_sizes import has_small_parts, has_warps, sized_tape
-from blobtree.validation import LARGEST_NUMBER, as_count, is_whole, real_number, shown, truth
+from blobtree.validation import LARGEST_NUMBER, is_whole, positive_count, real_number, shown, truth
 
 DEFAULT_RESOLUTION = 64
 
@@ -184,14 +184,12 @@ def polygonize(
             "expected one of resolution, cell_size and chord_error, got several; drop the others"
         )
     chord_error = _chord_error(tree, chord_error)
-    most = as_count(max_triangles)
-    if not is_whole(most) or most < 1:
-        raise InvalidResolution(f"max_triangles: expected a whole number from 1, got {shown(max_triangles)}")
+    most = positive_count("max_triangles", max_triangles, InvalidResolution)
     truth("creases", creases, InvalidResolution)
     adaptive = truth("adaptive", adaptive, InvalidResolution)
     within = _adaptive_within_chord_error if adaptive else _within_chord_error
     with reporting(progress, cancel) as report:
-        return within(tree, chord_error, int(most), creases, device, report)
+        return within(tree, chord_error, most, creases, device, report)
 
 
 def polygonize_parts(

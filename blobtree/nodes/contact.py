@@ -25,12 +25,7 @@ from blobtree.meshing.mesh import Mesh
 from blobtree.meshing.polygonize import polygonize
 from blobtree.nodes.node import Node
 from blobtree.nodes.parameters import Parameter, Quantity
-from blobtree.nodes.tree import (
-    Combination,
-    Macro,
-    ManyOperands,
-    Union,
-)
+from blobtree.nodes.tree import Combination, Macro, ManyOperands, Union
 
 LARGEST_RATIO = 100.0
 """Largest ratio of two stiffnesses; beyond it the stiffer solid is rigid for any purpose."""

@@ -30,11 +30,7 @@ from blobtree.nodes.parameters import (
     parameters_of,
     unit_vectors,
 )
-from blobtree.nodes.tree import (
-    AssociativeCombination,
-    Macro,
-    Union,
-)
+from blobtree.nodes.tree import AssociativeCombination, Macro, Union
 from blobtree.nodes.values import OPTIONAL
 from blobtree.tape.program import ProgramPrimitive
 from blobtree.validation import Vector

@@ -1,4 +1,4 @@
-"""Parquet files of anybody, read in a process of its own with limits on memory and time."""
+"""Parquet files from any source, read in a process of its own with limits on memory and time."""
 
 import json
 import os
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     import pyarrow
 
 BYTES, BYTES_PER_BYTE = 256 << 20, 64
-"""Bytes that the table of a file may have: of any file, and per byte of it."""
+"""Most bytes of a table: for any file, and per byte of the file."""
 
 SECONDS, SECONDS_PER_BYTE = 20.0, 1e-6
-"""Seconds of a processor for reading: of any file, and per byte of it."""
+"""Seconds of a processor for reading: for any file, and per byte of the file."""
 
 PATIENCE = 50.0
 """Seconds on the clock, for each second of that time, after which a reader counts as stuck."""

@@ -43,7 +43,7 @@ def main(path: str, budget: int, seconds: float) -> None:
         except MemoryError:
             answers.write(_line({"error": "it would take too much memory"}))
         except Exception as error:  # pyarrow has errors of many kinds
-            answers.write(_line({"error": (str(error).splitlines() or [type(error).__name__])[0]}))
+            answers.write(_line({"error": str(error)}))
         else:
             answers.write(_line({}))
             with pyarrow.ipc.new_stream(answers, table.schema) as stream:

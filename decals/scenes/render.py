@@ -272,6 +272,16 @@ def scene_hashes(scene: Scene) -> dict[str, str]:
     return {name: content_hash(getattr(scene, name)) for name in SHOWN_PARTS}
 
 
+def missing_beside(recipe: Mapping[str, Any], scene: Scene | None) -> tuple[str, ...]:
+    """Return what the recipe of a picture or an exported file needs and a scene does not have."""
+    missing = [f"the value of {name!r}, which the recipe only describes" for name in recipe["missing"]]
+    if scene is None:
+        return (*missing, "the scene: give its file with --scene")
+    hashes = scene_hashes(scene)
+    others = [name for name, value in recipe["scene"].items() if hashes.get(name) != value]
+    return (*missing, *(f"the {name} of the recipe: the scene has others" for name in others))
+
+
 def option_value(value: Any) -> Any:
     """Return an option as a recipe has it: the name of a mode, or a plain value."""
     return value.name.lower() if isinstance(value, Enum) else plain(value)

@@ -60,7 +60,7 @@ def test_a_picture_is_drawn_again_with_its_scene(saved: Path, capsys: Capture) -
     scene = decals.load_scene("scene.json")
     scene.replace(decals=scene.decals[1:]).save("edited.json")
     assert run(["reproduce", "a.png", "--scene", "edited.json"]) == 3
-    assert "the decals of the scene that was drawn: the file has others" in capsys.readouterr().out
+    assert "the decals of the recipe: the scene has others" in capsys.readouterr().out
 
 
 def test_frames_are_drawn_again_with_their_scene(saved: Path, capsys: Capture) -> None:
@@ -156,7 +156,7 @@ def test_an_exported_file_is_made_again(saved: Path, capsys: Capture, name: str)
     scene.replace(decals=scene.decals[1:]).save("edited.json")
     capsys.readouterr()
     assert run(["reproduce", name, "--scene", "edited.json"]) == 3
-    assert "the decals of the scene that was exported: it has others" in capsys.readouterr().out
+    assert "the decals of the recipe: the scene has others" in capsys.readouterr().out
 
 
 def held(text: bytes) -> str:
