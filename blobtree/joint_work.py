@@ -1,8 +1,8 @@
-"""Work on many trees at once: which of them go together, and what to do where they do not fit."""
+"""Work on many trees at once: which trees go together, and smaller groups where memory is short."""
 
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from blobtree.cells.sparse_cells import MIN_CULLED_TEXELS
 from blobtree.errors import InvalidNode, InvalidResolution
@@ -12,7 +12,7 @@ from blobtree.validation import items, shown
 Result = TypeVar("Result")
 
 
-def checked_trees(trees: Any) -> tuple[ImplicitModel, ...]:
+def checked_trees(trees: object) -> tuple[ImplicitModel, ...]:
     """Return several trees; raise InvalidNode for other values."""
     listed = None if isinstance(trees, ImplicitModel | str) else items(trees)
     if listed is None:
@@ -35,7 +35,7 @@ def of_tree(number: int) -> Iterator[None]:
 
 
 def is_small(tree: ImplicitModel) -> bool:
-    """Return True if a card is starved by this tree alone; its tape is then read as it is in a loop."""
+    """Return True for a tree whose tape is read whole; the work on it alone starves a card."""
     return len(tree.tape.data) < MIN_CULLED_TEXELS
 
 
@@ -46,10 +46,10 @@ def work_together(
     joint: Callable[[list[int]], Sequence[Result]],
     single: Callable[[int], Result],
 ) -> list[Result]:
-    """Return the results of all models, those of one kind from joint calls.
+    """Return the results of all models.
 
-    Models without a kind are alone, and those of which there is one. A joint call takes models up to the size
-    `most`; if they do not fit into memory, it is divided.
+    Models of one kind go together. A joint call takes models up to the size `most`, and is divided if they do
+    not fit into memory. A model without a kind, or the only one of its kind, takes a single call.
 
     Raises
     ------

@@ -97,7 +97,7 @@ def whole_number(name: str, value: Any, low: int, high: int | None, error: type[
 
 
 def count_number(name: str, value: Any, low: int, high: int | None, error: type[ImplicitDecalsError]) -> int:
-    """Return a count as an int: like `whole_number`, but a float without a fraction is one, too."""
+    """Return a count as an int; like `whole_number`, but a float without a fraction counts too."""
     return whole_number(name, as_count(value), low, high, error)
 
 

@@ -100,7 +100,7 @@ def test_modules_import_each_other_one_way() -> None:
 
 
 def test_circles_through_imports_at_run_time_only_shrink() -> None:
-    """The one that is known goes through the public names of `decals`."""
+    """The known circle goes through the public names of `decals`."""
     circles = cycles(module_graph())
     size = len(circles), sum(map(len, circles))
     assert size[0] <= RUN_TIME_CIRCLES[0], [sorted(names) for names in circles]

@@ -74,7 +74,7 @@ def model_of(block: wp.int32, keys: wp.array(dtype=wp.int64), models: Lattices) 
 def lattice_of(
     block: wp.int32, keys: wp.array(dtype=wp.int64), single: ChildGrid, models: Lattices
 ) -> ChildGrid:
-    """Return the lattice of a block's model; `single` is that of the only one."""
+    """Return the lattice of a block's model; `single` is that of an only model."""
     if models.grids.shape[0] == 0:
         return single
     return models.grids[model_of(block, keys, models)]

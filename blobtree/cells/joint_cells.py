@@ -1,7 +1,7 @@
 """Sparse cells of many models: their blocks in one list, which the kernels of one model refine together.
 
-The root blocks of the models are neighbours in a lattice, so each block has a key of its own, and those of a
-model are found among its own alone. The texels of all tapes lie in one array, behind all data regions.
+The root blocks of the models are neighbours in a lattice, so each block has a key of its own, and the blocks
+of a model have keys in one range. The texels of all tapes lie in one array, behind all data regions.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from blobtree.tape.tape import Tape, shifted_texels
 
 
 def most_models(depth: int) -> int:
-    """Return the number of models of a depth whose blocks have keys in one list."""
+    """Return how many models, in grids of a depth, have keys for all their blocks in one list."""
     return 1 << (3 * BRANCHING_BITS * (KEY_DIGITS - depth))
 
 
@@ -36,7 +36,7 @@ def build_joint_cells(
     Raises
     ------
     InvalidResolution
-        They are too many for one list, or do not fit into memory; take fewer.
+        The models are too many for one list, or do not fit into memory; take fewer.
     """
     tape, spans = joint_tape(models)
     depth = grids[0].depth

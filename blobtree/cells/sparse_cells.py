@@ -162,7 +162,7 @@ def refined(
     previous: SparseCells | None = None,
     pieces: Int32Array | None = None,
 ) -> SparseCells:
-    """Return cells with all levels below the root; `pieces` are those of its tape, if it is to be culled."""
+    """Return cells with all levels below the root; `pieces` are of the root's tape, if it is to be culled."""
     cells, depth = root, root.grid.depth
     for number in range(1, depth + 1):
         report("finding the surface", (number - 1) / depth)

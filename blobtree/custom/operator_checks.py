@@ -25,7 +25,7 @@ STEP = 1e-5
 """Step of the operands in finite differences."""
 
 NO_SLOPE = 1e-15
-"""Slopes below it move no surface; derived ones of absent operands are that small, not 0."""
+"""Slopes below it move no surface; derived slopes of absent operands are that small, but not 0."""
 
 MAX_KINK_SHARE = 0.2
 """Share of the samples that may lie on kinks, where finite differences are useless."""

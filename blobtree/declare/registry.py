@@ -1,8 +1,8 @@
 """Registries: kinds of nodes by their tags in files, and users' definitions by their names.
 
 A class of nodes registers itself when it is defined. So files, panels and the nodes' own methods find a kind
-by its tag, and need not import it. The package's root says how to load the library (`register_library`);
-that happens at the first question about a kind that is not there yet.
+by its tag, and need not import it. The package's root says how to load the library (`register_library`),
+which is done when a kind is looked up that is not loaded.
 """
 
 from collections.abc import Callable
@@ -35,7 +35,7 @@ def kind_of(tag: str) -> type[Any]:
 class Definitions(dict[str, Definition]):
     """Definitions of one sort by their names in files.
 
-    `noun` is what messages call one, `makers` are the functions that define some.
+    In messages, `noun` names a definition, and `makers` the functions that make one.
     """
 
     def __init__(self, noun: str, makers: str) -> None:

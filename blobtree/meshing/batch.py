@@ -27,7 +27,7 @@ from blobtree.tape.grown import runs_of_leaves
 from blobtree.tape.model import ImplicitModel
 
 MAX_JOINT_BLOCKS = 1 << 18
-"""Blocks of cells that are meshed at once; they take about a gigabyte."""
+"""Most blocks of cells that are meshed at once; they take about a gigabyte."""
 
 SURFACE_BLOCKS = 6
 """Blocks that a surface crosses, over the squared number of blocks along its box."""
@@ -45,7 +45,7 @@ def polygonize_batch(
     """Return the surfaces of many trees, each as `polygonize` returns it for this tree alone.
 
     Trees of the same kinds of nodes are meshed together, in few launches. On a graphics card that is much
-    faster than a loop over small trees. On a processor the results are those of the loop bit for bit. Trees
+    faster than a loop over small trees. On a processor the results equal those of a loop bit for bit. Trees
     with thin parts, narrow gaps or very many primitives are meshed alone.
 
     Parameters

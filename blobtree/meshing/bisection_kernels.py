@@ -66,7 +66,7 @@ def bisect_unconverged(
 ) -> None:
     """Move each unconverged vertex to the edge crossing of its patch nearest to the mean of these.
 
-    Models without one stay as they are: another evaluation may judge a vertex otherwise.
+    Models without such a vertex stay as they are: another evaluation may judge a vertex otherwise.
     """
     patch = patch_of(identifiers[first + wp.tid()], listed, patches)
     if unconverged[model_of(patch.block, cells.keys, cells.models)] == 0:

@@ -22,14 +22,14 @@ SIDE_HALVINGS = 12
 """Halvings until a side of a gap is known."""
 
 TOUCHING = wp.constant(4e-6)
-"""Width of a gap over the largest coordinate, below which float32 does not tell it from sides that touch."""
+"""Width of a gap over the largest coordinate, below which its sides touch in float32."""
 
 _Points = wp.types.matrix(shape=(WARP_REGISTERS, 3), dtype=wp.float32)
 
 
 @wp.func
 def nearest_primitive(q: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.int32:
-    """Return the primitive on a tape nearest to q, or deepest around it; −1 if the tape has only one.
+    """Return the primitive on a tape nearest to q, or deepest around it; −1 if the tape has no other.
 
     It is given by its texel, counted from the first one.
     """

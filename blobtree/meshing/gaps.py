@@ -1,12 +1,12 @@
 """Gaps: places where two surfaces are so near each other that cells would bridge the space between them.
 
-A mesh of cells joins two surfaces where an edge of a cell has both its ends inside, one beyond each surface,
-and no sample tells of the outside between. The ends belong to different primitives then, and the middle of
-the gap is as far from the one as from the other.
+A mesh of cells joins two surfaces where both ends of a cell's edge are inside, one end behind each surface,
+and no sample lies in the gap. The ends then belong to different primitives, and the middle of the gap is as
+far from one primitive as from the other.
 
-Beside a concave crease, edges cross the outside too. There the same two samples are also joined by edges that
-stay inside. So samples and such edges are a graph, and an edge crosses a gap if it joins two of its parts.
-Cells at these edges are divided until none is left.
+Beside a concave crease, edges cross the outside too, but other edges, which stay inside, join the same
+samples. So the samples and the edges that stay inside are a graph. An edge crosses a gap if its ends lie in
+different components of the graph. Cells beside such edges are divided until no such edge is left.
 """
 
 from dataclasses import dataclass
@@ -127,7 +127,7 @@ class Gaps:
         return result
 
     def _measured(self, blocks: IndexArray, lowest: IndexArray, axes: IndexArray) -> CrossingEdges:
-        """Return those of some edges that cross the outside."""
+        """Return the edges that cross the outside, with their widths and places."""
         tree, device, count = self._tree, self._tree.cells.device, len(blocks)
         if not count:
             return CrossingEdges.none()
@@ -147,7 +147,7 @@ class Gaps:
         return found.chosen(lengths > 0.0)
 
     def _apart(self, crossing: CrossingEdges) -> BoolArray:
-        """Return the edges whose ends are not joined by edges that stay inside."""
+        """Return True for edges whose ends no edges join that stay inside."""
         from scipy.sparse import coo_matrix  # most meshes have no such edges
         from scipy.sparse.csgraph import connected_components
         from scipy.spatial import cKDTree

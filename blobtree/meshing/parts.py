@@ -418,7 +418,7 @@ def _too_thin(tree: ImplicitModel, smallest: float) -> list[ThinPart]:
 
 
 def warn_of_thin_parts(tree: ImplicitModel, unresolved: list[ThinPart]) -> None:
-    """Log a warning that names the parts that are not resolved, the thinnest first, and one for gaps."""
+    """Log a warning that names unresolved parts, the thinnest first, and another that names gaps."""
     gaps = [part for part in unresolved if part.is_gap]
     parts = [part for part in unresolved if not part.is_gap]
     if parts:

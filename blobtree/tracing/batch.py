@@ -26,10 +26,10 @@ from blobtree.tracing.tree_cells import block_counts, cells_grid, trace_toleranc
 from blobtree.validation import axis_count, items, shown
 
 MAX_JOINT_MODELS = 64
-"""Models whose cells are built at once; those of a model take some 5 MB."""
+"""Most models whose cells are built at once; the cells of a model take about 5 MB."""
 
 MAX_JOINT_RAYS = 1 << 22
-"""Rays that are traced at once."""
+"""Most rays that are traced at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ def raycast_batch(
     """Return the first intersections of rays with many trees, as `Node.raycast` does for each alone.
 
     Trees of the same kinds of nodes are traced together, in few launches. On a graphics card that is much
-    faster than a loop over small trees. On a processor the results are those of the loop bit for bit. Trees
+    faster than a loop over small trees. On a processor the results equal those of a loop bit for bit. Trees
     of very many primitives are traced alone.
 
     Parameters
@@ -161,7 +161,7 @@ def raycast_batch(
 
 
 def _rays_of_each(origins: Any, directions: Any, count: int) -> list[tuple[Float32Array, Float32Array]]:
-    """Return checked rays of each model; those of all models are one array."""
+    """Return checked rays of each model; one array is for all models."""
     each = [axis_count(values) > 2 or _is_ragged(values) for values in (origins, directions)]
     if not any(each):
         return [checked_rays(origins, directions)] * count

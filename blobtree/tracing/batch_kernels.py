@@ -18,7 +18,7 @@ def trace_rays_of_models(
     distances: wp.array(dtype=wp.float32),
     spans: wp.array(dtype=wp.vec2i),
 ) -> None:
-    """Do the same as `trace_rays` where each ray has the number of its model."""
+    """Write what `trace_rays` writes; each ray has the number of its model."""
     i = first + wp.tid()
     direction = wp.normalize(directions[i])
     hit = trace_ray(origins[i], direction, 0.0, models[numbers[i]])

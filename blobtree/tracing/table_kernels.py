@@ -28,7 +28,7 @@ def refine_entries(
     children: wp.array(dtype=wp.int32),
     entries: wp.array(dtype=wp.int32),
 ) -> None:
-    """Write the index of each block in its level, or why it has none, from those `known` of the level above.
+    """Write the index of each block in its level, or why it has none, by entries `known` of the level above.
 
     `side` is the number of blocks along the new table.
     """
@@ -54,7 +54,7 @@ def mark_empty(
     entries: wp.array(dtype=wp.int32),
     distances: wp.array(dtype=wp.uint8),
 ) -> None:
-    """Write 0 for blocks that are not empty, else `farthest`; those beyond the grid are empty."""
+    """Write `farthest` for blocks that are empty or lie beyond the grid, else 0."""
     i = first + wp.tid()
     at = place_of(i, side)
     count = counts[at[3]]
@@ -72,9 +72,9 @@ def spread_distances(
     before: wp.array(dtype=wp.uint8),
     distances: wp.array(dtype=wp.uint8),
 ) -> None:
-    """Write the distance in blocks to the nearest one that is not empty, along one axis more than before.
+    """Write the distance to the nearest block that is not empty, along one axis more than before.
 
-    A distance is the largest of those along the axes.
+    A distance is the largest of the distances along the axes, in blocks.
     """
     i = first + wp.tid()
     place = (i // stride) % side
@@ -101,7 +101,7 @@ def write_table(
     shift: wp.int32,
     blocks: wp.array(dtype=wp.int32),
 ) -> None:
-    """Write the entries of the blocks of all grids, those of a model behind its start.
+    """Write the entries of the blocks of all grids; a model has its entries from its start on.
 
     The tape of a block lies `shift` texels behind its place in `spans`.
     """

@@ -1,7 +1,7 @@
 """Tables of blocks of many models in one array, see `TracingCells.blocks`.
 
-NumPy makes one table after the other, a processor's fastest way. On a graphics card that takes longer than
-the rays, so kernels make all tables at once.
+On a processor, NumPy makes one table after the other, which is fastest there. On a graphics card, that would
+take longer than the rays, so kernels make all tables at once.
 """
 
 from typing import Any
@@ -27,7 +27,7 @@ def numpy_tables(cells: SparseCells, counts: IndexArray, shift: int) -> tuple[An
 
 
 def device_tables(cells: SparseCells, counts: IndexArray, shift: int) -> tuple[Any, IndexArray]:
-    """Do the same as `numpy_tables` by kernels."""
+    """Return what `numpy_tables` returns; kernels make the tables."""
     device, models, side, starts = cells.device, len(counts), 1, _starts(counts)
     entries: Any = wp.array(np.arange(models), dtype=wp.int32, device=device)
     for level in cells.levels[1:]:

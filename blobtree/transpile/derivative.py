@@ -459,7 +459,7 @@ class _Transformation:
                 raise self.refusal(target, f"assignment to {ast.unparse(target)}")
 
     def tangents_to_assign(self, name: str, value: _Dual) -> list[tuple[str, str | None]]:
-        """Return the names of a variable's tangents, with those of a value that it gets."""
+        """Return the names of a variable's tangents, with the tangents of the value that it gets."""
         moved = self.each_direction(value.along)
         self.active.update((name, i) for i, tangent in enumerate(moved) if tangent is not None)
         return [(self.tangent(name, i), moved[i]) for i in range(len(moved)) if (name, i) in self.active]

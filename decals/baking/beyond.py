@@ -5,11 +5,11 @@ other side, turned about the seam into the plane of the face (`points_beyond`). 
 one picture, sampled at other places.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from blobtree._typing import Float64Array, Int64Array
+from blobtree._typing import Float64Array, Int32Array, Int64Array
 from decals.baking.seams import Seams, bilinear_texels
 
 FINENESS = 1 << 10
@@ -57,6 +57,6 @@ class Beyond(NamedTuple):
         corners = seams.corners
         return cls(texels[first], corners[edge, here], corners[edge, 1 - here], seams.faces[edge, 1 - here])
 
-    def chosen(self, rows: Any) -> "Beyond":
+    def chosen(self, rows: Int32Array) -> "Beyond":
         """Return some of the texels."""
         return Beyond(*(each[rows] for each in self))

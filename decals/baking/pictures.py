@@ -17,7 +17,7 @@ COLOR_TYPES = {1: 0, 2: 4, 3: 2, 4: 6}
 """Color type of a PNG file by its number of channels."""
 
 UP = 2
-"""Filter that writes each row as its difference from the one above."""
+"""Filter that writes each row as its difference from the row above."""
 
 LEVEL = 1
 """Compression level of zlib; higher ones take twice as long, and save one hundredth of the size."""

@@ -354,7 +354,7 @@ def write_texels(
     image: wp.array(dtype=wp.uint8),
     own: wp.array(dtype=wp.uint8),
 ):
-    """Write levels to texels and mark these as own ones, but for those without samples or of another mark."""
+    """Write levels to texels and mark them as own; texels without samples or of a higher mark stay."""
     i = first + wp.tid()
     texel = texels[i]
     if own[texel] <= mark and (counts.shape[0] == 0 or counts[wp.min(i, counts.shape[0] - 1)] > 0):

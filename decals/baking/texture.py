@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from blobtree._typing import (
     BoolArray,
@@ -368,7 +369,7 @@ class Sheet:
         values = channels.color_at(self._number, at.points.numpy(), at.units.numpy(), tangents, light)
         return array_on(self.device, values.reshape(-1), wp.float32)
 
-    def _mean_tangents(self, corners: Any, weights: Float32Array) -> Float32Array | None:
+    def _mean_tangents(self, corners: NDArray[np.integer], weights: Float32Array) -> Float32Array | None:
         """Return the tangents at points by those of unwrapped vertices, if the values need them."""
         assert self._channels is not None
         if self._channels.tangents is None:

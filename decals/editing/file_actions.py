@@ -39,7 +39,7 @@ PICTURE_SIZE = (1280, 720)
 """Width and height of pictures and videos without a size, in pixels."""
 
 MAX_PICTURE_PIXELS, MAX_GIF_PIXELS = 1 << 26, 1 << 28
-"""Pixels of a picture, which is in memory whole, and of all frames of a GIF file, which are, too."""
+"""Most pixels of a picture, and of all frames of a GIF file; both are whole in memory."""
 
 
 EXPORT_SUFFIXES = (*FORMATS, PAGE_SUFFIXES[0])

@@ -119,7 +119,7 @@ class _Builder:
         loaded(kernels.list_cells, self.device)  # with all others of their module
         if self.several:
             self.sets = self.ints(np.repeat(np.arange(self.set_count), self.sizes_of_sets))
-        else:  # without sums on the host, as below
+        else:  # all decals are of set 0; zeros need no copy from the host
             self.sets = self.zeros(self.count)
         order = self.drawing_order()
         sizes = self.choose_sizes(order)

@@ -74,10 +74,10 @@ def places_of(samples: OrientedPoints, distance: float) -> int:
 
 
 def _without_heaps(samples: OrientedPoints, reach: float) -> Int64Array:
-    """Return the samples without those beyond `MAX_HEAP` that are all linked to the same others.
+    """Return rows of samples: at most `MAX_HEAP` of each small cube whose normals have the same signs.
 
-    Samples of one small cube, whose normals have the same signs, are linked to each other. Only where a
-    projection moves many of them to one place, as at a tip, are they so many; their pairs would not end.
+    These samples are all linked to each other, so more of them change nothing. A projection can move very
+    many samples to one place, as at a tip, and their pairs would fill the memory.
     """
     cells = np.floor((samples.positions - samples.positions.min(axis=0)) * (2.0 / reach)).astype(np.int64)
     keys = np.zeros(len(samples), np.int64)

@@ -27,8 +27,8 @@ from decals.validation import real_array
 LEAST_SLOPE = 1e-9
 """Least slope of a level function along the surface; where it touches the surface, the speed has no end."""
 
-
 NEWTON_STEPS = 4
+"""Steps that move the end of a line to where it meets others."""
 
 END_REACH = 0.1
 """Greatest distance, in visible radii, by which an end of a line moves to where it meets others."""
@@ -215,9 +215,9 @@ def _move_ends(
 ) -> None:
     """Move the ends of lines on a surface to where they meet, by Newton's method for their level functions.
 
-    A line finds its end by labels of points alone, and those of a thin wedge between two others are rare. An
-    end that would move farther than END_REACH stays: it is another one, such as that on a boundary. A line
-    between two ends that move to one place is a piece of such a wedge, which the others pass already.
+    The labels of points place an end inexactly beside a thin wedge of a third decal. An end that would move
+    farther than END_REACH stays, as it lies elsewhere, such as on a boundary. A line whose two ends move to
+    one place lies within such a wedge, and becomes a point.
     """
     meetings: dict[bytes, list[int]] = defaultdict(list)
     for number, points in enumerate(polylines):

@@ -40,7 +40,7 @@ SHRINKING = 0.6
 """Factor by which the window around such a point shrinks in a step."""
 
 GROWTH = 2.0
-"""Factor by which it grows after it has lost the point."""
+"""Factor by which the window grows after it has lost the point."""
 
 MISSING = 2.0
 """Distance to a label that no point of a window has, longer than all in it."""

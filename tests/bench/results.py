@@ -1,4 +1,4 @@
-"""Compare results with those on file, bit by bit: values, bounds, pruned tapes, kernels, compile times.
+"""Compare results with those of a file, bit by bit: values, bounds, pruned tapes, kernels, compile times.
 
     python -m tests.bench.results                      # compare with tests/golden/results.json
     python -m tests.bench.results --write              # write that file

@@ -156,7 +156,7 @@ def tree_row(number: int, count: int) -> dict[str, float | str]:
     mesh = polygonize(model.tree)
     unmeshed = _parts_without_mesh(model, mesh)
     faults = [f"{name} has no mesh" for name in _names(model, unmeshed - over)]
-    if not over:  # else its area, and so all shares, are not those of the surface
+    if not over:  # else the mesh has another area than the surface, and all shares are wrong
         faults += [
             f"{name} has {found:g} decals in place of {expected:.1f}"
             for name, (found, expected) in zip(_names(model, set(bare)), bare.values(), strict=True)
