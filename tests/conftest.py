@@ -112,6 +112,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(pytest.mark.slow)
     if not any("::" in argument for argument in config.args):
         check_named_cases(cases)
+    if wrong := [item.nodeid for item in cases if " at 0x" in item.callspec.id]:
+        raise pytest.UsageError(f"names of cases hold addresses, which differ between workers: {wrong}")
     order = {f"tests/{name}": place for place, name in enumerate(LONG_FILES)}
     items.sort(key=lambda item: order.get(item.nodeid.partition("::")[0], len(order)))
 
