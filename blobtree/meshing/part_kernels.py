@@ -60,8 +60,9 @@ def smallest_part(
                     c = closest(code, point, tape, at)
                     size = RIM * c[3] + tape[last][3]
                     at = last + 1
-                if size >= least:  # bounds of stretches are large in large cubes
-                    result = wp.min(result, wp.max(size / stretch, least))
+                size /= stretch
+                if size >= least:
+                    result = wp.min(result, size)
         elif code == WARP:
             points[count] = point
             balls[count] = ball

@@ -152,6 +152,9 @@ def test_random_trees_stay_closed() -> None:
         assert is_closed(polygonize(plain_tree(rng, 6)).faces)
 
 
+@pytest.mark.xfail(
+    strict=True, reason="the bound of the stretch lets the ball seem thinner than the least part"
+)
 def test_a_ball_that_a_warp_makes_thin_has_the_smallest_cells() -> None:
     rate, away, radius = np.radians(15.0), np.hypot(14.0, 1.0), 0.0025
     mesh = polygonize_parts((BALL | Point((14, 1, 3), radius=radius)).twist(15.0), resolution=32)
