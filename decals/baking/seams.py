@@ -194,6 +194,7 @@ def match_seams(
     with ThreadPoolExecutor() as pool:
         running = [pool.submit(work.solve) for work in works]
         try:
+            report(0.0)
             while wait(running, REPORT_SECONDS).not_done:
                 report(sum(work.share for work in works) / channels)
         except BaseException:
