@@ -1,5 +1,6 @@
 // The picture of a page: decals and light on the surfaces that gbuffer.glsl holds, behind the code of decals
-// (decals/pages/programs.py). PICK: the number of the decal at one pixel in its place. Slots as those of light_pass.glsl.
+// (decals/pages/programs.py). PICK: two pixels with the decal and the surface at one place instead. Slots as those of
+// light_pass.glsl.
 //@ include camera.glsl
 uniform sampler2D g_position;
 uniform sampler2D g_normal;
@@ -11,17 +12,28 @@ void receive(vec4 position) {
     decal_surface_receivers = texelFetch(object_masks, ivec2(object & 4095, object >> 12), 0).x;
 }
 #ifdef PICK
-uniform ivec2 corner;  // the pixel
-layout(location = 0) out int number;
+uniform vec2 place;                  // in the picture, from -1 to 1
+const float GRAZING = 0.05;          // cosine between ray and normal below which a point within a pixel is not sought
+layout(location = 0) out vec4 picked;  // point and number of the decal; then normal, and 1 where there is a surface
 
 void main() {
-    vec4 position = texelFetch(g_position, corner, 0);
-    number = -1;
+    vec2 size = vec2(textureSize(g_position, 0));
+    vec2 pixel = 0.5 * (1.0 + place) * size;
+    ivec2 texel = ivec2(clamp(floor(pixel), vec2(0.0), size - 1.0));
+    vec4 position = texelFetch(g_position, texel, 0);
+    vec3 normal = texelFetch(g_normal, texel, 0).xyz;
+    picked = vec4(0.0, 0.0, 0.0, -1.0);
     if (position.w > 0.0) {
         float field;
         vec2 uv;
         receive(position);
-        number = decal_owner(position.xyz, texelFetch(g_normal, corner, 0).xyz, field, uv);
+        int number = decal_owner(position.xyz, normal, field, uv);
+        // The surface in the middle of the pixel, moved along its tangent plane.
+        vec3 ray = normalize(ray_direction(pixel));
+        float facing = dot(ray, normal);
+        float away = dot(position.xyz - eye.xyz, normal) / facing;
+        vec3 point = abs(facing) < GRAZING ? position.xyz : eye.xyz + away * ray;
+        picked = gl_FragCoord.x < 1.0 ? vec4(point, float(number)) : vec4(normal, 1.0);
     }
 }
 #else

@@ -83,7 +83,7 @@ def page_contents(
         "aspect": REFERENCE_ASPECT,
         "bounds": surfaces.bounds,
         "surfaces": surfaces.records,
-        "textures": {name: texture.record() for name, texture in textures.items()},
+        "textures": {name: texture.record(name) for name, texture in textures.items()},
         "isotropic": MESA_SOFTWARE,
         "targets": targets(),
         "samples": SAMPLES,

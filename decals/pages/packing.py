@@ -24,12 +24,11 @@ def packed(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str
     like bytes follow each other.
     """
     parts: list[bytes] = []
-    directory: list[dict[str, Any]] = []
-    written: dict[tuple[str, bytes], str] = {}
+    directory: dict[tuple[str, bytes], dict[str, Any]] = {}
     for name, array in arrays.items():
-        first = written.setdefault((array.dtype.name, array.tobytes()), name)
-        if first != name:
-            directory.append({"name": name, "like": first})
+        content = array.dtype.name, array.tobytes()
+        if content in directory:
+            directory[content]["names"].append(name)
             continue
         rows = array.reshape(len(array), -1) if array.dtype == np.uint8 else array.reshape(-1, 1)
         given = np.ascontiguousarray(rows)
@@ -38,15 +37,13 @@ def packed(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str
         width = given.shape[1] * given.itemsize
         places = given.view(np.uint8).reshape(-1, width).T
         parts.append(places.tobytes())
-        directory.append(
-            {
-                "name": name,
-                "kind": KINDS[array.dtype.name],
-                "count": array.size,
-                "differences": bool(differences),
-            }
-            | {"width": width}
-        )
-    text = msgspec.json.encode({**header, "arrays": directory})
-    content = len(text).to_bytes(4, "little") + text + b"".join(parts)
-    return base64.b64encode(zlib.compress(content, LEVEL)).decode("ascii")
+        directory[content] = {
+            "names": [name],
+            "kind": KINDS[array.dtype.name],
+            "count": array.size,
+            "width": width,
+            "differences": bool(differences),
+        }
+    text = msgspec.json.encode({**header, "arrays": list(directory.values())})
+    whole = len(text).to_bytes(4, "little") + text + b"".join(parts)
+    return base64.b64encode(zlib.compress(whole, LEVEL)).decode("ascii")

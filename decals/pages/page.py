@@ -33,7 +33,7 @@ from decals.validation import checked_path, describe, one_of
 
 MODULES = (
     *("vectors", "packing", "texels", "index", "decals", "history", "camera", "link", "graphics", "painter"),
-    *("files", "commands", "controls", "pointer", "viewer"),
+    *("files", "controls", "pointer", "viewer"),
 )
 """Modules of the viewer, each after those that it imports."""
 
@@ -54,6 +54,9 @@ SUFFIXES = ".html", ".htm"
 
 SLOT = re.compile(r"<!--([A-Z]+)-->")
 """Places of the page's template that are filled."""
+
+TOOLTIP = re.compile(r' title="([^"]*)"')
+"""Titles of buttons, which are also their labels for people who do not see them."""
 
 VIEWER = files("decals.pages") / "viewer"
 """Template, style and modules of the viewer."""
@@ -183,6 +186,7 @@ def page(
     texts = {"TITLE": html.escape(title), "ALT": html.escape(alt)}
     modes = "".join(f"<option>{mode}</option>" for mode in header["shaders"]["modes"])
     markup = _filled("controls.html", {**texts, "MODES": modes, "BACKGROUND": _gradient(sky)})
+    markup = TOOLTIP.sub(r'\g<0> aria-label="\1"', markup)
     data = packed({**header, "markup": markup, "controls": controls}, arrays)
     style, start = (_read(name) for name in ("page.css", "start.js"))
     script = _inline(viewer_script()) + start

@@ -24,6 +24,9 @@ from decals.surfaces.base_color import BaseTexture, Wrap
 NORMAL_LEVELS = 32767
 """Levels of the coordinates of normals."""
 
+BOXES = "corners of boxes"
+"""Array of the vertices of a box, in the order of their triangles."""
+
 MASKS = "object_masks"
 """Texture of the masks of all objects."""
 
@@ -104,7 +107,9 @@ class Surfaces:
         known = [name for name, program in self.programs.items() if program == shaders]
         program = known[0] if known else f"tree {number}"
         self.programs[program] = shaders
-        self._add(program, {}, [{"box": True, "count": BOX_VERTICES, "values": values}])
+        self.arrays[BOXES] = np.arange(BOX_VERTICES, dtype=np.int32)
+        parts = [{"first": 0, "count": BOX_VERTICES, "values": values}]
+        self._add(program, {}, parts, faces=BOXES, box=True)
 
     def _add_mesh(self, item: object, mesh: BakeMesh) -> None:
         number, base = len(self.records), mesh.base

@@ -39,7 +39,7 @@ TARGETS = {
     "g_position": "RGBA32F",
     "g_normal": "RGBA32F",
     "g_color": "RGBA16F",
-    "number": "R32I",
+    "picked": "RGBA32F",
     "decal_records": "RGBA32F",
     "decal_limits": "RGBA32F",
     "decal_index_levels": "RGBA32F",
@@ -60,9 +60,9 @@ class PageTexture:
         """Return the levels as arrays of a page."""
         return {f"{name} {number}": level for number, level in enumerate(self.levels)}
 
-    def record(self) -> dict[str, Any]:
+    def record(self, name: str) -> dict[str, Any]:
         """Return what the header says of the texture."""
-        return {**self.description, "levels": len(self.levels)}
+        return {**self.description, "levels": list(self.arrays(name))}
 
 
 def described(

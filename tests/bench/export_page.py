@@ -35,7 +35,7 @@ DRAG = """(steps) => {
   const { position, target } = viewer.camera;
   for (let i = 0; i < steps; i++) {
     const start = performance.now();
-    const hit = viewer.surfaceAt(0.3 * Math.sin(i), 0.3 * Math.cos(i));
+    const hit = viewer.pick(0.3 * Math.sin(i), 0.3 * Math.cos(i)).surface;
     if (hit) viewer.moveTo(hit, { open: i > 0 });
     times.push(performance.now() - start);
     const drawn = performance.now();

@@ -59,6 +59,11 @@ PIXELS = """() => {
   return { width: canvas.width, height: canvas.height, bytes: Array.from(bytes) };
 }"""
 
+PLACES = [[0.0, 0.0], [0.0513, -0.1027], [-0.1311, 0.0519], [0.1003, 0.1507]]
+"""Places on the model, of which most are between the middles of pixels."""
+SEEN_AGAIN = """(places) =>
+  places.map(([x, y]) => viewer.camera.seen(viewer.pick(x, y).surface.position, viewer.aspect))"""
+
 
 @dataclass(frozen=True)
 class Case:
@@ -296,14 +301,16 @@ async def use(browser: str) -> None:
 async def used(scene: Scene, browser: str, **options: Any) -> None:
     """Use a page of a scene."""
     async with shown(scene, (700, 600), browser=browser, **options) as page:
-        await page.evaluate("viewer.set({ link: 'mode=toString&d=0:1e300,0,0,0,0,0,0,0,0,1e300' })")
+        await page.evaluate("viewer.set({ link: 'mode=toString&k=0.5&d=0:1e300,0,0,0,0,0,0,0,0,1e300' })")
+        await page.evaluate("viewer.set({ link: 'k=1e999&eye=1,2&at=3' })")
         before = await state(page)
+        assert before["stiffness"] == scene.drawing.stiffness
         assert before["mode"] == scene.drawing.contact.name.lower()
         assert len(before["decals"]) == len(scene.decals)
-        number = await page.evaluate("viewer.decalAt(0, 0)")
+        number = await page.evaluate("viewer.pick(0, 0).number")
         assert number >= 0
-        assert await page.evaluate("viewer.decalAt(-0.99, 0.99)") == -1
-        assert await page.evaluate("viewer.surfaceAt(-0.99, 0.99)") is None
+        assert await page.evaluate("viewer.pick(-0.99, 0.99)") == {"number": -1, "surface": None}
+        assert np.allclose(await page.evaluate(SEEN_AGAIN, PLACES), PLACES, atol=1e-5)
         box = await page.locator("canvas").bounding_box()
         assert box is not None
         middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -448,7 +455,7 @@ async def state(page: Page) -> dict[str, Any]:
 
 async def hit(page: Page, x: float, y: float) -> Any:
     """Return the point of the surface at a place of the picture."""
-    return await page.evaluate("([x, y]) => viewer.surfaceAt(x, y).position", [x, y])
+    return await page.evaluate("([x, y]) => viewer.pick(x, y).surface.position", [x, y])
 
 
 async def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> None:

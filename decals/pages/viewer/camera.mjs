@@ -11,32 +11,22 @@ export class Camera {
     this.size = length(subtract(bounds[1], bounds[0])) || 1;
   }
 
-  // The same camera at a later time, or as a link has it.
-  place({ position, target }) {
-    Object.assign(this, { position, target });
-  }
-
   get pose() {
     return { position: this.position, target: this.target };
   }
 
-  // Unit vectors to the right, up, and along the view.
-  get axes() {
+  // From the middle of the picture to its right and its upper edge at distance 1, and along the view: narrow pictures
+  // show as much from left to right as wide ones.
+  frame(aspect) {
     const ahead = unit(subtract(this.target, this.position));
     const right = unit(cross(ahead, this.up));
-    return [right, cross(right, ahead), ahead];
+    const half = Math.tan((this.fov * Math.PI) / 360) * Math.max(1, this.referenceAspect / aspect);
+    return [scaled(right, half * aspect), scaled(cross(right, ahead), half), ahead];
   }
 
-  // Tangent of half the vertical angle of view; narrow pictures show as much from left to right as wide ones.
-  half(aspect) {
-    const half = Math.tan((this.fov * Math.PI) / 360);
-    return half * Math.max(1, this.referenceAspect / aspect);
-  }
-
-  // From the middle of the picture to its right and its upper edge at distance 1, and along the view.
-  frame(aspect) {
-    const [right, up, ahead] = this.axes;
-    return [scaled(right, this.half(aspect) * aspect), scaled(up, this.half(aspect)), ahead];
+  // A vector in that frame.
+  within(vector, aspect) {
+    return this.frame(aspect).map((axis) => dot(vector, axis) / dot(axis, axis));
   }
 
   // Distances of the near and the far plane, which enclose the model.
@@ -52,33 +42,23 @@ export class Camera {
   block(width, height, [x, y] = [0, 0]) {
     const [right, up, ahead] = this.frame(width / height);
     const [near, far] = this.range(ahead);
-    const rows = [scaled(right, 1 / dot(right, right)), scaled(up, 1 / dot(up, up)), ahead].map((axis) => [
-      ...axis,
-      -dot(axis, this.position),
-    ]);
-    const columns = [0, 1, 2, 3].flatMap((i) => {
-      const [across, upward, depth] = rows.map((row) => row[i]);
-      const z = ((far + near) * depth - (i === 3 ? 2 * far * near : 0)) / (far - near);
-      return [across - (2 * x * depth) / width, upward - (2 * y * depth) / height, z, depth];
-    });
-    const [column, row] = [scaled(right, 2 / width), scaled(up, 2 / height)];
-    const edge = subtract(subtract(ahead, right), up);
-    const corner = add(edge, add(scaled(column, x), scaled(row, y)));
-    return new Float32Array([...columns, ...this.position, 1, ...corner, 0, ...column, 0, ...row, 0]);
+    const [shiftX, shiftY] = [(2 * x) / width, (2 * y) / height];
+    const clip = (vector, w) => {
+      const [across, upward, depth] = this.within(vector, width / height);
+      const z = ((far + near) * depth - 2 * w * far * near) / (far - near);
+      return [across - shiftX * depth, upward - shiftY * depth, z, depth];
+    };
+    const axes = [clip([1, 0, 0], 0), clip([0, 1, 0], 0), clip([0, 0, 1], 0)].flat();
+    const columns = [...axes, ...clip(scaled(this.position, -1), 1)];
+    const corner = subtract(ahead, add(scaled(right, 1 - shiftX), scaled(up, 1 - shiftY)));
+    const steps = [...scaled(right, 2 / width), 0, ...scaled(up, 2 / height), 0];
+    return new Float32Array([...columns, ...this.position, 1, ...corner, 0, ...steps]);
   }
 
-  // The direction from the eye through a place of the picture, from −1 to 1 to the right and upward.
-  direction(x, y, aspect) {
-    const [right, up, ahead] = this.frame(aspect);
-    return unit(add(ahead, add(scaled(right, x), scaled(up, y))));
-  }
-
-  // Where a point is seen, from −1 to 1; null behind the eye.
+  // Where a point is seen, from −1 to 1 to the right and upward; null behind the eye.
   seen(point, aspect) {
-    const [right, up, ahead] = this.frame(aspect);
-    const from = subtract(point, this.position);
-    const depth = dot(from, ahead);
-    return depth <= 0 ? null : [right, up].map((edge) => dot(from, edge) / (dot(edge, edge) * depth));
+    const [x, y, depth] = this.within(subtract(point, this.position), aspect);
+    return depth <= 0 ? null : [x / depth, y / depth];
   }
 
   // Turn about the target, by angles to the right and upward.
@@ -89,12 +69,13 @@ export class Camera {
     this.position = add(this.target, isSteep ? offset : raised);
   }
 
-  // Move the picture by parts of its height.
-  pan(x, y) {
-    const [right, up] = this.axes;
-    const step = 2 * this.half(this.referenceAspect) * length(subtract(this.position, this.target));
-    const move = add(scaled(right, -x * step), scaled(up, -y * step));
-    this.place({ position: add(this.position, move), target: add(this.target, move) });
+  // Move the picture by parts of half its sides.
+  pan(x, y, aspect) {
+    const [right, up] = this.frame(aspect);
+    const away = length(subtract(this.position, this.target));
+    const move = scaled(add(scaled(right, x), scaled(up, y)), -away);
+    this.position = add(this.position, move);
+    this.target = add(this.target, move);
   }
 
   zoom(factor) {
@@ -105,7 +86,7 @@ export class Camera {
 
   // The direction that is upward in the picture, along a surface.
   upAlong(normal) {
-    const [right, up] = this.axes;
+    const [right, up] = this.frame(1).map(unit);
     return tangential(Math.abs(dot(up, normal)) < STEEPEST ? up : right, normal);
   }
 }

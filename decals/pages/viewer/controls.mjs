@@ -1,21 +1,46 @@
 // What stands around the picture (controls.html): buttons with their keys, the contact mode, and a line of text.
+import { copyLink, save } from "./files.mjs";
+import { turned } from "./vectors.mjs";
+
+const TURN = Math.PI / 12; // of a decal, at a press
+const SCALE = 1.1;
+const ZOOM = 1.1; // of the camera, at a press
+
+// What buttons and keys do, by the names of the buttons and of the keys without one.
+const COMMANDS = {
+  undo: (viewer) => viewer.history.go(-1),
+  redo: (viewer) => viewer.history.go(1),
+  add: (viewer) => viewer.addAt(0, 0),
+  remove: (viewer) => viewer.edit([[viewer.selected, null]]),
+  left: (viewer) => viewer.editSelected((row) => ({ tangent: turned(row.tangent, row.normal, TURN) })),
+  right: (viewer) => viewer.editSelected((row) => ({ tangent: turned(row.tangent, row.normal, -TURN) })),
+  smaller: (viewer) => viewer.editSelected(({ radius }) => ({ radius: radius / SCALE })),
+  larger: (viewer) => viewer.editSelected(({ radius }) => ({ radius: radius * SCALE })),
+  home: (viewer) => viewer.set({ camera: viewer.home }),
+  link: copyLink,
+  save,
+  n: (viewer) => viewer.select(1),
+  p: (viewer) => viewer.select(-1),
+  escape: (viewer) => viewer.set({ selected: -1 }),
+  arrowleft: (viewer) => viewer.arrow(-1, 0),
+  arrowright: (viewer) => viewer.arrow(1, 0),
+  arrowup: (viewer) => viewer.arrow(0, 1),
+  arrowdown: (viewer) => viewer.arrow(0, -1),
+  "+": (viewer) => viewer.moveCamera("zoom", 1 / ZOOM),
+  "=": (viewer) => viewer.moveCamera("zoom", 1 / ZOOM),
+  "-": (viewer) => viewer.moveCamera("zoom", ZOOM),
+};
 
 export class Controls {
   constructor(root, { markup, controls }, viewer) {
     root.classList.add("decal-viewer");
     root.innerHTML = markup;
-    const [canvas, bar, mode, stiffness, status] = ["canvas", ".bar", "select", "input", "[role=status]"].map(
-      (selector) => root.querySelector(selector),
-    );
-    Object.assign(this, { root, canvas, bar, mode, stiffness, status });
-    this.buttons = Array.from(this.bar.querySelectorAll("button"));
-    for (const button of this.buttons) {
-      button.setAttribute("aria-label", button.title);
-      button.addEventListener("click", () => viewer.run(button.name));
-    }
-    this.bar.hidden = !controls;
-    this.mode.addEventListener("change", () => viewer.set({ mode: this.mode.value }));
-    this.stiffness.addEventListener("input", () => viewer.set({ stiffness: Number(this.stiffness.value) }));
+    const [canvas, bar, status] = root.children;
+    const [mode, stiffness] = bar.querySelectorAll("select, input");
+    Object.assign(this, { root, canvas, status, mode, stiffness, buttons: bar.querySelectorAll("button") });
+    bar.hidden = !controls;
+    bar.addEventListener("click", ({ target }) => COMMANDS[target.name]?.(viewer));
+    bar.addEventListener("input", ({ target }) => viewer.set({ [target.name]: target.value }));
     root.addEventListener("keydown", (event) => this.press(event, viewer));
   }
 
@@ -24,8 +49,10 @@ export class Controls {
     if (event.target.matches("select, input")) return; // these have keys of their own
     const control = event.ctrlKey || event.metaKey ? `control+${event.shiftKey ? "shift+" : ""}` : "";
     const key = control + event.key.toLowerCase();
-    const button = this.buttons.find((one) => !one.disabled && one.dataset.keys.split(" ").includes(key));
-    if (viewer.run(button?.name ?? key)) event.preventDefault();
+    const button = this.root.querySelector(`button[data-keys~="${CSS.escape(key)}"]:enabled`);
+    const command = COMMANDS[button?.name ?? key];
+    if (command) event.preventDefault();
+    command?.(viewer);
   }
 
   // Show the state, and what can be done.
@@ -33,9 +60,8 @@ export class Controls {
     this.mode.value = mode;
     this.stiffness.value = stiffness;
     this.stiffness.disabled = mode !== "elastic";
-    const off = { undo: !history.done.length, redo: !history.undone.length };
-    for (const button of this.buttons)
-      button.disabled = off[button.name] ?? ("selected" in button.dataset && selected < 0);
+    const can = { undo: history.at > 0, redo: history.at + 1 < history.states.length, change: selected >= 0 };
+    for (const button of this.buttons) button.disabled = can[button.dataset.needs] === false;
   }
 
   say(text) {

@@ -36,11 +36,10 @@ export class DecalSet {
     return [...this.rows.keys()].filter((number) => this.rows[number]);
   }
 
-  // What shaders read, by the names of its textures.
+  // What shaders read, by the names of its textures without their prefix.
   get texels() {
-    const { levels, table, ids } = this.index;
-    const index = { decal_index_levels: levels, decal_index_table: table, decal_index_ids: ids };
-    return { decal_records: this.records, decal_limits: this.limits, ...index };
+    const { records, limits, index } = this;
+    return { records, limits, index_levels: index.levels, index_table: index.table, index_ids: index.ids };
   }
 
   pack(row, number) {

@@ -1,6 +1,5 @@
 // What leaves a page: a link to its state, and its scene as a file.
 import { written } from "./link.mjs";
-import { toBase64 } from "./packing.mjs";
 
 const READING = 60_000; // milliseconds in which a browser begins to read a file
 
@@ -14,16 +13,15 @@ export function copyLink({ controls, ...state }) {
     return controls.say("A page inside a notebook has no link of its own: save a scene file.");
   }
   controls.say("The link of this state is in the address bar.");
-  navigator.clipboard?.writeText(location.href).then(
-    () => controls.say("The link of this state is in the address bar and in the clipboard."),
-    () => {}, // refused
-  );
+  const sayBoth = () => controls.say("The link of this state is in the address bar and in the clipboard.");
+  navigator.clipboard?.writeText(location.href).then(sayBoth, () => {}); // may be refused
 }
 
 // The scene as a file that `decals.load_scene` takes.
 export function sceneText({ header, arrays, mode, stiffness, camera, home, decals }) {
   const { scene } = header;
-  const text = (name) => toBase64(new Uint8Array(arrays[name].buffer));
+  const text = (name) =>
+    btoa(Array.from(new Uint8Array(arrays[name].buffer), (byte) => String.fromCharCode(byte)).join(""));
   const objects = scene.objects.map((object, i) => {
     if (object.type !== "mesh") return object;
     return { ...object, data: { vertices: text(`vertices of ${i}`), faces: text(`faces of ${i}`) } };
@@ -35,10 +33,8 @@ export function sceneText({ header, arrays, mode, stiffness, camera, home, decal
 }
 
 export function save(viewer) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([sceneText(viewer)], { type: "application/json" }));
-  link.download = "scene.json";
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), READING); // Firefox reads it later
+  const href = URL.createObjectURL(new Blob([sceneText(viewer)], { type: "application/json" }));
+  Object.assign(document.createElement("a"), { href, download: "scene.json" }).click();
+  setTimeout(() => URL.revokeObjectURL(href), READING); // Firefox reads it later
   viewer.controls.say("The scene is saved as scene.json.");
 }

@@ -2,17 +2,16 @@
 import { ROW } from "./texels.mjs";
 
 export class Program {
-  constructor(gl, vertex, fragment) {
+  // `texts` are those of the vertex and the fragment shader.
+  constructor(gl, texts) {
     const program = gl.createProgram();
-    const shaders = Object.entries({ VERTEX_SHADER: vertex, FRAGMENT_SHADER: fragment }).map(
-      ([kind, text]) => {
-        const shader = gl.createShader(gl[kind]);
-        gl.shaderSource(shader, text);
-        gl.compileShader(shader);
-        gl.attachShader(program, shader);
-        return shader;
-      },
-    );
+    const shaders = texts.map((text, i) => {
+      const shader = gl.createShader([gl.VERTEX_SHADER, gl.FRAGMENT_SHADER][i]);
+      gl.shaderSource(shader, text);
+      gl.compileShader(shader);
+      gl.attachShader(program, shader);
+      return shader;
+    });
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
       const logs = [gl.getProgramInfoLog(program), ...shaders.map((shader) => gl.getShaderInfoLog(shader))];
@@ -39,9 +38,11 @@ export class Program {
   }
 }
 
-// Make a texture as decals/pages/textures.py describes it, of levels of texels; null for one without contents.
-export function makeTexture(gl, { target: kind, format, size, options, mips, anisotropy }, levels = [null]) {
-  const [target, texture] = [gl[kind], gl.createTexture()];
+// Make a texture as decals/pages/textures.py describes it, of levels of texels, null for one without contents; or make
+// one anew.
+export function makeTexture(gl, description, levels = [null], texture = gl.createTexture()) {
+  const { target: kind, format, size, options, mips, anisotropy } = description;
+  const target = gl[kind];
   const [internal, ...inMemory] = format.map((word) => gl[word]);
   gl.bindTexture(target, texture);
   levels.forEach((texels, level) => {
@@ -60,43 +61,39 @@ export function makeTexture(gl, { target: kind, format, size, options, mips, ani
 
 // Bring `Texels` to the graphics card, all or the rows that changed, and return their texture.
 export function uploaded(gl, texels, description) {
-  const { array, changes } = texels;
+  const { array, changes, onCard } = texels;
   const numbers = ROW * texels.width;
-  const size = [ROW, array.length / numbers];
-  if (!changes) {
-    if (size[1] > gl.getParameter(gl.MAX_TEXTURE_SIZE))
+  const rows = array.length / numbers;
+  if (onCard?.array !== array) {
+    if (rows > gl.getParameter(gl.MAX_TEXTURE_SIZE))
       throw new Error("this device has no room for the decals");
-    gl.deleteTexture(texels.onCard?.texture ?? null);
-    texels.onCard = makeTexture(gl, { ...description, size }, [array]);
-  } else if (changes.size) {
+    const made = makeTexture(gl, { ...description, size: [ROW, rows] }, [array], onCard?.texture);
+    texels.onCard = { ...made, array };
+  } else {
     const inMemory = description.format.slice(1).map((word) => gl[word]);
-    gl.bindTexture(gl.TEXTURE_2D, texels.onCard.texture);
+    gl.bindTexture(gl.TEXTURE_2D, onCard.texture);
     for (const row of changes) {
       const part = array.subarray(row * numbers, (row + 1) * numbers);
       gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, ROW, 1, ...inMemory, part);
     }
   }
-  texels.changes = new Set();
+  changes.clear();
   return texels.onCard;
 }
 
-// A target of drawing with textures, and with a depth buffer.
-export function makeTarget(gl, size, descriptions) {
-  const [framebuffer, depth] = [gl.createFramebuffer(), gl.createRenderbuffer()];
+// Make a target of drawing with textures and a depth buffer; or give one another size.
+export function makeTarget(gl, size, descriptions, before) {
+  const framebuffer = before?.framebuffer ?? gl.createFramebuffer();
+  const depth = before?.depth ?? gl.createRenderbuffer();
   gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
   gl.bindRenderbuffer(gl.RENDERBUFFER, depth);
   gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT24, ...size);
   gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
-  const textures = descriptions.map((description) => makeTexture(gl, { ...description, size }));
-  const places = textures.map((_, i) => gl.COLOR_ATTACHMENT0 + i);
-  textures.forEach(({ target, texture }, i) => {
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, places[i], target, texture, 0);
+  const textures = descriptions.map((description, i) => {
+    const made = makeTexture(gl, { ...description, size }, [null], before?.textures[i].texture);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + i, made.target, made.texture, 0);
+    return made;
   });
-  gl.drawBuffers(places);
-  const release = () => {
-    for (const { texture } of textures) gl.deleteTexture(texture);
-    gl.deleteRenderbuffer(depth);
-    gl.deleteFramebuffer(framebuffer);
-  };
-  return { framebuffer, textures, release };
+  gl.drawBuffers(textures.map((_, i) => gl.COLOR_ATTACHMENT0 + i));
+  return { framebuffer, depth, textures, size };
 }

@@ -8,10 +8,8 @@ const EMPTY = -1;
 
 // The smallest e with x < 2^e, for x above 0.
 export function exponentAbove(x) {
-  let e = Math.floor(Math.log2(x));
-  while (2 ** e <= x) e += 1;
-  while (2 ** (e - 1) > x) e -= 1;
-  return e;
+  const e = Math.floor(Math.log2(x)) + 1; // beside a power of two, rounding makes it one too large or too small
+  return e + (2 ** e <= x) - (2 ** (e - 1) > x);
 }
 
 export class DecalIndex {
@@ -33,11 +31,6 @@ export class DecalIndex {
     return Math.floor(this.records.array[RECORD * number + 7]);
   }
 
-  // Below 0 if the first of two decals comes first in lists.
-  compare(a, b) {
-    return this.rank(a) - this.rank(b) || a - b;
-  }
-
   // The ball that a decal reaches, and the exponent of its cells, as `cell_exponent` of decals/index/decal_cells.py.
   ball(number) {
     const { parity, floor, finest } = this.rules;
@@ -53,21 +46,20 @@ export class DecalIndex {
   // The cells that the ball of a decal touches.
   *cellsOf(number) {
     const { centre, reach, exponent } = this.ball(number);
+    const { halfRange, levelShift } = this.rules;
     const width = 2 ** exponent;
-    const level = this.levelOf.get(exponent);
+    const first = halfRange + this.levelOf.get(exponent) * 2 ** levelShift;
     const [low, high] = [-reach, reach].map((far) => centre.map((c) => Math.floor((c + far) / width)));
     const away = (cell, c) => Math.max(cell * width - c, c - (cell + 1) * width, 0) ** 2;
     for (let x = low[0]; x <= high[0]; x++)
       for (let y = low[1]; y <= high[1]; y++)
         for (let z = low[2]; z <= high[2]; z++)
           if (away(x, centre[0]) + away(y, centre[1]) + away(z, centre[2]) <= reach * reach)
-            yield this.cell(level, x, y, z);
+            yield this.cell([x + first, y + halfRange, z + halfRange]);
   }
 
-  // The cell of a level at some coordinates: its key in the table, the numbers in it, and where their list lies.
-  cell(level, x, y, z) {
-    const { halfRange, levelShift } = this.rules;
-    const key = [x + halfRange + level * 2 ** levelShift, y + halfRange, z + halfRange];
+  // The cell of a key in the table: the numbers in it, and where their list lies.
+  cell(key) {
     return this.cells[this.slotOf(key)] ?? this.seat({ key, numbers: [], head: EMPTY, room: 0 });
   }
 
@@ -109,16 +101,16 @@ export class DecalIndex {
     this.ids.set(cell.head, [length, ...cell.numbers]);
   }
 
-  // Insert a decal, whose record is there, into the lists of its cells.
+  // Insert a decal, whose record is there, into the lists of its cells, which are sorted by ranks and numbers.
   insert(number) {
-    const { exponent } = this.ball(number);
+    const [rank, { exponent }] = [this.rank(number), this.ball(number)];
     if (!this.levelOf.has(exponent)) this.levelOf.set(exponent, this.levelOf.size);
     const level = this.levelOf.get(exponent);
     const [, width, lowest, highest] = this.levels.at(level);
-    const ranks = [this.rank(number), ...(width > 0 ? [lowest, highest] : [])];
+    const ranks = [rank, ...(width > 0 ? [lowest, highest] : [])];
     this.levels.set(level, [2 ** -exponent, 2 ** exponent, Math.min(...ranks), Math.max(...ranks)]);
     for (const cell of this.cellsOf(number)) {
-      const before = cell.numbers.findLastIndex((other) => this.compare(other, number) < 0);
+      const before = cell.numbers.findLastIndex((other) => (this.rank(other) - rank || other - number) < 0);
       cell.numbers.splice(before + 1, 0, number);
       this.store(cell);
     }

@@ -19,27 +19,26 @@ export function written({ camera, mode, stiffness, decals, originals }) {
   return text.length <= LONGEST ? text : null;
 }
 
-// Return the state of a fragment, as far as it is valid.
+// Return the state of a fragment for `set`, which refuses other modes, stiffnesses and decals than valid ones.
 export function read(fragment, originals) {
   const fields = new URLSearchParams(fragment.replace(/^#/, ""));
   const numbers = (text, count) => {
     const values = (text ?? "").split(",").map(Number);
     return values.length >= count && values.every(Number.isFinite) ? values : null;
   };
-  const state = { changes: [] };
   const [eye, target] = ["eye", "at"].map((name) => numbers(fields.get(name), 3)?.slice(0, 3));
-  if (eye && target) state.camera = { position: eye, target };
-  if (fields.has("mode")) state.mode = fields.get("mode");
-  if (Number(fields.get("k")) >= 1) state.stiffness = Number(fields.get("k"));
+  const camera = eye && target && { position: eye, target };
+  const decals = {};
   for (const text of (fields.get("d") ?? "").split(";")) {
     const [, digits, parts] = /^(\d{1,7})(?:x|:(.*))$/.exec(text) ?? [];
     const [place, values] = [Number(digits), numbers(parts, 10)];
-    if (digits && parts === undefined && originals[place]) state.changes.push([place, null]);
+    const before = originals[place];
+    if (before && parts === undefined) decals[place] = null;
     if (values?.[9] > 0 && place <= originals.length + LONGEST) {
       const [position, normal, tangent] = [0, 3, 6].map((first) => values.slice(first, first + 3));
-      const base = originals[place] ?? { image: values[10] ?? 0 };
-      state.changes.push([place, { ...base, position, normal, tangent, radius: values[9] }]);
+      const base = before ?? { image: values[10] ?? 0 };
+      decals[place] = { ...base, position, normal, tangent, radius: values[9] };
     }
   }
-  return state;
+  return { camera, mode: fields.get("mode"), stiffness: fields.get("k"), decals };
 }

@@ -2,6 +2,8 @@
 import { Program, makeTarget, makeTexture, uploaded } from "./graphics.mjs";
 import { ROW } from "./texels.mjs";
 
+const SEEN = ["g_position", "g_normal", "g_color"]; // textures of what a camera sees
+
 export class Painter {
   constructor(canvas, header, arrays) {
     const gl = canvas.getContext("webgl2", { antialias: false, preserveDrawingBuffer: true });
@@ -9,32 +11,27 @@ export class Painter {
     if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("this device cannot draw float textures");
     const side = gl.getParameter(gl.MAX_TEXTURE_SIZE);
     if (side < ROW) throw new Error(`textures have ${side} texels here, and ${ROW} are needed`);
-    Object.assign(this, { gl, canvas, header, programs: new Map() });
+    Object.assign(this, { gl, canvas, header, programs: {}, textures: {} });
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     gl.cullFace(gl.FRONT);
     gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, gl.createBuffer()); // of the camera
     this.screen = gl.createVertexArray();
-    this.pixel = makeTarget(gl, [1, 1], [header.targets.number]);
-    this.textures = this.texturesOf(header, arrays);
+    this.picked = makeTarget(gl, [2, 1], [header.targets.picked]);
+    const renderer = gl.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER;
+    const device = gl.getParameter(renderer);
+    const own = header.isotropic.some((part) => device.includes(part)) ? { anisotropy: 0 } : {};
+    for (const [name, { levels, ...description }] of Object.entries(header.textures)) {
+      const texels = levels.map((level) => arrays[level]);
+      this.textures[name] = makeTexture(gl, { ...description, ...own }, texels);
+    }
     this.surfaces = header.surfaces.map((surface) => this.surfaceOf(surface, arrays));
   }
 
-  texturesOf({ textures, isotropic }, arrays) {
-    const { gl } = this;
-    const renderer = gl.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER;
-    const device = gl.getParameter(renderer);
-    const own = isotropic.some((part) => device.includes(part)) ? { anisotropy: 0 } : {};
-    const made = Object.entries(textures).map(([name, { levels, ...description }]) => {
-      const texels = Array.from({ length: levels }, (_, level) => arrays[`${name} ${level}`]);
-      return [name, makeTexture(gl, { ...description, ...own }, texels)];
-    });
-    return Object.fromEntries(made);
-  }
-
   // A surface with its program, and with a vertex array of its attributes.
-  surfaceOf({ program: name, attributes, faces, parts }, arrays) {
+  surfaceOf({ program: name, attributes, faces, parts, box }, arrays) {
     const { gl } = this;
-    const [array, program] = [gl.createVertexArray(), this.programOf(name, () => this.header.programs[name])];
+    const array = gl.createVertexArray();
+    const program = (this.programs[name] ??= new Program(gl, this.header.programs[name]));
     gl.bindVertexArray(array);
     const store = (target, data) => {
       gl.bindBuffer(target, gl.createBuffer());
@@ -46,21 +43,16 @@ export class Painter {
       gl.enableVertexAttribArray(place);
       gl.vertexAttribPointer(place, size, gl[kind], true, 0, 0);
     }
-    if (faces) store(gl.ELEMENT_ARRAY_BUFFER, faces);
-    return { program, array, parts };
+    store(gl.ELEMENT_ARRAY_BUFFER, faces);
+    return { program, array, parts, box };
   }
 
-  // A program by its name, compiled from its two shaders when it is first used.
-  programOf(name, shaders) {
-    if (!this.programs.has(name)) this.programs.set(name, new Program(this.gl, ...shaders()));
-    return this.programs.get(name);
-  }
-
-  // The program that draws, or picks, in a contact mode.
+  // The program that draws, or picks, in a contact mode, compiled when it is first used.
   decalProgram(kind, { mode, decals }) {
     const { screen, modes, ends } = this.header.shaders;
     const form = decals.full ? "full" : "plain";
-    return this.programOf(`${kind} ${mode} ${form}`, () => [screen, `${modes[mode][form]}${ends[kind]}`]);
+    const texts = [screen, `${modes[mode][form]}${ends[kind]}`];
+    return (this.programs[`${kind} ${mode} ${form}`] ??= new Program(this.gl, texts));
   }
 
   // Draw all surfaces as a camera sees them, with a shift of the picture in pixels: what decals and light read.
@@ -70,49 +62,46 @@ export class Painter {
     const block = camera.block(...size, shift);
     const view = `${size} ${block}`;
     if (view === this.view) return;
-    if (`${size}` !== this.size) {
-      this.seen?.release();
-      const names = ["g_position", "g_normal", "g_color"];
-      this.seen = makeTarget(
-        gl,
-        size,
-        names.map((name) => this.header.targets[name]),
-      );
-      names.forEach((name, i) => (this.textures[name] = this.seen.textures[i]));
+    if (`${size}` !== `${this.seen?.size}`) {
+      const descriptions = SEEN.map((name) => this.header.targets[name]);
+      this.seen = makeTarget(gl, size, descriptions, this.seen);
+      SEEN.forEach((name, i) => (this.textures[name] = this.seen.textures[i]));
     }
-    Object.assign(this, { view, size: `${size}` });
+    this.view = view;
     gl.bufferData(gl.UNIFORM_BUFFER, block, gl.DYNAMIC_DRAW);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.seen.framebuffer);
     gl.viewport(0, 0, ...size);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
-    for (const { program, array, parts } of this.surfaces) {
+    for (const { program, array, parts, box } of this.surfaces) {
       gl.bindVertexArray(array);
-      for (const { values, first, count, box } of parts) {
+      if (box) gl.enable(gl.CULL_FACE); // its back has one fragment for each ray
+      for (const { values, first, count } of parts) {
         program.use(values, this.textures);
-        if (box) gl.enable(gl.CULL_FACE); // its back has one fragment for each ray
-        if (box) gl.drawArrays(gl.TRIANGLES, 0, count);
-        else gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 4 * first);
-        gl.disable(gl.CULL_FACE);
+        gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 4 * first);
       }
+      gl.disable(gl.CULL_FACE);
     }
     gl.disable(gl.DEPTH_TEST);
   }
 
-  // Draw over a whole target what decals and light make of the surfaces.
-  paint(kind, { mode, decals, stiffness, selected }, corner = [0, 0]) {
-    const { gl, canvas, header, textures } = this;
+  // Draw over a whole target what decals and light make of the surfaces, or what lies at a place, from −1 to 1.
+  paint(kind, { framebuffer, size }, { mode, decals, stiffness, selected }, place = [0, 0]) {
+    const { gl, header, textures } = this;
     for (const [name, texels] of Object.entries(decals.texels))
-      textures[name] = uploaded(gl, texels, header.targets[name]);
+      textures[`decal_${name}`] = uploaded(gl, texels, header.targets[`decal_${name}`]);
+    const { position = [0, 0, 0], radius = 0 } = decals.rows[selected] ?? {};
     const values = {
       ...header.uniforms,
-      corner: ["2i", ...corner],
-      tile_size: ["2i", canvas.width, canvas.height],
+      place: ["2f", ...place],
+      tile_size: ["2i", ...this.seen.size],
       decal_index_level_count: ["1i", decals.index.levelOf.size],
       decal_index_mask: ["1i", decals.index.mask],
       decal_stiffness: ["1f", stiffness],
-      rim: ["4f", ...(decals.rows[selected]?.position ?? [0, 0, 0]), decals.rows[selected]?.radius ?? 0],
+      rim: ["4f", ...position, radius],
     };
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    gl.viewport(0, 0, ...size);
     this.decalProgram(kind, { mode, decals }).use(values, textures);
     gl.bindVertexArray(this.screen);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
@@ -120,14 +109,12 @@ export class Painter {
 
   // Draw one sample of the picture over the mean of those before it; the page's background shows around it.
   draw(state, sample = 0) {
-    const { gl, canvas } = this;
+    const { gl } = this;
     this.look(state.camera, this.header.samples[sample]);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.viewport(0, 0, canvas.width, canvas.height);
     gl.enable(gl.BLEND);
     gl.blendColor(0, 0, 0, 1 / (sample + 1));
     gl.blendFunc(gl.CONSTANT_ALPHA, gl.ONE_MINUS_CONSTANT_ALPHA);
-    this.paint("color", state);
+    this.paint("color", { framebuffer: null, size: this.seen.size }, state);
     gl.disable(gl.BLEND);
     this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     gl.flush();
@@ -137,35 +124,23 @@ export class Painter {
     return this.gl.clientWaitSync(this.fence, 0, 0) === this.gl.TIMEOUT_EXPIRED;
   }
 
-  // Numbers of a pixel of a target, counted from the lower left; a read ends when all drawing has ended.
-  read(target, place, [x, y], kind = "FLOAT", numbers = new Float32Array(4)) {
-    const { gl } = this;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, target);
-    gl.readBuffer(target ? gl.COLOR_ATTACHMENT0 + place : gl.BACK);
-    gl.readPixels(x, y, 1, 1, kind === "INT" ? gl.RGBA_INTEGER : gl.RGBA, gl[kind], numbers);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    return Array.from(numbers);
-  }
-
-  // Wait until the picture is drawn.
+  // Wait until the picture is drawn, as a read of it does.
   finish() {
-    this.read(null, 0, [0, 0], "UNSIGNED_BYTE", new Uint8Array(4));
+    const { gl } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
   }
 
-  // The number of the decal at a pixel; −1 for none.
-  owner(state, pixel) {
+  // What a camera sees at a place of the picture, from −1 to 1 to the right and upward: the number of the decal, −1 for
+  // none, and the surface as a point and the normal on the outside, null for none.
+  pick(state, place) {
     const { gl } = this;
     this.look(state.camera);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.pixel.framebuffer);
-    gl.viewport(0, 0, 1, 1);
-    this.paint("pick", state, pixel);
-    return this.read(this.pixel.framebuffer, 0, [0, 0], "INT", new Int32Array(4))[0];
-  }
-
-  // The surface that a camera sees at a pixel: a point, and the normal on the outside; null if there is none.
-  surface(camera, pixel) {
-    this.look(camera);
-    const [point, normal] = [0, 1].map((place) => this.read(this.seen.framebuffer, place, pixel));
-    return point[3] > 0 ? { position: point.slice(0, 3), normal: normal.slice(0, 3) } : null;
+    this.paint("pick", this.picked, state, place);
+    const numbers = new Float32Array(8);
+    gl.readPixels(0, 0, 2, 1, gl.RGBA, gl.FLOAT, numbers);
+    const [x, y, z, number, ...normal] = numbers;
+    const surface = normal.pop() > 0 ? { position: [x, y, z], normal } : null;
+    return { number, surface };
   }
 }

@@ -4,9 +4,8 @@ import { add, carried, subtract } from "./vectors.mjs";
 export class Pointer {
   constructor(viewer) {
     Object.assign(this, { viewer, canvas: viewer.canvas, fingers: new Map(), drag: null });
-    for (const name of ["pointerdown", "pointermove", "pointerup", "wheel"])
+    for (const name of ["pointerdown", "pointermove", "lostpointercapture", "wheel"])
       this.canvas.addEventListener(name, (event) => this[name](event));
-    this.canvas.addEventListener("pointercancel", (event) => this.pointerup(event));
     this.canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   }
 
@@ -21,20 +20,18 @@ export class Pointer {
     this.canvas.focus();
     this.canvas.setPointerCapture(event.pointerId);
     this.fingers.set(event.pointerId, this.place(event));
-    if (this.fingers.size > 1) this.drag = { move: this.pinch };
-    else if (event.button > 0 || event.shiftKey) this.drag = { move: this.pan };
-    else this.drag = this.grab(...this.place(event));
+    const pans = this.fingers.size > 1 || event.button > 0 || event.shiftKey;
+    this.drag = pans ? { move: this.pan } : this.grab(...this.place(event));
   }
 
   // Take hold of the decal at a place, or of the model.
   grab(x, y) {
     const { viewer } = this;
-    const number = viewer.decalAt(x, y);
-    const hit = number < 0 ? null : viewer.surfaceAt(x, y);
-    if (!hit) return { move: this.orbit, click: { selected: -1 } };
+    const { number, surface } = viewer.pick(x, y);
+    if (number < 0) return { move: this.orbit, click: { selected: -1 } };
     viewer.set({ selected: number });
-    const offset = subtract(viewer.decals.rows[number].position, hit.position);
-    return { move: this.dragDecal, offset, normal: hit.normal };
+    const offset = subtract(viewer.decals.rows[number].position, surface.position);
+    return { move: this.dragDecal, offset, normal: surface.normal };
   }
 
   pointermove(event) {
@@ -49,31 +46,30 @@ export class Pointer {
   // Move the decal so that the point that was taken hold of stays under the pointer, as `DecalDrag` of the editor.
   dragDecal([x, y]) {
     const { viewer, drag } = this;
-    const hit = viewer.surfaceAt(x, y);
-    if (!hit) return;
-    const middle = add(hit.position, carried(drag.offset, drag.normal, hit.normal));
-    viewer.moveTo(viewer.closestTo(middle) ?? hit, { open: drag.moved });
+    const { surface } = viewer.pick(x, y);
+    if (!surface) return;
+    const middle = add(surface.position, carried(drag.offset, drag.normal, surface.normal));
+    viewer.moveTo(viewer.closestTo(middle) ?? surface, { open: drag.edited });
+    drag.edited = true;
   }
 
   orbit(now, [x, y]) {
     this.viewer.moveCamera("orbit", 0.5 * Math.PI * x, 0.5 * Math.PI * y);
   }
 
-  pan(now, [x, y]) {
-    const share = 0.5 / this.fingers.size;
-    this.viewer.moveCamera("pan", share * x * this.viewer.aspect, share * y);
+  // Move the picture with the middle of all fingers, and zoom by the distance of two.
+  pan(now, [x, y], id) {
+    const { viewer, fingers } = this;
+    const other = [...fingers].find(([finger]) => finger !== id)?.[1];
+    if (other) {
+      const apart = (place) => Math.hypot((place[0] - other[0]) * viewer.aspect, place[1] - other[1]);
+      viewer.moveCamera("zoom", apart(fingers.get(id)) / Math.max(apart(now), 1e-3));
+    }
+    viewer.moveCamera("pan", x / fingers.size, y / fingers.size, viewer.aspect);
   }
 
-  // Zoom by the distance of two fingers, and move the picture with their middle.
-  pinch(now, step, id) {
-    const other = [...this.fingers].find(([finger]) => finger !== id)?.[1];
-    if (!other) return;
-    const apart = ([x, y]) => Math.hypot((x - other[0]) * this.viewer.aspect, y - other[1]);
-    this.viewer.moveCamera("zoom", apart(this.fingers.get(id)) / Math.max(apart(now), 1e-3));
-    this.pan(now, step);
-  }
-
-  pointerup(event) {
+  // A pointer is up, or the browser has taken it away.
+  lostpointercapture(event) {
     this.fingers.delete(event.pointerId);
     if (this.drag?.click && !this.drag.moved) this.viewer.set(this.drag.click);
     if (!this.fingers.size) this.drag = null; // a finger that stays goes on with the same drag

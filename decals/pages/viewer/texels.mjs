@@ -5,7 +5,7 @@ export const ROW = 4096;
 export class Texels {
   // `width` is the number of numbers in a texel.
   constructor(kind, width, count, value = 0) {
-    Object.assign(this, { width, array: new kind(0) });
+    Object.assign(this, { width, array: new kind(0), changes: new Set() });
     this.reserve(Math.max(count, 1));
     this.array.fill(value);
   }
@@ -17,7 +17,6 @@ export class Texels {
     const rows = Math.max(Math.ceil(count / ROW), (2 * array.length) / (ROW * width));
     this.array = new array.constructor(rows * ROW * width);
     this.array.set(array);
-    this.changes = null; // all rows
   }
 
   // Write numbers from a texel on.
@@ -25,7 +24,7 @@ export class Texels {
     const end = texel + values.length / this.width;
     this.reserve(end);
     this.array.set(values, texel * this.width);
-    for (let row = Math.floor(texel / ROW); row * ROW < end; row++) this.changes?.add(row);
+    for (let row = Math.floor(texel / ROW); row * ROW < end; row++) this.changes.add(row);
   }
 
   // The numbers of a texel.

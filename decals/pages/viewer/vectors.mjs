@@ -6,12 +6,7 @@ export const scaled = (a, k) => [a[0] * k, a[1] * k, a[2] * k];
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const length = (a) => Math.hypot(a[0], a[1], a[2]);
 export const unit = (a) => scaled(a, 1 / (length(a) || 1));
-
-export const cross = (a, b) => [
-  a[1] * b[2] - a[2] * b[1],
-  a[2] * b[0] - a[0] * b[2],
-  a[0] * b[1] - a[1] * b[0],
-];
+export const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
 
 // A vector turned about a unit axis, counter-clockwise (Rodrigues).
 export function turned(v, axis, angle) {
@@ -20,14 +15,11 @@ export function turned(v, axis, angle) {
   return add(add(scaled(v, c), scaled(cross(axis, v), Math.sin(angle))), along);
 }
 
-// A vector carried along by the smallest turn from one unit normal to another.
+// A vector carried along by the smallest turn from one unit normal to another: two reflections.
 export function carried(v, from, to) {
-  const axis = cross(from, to);
-  const sine = length(axis);
-  if (sine < 1e-9) {
-    return dot(from, to) > 0 ? v : subtract(v, scaled(to, 2 * dot(v, to)));
-  }
-  return turned(v, scaled(axis, 1 / sine), Math.atan2(sine, dot(from, to)));
+  const [sum, share] = [add(from, to), 1 + dot(from, to)];
+  if (share < 1e-9) return subtract(v, scaled(to, 2 * dot(v, to))); // opposite normals
+  return add(subtract(v, scaled(sum, dot(sum, v) / share)), scaled(to, 2 * dot(from, v)));
 }
 
 // The part of a vector across a unit normal, at length 1.

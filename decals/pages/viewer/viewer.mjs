@@ -1,6 +1,5 @@
 // A page's viewer: the model with its decals, which are picked, dragged, turned, scaled, added and deleted.
 import { Camera } from "./camera.mjs";
-import { COMMANDS } from "./commands.mjs";
 import { Controls } from "./controls.mjs";
 import { DecalSet, framed, isDecal } from "./decals.mjs";
 import { History } from "./history.mjs";
@@ -11,7 +10,6 @@ import { Pointer } from "./pointer.mjs";
 import { add, carried, cross, dot, length, scaled, subtract } from "./vectors.mjs";
 
 const OWN_SIZE = 0.05; // radius of the first decal, in sizes of the model
-const GRAZING = 0.05; // cosine between ray and normal below which a place within a pixel is not sought
 const ROUNDS = 4; // in which the closest surface is found
 const NARROW = 1; // angle of view, in degrees, of a look along one ray
 const STEP = 0.25; // of a decal, in radii, at a press
@@ -19,16 +17,16 @@ const ORBIT = Math.PI / 24; // of the model, at a press
 
 class Viewer {
   constructor(root, { header, arrays }, options) {
-    Object.assign(this, { header, arrays, listeners: new Map(), selected: -1, waiting: false, sample: 0 });
+    const { mode, stiffness, scene, rules } = header;
+    Object.assign(this, { header, arrays, mode, stiffness, selected: -1, listeners: new Map(), sample: 0 });
+    this.originals = scene.decals;
     this.controls = new Controls(root, { ...header, ...options }, this);
     this.canvas = this.controls.canvas;
     this.painter = new Painter(this.canvas, header, arrays);
-    this.decals = new DecalSet(header.scene.decals, header.rules);
-    this.originals = this.decals.rows.slice();
+    this.decals = new DecalSet(scene.decals, rules);
     this.history = new History(this.decals, () => this.changed("decals"));
     this.camera = new Camera(header.camera, header.bounds, header.aspect);
     this.home = this.camera.pose;
-    Object.assign(this, { mode: header.mode, stiffness: header.stiffness });
     this.pointer = new Pointer(this);
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.canvas);
@@ -44,14 +42,10 @@ class Viewer {
 
   // Change the camera, the contact mode, the stiffness, decals ({number: row or null}), or the state of a link.
   set({ link, camera, mode, stiffness, decals, selected }) {
-    if (link !== undefined) {
-      const { changes, ...state } = read(link, this.originals);
-      if (changes.length) this.edit(changes);
-      this.set(state);
-    }
-    if (camera) this.camera.place(camera);
+    if (link !== undefined) this.set(read(link, this.originals));
+    if (camera) Object.assign(this.camera, { position: camera.position, target: camera.target });
     if (Object.hasOwn(this.header.shaders.modes, mode ?? "")) this.mode = mode;
-    if (stiffness >= 1) this.stiffness = stiffness;
+    if (stiffness >= 1 && stiffness < Infinity) this.stiffness = Number(stiffness);
     if (decals) this.edit(Object.entries(decals).map(([number, row]) => [Number(number), row]));
     if (selected !== undefined) this.selected = this.decals.rows[selected] ? selected : -1;
     this.changed("view");
@@ -68,14 +62,6 @@ class Viewer {
   }
 
   // -- the picture ----------------------------------------------------------------------------------------
-
-  start() {
-    this.resize();
-    this.draw();
-    this.painter.finish();
-    performance.mark("first frame");
-    setTimeout(() => this.painter.decalProgram("pick", this)); // so that the first click does not wait
-  }
 
   get aspect() {
     return this.canvas.width / this.canvas.height;
@@ -95,13 +81,12 @@ class Viewer {
   }
 
   request() {
-    if (!this.waiting) requestAnimationFrame(() => this.refine());
-    this.waiting = true;
+    cancelAnimationFrame(this.frame);
+    this.frame = requestAnimationFrame(() => this.refine());
   }
 
   // Draw the next sample of the picture; further ones follow, each after the one before it, until it changes.
   refine() {
-    this.waiting = false;
     if (this.sample > 0 && this.painter.isBusy) this.request();
     else this.draw();
   }
@@ -116,27 +101,9 @@ class Viewer {
 
   // -- what lies at a place of the picture, from −1 to 1 ---------------------------------------------------
 
-  pixel(...place) {
-    const { width, height } = this.canvas;
-    return [width, height].map((side, axis) =>
-      Math.min(Math.max(Math.floor(((1 + place[axis]) * side) / 2), 0), side - 1),
-    );
-  }
-
-  decalAt(x, y) {
-    return this.painter.owner(this, this.pixel(x, y));
-  }
-
-  // The surface at a place: that in the middle of the pixel, moved along its tangent plane.
-  surfaceAt(x, y) {
-    const hit = this.painter.surface(this.camera, this.pixel(x, y));
-    if (!hit) return null;
-    const eye = this.camera.position;
-    const ray = this.camera.direction(x, y, this.aspect);
-    const facing = dot(ray, hit.normal);
-    if (Math.abs(facing) < GRAZING) return hit;
-    const distance = dot(subtract(hit.position, eye), hit.normal) / facing;
-    return { position: add(eye, scaled(ray, distance)), normal: hit.normal };
+  // The number of the decal, −1 for none, and the surface, null for none.
+  pick(x, y, camera = this.camera) {
+    return this.painter.pick({ ...this, camera }, [x, y]);
   }
 
   // The visible surface that is closest to a point beside it: it lies there along the normal.
@@ -144,7 +111,7 @@ class Viewer {
     let [found, place] = [null, point];
     for (let round = 0; round < ROUNDS; round++) {
       const seen = this.camera.seen(place, this.aspect);
-      const hit = seen && this.surfaceAt(...seen);
+      const hit = seen && this.pick(...seen).surface;
       if (!hit) break;
       found = hit;
       place = add(point, scaled(hit.normal, dot(subtract(hit.position, point), hit.normal)));
@@ -173,20 +140,21 @@ class Viewer {
     this.editSelected((row) => ({ ...hit, tangent: carried(row.tangent, row.normal, hit.normal) }), options);
   }
 
-  // Move the selected decal along the surface, by parts of its radius as seen: to where a look from above ends.
-  nudge(right, up) {
+  // Move the selected decal along the surface, to where a look from above ends; or turn the model.
+  arrow(right, up) {
+    if (this.selected < 0) return this.moveCamera("orbit", ORBIT * right, ORBIT * up);
     const { position, normal, radius } = this.decals.rows[this.selected];
     const along = this.camera.upAlong(normal);
-    const step = add(scaled(cross(along, normal), right * radius), scaled(along, up * radius));
-    const target = add(position, step);
+    const step = add(scaled(cross(along, normal), right), scaled(along, up));
+    const target = add(position, scaled(step, STEP * radius));
     const above = { position: add(target, scaled(normal, radius)), target, up: along, fov: NARROW };
     const { bounds, aspect } = this.header;
-    const hit = this.painter.surface(new Camera(above, bounds, aspect), this.pixel(0, 0));
+    const hit = this.pick(0, 0, new Camera(above, bounds, aspect)).surface;
     if (hit && length(subtract(hit.position, position)) < 3 * radius) this.moveTo(hit);
   }
 
   addAt(x, y) {
-    const hit = this.surfaceAt(x, y);
+    const hit = this.pick(x, y).surface;
     if (!hit) return this.controls.say("There is no surface: turn the model so that some is in the middle.");
     const like = this.decals.rows[this.selected] ?? this.decals.rows[this.decals.numbers[0]];
     const row = like ?? { radius: OWN_SIZE * this.camera.size, image: this.header.images ? 0 : -1 };
@@ -203,23 +171,10 @@ class Viewer {
     if (numbers.length) this.controls.say(`Decal ${this.selected} is selected.`);
   }
 
-  // Move the selected decal, or turn the model.
-  arrow(right, up) {
-    if (this.selected >= 0) this.nudge(STEP * right, STEP * up);
-    else this.moveCamera("orbit", ORBIT * right, ORBIT * up);
-  }
-
   // Move the camera by a function of its own.
   moveCamera(how, ...amounts) {
     this.camera[how](...amounts);
     this.changed("view");
-  }
-
-  // Run a command of a button or a key; false if there is none.
-  run(name) {
-    if (!Object.hasOwn(COMMANDS, name)) return false;
-    COMMANDS[name](this);
-    return true;
   }
 }
 
@@ -227,6 +182,10 @@ class Viewer {
 export async function mount(root, data, options = {}) {
   const viewer = new Viewer(root, await unpacked(data), options);
   if (options.link) viewer.set({ link: options.link });
-  viewer.start();
+  viewer.resize();
+  viewer.draw();
+  viewer.painter.finish();
+  performance.mark("first frame");
+  setTimeout(() => viewer.painter.decalProgram("pick", viewer)); // so that the first click does not wait
   return viewer;
 }

@@ -136,6 +136,17 @@ def test_an_index_after_edits_is_that_of_the_decals_then(seed: int) -> None:
         assert all(low <= ranks[number] <= high for number in listed)
 
 
+@needs_node
+def test_exponents_are_right_beside_powers_of_two() -> None:
+    script = """
+    const { exponentAbove } = await import("./index.mjs");
+    console.log(JSON.stringify(data.map(exponentAbove)));
+    """
+    powers = 2.0 ** np.arange(-60, 60)
+    sizes = np.concatenate([powers, np.nextafter(powers, 0), np.nextafter(powers, np.inf)])
+    assert run_node(script, sizes.tolist()) == np.frexp(sizes)[1].tolist()
+
+
 def decal_rank(row: dict[str, Any]) -> int:
     """Return the rank of a decal of a file."""
     layer: int = row["layer"]
