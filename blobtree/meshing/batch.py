@@ -14,16 +14,15 @@ from blobtree.meshing.dual_kernels import sample_blocks
 from blobtree.meshing.mesh import Mesh, download, extract_mesh
 from blobtree.meshing.polygonize import (
     DEFAULT_RESOLUTION,
-    bridges_gaps,
     cell_size_of,
     grid_around,
     load_kernels,
     polygonize,
+    samples_without_gaps,
     shows_thin_parts,
 )
 from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, reporting
-from blobtree.tape.grown import runs_of_leaves
 from blobtree.tape.model import ImplicitModel
 
 MAX_JOINT_BLOCKS = 1 << 18
@@ -105,18 +104,13 @@ def polygonize_batch(
             chosen = [models[n] for n in numbers], [grids[n] for n in numbers]
             meshes = _joint_meshes(*chosen, device, report)
             for row, (tree, grid) in enumerate(zip(*chosen, strict=True) if thin_matters else ()):
-                if _has_several_leaves(tree) and bridges_gaps(build_cells(tree.tape, grid, device=device)):
+                if samples_without_gaps(tree, build_cells(tree.tape, grid, device=device), report) is None:
                     meshes[row] = single(numbers[row])
             return meshes
 
         kinds = list(map(kind, models, grids))
         blocks = list(map(_expected_blocks, models, sizes))
         return work_together(kinds, blocks, MAX_JOINT_BLOCKS, joint, single)
-
-
-def _has_several_leaves(tree: ImplicitModel) -> bool:
-    """Return True if gaps may be between leaves of a tree."""
-    return sum(1 for _ in runs_of_leaves(tree._program)) > 1
 
 
 def _expected_blocks(tree: ImplicitModel, cell_size: float) -> float:

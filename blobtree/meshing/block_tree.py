@@ -5,6 +5,7 @@ a quarter as large. All blocks are numbered in the order in which they are made;
 identifies a cell of any level.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -58,7 +59,7 @@ class Rows:
 class BlockTree:
     """Blocks of several levels, the base being level 0."""
 
-    def __init__(self, cells: SparseCells) -> None:
+    def __init__(self, cells: SparseCells, step: Callable[[float], None] | None = None) -> None:
         self._cells, self._device = cells, cells.device
         self._kernel = cells.tape.instruction_set.kernel_for
         leaves = cells.leaves
@@ -68,7 +69,9 @@ class BlockTree:
         self._coordinates = Rows(leaves.blocks.numpy().reshape(-1, 3))
         self._children = Rows(np.full(blocks * CHILDREN, UNREFINED, np.int32))
         self._parents = Rows(np.full(blocks, -1, np.int64))
-        self._values = Rows(self._sample(0, 0, blocks))
+        self.first_samples = self._sample(0, 0, blocks, step)
+        """The field at the samples of the base, block by block, on the device."""
+        self._values = Rows(_by_block(self.first_samples))
 
     def __len__(self) -> int:
         return len(self.levels)
@@ -218,19 +221,26 @@ class BlockTree:
             self._parents.append(parents[refined // CHILDREN] * CHILDREN + refined % CHILDREN)
             self._levels.append(np.full(blocks - old, level + 1))
             self._coordinates.append(self._level_rows[0].all[old:].numpy().reshape(-1, 3))
-            self._values.append(self._sample(level + 1, old, blocks))
+            self._values.append(_by_block(self._sample(level + 1, old, blocks)))
 
-    def _sample(self, level: int, first: int, end: int) -> Float32Array:
-        """Return the field at the corners of the cells of blocks of one level (n, 5, 5, 5)."""
+    def _sample(
+        self, level: int, first: int, end: int, step: Callable[[float], None] | None = None
+    ) -> DeviceArray:
+        """Return the field at the corners of the cells of blocks of one level."""
         grid, count = self.grid(level), end - first
         listed = on_device(np.arange(first, end), wp.int32, self._device)
         values: DeviceArray = wp.empty(count * SAMPLES, dtype=wp.float32, device=self._device)
         arrays = self.level_arrays()
         inputs: list[Any] = [listed, arrays.blocks, arrays.keys, arrays.spans, arrays.tape]
         inputs += [child_grid(grid, grid.depth), Lattices()]
-        launch(self._kernel(sample_blocks), count * SAMPLES, inputs, [values], self._device)
-        samples: Float32Array = values.numpy().reshape(count, *(SAMPLES_PER_SIDE,) * 3)
-        return samples
+        launch(self._kernel(sample_blocks), count * SAMPLES, inputs, [values], self._device, step=step)
+        return values
+
+
+def _by_block(values: DeviceArray) -> Float32Array:
+    """Return samples in host memory (n, 5, 5, 5)."""
+    samples: Float32Array = values.numpy().reshape(-1, *(SAMPLES_PER_SIDE,) * 3)
+    return samples
 
 
 def on_device(values: NDArray[Any], dtype: Any, device: str) -> DeviceArray:

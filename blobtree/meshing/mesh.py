@@ -169,9 +169,17 @@ def vertex_arrays(positions: DeviceArray, normals: DeviceArray, colors: DeviceAr
     return vertices
 
 
-def extract_mesh(cells: SparseCells, report: Progress, previous: DeviceMesh | None = None) -> DeviceMesh:
-    """Return the dual mesh of the surface in `cells`; reuse `previous`, the mesh before an edit."""
-    return _Extraction(cells, previous).mesh(report)
+def extract_mesh(
+    cells: SparseCells,
+    report: Progress,
+    previous: DeviceMesh | None = None,
+    samples: DeviceArray | None = None,
+) -> DeviceMesh:
+    """Return the dual mesh of the surface in `cells`.
+
+    `previous` is the mesh before an edit, which is reused. `samples` holds the field, if it is known.
+    """
+    return _Extraction(cells, previous).mesh(report, samples)
 
 
 def download(mesh: DeviceMesh, sheet_counts: NDArray[np.uint8] | None = None) -> Mesh:
@@ -205,13 +213,14 @@ class _Extraction:
             self._reuse = reuse_kernels
         self._kernel = cells.tape.instruction_set.kernel_for
 
-    def mesh(self, report: Progress) -> DeviceMesh:
+    def mesh(self, report: Progress, values: DeviceArray | None) -> DeviceMesh:
         """Sample the field, place the vertices, connect them."""
         report("sampling the field", 0.0)
         changed, unchanged = self._changed_blocks()
         needed = len(changed) * SAMPLES * SAMPLE_BYTES + self._count * BLOCK_BYTES
         demand_memory(needed, self._device, f"the surface in {self._count:,} blocks of cells")
-        values = self._sample(changed, partial(report, "sampling the field"))
+        if values is None:
+            values = self._sample(changed, partial(report, "sampling the field"))
         codes, rows, offsets, vertex_counts, quad_counts = self._classify(changed, unchanged, values)
         vertex_starts, vertex_total = exclusive_scan(vertex_counts, "vertices")
         quad_starts, quad_total = exclusive_scan(quad_counts, "triangles")

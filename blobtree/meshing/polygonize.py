@@ -14,12 +14,14 @@ have one size.
 import logging
 import math
 from functools import partial
+from itertools import islice
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
 from blobtree.cells.grid import Grid, aligned_grid
+from blobtree.cells.scan import DeviceArray
 from blobtree.cells.sparse_cells import CELL_KERNELS, SparseCells, build_cells
 from blobtree.device import known_device, launch
 from blobtree.errors import InvalidResolution
@@ -31,6 +33,7 @@ from blobtree.meshing.dual_kernels import sample_blocks
 from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, reporting
+from blobtree.tape.grown import runs_of_leaves
 from blobtree.tape.model import ImplicitModel, checked_tree
 from blobtree.tape.operands import has_walls
 from blobtree.tape.part_sizes import has_small_parts, has_warps, sized_tape
@@ -204,22 +207,25 @@ def polygonize_parts(
     """Return the mesh with cells of `resolution`, and smaller ones where parts are thin, see `polygonize`."""
     truth("creases", creases, InvalidResolution)
     with reporting(progress, cancel) as report:
-        if not shows_thin_parts(tree, resolution, device):
-            polygonizer = Polygonizer(
-                tree, resolution=resolution, creases=creases, device=device, progress=report
-            )
-            if not bridges_gaps(polygonizer.device_mesh.cells):
-                return polygonizer.mesh
         size = cell_size_of(tree, resolution, None)
+        if not shows_thin_parts(tree, resolution, device):
+            load_kernels(tree, device, creases, sample_blocks, place_vertices)
+            cells = build_cells(tree.tape, grid_around(tree, size), device=device, report=report)
+            samples = samples_without_gaps(tree, cells, report)
+            if samples is not None:
+                _, mesh, sheet_counts = _extracted(cells, None, creases, report, samples)
+                return download(mesh, sheet_counts)
         return _mesh_of_thin_parts(tree, size, creases, device, report)
 
 
-def bridges_gaps(cells: SparseCells) -> bool:
-    """Return True if the mesh of cells of one size bridges a gap."""
+def samples_without_gaps(tree: ImplicitModel, cells: SparseCells, report: Progress) -> DeviceArray | None:
+    """Return the field at the samples of cells of one size; None if their mesh bridges a gap."""
     from blobtree.meshing.block_tree import BlockTree  # imported here, as above
     from blobtree.meshing.gaps import Gaps
 
-    return len(Gaps(BlockTree(cells)).edges()) > 0
+    blocks = BlockTree(cells, partial(report, "sampling the field"))
+    several = len(list(islice(runs_of_leaves(tree._program), 2))) > 1
+    return None if several and len(Gaps(blocks).edges()) else blocks.first_samples
 
 
 def shows_thin_parts(tree: ImplicitModel, resolution: int, device: str | None) -> bool:
@@ -524,8 +530,19 @@ class Polygonizer:
         grid = grid_around(tree, self._cell_size)
         old_cells = previous.cells if previous is not None else None
         cells = build_cells(tree.tape, grid, device=self._device, previous=old_cells, report=report)
-        mesh = extract_mesh(cells, report, previous)
-        return (mesh, *sharpened(mesh, report)) if self._creases else (mesh, mesh, None)
+        return _extracted(cells, previous, self._creases, report)
+
+
+def _extracted(
+    cells: SparseCells,
+    previous: DeviceMesh | None,
+    creases: bool,
+    report: Progress,
+    samples: DeviceArray | None = None,
+) -> tuple[DeviceMesh, DeviceMesh, NDArray[np.uint8] | None]:
+    """Return a mesh of cells, the same with vertices on creases if asked for, and its sheet counts."""
+    mesh = extract_mesh(cells, report, previous, samples)
+    return (mesh, *sharpened(mesh, report)) if creases else (mesh, mesh, None)
 
 
 def cell_size_of(tree: ImplicitModel, resolution: int | None, cell_size: float | None) -> float:
