@@ -11,6 +11,7 @@ from blobtree.cells.sparse_cells import build_cells
 from blobtree.device import known_device
 from blobtree.joint_work import checked_trees, is_small, of_tree, work_together
 from blobtree.meshing.dual_kernels import sample_blocks
+from blobtree.meshing.gaps import samples_without_gaps
 from blobtree.meshing.mesh import Mesh, download, extract_mesh
 from blobtree.meshing.polygonize import (
     DEFAULT_RESOLUTION,
@@ -18,7 +19,6 @@ from blobtree.meshing.polygonize import (
     grid_around,
     load_kernels,
     polygonize,
-    samples_without_gaps,
     shows_thin_parts,
 )
 from blobtree.meshing.vertex_kernels import place_vertices

@@ -10,6 +10,8 @@ different components of the graph. Cells beside such edges are divided until no 
 """
 
 from dataclasses import dataclass
+from functools import partial
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -17,10 +19,15 @@ import warp as wp
 
 from blobtree._typing import BoolArray, Float64Array, IndexArray, Int32Array, Int64Array
 from blobtree.cells.grid import BRANCHING, CHILDREN
+from blobtree.cells.scan import DeviceArray
+from blobtree.cells.sparse_cells import SparseCells
 from blobtree.device import launch
 from blobtree.formulas.falloff import ISO
 from blobtree.meshing.block_tree import BlockTree, on_device
 from blobtree.meshing.gap_kernels import find_owners, measure_gaps
+from blobtree.progress import Progress
+from blobtree.tape.grown import runs_of_leaves
+from blobtree.tape.model import ImplicitModel
 
 NEAR_BLOCKS = 2
 """Distance, in blocks of the base, within which edges inside join two samples."""
@@ -192,6 +199,13 @@ class Gaps:
         x, y, z = (line * scale[:, None] for line in (x, y, z))
         keys: Int64Array = (x << 42)[:, :, None, None] + (y << 21)[:, None, :, None] + z[:, None, None, :]
         return keys
+
+
+def samples_without_gaps(tree: ImplicitModel, cells: SparseCells, report: Progress) -> DeviceArray | None:
+    """Return the field at the samples of cells of one size; None if their mesh bridges a gap."""
+    blocks = BlockTree(cells, partial(report, "sampling the field"))
+    several = len(list(islice(runs_of_leaves(tree._program), 2))) > 1
+    return None if several and len(Gaps(blocks).edges()) else blocks.first_samples
 
 
 def connected_blocks(coordinates: Int32Array) -> IndexArray:

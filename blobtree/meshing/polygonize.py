@@ -14,7 +14,6 @@ have one size.
 import logging
 import math
 from functools import partial
-from itertools import islice
 
 import numpy as np
 import warp as wp
@@ -33,7 +32,6 @@ from blobtree.meshing.dual_kernels import sample_blocks
 from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, reporting
-from blobtree.tape.grown import runs_of_leaves
 from blobtree.tape.model import ImplicitModel, checked_tree
 from blobtree.tape.operands import has_walls
 from blobtree.tape.part_sizes import has_small_parts, has_warps, sized_tape
@@ -205,6 +203,8 @@ def polygonize_parts(
     cancel: Cancel | None = None,
 ) -> Mesh:
     """Return the mesh with cells of `resolution`, and smaller ones where parts are thin, see `polygonize`."""
+    from blobtree.meshing.gaps import samples_without_gaps  # imported here: cells of one size need none
+
     truth("creases", creases, InvalidResolution)
     with reporting(progress, cancel) as report:
         size = cell_size_of(tree, resolution, None)
@@ -216,16 +216,6 @@ def polygonize_parts(
                 _, mesh, sheet_counts = _extracted(cells, None, creases, report, samples)
                 return download(mesh, sheet_counts)
         return _mesh_of_thin_parts(tree, size, creases, device, report)
-
-
-def samples_without_gaps(tree: ImplicitModel, cells: SparseCells, report: Progress) -> DeviceArray | None:
-    """Return the field at the samples of cells of one size; None if their mesh bridges a gap."""
-    from blobtree.meshing.block_tree import BlockTree  # imported here, as above
-    from blobtree.meshing.gaps import Gaps
-
-    blocks = BlockTree(cells, partial(report, "sampling the field"))
-    several = len(list(islice(runs_of_leaves(tree._program), 2))) > 1
-    return None if several and len(Gaps(blocks).edges()) else blocks.first_samples
 
 
 def shows_thin_parts(tree: ImplicitModel, resolution: int, device: str | None) -> bool:
