@@ -34,12 +34,13 @@ class ChildGrid:
 
 @wp.struct
 class Lattices:
-    """Lattices of many models whose blocks lie in one list; no grids if there is one model alone.
+    """Lattices of the models whose blocks lie in one list.
 
-    The first digits of a block's key are then the number of its model, and `grids` holds that of each.
+    With several models, the first digits of a block's key are the number of its model.
     """
 
     grids: wp.array(dtype=ChildGrid)
+    """The lattice of each model; empty for a list of one model."""
     shift: wp.int64
     """Bits of a key behind the number of the model."""
 
@@ -64,7 +65,7 @@ class CellBlocks:
 
 @wp.func
 def model_of(block: wp.int32, keys: wp.array(dtype=wp.int64), models: Lattices) -> wp.int32:
-    """Return the number of the model of a block; 0 if there is one model alone."""
+    """Return the number of the model of a block; 0 in a list of one model."""
     if models.grids.shape[0] == 0:
         return 0
     return int(keys[block] >> models.shift)
@@ -74,7 +75,7 @@ def model_of(block: wp.int32, keys: wp.array(dtype=wp.int64), models: Lattices) 
 def lattice_of(
     block: wp.int32, keys: wp.array(dtype=wp.int64), single: ChildGrid, models: Lattices
 ) -> ChildGrid:
-    """Return the lattice of a block's model; `single` is that of an only model."""
+    """Return the lattice of a block's model; `single` is that of a list of one model."""
     if models.grids.shape[0] == 0:
         return single
     return models.grids[model_of(block, keys, models)]

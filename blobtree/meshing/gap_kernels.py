@@ -113,7 +113,7 @@ def measure_gaps(
     widths: wp.array(dtype=wp.float32),
     places: wp.array(dtype=wp.vec3),
 ) -> None:
-    """Write the width of the gap along each edge, 0 if there is none, and a place in it.
+    """Write the width of the gap that each edge crosses, and a place in the gap; 0 for edges without one.
 
     `steps` lead from the starts to the ends of edges. The ends belong to different primitives. A gap between
     these is where the nearest primitive changes, as its middle is as far from both.
