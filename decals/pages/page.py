@@ -7,8 +7,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.resources import files
 from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 from PIL import Image
@@ -58,7 +58,7 @@ SLOT = re.compile(r"<!--([A-Z]+)-->")
 TOOLTIP = re.compile(r' title="([^"]*)"')
 """Titles of buttons, which are also their labels for people who do not see them."""
 
-VIEWER = files("decals.pages") / "viewer"
+VIEWER = Path(__file__).parent / "viewer"
 """Template, style and modules of the viewer."""
 
 

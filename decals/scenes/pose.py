@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-import decals
 from blobtree import Node, polygonize
 from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.errors import InvalidNode
@@ -27,6 +26,7 @@ from decals.scenes.camera import Camera
 from decals.scenes.objects import Box, MeshObject, SceneObject, TreeObject
 from decals.scenes.origin import Origin
 from decals.scenes.scene import DecalImage, Scene
+from decals.scenes.shortcuts import public
 from decals.surfaces.base_color import BaseColor, Color
 from decals.surfaces.convert import as_shape, is_model
 from decals.surfaces.mesh_data import MeshData
@@ -131,14 +131,15 @@ class PosedScene:
 
     def render(self, **options: Any) -> Picture:
         """Draw the scene as its `drawing` says; options and errors are those of `decals.render`."""
-        return decals.render(self, **options)
+        picture: Picture = public("render")(self, **options)
+        return picture
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Raise `InvalidScene`: a file holds the rest pose, so save the scene that was posed.
 
         `decals.bake` writes the pose itself, with the decals in a texture.
         """
-        decals.save_scene(cast(Any, self), path)
+        public("save_scene")(cast(Any, self), path)
 
 
 def require_scene(name: str, scene: object, advice: str) -> Scene:

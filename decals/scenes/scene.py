@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import decals
 from blobtree.identity import Value
 from blobtree.immutable import read_only
 from blobtree.progress import Progress
@@ -31,6 +30,7 @@ from decals.scenes.objects import (
 )
 from decals.scenes.origin import WORLD, Origin
 from decals.scenes.recipe import Recipe
+from decals.scenes.shortcuts import public
 from decals.surfaces.convert import Model
 from decals.validation import describe, instance, require_rgba, whole_number
 
@@ -289,7 +289,7 @@ class Scene(Value):
         >>> len(decals.load_scene("ball.json").decals)
         20
         """
-        decals.save_scene(self, path, progress=progress)
+        public("save_scene")(self, path, progress=progress)
 
     def save_html(self, path: str | os.PathLike[str], **options: Any) -> None:
         """Write the scene as one HTML page whose decals can be moved; see `decals.pages.page`.
@@ -300,7 +300,7 @@ class Scene(Value):
         >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20)
         >>> scene.save_html("ball.html", resolution=16)
         """
-        decals.save_html(self, path, **options)
+        public("save_html")(self, path, **options)
 
     def page(self, **options: Any) -> Any:
         """Return the scene as one HTML page, which a notebook shows inline; see `decals.pages.page`.
@@ -311,7 +311,7 @@ class Scene(Value):
         >>> decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20).page(title="Ball", resolution=16)
         Page(title='Ball')
         """
-        return decals.pages.page(self, **options)
+        return public("pages").page(self, **options)
 
     def render(self, **options: Any) -> rendering.Picture:
         """Draw the scene as its `drawing` says; options and errors are those of `decals.render`.
@@ -322,7 +322,8 @@ class Scene(Value):
         >>> decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20).render(size=(64, 48))
         Picture(64 × 48 pixels)
         """
-        return decals.render(self, **options)
+        picture: rendering.Picture = public("render")(self, **options)
+        return picture
 
     def measure(self, **options: Any) -> Any:
         """Measure how the decals lie; options and errors are those of `decals.measure`.
@@ -333,7 +334,7 @@ class Scene(Value):
         >>> decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20).measure().coverage > 0.99
         True
         """
-        return decals.measure(self, **options)
+        return public("measure")(self, **options)
 
     def show(self, **options: Any) -> Any:
         """Show the scene in a window or a notebook; options and errors are those of `decals.show`.
@@ -343,7 +344,7 @@ class Scene(Value):
         >>> import blobtree, decals
         >>> decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20).show()  # doctest: +SKIP
         """
-        return decals.show(self, **options)
+        return public("show")(self, **options)
 
     def edit(self, **options: Any) -> "Scene":
         """Edit the scene in a window, and return the edited one; options are those of `decals.edit`.
@@ -354,7 +355,8 @@ class Scene(Value):
         >>> scene = decals.cover(blobtree.Point((0, 0, 0), radius=1), count=20)
         >>> scene = scene.edit()  # doctest: +SKIP
         """
-        return decals.edit(self, **options)
+        edited: Scene = public("edit")(self, **options)
+        return edited
 
     def _repr_png_(self) -> bytes | None:
         """Return a PNG file for notebooks; None, so that they show text, without OpenGL."""
