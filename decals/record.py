@@ -47,6 +47,9 @@ DEFAULT_STIFFNESS = 2.0
 NEIGHBOR_REACH = 0.575
 """Neighbour reach in influence radii. A neighbour beyond it would move r by less than 7e-5 of the rim."""
 
+OPAQUE_ALPHA = 0.9999
+"""Alpha above which decals below are left out."""
+
 NO_FIELD = 2.0
 """Complement of a decal that does not act on a point: above every e."""
 

@@ -10,8 +10,10 @@ A file carries no ``#version``: the caller chooses it, because one text serves s
 """
 
 import re
+from ast import literal_eval
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 DIRECTORY = Path(__file__).parent
@@ -19,10 +21,18 @@ DIRECTORY = Path(__file__).parent
 
 Define = str | int | float | bool
 
+_CONSTANT = re.compile(r"^const (?:float|int) (?P<name>\w+) = (?P<value>[-+.\de]+);", re.MULTILINE)
 _DIRECTIVE = re.compile(r"\s*//@\s*(?P<text>.*?)\s*$")
 _INCLUDE = re.compile(r"include\s+(?P<name>\S+)$")
 _SLOT = re.compile(r"slot\s+(?P<name>[A-Za-z_]\w*)(?P<optional>\s+optional)?$")
 _NAME = re.compile(r"[A-Za-z_]\w*$")
+
+
+@cache
+def constants(name: str) -> dict[str, int | float]:
+    """Return the constants that a file of shaders declares as numbers, by their names."""
+    text = (DIRECTORY / name).read_text(encoding="utf-8")
+    return {each["name"]: literal_eval(each["value"]) for each in _CONSTANT.finditer(text)}
 
 
 class ShaderError(Exception):

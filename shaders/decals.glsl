@@ -36,8 +36,6 @@ vec4 material_glow;
 vec3 relief_normal;  // at this pixel
 #endif
 
-const float OPAQUE = 0.9999;  // alpha under which no further decal is searched
-
 //@ slot functions
 
 struct DecalHit {

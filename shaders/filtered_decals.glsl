@@ -2,8 +2,6 @@
 // and contact, rims, contact lines and edges of layers by the shares of the pixel on both sides of them. The formulas
 // are those of decals/field/pixel_filter.py. A pixel is the parallelogram around q with the sides `right` and `up`.
 //@ include decals.glsl
-const float REACH = 0.575;  // see decals/record.py
-const int ELASTIC = 3;
 const bool PARTED = decal_nested && decal_contact == ELASTIC;  // small decals part the images of larger ones
 const int MANY = 100;
 const int MAX_BOUNDARIES = 2;  // through a pixel whose shares are computed
@@ -475,7 +473,7 @@ bool pixel_divided = false;
 // Premultiplied linear colour of a pixel that lies inside one decal or on bare surface. One traversal keeps all
 // candidates.
 vec4 inner_color(vec3 q, vec3 n, vec3 right, vec3 up) {
-    const int KEPT = 8;
+    const int KEPT = 8;  // in the components of `a` and `b`
     int owner = -1, count = 0;
     float least = 0.0, margin = 0.5 * (length(right) + length(up));
     ivec4 a = ivec4(-1), b = ivec4(-1);

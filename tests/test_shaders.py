@@ -1,11 +1,22 @@
 """The shader composer: text, slots, origins, and drivers' complaints mapped back to files."""
 
+import ast
+import re
 from pathlib import Path
 
 import pytest
 
 from decals.shaders import CompileError, ComposeError, Origin, Source, compile_error, compose
-from decals.shaders.compose import DIRECTORY
+from decals.shaders.compose import DIRECTORY, constants
+from tests.import_graph import modules
+
+COINCIDENCES = {
+    ("FOOT_STEPS", "FOOT_STEPS"),  # of thin parts of meshes; of rays to relief
+    ("MAX_KEPT", "KEPT"),  # both the components of two vectors
+    ("ROUNDING", "NORMAL_ROUNDING"),
+    ("STEPS", "SEED_STEPS"),
+}
+"""Constants of equal values and similar names that do not depend on each other."""
 
 
 @pytest.fixture
@@ -110,3 +121,47 @@ def test_shader_files_carry_no_version() -> None:
     files = [path for path in DIRECTORY.iterdir() if path.suffix in {".glsl", ".vert", ".frag", ".comp"}]
     for path in files:
         assert "#version" not in path.read_text(encoding="utf-8"), path.name
+
+
+def python_constants(text: str) -> list[tuple[str, object]]:
+    """Return the constants and members of enumerations of a Python file: names and literal values."""
+    found = []
+    for node in ast.walk(ast.parse(text)):
+        match node:
+            case ast.Assign(targets=[ast.Tuple(elts=names)], value=ast.Tuple(elts=values)):
+                found += list(zip(names, values, strict=False))
+            case ast.Assign(targets=[target], value=value):
+                found.append((target, value))
+    return [
+        (name.id, value.value)
+        for name, value in found
+        if isinstance(name, ast.Name) and isinstance(value, ast.Constant) and name.id.isupper()
+    ]
+
+
+def repeated(python: str, glsl: str) -> set[tuple[str, str]]:
+    """Return the pairs of constants of the same value of which one's name ends with the other's."""
+    declared = re.findall(r"const (?:int|uint|float) (\w+) = ([-+.\de]+)u?;", glsl)
+    declared += re.findall(r"^#define (\w+) ([-+.\de]+)$", glsl, re.MULTILINE)
+    return {
+        (name, other)
+        for name, value in python_constants(python)
+        for other, literal in declared
+        if value == float(literal) and (f"_{name}".endswith(f"_{other}") or f"_{other}".endswith(f"_{name}"))
+    }
+
+
+def test_constants_of_python_are_not_repeated_in_shaders() -> None:
+    python = [path.read_text(encoding="utf-8") for name, path in modules().items() if "apps" not in name]
+    shaders = (path for path in DIRECTORY.iterdir() if path.suffix in (".glsl", ".frag", ".vert", ".comp"))
+    glsl = "\n".join(path.read_text(encoding="utf-8") for path in shaders)
+    pairs = set().union(*(repeated(text, glsl) for text in python))
+    assert pairs == COINCIDENCES
+    example = "class Mode:\n    SOFT = 3\nNEAR_REACH, STEPS = 0.575, 4\n"
+    found = repeated(example, "const float REACH = 5.75e-1;\nconst int SOFT = 3;\n#define STEPS 5\n")
+    assert found == {("NEAR_REACH", "REACH"), ("SOFT", "SOFT")}
+
+
+def test_python_reads_constants_of_shaders() -> None:
+    assert constants("light_rows.glsl") == {"MAX_LIGHTS": 32}
+    assert constants("material.glsl")["MIN_FACING"] == 1e-3

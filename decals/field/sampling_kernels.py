@@ -10,12 +10,9 @@ from decals.field.mapping import in_image
 from decals.field.ownership import NO_OWNER, contact_at, owner_at, owner_below, uv_at
 from decals.field.receivers import fade_at
 from decals.index.lookup import IndexedDecals, next_number_below
-from decals.record import RECORD, rank_of
+from decals.record import OPAQUE_ALPHA, RECORD, rank_of
 
 wp.set_module_options(KERNEL_OPTIONS)
-
-OPAQUE_ALPHA = 0.9999
-"""Alpha above which decals below are left out."""
 
 
 @wp.func

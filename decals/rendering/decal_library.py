@@ -20,7 +20,7 @@ from decals.field.pixel_filter import (
 from decals.field.radial import is_above, lies_on_top, power
 from decals.field.receivers import acts, fade_at
 from decals.index.lookup import next_number_below
-from decals.record import Contact, balls_nested, has_cells
+from decals.record import NEIGHBOR_REACH, OPAQUE_ALPHA, Contact, balls_nested, has_cells
 
 LIBRARY_FUNCTIONS = (
     single_layer_at,
@@ -98,11 +98,16 @@ def _constants(
 
 def _declared(constants: dict[str, bool | int]) -> str:
     """Return the declarations of constants."""
-    lines = [f"const float RIM = {float(RIM)!r};\n"]
-    for name, value in constants.items():
-        kind = "bool" if isinstance(value, bool) else "int"
-        lines.append(f"const {kind} {name} = {str(value).lower()};\n")
-    return "".join(lines)
+    shared = {
+        "RIM": float(RIM),
+        "REACH": NEIGHBOR_REACH,
+        "OPAQUE": OPAQUE_ALPHA,
+        "ELASTIC": int(Contact.ELASTIC),
+    }
+    return "".join(
+        f"const {type(value).__name__} {name} = {str(value).lower()};\n"
+        for name, value in (shared | constants).items()
+    )
 
 
 def decal_functions(law: ContactLaw | None, *, filtered: bool = False) -> tuple[Any, ...]:

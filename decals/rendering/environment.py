@@ -23,6 +23,7 @@ from decals.errors import InvalidImage, InvalidScene
 from decals.images.load import AnyImage, image_pixels, is_embedded, read_image
 from decals.images.texels import Pixels, linear_premultiplied
 from decals.options import Values
+from decals.shaders import constants
 from decals.validation import MAX_LIGHT, finite_number, finite_vector, instance
 
 Vector = tuple[float, float, float]
@@ -47,8 +48,8 @@ TABLE_SHAPE = (32, 64)
 TABLE_LOBE_STEPS = (128, 12)
 """Directions over a lobe, from its axis and around it, with which the table is computed."""
 
-MIN_FACING = 1e-3
-"""Least cosine between normal and eye, as in ``shaders/material.glsl``."""
+MIN_FACING = constants("material.glsl")["MIN_FACING"]
+"""Least cosine between normal and eye."""
 
 
 class Panorama(Value):

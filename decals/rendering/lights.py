@@ -9,10 +9,11 @@ import numpy as np
 from blobtree._typing import Float64Array
 from blobtree.colors import ColorLike, color_rgb, is_named
 from decals.errors import InvalidScene
+from decals.shaders import constants
 from decals.validation import describe, finite_number, finite_vector
 
-MAX_LIGHTS = 32
-"""Number of lights that ``shaders/lights.glsl`` has room for."""
+MAX_LIGHTS = int(constants("light_rows.glsl")["MAX_LIGHTS"])
+"""Number of lights that shaders have room for."""
 
 NO_CONE_COSINE = -2.0
 """Cosine of the cone of a light that shines in all directions."""

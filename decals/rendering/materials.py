@@ -12,6 +12,7 @@ from decals.rendering.context import Context
 from decals.rendering.lights import Lighting
 from decals.rendering.options import ImageLike, SceneLike, relief_ranges, relief_texels
 from decals.rendering.pixel_pass import Program, set_uniform
+from decals.shaders import constants
 
 
 class MaterialArray:
@@ -38,7 +39,7 @@ class MaterialArray:
         self.texture.release()
 
 
-STEPS_PER_RADIUS = 16
+STEPS_PER_RADIUS = constants("offset_foot.glsl")["STEPS_PER_RADIUS"]
 """Steps of a ray over the radius of the smallest decal with relief."""
 
 RELIEF_LOOKUPS = 64
@@ -54,8 +55,8 @@ CONE_LENGTHS = (1 / 12, 1 / 6, 1 / 2, 2.0)
 RIM_DEPTHS = 48
 """Rings of equal width from the rim of an image to its centre, of which the highest points are known."""
 
-RIM_KNOTS = 32
-"""Distances from the rim for which slopes to neighbours are known, see ``shaders/relief.glsl``."""
+RIM_KNOTS = int(constants("relief.glsl")["RIM_KNOTS"])
+"""Distances from the rim for which slopes to neighbours are known."""
 
 STRETCH = 2.0
 """Assumed greatest movement of images by contact and mapping, over that of the surface."""

@@ -16,6 +16,7 @@ from decals.images.load import AnyImage, image_pixels
 from decals.images.texels import Pixels, as_bytes, decode_srgb, unit_levels, without_excess
 from decals.options import Values
 from decals.scenes.scene import DecalImage
+from decals.shaders import constants
 from decals.validation import describe, real_number
 
 MAP_NAMES = {
@@ -35,7 +36,7 @@ SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".bmp",
 FLAT = (128, 128, 255)
 """Texel of a normal map where the surface is flat."""
 
-MIN_ROUGHNESS = 0.045
+MIN_ROUGHNESS = constants("material.glsl")["MIN_ROUGHNESS"]
 """Least roughness that is drawn: highlights of smoother surface would be smaller than a pixel."""
 
 RIM_TAPER = 0.04

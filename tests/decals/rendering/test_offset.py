@@ -22,7 +22,6 @@ from decals.rendering.materials import CONE_LENGTHS, RIM_KNOTS, rim_heights, rim
 from decals.rendering.offset_tree import Shell
 from decals.rendering.pixel_pass import BACKEND_VARIABLE
 from decals.rendering.rest_buffer import RestBuffer
-from decals.shaders import compose
 from tests.decals.relief import expected_heights
 from tests.decals.rendering.test_edited import EditedScene
 from tests.decals.rendering.test_relief import waves
@@ -256,10 +255,6 @@ def test_cones_contain_the_heights_of_neighbours(sizes: float) -> None:
         assert near.sum() > 2
         assert (radii * hill[rows, columns] <= slopes[knots, k] * apart + 1e-6)[near].all()
     assert slopes[-1].max() < slopes[0].max()
-
-
-def test_the_shader_reads_as_many_slopes_as_there_are() -> None:
-    assert f"const int RIM_KNOTS = {RIM_KNOTS};" in compose("relief.glsl", version=None).text
 
 
 def interpolated(values: Array, places: Array) -> Array:
