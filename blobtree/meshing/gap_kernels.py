@@ -3,6 +3,7 @@
 import warp as wp
 
 from blobtree.cells.block_kernels import LevelBlocks, grid_point
+from blobtree.cells.grid import BRANCHING
 from blobtree.formulas.falloff import ISO, RIM
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.meshing.dual_kernels import SAMPLES, SAMPLES_PER_SIDE, sample_index
@@ -20,6 +21,12 @@ OWNER_HALVINGS = 16
 
 PROOF = 1
 """Halvings before a bound of the field, which proves for most edges that they stay inside."""
+
+ROUNDING = wp.constant(1e-5)
+"""Relative error of the field in float32, which a proof allows for."""
+
+HALF_BLOCK = wp.constant(0.5 * BRANCHING)
+"""Half the side of a block, in cells."""
 
 SIDE_HALVINGS = 12
 """Halvings until a side of a gap is known."""
@@ -80,6 +87,40 @@ def nearest_primitive(q: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.int32:
 
 
 @wp.kernel
+def bound_slopes(
+    first: wp.int32,
+    listed: wp.array(dtype=wp.int32),
+    level: LevelBlocks,
+    base: wp.vec3i,
+    corner: wp.vec3,
+    cell: wp.float32,
+    slopes: wp.array(dtype=wp.float32),
+) -> None:
+    """Write a Lipschitz bound of the field in listed blocks of a level."""
+    i = first + wp.tid()
+    block = listed[i]
+    low = sample_index(base + level.blocks[block], 0, 0, 0)
+    middle = grid_point(low, corner, cell) + wp.vec3(HALF_BLOCK * cell)
+    reach = wp.sqrt(3.0) * HALF_BLOCK * cell
+    bound = field_bound(middle, wp.vec3(0.0), reach, level.tape, level.spans[block])
+    slopes[i] = wp.max(bound[1], bound[2])
+
+
+@wp.func
+def may_leave(
+    i: wp.int32, place: wp.int32, stride: wp.int32, least: wp.float32, values: wp.array(dtype=wp.float32)
+) -> wp.bool:
+    """Return True if an edge of a sample along an axis has its ends inside with a sum of at most `least`."""
+    for side in range(2):
+        other = place + 2 * side - 1
+        if other >= 0 and other < SAMPLES_PER_SIDE:
+            value = values[i + (2 * side - 1) * stride]
+            if value >= ISO and values[i] + value <= least:
+                return True
+    return False
+
+
+@wp.kernel
 def find_owners(
     first: wp.int32,
     listed: wp.array(dtype=wp.int32),
@@ -87,18 +128,29 @@ def find_owners(
     base: wp.vec3i,
     corner: wp.vec3,
     cell: wp.float32,
+    slopes: wp.array(dtype=wp.float32),
     values: wp.array(dtype=wp.float32),
     owners: wp.array(dtype=wp.int32),
 ) -> None:
-    """Write the nearest primitive at samples of listed blocks of a level; −1 outside, and for single ones."""
+    """Write the nearest primitive at samples of listed blocks of a level; −1 outside, and for single ones.
+
+    It is −1 as well where the slope of the field proves that no edge of the sample leaves the inside.
+    """
     i = first + wp.tid()
-    block = listed[i // SAMPLES]
+    row = i // SAMPLES
     sample = i % SAMPLES
     owners[i] = -1
-    if values[i] >= ISO:
-        x = sample // (SAMPLES_PER_SIDE * SAMPLES_PER_SIDE)
-        y = (sample // SAMPLES_PER_SIDE) % SAMPLES_PER_SIDE
-        index = sample_index(base + level.blocks[block], x, y, sample % SAMPLES_PER_SIDE)
+    if values[i] < ISO:
+        return
+    x = sample // (SAMPLES_PER_SIDE * SAMPLES_PER_SIDE)
+    y = (sample // SAMPLES_PER_SIDE) % SAMPLES_PER_SIDE
+    z = sample % SAMPLES_PER_SIDE
+    least = 2.0 * ISO * (1.0 + ROUNDING) + slopes[row] * cell
+    unproved = may_leave(i, x, SAMPLES_PER_SIDE * SAMPLES_PER_SIDE, least, values)
+    unproved = unproved or may_leave(i, y, SAMPLES_PER_SIDE, least, values)
+    if unproved or may_leave(i, z, 1, least, values):
+        block = listed[row]
+        index = sample_index(base + level.blocks[block], x, y, z)
         owners[i] = nearest_primitive(grid_point(index, corner, cell), level.tape, level.spans[block])
 
 

@@ -24,7 +24,7 @@ from blobtree.cells.sparse_cells import SparseCells
 from blobtree.device import launch
 from blobtree.formulas.falloff import ISO
 from blobtree.meshing.block_tree import BlockTree, on_device
-from blobtree.meshing.gap_kernels import find_owners, measure_gaps
+from blobtree.meshing.gap_kernels import bound_slopes, find_owners, measure_gaps
 from blobtree.progress import Progress
 from blobtree.tape.grown import runs_of_leaves
 from blobtree.tape.model import ImplicitModel
@@ -121,15 +121,20 @@ class Gaps:
             self._crossing = self._crossing.then(self._measured(listed[rows], lowest, axes))
 
     def _owners(self, listed: IndexArray, level: int) -> Int32Array:
-        """Return the nearest primitive (n, 5, 5, 5) at samples of blocks of a level; −1 outside."""
+        """Return the nearest primitive (n, 5, 5, 5) at samples of blocks of a level.
+
+        It is −1 outside, and where the field's slope proves that all edges of the sample stay inside.
+        """
         tree, device = self._tree, self._tree.cells.device
         grid, values = tree.grid(level), tree.values[listed]
+        blocks: list[Any] = [on_device(listed, wp.int32, device), tree.level_arrays()]
+        blocks += [wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner), grid.cell_size]
+        kernel_for = tree.cells.tape.instruction_set.kernel_for
+        slopes: Any = wp.empty(len(listed), dtype=wp.float32, device=device)
+        launch(kernel_for(bound_slopes), len(listed), blocks, [slopes], device)
         owners: Any = wp.empty(values.size, dtype=wp.int32, device=device)
-        inputs = [on_device(listed, wp.int32, device), tree.level_arrays()]
-        inputs += [wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner), grid.cell_size]
-        inputs += [on_device(values.ravel(), wp.float32, device)]
-        kernel = tree.cells.tape.instruction_set.kernel_for(find_owners)
-        launch(kernel, values.size, inputs, [owners], device)
+        inputs = [*blocks, slopes, on_device(values.ravel(), wp.float32, device)]
+        launch(kernel_for(find_owners), values.size, inputs, [owners], device)
         result: Int32Array = owners.numpy().reshape(values.shape)
         return result
 
