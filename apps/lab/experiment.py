@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import BoolArray, Float64Array
 from decals.apps.lab.errors import InvalidLesson
 from decals.editing.queries import nearest_points
-from decals.field.law import AnyContact
+from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.model import Decals
 from decals.scenes.camera import Camera

@@ -19,8 +19,8 @@ from decals.baking.fine_trees import middles_on
 from decals.baking.plain_files import as_polydata
 from decals.baking.surface_colors import evaluation_options
 from decals.errors import InvalidMesh, InvalidScene
+from decals.field.contact_mode import AnyContact
 from decals.field.evaluate import evaluate
-from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.model import Decals
 from decals.scenes.cover import as_scene

@@ -11,8 +11,8 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, 
 from blobtree.validation import point_array
 from decals.editing.document import Document
 from decals.errors import InvalidEdit, InvalidPoints, InvalidScene
+from decals.field.contact_mode import AnyContact, contact_mode
 from decals.field.evaluate import Samples, evaluate
-from decals.field.law import AnyContact, contact_mode
 from decals.field.mapping import ImageMapping
 from decals.field.walks import Walks, walks_for
 from decals.model import Decals

@@ -12,6 +12,7 @@ from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import known_device
 from blobtree.validation import axis_count, items
 from decals.errors import InvalidDevice, InvalidPoints, InvalidScene
+from decals.field.contact_mode import AnyContact
 from decals.field.evaluate import (
     Modes,
     Samples,
@@ -20,7 +21,6 @@ from decals.field.evaluate import (
     samples_of,
     walk_texels,
 )
-from decals.field.law import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.field.points import (
     Rows,
@@ -36,14 +36,15 @@ from decals.field.points import (
     placed,
     rows_on,
 )
-from decals.field.query import BatchTarget, MaterialSamples, Neighbors, Query
+from decals.field.query import MaterialSamples, Neighbors, Query, Target, image_count
+from decals.field.sampling_kernels import color_points, sample_points
 from decals.field.walks import Walks
 from decals.images.load import AnyImage, each_image
 from decals.index.batch import DecalBatch, checked_sets
 from decals.index.build import starts_of
 from decals.model import Decals
 from decals.receivers import mask_on, takes_named_only
-from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, NEIGHBOR_REACH
 from decals.validation import describe
 
 MAX_DECALS = 1 << 18
@@ -51,6 +52,52 @@ MAX_DECALS = 1 << 18
 
 MAX_ROWS = 1 << 22
 """Points that are evaluated at once."""
+
+
+class BatchTarget:
+    """Many sets of decals, and the set of each result; see `Target`."""
+
+    def __init__(self, batch: DecalBatch, sets: Int32Array) -> None:
+        self._batch, self._sets, self.device = batch, sets, batch.device
+        self._sets_on_device: Any = wp.array(sets, dtype=wp.int32, device=batch.device)
+        self.image_count = image_count(batch.joined)
+
+    @property
+    def records(self) -> Any:
+        """Records of all decals."""
+        return self._batch.records
+
+    @records.setter
+    def records(self, records: Any) -> None:
+        self._batch.records = records
+
+    def kernel(self, single: Any) -> Any:
+        """Return the kernel for these decals."""
+        from decals.field import batch_kernels as kernels  # compiled at the first use
+
+        if single is sample_points:
+            return kernels.sample_sets
+        if single is color_points:
+            return kernels.color_sets
+        from decals.field.batch_neighbor_kernels import list_neighbors_of_sets
+
+        return list_neighbors_of_sets
+
+    def arguments(self) -> list[Any]:
+        """Return the arguments of kernels that stand for the decals."""
+        return [self._batch.rows(), self._sets_on_device]
+
+    def count(self, points: Any) -> int:
+        """Return the number of results."""
+        return len(self._sets)
+
+    def places(self, owners: Int32Array) -> Int64Array:
+        """Return the places in `records` of owners."""
+        return np.where(owners >= 0, owners + self._batch.starts[self._sets], -1)
+
+    def wide(self) -> tuple[Target, Int64Array | None]:
+        """Return decals with a wide index, and the numbers of its rows."""
+        return BatchTarget(self._batch.with_reach(1.0 / NEIGHBOR_REACH), self._sets), None
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from blobtree._typing import Float32Array, Float64Array, Int32Array
 from blobtree.device import array_on, known_device, launch
 from blobtree.validation import truth
 from decals.errors import InvalidDecals, InvalidScene
-from decals.field.law import AnyContact, contact_mode
+from decals.field.contact_mode import AnyContact, contact_mode
 from decals.field.mapping import ImageMapping
 from decals.field.points import checked_rows, checked_turns, device_of, placed, rows_on
 from decals.field.query import (

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
+from decals.surfaces.surface import tangent_axes
 
 STEP = 1e-3
 """Step of the differences, in visible radii of the owner."""
@@ -16,14 +17,6 @@ MIN_SLOPE = 1e-12
 OwnersAndImages = tuple[Int32Array, Float32Array]
 
 Points = NDArray[np.floating]
-
-
-def tangent_axes(normals: Points) -> tuple[Float64Array, Float64Array]:
-    """Return two unit vectors across each unit normal, which form a right-handed frame with it."""
-    axes = np.eye(3)[np.abs(normals).argmin(axis=1)]
-    first = np.cross(axes, normals)
-    first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-300)
-    return first, np.cross(normals, first)
 
 
 def image_jacobians(

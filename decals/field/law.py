@@ -9,7 +9,6 @@ functions in which the callees are replaced, so all backends evaluate the same f
 # (kernel code is Python only in form: its names have Warp types)
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import partial
 from types import FunctionType
 from typing import Any
@@ -21,15 +20,14 @@ from numpy.typing import NDArray
 from blobtree.custom.checks import result_of, shown
 from blobtree.custom.falloff import check_falling, find_rim
 from blobtree.custom.source import CustomSource, custom_source, kind_name
-from blobtree.declare.registry import Definitions
 from blobtree.errors import InvalidDefinition, UnknownKind
 from blobtree.formulas.falloff import Falloff
 from blobtree.formulas.falloffs import FALLOFF_NAMES
-from blobtree.identity import Value
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.transpile.specialize import rebind, referenced_values, warp_function
-from decals.errors import ImplicitDecalsError, InvalidScene
+from decals.errors import InvalidScene
 from decals.field.contact import contact_push, push_of, rim_distance
+from decals.field.contact_mode import LAWS, ContactLaw
 from decals.field.radial import RIM_SQUARED
 from decals.record import NEIGHBOR_REACH, RIM_RADIUS, Contact, field_complement
 from decals.validation import member
@@ -181,49 +179,6 @@ _FORMULAS: dict[str, Formulas] = {}
 """The formulas of all laws, by digest: laws with equal functions share what is compiled."""
 
 
-@dataclass(frozen=True, eq=False)
-class ContactLaw(Value):
-    """A decal field g and a contact law h in place of the paper's; `define_contact` makes one.
-
-    It stands for a contact mode in `evaluate`, `render`, `bake`, `measure` and `Drawing`.
-
-    Attributes
-    ----------
-    name : str
-        Its name in files.
-    base : Contact
-        PRODUCT or MIN: how the effects of several neighbours act together.
-    rim : float
-        Distance with g = ½, over that where g ends.
-    digest : str
-        Digest of all of that.
-    formulas : Formulas
-        The formulas of decals with g and h in them.
-    module : str
-        Module that defines g or h.
-
-    Examples
-    --------
-    >>> import decals
-    >>> law = decals.define_contact("gaussian", combine="min")
-    >>> law.name, law.base
-    ('gaussian', <Contact.MIN: 1>)
-    """
-
-    name: str
-    base: Contact
-    rim: float
-    digest: str
-    formulas: Formulas = field(repr=False, compare=False)
-    module: str = field(default="", repr=False, compare=False)
-
-    def __int__(self) -> int:
-        return int(self.base)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _unpickled, (self.name, self.base.name.lower(), self.digest, self.module)
-
-
 def _unpickled(name: str, base: str, digest: str, module: str) -> ContactLaw:
     """Return the law of this name; import its module first if it is not defined yet."""
     if name not in LAWS and name in FALLOFF_NAMES:
@@ -236,13 +191,6 @@ def _unpickled(name: str, base: str, digest: str, module: str) -> ContactLaw:
             "module that defines it first"
         )
     return LAWS[name]
-
-
-AnyContact = Contact | ContactLaw
-"""A contact mode, or a law in place of one."""
-
-LAWS: Definitions[ContactLaw] = Definitions("contact law", "define_contact for it")
-"""The laws that were defined, by name."""
 
 
 def define_contact(
@@ -318,13 +266,8 @@ def define_contact(
     own = g_source.digest_with(h_source.digest)
     formulas = _FORMULAS.setdefault(own, Formulas(functions, own))
     module = (g_source if law is None else h_source).python.__module__
-    LAWS[kind] = ContactLaw(kind, base, rim, digest, formulas, module)
+    LAWS[kind] = ContactLaw(kind, base, rim, digest, formulas, _unpickled, module)
     return LAWS[kind]
-
-
-def contact_mode(value: Any, error: type[ImplicitDecalsError]) -> AnyContact:
-    """Return a contact mode, which may be given by its name, or a law; raise an error for other values."""
-    return value if isinstance(value, ContactLaw) else member("contact", value, Contact, error)
 
 
 def _require_floats(source: CustomSource, count: int, expected: str) -> None:

@@ -11,11 +11,10 @@ import warp as wp
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import launch
 from decals.errors import InvalidImage
+from decals.field.contact_mode import AnyContact, ContactLaw
 from decals.field.jacobian import image_jacobians
-from decals.field.law import AnyContact, ContactLaw
 from decals.field.sampling_kernels import color_points, sample_points
 from decals.images.texels import Pixels, unit_levels
-from decals.index.batch import DecalBatch
 from decals.index.editor import DecalEditor
 from decals.index.index import index_on
 from decals.model import NO_IMAGE, Decals
@@ -158,52 +157,6 @@ class SingleTarget:
             limits = rows.limits_of(decals.receiver_table)
             wide.limits = wp.array(limits, dtype=wp.vec4, device=self.device)
         return SingleTarget(rows, wide, self.device), known
-
-
-class BatchTarget:
-    """Many sets of decals, and the set of each result; see `Target`."""
-
-    def __init__(self, batch: DecalBatch, sets: Int32Array) -> None:
-        self._batch, self._sets, self.device = batch, sets, batch.device
-        self._sets_on_device: Any = wp.array(sets, dtype=wp.int32, device=batch.device)
-        self.image_count = image_count(batch.joined)
-
-    @property
-    def records(self) -> Any:
-        """Records of all decals."""
-        return self._batch.records
-
-    @records.setter
-    def records(self, records: Any) -> None:
-        self._batch.records = records
-
-    def kernel(self, single: Any) -> Any:
-        """Return the kernel for these decals."""
-        from decals.field import batch_kernels as kernels  # compiled at the first use
-
-        if single is sample_points:
-            return kernels.sample_sets
-        if single is color_points:
-            return kernels.color_sets
-        from decals.field.batch_neighbor_kernels import list_neighbors_of_sets
-
-        return list_neighbors_of_sets
-
-    def arguments(self) -> list[Any]:
-        """Return the arguments of kernels that stand for the decals."""
-        return [self._batch.rows(), self._sets_on_device]
-
-    def count(self, points: Any) -> int:
-        """Return the number of results."""
-        return len(self._sets)
-
-    def places(self, owners: Int32Array) -> Int64Array:
-        """Return the places in `records` of owners."""
-        return np.where(owners >= 0, owners + self._batch.starts[self._sets], -1)
-
-    def wide(self) -> tuple[Target, Int64Array | None]:
-        """Return decals with a wide index, and the numbers of its rows."""
-        return BatchTarget(self._batch.with_reach(1.0 / NEIGHBOR_REACH), self._sets), None
 
 
 class Query:

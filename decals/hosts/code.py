@@ -7,7 +7,7 @@ from itertools import product
 from typing import NamedTuple
 
 from blobtree.transpile.builtins import RESERVED_WORDS
-from decals.field.law import AnyContact
+from decals.field.contact_mode import AnyContact
 from decals.index.arrays import DecalArrays
 from decals.record import Contact
 from decals.rendering.decal_library import decal_library

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from decals.errors import InvalidScene
-from decals.field.law import ContactLaw
+from decals.field.contact_mode import ContactLaw
 from decals.field.mapping import ImageMapping
 from decals.rendering.options import Drawing, SceneLike
 

@@ -5,8 +5,8 @@ from typing import Any
 
 from blobtree.formulas.falloff import RIM
 from blobtree.transpile.glsl import translate_library
+from decals.field.contact_mode import AnyContact, ContactLaw
 from decals.field.elastic import bump_at, image_shift, join_bumps
-from decals.field.law import AnyContact, ContactLaw
 from decals.field.mapping import in_image, tangent_coordinates, unroll_step
 from decals.field.ownership import contact_at, owner_at, owner_below, single_layer_at, uv_at
 from decals.field.pixel_filter import (

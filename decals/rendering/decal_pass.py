@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import moderngl
 
 from blobtree._typing import Float32Array
-from decals.field.law import AnyContact, ContactLaw
+from decals.field.contact_mode import AnyContact, ContactLaw
 from decals.field.mapping import ImageMapping
 from decals.rendering.context import Context
 from decals.rendering.data_texture import DataTexture

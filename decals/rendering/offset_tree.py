@@ -21,7 +21,7 @@ import numpy as np
 from blobtree import Node, polygonize
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.progress import reporting
-from decals.field.law import ContactLaw
+from decals.field.contact_mode import ContactLaw
 from decals.rendering.context import Context
 from decals.rendering.decal_data import stored
 from decals.rendering.decal_library import decal_functions

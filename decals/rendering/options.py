@@ -9,7 +9,7 @@ import numpy as np
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.colors import ColorLike, Rgba, color_rgba
 from decals.errors import InvalidScene
-from decals.field.law import AnyContact, contact_mode
+from decals.field.contact_mode import AnyContact, contact_mode
 from decals.field.mapping import ImageMapping
 from decals.images.load import AnyImage
 from decals.images.texels import Pixels

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array, Int64Array
-from decals.field.jacobian import tangent_axes
 from decals.model import FACING_LIMIT, Decals
 from decals.scattering.neighbors import FacingTree
-from decals.surfaces.surface import Surface
+from decals.surfaces.surface import Surface, tangent_axes
 
 NEARNESS = 1e-3
 """Distance from a centre within which an edge counts as its place, in spacings."""

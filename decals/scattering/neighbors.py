@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.device import launch
 from blobtree.progress import check_cancelled
-from decals.field.jacobian import tangent_axes
 from decals.model import FACING_LIMIT
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.repulsion import make_grid, neighbor_search, particle_struct
@@ -22,7 +21,7 @@ from decals.scattering.search_kernels import (
     nearest_distances,
     ring_distances,
 )
-from decals.surfaces.surface import Scalars, vectors
+from decals.surfaces.surface import Scalars, tangent_axes, vectors
 
 MIN_PARALLEL_QUERIES = 4000
 """Number of points from which a search uses more than one thread."""

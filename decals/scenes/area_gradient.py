@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float64Array
 from blobtree.progress import Progress
 from decals.errors import InvalidScene
-from decals.field.law import AnyContact, ContactLaw, contact_mode
+from decals.field.contact_mode import AnyContact, ContactLaw, contact_mode
 from decals.field.mapping import ImageMapping
 from decals.model import Decals
 from decals.record import Contact

@@ -16,7 +16,7 @@ from blobtree.files import replacing, write_atomically
 from blobtree.progress import Progress, reporting
 from blobtree.validation import items
 from decals.errors import InvalidScene
-from decals.field.law import AnyContact
+from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.scenes.camera import Camera
 from decals.scenes.objects import MeshObject, SceneObject, bounds_of

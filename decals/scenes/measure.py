@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
 from blobtree.progress import Progress, reporting
 from decals.errors import InvalidScene
+from decals.field.contact_mode import AnyContact
 from decals.field.evaluate import Samples, evaluate
-from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of, tangent_axes
-from decals.field.law import AnyContact
+from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of
 from decals.field.mapping import IMAGE_RADIUS_SQUARED, ImageMapping
 from decals.field.walks import walks_for
 from decals.model import Decals, Interaction
@@ -25,7 +25,7 @@ from decals.scenes.objects import MeshObject, SceneObject
 from decals.scenes.pose import require_scene
 from decals.scenes.scene import Scene
 from decals.surfaces.normals import split_at_creases
-from decals.surfaces.surface import unit_rows
+from decals.surfaces.surface import tangent_axes, unit_rows
 from decals.validation import count_number, whole_number
 
 SAMPLES_PER_DECAL = 200

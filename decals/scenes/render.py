@@ -13,7 +13,7 @@ from blobtree.identity import content_hash
 from blobtree.progress import reporting
 from blobtree.validation import items
 from decals.errors import InvalidScene
-from decals.field.law import AnyContact
+from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.images.load import AnyImage
 from decals.rendering.environment import Environment, as_environment

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
-from blobtree._typing import BoolArray, Float32Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array
 from blobtree.progress import check_cancelled
 from blobtree.validation import point_array
 from decals.errors import InvalidPoints
@@ -165,6 +165,14 @@ def unit_rows(vectors: NDArray[np.floating]) -> Float32Array:
     lengths = np.linalg.norm(wide, axis=1, keepdims=True)
     units: Float32Array = (wide / np.where(lengths > 0, lengths, 1.0)).astype(np.float32)
     return units
+
+
+def tangent_axes(normals: NDArray[np.floating]) -> tuple[Float64Array, Float64Array]:
+    """Return two unit vectors across each unit normal, which form a right-handed frame with it."""
+    axes = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    first = np.cross(axes, normals)
+    first /= np.maximum(np.linalg.norm(first, axis=1, keepdims=True), 1e-300)
+    return first, np.cross(normals, first)
 
 
 def make_read_only(array: NDArray[np.generic]) -> None:

@@ -15,7 +15,7 @@ from blobtree import Node
 from blobtree.colors import ColorLike
 from blobtree.graphics import opens_window, vtk_warnings_hidden
 from decals.errors import InvalidScene, NoGraphics
-from decals.field.law import AnyContact
+from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.images.load import DEFAULT_IMAGE, AnyImage
 from decals.model import NO_IMAGE, Decals

@@ -14,7 +14,7 @@ from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
 from blobtree._typing import Float64Array
 from decals.errors import InvalidScene
-from decals.field.law import AnyContact
+from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.hosts.code import Code, Form, code_of
 from decals.receivers import EVERYTHING, surface_mask

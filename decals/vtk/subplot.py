@@ -19,7 +19,7 @@ from vtkmodules.vtkRenderingCore import vtkActor
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.progress import displayed, reporting
 from decals.errors import InvalidPoints, InvalidScene
-from decals.field.law import AnyContact
+from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.images.load import AnyImage
 from decals.receivers import label_names

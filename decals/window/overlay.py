@@ -14,7 +14,7 @@ from blobtree.nodes.paths import Path
 from decals.editing.actions import KEYS, Actions
 from decals.editing.document import Document
 from decals.editing.queries import ANGLES, outlines
-from decals.field.law import AnyContact
+from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.scenes.objects import bounds_of
 from decals.vtk.adapters import weak_callback

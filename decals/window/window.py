@@ -20,7 +20,7 @@ from decals.editing.document import Document
 from decals.editing.pointer_tools import PointerTools
 from decals.editing.session import EditSession
 from decals.errors import InvalidEdit, InvalidScene
-from decals.field.law import AnyContact
+from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.scenes.cover import as_scene
 from decals.scenes.files import load_scene
