@@ -40,21 +40,18 @@ EXTRAS: dict[str, str] = {
     "decals.images": "radiance",
     "decals.index": "batch",
     "decals.pages": "*",
-    "decals.rendering": """
-        base_textures environment lights loop_guard materials offset_tree rest_buffer walk_cache
-        """,
+    "decals.rendering": "environment lights materials offset_tree rest_buffer walk_cache",
     "decals.scattering": """
         bare_places boundary boundary_kernels center_normals covering creases deform density gap_filling
         image_projections mean_normals owned_points polish relocation remesh trial_points turned_normals
         variation
         """,
     "decals.scenes": """
-        animation area_gradient figure gaps material material_record measure outlines pose provenance recipe
-        reproduction script tables
+        animation area_gradient figure gaps material material_record measure outlines pose reproduction
+        script tables
         """,
     "decals.surfaces": """
-        curved dataset_colors mesh_check mesh_file nesting space_curve triangulate trimesh_colors vtk_child
-        vtk_process windings
+        dataset_colors mesh_check mesh_file triangulate trimesh_colors vtk_child vtk_process
         """,
     "decals.surfaces.files": "*",
     "decals.vtk": "exports injection mapper",
