@@ -12,13 +12,16 @@ PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest --durations=10 --nump
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-slow test-all check format lint prose types wheel check-lower docs gl clean
+.PHONY: help demo sandbox test test-slow test-all check format lint prose types wheel check-lower docs gl clean
 
 help:  ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-14s%s\n", $$1, $$2 }' Makefile
 
 demo: $(INSTALLED) gl  ## Draw the pictures under out/
 	$(BIN)/implicit-decals demo
+
+sandbox: $(VENV)/browser gl  ## Open the modeller and editor in the browser, with the extra `browser`
+	$(BIN)/implicit-decals sandbox
 
 test: $(INSTALLED) gl  ## Run the tests, except those that are slow or need a CUDA device or a browser
 	$(PYTEST) -m "not slow and $(ORDINARY)"
@@ -81,4 +84,9 @@ $(BIN)/python:
 $(INSTALLED): pyproject.toml | $(BIN)/python
 	@echo "Installing the dependencies of pyproject.toml into $(VENV): the first time 1.5 GB, some minutes"
 	@PYTHONWARNINGS="ignore:Editable installation" $(BIN)/python -m pip install --quiet --editable '.[dev]'
+	@touch $@
+
+$(VENV)/browser: $(INSTALLED)
+	@echo "Installing what the sandbox needs into $(VENV)"
+	@PYTHONWARNINGS="ignore:Editable installation" $(BIN)/python -m pip install --quiet --editable '.[dev,browser]'
 	@touch $@
