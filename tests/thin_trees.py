@@ -17,6 +17,8 @@ from scipy.sparse.csgraph import connected_components
 import blobtree
 from blobtree import Box, Disc, Node, Point, Segment, Shell, Torus
 from blobtree._typing import BoolArray, Float64Array, IndexArray, Int32Array, Int64Array
+from blobtree.formulas.falloff import ISO
+from blobtree.tape.model import gradients_at
 
 PRIMITIVES = ("ball", "hair", "rod", "ring", "plate")
 WALLS = ("lens", "shell", "pipe", "case")
@@ -27,13 +29,30 @@ SHARE_ERROR = 0.05
 AROUND = 48
 """Steps around the axis of a part."""
 
+OWN_TRIANGLES = 64
+"""Extent of a part's own region over the longest sides of triangles whose area in it is measured."""
+
+THICKER_SHARE = 0.05
+"""Share of a part's area that may be thinner than its radius says: ends of tubes, rims of plates."""
+
+DIFFERENCE = 1e-6
+STEPS: Float64Array = DIFFERENCE * np.eye(3)
+"""Steps of the differences that are the derivatives of deformations."""
+
+SAGITTA = 0.25
+"""Distance from a triangle to the surface that it shows, over its longest side, at most."""
+
+NEWTON_STEPS = 4
+"""Steps from the middle of a triangle to the surface."""
+
 
 @dataclass(frozen=True)
 class Part:
-    """A part of a tree: its kind, its radius (for walls half the thickness), its node, and its own region."""
+    """A part of a tree: its kind, its radius, its node, and its own region."""
 
     kind: str
     radius: float
+    """Half its thickness under the deformation, where it is thin but for a twentieth of its area."""
     node: Node
     """The part under the deformation of the tree."""
     centers: Float64Array
@@ -54,6 +73,22 @@ class Part:
             return np.zeros(0, bool)
         near = self.node(points) > 0.25
         return near if self.others is None else near & (self.others(points) == 0.0)
+
+    def area_in(self, corners: Float64Array) -> float:
+        """Return the area of triangles (n, 3, 3) in the own region.
+
+        A triangle may be as large as the region, and its middle off the surface. So triangles are cut into
+        small ones, and each belongs where the surface is nearest, if it is as near as a chord.
+        """
+        lower, upper = self.centers.min(axis=0), self.centers.max(axis=0)
+        extent = float((upper - lower).max())
+        near = ((corners >= lower - extent) & (corners <= upper + extent)).all(axis=2).any(axis=1)
+        corners, longest = _cut(corners[near], extent / OWN_TRIANGLES)
+        centers, doubled = corners.mean(axis=1), _doubled_areas(corners)[1]
+        places = _on_surface(self.node, centers, 0.1 * extent)
+        own = self.owns(places) & (self.node(centers) > 0.25)
+        own &= np.linalg.norm(places - centers, axis=1) < SAGITTA * longest
+        return float(doubled[own].sum()) / 2.0
 
 
 @dataclass(frozen=True)
@@ -100,7 +135,8 @@ def random_tree(seed: int, *, thinnest: float = 2e-4) -> ThinTree:
             others = node if others is None else others | node
         centers, areas = _triangles(move(vertices), faces)
         own = np.ones(len(areas), bool) if others is None else others(centers) == 0.0
-        parts.append(Part(kind, radius, deformed[number], centers[own], areas[own], others))
+        thin = radius * _least_scale(move, vertices, faces)
+        parts.append(Part(kind, thin, deformed[number], centers[own], areas[own], others))
     return ThinTree(tree, tuple(parts))
 
 
@@ -305,8 +341,67 @@ def _quads(rows: int, columns: int, *, closed: bool) -> IndexArray:
 def _triangles(vertices: Float64Array, faces: IndexArray | Int32Array) -> tuple[Float64Array, Float64Array]:
     """Return middles and areas of triangles."""
     corners = vertices[faces]
+    return corners.mean(axis=1), _doubled_areas(corners)[1] / 2.0
+
+
+def _doubled_areas(corners: Float64Array) -> tuple[Float64Array, Float64Array]:
+    """Return normals (n, 3) as long as the doubled areas (n,) of triangles (n, 3, 3), and these."""
     crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return corners.mean(axis=1), 0.5 * np.linalg.norm(crosses, axis=1)
+    return crosses, np.linalg.norm(crosses, axis=1)
+
+
+def _least_scale(move: PointMap, vertices: Float64Array, faces: IndexArray) -> float:
+    """Return the factor by which a deformation makes a part thinner, but for THICKER_SHARE of its area.
+
+    A slab with the normal n between two planes becomes thinner by |J⁻ᵀ n|.
+    """
+    corners = vertices[faces]
+    normals, areas = _doubled_areas(corners)
+    corners, normals = corners[areas > 0.0], normals[areas > 0.0] / areas[areas > 0.0, None]
+    centers = corners.mean(axis=1)
+    columns = [(move(centers + step) - move(centers - step)) / (2.0 * DIFFERENCE) for step in STEPS]
+    longer = np.linalg.solve(np.stack(columns, axis=1), normals[:, :, None])[:, :, 0]
+    scales = 1.0 / np.linalg.norm(longer, axis=1)
+    weights = _doubled_areas(move(corners.reshape(-1, 3)).reshape(corners.shape))[1]
+    order = np.argsort(scales)
+    share = np.cumsum(weights[order]) / weights.sum()
+    return float(scales[order][np.searchsorted(share, THICKER_SHARE)])
+
+
+def _cut(corners: Float64Array, longest: float) -> tuple[Float64Array, Float64Array]:
+    """Return triangles (n, 3, 3) cut into quarters until their sides are at most `longest`.
+
+    Return also the longest side of the triangle that each is cut from.
+    """
+    done, of_done = [np.empty((0, 3, 3))], [np.empty(0)]
+    whole = _longest_sides(corners)
+    while len(corners):
+        small = _longest_sides(corners) <= longest
+        done.append(corners[small])
+        of_done.append(whole[small])
+        a, b, c = np.moveaxis(corners[~small], 1, 0)
+        d, e, f = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+        quarters = ((a, d, f), (d, b, e), (f, e, c), (d, e, f))
+        corners = np.concatenate([np.stack(quarter, axis=1) for quarter in quarters])
+        whole = np.tile(whole[~small], 4)
+    return np.concatenate(done), np.concatenate(of_done)
+
+
+def _longest_sides(corners: Float64Array) -> Float64Array:
+    """Return the longest side of each triangle."""
+    lengths: Float64Array = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    return lengths
+
+
+def _on_surface(node: Node, points: Float64Array, longest: float) -> Float64Array:
+    """Return points after steps of Newton's method to the surface of a node; those off its field stay."""
+    for _step in range(NEWTON_STEPS):
+        rows = gradients_at(node.tape, points).astype(np.float64)
+        squared = np.maximum((rows[:, 1:] ** 2).sum(axis=1, keepdims=True), 1e-300)
+        steps = rows[:, 1:] * (ISO - rows[:, :1]) / squared
+        lengths = np.linalg.norm(steps, axis=1, keepdims=True)
+        points = points + steps * np.minimum(1.0, longest / np.maximum(lengths, 1e-300))
+    return points
 
 
 def is_closed(faces: Int32Array) -> bool:

@@ -32,7 +32,7 @@ from decals import scatter
 from decals.errors import InvalidMesh
 from decals.experiments import Grid, run
 from decals.surfaces import ImplicitSurface
-from tests.thin_trees import ThinTree, decals_of_parts, has_share, is_closed, mesh_areas, random_tree
+from tests.thin_trees import ThinTree, decals_of_parts, has_share, is_closed, random_tree
 
 TARGETS = {
     "thin_parts_lost": "0",
@@ -212,11 +212,11 @@ def _parts_without_mesh(model: ThinTree, mesh: Mesh) -> set[int]:
     counted = _counted_parts(model)
     if not is_closed(mesh.faces):
         return counted
-    centers, areas = mesh_areas(mesh)
+    corners = mesh.vertices.astype(np.float64)[mesh.faces]
     return {
         number
         for number in counted
-        if areas[model.parts[number].owns(centers)].sum() < LEAST_AREA * model.parts[number].area
+        if model.parts[number].area_in(corners) < LEAST_AREA * model.parts[number].area
     }
 
 
