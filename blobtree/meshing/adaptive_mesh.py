@@ -38,6 +38,12 @@ from blobtree.progress import Progress
 SLOTS = CHILDREN + OCTANTS
 """Leaves that a block can have, of either size."""
 
+SINGLE_REPAIRS = 6
+"""Rounds of repairs without polygons in which no leaves but wrong ones are divided."""
+
+WIDEST_REPAIR = 8.0
+"""Distance from a wrong leaf, in sides of it, within which leaves are divided in later rounds."""
+
 MAX_REPAIRS = 100
 """Most rounds in which leaves are divided until the mesh is a manifold; each makes some leaves smaller."""
 
@@ -122,25 +128,33 @@ class AdaptiveMesher:
         self._known_edges: LeafEdges
 
     def mesh(
-        self, report: Progress, max_repairs: int = MAX_REPAIRS, max_growth: float = np.inf
+        self,
+        report: Progress,
+        max_repairs: int = MAX_REPAIRS,
+        max_growth: float = np.inf,
+        max_leaves: float = np.inf,
     ) -> AdaptiveMesh:
         """Return the mesh of the leaves; divide those at which it would not be a manifold.
 
         Raises
         ------
         InvalidResolution
-            Cells cannot be divided any further, or their blocks have grown by more than a factor.
+            Cells cannot be divided any further, or their blocks have grown by more than a factor, or all
+            rounds together have had too many leaves.
         """
-        most = max_growth * len(self._tree)
+        most, stuck, seen = max_growth * len(self._tree), 0, 0
         for repair in range(max_repairs):
-            if len(self._tree) > most:
+            if len(self._tree) > most or seen > max_leaves:
                 break
             report("connecting vertices", repair / max_repairs)
             self._cells.settle()
             leaves = self._cells.leaves()
+            seen += len(leaves)
             rows, polygons, irregular, pierced = self._polygons(leaves)
             if polygons is None:
-                self._divide(leaves, np.flatnonzero(irregular & ~SIMPLE[leaves.codes]), pierced)
+                wrong = np.flatnonzero(irregular & ~SIMPLE[leaves.codes])
+                self._divide(leaves, _widened(leaves, wrong, stuck - SINGLE_REPAIRS), pierced)
+                stuck += 1
                 continue
             counts = PATCH_COUNT[rows].astype(np.int64)
             owners = np.repeat(np.arange(len(leaves)), counts)
@@ -155,6 +169,7 @@ class AdaptiveMesher:
                 return self._with_turned_diagonals(mesh) if self._creases else mesh
             wrong = np.unique(owners[torn])
             self._divide(leaves, wrong[irregular[wrong]] if irregular[wrong].any() else wrong, pierced)
+            stuck = 0
         raise InvalidResolution("cells could not be divided to a closed mesh; allow a smaller error")
 
     def _divide(self, leaves: Leaves, wrong: IndexArray, pierced: IndexArray) -> None:
@@ -404,6 +419,24 @@ class AdaptiveMesher:
         arrays.whole, arrays.whole_span = whole.data, whole.span
         offset = at & 3
         return arrays, rank[blocks.ravel()], offset[:, 0] * 16 + offset[:, 1] * 4 + offset[:, 2]
+
+
+def _widened(leaves: Leaves, wrong: IndexArray, rounds: int) -> IndexArray:
+    """Return leaves to divide after some rounds that found wrong ones: others around them too.
+
+    Between two sides that lie near each other, each divided leaf makes the next one wrong. Alone, these
+    would take a round for each leaf on the way.
+    """
+    if rounds < 0 or not len(wrong):
+        return wrong
+    from scipy.spatial import cKDTree  # most meshes need few repairs
+
+    reach = min(2.0 ** (rounds // 2), WIDEST_REPAIR)
+    others = np.flatnonzero(~SIMPLE[leaves.codes])
+    middles = leaves.lowest + 0.5 * leaves.sizes[:, None]
+    distances, nearest = cKDTree(middles[wrong]).query(middles[others], p=np.inf)
+    side, sizes = leaves.sizes[wrong][nearest], leaves.sizes[others]
+    return np.union1d(wrong, others[(sizes >= side) & (distances < reach * side + 0.5 * sizes)])
 
 
 def first_cells(leaves: Leaves) -> IndexArray:
