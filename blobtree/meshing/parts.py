@@ -59,6 +59,10 @@ SPARE_SHARE = 1 / 16
 LEAST_CELL = 3e-5
 """Smallest cells, over the longest side of the support; parts that need smaller ones are left out."""
 
+FINE_CELL, MAX_FINE_CELLS = 5.5e-5, 100_000
+"""Cells of walls thinner than a ten-thousandth, over the longest side of the support. A wall that takes more
+of them is left out."""
+
 CROSSED_CELLS = 16.0
 """Cells of a block that a plane through its middle crosses."""
 
@@ -76,6 +80,9 @@ MAX_PART_REPAIRS = 80
 
 MAX_REPAIR_GROWTH = 1.4
 """Largest growth of the number of blocks in these rounds; a wall that memory does not allow takes more."""
+
+MAX_REPAIRED_LEAVES = 20_000_000
+"""Most leaves of all these rounds together: as long as half a minute."""
 
 MAX_SECOND_BLOCKS = 40_000
 """Most blocks of a mesh that did not close, for a second mesh to be tried."""
@@ -148,6 +155,10 @@ class PartCells(AdaptiveCells):
         self._given_up = np.zeros(len(tree.cells.leaves), bool)
         """Blocks of the base at gaps for which there is no room."""
         self._gap_blocks = 0
+        if walls is not None:
+            fine = FINE_CELL / LEAST_CELL * least
+            large = walls.leave_out_large(CROSSED_CELLS * MAX_PART_BLOCKS, fine, MAX_FINE_CELLS)
+            self.unresolved += [ThinPart(*wall) for wall in large]
         self._divide_thin_parts()
 
     def _divide_thin_parts(self) -> None:
@@ -331,11 +342,13 @@ def mesh_of_parts(
     creases: bool,
     report: Progress,
     first: FirstCells | None = None,
+    without_walls: bool = True,
 ) -> tuple[Mesh | None, list[ThinPart]]:
     """Return a mesh of cells that are smaller where parts are thin, and the parts that it does not show.
 
-    There is no mesh if the cells of `grid_of(1.0)` do. `grid_of` returns a grid whose cells are smaller by a
-    factor. `first` are the `first_cells` if these are known.
+    There is no mesh if the cells of `grid_of(1.0)` show all parts, or if none closes, not even
+    `without_walls`. `grid_of` returns a grid whose cells are smaller by a factor. `first` are the
+    `first_cells` if these are known.
     """
     smallest, size = _least_cell(tree), grid_of(1.0).cell_size
     if first is None:
@@ -353,14 +366,18 @@ def mesh_of_parts(
         Gaps(blocks).edges()
     ):
         return None, unresolved
-    for is_second in (False, True):
-        if is_second:
-            scale = OTHER_CELLS * first.blocks.cells.grid.cell_size / size
-            first = _sampled(tree, grid_of(scale), device, report)
+    scale = first.blocks.cells.grid.cell_size / size
+    for attempt in range(3):
         try:
             mesh, others = _closed_mesh(first, smallest, creases, report)
         except InvalidResolution:
-            if len(first.blocks) > MAX_SECOND_BLOCKS:
+            if attempt == 0 and len(first.blocks) <= MAX_SECOND_BLOCKS:
+                first = _sampled(tree, grid_of(OTHER_CELLS * scale), device, report)
+            elif first.walls is not None and without_walls:  # their rims may be too sharp for any cells
+                named = _sampled(tree, grid_of(scale), device, report)
+                unresolved += [ThinPart(*wall) for wall in named.walls.thinnest] if named.walls else []
+                first = FirstCells(named.blocks, None)
+            else:
                 break
         else:
             return mesh, others + unresolved
@@ -380,9 +397,9 @@ def _closed_mesh(
     parts = PartCells(first.blocks, 0.0, smallest, first.walls)
     parts.divide_gaps()
     mesher = AdaptiveMesher(parts, creases)
-    mesh = mesher.mesh(report, MAX_PART_REPAIRS, MAX_REPAIR_GROWTH)
+    mesh = mesher.mesh(report, MAX_PART_REPAIRS, MAX_REPAIR_GROWTH, MAX_REPAIRED_LEAVES)
     while parts.divide_gaps():  # repairs have made cells so small that they bridge gaps
-        mesh = mesher.mesh(report, MAX_PART_REPAIRS, MAX_REPAIR_GROWTH)
+        mesh = mesher.mesh(report, MAX_PART_REPAIRS, MAX_REPAIR_GROWTH, MAX_REPAIRED_LEAVES)
     return without_specks(mesh.mesh(creases)), parts.unresolved
 
 

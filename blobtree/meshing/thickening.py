@@ -293,7 +293,8 @@ def mesh_of_thin_parts(
     def with_small_cells(
         model: ImplicitModel, first: FirstCells | None = None
     ) -> tuple[Mesh, list[ThinPart]]:
-        mesh, unresolved = mesh_of_parts(model, partial(grid_of, model), device, creases, report, first)
+        grids = partial(grid_of, model)
+        mesh, unresolved = mesh_of_parts(model, grids, device, creases, report, first, model is tree)
         return mesh or uniform(model), unresolved
 
     size = grid_of(tree, 1.0).cell_size

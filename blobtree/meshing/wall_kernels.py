@@ -14,9 +14,6 @@ from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
-OPPOSED = wp.constant(0.8)
-"""Least cosine between the inward normal on one side and the outward normal on the other side of a wall."""
-
 PLACE_HALVINGS = 12
 """Bisection steps between the corners of a cell."""
 
@@ -100,6 +97,7 @@ def measure_walls(
     thinnest: wp.float32,
     flattest: wp.float32,
     rim: wp.float32,
+    opposed: wp.float32,
     tree: BlockTreeArrays,
     places: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
@@ -113,8 +111,9 @@ def measure_walls(
     Start from the tree's surface within `size`, and look along the inward normal for the other side, with
     steps that double from `thinnest` on. The solid begins nearer than `flattest`, as points are only nearly
     on the surface: two sides that touch have none between them. The two sides of a wall face away from each
-    other. A wedge is as thick as at the distance `rim` from its edge at least, and its thickness is negative
-    nearer to the edge.
+    other: the cosine between the inward normal on one side and the outward normal on the other side is
+    `opposed` at least. A wedge is as thick as at the distance `rim` from its edge at least, and its thickness
+    is negative nearer to the edge.
     """
     i = first + wp.tid()
     thicknesses[i] = UNLIMITED
@@ -170,7 +169,7 @@ def measure_walls(
                 if steepness > 0.0:
                     cosine = wp.dot(inward, g) / steepness
                 angle = wp.acos(wp.clamp(-cosine, -1.0, 1.0))
-                if cosine <= -OPPOSED:
+                if cosine <= -opposed:
                     angles[i] = angle
                     thicknesses[i] = far
                     if far < rim * angle:

@@ -34,7 +34,7 @@ from blobtree.tape.tape import DeviceTape
 WALL_CELLS = 2.0 * PLATE_CELLS
 """Cells across a wall, for the corners of cells to lie in it."""
 
-RIM_SHARE, SMALL_RIM_SHARE = 1 / 24, 1 / 16
+RIM_SHARE, SMALL_RIM_SHARE = 1 / 16, 1 / 8
 """Width of the strip along the edge of a lens, over the lens's radius; of small lenses too."""
 
 SMALL_LENS = 3.0
@@ -42,6 +42,9 @@ SMALL_LENS = 3.0
 
 EDGE_SHARE = 1 / 4
 """Size of the smallest cells at the edges of a lens, over that of the thinnest parts."""
+
+ENOUGH, MOST_SPREADS = 100, 3
+"""Samples that tell the size of walls, and levels in which more are put between those of the first one."""
 
 PARALLEL = np.radians(25.0)
 """Angle between the sides of a wall below which they are nearly parallel."""
@@ -52,8 +55,18 @@ THINNEST = 1e-6
 FLAT = 2e-3
 """Angle between the sides of a wall below which it is as thin all around, and no edge of a wedge."""
 
-LENS_REACH = 2.0
-"""Largest radius of a lens over that of its part with nearly parallel sides, for all angles of its edge."""
+WALL_OPPOSED, LENS_OPPOSED = 0.8, -0.2
+"""Least cosine between the inward normal on one side of a wall and the outward one on the other side; thick
+lenses have right angles at their edges."""
+
+WALL_REACH, LENS_REACH = 2.0, 3.5
+"""Largest radius of a wedge or a lens over that of its part with nearly parallel sides."""
+
+THICK_SHARE = 0.75
+"""Part of a wall's places that are as thin as this part of its thickest ones at most, which lenses have."""
+
+THIN_SHARE = 0.1
+"""Part of a wall's places that may be thinner than is expected of so large an area: at edges."""
 
 CLIMBS = 3
 """Steps of samples toward the solid, before its thickness is measured."""
@@ -83,22 +96,29 @@ SPREAD: dict[int, Float64Array] = {
 class _Samples:
     """Thin places of the surface of one operand."""
 
-    leaf: ProgramLeaf
+    operand: Operand
     tape: DeviceTape
     rim: float
-    """Width of the strip along the edge of a wedge that keeps larger cells."""
+    """Width of the strip along the edge of a wedge in which cells are as large as at its inner side."""
     places: Float32Array
     """Points on the surface (n, 3)."""
     normals: Float32Array
     """Inward normals (n, 3)."""
     needed: Float32Array
     """Sizes of the cells that the wall needs (n,)."""
+    turns: Float32Array
+    """Angles between the sides of the wall (n,)."""
+
+    @staticmethod
+    def none(operand: Operand, device: str, rim: float = 0.0) -> "_Samples":
+        """Return no samples."""
+        numbers, points = np.empty(0, np.float32), np.empty((0, 3), np.float32)
+        return _Samples(operand, operand.tape.on(device), rim, points, points, numbers, numbers)
 
     def chosen(self, among: BoolArray | IndexArray) -> "_Samples":
         """Return some of the samples."""
-        return replace(
-            self, places=self.places[among], normals=self.normals[among], needed=self.needed[among]
-        )
+        columns = ("places", "normals", "needed", "turns")
+        return replace(self, **{name: getattr(self, name)[among] for name in columns})
 
     def thinned(self, spacing: float) -> "_Samples":
         """Return one sample in each cube of this side: many of them climb to one place."""
@@ -146,18 +166,37 @@ class Walls:
         self._device, self._kernel = cells.device, cells.tape.instruction_set.kernel_for
         self._operands = operands = operands_of(tree._program, tree.tape)
         lines = [_crossed_edges(build_cells(one.tape, cells.grid, device=self._device)) for one in operands]
-        self._samples = []
+        self._samples: list[_Samples] = []
+        self._thick: list[float] = []
+        """Cells that the thicker places of each operand's walls need."""
         for operand, (low, high), near in zip(
             operands, lines, self._near_others(operands, lines), strict=True
         ):
-            tape = operand.tape.on(self._device)
-            samples = self._thin(operand.leaf, tape, 0.0, low[near], high[near], 0)
-            if count := np.count_nonzero(samples.needed >= self._least):
-                radius = float(np.sqrt(count / np.pi))
-                share = RIM_SHARE if radius > SMALL_LENS else SMALL_RIM_SHARE
-                rim = share * radius * cells.grid.cell_size
-                samples = self._thin(operand.leaf, tape, rim, low[near], high[near], 0)
+            samples, thick = _Samples.none(operand, self._device), np.inf
+            samples = self._first_samples(samples, low[near], high[near])
+            if (samples.needed >= self._least).any():
+                needed, radius = self._closely(samples)
+                small = radius <= SMALL_LENS * cells.grid.cell_size
+                rim = (SMALL_RIM_SHARE if small else RIM_SHARE) * radius
+                thick = float(np.quantile(needed, THICK_SHARE))
+                samples = self._first_samples(replace(samples, rim=rim), low[near], high[near])
             self._samples.append(samples)
+            self._thick.append(thick)
+
+    def _closely(self, samples: _Samples) -> tuple[Float64Array, float]:
+        """Return the sizes of cells that the walls of an operand need in enough places, and their radius.
+
+        Walls may be small beside cells.
+        """
+        level, spacing, closer = 0, self._blocks.grid(0).cell_size, samples
+        while 0 < len(closer.needed) < ENOUGH and level < MOST_SPREADS:
+            samples, spacing = closer, _spacing(self._blocks.grid(level).cell_size, level)
+            level += 1
+            closer = self._thin(samples, *samples.spread(spacing, 4), level)
+        if len(closer.needed):
+            samples, spacing = closer, _spacing(self._blocks.grid(level).cell_size, level)
+        cubes = np.unique(np.floor(samples.places / spacing).astype(np.int64), axis=0)
+        return samples.needed.astype(np.float64), spacing * float(np.sqrt(len(cubes) / np.pi))
 
     def _near_others(self, operands: list[Operand], lines: list[Ends]) -> list[BoolArray]:
         """Return which lines of each operand are near the tree's surface, and near another operand's.
@@ -222,12 +261,13 @@ class Walls:
     @property
     def thinnest(self) -> list[tuple[float, Float64Array, ProgramLeaf]]:
         """Size of cells, place and leaf of the sample of each operand where its wall is thinnest."""
-        return [
-            (float(samples.needed[at]), samples.places[at].astype(np.float64), samples.leaf)
-            for samples in self._samples
-            if len(samples.needed)
-            for at in [int(samples.needed.argmin())]
-        ]
+        return [self._thinnest_of(samples) for samples in self._samples if len(samples.needed)]
+
+    @staticmethod
+    def _thinnest_of(samples: _Samples) -> tuple[float, Float64Array, ProgramLeaf]:
+        """Return size of cells, place and leaf of the sample where a wall is thinnest."""
+        at = int(samples.needed.argmin())
+        return float(samples.needed[at]), samples.places[at].astype(np.float64), samples.operand.leaf
 
     def needed(self, first: int) -> Float32Array:
         """Return the sizes of cells that walls need in blocks of the finest level, from number `first` on."""
@@ -261,7 +301,26 @@ class Walls:
             either = np.any(chosen[np.where(rows >= 0, first + rows, -1)], axis=0)
             kept = samples.chosen(np.flatnonzero(either))
             ends = kept.spread(spacing, 2 if level == 0 else 4)
-            self._samples[number] = self._thin(samples.leaf, samples.tape, samples.rim, *ends, level + 1)
+            self._samples[number] = self._thin(samples, *ends, level + 1)
+
+    def leave_out_large(
+        self, most: float, finest: float, most_fine: float
+    ) -> list[tuple[float, Float64Array, ProgramLeaf]]:
+        """Forget walls that need more cells than `most`, or than `most_fine` cells below `finest`.
+
+        Return size of cells, place and leaf of each. To be called before blocks are refined. Beside other
+        parts a wall may be thick, so its thickest places do not tell whether it is fine.
+        """
+        left_out, area = [], self._blocks.grid(0).cell_size ** 2
+        for number, samples in enumerate(self._samples):
+            if not len(samples.needed):
+                continue
+            needed = samples.needed.astype(np.float64)
+            cells = (area / needed.clip(np.quantile(needed, THIN_SHARE)) ** 2).sum()
+            if cells > (most_fine if self._thick[number] < THICK_SHARE * finest else most):
+                left_out.append(self._thinnest_of(samples))
+                self._samples[number] = samples.chosen(np.empty(0, np.intp))
+        return left_out
 
     def leaf_at(self, place: Float64Array, size: float) -> ProgramLeaf | None:
         """Return a leaf of the operand with a sample nearest to a place whose wall needs cells of a size.
@@ -272,7 +331,7 @@ class Walls:
         for samples in self._samples:
             gaps = np.linalg.norm(samples.places[samples.needed <= size] - place, axis=1)
             if gaps.min(initial=np.inf) < nearest:
-                nearest, result = gaps.min(), samples.leaf
+                nearest, result = gaps.min(), samples.operand.leaf
         return result
 
     def _rows(self, places: Float64Array, first: int) -> IndexArray:
@@ -284,55 +343,47 @@ class Walls:
         at = np.floor((places - grid.origin) / (4 * grid.cell_size)).astype(np.int64)
         return _Index(blocks.coordinates[first:].astype(np.int64)).find(at)
 
-    def _thin(
-        self,
-        leaf: ProgramLeaf,
-        tape: DeviceTape,
-        rim: float,
-        starts: Float32Array,
-        ends: Float32Array,
-        level: int,
-    ) -> _Samples:
-        """Return the samples between `starts` and `ends` where a wall is too thin for cells of a level."""
+    def _thin(self, like: _Samples, starts: Float32Array, ends: Float32Array, level: int) -> _Samples:
+        """Return the samples between `starts` and `ends` where a wall is too thin for cells of a level.
+
+        The operand and the strip are those of other samples.
+        """
         count, device = len(starts), self._device
         size, limit = (self._blocks.grid(at).cell_size for at in (level, max(level - 1, 0)))
         low, high = (on_device(array, wp.vec3, device) for array in (starts, ends))
         places, moved, normals = (wp.zeros(count, dtype=wp.vec3, device=device) for _ in range(3))
         thicknesses, angles = (wp.zeros(count, dtype=wp.float32, device=device) for _ in range(2))
         arrays = self._blocks.arrays()
-        of_operand = [tape.data, tape.span]
+        of_operand = [like.tape.data, like.tape.span]
         launch(self._kernel(place_samples), count, [low, high, 0.5 * size, *of_operand], [places], device)
         for _climb in range(CLIMBS):
             launch(self._kernel(climb), count, [places, size, *of_operand, arrays], [moved], device)
             places, moved = moved, places
-        inputs = [places, size, WALL_CELLS * limit, self._thinnest, WALL_CELLS * self._least, rim, arrays]
+        inputs = [places, size, WALL_CELLS * limit, self._thinnest, WALL_CELLS * self._least, like.rim]
+        inputs += [LENS_OPPOSED if like.operand.meets else WALL_OPPOSED, arrays]
         launch(self._kernel(measure_walls), count, inputs, [moved, normals, thicknesses, angles], device)
-        needed = thicknesses.numpy() / np.float32(WALL_CELLS)
-        needed = np.where(needed < 0.0, self._next_size(-needed), needed)
-        samples = _Samples(leaf, tape, rim, moved.numpy(), normals.numpy(), needed)
-        turns = angles.numpy()
+        needed, turns = np.abs(thicknesses.numpy()) / np.float32(WALL_CELLS), angles.numpy()
         thin = (needed < limit) & ((needed >= self._least) | (turns < FLAT))
-        if level == 0:
-            thin[thin] = _beside_parallel_sides(samples.places[thin], turns[thin], size)
-        samples = samples.chosen(thin)
-        return samples.thinned(0.5 * _spacing(size, level))
+        samples = replace(like, places=moved.numpy(), normals=normals.numpy(), needed=needed, turns=turns)
+        return samples.chosen(thin).thinned(0.5 * _spacing(size, level))
 
-    def _next_size(self, needed: Float32Array) -> Float32Array:
-        """Return the next larger sizes that cells can have."""
-        base = self._blocks.grid(0).cell_size
-        halvings = np.floor(np.log2(base / np.maximum(needed, 1e-30)))
-        return np.asarray(np.nextafter(base * 2.0**-halvings, np.inf), np.float32)
+    def _first_samples(self, like: _Samples, starts: Float32Array, ends: Float32Array) -> _Samples:
+        """Return the samples of the base near nearly parallel sides; all others are only sharp edges."""
+        from scipy.spatial import cKDTree  # most meshes have no thin walls
 
-
-def _beside_parallel_sides(places: Float32Array, angles: Float32Array, spacing: float) -> BoolArray:
-    """Return which places are near nearly parallel sides; all others are only sharp edges."""
-    from scipy.spatial import cKDTree  # most meshes have no thin walls
-
-    seeds = places[angles < PARALLEL]
-    if not len(seeds):
-        return np.zeros(len(places), bool)
-    reach = LENS_REACH * spacing * float(np.sqrt(len(seeds) / np.pi)) + 2.0 * spacing
-    return np.asarray(cKDTree(seeds).query(places)[0] < reach, bool)
+        level, spacing = 0, self._blocks.grid(0).cell_size
+        samples = closer = self._thin(like, starts, ends, 0)
+        most = MOST_SPREADS if like.operand.meets else 0
+        while level < most and 0 < len(closer.turns) < ENOUGH and closer.turns.min() >= PARALLEL:
+            level += 1
+            closer = self._thin(closer, *closer.spread(spacing, 4), level)
+            spacing = _spacing(self._blocks.grid(level).cell_size, level)
+        seeds = closer.places[closer.turns < PARALLEL]
+        if not len(seeds):
+            return samples.chosen(np.empty(0, np.intp))
+        reach = (LENS_REACH if like.operand.meets else WALL_REACH) * float(np.sqrt(len(seeds) / np.pi))
+        reach = reach * spacing + 2.0 * self._blocks.grid(0).cell_size
+        return samples.chosen(cKDTree(seeds).query(samples.places)[0] < reach)
 
 
 def _of_neighbors(values: NDArray[Any], pick: np.ufunc, axis: int) -> NDArray[Any]:

@@ -27,6 +27,8 @@ class Operand:
     """Its leaves, counted through the program."""
     tool: bool
     """True if it is removed from others."""
+    meets: bool
+    """True if only what it has in common with others is left."""
 
     @property
     def faces_itself(self) -> bool:
@@ -41,6 +43,7 @@ class _Part:
     texels: tuple[Float32Array, ...] = ()
     numbers: tuple[int, ...] = ()
     tool: bool = False
+    meets: bool = False
 
     def then(self, texels: Float32Array, numbers: tuple[int, ...]) -> "_Part":
         """Return these instructions and one more."""
@@ -62,6 +65,11 @@ class _Value:
     def parts(self) -> tuple[_Part, ...]:
         """The operands, or all of it."""
         return self.operands or ((self.whole,) if self.whole.texels else ())
+
+    @property
+    def met(self) -> tuple[_Part, ...]:
+        """The parts, as those of an operand of an intersection."""
+        return tuple(replace(part, meets=True) for part in self.parts)
 
     @property
     def tools(self) -> tuple[_Part, ...]:
@@ -95,7 +103,8 @@ def operands_of(program: list[Instruction], tape: Tape) -> list[Operand]:
                     more = tuple(_runs(step, texels, tape, numbers))
                 elif value.operands:
                     more = (_Part((texels,), numbers),)
-                operands = value.parts + more if more else ()
+                met = removes(operator) and operator.support is not Support.LEFT
+                operands = (value.met if met else value.parts) + more if more else ()
                 value = _Value(value.whole.then(texels, numbers), operands)
             case Push(register):
                 registers[register], value = (value, texels), _Value()
@@ -107,7 +116,7 @@ def operands_of(program: list[Instruction], tape: Tape) -> list[Operand]:
                 operands = ()
                 if removes(operator):
                     tools = operator.support is Support.LEFT
-                    operands = left.parts + (right.tools if tools else right.parts)
+                    operands = left.parts + right.tools if tools else left.met + right.met
                 elif left.operands or right.operands:
                     operands = left.parts + right.parts
                 value = _Value(whole, operands)
@@ -165,12 +174,12 @@ def _runs(step: Run, texels: Float32Array, tape: Tape, numbers: tuple[int, ...])
         yield _Part((np.vstack([header, texels[1:]]),), numbers, tool=True)
         return
     for number, own in zip(numbers, np.split(texels[1:], len(numbers)), strict=True):
-        yield _Part((_alone(texels, own, tape),), (number,))
+        yield _Part((_alone(texels, own, tape),), (number,), meets=True)
 
 
 def _operand(part: _Part, tape: Tape, leaves: list[ProgramLeaf]) -> Operand:
     """Return an operand with its tape."""
-    return Operand(_tape_of(part, tape), leaves[part.numbers[0]], part.numbers, part.tool)
+    return Operand(_tape_of(part, tape), leaves[part.numbers[0]], part.numbers, part.tool, part.meets)
 
 
 def _tape_of(part: _Part, tape: Tape) -> Tape:

@@ -5,7 +5,7 @@ import logging
 import numpy as np
 import pytest
 
-from blobtree import Box, Node, Point, Segment, Shell, SmoothDifference, polygonize
+from blobtree import Box, Mesh, Node, Point, Segment, Shell, SmoothDifference, polygonize
 from blobtree.errors import InvalidResolution
 from blobtree.meshing.adaptive_mesh import AdaptiveMesh, AdaptiveMesher
 from blobtree.meshing.polygonize import polygonize_parts
@@ -54,6 +54,35 @@ def test_both_sides_of_a_wall_have_their_area(name: str) -> None:
     mesh = polygonize_parts(tree, resolution=16)
     assert is_closed(mesh.faces)
     assert mesh_areas(mesh)[1].sum() == pytest.approx(area, rel=0.14 if name == "small lens" else 0.06)
+
+
+LARGE_LENS = BALL & BALL.translate((1.4, 0, 0))
+
+
+def lens_area(mesh: Mesh) -> float:
+    """Return the area of a mesh on the positive side of x = 0, of a closed mesh."""
+    assert is_closed(mesh.faces)
+    centers, areas = mesh_areas(mesh)
+    return float(areas[centers[:, 0] > 0.0].sum())
+
+
+def test_a_thick_lens_smaller_than_cells_has_its_rim() -> None:
+    tree = BALL.translate((-60, 0, 0)) | LARGE_LENS.rotate((1, 2, 3), 40.0).translate((10, 0, 0))
+    assert lens_area(polygonize(tree)) == pytest.approx(2.0 * np.pi * 0.6, rel=0.08)
+
+
+def test_a_flat_lens_smaller_than_cells_has_its_area() -> None:
+    flat = BALL & BALL.translate((1.98, 0, 0))
+    tree = BALL.translate((-60, 0, 0)) | flat.scale(0.8).rotate((1, 2, 3), 40.0).translate((10, 0, 0))
+    assert lens_area(polygonize(tree)) == pytest.approx(0.64 * 2.0 * np.pi * 0.02, rel=0.12)
+
+
+def test_walls_far_thinner_than_parts_that_count_are_named(caplog: pytest.LogCaptureFixture) -> None:
+    flat = BALL & BALL.translate((1.999, 0, 0))
+    mesh = polygonize(BALL.translate((-30, 0, 0)) | flat | Point((10, 0, 0), radius=0.01))
+    assert "a wall of the Intersection at path (1,)" in caplog.text
+    assert len(mesh.faces) < 20_000
+    assert lens_area(mesh) == pytest.approx(4.0 * np.pi * 1e-4, rel=0.15)
 
 
 def test_a_wall_between_two_holes_has_its_area() -> None:

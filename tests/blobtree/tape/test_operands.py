@@ -60,6 +60,20 @@ def test_tools_are_what_is_removed_and_stays_removed(tree: Node, tools: list[str
     assert sorted(type(operand.leaf).__name__ for operand in operands if operand.tool) == tools
 
 
+@pytest.mark.parametrize(
+    ("tree", "meeting"),
+    [
+        (BALL - ROD, []),
+        (BALL & ROD, ["Point", "Segment"]),
+        ((BALL & ROD) - BOX, ["Point", "Segment"]),
+        ((BALL - BOX) & (ROD + NEAR), ["Box", "Point", "Segment"]),
+    ],
+)
+def test_operands_of_intersections_meet(tree: Node, meeting: list[str]) -> None:
+    operands = operands_of(tree._program, tree.tape)
+    assert sorted(type(operand.leaf).__name__ for operand in operands if operand.meets) == meeting
+
+
 def test_leaves_have_their_own_values() -> None:
     tree = ((BALL + ROD).twist(30.0) - BOX.scale((1, 2, 0.5))) | (NEAR & ROD.translate((0, 1, 0)))
     parts = [BALL.twist(30.0), ROD.twist(30.0), BOX.scale((1, 2, 0.5)), NEAR, ROD.translate((0, 1, 0))]
