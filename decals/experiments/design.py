@@ -131,7 +131,7 @@ class Grid(Design):
     {'count': 10, 'contact': 'elastic'}
     """
 
-    def __init__(self, **values: Iterable[Any]) -> None:
+    def __init__(self, /, **values: Iterable[Any]) -> None:
         for name, choices in values.items():
             if isinstance(choices, str | bytes | Mapping) or not isinstance(choices, Iterable):
                 raise InvalidInput(
@@ -188,7 +188,7 @@ class Sobol(Design):
     (8, ['count', 'radius'])
     """
 
-    def __init__(self, count: int, seed: int = 0, **ranges: Range) -> None:
+    def __init__(self, count: int, /, seed: int = 0, **ranges: Range) -> None:
         super().__init__(_filled("Sobol", count, seed, ranges))
 
 
@@ -204,7 +204,7 @@ class LatinHypercube(Design):
     [0, 1, 2, 3]
     """
 
-    def __init__(self, count: int, seed: int = 0, **ranges: Range) -> None:
+    def __init__(self, count: int, /, seed: int = 0, **ranges: Range) -> None:
         super().__init__(_filled("LatinHypercube", count, seed, ranges))
 
 

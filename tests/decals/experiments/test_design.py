@@ -41,6 +41,13 @@ def test_numbers_of_numpy_become_those_of_python() -> None:
 
 
 @pytest.mark.parametrize("kind", [Sobol, LatinHypercube])
+def test_a_parameter_of_a_box_may_have_any_name(kind: type[Sobol]) -> None:
+    design = kind(4, radius=(0.01, 1.0, "log"), count=(10, 99), self=(0, 1))
+    assert {tuple(sorted(trial)) for trial in design} == {("count", "radius", "self")}
+    assert list(Grid(self=[1])) == [{"self": 1}]
+
+
+@pytest.mark.parametrize("kind", [Sobol, LatinHypercube])
 @settings(deadline=None)
 @given(count=st.integers(1, 40), seed=st.integers(0, 9))
 def test_boxes_are_filled_within_their_ranges(kind: type[Sobol], count: int, seed: int) -> None:
