@@ -17,6 +17,7 @@ from decals.apps.commands.gallery import MAX_SIDE
 from decals.apps.commands.options import MAX_SAMPLES, Definitions, Trust, check_count, parse_size
 from decals.apps.commands.progress_bars import preparing
 from decals.apps.gallery.helpers import GALLERY_FUNCTION, example_picture
+from decals.apps.models.samples import sample_mesh
 from decals.baking.reproduction import NO_RECIPE, reproduce_export
 from decals.errors import ImplicitDecalsError, InvalidInput
 from decals.images.load import load_image
@@ -61,19 +62,16 @@ def reproduce(
     suffix = Path(file).suffix.lower()
     if suffix not in (".png", *EXPORTED) and scene is not None:
         raise InvalidInput(f"--scene: expected a PNG, GLB or glTF file beside it, got {file!r}; leave it out")
+    if suffix not in (".png", ".json", *EXPORTED):
+        raise InvalidInput(f"expected a scene (.json), or a PNG, GLB or glTF file, got {file!r}")
     with preparing(define) as progress:
+        held = None if scene is None else load_scene(scene, samples=sample_mesh, trust=trust)
         if suffix == ".png":
-            held = None if scene is None else load_scene(scene, trust=trust)
             found = _of_picture(Path(file), held, progress)
         elif suffix in EXPORTED:
-            found = reproduce_export(
-                Path(file),
-                None if scene is None else load_scene(scene, trust=trust),
-                trust=trust,
-                progress=progress,
-            )
+            found = reproduce_export(Path(file), held, samples=sample_mesh, trust=trust, progress=progress)
         else:
-            found = made_again(load_scene(file, trust=trust), progress=progress)
+            found = made_again(load_scene(file, samples=sample_mesh, trust=trust), progress=progress)
     return _report(file, found)
 
 

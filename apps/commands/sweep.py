@@ -75,6 +75,9 @@ def sweep(
     else:
         results = run(function, design, out, retry=retry, **options)
     Console().print(f"{results} in {results.folder}", highlight=False, soft_wrap=True)
+    errors = Counter(str(row["error"]) for row in results.failed)
+    for error, count in errors.most_common(LATEST):
+        console.print(Text(f"{count} trial{'s' * (count > 1)}: {error}"), soft_wrap=True)
     return 1 if results.failed else 0
 
 

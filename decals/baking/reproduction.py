@@ -14,6 +14,7 @@ from decals.baking.export import EXPORT_FUNCTION, export
 from decals.errors import ImplicitDecalsError, InvalidInput
 from decals.scenes.files import from_json
 from decals.scenes.provenance import changes_since, device_text, package_versions, provenance
+from decals.scenes.records import SampleLoader
 from decals.scenes.render import missing_beside
 from decals.scenes.reproduction import Reproduction
 from decals.scenes.scene import Scene
@@ -25,7 +26,12 @@ NO_RECIPE = "a recipe: the file does not say how it was made"
 
 
 def reproduce_export(
-    path: Path, scene: Scene | None = None, *, trust: bool = False, progress: Progress | None = None
+    path: Path,
+    scene: Scene | None = None,
+    *,
+    samples: SampleLoader | None = None,
+    trust: bool = False,
+    progress: Progress | None = None,
 ) -> Reproduction:
     """Export a scene again as a glTF or GLB file says, and compare the files.
 
@@ -35,6 +41,8 @@ def reproduce_export(
         The file.
     scene : Scene, optional
         Its scene, if the file does not hold it.
+    samples : callable, optional
+        See `load_scene`.
     trust : bool
         Read images that lie outside of the file's folder, if its scene has some.
     progress : callable, optional
@@ -51,7 +59,7 @@ def reproduce_export(
         return Reproduction((NO_RECIPE,))
     try:
         if scene is None and isinstance(held := recipe.get("source"), str):
-            scene = from_json(_unpacked(held), folder=path.parent, trust=trust)
+            scene = from_json(_unpacked(held), folder=path.parent, samples=samples, trust=trust)
         missing = missing_beside(recipe, scene)
         if missing or scene is None:
             return Reproduction(missing)

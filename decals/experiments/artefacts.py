@@ -57,7 +57,7 @@ def is_artefact(value: Any, folder: Path, suffix: str) -> bool:
 
 
 def _measure(name: str, value: Any, folder: Path) -> Any:
-    if isinstance(value, np.generic):
+    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
         value = value.item()
     if value is None or isinstance(value, bool | int | float | str):
         return value
@@ -79,12 +79,14 @@ def _writers() -> Iterator[tuple[type, str, Callable[[Any, Path], object]]]:
     import blobtree
     from decals.model import Decals
     from decals.rendering.picture import Picture
+    from decals.scenes.measure import DecalMeasures
     from decals.scenes.scene import Scene
 
     yield Picture, ".png", lambda picture, path: picture.save(path)
     yield Scene, ".json", lambda scene, path: scene.save(path)
     yield blobtree.Node, ".json", lambda tree, path: blobtree.save(tree, path)
     yield Decals, ".npz", lambda decals, path: np.savez(path, **_arrays(decals))
+    yield DecalMeasures, ".npz", lambda measures, path: np.savez(path, **vars(measures))
     yield np.ndarray, ".npy", lambda array, path: np.save(path, array)
     yield pv.PolyData, ".vtp", lambda mesh, path: mesh.save(path)
     yield blobtree.Mesh, ".vtp", lambda mesh, path: mesh.save(path)

@@ -20,7 +20,7 @@ from decals.experiments.outcome import COLUMNS, Row
 from decals.experiments.results import Results
 from decals.experiments.store import Store, rows_in
 from decals.experiments.values import light
-from decals.experiments.workers import Rows, Work, cluster, connected, here, processes
+from decals.experiments.workers import Rows, Started, Work, cluster, connected, here, processes
 from decals.scenes.recipe import plain
 from decals.validation import count_number, describe, real_number
 
@@ -112,14 +112,13 @@ def run(
         real_number("limit", limit, "seconds above 0", lambda value: value > 0, InvalidInput)
     megabytes = _megabytes(memory, max(1, count))
     with Store(folder, about) as store, reporting(progress, cancel) as report:
-        if (interrupted := store.interrupted()) is not None:
-            store.add({**interrupted, "status": "ended", "error": "ended the process in which it ran"})
         known = {row["trial"]: row for row in rows_in(folder) if row.get("function") == digest}
         todo = [key for key in trials if key not in known or (retry and known[key]["status"] != "done")]
         rows = [_first_columns(key, digest, trials[key]) for key in todo]
         work = Work(function, folder, limit, megabytes)
         chosen = [trials[key] for key in todo]
-        with _executor(work, chosen, count, scheduler, lambda number: store.begin(rows[number])) as ended:
+        started = Started(lambda number: store.begin(rows[number]), store.interrupted(rows))
+        with _executor(work, chosen, count, scheduler, started) as ended:
             report("running trials", 0.0)
             for done, (number, row) in enumerate(ended, 1):
                 store.add(whole := rows[number] | row)
@@ -131,7 +130,7 @@ def run(
 
 @contextmanager
 def _executor(
-    work: Work, trials: list[Trial], workers: int, scheduler: Any, begin: Callable[[int], object]
+    work: Work, trials: list[Trial], workers: int, scheduler: Any, started: Started
 ) -> Iterator[Rows]:
     """Yield the rows of trials, by the executor that the caller chose."""
     with ExitStack() as stack:
@@ -141,13 +140,16 @@ def _executor(
         elif workers:
             rows = processes(work, [light(trial, work.folder) for trial in trials], workers)
         else:
-            rows = here(work, trials, begin)
+            rows = here(work, trials, started)
         yield stack.enter_context(closing(rows))
 
 
 def _first_columns(key: str, digest: str, trial: Trial) -> Row:
     """Return the columns of a row that are known before its trial runs."""
-    values = {name: plain(value) for name, value in trial.items()}
+    values = {
+        name: value if isinstance(value, float) else plain(value)  # also inf and nan
+        for name, value in trial.items()
+    }
     texts = {name: json.dumps(value) for name, value in values.items() if isinstance(value, Mapping)}
     return {"trial": key, "function": digest, **values, **texts}
 

@@ -14,6 +14,7 @@ from blobtree.files import write_atomically
 from decals.errors import InvalidInput, MissingPackage
 from decals.experiments.artefacts import is_artefact
 from decals.experiments.results import Results
+from decals.validation import describe
 
 PICTURES = 24
 """Most pictures of one measure in a report."""
@@ -170,6 +171,8 @@ def _figure(kind: str) -> Callable[[Results, str | None, list[str]], bytes]:
             ) from error
         if measure is None or len(by) not in (1, 2):
             raise InvalidInput("a figure: expected a measure, and one or two parameters to draw it by")
+        if measure in results.measures and measure not in results.numbers:
+            raise InvalidInput(f"a figure: expected a measure that is a number, got {describe(measure)}")
         groups = [group for group in results.interval(measure, by) if group["trials"]]
         figure = Figure(figsize=(4.8, 3.4), layout="constrained")
         axes = figure.add_subplot(xlabel=_plain(by[0]), ylabel=_plain(measure))

@@ -194,10 +194,12 @@ def _summary(values: list[Any], confidence: float, seed: int) -> dict[str, Any]:
 
 def _rank(value: Any) -> tuple[str, Any]:
     """Return a key that sorts values of several types."""
-    if isinstance(value, bool | int | float):
+    if isinstance(value, bool | int | float) and value == value:
         return "", value
     return type(value).__name__, str(value)
 
 
 def _hashable(value: Any) -> Any:
-    return str(value) if isinstance(value, list | dict) else value
+    if isinstance(value, list | dict):
+        return str(value)
+    return value if value == value else np.nan  # one NaN, which groups find again

@@ -10,7 +10,7 @@ import errno
 import io
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
@@ -152,8 +152,9 @@ class Store:
 
     def __exit__(self, *error: object) -> None:
         try:
+            with suppress(OSError):
+                (self._folder / RUNNING).unlink(missing_ok=True)
             self._make_shard()
-            (self._folder / RUNNING).unlink(missing_ok=True)
         finally:
             self._journal.close()
             self._lock.release()
@@ -175,14 +176,15 @@ class Store:
                 )
 
     def begin(self, row: Row) -> None:
-        """Note the trial that starts in this process; if it ends the process, `interrupted` returns it."""
+        """Note the trial that starts in this process; if the process ends, `interrupted` returns it."""
         self._guarded(lambda: (self._folder / RUNNING).write_text(json.dumps(row)))
 
-    def interrupted(self) -> Row | None:
-        """Return the trial that ran in the process of the last run when that process ended."""
+    def interrupted(self, rows: Sequence[Row]) -> int | None:
+        """Return the number of the row that ran in the process of the last run when that process ended."""
         with suppress(FileNotFoundError, ValueError):
-            row: Row = json.loads((self._folder / RUNNING).read_text())
-            return row
+            found: Row = json.loads((self._folder / RUNNING).read_text())
+            keys = [(row["trial"], row["function"]) for row in rows]
+            return keys.index((found.get("trial"), found.get("function")))
         return None
 
     def add(self, row: Row) -> None:

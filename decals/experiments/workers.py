@@ -24,7 +24,7 @@ from decals._version import __version__
 from decals.errors import InvalidInput, MissingPackage
 from decals.experiments.design import Trial
 from decals.experiments.outcome import Row, outcome
-from decals.experiments.values import pickled, stored, unpickled
+from decals.experiments.values import light, pickled, stored, unpickled
 from decals.validation import describe
 
 Rows = Generator[tuple[int, Row], None, None]
@@ -58,12 +58,34 @@ class Work:
     """Memory of a process after which its trial is ended."""
 
 
-def here(work: Work, trials: Sequence[Trial], begin: Callable[[int], object]) -> Rows:
-    """Run trials one after the other in this process; `begin` is called before each."""
+@dataclass(frozen=True)
+class Started:
+    """What is known of trials that start in this process."""
+
+    begin: Callable[[int], object]
+    """Called before each trial."""
+    suspect: int | None
+    """Number of a trial in which the last run ended, by its own fault or from outside."""
+
+
+def here(work: Work, trials: Sequence[Trial], started: Started) -> Rows:
+    """Run trials one after the other in this process, but for a suspect one in a process of its own."""
+    if started.suspect is not None:
+        yield started.suspect, _apart(work, trials[started.suspect])
     for number, trial in enumerate(trials):
-        check_cancelled("running trials")
-        begin(number)
-        yield number, outcome(work.function, trial, work.folder)
+        if number != started.suspect:
+            check_cancelled("running trials")
+            started.begin(number)
+            yield number, outcome(work.function, trial, work.folder)
+
+
+def _apart(work: Work, trial: Trial) -> Row:
+    """Return the row of a trial that may end its process; that it did, where no other process can run it."""
+    try:
+        ((_, row),) = processes(work, [light(trial, work.folder)], 1)
+    except InvalidInput:
+        return _cut(None, "ended the process in which it ran")
+    return row
 
 
 # -- local processes ------------------------------------------------------------------------------------
@@ -104,7 +126,7 @@ class _Worker:
         self._began = time.monotonic()
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(theirs, self._payload), daemon=True)
+        self._process = context.Process(target=_serve, args=(theirs, self._payload))
         with _one_thread():
             self._process.start()
         theirs.close()
@@ -156,7 +178,9 @@ class _Worker:
         self._open()
 
     def end(self) -> None:
-        """End the process."""
+        """End the process, and those that its trial started."""
+        if self._process.pid is not None:
+            _kill_group(self._process.pid)
         self._process.kill()
         self._process.join()
         self._connection.close()
@@ -178,6 +202,8 @@ def _died(seconds: float, code: int) -> Row:
 def _serve(connection: Connection, payload: bytes) -> None:
     """Run the trials that come through a connection, until it closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends its workers
+    with suppress(AttributeError):  # Windows has no groups of processes
+        os.setpgid(0, 0)
     parent = multiprocessing.parent_process()
     assert parent is not None
     try:
@@ -198,7 +224,14 @@ def _watch(parent: int, megabytes: float) -> None:
     while not wait([parent], timeout=TICK):
         if used_megabytes() > megabytes:
             os._exit(MEMORY_EXIT)
+    _kill_group(os.getpid())
     os._exit(1)
+
+
+def _kill_group(leader: int) -> None:
+    """End a process that leads a group, and all others of the group."""
+    with suppress(AttributeError, OSError):
+        os.killpg(leader, signal.SIGKILL)
 
 
 def used_megabytes() -> float:
@@ -257,13 +290,15 @@ def connected(scheduler: Any) -> Iterator[Any]:
 
 
 def _check_versions(client: Any) -> None:
-    try:
-        versions = client.run(_version)
-    except Exception as error:  # workers without the package fail to read the function
-        raise InvalidInput(
-            f"the workers of the cluster cannot import this package ({error}); install it there"
-        ) from error
-    if others := {found for found in versions.values() if found != __version__}:
+    """Raise an error if a worker lacks this version; one that ends meanwhile does not count."""
+    found = client.run(_version, on_error="return").values()
+    if errors := [
+        error for error in found if isinstance(error, Exception) and not isinstance(error, OSError)
+    ]:
+        raise InvalidInput(  # workers without the package fail to read the function
+            f"the workers of the cluster cannot import this package ({errors[0]}); install it there"
+        )
+    if others := {version for version in found if isinstance(version, str)} - {__version__}:
         raise InvalidInput(
             f"the workers of the cluster have version {', '.join(sorted(others))} of implicit-decals, "
             f"this process has {__version__}; install the same version"

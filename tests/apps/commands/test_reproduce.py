@@ -43,6 +43,15 @@ def test_a_scene_is_made_again(saved: Path, capsys: Capture) -> None:
     assert "positions: 5 of 5 decals differ" in capsys.readouterr().out
 
 
+def test_scenes_of_samples_are_made_again(saved: Path, capsys: Capture) -> None:
+    assert run(["render", "knot", "--decals", "9", "--save", "a.json", "--size", "40x30", "-o", "a.png"]) == 0
+    assert run(["export", "a.json", "-o", "a.glb", "--size", "64"]) == 0
+    capsys.readouterr()
+    for arguments in (["a.json"], ["a.png", "--scene", "a.json"], ["a.glb"]):
+        assert run(["reproduce", *arguments]) == 0
+        assert capsys.readouterr().out == f"{arguments[0]}: made again, equal bit for bit\n"
+
+
 def test_a_picture_is_drawn_again_with_its_scene(saved: Path, capsys: Capture) -> None:
     assert run(["render", "scene.json", "--size", "40x30", "-o", "a.png"]) == 0
     capsys.readouterr()

@@ -1,8 +1,10 @@
 """Functions of experiments, which worker processes import."""
 
 import functools
+import multiprocessing
 import os
 import signal
+import subprocess
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -106,3 +108,27 @@ def called(f: Any) -> int:
 def named(text: str) -> dict[str, Any]:
     """Texts that look like files and formulas."""
     return {"path": text, "cost in $": 1.0}
+
+
+def ends(x: int, folder: str) -> int:
+    """End the process at 1; at 2 at the first call alone, as a kill from outside does."""
+    calls = Path(folder, f"call {x}")
+    if x == 1 or (x == 2 and not calls.exists()):
+        calls.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return x
+
+
+def with_children(x: int, limit: float) -> list[int]:
+    """Compute in processes of the trial's own; at 2 start one that outlives it."""
+    if x == 2:
+        subprocess.Popen(["sleep", f"{limit:.6f}"])
+        time.sleep(600)
+    with multiprocessing.Pool(1) as pool:
+        return pool.map(abs, [-x])
+
+
+def summary(count: int) -> Any:
+    """What `decals.measure` returns, and an array without dimensions."""
+    measures = decals.measure(covered(count), samples=1000)
+    return {**vars(measures), "zero": np.array(3.5)}

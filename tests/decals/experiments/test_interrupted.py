@@ -13,8 +13,10 @@ from typing import Any
 
 import pytest
 
+from decals import __version__
 from decals.errors import InvalidInput, MissingPackage
 from decals.experiments import Grid, Results, report, run
+from decals.experiments.workers import _check_versions
 from tests.decals.experiments import functions
 
 SCRIPT = """
@@ -43,6 +45,36 @@ def test_killed_runs_resume_to_the_same_table(tmp_path: Path) -> None:
         child.wait()
     results = run(functions.slow, Grid(x=range(40)), tmp_path / "out", workers=2)
     assert rows(results) == expected
+
+
+@pytest.mark.slow
+def test_a_trial_in_which_this_process_ended_runs_in_another_one(tmp_path: Path) -> None:
+    """One that was killed from outside gives its row; one that kills its process gives the reason."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import sys\nfrom decals.experiments import Grid, run\n"
+        "from tests.decals.experiments import functions\n"
+        "if __name__ == '__main__':\n"
+        "    run(functions.ends, Grid(x=[0, 1, 2, 3], folder=sys.argv[1:]), 'out', workers=0)\n"
+    )
+    for code in (-signal.SIGKILL, -signal.SIGKILL, 0):
+        assert subprocess.run([sys.executable, script, tmp_path], cwd=tmp_path).returncode == code
+    found = {
+        row["x"]: (row["status"], row["error"], row.get("result")) for row in Results(tmp_path / "out").rows
+    }
+    assert found.pop(1) == ("ended", "ended its process (signal SIGKILL)", None)
+    assert found == {x: ("done", None, x) for x in (0, 2, 3)}
+
+
+@pytest.mark.slow
+def test_trials_may_start_processes_which_end_with_them(tmp_path: Path) -> None:
+    seconds = 9000 + random.random()
+    design = Grid(x=[1, 2, 3], limit=[seconds])
+    results = run(functions.with_children, design, tmp_path, workers=1, limit=3)
+    found = [(row["x"], row["status"], row["result"]) for row in results.rows]
+    assert found == [(1, "done", [1]), (2, "ended", None), (3, "done", [3])]
+    running = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True).stdout
+    assert f"sleep {seconds:.6f}" not in running
 
 
 @pytest.fixture
@@ -102,6 +134,26 @@ def test_a_scheduler_that_is_not_there_is_refused(tmp_path: Path, monkeypatch: p
         run(functions.slow, Grid(x=[1]), tmp_path, scheduler="tcp://127.0.0.1:9")
     with pytest.raises(InvalidInput, match="scheduler: expected an address or a Dask client"):
         run(functions.slow, Grid(x=[1]), tmp_path, scheduler=3)
+
+
+class Cluster:
+    """A client of a cluster whose workers answer as given."""
+
+    def __init__(self, answers: list[Any]) -> None:
+        self.answers = answers
+
+    def run(self, _function: Any, on_error: str) -> dict[int, Any]:
+        assert on_error == "return"
+        return dict(enumerate(self.answers))
+
+
+def test_workers_of_other_versions_are_refused_but_not_those_that_end() -> None:
+    lost = OSError("Stream is closed")
+    _check_versions(Cluster([__version__, lost]))
+    with pytest.raises(InvalidInput, match=r"have version 0\.0\.1 of implicit-decals"):
+        _check_versions(Cluster([__version__, "0.0.1", lost]))
+    with pytest.raises(InvalidInput, match=r"cannot import this package \(No module named 'decals'\)"):
+        _check_versions(Cluster([ModuleNotFoundError("No module named 'decals'"), __version__]))
 
 
 def test_without_dask_a_scheduler_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 import errno
 import json
+import math
 import os
 import pickle
 import sys
@@ -21,7 +22,7 @@ from blobtree.files import PREFIX
 from decals.apps.experiments.blends import blends
 from decals.apps.experiments.pressed_solids import pressed_solids
 from decals.errors import Cancelled, InvalidInput
-from decals.experiments import Design, Grid, Results, Seeds, run
+from decals.experiments import Design, Grid, Results, Seeds, report, run
 from decals.experiments import store as stores
 from decals.experiments.fingerprint import fingerprint
 from decals.experiments.values import stored, unpickled
@@ -387,6 +388,32 @@ def test_two_runs_in_one_folder_are_refused(tmp_path: Path) -> None:
         run(functions.measured, DESIGN, tmp_path, workers=0)
     lock.release()
     assert len(run(functions.measured, DESIGN, tmp_path, workers=0)) == 6
+
+
+def test_parameters_that_are_not_finite_stay_numbers(tmp_path: Path) -> None:
+    choices = [math.nan, 1.0, math.inf, -math.inf, float("nan")]
+    results = run(lambda x: float(x > 0), Grid(x=choices), tmp_path, workers=0)
+    found = [row["x"] for row in Results(tmp_path).rows]
+    assert found[:3] == [-math.inf, 1.0, math.inf]
+    assert len(found) == 4
+    assert math.isnan(found[3])
+    assert [group["trials"] for group in results.interval("result", by="x")] == [1, 1, 1, 1]
+    assert results.to_pandas().x.dtype == float
+    report(results, tmp_path / "report.html")
+
+
+def test_what_measure_returns_is_a_result(tmp_path: Path) -> None:
+    (row,) = run(functions.summary, Grid(count=[5]), tmp_path, workers=0).rows
+    expected = decals.measure(functions.covered(5), samples=1000)
+    assert (row["coverage"], row["zero"]) == (expected.coverage, 3.5)
+    with np.load(tmp_path / row["decals"]) as found:
+        np.testing.assert_array_equal(found["kept"], expected.decals.kept)
+
+
+def test_a_figure_of_texts_is_refused(tmp_path: Path) -> None:
+    results = run(functions.named, Grid(text=["a", "b"]), tmp_path / "out", workers=0)
+    with pytest.raises(InvalidInput, match="expected a measure that is a number, got 'path'"):
+        report(results, tmp_path / "a.svg", measure="path", by=["text"])
 
 
 def test_a_full_disk_stops_the_run_and_keeps_its_rows(
