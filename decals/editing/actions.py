@@ -8,7 +8,6 @@ from collections.abc import Callable
 from os import PathLike
 
 from decals.editing.action_state import ActionState, Cursor
-from decals.editing.background import are_many
 from decals.editing.bare_watch import BareWatch
 from decals.editing.brush_actions import BrushActions
 from decals.editing.brushes import Brush
@@ -18,6 +17,7 @@ from decals.editing.file_actions import FileActions
 from decals.editing.key_bindings import UNREGISTERED, Group, KeyTable, registered_actions
 from decals.editing.outline_actions import OutlineActions
 from decals.editing.session import EditSession, UndoEntry
+from decals.editing.steps import are_many
 from decals.editing.tree_actions import TreeActions
 from decals.editing.view_actions import ViewActions
 from decals.editing.visibility_actions import VisibilityActions

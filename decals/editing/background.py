@@ -16,17 +16,11 @@ from itertools import count
 from os import PathLike
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 from blobtree.device import core_left_free
 from blobtree.progress import Cancel, Progress, reporting
-from decals.editing.carrying import CarriedEdit, Inputs
-from decals.editing.commands import DecalCommand
-from decals.editing.filling import FillBarePlaces
-from decals.editing.scatter_commands import AddObject, RelaxDecals, RemoveObject, ReplaceDecals, ScatterDecals
+from decals.editing.carrying import CarriedEdit
 from decals.editing.session import Command, EditSession, SaveJob, UndoEntry
-from decals.editing.tree_commands import PrimitiveCommand
+from decals.editing.steps import Busy, Inputs, Step, step_of
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.camera import Camera
 from decals.validation import describe
@@ -233,70 +227,15 @@ SHORT_SWITCH_INTERVAL = ShortSwitchInterval()
 """The only instance, because the interval belongs to the interpreter."""
 
 
-MAX_IMMEDIATE_DECALS = 500
-"""Commands for more decals than this run in the background."""
-
-LONG_COMMANDS = (
-    AddObject,
-    FillBarePlaces,
-    PrimitiveCommand,
-    RelaxDecals,
-    RemoveObject,
-    ReplaceDecals,
-    ScatterDecals,
-)
-"""Commands that query surfaces at many points, or build surfaces."""
-
 CLOSE_TIMEOUT = 5.0
 """Seconds for which `BackgroundJobs.close` waits for cancelled edits."""
 
 SAVE = "save"
 """Label of a save."""
 
-BUSY = "another edit is running; wait for it, or press Escape to cancel it"
 LEFT_OUT = "what waited for the edit was left out, because the selection changed meanwhile"
 MAX_WAITING = 8
 """Most requests that wait for the running edit, and most files that wait to be written."""
-
-
-class Busy(InvalidEdit):
-    """The request has to wait for another edit.
-
-    Attributes
-    ----------
-    label
-        What the request does, in a few words.
-    """
-
-    def __init__(self, label: str) -> None:
-        super().__init__(BUSY)
-        self.label = label
-
-
-Step = Callable[[EditSession], str]
-"""Edits a session, and returns a message for the user (empty for none)."""
-
-
-def are_many(numbers: ArrayLike) -> bool:
-    """Return True if an edit of these decals belongs in the background."""
-    return np.size(numbers) > MAX_IMMEDIATE_DECALS
-
-
-def takes_long(command: Command) -> bool:
-    """Return True if a command belongs in the background: it queries surfaces, or edits many decals."""
-    if isinstance(command, DecalCommand):
-        return are_many(command.numbers)
-    return isinstance(command, LONG_COMMANDS)
-
-
-def step_of(command: Command) -> Step:
-    """Return the step that carries out a command."""
-
-    def step(session: EditSession) -> str:
-        session.do(command)
-        return command.label
-
-    return step
 
 
 def _carried_step(entry: UndoEntry, message: str) -> Step:

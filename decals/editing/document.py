@@ -22,9 +22,8 @@ from decals.rendering.options import Drawing
 from decals.scenes.camera import Camera
 from decals.scenes.objects import MeshObject, SceneObject, shown_objects
 from decals.scenes.origin import WORLD, Origin
-from decals.scenes.pose import require_scene
 from decals.scenes.recipe import Recipe
-from decals.scenes.scene import DecalImage, Scene
+from decals.scenes.scene import DecalImage, Scene, require_scene
 from decals.surfaces.base_color import BaseColor
 from decals.validation import instance, whole_number
 

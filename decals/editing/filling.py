@@ -7,9 +7,9 @@ from typing import ClassVar
 import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
-from decals.editing.carrying import columns_of, shapes_of
 from decals.editing.document import Document, Edit
 from decals.editing.scatter_commands import object_indices
+from decals.editing.steps import columns_of, shapes_of
 from decals.errors import InvalidEdit
 from decals.field.evaluate import evaluate
 from decals.field.mapping import IMAGE_RADIUS_SQUARED
@@ -329,6 +329,7 @@ class FillBarePlaces:
     objects: tuple[int, ...]
     opened_by: Edit | None = None
     seed: int = 0
+    long: ClassVar[bool] = True
     label: ClassVar[str] = "fill bare places"
 
     def inputs(self, document: Document) -> object:

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, IndexArray, Int64Array
 from blobtree.progress import Progress
 from blobtree.validation import point_array
-from decals.editing.carrying import columns_of, shapes_of
 from decals.editing.document import Document, Edit
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points
+from decals.editing.steps import columns_of, shapes_of
 from decals.errors import InvalidEdit
 from decals.model import MAX_COORDINATE, Decals
 from decals.scattering.appearance import Appearance
@@ -93,6 +93,7 @@ class ReplaceDecals:
     decals: Decals
     expected_objects: tuple[SceneObject, ...] = ()
     recipe: Recipe | None = None
+    long: ClassVar[bool] = True
     label: ClassVar[str] = "scatter"
 
     def compute(self, document: Document) -> Edit:
@@ -136,6 +137,7 @@ class ScatterDecals:
     count: int
     seed: int = 0
     options: dict[str, Any] = field(default_factory=dict)
+    long: ClassVar[bool] = True
     label: ClassVar[str] = "scatter"
 
     def compute_command(
@@ -219,6 +221,7 @@ class RelaxDecals:
 
     point: ArrayLike
     radius: float | None = None
+    long: ClassVar[bool] = True
     label: ClassVar[str] = "relax"
 
     def inputs(self, document: Document) -> object:
@@ -290,6 +293,7 @@ class AddObject:
     'ball'
     """
 
+    long: ClassVar[bool] = True
     object: SceneObject
     label: str = "add an object"
 
@@ -325,6 +329,7 @@ class RemoveObject:
     """
 
     number: int
+    long: ClassVar[bool] = True
     label: ClassVar[str] = "remove an object"
 
     def compute(self, document: Document) -> Edit:

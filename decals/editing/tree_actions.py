@@ -15,8 +15,6 @@ from blobtree.nodes.paths import Path, node_at, node_in_world, primitive_at
 from blobtree.nodes.places import Place
 from blobtree.nodes.surgery import Join, dominant_primitive, join_of, path_of, paths_after, world_space_path
 from decals.editing.action_state import Cursor, WindowActions, require_pick
-from decals.editing.background import Step
-from decals.editing.carrying import usual_inputs
 from decals.editing.decal_actions import TINTS
 from decals.editing.document import Document
 from decals.editing.gizmo import Handle, HandleDrag, Ray, handles_of, moved_point, snap_distance
@@ -25,6 +23,7 @@ from decals.editing.new_nodes import alternatives, checked_kind, exchanged_node,
 from decals.editing.queries import SurfacePick
 from decals.editing.scatter_commands import AddObject, RemoveObject
 from decals.editing.session import EditSession
+from decals.editing.steps import Step, usual_inputs
 from decals.editing.tree_commands import (
     AddPrimitive,
     DragSurface,

@@ -71,6 +71,7 @@ class PrimitiveCommand:
         Path of the node in the object's tree.
     """
 
+    long: ClassVar[bool] = True
     object: int
     path: Path
 

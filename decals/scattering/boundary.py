@@ -15,6 +15,7 @@ from blobtree._typing import BoolArray, Float64Array, Int32Array
 from blobtree.device import launch
 from decals.model import FACING_LIMIT
 from decals.scattering.boundary_kernels import PLANES_PER_POINT, BoundarySegments, find_mirror_planes
+from decals.scattering.repulsion import mirror_planes, no_mirror_planes
 from decals.scattering.search_kernels import MirrorPlanes, Particles
 from decals.surfaces.mesh import MeshSurface, edges_of
 from decals.surfaces.surface import Scalars, Surface
@@ -28,20 +29,6 @@ the edge itself continues it as well."""
 
 MAX_PIECES = 100_000
 """Largest number of pieces that boundaries are cut into, besides one for each edge."""
-
-
-def no_mirror_planes(device: str) -> MirrorPlanes:
-    """Return mirror planes of surfaces without boundary."""
-    return _mirror_planes(0, 0, device)
-
-
-def _mirror_planes(per_point: int, count: int, device: str) -> MirrorPlanes:
-    mirrors: Any = MirrorPlanes()
-    mirrors.per_point = per_point
-    mirrors.points = wp.zeros(per_point * count, dtype=wp.vec3, device=device)
-    mirrors.normals = wp.zeros(per_point * count, dtype=wp.vec3, device=device)
-    planes: MirrorPlanes = mirrors
-    return planes
 
 
 class Boundary:
@@ -100,7 +87,7 @@ class Boundary:
         if self.count == 0:
             return no_mirror_planes(self.device)
         count = len(surface_ids)
-        mirrors = _mirror_planes(PLANES_PER_POINT, count, self.device)
+        mirrors = mirror_planes(PLANES_PER_POINT, count, self.device)
         inputs = [self._segments, reach, FACING_LIMIT, points, surface_ids, enabled]
         launch(find_mirror_planes, count, inputs, [mirrors], device=self.device)
         return mirrors

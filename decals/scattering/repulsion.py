@@ -8,7 +8,6 @@ import warp as wp
 
 from blobtree.device import launch
 from decals.model import FACING_LIMIT
-from decals.scattering.boundary import no_mirror_planes
 from decals.scattering.repulsion_kernels import (
     EnergyLaw,
     NeighborLists,
@@ -55,6 +54,21 @@ RING_WEIGHT = 600.0
 
 HARDENING = (0.6, 1.0)
 """Parts of the schedule between which stiffness and ring weight rise from 0 to their final values."""
+
+
+def no_mirror_planes(device: str) -> MirrorPlanes:
+    """Return mirror planes of surfaces without boundary."""
+    return mirror_planes(0, 0, device)
+
+
+def mirror_planes(per_point: int, count: int, device: str) -> MirrorPlanes:
+    """Return room for the mirror planes of so many points."""
+    mirrors: Any = MirrorPlanes()
+    mirrors.per_point = per_point
+    mirrors.points = wp.zeros(per_point * count, dtype=wp.vec3, device=device)
+    mirrors.normals = wp.zeros(per_point * count, dtype=wp.vec3, device=device)
+    planes: MirrorPlanes = mirrors
+    return planes
 
 
 @dataclass(frozen=True)

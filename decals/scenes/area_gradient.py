@@ -19,8 +19,7 @@ from decals.field.mapping import ImageMapping
 from decals.model import Decals
 from decals.record import Contact
 from decals.scenes.outlines import STEP, LineKind, SurfaceLine, outlines
-from decals.scenes.pose import require_scene
-from decals.scenes.scene import Scene
+from decals.scenes.scene import Scene, require_scene
 from decals.surfaces.surface import Surface
 from decals.validation import real_array
 

@@ -21,9 +21,8 @@ from decals.field.mapping import ImageMapping
 from decals.scenes.camera import Camera
 from decals.scenes.objects import MeshObject, SceneObject, bounds_of
 from decals.scenes.outlines import STEP, LineKind, chains, outlines
-from decals.scenes.pose import require_scene
 from decals.scenes.render import render
-from decals.scenes.scene import Scene
+from decals.scenes.scene import Scene, require_scene
 from decals.surfaces.mesh import edges_of
 from decals.validation import checked_path, describe, finite_number, instance, optional_package
 

@@ -47,7 +47,6 @@ from decals.scenes.drawing_record import DrawingRecord, drawing_of_record, drawi
 from decals.scenes.material import DecalMaterial
 from decals.scenes.material_record import MaterialRecord, material_of, material_record, sources_of
 from decals.scenes.objects import SceneObject, as_object
-from decals.scenes.pose import require_scene
 from decals.scenes.recipe import Recipe
 from decals.scenes.records import (
     TRUST_ADVICE,
@@ -63,7 +62,7 @@ from decals.scenes.records import (
     record_of,
     records_of,
 )
-from decals.scenes.scene import DecalImage, Scene
+from decals.scenes.scene import DecalImage, Scene, require_scene
 from decals.validation import as_path
 
 PART = 500

@@ -22,8 +22,7 @@ from decals.scattering.domain import Domain, OrientedPoints, apportion
 from decals.scattering.neighbors import FacingTree, bond_orders, ideal_spacing, spacing_of_distances
 from decals.scenes.gaps import gap_widths
 from decals.scenes.objects import MeshObject, SceneObject
-from decals.scenes.pose import require_scene
-from decals.scenes.scene import Scene
+from decals.scenes.scene import Scene, require_scene
 from decals.surfaces.normals import split_at_creases
 from decals.surfaces.surface import tangent_axes, unit_rows
 from decals.validation import count_number, whole_number

@@ -24,8 +24,7 @@ from decals.field.walks import walks_for
 from decals.model import Decals, Interaction
 from decals.rendering.options import modes_of
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject
-from decals.scenes.pose import require_scene
-from decals.scenes.scene import Scene
+from decals.scenes.scene import Scene, require_scene
 from decals.surfaces.normals import split_at_creases
 from decals.surfaces.subdivide import subdivided
 from decals.validation import real_number

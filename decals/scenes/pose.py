@@ -9,7 +9,7 @@ This removes the limitation that section 3.5 of the paper states.
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,7 +25,7 @@ from decals.rendering.picture import Picture
 from decals.scenes.camera import Camera
 from decals.scenes.objects import Box, MeshObject, SceneObject, TreeObject
 from decals.scenes.origin import Origin
-from decals.scenes.scene import DecalImage, Scene
+from decals.scenes.scene import DecalImage, Scene, require_scene
 from decals.scenes.shortcuts import public
 from decals.surfaces.base_color import BaseColor, Color
 from decals.surfaces.convert import as_shape, is_model
@@ -123,6 +123,7 @@ class PosedScene:
         How the scene is drawn.
     """
 
+    posed: ClassVar[bool] = True
     objects: tuple[SceneObject | PosedMesh, ...]
     decals: Decals
     images: tuple[DecalImage, ...]
@@ -140,13 +141,6 @@ class PosedScene:
         `decals.bake` writes the pose itself, with the decals in a texture.
         """
         public("save_scene")(cast(Any, self), path)
-
-
-def require_scene(name: str, scene: object, advice: str) -> Scene:
-    """Return a scene at rest; raise InvalidScene for any other value, with the advice for a posed one."""
-    if isinstance(scene, PosedScene):
-        raise InvalidScene(f"{name}: expected a Scene at rest, got a posed one; {advice}")
-    return instance(name, scene, Scene, InvalidScene, "decals.cover makes one")
 
 
 def pose(

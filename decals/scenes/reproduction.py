@@ -13,10 +13,9 @@ from decals.scattering.density import PaintedImage
 from decals.scattering.image_projections import Planar
 from decals.scattering.scatter import scatter
 from decals.scattering.variation import Jitter
-from decals.scenes.pose import require_scene
 from decals.scenes.provenance import changes_since, device_text, package_versions, provenance
 from decals.scenes.recipe import Recipe, shape_hash
-from decals.scenes.scene import Scene
+from decals.scenes.scene import Scene, require_scene
 
 FUNCTIONS = ("decals.cover", "decals.scatter")
 """Functions of recipes whose decals can be made again."""

@@ -396,3 +396,10 @@ class Scene(Value):
             "layer_names": layer_names,
         }
         return replace(self, **{key: value for key, value in given.items() if value is not None})
+
+
+def require_scene(name: str, scene: object, advice: str) -> Scene:
+    """Return a scene at rest; raise InvalidScene for any other value, with the advice for a posed one."""
+    if getattr(scene, "posed", False):
+        raise InvalidScene(f"{name}: expected a Scene at rest, got a posed one; {advice}")
+    return instance(name, scene, Scene, InvalidScene, "decals.cover makes one")

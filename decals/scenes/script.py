@@ -24,8 +24,7 @@ from decals.rendering.options import Background, Drawing
 from decals.scenes.material import MAP_NAMES, DecalMaterial
 from decals.scenes.objects import MeshObject, SceneObject
 from decals.scenes.origin import WORLD
-from decals.scenes.pose import require_scene
-from decals.scenes.scene import DecalImage, Scene
+from decals.scenes.scene import DecalImage, Scene, require_scene
 from decals.surfaces.base_color import COLOR_ARRAYS, BaseColor
 from decals.surfaces.windings import MeshOrientation
 

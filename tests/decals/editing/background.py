@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from decals.editing import Actions, EditSession
-from decals.editing.background import step_of
 from decals.editing.queries import SurfacePick
+from decals.editing.steps import step_of
 from tests.decals.editing.scenes import scene
 
 LONG = 30.0

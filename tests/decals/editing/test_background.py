@@ -27,11 +27,11 @@ from decals.editing import (
     TurnDecals,
 )
 from decals.editing.action_state import COMPILING
-from decals.editing.background import BUSY, MAX_WAITING, step_of
+from decals.editing.background import MAX_WAITING
 from decals.editing.brushes import Brush
-from decals.editing.carrying import LOOKS, inputs_of
 from decals.editing.document import Document, Edit
 from decals.editing.scatter_commands import decals_on
+from decals.editing.steps import BUSY, LOOKS, inputs_of, step_of
 from decals.errors import InvalidEdit
 from decals.scenes.objects import TreeObject
 from tests.decals.editing.background import LONG, Held, finish, press, threaded

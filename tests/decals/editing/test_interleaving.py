@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from decals.editing import Actions, EditSession
-from decals.editing.background import BUSY
+from decals.editing.steps import BUSY
 from decals.scenes.files import load_scene
 from tests.decals.editing.background import LONG, surface_pick, threaded
 from tests.decals.editing.scenes import digest, goes_back_and_forth, scene

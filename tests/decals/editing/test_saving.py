@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from decals.editing import ScaleDecals
-from decals.editing.background import step_of
+from decals.editing.steps import step_of
 from decals.errors import InvalidScene
 from decals.scenes.files import load_scene
 from tests.decals.editing.background import LONG, finish, hold_writing, press, threaded

@@ -7,8 +7,7 @@ import warp as wp
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array
-from decals.scattering.boundary import no_mirror_planes
-from decals.scattering.repulsion import Law, Repulsion, particle_struct
+from decals.scattering.repulsion import Law, Repulsion, no_mirror_planes, particle_struct
 from decals.scattering.repulsion_kernels import StepTerms
 
 
