@@ -16,7 +16,7 @@ EXTRAS: dict[str, str] = {
         """,
     "blobtree.meshing": """
         adaptive adaptive_cell_kernels adaptive_cells adaptive_kernels adaptive_mesh batch
-        bisection_kernels block_tree clip crease_branches crease_intersections crease_kernels
+        block_tree clip crease_branches crease_intersections crease_kernels
         crease_sheets creases crumbs distance_kernels gap_kernels gaps leaf_changes leaf_gaps
         part_kernels parts thickening thickening_kernels wall_kernels walls
         """,
@@ -28,7 +28,7 @@ EXTRAS: dict[str, str] = {
     "blobtree.tape": "attributes directed directed_along grown operands part_sizes poses rest_kernels",
     "decals.baking": "*",
     "decals.editing": """
-        background bare_watch brush_actions brushes carrying filling followers outline_actions overlays
+        background bare_watch brush_actions brushes carrying filling formats outline_actions overlays
         recovery slicing visibility visibility_actions
         """,
     "decals.experiments": "*",

@@ -9,7 +9,8 @@ import numpy as np
 from decals.apps.sandbox.controls import STEPS, Control, option_control, parsed_option
 from decals.apps.sandbox.outline import picture
 from decals.editing.action_state import ActionState
-from decals.editing.brushes import Brush, BrushSettings, default_decal_radius, default_radius, positive_number
+from decals.editing.brush_settings import Brush, BrushSettings
+from decals.editing.brushes import default_decal_radius, default_radius, positive_number
 from decals.editing.commands import ReplaceImage, SetValues
 from decals.editing.decal_actions import FIRST_DECAL_COUNT
 from decals.editing.document import Document

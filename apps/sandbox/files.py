@@ -17,8 +17,8 @@ from decals.apps.sandbox.decal_panel import image_names
 from decals.apps.sandbox.folder import HDR, MODELS, keep_upload, listed, plain_name, read_upload
 from decals.apps.views import THREE_QUARTER
 from decals.editing.commands import AddImage, ReplaceImage
-from decals.editing.file_actions import WRITTEN_SUFFIXES
 from decals.editing.file_names import open_plain
+from decals.editing.formats import WRITTEN_SUFFIXES
 from decals.editing.outline_actions import Part, image_on_layer
 from decals.editing.queries import SurfacePick
 from decals.editing.recovery import recovery_path

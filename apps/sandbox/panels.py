@@ -10,8 +10,8 @@ from decals.apps.sandbox.files import LIGHT
 from decals.apps.sandbox.folder import IMAGES, MODELS
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing.actions import KEYS
-from decals.editing.brushes import Brush
-from decals.editing.file_actions import EXPORT_SUFFIXES, Video
+from decals.editing.brush_settings import Brush
+from decals.editing.formats import EXPORT_SUFFIXES, Video
 from decals.editing.key_bindings import CAMERA, Binding, Group, format_gestures
 from decals.editing.view_actions import SIDE_KEYS
 

@@ -36,13 +36,20 @@ from .tree_commands import (
     MoveToObject,
     PaintPrimitive,
     RemovePrimitive,
-    RenameObject,
     ReplaceNode,
     ResizePrimitive,
     SetParameter,
     TransformPrimitive,
 )
-from .visibility import FlagNodes, HideDecals, LockLayers, RenameLayer, RenameNode, ShowDecals
+from .visibility import (
+    FlagNodes,
+    HideDecals,
+    LockLayers,
+    RenameLayer,
+    RenameNode,
+    RenameObject,
+    ShowDecals,
+)
 
 __all__ = [
     "KEYS",

@@ -13,7 +13,7 @@ from blobtree._typing import Float32Array, Int64Array
 from blobtree.kernels import NotCompiled, without_compiling
 from blobtree.nodes.paths import Path
 from decals.editing.background import BackgroundJobs
-from decals.editing.brushes import BrushSettings
+from decals.editing.brush_settings import BrushSettings
 from decals.editing.commands import SetDrawing
 from decals.editing.document import Document, Edit
 from decals.editing.prompts import PromptLine

@@ -10,7 +10,7 @@ from os import PathLike
 from decals.editing.action_state import ActionState, Cursor
 from decals.editing.bare_watch import BareWatch
 from decals.editing.brush_actions import BrushActions
-from decals.editing.brushes import Brush
+from decals.editing.brush_settings import Brush
 from decals.editing.commands import DeleteDecals, DuplicateDecals
 from decals.editing.decal_actions import DecalActions
 from decals.editing.file_actions import FileActions

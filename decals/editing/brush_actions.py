@@ -1,7 +1,7 @@
 """Actions that choose the brush of a window."""
 
 from decals.editing.action_state import WindowActions
-from decals.editing.brushes import Brush
+from decals.editing.brush_settings import Brush
 from decals.editing.key_bindings import Group
 
 BRUSHES = {

@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array, Int64Array
 from blobtree.validation import LARGEST_NUMBER, SMALLEST_NUMBER
+from decals.editing.brush_settings import Brush, BrushSettings
 from decals.editing.commands import DeleteDecals, SetValues
 from decals.editing.document import Document, Edit
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points
@@ -17,7 +17,6 @@ from decals.editing.scatter_commands import SPACING, RelaxDecals
 from decals.editing.session import Command
 from decals.errors import InvalidEdit
 from decals.model import NO_IMAGE, Decals
-from decals.options import Values
 from decals.scattering.orientation import tangents
 from decals.scenes.objects import bounds_of
 from decals.validation import describe, finite_number, finite_vector, whole_number
@@ -31,58 +30,8 @@ CANDIDATES = 30
 STEEP = 0.2
 """Cosine of the angle between a stroke and a surface beyond which the align brush skips a decal."""
 
-LEAST_DENSITY = 0.05
-"""Low end of the slider of the density."""
-
 MAX_NEW_DECALS = 400
 """Decals that one touch of the scatter brush adds, at most."""
-
-
-class Brush(StrEnum):
-    """What a drag with the left button does to decals.
-
-    SELECT selects and moves single ones, BOX and LASSO select those in a box, or in a line around them, and
-    PAINT those that it touches. PULL drags the surface below them. ALIGN turns images along the stroke.
-    """
-
-    SELECT = "select"
-    BOX = "box"
-    LASSO = "lasso"
-    PAINT = "paint"
-    PULL = "pull"
-    SCATTER = "scatter"
-    PUSH = "push"
-    ERASE = "erase"
-    RELAX = "relax"
-    ALIGN = "align"
-
-
-@dataclass
-class BrushSettings:
-    """The brush of a window.
-
-    Attributes
-    ----------
-    brush
-        The kind of brush.
-    radius
-        Its radius in model units; 0 for a tenth of the scene's size.
-    decal_radius
-        Radius of the decals that the scatter brush adds, in model units; 0 for the median of the scene.
-    density
-        Decals of the scatter brush relative to a tiling without gaps, above 0 and at most 1.
-    images
-        Images that the scatter brush chooses from; empty for all.
-    seed
-        Seed of its next touch.
-    """
-
-    brush: Brush = Brush.SELECT
-    radius: float = 0.0
-    decal_radius: float = 0.0
-    density: Annotated[float, Values(LEAST_DENSITY, 1.0)] = 1.0
-    images: tuple[int, ...] = ()
-    seed: int = 0
 
 
 def decals_within(document: Document, point: ArrayLike, radius: float) -> Int64Array:

@@ -1,67 +1,39 @@
 """Actions on files: save, save as, export, add images, and close without losing work."""
 
 from collections.abc import Callable
-from enum import StrEnum
 from os import PathLike
 from pathlib import Path
 
 from blobtree._typing import UInt8Array
 from blobtree.files import exists, is_folder
 from blobtree.progress import Cancel, Progress
-from decals.baking.export import export
-from decals.baking.formats import FORMATS
 from decals.editing.action_state import ActionState, Cursor, WindowActions
 from decals.editing.commands import AddImage, ReplaceScene
 from decals.editing.file_names import name_fault
+from decals.editing.formats import (
+    EXPORT_FIRST,
+    EXPORT_SUFFIXES,
+    PICTURE_SUFFIXES,
+    WRITTEN_SUFFIXES,
+    Video,
+    checked_size,
+    write_scene,
+)
 from decals.editing.key_bindings import Group
 from decals.editing.prompts import Question, TextPrompt
 from decals.editing.recovery import RecoveryFile, numbered_paths
 from decals.editing.session import Command
 from decals.errors import InvalidEdit
 from decals.images.builtin import BUILTIN_IMAGES, is_builtin
-from decals.pages.page import SUFFIXES as PAGE_SUFFIXES
-from decals.pages.page import save_html
 from decals.rendering.options import Size
 from decals.rendering.picture import Picture
-from decals.scenes.animation import VIDEO_SUFFIXES, animate, turntable
 from decals.scenes.camera import Camera
 from decals.scenes.files import load_scene
-from decals.scenes.render import render
 from decals.scenes.scene import DecalImage, Scene
-from decals.scenes.script import write_script
 from decals.validation import member
 
 UNTITLED = "untitled"
 """Title of a scene without a file."""
-
-PICTURE_SUFFIXES = (".png", ".jpg")
-PICTURE_SIZE = (1280, 720)
-"""Width and height of pictures and videos without a size, in pixels."""
-
-MAX_PICTURE_PIXELS, MAX_GIF_PIXELS = 1 << 26, 1 << 28
-"""Most pixels of a picture, and of all frames of a GIF file; both are whole in memory."""
-
-
-EXPORT_SUFFIXES = (*FORMATS, PAGE_SUFFIXES[0])
-"""Formats of other programs, and pages."""
-
-EXPORT_FIRST = ".ply"
-"""Format that is proposed: it has colours and takes one file."""
-
-WRITTEN_SUFFIXES = (".json", ".py", *EXPORT_SUFFIXES, *PICTURE_SUFFIXES, *VIDEO_SUFFIXES)
-
-
-class Video(StrEnum):
-    """What a video shows."""
-
-    TURNTABLE = "turntable"
-    """The scene from all sides."""
-    SESSION = "session"
-    """The scene at the beginning of the history, and after each entry."""
-
-
-VIDEO_RATES = {Video.TURNTABLE: 25.0, Video.SESSION: 4.0}
-"""Frames per second."""
 
 NOTHING = object()
 """Mark that no changes were discarded."""
@@ -221,35 +193,17 @@ class FileActions(WindowActions):
             Picture(self.screenshot()).save(path)
             self._state.show(f"exported to {text}")
             return
-        width, height = size = PICTURE_SIZE if size is None else size
-        if width * height > MAX_PICTURE_PIXELS:
-            raise InvalidEdit(
-                f"size: expected at most {MAX_PICTURE_PIXELS:,} pixels, got {width} x {height}; take fewer, "
-                "or the command render"
-            )
+        size = checked_size(size)
         session = self._state.session
         scene = session.document.scene
         camera, fork = self.camera() or scene.camera, session.fork()
         shown = scene.replace(camera=camera)
 
+        def history() -> list[Scene]:
+            return [state.replace(camera=camera) for state in fork.replay()]
+
         def write(progress: Progress) -> None:
-            if suffix == ".py":
-                write_script(shown, path)
-            elif suffix in PICTURE_SUFFIXES:
-                render(shown, size=size).save(path)
-            elif suffix in PAGE_SUFFIXES:
-                save_html(shown, path, progress=progress)
-            elif suffix in VIDEO_SUFFIXES:
-                turned = shows is Video.TURNTABLE
-                frames = turntable(shown) if turned else [s.replace(camera=camera) for s in fork.replay()]
-                if suffix == ".gif" and len(frames) * width * height > MAX_GIF_PIXELS:
-                    raise InvalidEdit(
-                        f"size: expected at most {MAX_GIF_PIXELS:,} pixels in all frames of a GIF file, got "
-                        f"{len(frames)} x {width} x {height}; take fewer, or write .mp4"
-                    )
-                animate(frames, path, size=size, rate=VIDEO_RATES[shows], progress=progress)
-            else:
-                export(shown, path, progress=progress)
+            write_scene(shown, path, size, shows, history, progress)
 
         self._state.background.write(f"export to {text}", write, f"exported to {text}")
 

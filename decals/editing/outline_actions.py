@@ -10,8 +10,7 @@ from decals.editing.commands import DeleteDecals, RemoveImage, SetValues
 from decals.editing.document import Document
 from decals.editing.scatter_commands import RemoveObject
 from decals.editing.tree_actions import TreeActions
-from decals.editing.tree_commands import RenameObject
-from decals.editing.visibility import RenameLayer, RenameNode
+from decals.editing.visibility import RenameLayer, RenameNode, RenameObject
 from decals.editing.visibility_actions import VisibilityActions
 from decals.errors import InvalidEdit
 from decals.validation import describe

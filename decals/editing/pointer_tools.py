@@ -7,7 +7,8 @@ import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array, Int64Array
 from decals.editing.actions import KEYS, Actions
-from decals.editing.brushes import Brush, BrushStroke
+from decals.editing.brush_settings import Brush
+from decals.editing.brushes import BrushStroke
 from decals.editing.commands import MoveDecals
 from decals.editing.gizmo import Ray, on_plane
 from decals.editing.queries import (

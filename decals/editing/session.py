@@ -8,7 +8,7 @@ from typing import Protocol
 
 from blobtree.progress import Progress
 from decals.editing.document import DecalStates, Document, Edit, SceneParts
-from decals.editing.visibility import check_locks
+from decals.editing.locks import check_locks
 from decals.errors import InvalidEdit
 from decals.scenes.camera import Camera
 from decals.scenes.files import save_scene

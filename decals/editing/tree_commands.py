@@ -35,10 +35,9 @@ from blobtree.validation import affine_matrix, truth
 from decals.editing.document import Document, Edit
 from decals.editing.followers import FIELD_TOLERANCE, followers
 from decals.editing.queries import move_decals, nearest_points
-from decals.editing.visibility import Renaming
 from decals.errors import InvalidEdit
 from decals.options import inherit_descriptions
-from decals.scenes.objects import SceneObject, TreeObject, check_names, flagged, with_tree
+from decals.scenes.objects import SceneObject, TreeObject, flagged, with_tree
 from decals.validation import describe, finite_number, finite_vector, instance, member, whole_number
 
 DRAGGED = (
@@ -744,39 +743,6 @@ class GroupOperands(StructureCommand):
     def restructure(self, tree: Node) -> tuple[Node, Path]:
         """Return the new tree, and the path of the group in it."""
         return surgery.group_operands(tree, self.path, self.steps)
-
-
-@dataclass(frozen=True, eq=False)
-class RenameObject(Renaming):
-    """Give an object another name.
-
-    Parameters
-    ----------
-    number
-        Index of the object.
-    name
-        Its new name, unique in the scene.
-
-    Examples
-    --------
-    >>> import decals
-    >>> from blobtree import Point
-    >>> from decals.editing import EditSession, RenameObject
-    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
-    >>> edit = session.do(RenameObject(0, "ball"))
-    >>> session.document.objects[0].name
-    'ball'
-    """
-
-    number: int
-    name: str
-
-    def compute(self, document: Document) -> Edit:
-        """Return the edit."""
-        renamed = flagged(document.object(self.number), name=self.name)
-        objects = document.objects_with(self.number, renamed)
-        check_names(objects)
-        return document.compute_parts(objects=objects)
 
 
 @dataclass(frozen=True, eq=False)

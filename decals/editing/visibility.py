@@ -1,4 +1,4 @@
-"""Commands that hide, lock and name parts of a scene, and the check that others change no locked part."""
+"""Commands that hide, lock and name parts of a scene."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -7,15 +7,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree import Node
-from blobtree.errors import InvalidNode
 from blobtree.nodes.paths import Path, node_at
-from blobtree.nodes.surgery import path_of
 from decals.editing.document import DecalStates, Document, Edit
 from decals.editing.queries import move_decals, nearest_points
 from decals.errors import InvalidEdit
 from decals.index.rows import as_numbers
-from decals.scenes.objects import Paths, SceneObject, TreeObject, flagged
+from decals.scenes.objects import Paths, TreeObject, check_names, flagged
 from decals.scenes.scene import as_layer_names, as_layers
 from decals.validation import describe
 
@@ -203,6 +200,39 @@ class Renaming:
 
 
 @dataclass(frozen=True, eq=False)
+class RenameObject(Renaming):
+    """Give an object another name.
+
+    Parameters
+    ----------
+    number
+        Index of the object.
+    name
+        Its new name, unique in the scene.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession, RenameObject
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(RenameObject(0, "ball"))
+    >>> session.document.objects[0].name
+    'ball'
+    """
+
+    number: int
+    name: str
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        renamed = flagged(document.object(self.number), name=self.name)
+        objects = document.objects_with(self.number, renamed)
+        check_names(objects)
+        return document.compute_parts(objects=objects)
+
+
+@dataclass(frozen=True, eq=False)
 class RenameNode(Renaming):
     """Give a node of a BlobTree a name, which it keeps while the tree is edited.
 
@@ -278,49 +308,3 @@ def _renamed(names: dict[Any, str], key: Any, name: str) -> dict[Any, str]:
     """Return names with another one; without it if it is empty."""
     others = {other: text for other, text in names.items() if other != key}
     return others if isinstance(name, str) and name == "" else {**others, key: name}
-
-
-def check_locks(document: Document, edit: Edit) -> None:
-    """Raise `InvalidEdit` if an edit of a document changes something that is locked there.
-
-    Decals of a locked layer may still follow a surface that changes.
-    """
-    after = edit.parts_after.objects
-    if after is None:
-        if document.locked_layers and len(edit.before.decals):
-            for layer in np.intersect1d(edit.before.decals.layers, document.locked_layers).tolist():
-                raise InvalidEdit(
-                    f"layer {layer} is locked; unlock it in the outline, or deselect its decals"
-                )
-        return
-    by_name = {item.name: item for item in after}
-    new = (item for item in after if not any(item is other for other in document.objects))
-    changed = [tree for item in new if (tree := _tree(item)) is not None]
-    for number, item in enumerate(document.objects):
-        other = after[number] if len(after) == len(document.objects) else by_name.get(item.name)
-        if not item.locked or other is item:
-            continue
-        kept = other is not None and other.name == item.name and _tree(other) is _tree(item)
-        if () in item.locked and not kept:
-            raise InvalidEdit(f"{item.name!r} is locked; unlock it in the outline")
-        before = _tree(item)
-        if before is None:
-            continue
-        for node in (node_at(before, path) for path in item.locked if path):
-            if not any(_has(tree, node) for tree in changed):
-                raise InvalidEdit(
-                    f"a {type(node).__name__} of {item.name!r} is locked; unlock it in the outline"
-                )
-
-
-def _tree(item: SceneObject) -> Node | None:
-    return item.tree if isinstance(item, TreeObject) else None
-
-
-def _has(tree: Node, node: Node) -> bool:
-    """Return True if a tree has a node."""
-    try:
-        path_of(tree, node)
-    except InvalidNode:
-        return False
-    return True

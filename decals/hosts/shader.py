@@ -20,8 +20,7 @@ from decals.index.editor import DecalEditor
 from decals.receivers import EVERYTHING, mask_on
 from decals.record import Contact
 from decals.rendering.data_texture import rectangles
-from decals.rendering.materials import has_materials
-from decals.rendering.options import SceneLike, check_scene, drawing_of, is_limited
+from decals.rendering.options import SceneLike, check_scene, drawing_of, has_materials, is_limited
 from decals.scenes.origin import WORLD, Origin
 from decals.shaders import ComposeError
 from decals.shaders.isolate import prefixed_name

@@ -13,8 +13,7 @@ from blobtree._typing import Float64Array
 from decals.index.change_log import affected_balls
 from decals.index.editor import DecalEditor
 from decals.model import Decals
-from decals.rendering.materials import has_relief
-from decals.rendering.options import RenderOptions, SceneLike
+from decals.rendering.options import RenderOptions, SceneLike, has_relief
 from decals.rendering.pixel_pass import GROUP
 from decals.rendering.viewpoint import Bounds, Rectangle, Tile
 

@@ -266,17 +266,6 @@ def _first_light(lights: Lighting | None) -> tuple[float, ...]:
     return (*(inverse[:3, :3] @ first.position + inverse[:3, 3]).tolist(), 2.0)
 
 
-def has_relief(scene: SceneLike) -> bool:
-    """Return True if decals of a scene have relief that is drawn: posed objects are drawn without it."""
-    posed = any(hasattr(item, "rest") for item in scene.objects)
-    return has_materials(scene) and not posed and any(getattr(image, "relief", 0.0) for image in scene.images)
-
-
-def has_materials(scene: SceneLike) -> bool:
-    """Return True if a scene has decals, and an image with maps of its surface."""
-    return len(scene.decals) > 0 and any(hasattr(image, "surface_texels") for image in scene.images)
-
-
 def map_texels(image: ImageLike, shape: tuple[int, int]) -> Iterator[Float32Array]:
     """Yield the two layers of an image, the upper row first."""
     if not hasattr(image, "surface_texels"):

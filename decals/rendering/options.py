@@ -308,6 +308,17 @@ def is_limited(scene: SceneLike) -> bool:
     return len(scene.decals) > 0 and (limited or any(map(takes_named_only, scene.objects)))
 
 
+def has_relief(scene: SceneLike) -> bool:
+    """Return True if decals of a scene have relief that is drawn: posed objects are drawn without it."""
+    posed = any(hasattr(item, "rest") for item in scene.objects)
+    return has_materials(scene) and not posed and any(getattr(image, "relief", 0.0) for image in scene.images)
+
+
+def has_materials(scene: SceneLike) -> bool:
+    """Return True if a scene has decals, and an image with maps of its surface."""
+    return len(scene.decals) > 0 and any(hasattr(image, "surface_texels") for image in scene.images)
+
+
 def check_scene(scene: object) -> None:
     """Raise InvalidScene for a value without objects, decals and images."""
     if not is_scene_like(scene):

@@ -30,7 +30,6 @@ from decals.rendering.frame_plan import FramePlan, FrameRequest, decal_source, p
 from decals.rendering.gbuffer import depth_program
 from decals.rendering.image_array import ImageArray
 from decals.rendering.light_pass import light_program, light_variant, resolve_program
-from decals.rendering.materials import has_materials, has_relief
 from decals.rendering.mesh import ColoredMesh, MeshDrawable, PosedColoredMesh, PosedMeshDrawable
 from decals.rendering.offset_tree import OffsetTreeDrawable
 from decals.rendering.options import (
@@ -38,6 +37,8 @@ from decals.rendering.options import (
     SceneLike,
     check_scene,
     drawn_objects,
+    has_materials,
+    has_relief,
     is_limited,
     viewpoint_of,
 )

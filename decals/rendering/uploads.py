@@ -17,15 +17,16 @@ from decals.rendering.drawable import Drawable, drawable_for
 from decals.rendering.environment import Environment
 from decals.rendering.image_array import ImageArray
 from decals.rendering.light_pass import EnvironmentTextures
-from decals.rendering.materials import (
-    RELIEF_LOOKUPS,
-    MaterialArray,
-    Relief,
-    ReliefArray,
+from decals.rendering.materials import RELIEF_LOOKUPS, MaterialArray, Relief, ReliefArray
+from decals.rendering.options import (
+    Drawing,
+    SceneLike,
+    check_scene,
+    drawn_objects,
     has_materials,
     has_relief,
+    is_limited,
 )
-from decals.rendering.options import Drawing, SceneLike, check_scene, drawn_objects, is_limited
 from decals.rendering.viewpoint import Bounds
 from decals.rendering.walk_cache import WalkCache
 

@@ -23,6 +23,9 @@ from decals.scattering.search_kernels import (
 )
 from decals.surfaces.surface import Scalars, tangent_axes, vectors
 
+CLOSE_DISTANCE = 0.89
+"""Distance of two particles, in spacings, below which they are too close."""
+
 MIN_PARALLEL_QUERIES = 4000
 """Number of points from which a search uses more than one thread."""
 

@@ -9,14 +9,11 @@ import warp as wp
 from blobtree._typing import BoolArray, Float32Array, Int64Array
 from blobtree.device import launch
 from decals.scattering.domain import Domain, OrientedPoints, crosses_density_step
-from decals.scattering.neighbors import NeighborQuery, index_array, local_maxima
+from decals.scattering.neighbors import CLOSE_DISTANCE, NeighborQuery, index_array, local_maxima
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.projection import spans_of
 from decals.scattering.repulsion import LOCAL_LAW, particle_struct
 from decals.scattering.search_kernels import Candidates, ChoiceRule, move_to_best, sample_around
-
-CLOSE_DISTANCE = 0.89
-"""Distance of two particles, in spacings, below which they are too close."""
 
 MIN_TRIALS, TRIALS_PER_ROUND = 60, 1000
 """Candidates of each moving particle at least, and of all moving particles of a round together."""

@@ -22,10 +22,16 @@ from decals.scattering.domain import (
     remaining_counts,
 )
 from decals.scattering.gap_filling import fill_gaps
-from decals.scattering.neighbors import NeighborQuery, Spacing, ideal_spacing, spacing_of_points
+from decals.scattering.neighbors import (
+    CLOSE_DISTANCE,
+    NeighborQuery,
+    Spacing,
+    ideal_spacing,
+    spacing_of_points,
+)
 from decals.scattering.orientation import Direction
 from decals.scattering.particle_state import ParticleState
-from decals.scattering.polish import CLOSE_DISTANCE, polish, relax_near
+from decals.scattering.polish import polish, relax_near
 from decals.scattering.relocation import CandidatePoints, DensityAnchors, crowded_particles, relocate
 from decals.scattering.repulsion import CUTOFF, law_at
 from decals.scattering.sizing import Sizing

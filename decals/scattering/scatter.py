@@ -15,8 +15,8 @@ from decals.model import Decals
 from decals.options import Values
 from decals.scattering.appearance import Appearance
 from decals.scattering.domain import Density, Mask, as_surfaces
+from decals.scattering.neighbors import CLOSE_DISTANCE
 from decals.scattering.orientation import Direction
-from decals.scattering.polish import CLOSE_DISTANCE
 from decals.scattering.relaxation import Relaxation
 from decals.scattering.repulsion_kernels import repel
 from decals.scattering.search_kernels import sample_around

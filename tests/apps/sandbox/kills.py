@@ -26,7 +26,7 @@ from blobtree import Point
 from decals.editing import recovery
 from decals.editing.actions import Actions
 from decals.editing.session import EditSession
-from decals.editing.tree_commands import RenameObject
+from decals.editing.visibility import RenameObject
 from decals.scenes.files import load_scene
 
 PAUSE = 0.01

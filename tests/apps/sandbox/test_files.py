@@ -338,7 +338,7 @@ def test_pictures_too_large_for_the_memory_are_refused(
         for size in ("999999 x 999999", "671088 x 101", "16384 x 16384", "8192 x 8193"):
             sandbox.write_file(name, True, size)
             assert "size: expected at most 67,108,864 pixels, got " in sandbox.status
-    monkeypatch.setattr("decals.editing.file_actions.MAX_GIF_PIXELS", 120 * 64 * 48 - 1)
+    monkeypatch.setattr("decals.editing.formats.MAX_GIF_PIXELS", 120 * 64 * 48 - 1)
     sandbox.write_file("a.gif", True, "64 x 48")
     finish(window)
     assert "pixels in all frames of a GIF file, got 120 x 64 x 48" in sandbox.status

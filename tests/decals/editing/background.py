@@ -64,9 +64,9 @@ def hold_writing(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 def hold_export(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Let exports wait until they are let go; the events that say that, as above."""
-    from decals.editing import file_actions
+    from decals.editing import formats
 
-    begun, go, write = threading.Event(), threading.Event(), vars(file_actions)["export"]
+    begun, go, write = threading.Event(), threading.Event(), vars(formats)["export"]
 
     def slowly(scene: Any, path: Any, *, progress: Any) -> None:
         begun.set()
@@ -74,5 +74,5 @@ def hold_export(monkeypatch: pytest.MonkeyPatch) -> Any:
             progress("writing", 0.5)
         write(scene, path, progress=progress)
 
-    monkeypatch.setattr(file_actions, "export", slowly)
+    monkeypatch.setattr(formats, "export", slowly)
     return begun, go

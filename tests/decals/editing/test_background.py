@@ -28,7 +28,7 @@ from decals.editing import (
 )
 from decals.editing.action_state import COMPILING
 from decals.editing.background import MAX_WAITING
-from decals.editing.brushes import Brush
+from decals.editing.brush_settings import Brush
 from decals.editing.document import Document, Edit
 from decals.editing.scatter_commands import decals_on
 from decals.editing.steps import BUSY, LOOKS, inputs_of, step_of

@@ -8,7 +8,8 @@ import pytest
 import decals
 from blobtree import Point
 from decals.editing import Actions, EditSession, PointerTools
-from decals.editing.brushes import CLOSEST, Brush, BrushDecals, PushDecals
+from decals.editing.brush_settings import Brush
+from decals.editing.brushes import CLOSEST, BrushDecals, PushDecals
 from decals.editing.commands import SetValues
 from decals.editing.scatter_commands import SPACING, RelaxDecals
 from decals.editing.visibility import LockLayers

@@ -21,7 +21,7 @@ from decals.editing import (
     RemoveObject,
     TransformPrimitive,
 )
-from decals.editing.brushes import Brush
+from decals.editing.brush_settings import Brush
 from decals.editing.gizmo import (
     HandleDrag,
     along_line,

@@ -3,7 +3,7 @@
 from collections import Counter
 
 from decals.editing import KEYS, Actions, EditSession
-from decals.editing.brushes import Brush
+from decals.editing.brush_settings import Brush
 from decals.editing.key_bindings import CAMERA, gesture_name
 from tests.decals.editing.scenes import scene
 

@@ -12,7 +12,7 @@ from blobtree import Node, Point
 from blobtree.nodes.paths import primitive_at
 from decals.editing import EditSession
 from decals.editing.actions import Actions
-from decals.editing.brushes import Brush
+from decals.editing.brush_settings import Brush
 from decals.editing.decal_actions import SCALE_STEP
 from decals.editing.pointer_tools import PointerTools
 from decals.editing.queries import inside_polygon

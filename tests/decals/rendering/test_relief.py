@@ -11,7 +11,7 @@ import decals
 from decals import Camera, DecalMaterial, Decals, Scene
 from decals.index import DecalEditor
 from decals.rendering import Buffers, Light, Lighting, Renderer, RenderOptions
-from decals.rendering.materials import has_relief
+from decals.rendering.options import has_relief
 from tests.decals.relief import expected_heights
 from tests.decals.rendering.test_edited import EditedScene
 from tests.decals.rendering.test_posed import sheet
