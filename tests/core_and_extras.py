@@ -40,7 +40,7 @@ EXTRAS: dict[str, str] = {
     "decals.images": "radiance",
     "decals.index": "batch",
     "decals.pages": "*",
-    "decals.rendering": "environment lights materials offset_tree rest_buffer walk_cache",
+    "decals.rendering": "environment lights materials offset_tree posed_mesh rest_buffer walk_cache",
     "decals.scattering": """
         bare_places boundary boundary_kernels center_normals covering creases deform density gap_filling
         image_projections mean_normals owned_points polish relocation remesh trial_points turned_normals
@@ -59,8 +59,8 @@ EXTRAS: dict[str, str] = {
 }
 """The modules of each package that are extras, ``*`` for all."""
 
-LISTS = ("blobtree.formulas.library", "blobtree.nodes.kinds")
-"""Modules that list all kinds; what they import does not count."""
+LISTS = ("blobtree.formulas.library", "blobtree.nodes.kinds", "decals.rendering.drawables")
+"""Modules that list all kinds of nodes or of drawn objects; what they import does not count."""
 
 
 def is_extra(module: str) -> bool:

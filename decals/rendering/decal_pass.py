@@ -1,6 +1,8 @@
 """The decal pass: colours all pixels at once, for any number of decals and objects."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import moderngl
 
@@ -11,10 +13,9 @@ from decals.rendering.context import Context
 from decals.rendering.data_texture import DataTexture
 from decals.rendering.decal_data import DecalData, stored
 from decals.rendering.decal_library import decal_constants, decal_library
+from decals.rendering.effect import DecalTexture, ReliefEffect
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.image_array import ImageArray
-from decals.rendering.lights import Lighting
-from decals.rendering.materials import MaterialArray, Relief
 from decals.rendering.pixel_pass import (
     IndirectPass,
     ListedPass,
@@ -26,7 +27,6 @@ from decals.rendering.pixel_pass import (
     set_uniform,
     use_textures,
 )
-from decals.rendering.rest_buffer import RestBuffer
 from decals.rendering.viewpoint import WHOLE, Part, Rectangle, Tile
 
 BODY = "decal_pass.glsl"
@@ -55,9 +55,9 @@ class DecalSource:
     contact: AnyContact
     stiffness: float
     masks: DataTexture | None = None
-    materials: MaterialArray | None = None
-    relief: Relief | None = None
-    lights: Lighting | None = None
+    materials: DecalTexture | None = None
+    relief: ReliefEffect | None = None
+    lights: Any = None
     walks: DataTexture | None = None
 
     @property
@@ -147,12 +147,12 @@ class DecalPass:
         source: "DecalSource | None",
         images: ImageArray | None,
         filtered: bool = False,
-        rest: RestBuffer | None = None,
+        rest: Mapping[str, moderngl.Texture] | None = None,
         part: Part = WHOLE,
     ) -> None:
         """Paint some rows of a rectangle; without decals, or images for them, in the objects' own colours.
 
-        Materials of the decals fill `material_targets` too.
+        Materials of the decals fill `material_targets` too. ``rest`` are the textures of a rest buffer.
         """
         shining = source is not None and source.materials is not None
         walked = source is not None and source.walks is not None
@@ -168,7 +168,7 @@ class DecalPass:
         library = "" if source is None else source.library(filtered=filtered)
         painting = self._pass(library, posed=rest is not None, **variant)
         textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_color": gbuffer.color}
-        textures |= rest.textures if rest is not None else {}
+        textures |= rest or {}
         for program in painting.programs:
             use_textures(program, textures)
             if source is not None and images is not None:

@@ -1,7 +1,7 @@
 """The drawables of objects, by the types of the objects."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeGuard
 
 from decals.errors import InvalidScene
 from decals.rendering.context import Context
@@ -49,6 +49,38 @@ class Drawable(Protocol):
     def release(self) -> None:
         """Release the memory."""
         ...
+
+
+class RestDrawable(Drawable, Protocol):
+    """A drawable whose decals lie on a rest pose."""
+
+    def draw_rest(self, object_id: int, tile: Tile, rest: Any, part: Part = WHOLE) -> None:
+        """Write the places in the rest pose, a `RestBuffer`, where the object is visible."""
+        ...
+
+
+class OffsetDrawable(Drawable, Protocol):
+    """A drawable whose surface heights of decals can move."""
+
+    def prepare(self, source: Any) -> None:
+        """Compile the programs for decals, a `DecalSource`."""
+        ...
+
+    def draw_offset(
+        self, object_id: int, tile: Tile, gbuffer: GBuffer, rest: Any, source: Any, part: Part = WHOLE
+    ) -> None:
+        """Draw the moved surface into the G-buffer, and its places at rest into a `RestBuffer`."""
+        ...
+
+
+def has_rest_pose(drawable: Drawable) -> TypeGuard[RestDrawable]:
+    """Return True if the decals of an object lie on a rest pose."""
+    return hasattr(drawable, "draw_rest")
+
+
+def can_be_moved(drawable: Drawable) -> TypeGuard[OffsetDrawable]:
+    """Return True if heights of decals can move the surface of an object."""
+    return hasattr(drawable, "draw_offset")
 
 
 Factory = Callable[[Context, Any], Drawable]

@@ -7,8 +7,7 @@ import numpy as np
 
 from decals.rendering.decal_pass import DecalSource
 from decals.rendering.dirty_regions import TargetState, same_objects
-from decals.rendering.mesh import PosedMeshDrawable
-from decals.rendering.offset_tree import OffsetTreeDrawable
+from decals.rendering.drawable import can_be_moved, has_rest_pose
 from decals.rendering.options import RenderOptions, SceneLike
 from decals.rendering.targets import Targets
 from decals.rendering.uploads import UploadedScene
@@ -81,7 +80,8 @@ def plan_frame(
     steps = _surface_steps(uploaded, tile, targets, source, depth=depth) if dirty.surface else []
     gbuffer, paint = targets.gbuffer, targets.decal_pass.paint
     rest = targets.rest_for(uploaded)
-    decal_arguments = gbuffer, source, uploaded.images, options.filtered, rest
+    places = None if rest is None else rest.textures
+    decal_arguments = gbuffer, source, uploaded.images, options.filtered, places
     steps += [partial(targets.decal_pass.draw, rectangle, *decal_arguments) for rectangle in dirty.paint]
     radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
     materials = None if uploaded.materials is None else targets.decal_pass.material_targets
@@ -112,7 +112,7 @@ def _surface_steps(
     if rest is not None:
         steps.append(partial(rest.clear, tile.width, tile.height))
     for number, drawable in objects:
-        if isinstance(drawable, OffsetTreeDrawable) and uploaded.moves(drawable):
+        if uploaded.relief is not None and can_be_moved(drawable):
             assert rest is not None
             assert source is not None
             steps.append(partial(drawable.draw_offset, number, tile, gbuffer, rest, source))
@@ -124,6 +124,6 @@ def _surface_steps(
         steps += [
             partial(drawable.draw_rest, number, tile, rest)
             for number, drawable in objects
-            if isinstance(drawable, PosedMeshDrawable)
+            if has_rest_pose(drawable)
         ]
     return steps

@@ -20,18 +20,17 @@ from blobtree.progress import reporting
 from decals.errors import InvalidPoints, InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.index.editor import DecalEditor
+from decals.rendering import drawables  # noqa: F401  (registers kinds of objects)
 from decals.rendering.context import Context
 from decals.rendering.decal_data import DecalData
 from decals.rendering.decal_library import decal_library
 from decals.rendering.decal_pass import decal_programs
 from decals.rendering.dirty_regions import TargetState
-from decals.rendering.drawable import register, warmup_of
+from decals.rendering.drawable import can_be_moved, warmup_of
 from decals.rendering.frame_plan import FramePlan, FrameRequest, decal_source, plan_frame
 from decals.rendering.gbuffer import depth_program
 from decals.rendering.image_array import ImageArray
 from decals.rendering.light_pass import light_program, light_variant, resolve_program
-from decals.rendering.mesh import ColoredMesh, MeshDrawable, PosedColoredMesh, PosedMeshDrawable
-from decals.rendering.offset_tree import OffsetTreeDrawable
 from decals.rendering.options import (
     RenderOptions,
     SceneLike,
@@ -46,7 +45,6 @@ from decals.rendering.picture import Buffers, TiledArray, TiledBuffers
 from decals.rendering.pixel_pass import CameraBuffer, PassBackend
 from decals.rendering.progressive import ProgressiveFrame
 from decals.rendering.targets import BUFFERS_SLOT, WHOLE_SLOT, TargetPool, Targets
-from decals.rendering.tree import TreeHolder
 from decals.rendering.uploads import UploadedScene, Uploads
 from decals.rendering.viewpoint import (
     MAX_TILE,
@@ -65,10 +63,6 @@ DEFAULT_OPTIONS = RenderOptions()
 
 PACKAGES = ("blobtree", "decals")
 """Packages whose lines no warning names."""
-
-register(PosedColoredMesh, PosedMeshDrawable, PosedMeshDrawable.warmup)
-register(ColoredMesh, MeshDrawable, MeshDrawable.warmup)
-register(TreeHolder, OffsetTreeDrawable, OffsetTreeDrawable.warmup)
 
 
 class Renderer:
@@ -461,7 +455,7 @@ def _compile_offsets(uploads: Uploads, scene: SceneLike, options: RenderOptions)
     uploaded = uploads.scene(scene, options)
     source = decal_source(uploaded, options)
     for drawable in uploaded.drawables:
-        if source is not None and isinstance(drawable, OffsetTreeDrawable):
+        if source is not None and can_be_moved(drawable):
             drawable.prepare(source)
 
 

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from decals.rendering.context import DEPTH, Context
 from decals.rendering.decal_pass import DecalPass
 from decals.rendering.dirty_regions import TargetState, same_objects
+from decals.rendering.drawable import has_rest_pose
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.light_pass import LightPass, ResolvePass
-from decals.rendering.mesh import PosedMeshDrawable
 from decals.rendering.options import Size
 from decals.rendering.rest_buffer import RestBuffer
 from decals.rendering.uploads import UploadedScene
@@ -40,9 +40,8 @@ class Targets:
 
     def rest_for(self, uploaded: UploadedScene) -> RestBuffer | None:
         """Return the rest buffer if some objects are posed, or moved by heights, else None."""
-        if not any(isinstance(drawable, PosedMeshDrawable) for drawable in uploaded.drawables) and not any(
-            map(uploaded.moves, uploaded.drawables)
-        ):
+        drawables = uploaded.drawables
+        if not any(map(has_rest_pose, drawables)) and not any(map(uploaded.moves, drawables)):
             return None
         if self._rest is None:
             self._rest = RestBuffer(self._context, self.gbuffer)

@@ -13,7 +13,7 @@ from decals.receivers import object_mask
 from decals.rendering.context import Context
 from decals.rendering.data_texture import DataTexture
 from decals.rendering.decal_data import DecalData
-from decals.rendering.drawable import Drawable, drawable_for
+from decals.rendering.drawable import Drawable, can_be_moved, drawable_for
 from decals.rendering.environment import Environment
 from decals.rendering.image_array import ImageArray
 from decals.rendering.light_pass import EnvironmentTextures
@@ -104,7 +104,7 @@ class UploadedScene:
 
     def moves(self, drawable: Drawable) -> bool:
         """Return True if heights of decals move the surface of an object."""
-        return self.relief is not None and hasattr(drawable, "draw_offset")
+        return self.relief is not None and can_be_moved(drawable)
 
 
 class Uploads:
