@@ -59,8 +59,13 @@ EXTRAS: dict[str, str] = {
 }
 """The modules of each package that are extras, ``*`` for all."""
 
-LISTS = ("blobtree.formulas.library", "blobtree.nodes.kinds", "decals.rendering.drawables")
-"""Modules that list all kinds of nodes or of drawn objects; what they import does not count."""
+LISTS = (
+    "blobtree.formulas.library",
+    "blobtree.nodes.kinds",
+    "decals.editing.actions",
+    "decals.rendering.drawables",
+)
+"""Modules that list all kinds of nodes, of drawn objects, and of actions; what they import does not count."""
 
 
 def is_extra(module: str) -> bool:

@@ -1,36 +1,28 @@
-"""Actions of the editing window by name: selection, history, and those on files, decals and trees.
+"""Actions of the editing window by name: all classes of actions, joined.
 
-To add an action, write a method with the decorator `Group.action` in `Actions` or one of the classes that it
-names. The key table and the help follow from it.
+To add an action, write a method with the decorator `Group.action` in one of these classes. The key table and
+the help follow from it.
 """
 
-from collections.abc import Callable
 from os import PathLike
 
 from decals.editing.action_state import ActionState, Cursor
 from decals.editing.bare_watch import BareWatch
 from decals.editing.brush_actions import BrushActions
-from decals.editing.brush_settings import Brush
-from decals.editing.commands import DeleteDecals, DuplicateDecals
 from decals.editing.decal_actions import DecalActions
 from decals.editing.file_actions import FileActions
-from decals.editing.key_bindings import UNREGISTERED, Group, KeyTable, registered_actions
+from decals.editing.key_bindings import UNREGISTERED, KeyTable, registered_actions
 from decals.editing.outline_actions import OutlineActions
-from decals.editing.session import EditSession, UndoEntry
-from decals.editing.steps import are_many
+from decals.editing.scene_actions import SceneActions
+from decals.editing.session import EditSession
 from decals.editing.tree_actions import TreeActions
 from decals.editing.view_actions import ViewActions
 from decals.editing.visibility_actions import VisibilityActions
 from decals.errors import InvalidEdit
-from decals.field.mapping import ImageMapping
-from decals.record import Contact
-from decals.validation import describe, whole_number
-
-STIFFNESSES = 1.0, 1.5, 2.0, 3.0, 6.0
-"""Stiffnesses that a key goes through."""
+from decals.validation import describe
 
 
-class Actions:
+class Actions(SceneActions):
     """Carries out the actions of the key table on an edit session.
 
     Parameters
@@ -91,21 +83,19 @@ class Actions:
         path: str | PathLike[str] | None = None,
         threaded: bool = False,
     ) -> None:
-        self.state = ActionState(session, threaded=threaded)
+        state = ActionState(session, threaded=threaded)
+        super().__init__(state, TreeActions(state))
         self.bare = BareWatch(session)
-        self.decals = DecalActions(self.state, self.bare)
-        self.trees = TreeActions(self.state)
-        self.files = FileActions(self.state, path)
-        self.visibility = VisibilityActions(self.state)
-        self.outline = OutlineActions(self.state, self.trees, self.visibility)
-        self.view, self.brush = ViewActions(self.state), BrushActions(self.state)
-        self.help_page, self.help_pages = 0, 1
-        self.forget_press: Callable[[], bool] = lambda: False
-        self.deselect_rows: Callable[[], bool] = lambda: False
+        self.decals = DecalActions(state, self.bare)
+        self.files = FileActions(state, path)
+        self.visibility = VisibilityActions(state)
+        self.outline = OutlineActions(state, self.trees, self.visibility)
+        self.view, self.brush = ViewActions(state), BrushActions(state)
+        owners = self, self.files, self.decals, self.brush, self.trees, self.visibility, self.view
         self._actions = {
             name: (binding, method.__get__(owner))
-            for owner in (self, self.files, self.decals, self.brush, self.trees, self.visibility, self.view)
-            for name, (binding, method) in registered_actions(type(owner)).items()
+            for owner, kind in zip(owners, OWNERS, strict=True)
+            for name, (binding, method) in registered_actions(kind).items()
         }
 
     def perform(self, name: str, cursor: Cursor) -> None:
@@ -131,202 +121,8 @@ class Actions:
         self.state.begin_series((name, self.state.selection) if binding.repeats else None, binding.summary)
         self.state.attempt(lambda: method(cursor), waits=not binding.repeats)
 
-    # -- selection --------------------------------------------------------------------------------------
 
-    @Group.SELECTION.action("select", "Click", summary="select the decal under the cursor")
-    def select(self, cursor: Cursor) -> None:
-        """Select the decal under the cursor, or none."""
-        pick = self.state.picked = cursor()
-        self.state.selection = () if pick is None else self.state.selectable([pick.owner])
-        self.state.message = f"decal {pick.owner}" if pick is not None and self.state.selection else ""
-
-    @Group.SELECTION.action("select_also", "Shift+Click", summary="add it to the selection, or remove it")
-    def select_also(self, cursor: Cursor) -> None:
-        """Add the decal under the cursor to the selection, or remove it."""
-        pick = cursor()
-        if pick is None or not self.state.selectable([pick.owner]):
-            return
-        selection = self.state.selection
-        others = tuple(number for number in selection if number != pick.owner)
-        self.state.selection = others if pick.owner in selection else (*others, pick.owner)
-        self.state.message = f"{len(self.state.selection)} decals"
-
-    @Group.SELECTION.action("select_all", "Ctrl+a", summary="select all decals")
-    def select_all(self, _cursor: Cursor) -> None:
-        """Select all decals."""
-        self.state.selection = self.state.selectable(self.state.session.document.decals.numbers)
-        self.state.message = f"{len(self.state.selection)} decals"
-
-    @Group.SELECTION.action(
-        "deselect", "Escape", summary="end the first of: help, brush, drag, selection, edit, export"
-    )
-    def deselect(self, _cursor: Cursor) -> None:
-        """End the help, else the brush, else the drag, else the selection, else the edit, else all exports.
-
-        A brush ends with its stroke, which is reverted.
-        """
-        state = self.state
-        state.message = ""
-        if self.help_visible:
-            self.help_page = 0
-        elif state.brush.brush is not Brush.SELECT:
-            state.brush.brush = Brush.SELECT
-            self._revert_drag()
-        elif not self._revert_drag() and not self._deselect_all():
-            state.background.cancel(exports=True)
-
-    def _revert_drag(self) -> bool:
-        """Revert the drag; return False without a drag."""
-        background = self.state.background
-        dragged = self.forget_press() or self.state.session.stroke_open or background.following
-        if dragged:
-            background.revert_drag()
-        return dragged
-
-    def _deselect_all(self) -> bool:
-        """Deselect decals, primitive and rows; return False if nothing was selected."""
-        state = self.state
-        selected = self.deselect_rows() or bool(state.selection) or state.primitive is not None
-        state.selection, state.primitive = (), None
-        return selected
-
-    @Group.SELECTION.action(
-        "duplicate", "d", summary="duplicate the selected decals, else the selected primitive"
-    )
-    def duplicate(self, _cursor: Cursor) -> None:
-        """Duplicate the selected decals and select the copies, or duplicate the selected primitive."""
-        state = self.state
-        if state.primitive_is_subject:
-            self.trees.duplicate_selected()
-            return
-        count = len(state.selection)
-
-        def select() -> None:
-            end = state.session.document.decals.next_number
-            state.selection = tuple(range(end - count, end))
-
-        state.run(DuplicateDecals(state.selected_numbers), select)
-
-    @Group.SELECTION.action(
-        "delete", "Delete", "BackSpace", summary="delete the selected decals, else the selected primitive"
-    )
-    def delete(self, _cursor: Cursor) -> None:
-        """Delete the selected decals, or the selected primitive."""
-        if self.state.primitive_is_subject:
-            self.trees.delete_selected()
-        else:
-            self.state.run(DeleteDecals(self.state.selected_numbers))
-
-    # -- scene ------------------------------------------------------------------------------------------
-
-    @Group.SCENE.action("undo", "Ctrl+z", summary="undo")
-    def undo(self, _cursor: Cursor) -> None:
-        """Undo the last entry."""
-        self._step_through_history(lambda: self.state.session.next_undo, "undo", _undo)
-
-    @Group.SCENE.action("redo", "Ctrl+y", "Ctrl+Shift+z", summary="redo")
-    def redo(self, _cursor: Cursor) -> None:
-        """Redo the entry that was undone last."""
-        self._step_through_history(lambda: self.state.session.next_redo, "redo", _redo)
-
-    def _step_through_history(
-        self,
-        next_entry: Callable[[], UndoEntry | None],
-        name: str,
-        step: Callable[[EditSession, UndoEntry], str],
-    ) -> None:
-        """Undo or redo an entry after the steps of a drag, in the background if it changes many decals."""
-        state = self.state
-
-        def step_once() -> None:
-            entry = next_entry()
-            if entry is not None and entry.edit.parts_after.objects is not None:
-                state.background.require_idle(name)  # the running edit is computed for the present objects
-            if entry is None:
-                state.message = f"nothing to {name}"
-            elif are_many(entry.edit.after.numbers):
-                state.background.edit(name, lambda session: step(session, entry))
-            else:
-                state.message = step(state.session, entry)
-
-        self.when_idle(name, step_once)
-
-    def when_idle(self, label: str, step: Callable[[], None]) -> None:
-        """End a drag, and take a step once its edits are adopted; `Busy` while another edit runs."""
-        background = self.state.background
-
-        def followed() -> None:
-            background.require_idle(label, computing=False)
-            step()
-
-        if self.state.session.stroke_open:
-            self.trees.end_drag()
-        background.when_followed(followed)
-
-    def go_to(self, count: int) -> None:
-        """End a drag, then undo or redo until so many entries of the history are done.
-
-        Raises
-        ------
-        InvalidEdit
-            The history has fewer entries, or another edit runs.
-        """
-        session = self.state.session
-        total = len(session.labels) + len(session.undone_labels)
-        number = whole_number("history", count, 0, total, InvalidEdit)
-
-        def step() -> None:
-            while len(session.labels) > number:
-                session.undo()
-            while len(session.labels) < number and session.redo() is not None:
-                pass
-            self.state.show(f"history: after {session.labels[-1]}" if number else "history: at the start")
-
-        self.when_idle("go through the history", step)
-
-    @Group.SCENE.action("next_contact", "p", summary="contact mode: product, min, radial, elastic")
-    def next_contact(self, _cursor: Cursor) -> None:
-        """Draw with the next contact mode."""
-        contact = Contact((int(self.state.session.document.drawing.contact) + 1) % len(Contact))
-        self.state.draw_with(f"contact mode: {contact.name.lower()}", contact=contact)
-
-    @Group.SCENE.action("next_stiffness", "Shift+p", summary="stiffness of elastic contact: 1, 1.5, 2, 3, 6")
-    def next_stiffness(self, _cursor: Cursor) -> None:
-        """Draw with the next stiffness."""
-        present = self.state.session.document.drawing.stiffness
-        stiffness = next((one for one in STIFFNESSES if one > present), STIFFNESSES[0])
-        self.state.draw_with(f"stiffness of elastic contact: {stiffness:g}", stiffness=stiffness)
-
-    @Group.SCENE.action("next_mapping", "u", summary="image mapping of the window: corrected, chord, walked")
-    def next_mapping(self, _cursor: Cursor) -> None:
-        """Draw with the next image mapping."""
-        mapping = ImageMapping((self.state.session.document.drawing.mapping - 1) % len(ImageMapping))
-        self.state.draw_with(f"image mapping: {mapping.name.lower()}", mapping=mapping)
-
-    @Group.SCENE.action("help", "h", "F1", summary="show this help, its next page, or hide it")
-    def turn_help(self, _cursor: Cursor) -> None:
-        """Show the help or its next page; after the last page hide it."""
-        self.help_page = (self.help_page + 1) % (self.help_pages + 1)
-
-    @property
-    def help_visible(self) -> bool:
-        """True while the window shows the help."""
-        return self.help_page > 0
-
-
-def _undo(session: EditSession, entry: UndoEntry) -> str:
-    if session.next_undo is not entry:
-        raise InvalidEdit("another edit was made meanwhile; undo again")
-    return f"undid: {session.undo()}"
-
-
-def _redo(session: EditSession, entry: UndoEntry) -> str:
-    if session.next_redo is not entry:
-        raise InvalidEdit("another edit was made meanwhile; there is nothing to redo")
-    return f"redid: {session.redo()}"
-
-
-OWNERS = Actions, FileActions, DecalActions, BrushActions, TreeActions, VisibilityActions, ViewActions
+OWNERS = SceneActions, FileActions, DecalActions, BrushActions, TreeActions, VisibilityActions, ViewActions
 """Classes of actions, in the order of the help."""
 
 KEYS = KeyTable(
