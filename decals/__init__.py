@@ -4,7 +4,7 @@ The public names are listed in `__init__.pyi` and are loaded at first use, so `i
 """
 
 from blobtree.lazy import attach_stub
-from decals.scenes.shortcuts import provide
+from decals.shortcuts import provide
 
 __getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
 provide(__getattr__)

@@ -26,7 +26,7 @@ from decals.scenes.camera import Camera
 from decals.scenes.objects import Box, MeshObject, SceneObject, TreeObject
 from decals.scenes.origin import Origin
 from decals.scenes.scene import DecalImage, Scene, require_scene
-from decals.scenes.shortcuts import public
+from decals.shortcuts import public
 from decals.surfaces.base_color import BaseColor, Color
 from decals.surfaces.convert import as_shape, is_model
 from decals.surfaces.mesh_data import MeshData

@@ -30,7 +30,7 @@ from decals.scenes.objects import (
 )
 from decals.scenes.origin import WORLD, Origin
 from decals.scenes.recipe import Recipe
-from decals.scenes.shortcuts import public
+from decals.shortcuts import public
 from decals.surfaces.convert import Model
 from decals.validation import describe, instance, require_rgba, whole_number
 
