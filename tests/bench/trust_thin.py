@@ -152,20 +152,19 @@ def tree_row(number: int, count: int) -> dict[str, float | str]:
     with messages.received():
         seconds, positions = _scattered(model.tree, None, count)
     over, counted = _named_parts(model, messages.texts), _counted_parts(model)
-    bare, shares = _bare_parts(model, positions)
+    bare, shares = _bare_parts(model, positions, counted - over)
     mesh = polygonize(model.tree)
     unmeshed = _parts_without_mesh(model, mesh)
     faults = [f"{name} has no mesh" for name in _names(model, unmeshed - over)]
-    if not over:  # else the mesh has another area than the surface, and all shares are wrong
-        faults += [
-            f"{name} has {found:g} decals in place of {expected:.1f}"
-            for name, (found, expected) in zip(_names(model, set(bare)), bare.values(), strict=True)
-        ]
+    faults += [
+        f"{name} has {found:g} decals in place of {expected:.1f}"
+        for name, (found, expected) in zip(_names(model, set(bare)), bare.values(), strict=True)
+    ]
     return {
         "parts": len(counted),
         "shares": shares,
         "parts_over_memory": len(over & counted),
-        "parts_lost": len((unmeshed - over) | (set() if over else set(bare))),
+        "parts_lost": len((unmeshed - over) | set(bare)),
         "cost": seconds / before if before > 0.0 else 0.0,
         "processor": seconds,
         "triangles": len(mesh.faces),
@@ -220,13 +219,19 @@ def _parts_without_mesh(model: ThinTree, mesh: Mesh) -> set[int]:
     }
 
 
-def _bare_parts(model: ThinTree, positions: Float64Array) -> tuple[dict[int, tuple[int, float]], int]:
-    """Return the counted parts without their share of the decals, each with its decals and its share.
+def _bare_parts(
+    model: ThinTree, positions: Float64Array, among: set[int]
+) -> tuple[dict[int, tuple[int, float]], int]:
+    """Return the parts without their share of the decals, each with its decals and its share.
 
-    Return also how many parts were checked."""
+    Parts that need no mesh, and have none or a part of it, leave their decals to others, so shares are those
+    among the parts that have one. Return also how many were checked.
+    """
     found, expected = decals_of_parts(model, positions)
+    numbers = sorted(among)
+    expected *= found[numbers].sum() / max(expected[numbers].sum(), 1e-300)
     right = has_share(found, expected)
-    checked = [number for number in sorted(_counted_parts(model)) if expected[number] >= LEAST_DECALS]
+    checked = [number for number in numbers if expected[number] >= LEAST_DECALS]
     bare = {number: (int(found[number]), float(expected[number])) for number in checked if not right[number]}
     return bare, len(checked)
 
