@@ -44,6 +44,7 @@ from decals.scenes.files import to_json
 from decals.scenes.material import DecalMaterial
 from decals.scenes.objects import MeshObject
 from decals.scenes.scene import Scene
+from decals.validation import MAX_STIFFNESS
 
 MAX_DECALS = 100_000
 """Most decals of a page: its index is built by the page's script."""
@@ -142,6 +143,7 @@ def record_rules(receivers: Sequence[str], form: Form) -> dict[str, Any]:
         "interactions": {item.name.lower(): int(item) for item in Interaction},
         "minRadius": MIN_RADIUS,
         "maxCoordinate": MAX_COORDINATE,
+        "maxStiffness": MAX_STIFFNESS,
         "keptRadius": MIN_KEPT_RADIUS,
         "nestingSlack": NESTING_SLACK,
         "plain": {name: getattr(form, name) for name in ("layered", "limited", "nested")},

@@ -15,6 +15,12 @@ export class Camera {
     return { position: this.position, target: this.target };
   }
 
+  // Move to a pose, unless the eye is at the target, straight above or below it, or too far away.
+  place({ position, target }) {
+    const across = length(cross(subtract(target, position), this.up));
+    if (across > 0 && across < this.size / CLOSEST) Object.assign(this, { position, target });
+  }
+
   // From the middle of the picture to its right and its upper edge at distance 1, and along the view: narrow pictures
   // show as much from left to right as wide ones.
   frame(aspect) {

@@ -27,7 +27,6 @@ const COMMANDS = {
   arrowup: (viewer) => viewer.arrow(0, 1),
   arrowdown: (viewer) => viewer.arrow(0, -1),
   "+": (viewer) => viewer.moveCamera("zoom", 1 / ZOOM),
-  "=": (viewer) => viewer.moveCamera("zoom", 1 / ZOOM),
   "-": (viewer) => viewer.moveCamera("zoom", ZOOM),
 };
 
@@ -41,14 +40,14 @@ export class Controls {
     bar.hidden = !controls;
     bar.addEventListener("click", ({ target }) => COMMANDS[target.name]?.(viewer));
     bar.addEventListener("input", ({ target }) => viewer.set({ [target.name]: target.value }));
-    root.addEventListener("keydown", (event) => this.press(event, viewer));
+    for (const part of [canvas, bar]) part.addEventListener("keydown", (event) => this.press(event, viewer));
   }
 
   // Run the command of a key: that of an enabled button, or one without a button.
   press(event, viewer) {
-    if (event.target.matches("select, input")) return; // these have keys of their own
+    if (event.altKey || event.target.matches("select, input")) return; // keys of the browser, and of these
     const control = event.ctrlKey || event.metaKey ? `control+${event.shiftKey ? "shift+" : ""}` : "";
-    const key = control + event.key.toLowerCase();
+    const key = control + event.key.toLowerCase().replace("=", "+");
     const button = this.root.querySelector(`button[data-keys~="${CSS.escape(key)}"]:enabled`);
     const command = COMMANDS[button?.name ?? key];
     if (command) event.preventDefault();
@@ -58,10 +57,10 @@ export class Controls {
   // Show the state, and what can be done.
   show({ mode, stiffness, selected, history }) {
     this.mode.value = mode;
-    this.stiffness.value = stiffness;
-    this.stiffness.disabled = mode !== "elastic";
+    Object.assign(this.stiffness, { value: stiffness, disabled: mode !== "elastic" });
     const can = { undo: history.at > 0, redo: history.at + 1 < history.states.length, change: selected >= 0 };
     for (const button of this.buttons) button.disabled = can[button.dataset.needs] === false;
+    if (this.root.querySelector("button:disabled:focus")) this.canvas.focus(); // else keys reach nothing
   }
 
   say(text) {

@@ -6,30 +6,30 @@ import { length, subtract, tangential, unit } from "./vectors.mjs";
 const linear = (c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
 
 // A decal with a normal and a tangent that are perpendicular and of length 1.
-export function framed(row) {
-  const normal = unit(row.normal);
-  return { ...row, normal, tangent: tangential(row.tangent, normal) };
+export function framed({ normal = [], tangent = [], ...row }) {
+  const up = unit(normal);
+  return { ...row, normal: up, tangent: tangential(tangent, up) };
 }
 
 // True for a decal that a scene file may have, with a frame of unit vectors.
 export function isDecal({ position, normal, tangent, radius, image = 0 }, rules, images) {
   const { maxCoordinate, minRadius } = rules;
-  const isVector = (v) => v.length === 3 && v.every((x) => Math.abs(x) <= maxCoordinate);
+  const isWithin = (x, least) => Number.isFinite(x) && x >= least && x <= maxCoordinate;
+  const isVector = (v) => v?.length === 3 && v.every((x) => isWithin(x, -maxCoordinate));
   const isUnit = (v) => isVector(v) && Math.abs(length(v) - 1) < 1e-6;
   const isImage = Number.isInteger(image) && image >= -1 && image < images;
-  const isRadius = radius >= minRadius && radius <= maxCoordinate;
-  return isVector(position) && isUnit(normal) && isUnit(tangent) && isRadius && isImage;
+  return isVector(position) && isUnit(normal) && isUnit(tangent) && isWithin(radius, minRadius) && isImage;
 }
 
 export class DecalSet {
   constructor(rows, rules) {
-    Object.assign(this, { rules, rows: rows.slice() });
+    // `full`: an edit made decals for which the plain shaders are wrong
+    Object.assign(this, { rules, rows: rows.slice(), full: false });
     this.records = new Texels(Float32Array, 4, 4 * rows.length);
     this.limits = new Texels(Float32Array, 4, rows.length);
     this.rows.forEach((row, number) => row && this.pack(row, number));
     this.index = new DecalIndex(rules.index, this.records, this.numbers);
     this.rank = this.numbers.length ? this.index.rank(this.numbers[0]) : null; // of all, without layers
-    this.full = false; // an edit made decals for which the plain shaders are wrong
   }
 
   get numbers() {

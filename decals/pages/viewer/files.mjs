@@ -18,8 +18,7 @@ export function copyLink({ controls, ...state }) {
 }
 
 // The scene as a file that `decals.load_scene` takes.
-export function sceneText({ header, arrays, mode, stiffness, camera, home, decals }) {
-  const { scene } = header;
+export function sceneText({ header: { scene }, arrays, mode, stiffness, camera, home, decals }) {
   const text = (name) =>
     btoa(Array.from(new Uint8Array(arrays[name].buffer), (byte) => String.fromCharCode(byte)).join(""));
   const objects = scene.objects.map((object, i) => {

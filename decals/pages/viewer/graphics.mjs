@@ -13,7 +13,7 @@ export class Program {
       return shader;
     });
     gl.linkProgram(program);
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
       const logs = [gl.getProgramInfoLog(program), ...shaders.map((shader) => gl.getShaderInfoLog(shader))];
       throw new Error(`this device refuses a shader: ${logs.join(" ")}`);
     }

@@ -5,12 +5,14 @@ export class History {
     Object.assign(this, { decals, onChange, states: [decals.rows.slice()], at: 0 });
   }
 
-  // Change decals at once; `open` continues the last step, as a drag does.
-  change(pairs, { open = false } = {}) {
+  // Change decals at once, and return the step; one that is given goes on, as in a drag, unless another came between.
+  change(pairs, last) {
     const rows = this.decals.rows.slice();
     for (const [number, row] of pairs) rows[number] = row;
-    this.states.splice(this.at + (open ? 0 : 1), Infinity, rows);
-    this.go(open ? 0 : 1);
+    const steps = last && last === this.states[this.at] ? 0 : 1;
+    this.states.splice(this.at + steps, Infinity, rows);
+    this.go(steps);
+    return rows;
   }
 
   // Undo steps, below 0, or do them again, as far as there are any.

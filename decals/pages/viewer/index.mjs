@@ -23,10 +23,6 @@ export class DecalIndex {
     for (const number of numbers) this.insert(number);
   }
 
-  get mask() {
-    return this.table.array.length / 4 - 1;
-  }
-
   rank(number) {
     return Math.floor(this.records.array[RECORD * number + 7]);
   }
@@ -87,6 +83,7 @@ export class DecalIndex {
   // Make a table of some slots at least, with some cells.
   seatAll(cells, slots) {
     Object.assign(this, { table: new Texels(Int32Array, 4, slots, EMPTY), cells: [], used: 0 });
+    this.mask = this.table.array.length / 4 - 1;
     cells.forEach((cell) => this.seat(cell));
   }
 

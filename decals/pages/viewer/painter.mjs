@@ -124,10 +124,9 @@ export class Painter {
     return this.gl.clientWaitSync(this.fence, 0, 0) === this.gl.TIMEOUT_EXPIRED;
   }
 
-  // Wait until the picture is drawn, as a read of it does.
+  // Wait until the picture that was drawn last is there, as a read of it does.
   finish() {
     const { gl } = this;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
   }
 

@@ -49,8 +49,7 @@ export class Pointer {
     const { surface } = viewer.pick(x, y);
     if (!surface) return;
     const middle = add(surface.position, carried(drag.offset, drag.normal, surface.normal));
-    viewer.moveTo(viewer.closestTo(middle) ?? surface, { open: drag.edited });
-    drag.edited = true;
+    drag.step = viewer.moveTo(viewer.closestTo(middle) ?? surface, drag.step);
   }
 
   orbit(now, [x, y]) {

@@ -1,4 +1,5 @@
 // Show the data of this page, or else say why its picture stays.
+addEventListener("hashchange", () => location.reload()); // another link was pasted
 const root = document.getElementById("viewer");
 const still = root.firstElementChild;
 mount(root, document.getElementById("data").textContent, { link: location.hash }).then(

@@ -41,11 +41,11 @@ class Viewer {
   }
 
   // Change the camera, the contact mode, the stiffness, decals ({number: row or null}), or the state of a link.
-  set({ link, camera, mode, stiffness, decals, selected }) {
-    if (link !== undefined) this.set(read(link, this.originals));
-    if (camera) Object.assign(this.camera, { position: camera.position, target: camera.target });
+  set({ link, camera, mode, stiffness, decals, selected } = {}) {
+    if (link) this.set(read(link, this.originals));
+    if (camera) this.camera.place(camera);
     if (Object.hasOwn(this.header.shaders.modes, mode ?? "")) this.mode = mode;
-    if (stiffness >= 1 && stiffness < Infinity) this.stiffness = Number(stiffness);
+    if (stiffness >= 1 && stiffness <= this.header.rules.maxStiffness) this.stiffness = Number(stiffness);
     if (decals) this.edit(Object.entries(decals).map(([number, row]) => [Number(number), row]));
     if (selected !== undefined) this.selected = this.decals.rows[selected] ? selected : -1;
     this.changed("view");
@@ -56,6 +56,7 @@ class Viewer {
   }
 
   dispose() {
+    cancelAnimationFrame(this.frame);
     this.observer.disconnect();
     this.painter.gl.getExtension("WEBGL_lose_context")?.loseContext();
     this.controls.root.replaceChildren();
@@ -75,6 +76,7 @@ class Viewer {
   }
 
   changed(event) {
+    this.controls.say("");
     for (const call of this.listeners.get(event) ?? []) call(this.get());
     this.sample = 0;
     this.request();
@@ -121,23 +123,25 @@ class Viewer {
 
   // -- edits ----------------------------------------------------------------------------------------------
 
-  // Change decals, with normals and tangents made perpendicular and of length 1; others than valid ones stay.
-  edit(pairs, options) {
+  // Change decals, with normals and tangents made perpendicular and of length 1; others than valid ones stay. What is
+  // returned continues the step.
+  edit(pairs, step) {
     const { rules, images } = this.header;
     const changes = pairs
       .map(([number, row]) => [number, row && framed(row)])
-      .filter(([, row]) => !row || isDecal(row, rules, images));
-    if (changes.length) this.history.change(changes, options);
+      .filter(([number, row]) => number >>> 0 === number && (!row || isDecal(row, rules, images)));
+    return changes.length ? this.history.change(changes, step) : step;
   }
 
-  editSelected(change, options) {
+  editSelected(change, step) {
     const row = this.decals.rows[this.selected];
-    if (row) this.edit([[this.selected, { ...row, ...change(row) }]], options);
+    return row && this.edit([[this.selected, { ...row, ...change(row) }]], step);
   }
 
   // Move the selected decal to a point of the surface; its image is carried along.
-  moveTo(hit, options) {
-    this.editSelected((row) => ({ ...hit, tangent: carried(row.tangent, row.normal, hit.normal) }), options);
+  moveTo(hit, step) {
+    const along = ({ tangent, normal }) => carried(tangent, normal, hit.normal);
+    return this.editSelected((row) => ({ ...hit, tangent: along(row) }), step);
   }
 
   // Move the selected decal along the surface, to where a look from above ends; or turn the model.
@@ -148,8 +152,7 @@ class Viewer {
     const step = add(scaled(cross(along, normal), right), scaled(along, up));
     const target = add(position, scaled(step, STEP * radius));
     const above = { position: add(target, scaled(normal, radius)), target, up: along, fov: NARROW };
-    const { bounds, aspect } = this.header;
-    const hit = this.pick(0, 0, new Camera(above, bounds, aspect)).surface;
+    const hit = this.pick(0, 0, new Camera(above, this.header.bounds, this.header.aspect)).surface;
     if (hit && length(subtract(hit.position, position)) < 3 * radius) this.moveTo(hit);
   }
 
@@ -167,8 +170,8 @@ class Viewer {
   select(step) {
     const { numbers } = this.decals;
     const at = this.selected < 0 && step < 0 ? 0 : numbers.indexOf(this.selected);
-    if (numbers.length) this.set({ selected: numbers.at((at + step) % numbers.length) });
-    if (numbers.length) this.controls.say(`Decal ${this.selected} is selected.`);
+    this.set({ selected: numbers.at((at + step) % numbers.length) });
+    if (this.selected >= 0) this.controls.say(`Decal ${this.selected} is selected.`);
   }
 
   // Move the camera by a function of its own.

@@ -305,8 +305,7 @@ def test_edits_are_undone_and_a_drag_is_one_step() -> None:
     const seen = [];
     const look = () => seen.push([...decals.rows]);
     history.change([[0, "c"]]);
-    history.change([[1, "d"]]);
-    history.change([[1, "e"]], { open: true });
+    history.change([[1, "e"]], history.change([[1, "d"]]));
     history.change([[2, "f"]]);
     look();
     for (const step of [-1, -1, -1, -1, 1, 1]) { history.go(step); look(); }
@@ -325,6 +324,50 @@ def test_edits_are_undone_and_a_drag_is_one_step() -> None:
         ["c", "e", None],
         [None, "e", None],
     ]
+
+
+@needs_node
+@pytest.mark.parametrize("between", ["history.go(-1)", "history.change([[1, 'x']])", "history.go(1)"])
+def test_no_state_is_lost_by_what_comes_between_steps_of_a_drag(between: str) -> None:
+    script = f"""
+    const {{ History }} = await import("./history.mjs");
+    const decals = {{ rows: ["a", "b"], set(number, row) {{ this.rows[number] = row; }} }};
+    const history = new History(decals, () => {{}});
+    const step = history.change([[0, "dragged"]]);
+    {between};
+    history.change([[0, "farther"]], step);
+    const seen = [[...decals.rows]];
+    while (history.at > 0) {{ history.go(-1); seen.push([...decals.rows]); }}
+    console.log(JSON.stringify(seen));
+    """
+    seen = run_node(script, None)
+    assert seen[0][0] == "farther"
+    assert seen[-1] == ["a", "b"]
+    assert len(seen) == (4 if "x" in between else 2)
+
+
+@needs_node
+def test_poses_without_a_picture_are_refused() -> None:
+    good = [[0, 0, 3], [0, 0, 0]], [[0, 1, 3], [5, 1, 0]], [[50, 0, 0], [0, 50, 0]]
+    wrong = (
+        [[0, 0, 0], [0, 0, 0]],
+        [[0, 5, 0], [0, 0, 0]],
+        [[0, -5, 0], [0, 0, 0]],
+        [[1e300, 0, 0], [0, 0, 0]],
+        [[0, 0, 3], [1e30, 0, 0]],
+        [[None, 0, 3], ["x", 0, 0]],
+    )
+    script = """
+    const { Camera } = await import("./camera.mjs");
+    const start = { position: [1, 2, 3], target: [0, 0, 0], up: [0, 2, 0], fov: 30 };
+    const found = data.map(([position, target]) => {
+      const camera = new Camera(start, [[-1, -1, -1], [1, 1, 1]], 1.5);
+      camera.place({ position, target });
+      return camera.position === position && camera.target === target;
+    });
+    console.log(JSON.stringify(found));
+    """
+    assert run_node(script, [*good, *wrong]) == [True] * len(good) + [False] * len(wrong)
 
 
 @needs_node
@@ -371,14 +414,17 @@ def test_decals_of_links_are_those_that_files_may_have() -> None:
         {"image": 2},
         {"image": -2},
         {"image": 0.5},
+        {"radius": "0.5"},
+        {"position": ["1", "2", "3"]},
     ]
+    lacking = [{name: good[name] for name in good if name != left} for left in list(good)[:4]]
     script = """
-    const { isDecal } = await import("./decals.mjs");
-    console.log(JSON.stringify(data.rows.map((row) => isDecal(row, data.rules, 2))));
+    const { framed, isDecal } = await import("./decals.mjs");
+    console.log(JSON.stringify(data.rows.map((row) => isDecal(framed(row), data.rules, 2))));
     """
-    rows = [good, {**good, "image": -1}, *({**good, **change} for change in wrong)]
+    rows = [good, {**good, "image": -1}, *({**good, **change} for change in wrong), *lacking, {}]
     rules = record_rules([""], Form(decals.Contact.ELASTIC))
-    assert run_node(script, {"rows": rows, "rules": rules}) == [True, True, *[False] * len(wrong)]
+    assert run_node(script, {"rows": rows, "rules": rules}) == [True, True, *[False] * (len(rows) - 2)]
 
 
 @needs_node
