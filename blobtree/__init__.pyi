@@ -1,9 +1,10 @@
 from ._version import __version__
-from .custom.falloff import define_falloff
 from .custom.field import CustomField, define_field
 from .custom.operator import CustomCombination, define_operator
 from .custom.skeleton import CustomPrimitive, define_skeleton
 from .custom.warp import CustomWarp, define_warp
+from .declare.falloff import Falloff, define_falloff
+from .declare.formula import formula
 from .derivatives.curvature import Curvatures
 from .errors import (
     Cancelled,
@@ -23,7 +24,7 @@ from .errors import (
     UnusableFile,
 )
 from .fitting import Fit, fit
-from .formulas.falloff import ISO, RIM, Falloff
+from .formulas.falloff import ISO, RIM
 from .formulas.falloffs import FALLOFF_NAMES
 from .identity import content_hash
 from .io import from_json, load, save, to_json
@@ -189,6 +190,7 @@ __all__ = [
     "define_warp",
     "field_grid",
     "fit",
+    "formula",
     "from_json",
     "from_mesh",
     "from_sdf",

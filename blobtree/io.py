@@ -25,9 +25,9 @@ from blobtree.custom.field import CustomField
 from blobtree.custom.operator import CustomCombination
 from blobtree.custom.skeleton import CustomPrimitive
 from blobtree.custom.warp import CustomWarp
+from blobtree.declare.falloff import Falloff
 from blobtree.errors import ImplicitDecalsError, InvalidFile, UnusableFile
 from blobtree.files import write_atomically
-from blobtree.formulas.falloff import Falloff
 from blobtree.json_errors import json_reason
 from blobtree.nodes.attributes import Attributes, AttributeValue
 from blobtree.nodes.kinds import NODE_KINDS

@@ -9,7 +9,7 @@ from typing import Any, Self
 
 from blobtree import Node
 from blobtree.colors import Rgb, Rgba
-from blobtree.formulas.falloff import Falloff
+from blobtree.declare.falloff import Falloff
 from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.nodes.parameters import UNITS, Parameter, Quantity, describe, parameters_of
 from blobtree.transpile.python import plain_python

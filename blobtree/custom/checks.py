@@ -4,14 +4,14 @@ They cannot prove a claim, but a wrong function seldom passes.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from blobtree._typing import Float64Array
-from blobtree.custom.source import CustomSource
+from blobtree.declare.formula import Formula, result_of, shown
 from blobtree.nodes.parameters import Parameter
 from blobtree.transpile.python import Precision, vector
 
@@ -59,47 +59,17 @@ def in_precision(value: Any, precision: Precision) -> Any:
     return precision(value) if isinstance(value, float) else value
 
 
-def result_of(
-    source: CustomSource,
-    function: Callable[..., Any],
-    arguments: list[Any],
-    where: Callable[[], str],
-    size: int,
-) -> Float64Array:
-    """Return the result of a function as `size` numbers; raise `InvalidDefinition` otherwise.
-
-    `where` says for errors at which arguments it is called.
-    """
-    try:
-        with np.errstate(all="ignore"):
-            result = np.asarray(function(*arguments), np.float64)
-    except ArithmeticError as error:
-        raise source.refusal(f"for {where()} it fails: {error}; it must have a result everywhere") from error
-    except Exception as error:  # the function is the user's own
-        raise source.refusal(f"for {where()} it fails: {type(error).__name__}: {error}") from error
-    if result.shape != (size,) or not np.isfinite(result).all():
-        raise source.refusal(f"for {where()} it returns {shown(result)}; expected {size} finite numbers")
-    return result
-
-
-def shown(numbers: Any) -> str:
-    """Return a number, or several in parentheses, as messages show them."""
-    flat = np.ravel(np.asarray(numbers, np.float64)).tolist()
-    text = ", ".join(f"{number:.6g}" for number in flat)
-    return text if len(flat) == 1 else f"({text})"
-
-
 @dataclass(frozen=True)
 class Trial:
     """A user's function of a point, with one set of values of its other parameters."""
 
-    source: CustomSource
+    source: Formula
     values: dict[str, Any]
     size: int
     """Number of numbers that it returns."""
 
     def call(
-        self, function: CustomSource, leading: tuple[Any, ...], size: int, precision: Precision = np.float64
+        self, function: Formula, leading: tuple[Any, ...], size: int, precision: Precision = np.float64
     ) -> Float64Array:
         """Return the result (size,) of a function of leading arguments, the point first, and the values."""
         plain = function.reference(precision)
@@ -127,7 +97,7 @@ class Trial:
         """Return the function's result at a point."""
         return self.call(self.source, (tuple(q),), self.size, precision)
 
-    def bound(self, claim: float | CustomSource, center: Float64Array, radius: float) -> float:
+    def bound(self, claim: float | Formula, center: Float64Array, radius: float) -> float:
         """Return a claimed bound in a ball."""
         if isinstance(claim, float):
             return claim
@@ -136,7 +106,7 @@ class Trial:
 
 
 def trials(
-    source: CustomSource,
+    source: Formula,
     parameters: tuple[Parameter, ...],
     size: int,
     extent: float,

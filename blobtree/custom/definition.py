@@ -3,15 +3,17 @@
 import copyreg
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import make_dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import warp as wp
 
-from blobtree.custom.source import CustomSource, custom_source, node_class, spelled
+from blobtree.declare.formula import Formula, class_name, formula_of, spelled
 from blobtree.declare.registry import Definitions
 from blobtree.nodes.node import Node
 from blobtree.nodes.parameters import Parameter, Quantity
+from blobtree.nodes.tree import AssociativeCombination
 
 _SIZES: dict[Any, int] = {
     wp.float32: 1,
@@ -28,7 +30,7 @@ Limits = tuple[float | None, float | None]
 
 
 def custom_parameters(
-    source: CustomSource, names: Sequence[str], limits: Mapping[str, Limits] | None, base: type[Node]
+    source: Formula, names: Sequence[str], limits: Mapping[str, Limits] | None, base: type[Node]
 ) -> tuple[Parameter, ...]:
     """Return the named parameters of a user's function.
 
@@ -72,7 +74,7 @@ def custom_parameters(
     return tuple(parameters)
 
 
-def _limits(source: CustomSource, name: str, limits: Limits) -> tuple[float, float]:
+def _limits(source: Formula, name: str, limits: Limits) -> tuple[float, float]:
     try:
         low, high = limits
         low, high = (-math.inf if low is None else float(low)), (math.inf if high is None else float(high))
@@ -85,7 +87,7 @@ def _limits(source: CustomSource, name: str, limits: Limits) -> tuple[float, flo
     return low, high
 
 
-def point_function(function: Any, returns: Any) -> tuple[CustomSource, list[str]]:
+def point_function(function: Any, returns: Any) -> tuple[Formula, list[str]]:
     """Return a user's function of a point, and the names of its other parameters.
 
     Raises
@@ -93,7 +95,7 @@ def point_function(function: Any, returns: Any) -> tuple[CustomSource, list[str]
     InvalidDefinition
         It is no typed function with this result, or its first parameter is no point.
     """
-    source = custom_source(function, returns=returns)
+    source = formula_of(function, returns=returns)
     first, *names = list(source.parameters) or [""]
     if source.parameters.get(first) is not wp.vec3:
         raise source.refusal("expected the point `q: wp.vec3` as its first parameter")
@@ -101,7 +103,7 @@ def point_function(function: Any, returns: Any) -> tuple[CustomSource, list[str]
 
 
 def claimed_function(
-    source: CustomSource,
+    source: Formula,
     parameters: tuple[Parameter, ...],
     claim: Any,
     name: str,
@@ -109,12 +111,12 @@ def claimed_function(
     returns: Any,
     *,
     needs_leading: bool = True,
-) -> CustomSource:
+) -> Formula:
     """Return the function of a claim: of the `leading` parameters, by type, and then those of the kind.
 
     Without `needs_leading` it may be a function of the kind's parameters alone.
     """
-    bound = custom_source(claim, returns=returns)
+    bound = formula_of(claim, returns=returns)
     own = [source.parameters[parameter.name] for parameter in parameters]
     types = [wp.float32 if kind is float else kind for kind in bound.parameters.values()]
     own = [wp.float32 if kind is float else kind for kind in own]
@@ -127,14 +129,14 @@ def claimed_function(
 
 
 def claimed_bound(
-    source: CustomSource,
+    source: Formula,
     parameters: tuple[Parameter, ...],
     claim: Any,
     name: str,
     ball: tuple[str, str],
     *,
     positive: bool,
-) -> float | CustomSource:
+) -> float | Formula:
     """Return a claimed bound: a number, or a function of the kind's parameters, and maybe of a ball."""
     if isinstance(claim, int | float | np.number) and not isinstance(claim, bool):
         if not (claim > 0.0 if positive else claim >= 0.0) or not claim < np.inf:
@@ -146,7 +148,7 @@ def claimed_bound(
 
 
 def bound_call(
-    claim: float | CustomSource, ball: Sequence[str], readings: Sequence[str]
+    claim: float | Formula, ball: Sequence[str], readings: Sequence[str]
 ) -> tuple[str, dict[str, Any]]:
     """Return the expression of a claimed bound in a generated function, and the functions that it calls."""
     if isinstance(claim, float):
@@ -180,6 +182,17 @@ def tape_readings(
 def texel_lines(count: int) -> str:
     """Return the lines of a generated function that read its texels."""
     return "".join(f"    t{i} = tape[at + {i}]\n" for i in range(count))
+
+
+def node_class(
+    kind: str, source: Formula, fields: list[Any], base: type[Node], namespace: dict[str, Any]
+) -> Any:
+    """Return a node class with these fields, in the module of the function."""
+    inherits_init = issubclass(base, AssociativeCombination)
+    options: dict[str, Any] = {"frozen": True, "eq": False, "repr": False, "init": not inherits_init}
+    node_type = make_dataclass(class_name(kind), fields, bases=(base,), namespace=namespace, **options)
+    node_type.__module__ = source.python.__module__
+    return node_type
 
 
 class CustomKind(type):
@@ -217,7 +230,7 @@ CUSTOM_KINDS: Definitions[CustomKind] = Definitions(
 
 def defined_kind(
     base: type[Any],
-    source: CustomSource,
+    source: Formula,
     kind: str,
     digest: str,
     parameters: tuple[Parameter, ...],

@@ -29,7 +29,7 @@ from blobtree.custom.definition import (
     texel_lines,
 )
 from blobtree.custom.field_checks import FieldClaims, check_field
-from blobtree.custom.source import CustomSource, generated, kind_name, returned_type
+from blobtree.declare.formula import Formula, generated, kind_name, returned_type
 from blobtree.formulas.fields import FieldKind
 from blobtree.nodes.fields import BoxedField
 from blobtree.nodes.parameters import Parameter
@@ -158,7 +158,7 @@ def define_field(
 
 
 def _row(
-    kind: str, digest: str, source: CustomSource, parameters: tuple[Parameter, ...], claims: FieldClaims
+    kind: str, digest: str, source: Formula, parameters: tuple[Parameter, ...], claims: FieldClaims
 ) -> FieldKind:
     """Return the row of the table, with functions generated around the user's."""
     readings, texels = tape_readings(parameters, FIRST_NUMBER)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from blobtree._typing import Float64Array
-from blobtree.custom.checks import SEED, SLOPE_TOLERANCE, VALUE_TOLERANCE, Trial, shown, trials
-from blobtree.custom.source import CustomSource
+from blobtree.custom.checks import SEED, SLOPE_TOLERANCE, VALUE_TOLERANCE, Trial, trials
+from blobtree.declare.formula import Formula, shown
 from blobtree.nodes.parameters import Parameter
 
 POINTS = 40
@@ -23,8 +23,8 @@ SINGLE_TOLERANCE = 1e-4
 class FieldClaims:
     """The claims of a definition about its field."""
 
-    steepest: float | CustomSource
-    interval: CustomSource | None
+    steepest: float | Formula
+    interval: Formula | None
     extent: float
     derived: bool
     """True if the function returns its value alone, and its gradient is derived."""
@@ -36,7 +36,7 @@ class FieldClaims:
         return slope, self.interval and self.interval.digest
 
 
-def check_field(source: CustomSource, parameters: tuple[Parameter, ...], claims: FieldClaims) -> None:
+def check_field(source: Formula, parameters: tuple[Parameter, ...], claims: FieldClaims) -> None:
     """Raise `InvalidDefinition` if samples contradict a claim, or a value is negative or not finite."""
     rng = np.random.default_rng(SEED)
     sampled = trials(source, parameters, 1 if claims.derived else 4, claims.extent, POINTS, rng)
@@ -106,7 +106,7 @@ def _try_intervals(
     trial: Trial,
     points: Float64Array,
     claims: FieldClaims,
-    interval: CustomSource,
+    interval: Formula,
     rng: np.random.Generator,
 ) -> None:
     """Check that values in balls lie in the claimed intervals."""

@@ -20,7 +20,7 @@ import warp as wp
 
 from blobtree.custom.definition import CustomNode, Limits, custom_parameters, defined_kind
 from blobtree.custom.operator_checks import Claims, check_directed_operator, check_operator
-from blobtree.custom.source import CustomSource, custom_source, derived, generated, kind_name, returned_type
+from blobtree.declare.formula import Formula, derived, formula_of, generated, kind_name, returned_type
 from blobtree.formulas.operators import (
     UNBOUNDED,
     Operator,
@@ -131,7 +131,7 @@ def define_operator(
     >>> Average = define_operator(average, steepest=0.5)  # doctest: +SKIP
     """
     value_alone = returned_type(function) in (wp.float32, float)
-    source = custom_source(function, returns=wp.float32 if value_alone else wp.vec3)
+    source = formula_of(function, returns=wp.float32 if value_alone else wp.vec3)
     parameters = _parameters(source, limits, gradients)
     if value_alone:
         a, b = list(source.parameters)[:2]
@@ -170,13 +170,13 @@ def define_operator(
     return node
 
 
-def _operands_of(source: CustomSource, gradients: bool) -> list[str]:
+def _operands_of(source: Formula, gradients: bool) -> list[str]:
     """Return the names of the operands, and of their gradients if the operator reads them."""
     return list(source.parameters)[: 4 if gradients else 2]
 
 
 def _parameters(
-    source: CustomSource, limits: Mapping[str, Limits] | None, gradients: bool
+    source: Formula, limits: Mapping[str, Limits] | None, gradients: bool
 ) -> tuple[Parameter, ...]:
     """Return the parameters beside the operands."""
     operands = _operands_of(source, gradients)
@@ -191,8 +191,8 @@ def _parameters(
 
 
 def _bound(
-    source: CustomSource, parameters: tuple[Parameter, ...], steepest: Any, envelope: Any, gradients: bool
-) -> "float | CustomSource":
+    source: Formula, parameters: tuple[Parameter, ...], steepest: Any, envelope: Any, gradients: bool
+) -> "float | Formula":
     """Return the bound that a definition needs: its envelope if it reads gradients, else `steepest`."""
     if not gradients:
         if envelope is not None:
@@ -204,20 +204,20 @@ def _bound(
         raise source.refusal(
             f"gradients: expected envelope, a typed function, and no steepest; got envelope={envelope!r}"
         )
-    bound = custom_source(envelope, returns=wp.vec2)
+    bound = formula_of(envelope, returns=wp.vec2)
     if list(bound.parameters.values()) != [wp.float32] * (2 + len(parameters)):
         raise bound.refusal(f"expected (a, b, ...) with the {len(parameters)} parameters of {source.name}")
     return bound
 
 
-def _steepness(source: CustomSource, steepest: Any) -> "float | CustomSource":
+def _steepness(source: Formula, steepest: Any) -> "float | Formula":
     """Return the bound on the partial derivatives, a number or a function."""
     if not callable(steepest):
         number = finite_number("steepest", steepest)
         if number <= 0.0:
             raise source.refusal(f"steepest: expected a number above 0 or a typed function, got {steepest!r}")
         return number
-    bound = custom_source(steepest, returns=wp.vec2)
+    bound = formula_of(steepest, returns=wp.vec2)
     if list(bound.parameters.values()) != list(source.parameters.values()):
         raise bound.refusal(f"expected (max_a, max_b, ...) of the same types as {source.name}")
     return bound
@@ -331,10 +331,10 @@ def {name}(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=w
 '''
 
 
-def _directed_row(kind: str, digest: str, source: CustomSource, claims: Claims) -> Operator:
+def _directed_row(kind: str, digest: str, source: Formula, claims: Claims) -> Operator:
     """Return the row of an operator that reads gradients."""
     shape, envelope, function = _SHAPES[claims.like], claims.steepest, source.function
-    assert isinstance(envelope, CustomSource)
+    assert isinstance(envelope, Formula)
     low, high = shape.corners
     texts = {"absent": shape.absent, "alone": shape.alone, "low": low, "high": high}
     texts |= {"function": function.key, "envelope": envelope.function.key}
@@ -366,7 +366,7 @@ def _slots(count: int) -> dict[str, str]:
     return {"tape": ", tape: wp.array(dtype=wp.vec4)", "passed": ", tape", "extra": "".join(readings)}
 
 
-def _row(kind: str, digest: str, source: CustomSource, claims: Claims) -> Operator:
+def _row(kind: str, digest: str, source: Formula, claims: Claims) -> Operator:
     """Return the row of the table, with functions generated around the user's."""
     shape, bound, function = _SHAPES[claims.like], claims.steepest, source.function
     texts = _slots(len(source.parameters) - 2) | {"absent": shape.absent, "function": function.key}

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from blobtree._typing import Float64Array
-from blobtree.custom.checks import SEED, SLOPE_TOLERANCE, VALUE_TOLERANCE, result_of, shown, trial_value
-from blobtree.custom.source import CustomSource
+from blobtree.custom.checks import SEED, SLOPE_TOLERANCE, VALUE_TOLERANCE, trial_value
+from blobtree.declare.formula import Formula, result_of, shown
 from blobtree.nodes.parameters import Parameter
 from blobtree.transpile.python import Precision, vector
 
@@ -35,7 +35,7 @@ MAX_KINK_SHARE = 0.2
 class Claims:
     """The claims of a definition about its operator."""
 
-    steepest: float | CustomSource
+    steepest: float | Formula
     like: str | None
     monotone: bool
     order_free: bool
@@ -45,7 +45,7 @@ class Claims:
 class _Trial:
     """An operator with one value of its parameter."""
 
-    source: CustomSource
+    source: Formula
     parameters: tuple[float, ...]
     steepest: Callable[..., Any]
     precision: Precision = np.float64
@@ -78,7 +78,7 @@ class _Trial:
         return f"F({', '.join([*numbers, *map(shown, (*self.gradients, *self.parameters))])})"
 
 
-def check_operator(source: CustomSource, parameters: tuple[Parameter, ...], claims: Claims) -> None:
+def check_operator(source: Formula, parameters: tuple[Parameter, ...], claims: Claims) -> None:
     """Raise `InvalidDefinition` if sampled operands contradict a claim."""
     rng = np.random.default_rng(SEED)
     steepest = _steepest(claims.steepest)
@@ -96,10 +96,10 @@ def check_operator(source: CustomSource, parameters: tuple[Parameter, ...], clai
             _try_order(trial, rng)
 
 
-def check_directed_operator(source: CustomSource, parameters: tuple[Parameter, ...], claims: Claims) -> None:
+def check_directed_operator(source: Formula, parameters: tuple[Parameter, ...], claims: Claims) -> None:
     """Raise `InvalidDefinition` if samples contradict a claim about an operator that reads gradients."""
     rng = np.random.default_rng(SEED)
-    assert isinstance(claims.steepest, CustomSource)
+    assert isinstance(claims.steepest, Formula)
     envelope = claims.steepest.reference()
     for setting, gradients in enumerate(_gradient_pairs(rng)):
         values = tuple(float(trial_value(parameter, rng, setting)) for parameter in parameters)
@@ -245,7 +245,7 @@ def _try_continuity(trial: _Trial, operands: Float64Array, rng: np.random.Genera
             )
 
 
-def _steepest(claim: float | CustomSource) -> Callable[..., Any]:
+def _steepest(claim: float | Formula) -> Callable[..., Any]:
     if isinstance(claim, float):
         return lambda *_operands: (claim, claim)
     return claim.reference()

@@ -34,7 +34,7 @@ from blobtree.custom.definition import (
     texel_lines,
 )
 from blobtree.custom.skeleton_checks import check_skeleton
-from blobtree.custom.source import CustomSource, generated, kind_name
+from blobtree.declare.formula import Formula, generated, kind_name
 from blobtree.errors import InvalidNode
 from blobtree.formulas.skeletons import Skeleton, min_influence_of_one
 from blobtree.nodes.parameters import Color, Parameter, Radius
@@ -148,7 +148,7 @@ def define_skeleton(
 
 
 def _row(
-    kind: str, digest: str, source: CustomSource, parameters: tuple[Parameter, ...], *, convex: bool
+    kind: str, digest: str, source: Formula, parameters: tuple[Parameter, ...], *, convex: bool
 ) -> Skeleton:
     """Return the row of the table, with functions generated around the user's."""
     readings, texels = tape_readings(parameters, skipped=INFLUENCE_SLOT)

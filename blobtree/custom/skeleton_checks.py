@@ -7,8 +7,8 @@ import numpy as np
 
 from blobtree._typing import Float64Array
 from blobtree.custom.bounds_kernels import FARTHEST
-from blobtree.custom.checks import SEED, TRIALS, Trial, shown, trial_value
-from blobtree.custom.source import CustomSource
+from blobtree.custom.checks import SEED, TRIALS, Trial, trial_value
+from blobtree.declare.formula import Formula, shown
 from blobtree.nodes.parameters import Parameter
 
 POINTS = 80
@@ -24,7 +24,7 @@ FAR_SHARE = 0.1
 """Distance of a closest point, relative to that of its far query, at which a skeleton counts as unbounded."""
 
 
-def check_skeleton(source: CustomSource, parameters: tuple[Parameter, ...], *, convex: bool) -> None:
+def check_skeleton(source: Formula, parameters: tuple[Parameter, ...], *, convex: bool) -> None:
     """Raise `InvalidDefinition` unless a function seems to return the closest point of a set.
 
     Let c be the point returned for q. Then c is returned for c itself, and no point returned for another

@@ -34,8 +34,8 @@ from blobtree.custom.definition import (
     tape_readings,
     texel_lines,
 )
-from blobtree.custom.source import CustomSource, generated, kind_name
 from blobtree.custom.warp_checks import WarpClaims, check_warp
+from blobtree.declare.formula import Formula, generated, kind_name
 from blobtree.errors import InvalidNode
 from blobtree.formulas.warps import SpaceWarp
 from blobtree.nodes.node import Node
@@ -163,7 +163,7 @@ def define_warp(
 
 
 def _box(
-    source: CustomSource, parameters: tuple[Parameter, ...], box: Any
+    source: Formula, parameters: tuple[Parameter, ...], box: Any
 ) -> Callable[[Float64Array, Float64Array, tuple[float, ...]], Box]:
     """Return the function (lower, upper, numbers of the parameters) of the claim."""
     if isinstance(box, int | float | np.number) and not isinstance(box, bool):
@@ -203,7 +203,7 @@ def _box_text(box: Any) -> str:
 
 
 def _row(
-    kind: str, digest: str, source: CustomSource, parameters: tuple[Parameter, ...], claims: WarpClaims
+    kind: str, digest: str, source: Formula, parameters: tuple[Parameter, ...], claims: WarpClaims
 ) -> SpaceWarp:
     """Return the row of the table, with functions generated around the user's."""
     readings, count = tape_readings(parameters, FIRST_NUMBER)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from blobtree._typing import Box, Float64Array
-from blobtree.custom.checks import SEED, SLOPE_TOLERANCE, Trial, shown, trials
-from blobtree.custom.source import CustomSource
+from blobtree.custom.checks import SEED, SLOPE_TOLERANCE, Trial, trials
+from blobtree.declare.formula import Formula, shown
 from blobtree.nodes.parameters import Parameter
 
 POINTS = 30
@@ -27,9 +27,9 @@ SINGLE_TOLERANCE = 1e-4
 class WarpClaims:
     """The claims of a definition about its warp."""
 
-    stretch: float | CustomSource
+    stretch: float | Formula
     box: Callable[[Float64Array, Float64Array, tuple[float, ...]], Box]
-    pullback: CustomSource | None
+    pullback: Formula | None
     extent: float
 
     @property
@@ -39,7 +39,7 @@ class WarpClaims:
         return stretch, self.pullback and self.pullback.digest
 
 
-def check_warp(source: CustomSource, parameters: tuple[Parameter, ...], claims: WarpClaims) -> None:
+def check_warp(source: Formula, parameters: tuple[Parameter, ...], claims: WarpClaims) -> None:
     """Raise `InvalidDefinition` if samples contradict a claim, or the Jacobian is singular at one."""
     rng = np.random.default_rng(SEED)
     for trial, points in trials(source, parameters, 3, claims.extent, POINTS, rng):
@@ -80,7 +80,7 @@ def _try_determinants(trial: Trial, smooth: list[tuple[Float64Array, Float64Arra
 def _try_pullback(
     trial: Trial,
     smooth: list[tuple[Float64Array, Float64Array]],
-    pullback: CustomSource,
+    pullback: Formula,
     rng: np.random.Generator,
 ) -> None:
     for q, jacobian in smooth:

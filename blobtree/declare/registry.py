@@ -24,11 +24,16 @@ def register_library(load: Callable[[], object]) -> None:
     _libraries.append(load)
 
 
+def load_libraries() -> None:
+    """Load all kinds of the libraries."""
+    for load in _libraries:
+        load()
+
+
 def kind_of(tag: str) -> type[Any]:
     """Return the class of nodes with this tag."""
     if tag not in NODE_KINDS:
-        for load in _libraries:
-            load()
+        load_libraries()
     return NODE_KINDS[tag]
 
 

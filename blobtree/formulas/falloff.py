@@ -3,21 +3,16 @@
 Source: Wyvill's field function, eq. 2 of the Implicit Decals paper. Its support is compact: outside its
 influence radius a skeleton contributes exactly 0, so evaluation can skip it.
 
-`Falloff` is a row of the table of falloffs. Primitives read this one unless they name another
-(`formulas.falloffs`).
+Primitives have this one unless they name another (`kinds.falloff`, `formulas.falloffs`).
 """
 
 import math
-from dataclasses import dataclass
 
 import warp as wp
 
-from blobtree.identity import content_hash
+from blobtree.iso import ISO as ISO
 
 wp.set_module_options({"enable_backward": False})
-
-ISO = 0.5
-"""Field value on the surface; the field is larger inside."""
 
 RIM = math.sqrt(1.0 - 2.0 ** (-1.0 / 3.0))
 """Visible radius / influence radius: the normalised distance at which an isolated falloff equals ISO."""
@@ -77,78 +72,3 @@ def falloff_shallowest(nearest: wp.float32, farthest: wp.float32) -> wp.float32:
 def falloff_range(nearest: wp.float32, farthest: wp.float32) -> wp.vec2:
     """Return the smallest and largest g(d) over squared distances from `nearest` to `farthest`."""
     return wp.vec2(falloff(farthest), falloff(nearest))
-
-
-# -- the table ------------------------------------------------------------------------------------------
-
-
-@wp.func
-def wyvill_value(distance: wp.float32) -> wp.float32:
-    """Return g(d) = (1 − d²)³, 0 ≤ d ≤ 1."""
-    return falloff(distance * distance)
-
-
-@wp.func
-def wyvill_slope(distance: wp.float32) -> wp.float32:
-    """Return g'(d) = −6 d (1 − d²)²."""
-    return -falloff_steepness(distance)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Falloff:
-    """A falloff: a field over the normalised distance d, which falls from g(0) = 1 to g(1) = 0.
-
-    Primitives take one as `falloff`, by name or as an object. The built-in ones are in `FALLOFF_NAMES`;
-    `define_falloff` makes others.
-
-    Attributes
-    ----------
-    name
-        Its name in files.
-    value, slope
-        Typed functions of the distance from 0 to 1: g ≥ 0 and g' ≤ 0.
-    rim
-        The distance with g = ISO. A primitive of visible radius r reads the distance r there.
-    steepest_distance
-        Where the slope is steepest, if it rises up to there and falls after it; otherwise −1.
-    steepest_slope
-        A bound on the magnitude of the slope.
-    digest
-        Digest of the sources of a custom falloff.
-    module
-        Module that defines a custom falloff.
-
-    Examples
-    --------
-    >>> from blobtree import Point
-    >>> Point((0, 0, 0), radius=1.0, falloff="gaussian").falloff.name
-    'gaussian'
-    """
-
-    name: str
-    value: wp.Function
-    slope: wp.Function
-    rim: float
-    steepest_distance: float
-    steepest_slope: float
-    digest: str = ""
-    module: str = ""
-
-    def __repr__(self) -> str:
-        return repr(self.name)
-
-    @property
-    def content_hash(self) -> str:
-        """Content hash, see `blobtree.content_hash`: that of its name, and of the source of a custom one."""
-        return content_hash((type(self).__name__, self.name, self.digest))
-
-    @property
-    def numbers(self) -> tuple[float, float, float]:
-        """Rim, steepest distance and steepest slope."""
-        return self.rim, self.steepest_distance, self.steepest_slope
-
-
-WYVILL = Falloff("wyvill", wyvill_value, wyvill_slope, RIM, STEEPEST_DISTANCE, STEEPEST_SLOPE)
-
-FALLOFFS = (WYVILL,)
-"""The falloffs of the core; the index of one here is its code on the tape."""

@@ -5,13 +5,13 @@ and the library together (`tape.instruction_set.library`). A new family of kinds
 ends in a tuple of rows, and one name here.
 """
 
+from blobtree.declare.falloff import Falloff
 from blobtree.formulas.blends import BLENDS
 from blobtree.formulas.contact import CONTACT_OPERATORS
 from blobtree.formulas.convolution import CONVOLUTION_FIELDS
 from blobtree.formulas.curve_skeletons import CURVE_SKELETONS
 from blobtree.formulas.deformations import DEFORMATIONS
 from blobtree.formulas.direct_fields import DIRECT_FIELDS
-from blobtree.formulas.falloff import Falloff
 from blobtree.formulas.falloffs import MORE_FALLOFFS
 from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.flat_skeletons import FLAT_SKELETONS

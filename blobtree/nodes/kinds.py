@@ -1,6 +1,7 @@
-"""All built-in classes of nodes: the import of each file that defines some fills `NODE_KINDS`."""
+"""All built-in kinds: the import of each file that defines some fills the registries."""
 
 from blobtree.declare.registry import NODE_KINDS
+from blobtree.formulas import falloffs
 from blobtree.nodes import (
     blends,
     contact,
@@ -21,6 +22,7 @@ __all__ = [
     "convolution",
     "curves",
     "deformations",
+    "falloffs",
     "fields",
     "flats",
     "primitives",

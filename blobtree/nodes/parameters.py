@@ -22,9 +22,9 @@ import numpy as np
 
 from blobtree._typing import Float64Array
 from blobtree.colors import ColorLike, color_rgb
+from blobtree.declare.falloff import FALLOFF_NAMES, Falloff
+from blobtree.declare.registry import load_libraries
 from blobtree.errors import InvalidNode
-from blobtree.formulas.falloff import Falloff
-from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.nodes.attributes import AttributeMapping, checked_attributes
 from blobtree.nodes.samples import checked_samples
 from blobtree.nodes.values import fields_of
@@ -211,14 +211,17 @@ class Parameter:
 
 
 def _falloff(name: str, value: Any) -> Falloff:
-    """Return a falloff, or the one of this name; raise `InvalidNode` otherwise."""
+    """Return a falloff, that of a class or of a name; raise `InvalidNode` otherwise."""
+    if isinstance(value, type) and issubclass(value, Falloff) and value is not Falloff:
+        return value()
     if isinstance(value, Falloff):
         return value
+    load_libraries()
     if isinstance(value, str) and value in FALLOFF_NAMES:
         return FALLOFF_NAMES[value]
     raise InvalidNode(
         f"{name}: expected a falloff or one of {', '.join(FALLOFF_NAMES)}, got {shown(value)}; "
-        "define_falloff makes others"
+        "a subclass of Falloff makes another"
     )
 
 

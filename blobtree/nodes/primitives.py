@@ -15,9 +15,10 @@ from typing import Annotated, Any, ClassVar, Self, cast
 import numpy as np
 
 from blobtree._typing import Float64Array
+from blobtree.declare.falloff import Falloff
 from blobtree.formulas.blends import DEEPEST
-from blobtree.formulas.falloff import WYVILL, Falloff
 from blobtree.formulas.skeletons import BOX, CIRCLE, CONE, DISC, POINT, SEGMENT, Skeleton
+from blobtree.kinds.falloff import WYVILL
 from blobtree.nodes.attributes import NO_ATTRIBUTES, AttributeMapping
 from blobtree.nodes.node import Node
 from blobtree.nodes.parameters import (
@@ -88,7 +89,8 @@ class Falling(LeafKeywords):
     """The keyword of leaves whose field is a function of a distance."""
 
     falloff: Annotated[
-        Falloff | str, Parameter(Quantity.FALLOFF, "how the field falls off with the distance, or its name")
+        Falloff | type[Falloff] | str,
+        Parameter(Quantity.FALLOFF, "how the field falls off with the distance, or its name"),
     ] = field(default=WYVILL, metadata=OPTIONAL_FIELD)
 
     @property

@@ -11,12 +11,12 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.formulas.falloff import FALLOFFS
 from blobtree.formulas.fields import FIELDS
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.skeletons import SKELETONS
 from blobtree.formulas.warps import WARPS
 from blobtree.kernels import KERNEL_OPTIONS
+from blobtree.kinds.falloff import FALLOFFS
 from blobtree.texels import Texels
 from blobtree.transpile.specialize import RowChoice
 

@@ -18,12 +18,13 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.formulas.falloff import FALLOFFS, Falloff
+from blobtree.declare.falloff import Falloff
 from blobtree.formulas.fields import FIELDS, FieldKind
 from blobtree.formulas.operators import OPERATORS, Operator
 from blobtree.formulas.skeletons import SKELETONS, Skeleton
 from blobtree.formulas.warps import WARPS, SpaceWarp
 from blobtree.kernels import KERNEL_OPTIONS
+from blobtree.kinds.falloff import FALLOFFS
 from blobtree.lazy import Lazy
 from blobtree.tape.dispatch import CORE_TABLES
 from blobtree.transpile.derivative import derivative_along, differentiated

@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Box, Float64Array, IndexArray
+from blobtree.declare.falloff import Falloff
 from blobtree.errors import InvalidNode
-from blobtree.formulas.falloff import RIM, Falloff
+from blobtree.formulas.falloff import RIM
 from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.operators import RICCI, SUM, UNION, Operator, Support
 from blobtree.formulas.skeletons import Skeleton

@@ -46,10 +46,10 @@ from numpy.typing import ArrayLike, NDArray
 from blobtree._typing import Float32Array
 from blobtree.device import known_device
 from blobtree.errors import InvalidNode
-from blobtree.formulas.falloff import WYVILL
 from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.operators import SUM
 from blobtree.formulas.skeletons import Skeleton
+from blobtree.kinds.falloff import WYVILL
 from blobtree.tape.bounds import warp_parameters
 from blobtree.tape.codes import (
     FIELD,

@@ -17,11 +17,10 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from blobtree.custom.checks import result_of, shown
-from blobtree.custom.falloff import check_falling, find_rim
-from blobtree.custom.source import CustomSource, custom_source, kind_name
+from blobtree.declare.falloff import Falloff
+from blobtree.declare.falloff_checks import check_falling, find_rim
+from blobtree.declare.formula import Formula, formula_of, kind_name, result_of, shown
 from blobtree.errors import InvalidDefinition, UnknownKind
-from blobtree.formulas.falloff import Falloff
 from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.transpile.specialize import rebind, referenced_values, warp_function
@@ -245,8 +244,8 @@ def define_contact(
             f"field: expected a typed function or one of {', '.join(FALLOFF_NAMES)}, got {field!r}"
         )
     falloff = FALLOFF_NAMES[field] if isinstance(field, str) else field
-    g_source = custom_source(falloff.value if isinstance(falloff, Falloff) else falloff, returns=wp.float32)
-    h_source = custom_source(law_of if law is None else law, returns=wp.float32)
+    g_source = formula_of(falloff.value if isinstance(falloff, Falloff) else falloff, returns=wp.float32)
+    h_source = formula_of(law_of if law is None else law, returns=wp.float32)
     _require_floats(g_source, 1, "the distance `d: wp.float32` as its only parameter")
     _require_floats(h_source, 2, "the fields `own: wp.float32, other: wp.float32` as its parameters")
     given = falloff.name if isinstance(falloff, Falloff) else g_source.name
@@ -270,12 +269,12 @@ def define_contact(
     return LAWS[kind]
 
 
-def _require_floats(source: CustomSource, count: int, expected: str) -> None:
+def _require_floats(source: Formula, count: int, expected: str) -> None:
     if len(source.parameters) != count or not set(source.parameters.values()) <= {wp.float32, float}:
         raise source.refusal(f"expected {expected}")
 
 
-def _sampled(source: CustomSource, *arguments: Floats, single: bool = False) -> Floats:
+def _sampled(source: Formula, *arguments: Floats, single: bool = False) -> Floats:
     """Return the values of a function over arrays of arguments."""
     precision = np.float32 if single else np.float64
     reference = source.reference(precision)
@@ -293,7 +292,7 @@ def _place(names: str, values: list[Any]) -> str:
     return f"{names} = {shown(values)}"
 
 
-def _check_field(source: CustomSource) -> float:
+def _check_field(source: Formula) -> float:
     """Raise `InvalidDefinition` if samples show that g is no field of decals; return its rim."""
     distances = np.linspace(0.0, 1.0, SAMPLES)
     values = _sampled(source, distances)
@@ -321,7 +320,7 @@ def _check_field(source: CustomSource) -> float:
     return find_rim(partial(_sampled, source))
 
 
-def _check_law(law: CustomSource, field: CustomSource, rim: float) -> None:
+def _check_law(law: Formula, field: Formula, rim: float) -> None:
     """Raise `InvalidDefinition` if samples of h contradict the constraints of the paper's section 3.2."""
     owns = np.linspace(0.5, 1.0, LAW_SAMPLES + 1)[1:-1]
     shares = np.linspace(0.0, 1.0, LAW_SAMPLES)

@@ -64,8 +64,8 @@ from blobtree import (
     Twist,
     Union,
 )
-from blobtree.formulas.falloff import FALLOFFS
 from blobtree.formulas.falloffs import MORE_FALLOFFS
+from blobtree.kinds.falloff import FALLOFFS
 from blobtree.nodes.primitives import Falling, Leaf, Primitive, Profile
 from blobtree.validation import Vector
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import warp as wp
 
 from blobtree import (
     FALLOFF_NAMES,
@@ -17,6 +18,7 @@ from blobtree import (
     Difference,
     Disc,
     Ellipsoid,
+    Falloff,
     Gyroid,
     HalfSpace,
     InvalidDefinition,
@@ -34,6 +36,7 @@ from blobtree import (
     Torus,
     Union,
     define_falloff,
+    formula,
     from_json,
     from_sdf,
     numeric_parameters,
@@ -47,10 +50,11 @@ from blobtree.nodes.parameters import parameters_of
 from blobtree.nodes.paths import moved, resized
 from blobtree.nodes.primitives import PROFILE, Primitive
 from blobtree.tape.instruction_set import BUILT_IN
+from blobtree.transpile.python import plain_python
 from tests.blobtree.custom_kinds import Ring, Staircase, Tent
 from tests.blobtree.kernels import rising, short, staircase_slope, tent, tent_slope, vector
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
-from tests.blobtree.transpile.warp_functions import call
+from tests.blobtree.transpile.warp_functions import call, python_function
 from tests.blobtree.trees import BUILT_IN_FALLOFFS, points_around
 from tests.oracles import blobtree as oracle
 from tests.oracles import falloffs as exact
@@ -342,6 +346,46 @@ def test_wrong_falloffs_are_refused(value: Any, slope: Any, message: str) -> Non
         define_falloff(value, slope, name="wrong")
     with pytest.raises(InvalidDefinition, match="'wyvill' is a built-in falloff"):
         define_falloff(tent, tent_slope, name="wyvill")
+
+
+def test_a_falloff_is_a_class_with_one_formula() -> None:
+    def declared() -> type[Falloff]:
+        class SoftEdge(Falloff):
+            @formula
+            def value(d: wp.float32) -> wp.float32:
+                return (1.0 - d * d) * (1.0 - d)  # type: ignore[no-any-return]
+
+        return SoftEdge
+
+    kind = declared()
+    (edge,) = {kind(), declared()(), FALLOFF_NAMES["soft_edge"]}
+    node = Point((0, 0, 0), radius=1.0, falloff=kind)
+    assert isinstance(node.falloff, kind)
+    assert node == from_json(to_json(node)) == replace(node, falloff="soft_edge")
+    assert define_falloff(kind._formulas["value"].python, name="soft_edge") is edge
+    assert (1.0 - edge.rim**2) * (1.0 - edge.rim) == pytest.approx(ISO)
+    slope = plain_python(python_function(edge.slope))
+    for d in np.linspace(0.0, 1.0, 9):
+        assert slope(d) == pytest.approx(3.0 * d**2 - 2.0 * d - 1.0)
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ({}, "expected a falloff with the formula `value`"),
+        ({"value": tent}, "expected a falloff with the formula `value`"),
+        ({"value": formula(tent), "rim": formula(tent)}, "formula 'rim': expected one of value, slope"),
+        ({"value": formula(tent), "tag": "a b"}, "tag: expected letters, digits and single underscores"),
+        ({"value": formula(tent), "tag": "cauchy"}, "'cauchy' is a built-in falloff"),
+        ({"value": formula(tent), "numbers": (0.5, 0.0, 1.0)}, "numbers: expected none"),
+    ],
+)
+def test_wrong_classes_of_falloffs_are_refused(body: dict[str, Any], message: str) -> None:
+    with pytest.raises(InvalidDefinition, match=message):
+        type("Wrong", (Falloff,), {"__module__": __name__, **body})
+    assert "wrong" not in FALLOFF_NAMES
+    with pytest.raises(TypeError, match="expected a subclass of Falloff"):
+        Falloff()
 
 
 def test_a_negative_sum_below_any_operator_is_raised_to_zero() -> None:

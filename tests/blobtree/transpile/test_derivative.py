@@ -14,11 +14,11 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree import UntranslatableFunction
-from blobtree.formulas.falloff import FALLOFFS
 from blobtree.formulas.falloffs import MORE_FALLOFFS
 from blobtree.formulas.library import LIBRARY_OPERATORS
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.skeletons import SKELETONS
+from blobtree.kinds.falloff import FALLOFFS
 from blobtree.tape import interpreter
 from blobtree.transpile.derivative import (
     derivative_along,

@@ -22,8 +22,8 @@ FUNCTIONS = [
     *(f for f in typed_functions(kernels) if row_choice(f.function) is None),
     *(
         f
-        for name in ("falloff", "operators")
-        for f in typed_functions(import_module(f"blobtree.formulas.{name}"))
+        for name in ("formulas.falloff", "formulas.operators", "kinds.falloff")
+        for f in typed_functions(import_module(f"blobtree.{name}"))
     ),
     *(f for f in typed_functions(custom_functions)),
 ]

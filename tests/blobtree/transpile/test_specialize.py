@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from blobtree.formulas import operators
-from blobtree.formulas.falloff import WYVILL
+from blobtree.kinds.falloff import WYVILL
 from blobtree.tape import dispatch
 from blobtree.transpile.specialize import rebind, referenced_values, row_choice
 from tests.blobtree.transpile.kernels import choose, chosen

@@ -15,6 +15,7 @@ import tempfile
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
@@ -42,9 +43,10 @@ class TypedFunction:
 
 
 def typed_functions(module: ModuleType) -> list[TypedFunction]:
-    """The typed functions that `module` defines, save those that Warp specialises as it compiles."""
+    """The typed functions and formulas that `module` defines, save those that Warp specialises."""
+    kinds = [value for value in vars(module).values() if isinstance(value, type)]
     found = []
-    for value in vars(module).values():
+    for value in chain(vars(module).values(), *(vars(kind).values() for kind in kinds)):
         if (
             isinstance(value, wp.Function)
             and value.func is not None
@@ -121,11 +123,12 @@ def _kernels(module_name: str) -> dict[str, tuple[wp.Kernel, TypedFunction]]:
     folder = Path(tempfile.mkdtemp(prefix="kernels-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)  # Warp reads the file as long as it runs
     path = folder / f"{generated}.py"
-    path.write_text("\n".join([_HEAD, *(_kernel_source(module_name, function) for function in functions)]))
+    path.write_text("\n".join([_HEAD, *map(_kernel_source, functions)]))
     spec = importlib.util.spec_from_file_location(generated, path)
     assert spec is not None
     assert spec.loader is not None
     made = importlib.util.module_from_spec(spec)
+    vars(made).update({function.name: function.function for function in functions})
     sys.modules[generated] = made
     spec.loader.exec_module(made)
     return {function.name: (getattr(made, f"run_{function.name}"), function) for function in functions}
@@ -137,7 +140,7 @@ _HEAD = (
 )
 
 
-def _kernel_source(module_name: str, typed: TypedFunction) -> str:
+def _kernel_source(typed: TypedFunction) -> str:
     def spelled(hint: Any, name: str = "return") -> str:
         if uniforms_of(hint) is not None:
             return f"{typed.name}.func.__annotations__[{name!r}]"
@@ -149,8 +152,6 @@ def _kernel_source(module_name: str, typed: TypedFunction) -> str:
     )
     separator = ", " if parameters else ""
     return f"""\
-from {module_name} import {typed.name}
-
 @wp.kernel
 def run_{typed.name}({parameters}{separator}out: {spelled(typed.returned)}):
     i = wp.tid()

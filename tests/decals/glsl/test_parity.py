@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree.formulas.falloff import FALLOFFS
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.warps import WARPS
+from blobtree.kinds.falloff import FALLOFFS
 from blobtree.tape.dispatch import (
     falloff_numbers,
     falloff_slope,
@@ -35,6 +35,7 @@ from tests.decals.glsl.functions import AGREEMENT, ALL_KINDS, run_program, throu
 MODULES = (
     "blobtree.formulas.falloff",
     "blobtree.formulas.falloffs",
+    "blobtree.kinds.falloff",
     "blobtree.formulas.skeletons",
     "blobtree.formulas.operators",
     "blobtree.tape.dispatch",

@@ -1,25 +1,13 @@
-"""Custom falloffs: a falloff from one typed function g.
-
-@wp.func
-def linear(d: wp.float32) -> wp.float32:
-    return 1.0 - d
-
-Linear = define_falloff(linear)
-model = Point((0, 0, 0), radius=1.0, falloff=Linear)
-"""
+"""Samples of falloffs: where one is half and steepest, and whether it falls from 1 to 0."""
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
-import warp as wp
 from numpy.typing import NDArray
 
-from blobtree.custom.checks import result_of
-from blobtree.custom.source import CustomSource, custom_source, derived, kind_name
-from blobtree.formulas.falloff import ISO, Falloff
-from blobtree.formulas.falloffs import FALLOFF_NAMES, MORE_FALLOFFS
+from blobtree.declare.formula import Formula, result_of
+from blobtree.iso import ISO
 
 SAMPLES = 2001
 TOLERANCE = 1e-5
@@ -39,88 +27,7 @@ Floats = NDArray[np.float64]
 Sampled = Callable[[Floats], Floats]
 
 
-def define_falloff(value: Any, slope: Any = None, *, name: str | None = None) -> Falloff:
-    """Return a falloff from a function g.
-
-    Parameters
-    ----------
-    value
-        ``(d: wp.float32) -> wp.float32``, with or without ``@wp.func``: g(d) for 0 ≤ d ≤ 1. It falls from
-        g(0) = 1 to g(1) = 0 without rising. A field is smooth where g'(0) = g'(1) = 0.
-    slope
-        The derivative g'(d), a function of the same type; by default it is derived from the source.
-    name
-        Name of the falloff in files; by default the name of `value`.
-
-    Returns
-    -------
-    Falloff
-        A value for the keyword `falloff` of primitives around a skeleton; so is its name.
-
-    Raises
-    ------
-    InvalidDefinition
-        A function has no types or no source, the name is that of a built-in falloff, or samples contradict
-        the above. Nothing has been compiled by then.
-    UntranslatableFunction
-        A function leaves the shared subset; the message names file and line.
-
-    Examples
-    --------
-    >>> import warp as wp
-    >>> from blobtree import Point, define_falloff
-    >>> @wp.func
-    ... def linear(d: wp.float32) -> wp.float32:
-    ...     return 1.0 - d
-    >>> falloff = define_falloff(linear)
-    >>> round(falloff.rim, 6)
-    0.5
-    >>> Point((0, 0, 0), radius=1.0, falloff=falloff)
-    Point(center=(0.0, 0.0, 0.0), radius=1.0, color=(0.8, 0.8, 0.8), falloff='linear')
-    """
-    source = _of_distance(value)
-    derivative = derived(source, list(source.parameters), _SLOPE) if slope is None else _of_distance(slope)
-    kind = kind_name(source, name)
-    if kind in {row.name for row in MORE_FALLOFFS} or kind == "wyvill":
-        raise source.refusal(f"name: {kind!r} is a built-in falloff; choose another name")
-    digest = source.digest_with(kind, derivative.digest)
-    known = FALLOFF_NAMES.get(kind)
-    if known is not None and known.digest == digest:
-        return known
-    g, g_slope = _sampled(source), _sampled(derivative)
-    _check(source, derivative, g, g_slope)
-    steepest_distance, steepest_slope = _steepest(g_slope)
-    falloff = Falloff(
-        kind,
-        source.function,
-        derivative.function,
-        find_rim(g),
-        steepest_distance,
-        steepest_slope,
-        digest,
-        source.python.__module__,
-    )
-    FALLOFF_NAMES[kind] = falloff
-    return falloff
-
-
-_SLOPE = '''\
-def {name}({typed}) -> wp.float32:
-    """The derivative of the user's falloff."""
-    value, slope = {partials}
-    return slope
-'''
-
-
-def _of_distance(function: Any) -> CustomSource:
-    """Return a user's function of the distance."""
-    source = custom_source(function, returns=wp.float32)
-    if list(source.parameters.values()) not in ([wp.float32], [float]):
-        raise source.refusal("expected the distance `d: wp.float32` as its only parameter")
-    return source
-
-
-def _sampled(source: CustomSource) -> Sampled:
+def _sampled(source: Formula) -> Sampled:
     """Return the function over arrays of distances."""
     reference = source.reference()
 
@@ -134,8 +41,9 @@ def _sampled(source: CustomSource) -> Sampled:
     return sampled
 
 
-def _check(source: CustomSource, derivative: CustomSource, g: Sampled, g_slope: Sampled) -> None:
+def check_falloff(source: Formula, derivative: Formula) -> None:
     """Raise `InvalidDefinition` if samples show that g is no falloff, or that its derivative is wrong."""
+    g, g_slope = _sampled(source), _sampled(derivative)
     distances = np.linspace(0.0, 1.0, SAMPLES)
     values, slopes = g(distances), g_slope(distances)
     check_falling(source, distances, values, "a falloff")
@@ -161,7 +69,7 @@ def _check(source: CustomSource, derivative: CustomSource, g: Sampled, g_slope: 
     _check_single(derivative, distances, slopes)
 
 
-def check_falling(source: CustomSource, distances: Floats, values: Floats, what: str) -> None:
+def check_falling(source: Formula, distances: Floats, values: Floats, what: str) -> None:
     """Raise `InvalidDefinition` unless samples of g fall from 1 to 0 without rising."""
     for place, expected in ((0, 1.0), (-1, 0.0)):
         if abs(values[place] - expected) > TOLERANCE:
@@ -177,7 +85,7 @@ def check_falling(source: CustomSource, distances: Floats, values: Floats, what:
         )
 
 
-def _check_single(source: CustomSource, distances: Floats, expected: Floats) -> None:
+def _check_single(source: Formula, distances: Floats, expected: Floats) -> None:
     """Check that results survive float32, in which devices compute."""
     reference = source.reference(np.float32)
     for d, value in zip(distances, expected, strict=True):
@@ -196,6 +104,11 @@ def find_rim(g: Sampled) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if g(np.array([middle]))[0] > ISO else (low, middle)
     return 0.5 * (low + high)
+
+
+def find_numbers(source: Formula, derivative: Formula) -> tuple[float, float, float]:
+    """Return the rim of a falloff, where it is steepest, and how steep."""
+    return find_rim(_sampled(source)), *_steepest(_sampled(derivative))
 
 
 def _steepest(g_slope: Sampled) -> tuple[float, float]:

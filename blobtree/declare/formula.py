@@ -1,7 +1,10 @@
-"""The source of a custom kind: a user's typed function, its parameters, and a unique name for it.
+"""Formulas: typed functions of kinds, each with its source and a unique name.
+
+A kind declares its formulas in the body of its class, as static functions after `@formula`.
 
 Two definitions may use the same names, and a shader has one namespace for all functions. Hence a user's
-function and all functions that it calls are copied under names that carry a digest of their sources.
+function and all functions that it calls are copied under names that carry a digest of their sources. The
+formulas of this package are named after their kind instead; tests check them, and no import does.
 """
 
 import ast
@@ -9,17 +12,16 @@ import hashlib
 import inspect
 import re
 import textwrap
-from collections.abc import Sequence
-from dataclasses import dataclass, field, make_dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from types import FunctionType
 from typing import Any
 
 import numpy as np
 import warp as wp
 
+from blobtree._typing import Float64Array
 from blobtree.errors import InvalidDefinition
-from blobtree.nodes.node import Node
-from blobtree.nodes.tree import AssociativeCombination
 from blobtree.transpile.derivative import partial_derivatives
 from blobtree.transpile.glsl import translate_library
 from blobtree.transpile.python import Precision, find_changed_constants, plain_python
@@ -30,8 +32,8 @@ PLAIN_NAME = re.compile(r"[A-Za-z](_?[A-Za-z0-9])*")
 
 
 @dataclass(frozen=True, eq=False)
-class CustomSource:
-    """A user's function under a unique name."""
+class Formula:
+    """A typed function under a unique name."""
 
     name: str
     parameters: dict[str, Any]
@@ -53,7 +55,8 @@ class CustomSource:
 
     def refusal(self, reason: str) -> InvalidDefinition:
         """Return the error that states the function's location and a reason."""
-        return InvalidDefinition(f"{self.location}: {self.name}: {reason}")
+        label = self.python.__qualname__.rpartition("<locals>.")[2]
+        return InvalidDefinition(f"{self.location}: {label}: {reason}")
 
     def reference(self, precision: Precision = np.float64) -> FunctionType:
         """Return the function as plain Python, in a floating-point type; it is translated once."""
@@ -63,7 +66,88 @@ class CustomSource:
         return self._references[precision]
 
 
-def custom_source(function: Any, *, returns: Any) -> CustomSource:
+class Declared:
+    """A formula in the body of a class, before the class exists."""
+
+    def __init__(self, function: Any) -> None:
+        self.function = function
+
+
+def formula(function: Callable[..., Any]) -> Any:
+    """Mark a function in the body of a kind as one of its formulas: a static, typed function.
+
+    Examples
+    --------
+    >>> import warp as wp
+    >>> from blobtree import Falloff, formula
+    >>> class Parabola(Falloff):
+    ...     @formula
+    ...     def value(d: wp.float32) -> wp.float32:
+    ...         return 1.0 - d * d
+    >>> round(Parabola().rim, 4)
+    0.7071
+    """
+    return Declared(function)
+
+
+def is_own(kind: type) -> bool:
+    """Return True for a kind of this package."""
+    return kind.__module__.partition(".")[0] == __name__.partition(".")[0]
+
+
+def tag_of(kind: type) -> str:
+    """Return the name of a kind in files: its `tag`, or the name of its class, `SoftObject` → `soft_object`.
+
+    Raises
+    ------
+    InvalidDefinition
+        It is no plain name.
+    """
+    tag = vars(kind).get("tag", re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", kind.__name__).lower())
+    if not isinstance(tag, str) or not PLAIN_NAME.fullmatch(tag):
+        raise InvalidDefinition(
+            f"{kind.__qualname__}: tag: expected letters, digits and single underscores, got {tag!r}"
+        )
+    return tag
+
+
+def declared_formulas(kind: type, tag: str, results: Mapping[str, Any]) -> dict[str, Formula]:
+    """Return the formulas in the body of a class by name, and put their typed functions there.
+
+    `results` has the type of the result of each formula that the sort of the kind knows.
+
+    Raises
+    ------
+    InvalidDefinition
+        A formula has no types, no source or an unknown name.
+    UntranslatableFunction
+        A formula leaves the subset of Python that Warp and GLSL share.
+    """
+    formulas = {}
+    for name, declared in list(vars(kind).items()):
+        if isinstance(declared, Declared):
+            if name not in results:
+                known = ", ".join(results)
+                raise InvalidDefinition(
+                    f"{kind.__qualname__}: formula {name!r}: expected one of {known}; remove @formula, or "
+                    "rename it"
+                )
+            if is_own(kind):
+                formulas[name] = _own_formula(declared.function, f"{tag}_{name}")
+            else:
+                formulas[name] = formula_of(declared.function, returns=results[name])
+            setattr(kind, name, formulas[name].function)
+    return formulas
+
+
+def _own_formula(python: FunctionType, name: str) -> Formula:
+    """Return a formula of this package under a name."""
+    python.__qualname__ = name
+    hints = {key: hint for key, hint in python.__annotations__.items() if key != "return"}
+    return Formula(name, hints, warp_function(python), python, "")
+
+
+def formula_of(function: Any, *, returns: Any) -> Formula:
     """Read a user's function without compiling it.
 
     Raises
@@ -73,7 +157,7 @@ def custom_source(function: Any, *, returns: Any) -> CustomSource:
     UntranslatableFunction
         It leaves the subset of Python that Warp and GLSL share; the message names file and line.
     """
-    python = _python_function(function)
+    python = python_function(function)
     _require_source(python)
     hints = _hints(python)
     location = f"{python.__code__.co_filename}:{python.__code__.co_firstlineno}"
@@ -91,15 +175,15 @@ def custom_source(function: Any, *, returns: Any) -> CustomSource:
     function_copy = _renamed(python, digest, {})
     translate_library([function_copy])
     _require_variables(python)
-    return CustomSource(python.__name__, {name: hints[name] for name in names}, function_copy, python, digest)
+    return Formula(python.__name__, {name: hints[name] for name in names}, function_copy, python, digest)
 
 
 def returned_type(function: Any) -> Any:
     """Return the annotated type of a function's result, None if it has none."""
-    return _hints(_python_function(function)).get("return")
+    return _hints(python_function(function)).get("return")
 
 
-def kind_name(source: CustomSource, name: str | None) -> str:
+def kind_name(source: Formula, name: str | None) -> str:
     """Return the name of a kind in files: `name`, or that of its function."""
     kind = source.name if name is None else name
     if not isinstance(kind, str) or not PLAIN_NAME.fullmatch(kind):
@@ -112,17 +196,6 @@ def class_name(kind: str) -> str:
     return "".join(word[:1].upper() + word[1:] for word in kind.split("_"))
 
 
-def node_class(
-    kind: str, source: CustomSource, fields: list[Any], base: type[Node], namespace: dict[str, Any]
-) -> Any:
-    """Return a node class with these fields, in the module of the function."""
-    inherits_init = issubclass(base, AssociativeCombination)
-    options: dict[str, Any] = {"frozen": True, "eq": False, "repr": False, "init": not inherits_init}
-    node_type = make_dataclass(class_name(kind), fields, bases=(base,), namespace=namespace, **options)
-    node_type.__module__ = source.python.__module__
-    return node_type
-
-
 def generated(
     kind: str, digest: str, part: str, template: str, scope: dict[str, Any], **texts: str
 ) -> wp.Function:
@@ -132,9 +205,7 @@ def generated(
     return warp_function(defined(name, template.format(name=name, **texts), known))
 
 
-def derived(
-    source: CustomSource, varying: Sequence[str], template: str, least: float | None = None
-) -> CustomSource:
+def derived(source: Formula, varying: Sequence[str], template: str, least: float | None = None) -> Formula:
     """Return a function of the value and the partial derivatives of a user's function.
 
     The template's ``{partials}`` is the call that returns both, ``{typed}`` are the typed parameters.
@@ -154,7 +225,38 @@ def derived(
     return replace(source, function=function)
 
 
-def _python_function(function: Any) -> FunctionType:
+def result_of(
+    source: Formula,
+    function: Callable[..., Any],
+    arguments: list[Any],
+    where: Callable[[], str],
+    size: int,
+) -> Float64Array:
+    """Return the result of a function as `size` numbers; raise `InvalidDefinition` otherwise.
+
+    `where` says for errors at which arguments it is called.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            result = np.asarray(function(*arguments), np.float64)
+    except ArithmeticError as error:
+        raise source.refusal(f"for {where()} it fails: {error}; it must have a result everywhere") from error
+    except Exception as error:  # the function is the user's own
+        raise source.refusal(f"for {where()} it fails: {type(error).__name__}: {error}") from error
+    if result.shape != (size,) or not np.isfinite(result).all():
+        raise source.refusal(f"for {where()} it returns {shown(result)}; expected {size} finite numbers")
+    return result
+
+
+def shown(numbers: Any) -> str:
+    """Return a number, or several in parentheses, as messages show them."""
+    flat = np.ravel(np.asarray(numbers, np.float64)).tolist()
+    text = ", ".join(f"{number:.6g}" for number in flat)
+    return text if len(flat) == 1 else f"({text})"
+
+
+def python_function(function: Any) -> FunctionType:
+    """Return the Python function of a user's function; raise `InvalidDefinition` for anything else."""
     python = function.func if isinstance(function, wp.Function) else function
     if not isinstance(python, FunctionType):
         raise InvalidDefinition(f"expected a typed function, got {function!r}; write it with `def`")

@@ -1,0 +1,211 @@
+"""Falloffs: how a field falls off with the distance. A falloff is a class with one formula."""
+
+from typing import Any, ClassVar, Self, cast
+
+import warp as wp
+
+from blobtree.declare.falloff_checks import check_falloff, find_numbers
+from blobtree.declare.formula import (
+    Formula,
+    class_name,
+    declared_formulas,
+    derived,
+    formula,
+    is_own,
+    python_function,
+    tag_of,
+)
+from blobtree.declare.registry import Definitions, load_libraries
+from blobtree.errors import InvalidDefinition
+from blobtree.identity import content_hash
+from blobtree.lazy import Lazy
+
+_SLOPE = '''\
+def {name}({typed}) -> wp.float32:
+    """The derivative of a falloff."""
+    value, slope = {partials}
+    return slope
+'''
+
+
+class Falloff:
+    """A falloff: a field over the normalised distance d, which falls from g(0) = 1 to g(1) = 0.
+
+    A falloff is a subclass with the formula ``value(d: wp.float32) -> wp.float32``, g(d) for 0 ≤ d ≤ 1, which
+    never rises. A field is smooth where g'(0) = g'(1) = 0. The class attribute `tag` is its name in files; by
+    default that is the name of the class, in lower case with underscores. Primitives take the class, or its
+    name, as `falloff`. The names of all falloffs are in `FALLOFF_NAMES`. The class has one instance.
+
+    Attributes
+    ----------
+    name
+        Its name in files.
+    value, slope
+        Typed functions of the distance from 0 to 1: g ≥ 0 and g' ≤ 0. The formula `slope` is derived unless
+        the class has it.
+    rim
+        The distance with g = ISO. A primitive of visible radius r reads the distance r there.
+    steepest_distance
+        Where the slope is steepest, if it rises up to there and falls after it; otherwise −1.
+    steepest_slope
+        A bound on the magnitude of the slope.
+    digest
+        Digest of the sources of a falloff that this package does not define.
+
+    Raises
+    ------
+    InvalidDefinition
+        At the definition of a subclass: it has no `value`, a formula has no types or no source, the name is
+        that of a built-in falloff, or samples contradict the above. Nothing has been compiled by then.
+    UntranslatableFunction
+        A formula leaves the shared subset; the message names file and line.
+
+    Examples
+    --------
+    >>> import warp as wp
+    >>> from blobtree import Falloff, Point, formula
+    >>> class Ramp(Falloff):
+    ...     @formula
+    ...     def value(d: wp.float32) -> wp.float32:
+    ...         return 1.0 - d
+    >>> Point((0, 0, 0), radius=1.0, falloff=Ramp)
+    Point(center=(0.0, 0.0, 0.0), radius=1.0, color=(0.8, 0.8, 0.8), falloff='ramp')
+    >>> Point((0, 0, 0), radius=1.0, falloff="gaussian").falloff.name
+    'gaussian'
+    """
+
+    name: ClassVar[str]
+    digest: ClassVar[str] = ""
+    value: ClassVar[wp.Function]
+    _formulas: ClassVar[dict[str, Formula]]
+    _instance: ClassVar["Falloff"]
+
+    def __init_subclass__(cls) -> None:
+        cls.name = tag_of(cls)
+        cls._formulas = declared_formulas(cls, cls.name, {"value": wp.float32, "slope": wp.float32})
+        if "value" not in cls._formulas:
+            raise InvalidDefinition(f"{cls.__qualname__}: expected a falloff with the formula `value`")
+        falloff = object.__new__(cls)
+        if not is_own(cls):
+            falloff = falloff._checked()
+        cls._instance = FALLOFF_NAMES[cls.name] = falloff
+
+    def __new__(cls) -> Self:
+        """Return the instance of the class."""
+        if cls is Falloff:
+            raise TypeError("expected a subclass of Falloff with the formula `value`")
+        return cast(Self, cls._instance)
+
+    def __repr__(self) -> str:
+        return repr(self.name)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return unpickled, (self.name, type(self).__module__)
+
+    @property
+    def content_hash(self) -> str:
+        """Content hash, see `blobtree.content_hash`: that of its name, and of the sources of a custom one."""
+        return content_hash((Falloff.__name__, self.name, self.digest))
+
+    @Lazy
+    def _slope(self) -> Formula:
+        value = self._formulas["value"]
+        return self._formulas.get("slope") or derived(value, list(value.parameters), _SLOPE)
+
+    @property
+    def slope(self) -> wp.Function:
+        """The derivative g'(d), a typed function."""
+        return self._slope.function
+
+    @Lazy
+    def numbers(self) -> tuple[float, float, float]:
+        """Rim, steepest distance and steepest slope, found from samples unless the class states them."""
+        return find_numbers(self._formulas["value"], self._slope)
+
+    @property
+    def rim(self) -> float:
+        """The distance with g = ISO."""
+        return self.numbers[0]
+
+    @property
+    def steepest_distance(self) -> float:
+        """Where the slope is steepest, −1 if it has several peaks."""
+        return self.numbers[1]
+
+    @property
+    def steepest_slope(self) -> float:
+        """A bound on the magnitude of the slope."""
+        return self.numbers[2]
+
+    def _checked(self) -> "Falloff":
+        """Return a user's falloff after checks, or the known one of the same sources."""
+        load_libraries()
+        value, slope = self._formulas["value"], self._slope
+        for source in (value, slope):
+            if list(source.parameters.values()) not in ([wp.float32], [float]):
+                raise source.refusal("expected the distance `d: wp.float32` as its only parameter")
+        known = FALLOFF_NAMES.get(self.name)
+        if known is not None and not known.digest:
+            raise value.refusal(f"name: {self.name!r} is a built-in falloff; choose another name")
+        type(self).digest = value.digest_with(self.name, slope.digest)
+        if known is not None and known.digest == self.digest:
+            return known
+        if "numbers" in vars(type(self)):
+            raise value.refusal("numbers: expected none, they are found from samples")
+        check_falloff(value, slope)
+        return self
+
+
+FALLOFF_NAMES: Definitions[Falloff] = Definitions("falloff", "define_falloff or a subclass of Falloff for it")
+"""Every falloff by its name in files; the definition of a subclass adds to it."""
+
+
+def unpickled(name: str, module: str) -> Falloff:
+    """Return the falloff that a pickle names."""
+    return FALLOFF_NAMES.unpickled(name, module)
+
+
+def define_falloff(value: Any, slope: Any = None, *, name: str | None = None) -> Falloff:
+    """Return a falloff from a function g: a short form of a subclass of `Falloff`.
+
+    Parameters
+    ----------
+    value
+        ``(d: wp.float32) -> wp.float32``, with or without ``@wp.func``: the formula `value`.
+    slope
+        The derivative g'(d), a function of the same type; by default it is derived from the source.
+    name
+        Name of the falloff in files; by default the name of `value`.
+
+    Returns
+    -------
+    Falloff
+        A value for the keyword `falloff` of primitives around a skeleton; so is its name.
+
+    Raises
+    ------
+    InvalidDefinition
+        See `Falloff`.
+    UntranslatableFunction
+        A function leaves the shared subset; the message names file and line.
+
+    Examples
+    --------
+    >>> import warp as wp
+    >>> from blobtree import Point, define_falloff
+    >>> @wp.func
+    ... def linear(d: wp.float32) -> wp.float32:
+    ...     return 1.0 - d
+    >>> falloff = define_falloff(linear)
+    >>> round(falloff.rim, 6)
+    0.5
+    >>> Point((0, 0, 0), radius=1.0, falloff=falloff)
+    Point(center=(0.0, 0.0, 0.0), radius=1.0, color=(0.8, 0.8, 0.8), falloff='linear')
+    """
+    python = python_function(value)
+    tag = python.__name__ if name is None else name
+    body = {"value": formula(value), "tag": tag, "__module__": python.__module__, "__doc__": python.__doc__}
+    if slope is not None:
+        body["slope"] = formula(slope)
+    made: type[Falloff] = type(class_name(str(tag)), (Falloff,), body)
+    return made()
