@@ -14,7 +14,7 @@ A missing claim costs speed only: fewer cells are pruned.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, cast, get_args
+from typing import Any, get_args
 
 import warp as wp
 
@@ -23,13 +23,8 @@ from blobtree.custom.operator_checks import Claims, check_directed_operator, che
 from blobtree.declare.formula import Formula, derived, formula_of, generated, kind_name, returned_type
 from blobtree.formulas.operators import (
     UNBOUNDED,
+    Like,
     Operator,
-    Support,
-    blend_choice,
-    difference_like_choice,
-    intersection_like_choice,
-    monotone_range,
-    unclaimed_choice,
     widened_range,
 )
 from blobtree.nodes.parameters import Parameter
@@ -40,8 +35,6 @@ from blobtree.validation import finite_number
 
 LEAST_OPERAND = 1e-18
 """Operands below are raised to it where partial derivatives are derived: quotients of them stay finite."""
-
-Like = Literal["blend", "intersection", "difference"]
 
 
 class CustomCombination(CustomNode, AssociativeCombination):
@@ -229,8 +222,6 @@ class _Shape:
 
     absent: str
     """Lines that return the exact result where an operand is absent."""
-    choice: Any
-    support: Support
     alone: str
     """Lines that return the slope where the result does not depend on the gradient of an absent operand."""
     corners: tuple[str, str] = ("a[0], b[0]", "a[1], b[1]")
@@ -244,27 +235,19 @@ _SLOPE_ALONE = "    if {}:\n        return {}\n"
 _SHAPES: dict[str | None, _Shape] = {
     "blend": _Shape(
         _KEEP_A + _KEEP_B,
-        blend_choice,
-        Support.EITHER,
         _SLOPE_ALONE.format("max_b <= 0.0", "slope_a") + _SLOPE_ALONE.format("max_a <= 0.0", "slope_b"),
     ),
     "intersection": _Shape(
         _NOTHING.format("a <= 0.0 or b <= 0.0"),
-        intersection_like_choice,
-        Support.COMMON,
         _SLOPE_ALONE.format("max_a <= 0.0 or max_b <= 0.0", "0.0"),
     ),
     "difference": _Shape(
         _NOTHING.format("a <= 0.0") + _KEEP_A,
-        difference_like_choice,
-        Support.LEFT,
         _SLOPE_ALONE.format("max_a <= 0.0", "0.0") + _SLOPE_ALONE.format("max_b <= 0.0", "slope_a"),
         ("a[0], b[1]", "a[1], b[0]"),
     ),
     None: _Shape(
         _NOTHING.format("a <= 0.0 and b <= 0.0"),
-        unclaimed_choice,
-        Support.EITHER,
         _SLOPE_ALONE.format("max_a <= 0.0 and max_b <= 0.0", "0.0"),
     ),
 }
@@ -345,11 +328,9 @@ def _directed_row(kind: str, digest: str, source: Formula, claims: Claims) -> Op
         kind,
         generated(kind, digest, "partials", _DIRECTED_PARTIALS, scope, **texts),
         generated(kind, digest, "slope", _DIRECTED_SLOPE, scope, **texts),
+        claims.like,
         generated(kind, digest, "range", _DIRECTED_RANGE, scope, **texts),
-        cast("wp.Function", shape.choice),
         commutes=False,
-        starts_from_zero=claims.like == "blend",
-        support=shape.support,
         gradients=True,
         digest=digest,
     )
@@ -383,13 +364,9 @@ def _row(kind: str, digest: str, source: Formula, claims: Claims) -> Operator:
         kind,
         partials,
         generated(kind, digest, "slope", _SLOPE, scope, **texts),
-        monotone_range(partials, falls_with_b=claims.like == "difference")
-        if claims.monotone
-        else generated(kind, digest, "range", _RANGE, scope, **texts),
-        cast("wp.Function", shape.choice),
+        claims.like,
+        None if claims.monotone else generated(kind, digest, "range", _RANGE, scope, **texts),
         commutes=claims.order_free,
-        starts_from_zero=claims.like == "blend",
         monotone=claims.monotone and claims.like != "difference",
-        support=shape.support,
         digest=digest,
     )

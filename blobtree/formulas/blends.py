@@ -12,15 +12,10 @@ from blobtree.formulas.operators import (
     KEEP_NONE,
     KEEP_RIGHT,
     Operator,
-    Support,
-    blend_choice,
-    difference_like_choice,
     difference_partials,
     extremum_slope,
-    intersection_like_choice,
     intersection_partials,
     intersection_range,
-    monotone_range,
     ricci_norm,
     ricci_partials,
     union_partials,
@@ -492,83 +487,56 @@ def deepest_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
     return KEEP_BOTH
 
 
-superelliptic_range = monotone_range(superelliptic_partials)
-r_union_range = monotone_range(r_union_partials)
-r_intersection_range = monotone_range(r_intersection_partials)
-r_difference_range = monotone_range(r_difference_partials, falls_with_b=True)
-smooth_intersection_range = monotone_range(smooth_intersection_partials)
-clean_union_range = monotone_range(clean_union_partials)
-controllable_range = monotone_range(controllable_partials)
-masked_range = monotone_range(masked_partials)
-
-
 # -- the table ------------------------------------------------------------------------------------------
 
 SUPERELLIPTIC = Operator(
     "superelliptic",
     superelliptic_partials,
     superelliptic_slope,
-    superelliptic_range,
-    superelliptic_choice,
+    "blend",
+    choice=superelliptic_choice,
     monotone=True,
 )
-R_UNION = Operator(
-    "r_union",
-    r_union_partials,
-    r_union_slope,
-    r_union_range,
-    blend_choice,
-    commutes=False,
-    monotone=True,
-)
+R_UNION = Operator("r_union", r_union_partials, r_union_slope, "blend", commutes=False, monotone=True)
 R_INTERSECTION = Operator(
     "r_intersection",
     r_intersection_partials,
     r_intersection_slope,
-    r_intersection_range,
-    intersection_like_choice,
+    "intersection",
     commutes=False,
-    starts_from_zero=False,
     monotone=True,
-    support=Support.COMMON,
 )
 R_DIFFERENCE = Operator(
     "r_difference",
     r_difference_partials,
     r_difference_slope,
-    r_difference_range,
-    difference_like_choice,
+    "difference",
     commutes=False,
-    starts_from_zero=False,
-    support=Support.LEFT,
 )
 SMOOTH_INTERSECTION = Operator(
     "smooth_intersection",
     smooth_intersection_partials,
     smooth_intersection_slope,
-    smooth_intersection_range,
-    smooth_intersection_choice,
+    "intersection",
+    choice=smooth_intersection_choice,
     commutes=False,
-    starts_from_zero=False,
     monotone=True,
-    support=Support.COMMON,
 )
 SMOOTH_DIFFERENCE = Operator(
     "smooth_difference",
     smooth_difference_partials,
     smooth_difference_slope,
+    "difference",
     smooth_difference_range,
     smooth_difference_choice,
     commutes=False,
-    starts_from_zero=False,
-    support=Support.LEFT,
 )
 CLEAN_UNION = Operator(
     "clean_union",
     clean_union_partials,
     clean_union_slope,
-    clean_union_range,
-    clean_union_choice,
+    "blend",
+    choice=clean_union_choice,
     commutes=False,
     monotone=True,
 )
@@ -576,8 +544,8 @@ CONTROLLABLE = Operator(
     "controllable",
     controllable_partials,
     controllable_slope,
-    controllable_range,
-    controllable_choice,
+    "blend",
+    choice=controllable_choice,
     commutes=False,
     monotone=True,
 )
@@ -585,18 +553,17 @@ MASKED = Operator(
     "masked",
     masked_partials,
     masked_slope,
-    masked_range,
-    masked_choice,
+    "intersection",
+    choice=masked_choice,
     commutes=False,
-    starts_from_zero=False,
     monotone=True,
-    support=Support.COMMON,
 )
 
 DEEPEST = Operator(
     "deepest",
     intersection_partials,
     extremum_slope,
+    "blend",
     intersection_range,
     deepest_choice,
     monotone=True,

@@ -17,7 +17,7 @@ can reach ½.
 
 import warp as wp
 
-from blobtree.formulas.operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, Operator, Support
+from blobtree.formulas.operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, Operator
 from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
@@ -205,32 +205,30 @@ PRESS = Operator(
     "press",
     press_partials,
     press_slope,
+    "difference",
     press_range,
     press_choice,
     commutes=False,
-    starts_from_zero=False,
-    support=Support.LEFT,
     paints=False,
 )
 BULGE = Operator(
     "bulge",
     bulge_partials,
     press_slope,
+    "difference",
     bulge_range,
     bulge_choice,
     commutes=False,
-    starts_from_zero=False,
-    support=Support.LEFT,
     paints=False,
 )
 RATED_UNION = Operator(
     "rated_union",
     rated_union_partials,
     rated_union_slope,
+    None,
     rated_union_range,
     rated_union_choice,
     commutes=False,
-    starts_from_zero=False,
     monotone=True,
 )
 

@@ -7,7 +7,7 @@ directions changes, in radians per unit; it is `UNBOUNDED` where none is known.
 
 import warp as wp
 
-from blobtree.formulas.operators import UNBOUNDED, Operator, blend_choice, union_partials, widened_range
+from blobtree.formulas.operators import UNBOUNDED, Operator, union_partials, widened_range
 from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
@@ -141,8 +141,8 @@ GRADIENT_BLEND = Operator(
     "gradient_blend",
     gradient_blend_partials,
     gradient_blend_slope,
+    "blend",
     gradient_blend_range,
-    blend_choice,
     commutes=False,
     gradients=True,
 )

@@ -23,6 +23,7 @@ not know of them.
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Literal
 
 import warp as wp
 
@@ -225,7 +226,7 @@ def difference_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
     return KEEP_BOTH
 
 
-# -- shared by custom operators -------------------------------------------------------------------------
+# -- what claims imply ----------------------------------------------------------------------------------
 
 
 CUSTOM_ROUNDING = 4e-6
@@ -267,8 +268,9 @@ def widened_range(smallest: wp.float32, largest: wp.float32) -> wp.vec2:
     )
 
 
-def monotone_range(partials: wp.Function, *, falls_with_b: bool = False) -> wp.Function:
-    """Return the range of an operator that never falls as a grows, nor as b does (or never rises with b)."""
+def monotone_range(partials: wp.Function, like: str | None) -> wp.Function:
+    """Return the range of an operator without one, see `Operator`."""
+    falls_with_b = like == "difference"
     names = ["a", "b", "parameter", "tape"][: parameter_count(partials)]
     types = {"a": wp.vec2, "b": wp.vec2, "parameter": wp.float32, "tape": Texels}
     low, high = ("a[0], b[1]", "a[1], b[0]") if falls_with_b else ("a[0], b[0]", "a[1], b[1]")
@@ -297,22 +299,37 @@ class Support(Enum):
     COMMON = "where both a and b differ from 0"
 
 
+Like = Literal["blend", "intersection", "difference"]
+"""What F is where an operand is absent (0): the other one; 0; a without b, and 0 without a."""
+
+_SUPPORTS = {"intersection": Support.COMMON, "difference": Support.LEFT}
+_CHOICES = {
+    "blend": blend_choice,
+    "intersection": intersection_like_choice,
+    "difference": difference_like_choice,
+    None: unclaimed_choice,
+}
+
+
 @dataclass(frozen=True, eq=False)
 class Operator:
-    """One row of the table: an operator's name, functions and algebraic properties."""
+    """One row of the table: an operator's name, functions and claims.
+
+    Pruning and the part of space where F acts follow from `like`; a sharper `choice` takes its place. An
+    operator without a `range` never falls as a grows, nor as b does, or, like a difference, nor rises with b.
+    """
 
     name: str
     partials: wp.Function
     slope: wp.Function
-    range: wp.Function
-    choice: wp.Function
+    like: Like | None
+    """None for anything else; F is 0 where both operands are."""
+    range: wp.Function = None
+    choice: wp.Function = None
     commutes: bool = True
     """True if operands may be exchanged and nested in any way."""
-    starts_from_zero: bool = True
-    """True if F(0, b) = b, so that a fold may start from the empty field."""
     monotone: bool = False
     """F never falls where its operands rise, and `slope` takes slopes below 0, of operands that fall."""
-    support: Support = Support.EITHER
     paints: bool = True
     """True if the second operand's colour shows where F depends on it; else F has the first one's."""
     signed: bool = False
@@ -322,29 +339,43 @@ class Operator:
     digest: str = ""
     """Digest of the sources of a custom operator."""
 
+    def __post_init__(self) -> None:
+        if self.choice is None:
+            object.__setattr__(self, "choice", _CHOICES[self.like])
+        if self.range is None:
+            object.__setattr__(self, "range", monotone_range(self.partials, self.like))
 
-SUM = Operator("sum", sum_partials, sum_slope, sum_range, blend_choice, monotone=True, signed=True)
-RICCI = Operator("ricci", ricci_partials, ricci_slope, ricci_range, blend_choice, monotone=True)
-UNION = Operator("union", union_partials, extremum_slope, union_range, union_choice, monotone=True)
+    @property
+    def starts_from_zero(self) -> bool:
+        """True if F(0, b) = b, so that a fold may start from the empty field."""
+        return self.like == "blend"
+
+    @property
+    def support(self) -> Support:
+        """The part of space in which F may differ from 0."""
+        return _SUPPORTS.get(self.like, Support.EITHER)
+
+
+SUM = Operator("sum", sum_partials, sum_slope, "blend", sum_range, monotone=True, signed=True)
+RICCI = Operator("ricci", ricci_partials, ricci_slope, "blend", ricci_range, monotone=True)
+UNION = Operator("union", union_partials, extremum_slope, "blend", union_range, union_choice, monotone=True)
 INTERSECTION = Operator(
     "intersection",
     intersection_partials,
     extremum_slope,
+    "intersection",
     intersection_range,
     intersection_choice,
-    starts_from_zero=False,
     monotone=True,
-    support=Support.COMMON,
 )
 DIFFERENCE = Operator(
     "difference",
     difference_partials,
     difference_slope,
+    "difference",
     difference_range,
     difference_choice,
     commutes=False,
-    starts_from_zero=False,
-    support=Support.LEFT,
 )
 
 OPERATORS = (SUM, RICCI, UNION, INTERSECTION, DIFFERENCE)

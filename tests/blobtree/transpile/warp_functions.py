@@ -24,6 +24,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
+from blobtree.formulas.operators import Operator
 from blobtree.transpile.glsl import uniforms_of
 
 _SCALARS = {wp.float32: np.float32, wp.int32: np.int32, wp.uint32: np.uint32, wp.bool: np.bool_}
@@ -43,9 +44,9 @@ class TypedFunction:
 
 
 def typed_functions(module: ModuleType) -> list[TypedFunction]:
-    """The typed functions and formulas that `module` defines, save those that Warp specialises."""
-    kinds = [value for value in vars(module).values() if isinstance(value, type)]
-    found = []
+    """The typed functions that `module` and its kinds define, save those that Warp specialises."""
+    kinds = [value for value in vars(module).values() if isinstance(value, type | Operator)]
+    found = {}
     for value in chain(vars(module).values(), *(vars(kind).values() for kind in kinds)):
         if (
             isinstance(value, wp.Function)
@@ -55,8 +56,8 @@ def typed_functions(module: ModuleType) -> list[TypedFunction]:
             hints = dict(value.func.__annotations__)
             returned = hints.pop("return")
             if not value.func.__code__.co_freevars:
-                found.append(TypedFunction(value, hints, returned))
-    return found
+                found[value.key] = TypedFunction(value, hints, returned)
+    return [*found.values()]
 
 
 def python_function(function: Any) -> FunctionType:
