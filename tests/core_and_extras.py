@@ -60,7 +60,6 @@ EXTRAS: dict[str, str] = {
 """The modules of each package that are extras, ``*`` for all."""
 
 LISTS = (
-    "blobtree.formulas.library",
     "blobtree.nodes.kinds",
     "decals.editing.actions",
     "decals.rendering.drawables",

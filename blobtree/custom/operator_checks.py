@@ -11,6 +11,7 @@ import numpy as np
 from blobtree._typing import Float64Array
 from blobtree.custom.checks import SEED, SLOPE_TOLERANCE, VALUE_TOLERANCE, trial_value
 from blobtree.declare.formula import Formula, result_of, shown
+from blobtree.formulas.operators import Like
 from blobtree.nodes.parameters import Parameter
 from blobtree.transpile.python import Precision, vector
 
@@ -36,7 +37,7 @@ class Claims:
     """The claims of a definition about its operator."""
 
     steepest: float | Formula
-    like: str | None
+    like: Like | None
     monotone: bool
     order_free: bool
 

@@ -15,7 +15,7 @@ from blobtree.declare.formula import (
     python_function,
     tag_of,
 )
-from blobtree.declare.registry import Definitions, load_libraries
+from blobtree.declare.registry import Definitions, library_rows, load_libraries
 from blobtree.errors import InvalidDefinition
 from blobtree.identity import content_hash
 from blobtree.lazy import Lazy
@@ -86,7 +86,9 @@ class Falloff:
         if "value" not in cls._formulas:
             raise InvalidDefinition(f"{cls.__qualname__}: expected a falloff with the formula `value`")
         falloff = object.__new__(cls)
-        if not is_own(cls):
+        if is_own(cls):
+            library_rows(falloff)
+        else:
             falloff = falloff._checked()
         cls._instance = FALLOFF_NAMES[cls.name] = falloff
 

@@ -16,6 +16,9 @@ Definition = TypeVar("Definition")
 NODE_KINDS: dict[str, type[Any]] = {}
 """The classes of nodes that are loaded, by their tags; `blobtree.nodes.kinds` loads all."""
 
+LIBRARY_ROWS: list[Any] = []
+"""What the loaded kinds of this package put on tapes beyond the core, in any order."""
+
 _libraries: list[Callable[[], object]] = []
 
 
@@ -28,6 +31,12 @@ def load_libraries() -> None:
     """Load all kinds of the libraries."""
     for load in _libraries:
         load()
+
+
+def library_rows(*rows: Definition) -> tuple[Definition, ...]:
+    """Return rows after adding them to those of the library."""
+    LIBRARY_ROWS.extend(rows)
+    return rows
 
 
 def kind_of(tag: str) -> type[Any]:

@@ -6,6 +6,7 @@ converted, and each function states how. Operators with several parameters read 
 
 import warp as wp
 
+from blobtree.declare.registry import library_rows
 from blobtree.formulas.operators import (
     KEEP_BOTH,
     KEEP_LEFT,
@@ -571,7 +572,7 @@ DEEPEST = Operator(
 )
 """min(f, g) of fields that are 0 or less: the union of pieces with a negative weight."""
 
-BLENDS: tuple[Operator, ...] = (
+BLENDS = library_rows(
     SUPERELLIPTIC,
     R_UNION,
     R_INTERSECTION,

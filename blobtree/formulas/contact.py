@@ -17,6 +17,7 @@ can reach ½.
 
 import warp as wp
 
+from blobtree.declare.registry import library_rows
 from blobtree.formulas.operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, Operator
 from blobtree.texels import Texels
 
@@ -232,5 +233,4 @@ RATED_UNION = Operator(
     monotone=True,
 )
 
-CONTACT_OPERATORS = (PRESS, BULGE, RATED_UNION)
-"""Operators of contact between solids."""
+library_rows(PRESS, BULGE, RATED_UNION)

@@ -25,6 +25,7 @@ import math
 
 import warp as wp
 
+from blobtree.declare.registry import library_rows
 from blobtree.formulas.fields import FieldKind
 from blobtree.texels import Texels
 
@@ -454,5 +455,5 @@ CONVOLUTION_TRIANGLE = FieldKind(
     "convolution_triangle", convolution_triangle, convolution_triangle_bounds, parameters=4
 )
 
-CONVOLUTION_FIELDS = (CONVOLUTION_SEGMENT, CONVOLUTION_ARC, CONVOLUTION_TRIANGLE)
+CONVOLUTION_FIELDS = library_rows(CONVOLUTION_SEGMENT, CONVOLUTION_ARC, CONVOLUTION_TRIANGLE)
 """Every kind, in the order of their codes on the tape."""

@@ -8,6 +8,7 @@ bracket the minima. No start value can lead to the wrong one of two minima.
 
 import warp as wp
 
+from blobtree.declare.registry import library_rows
 from blobtree.formulas.skeletons import (
     JOINT_YIELD,
     TUBE_CELLS,
@@ -338,4 +339,4 @@ CURVE = Skeleton(
     cells=TUBE_CELLS,
 )
 
-CURVE_SKELETONS = (JOINED_SEGMENT, ARC, CURVE)
+library_rows(JOINED_SEGMENT, ARC, CURVE)

@@ -16,6 +16,7 @@ import numpy as np
 import warp as wp
 
 from blobtree._typing import Box, Float64Array
+from blobtree.declare.registry import library_rows
 from blobtree.errors import InvalidNode
 from blobtree.formulas.warps import UNKNOWN_EXTENT, SpaceWarp
 from blobtree.texels import Texels
@@ -565,5 +566,4 @@ BEND = SpaceWarp("bend", bend_forward, bend_pullback, bend_stretch, bend_box, be
 NOISE = SpaceWarp("noise", noise_forward, noise_pullback, noise_stretch, noise_box)
 CURVE = SpaceWarp("curve", curve_forward, curve_pullback, curve_stretch, curve_box)
 
-DEFORMATIONS = (TAPER, SHEAR, STRETCH, LIMITED_TWIST, BEND, NOISE, CURVE)
-"""The warps of this file, in the order of their codes."""
+library_rows(TAPER, SHEAR, STRETCH, LIMITED_TWIST, BEND, NOISE, CURVE)

@@ -8,6 +8,7 @@ import math
 
 import warp as wp
 
+from blobtree.declare.registry import library_rows
 from blobtree.formulas.falloff import RIM
 from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.noise import LARGEST_NOISE, STEEPEST_NOISE, gradient_noise
@@ -149,5 +150,4 @@ SUPERQUADRIC = FieldKind(
 GYROID = FieldKind("gyroid", gyroid_distance, gyroid_bounds, parameters=3, distance=True, windowed=True)
 NOISE = FieldKind("noise", noise_value_gradient, noise_bounds, parameters=3, windowed=True)
 
-DIRECT_FIELDS = (SUPERQUADRIC, GYROID, NOISE)
-"""Every direct field of this file."""
+library_rows(SUPERQUADRIC, GYROID, NOISE)

@@ -121,10 +121,7 @@ class Cauchy(Falloff):
         return 2.0 * CAUCHY_SCALE * distance * (slope - CAUCHY_END_SLOPE)
 
 
-__all__ = ["FALLOFF_NAMES", "MORE_FALLOFFS"]
-
-MORE_FALLOFFS: tuple[Falloff, ...] = (SoftObject(), BlancSchlick(), Metaball(), Gaussian(), Cauchy())
-"""The falloffs outside the core."""
+__all__ = ["FALLOFF_NAMES"]
 
 _unpickled = unpickled
 """Pickles of earlier versions name it."""

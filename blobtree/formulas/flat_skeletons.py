@@ -2,6 +2,7 @@
 
 import warp as wp
 
+from blobtree.declare.registry import library_rows
 from blobtree.formulas.skeletons import JOINT_YIELD, PLATE_CELLS, Skeleton, min_influence_of_one
 from blobtree.texels import Texels
 
@@ -101,4 +102,4 @@ TRIANGLE = Skeleton(
     "triangle", closest_on_triangle, min_influence_of_triangle, parameters=4, convex=True, cells=PLATE_CELLS
 )
 
-FLAT_SKELETONS = (RECTANGLE, TRIANGLE)
+library_rows(RECTANGLE, TRIANGLE)

@@ -23,7 +23,7 @@ not know of them.
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Literal
+from typing import Any, Literal
 
 import warp as wp
 
@@ -324,8 +324,8 @@ class Operator:
     slope: wp.Function
     like: Like | None
     """None for anything else; F is 0 where both operands are."""
-    range: wp.Function = None
-    choice: wp.Function = None
+    range: Any = None
+    choice: Any = None
     commutes: bool = True
     """True if operands may be exchanged and nested in any way."""
     monotone: bool = False

@@ -2,6 +2,7 @@
 
 import warp as wp
 
+from blobtree.declare.registry import library_rows
 from blobtree.formulas.skeletons import Skeleton, min_influence_of_one
 from blobtree.texels import Texels
 
@@ -57,4 +58,6 @@ CYLINDER = Skeleton(
     depth=depth_in_cylinder,
 )
 
-SOLID_SKELETONS = (CYLINDER,)
+library_rows(
+    CYLINDER,
+)

@@ -12,6 +12,7 @@ from d = (1 − RIM) s outward, and 1 from −RIM s inward. For a ball of radius
 
 import warp as wp
 
+from blobtree.declare.registry import library_rows
 from blobtree.formulas.falloff import RIM
 from blobtree.formulas.fields import FieldKind
 from blobtree.texels import Texels
@@ -118,5 +119,6 @@ def volume_bounds(center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int3
 
 VOLUME = FieldKind("volume", volume_distance, volume_bounds, parameters=3, distance=True)
 
-VOLUME_FIELDS = (VOLUME,)
-"""Every kind of sampled fields."""
+library_rows(
+    VOLUME,
+)

@@ -2,7 +2,7 @@
 
 Kernels are written against the tables of core kinds; a tree of core kinds has BUILT_IN, whose kernels are
 those in the files. For any other set of kinds the same kernels are instantiated (`transpile.specialize`). A
-tree with library kinds has `library`: the core rows, then those of `formulas.library`. A tree with custom
+tree with library kinds has `library`: the core rows, then those of the registry. A tree with custom
 kinds has a set of its own: the rows of BUILT_IN or `library`, then the custom ones.
 """
 
@@ -19,6 +19,7 @@ from typing import Any
 import warp as wp
 
 from blobtree.declare.falloff import Falloff
+from blobtree.declare.registry import LIBRARY_ROWS, load_libraries
 from blobtree.formulas.fields import FIELDS, FieldKind
 from blobtree.formulas.operators import OPERATORS, Operator
 from blobtree.formulas.skeletons import SKELETONS, Skeleton
@@ -173,24 +174,10 @@ _created: list[InstructionSet] = []
 @cache
 def library() -> InstructionSet:
     """Return the instruction set of trees with library kinds, whose formulas take long to import."""
-    from blobtree.formulas.library import (
-        LIBRARY_FALLOFFS,
-        LIBRARY_FIELDS,
-        LIBRARY_OPERATORS,
-        LIBRARY_SKELETONS,
-        LIBRARY_WARPS,
-    )
-
+    load_libraries()
     with _LOCK:
         if not _created:
-            first = InstructionSet(
-                (*SKELETONS, *LIBRARY_SKELETONS),
-                (*OPERATORS, *LIBRARY_OPERATORS),
-                (*WARPS, *LIBRARY_WARPS),
-                (*FIELDS, *LIBRARY_FIELDS),
-                (*FALLOFFS, *LIBRARY_FALLOFFS),
-            )
-            _created.append(first)
+            _created.append(BUILT_IN.with_rows(LIBRARY_ROWS))
         return _created[0]
 
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from blobtree import (
+    FALLOFF_NAMES,
     Arc,
     BlendGraph,
     Box,
@@ -64,12 +65,10 @@ from blobtree import (
     Twist,
     Union,
 )
-from blobtree.formulas.falloffs import MORE_FALLOFFS
-from blobtree.kinds.falloff import FALLOFFS
 from blobtree.nodes.primitives import Falling, Leaf, Primitive, Profile
 from blobtree.validation import Vector
 
-BUILT_IN_FALLOFFS = [row.name for row in (*FALLOFFS, *MORE_FALLOFFS)]
+BUILT_IN_FALLOFFS = [name for name, falloff in FALLOFF_NAMES.items() if not falloff.digest]
 
 KINDS = (Point, Segment, Cone, Sum, Ricci, Union, Intersection, Difference, Transform, Offset, Twist)
 

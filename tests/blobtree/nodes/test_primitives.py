@@ -38,13 +38,12 @@ from blobtree import (
     to_json,
 )
 from blobtree.formulas.falloff import RIM
-from blobtree.formulas.library import LIBRARY_SKELETONS
-from blobtree.formulas.skeletons import SKELETONS
 from blobtree.nodes.curves import JoinedSegment
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.parameters import Quantity, describe, parameters_of
 from blobtree.nodes.paths import moved, resized
 from blobtree.nodes.primitives import PROFILE, Leaf, Primitive, Profile
+from blobtree.tape.instruction_set import library
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
 from tests.blobtree.trees import SOLIDS, points_around
 from tests.oracles import blobtree as oracle
@@ -339,7 +338,7 @@ def test_every_parameter_is_declared_documented_and_in_files(kind: type[Node]) -
 def test_every_skeleton_has_a_primitive_with_a_radius_and_a_color() -> None:
     kinds = [kind for kind in NODE_KINDS.values() if issubclass(kind, Primitive)]
     pieces = {JoinedSegment.skeleton}  # of polylines, which files hold as a whole
-    assert {kind.skeleton for kind in kinds} | pieces == {*SKELETONS, *LIBRARY_SKELETONS}
+    assert {kind.skeleton for kind in kinds} | pieces == {*library().skeletons}
     for kind in kinds:
         quantities = [parameter.quantity for parameter in parameters_of(kind).values()]
         assert quantities.count(Quantity.COLOR) == 1

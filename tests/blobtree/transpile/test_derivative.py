@@ -14,12 +14,9 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree import UntranslatableFunction
-from blobtree.formulas.falloffs import MORE_FALLOFFS
-from blobtree.formulas.library import LIBRARY_OPERATORS
-from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.skeletons import SKELETONS
-from blobtree.kinds.falloff import FALLOFFS
 from blobtree.tape import interpreter
+from blobtree.tape.instruction_set import library
 from blobtree.transpile.derivative import (
     derivative_along,
     differentiated,
@@ -178,7 +175,7 @@ def test_formulas_have_derivatives(typed: Any) -> None:
     check_partials(typed.function, names, SEEDS[0], **exponent)
 
 
-OPERATOR_ROWS = [row for row in (*OPERATORS, *LIBRARY_OPERATORS) if not row.gradients]
+OPERATOR_ROWS = [row for row in library().operators if not row.gradients]
 
 
 @pytest.mark.parametrize("row", OPERATOR_ROWS, ids=lambda row: row.name)
@@ -194,7 +191,7 @@ def test_partials_written_by_hand_are_those_of_the_engine(row: Any) -> None:
             np.testing.assert_allclose([by_a[0], by_b[0]], result[1:], rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("row", [*FALLOFFS, *MORE_FALLOFFS], ids=lambda row: row.name)
+@pytest.mark.parametrize("row", library().falloffs, ids=lambda row: row.name)
 def test_slopes_of_falloffs_are_those_of_the_engine(row: Any) -> None:
     derived = plain_python(python_function(partial_derivatives(row.value)))
     slope = plain_python(python_function(row.slope))
