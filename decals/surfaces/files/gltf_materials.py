@@ -79,6 +79,7 @@ class _Source(Record, frozen=True):
 class _TextureExtensions(Record, frozen=True):
     webp: _Source | None = field(name="EXT_texture_webp", default=None)
     avif: _Source | None = field(name="EXT_texture_avif", default=None)
+    basisu: _Source | None = field(name="KHR_texture_basisu", default=None)
 
 
 class _Texture(Record, frozen=True):
@@ -168,7 +169,12 @@ class Materials:
         others = [other.source for other in (record.extensions.webp, record.extensions.avif) if other]
         source = others[0] if others else record.source
         if source is None:
-            raise Unreadable(f"texture {index} has no image of a kind that is read")
+            kind = (
+                "only a KTX2 image, which is not read"
+                if record.extensions.basisu
+                else "no image that is read"
+            )
+            raise Unreadable(f"texture {index} has {kind}")
         sampler = _Sampler()
         if record.sampler is not None:
             sampler = self._record("samplers", record.sampler, f"texture {index}", _Sampler)
