@@ -1,4 +1,4 @@
-"""Warp kernel of seams: texels along them are changed point by point until both sides agree."""
+"""Warp kernels of seams: how far both sides differ, what lies around, and changes point by point."""
 
 # mypy: ignore-errors
 # (kernel code is Python only in form: its names have Warp types)
@@ -6,7 +6,7 @@
 import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
-from decals.baking.srgb import decoded, decoded_slope, encoded
+from decals.baking.srgb import decoded, decoded64, decoded_slope, decoded_slope64, encoded, encoded64
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -39,11 +39,96 @@ def slope(level: wp.float32, srgb: wp.bool) -> wp.float32:
 
 
 @wp.kernel
+def decode_listed(
+    first: wp.int32,
+    numbers: wp.array(dtype=wp.int32),
+    srgb: wp.array(dtype=wp.uint8),
+    levels: wp.array(dtype=wp.float64),
+    light: wp.array(dtype=wp.float64),
+):
+    """Write the linear light of some levels, which lie one channel after another."""
+    at = numbers[first + wp.tid()]
+    light[at] = levels[at]
+    if srgb[at % srgb.shape[0]] != wp.uint8(0):
+        light[at] = decoded64(levels[at])
+
+
+@wp.kernel
+def linearize(
+    first: wp.int32,
+    rows: wp.array(dtype=wp.int32),
+    index: wp.array2d(dtype=wp.int32),
+    weights: wp.array2d(dtype=wp.float64),
+    srgb: wp.array(dtype=wp.uint8),
+    levels: wp.array(dtype=wp.float64),
+    light: wp.array(dtype=wp.float64),
+    gaps: wp.array(dtype=wp.float64),
+    slopes: wp.array2d(dtype=wp.float64),
+):
+    """Write how far both sides differ at rows, and the derivatives by the eight levels if there is room."""
+    i = first + wp.tid()
+    channels = srgb.shape[0]
+    point = rows[i] / channels
+    channel = rows[i] % channels
+    mixed = wp.vec2d()
+    for k in range(8):
+        mixed[k / 4] += weights[point, k] * light[index[point, k] * channels + channel]
+    gamma = srgb[channel] != wp.uint8(0)
+    if gamma:
+        for side in range(2):
+            mixed[side] = encoded64(wp.clamp(mixed[side], wp.float64(0.0), wp.float64(1.0)))
+    gaps[i] = mixed[0] - mixed[1]
+    if slopes.shape[0] > 0:
+        for k in range(8):
+            value = weights[point, k]
+            if gamma:
+                level = levels[index[point, k] * channels + channel]
+                value = value * decoded_slope64(level) / decoded_slope64(mixed[k / 4])
+            if k >= 4:
+                value = -value
+            slopes[i, k] = value
+
+
+@wp.kernel
+def mark_levels(
+    first: wp.int32,
+    runs: wp.array(dtype=wp.uint8),
+    index: wp.array2d(dtype=wp.int32),
+    channels: wp.int32,
+    marks: wp.array(dtype=wp.uint8),
+):
+    """Mark the levels that are mixed at marked runs."""
+    i = first + wp.tid()
+    if runs[i] != wp.uint8(0):
+        for k in range(8):
+            marks[index[i / channels, k] * channels + i % channels] = wp.uint8(1)
+
+
+@wp.kernel
+def mark_runs(
+    first: wp.int32,
+    marks: wp.array(dtype=wp.uint8),
+    valid: wp.array(dtype=wp.uint8),
+    index: wp.array2d(dtype=wp.int32),
+    channels: wp.int32,
+    runs: wp.array(dtype=wp.uint8),
+):
+    """Mark the valid runs at which a marked level is mixed."""
+    i = first + wp.tid()
+    if valid[i] != wp.uint8(0):
+        for k in range(8):
+            if marks[index[i / channels, k] * channels + i % channels] != wp.uint8(0):
+                runs[i] = wp.uint8(1)
+
+
+@wp.kernel
 def settle(
     first: wp.int32,
+    bounds: wp.array(dtype=wp.int32),
+    rows: wp.array(dtype=wp.int32),
     index: wp.array2d(dtype=wp.int32),
     weights: wp.array2d(dtype=wp.float32),
-    srgb: wp.bool,
+    kinds: wp.array(dtype=wp.uint8),
     sweeps: wp.int32,
     aim: wp.float32,
     limit: wp.float32,
@@ -52,29 +137,36 @@ def settle(
     changed: wp.array(dtype=wp.int32),
     seen: wp.array(dtype=wp.int32),
 ):
-    """Change texels at each point in turn, forth and back, where both sides differ by more than ``limit``.
+    """Change levels at each row in turn, forth and back, where both sides differ by more than ``limit``.
 
-    The change is about the smallest after which both sides differ by ``aim`` (the method of Kaczmarz). Points
-    whose texels have not changed since the sweep ``seen`` are left out; ``changed`` has the sweep of each
-    texel. One thread runs the kernel, since each step needs the steps before.
+    The change is about the smallest after which both sides differ by ``aim`` (the method of Kaczmarz). Rows
+    whose levels have not changed since the sweep ``seen`` are left out; ``changed`` has the sweep of each
+    level. One thread has the rows from one of ``bounds`` to the next, since each step needs the steps before;
+    rows of different threads have no level in common.
     """
-    count = index.shape[0]
+    part = first + wp.tid()
+    begin = bounds[part]
+    count = bounds[part + 1] - begin
+    channels = kinds.shape[0]
+    channel = rows[begin] % channels
+    srgb = kinds[channel] != wp.uint8(0)
     for sweep in range(sweeps):
         updates = wp.int32(0)
         for at in range(count):
-            i = at
+            i = begin + at
             if sweep % 2 == 1:
-                i = count - 1 - at
+                i = begin + count - 1 - at
+            point = rows[i] / channels
             newest = wp.int32(-1)
             for k in range(8):
-                newest = wp.max(newest, changed[index[i, k]])
+                newest = wp.max(newest, changed[index[point, k] * channels + channel])
             if newest >= seen[i]:
                 seen[i] = sweep
                 mixed = wp.float32(0.0)
                 other = wp.float32(0.0)
                 for k in range(4):
-                    mixed += weights[i, k] * light[index[i, k]]
-                    other += weights[i, k + 4] * light[index[i, k + 4]]
+                    mixed += weights[point, k] * light[index[point, k] * channels + channel]
+                    other += weights[point, k + 4] * light[index[point, k + 4] * channels + channel]
                 mixed = level_of(mixed, srgb)
                 other = level_of(other, srgb)
                 gap = mixed - other
@@ -82,8 +174,8 @@ def settle(
                     slopes = wp.vector(length=8, dtype=wp.float32)
                     power = wp.float32(0.0)
                     for k in range(8):
-                        level = levels[index[i, k]]
-                        slopes[k] = weights[i, k] * slope(level, srgb)
+                        level = levels[index[point, k] * channels + channel]
+                        slopes[k] = weights[point, k] * slope(level, srgb)
                         if k < 4:
                             slopes[k] = slopes[k] / slope(mixed, srgb)
                         else:
@@ -95,7 +187,7 @@ def settle(
                         updates += 1
                         step = (gap - wp.clamp(gap, -aim, aim)) / power
                         for k in range(8):
-                            texel = index[i, k]
+                            texel = index[point, k] * channels + channel
                             level = wp.clamp(levels[texel] - step * slopes[k], 0.0, 1.0)
                             if level != levels[texel]:
                                 levels[texel] = level

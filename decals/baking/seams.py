@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
-from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse import coo_array, csc_array, csr_array, diags_array
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from blobtree._typing import BoolArray, Float64Array, Int32Array, Int64Array, UInt8Array
 from blobtree.device import array_on, launch
 from decals.baking.meshes import BakeMesh
-from decals.baking.seam_kernels import settle
+from decals.baking.seam_kernels import decode_listed, linearize, mark_levels, mark_runs, settle
 from decals.baking.unwrapped import Unwrapped
-from decals.images.texels import decode_srgb, encode_srgb
 from decals.surfaces.topology import welded
 
 CPU = "cpu"
@@ -51,6 +51,9 @@ BOUND_WEIGHT, BOUND_DECAY = 30.0, 0.5
 
 MAX_CHANGE = 0.25
 """Largest change of a texel in a step."""
+
+PART_ROWS = 1 << 14
+"""Rows from which on least squares without common texels are solved by themselves, at the same time."""
 
 SQUARES_FROM = 10.0
 """Difference of 255 from which on a point takes part in the least squares; smaller ones are settled."""
@@ -181,29 +184,13 @@ def match_seams(
     size, channels = image.shape[1], image.shape[3]
     texels = image.reshape(-1, channels)
     found = [bilinear_texels(places[:, side], tiles[:, side], size) for side in (0, 1)]
-    index, weights = (np.stack(each) for each in zip(*found, strict=True))
+    index, weights = (np.concatenate(each, axis=1) for each in zip(*found, strict=True))
     used = _distinct(index, len(texels))
     number = np.empty(len(texels), np.int32)
     number[used] = np.arange(len(used))
-    index = number[index]
-    works = []
-    for channel in range(channels):
-        rows = np.flatnonzero(smooth[:, channel])
-        levels = texels[used, channel] / 255.0
-        works.append(_Match(levels, index[:, rows], weights[:, rows], srgb[channel]))
-    with ThreadPoolExecutor() as pool:
-        running = [pool.submit(work.solve) for work in works]
-        try:
-            report(0.0)
-            while wait(running, REPORT_SECONDS).not_done:
-                report(sum(work.share for work in works) / channels)
-        except BaseException:
-            for work in works:
-                work.stopped = True
-            raise
-    for channel, (work, task) in enumerate(zip(works, running, strict=True)):
-        task.result()  # an error of it is raised here
-        texels[used, channel] = np.rint(255.0 * work.levels)
+    report(0.0)
+    work = _Match(texels[used], number[index], weights, smooth, srgb, report)
+    texels[used] = np.rint(255.0 * work.solved()).astype(np.uint8)
     return used
 
 
@@ -215,123 +202,235 @@ def _distinct(numbers: Int64Array, count: int) -> Int64Array:
 
 
 class _Match:
-    """Levels of one channel, from 0 to 1, that become alike on both sides of seams.
+    """Levels of texels, from 0 to 1, that become alike on both sides of seams, each channel by itself.
+
+    A row is a point and a channel, ``point * channels + channel``; a level is a texel and a channel. Points
+    in turn whose texels are the same are a run.
 
     Parameters
     ----------
-    levels : float64[n]
+    texels : uint8[n, channels]
         The texels.
-    index : int32[2, m, 4]
-        The texels that are mixed at points of seams, on both sides.
-    weights : float64[2, m, 4]
+    index : int32[m, 8]
+        The texels that are mixed at points of seams: four on each side.
+    weights : float64[m, 8]
         Their weights.
-    srgb : bool
-        True if texels are decoded before they are mixed.
-
-    Attributes
-    ----------
-    share : float
-        The part of the work that is done.
-    stopped : bool
-        True to end the work soon.
+    smooth : bool[m, channels]
+        True for the rows that are matched.
+    srgb : sequence of bool
+        True for channels that are decoded before they are mixed.
+    report : callable
+        Called often with the fraction done; an error that it raises ends the work.
     """
 
-    share = 0.0
-    stopped = False
+    def __init__(
+        self,
+        texels: UInt8Array,
+        index: Int32Array,
+        weights: Float64Array,
+        smooth: BoolArray,
+        srgb: Sequence[bool],
+        report: Callable[[float], None],
+    ) -> None:
+        self._shape, self._channels, self._report = texels.shape, len(srgb), report
+        self._first = (texels / 255.0).reshape(-1)
+        self._smooth, self._index = smooth, index
+        starts = np.flatnonzero(np.append(True, (index[1:] != index[:-1]).any(axis=1)))
+        self._starts, self._ends = starts, np.append(starts[1:], len(index))
+        self._run_of = np.repeat(np.arange(len(starts)), self._ends - starts)
+        self._run_index = index[starts]
+        self._valid = np.logical_or.reduceat(smooth, starts, axis=0).reshape(-1).view(np.uint8)
+        self._srgb = array_on(CPU, np.asarray(srgb), wp.uint8)
+        self._points = [array_on(CPU, index, wp.int32), array_on(CPU, weights, wp.float64), self._srgb]
+        self._weights32 = array_on(CPU, weights, wp.float32)
+        self._levels, self._light = self._first.copy(), np.empty_like(self._first)
+        self._decode(np.arange(len(self._first)))
 
-    def __init__(self, levels: Float64Array, index: Int32Array, weights: Float64Array, srgb: bool) -> None:
-        self.levels, self._first = levels, levels.copy()
-        self._index, self._weights, self._srgb = index, weights, srgb
+    def solved(self) -> Float64Array:
+        """Return levels ``float64[n, channels]`` that differ as little from the texels as the seams need."""
+        rows = np.flatnonzero(self._smooth)
+        chosen, _ = self._around(rows[np.abs(self._gaps(rows)) > SQUARES_FROM / 255.0])
+        if len(chosen):
+            self._least_squares(chosen)
+        self._settle(rows)
+        return self._levels.reshape(self._shape)
 
-    def solve(self) -> None:
-        """Change the levels as little as the seams need."""
-        rows = self._rows_around(np.abs(self._gaps()[0]) > SQUARES_FROM / 255.0)
-        if len(rows):
-            self._least_squares(rows)
-        self._settle()
+    def _gaps(self, rows: Int64Array, slopes: Float64Array | None = None) -> Float64Array:
+        """Return the differences of both sides at rows, and write their derivatives, ``float64[k, 8]``."""
+        gaps = np.empty(len(rows))
+        known = np.empty((0, 8)) if slopes is None else slopes
+        inputs = [array_on(CPU, rows, wp.int32), *self._points]
+        states = [array_on(CPU, state, wp.float64) for state in (self._levels, self._light)]
+        outputs = [array_on(CPU, values, wp.float64) for values in (gaps, known)]
+        launch(linearize, len(rows), [*inputs, *states], outputs, CPU)
+        return gaps
 
-    def _gaps(self, rows: Int64Array | slice = slice(None)) -> tuple[Float64Array, Float64Array]:
-        """Return the differences of both sides at points, and the levels on both, ``float64[2, k]``."""
-        light = self._decoded(self.levels)[self._index[:, rows]]
-        mixed = self._encoded((light * self._weights[:, rows]).sum(axis=2))
-        return mixed[0] - mixed[1], mixed
+    def _decode(self, numbers: Int64Array) -> None:
+        """Make the light of some levels that of these."""
+        inputs = [array_on(CPU, numbers, wp.int32), self._srgb, array_on(CPU, self._levels, wp.float64)]
+        launch(decode_listed, len(numbers), inputs, [array_on(CPU, self._light, wp.float64)], CPU)
 
-    def _rows_around(self, wrong: BoolArray) -> Int64Array:
-        """Return the rows of some points and of the points around them."""
-        chosen: BoolArray = wrong
-        for _ in range(RINGS):
-            marked = np.zeros(len(self.levels), np.bool_)
-            marked[self._index[:, chosen]] = True
-            chosen = np.asarray(marked[self._index].any(axis=(0, 2)))
-        return np.flatnonzero(chosen)
+    def _around(self, wrong: Int64Array) -> tuple[Int64Array, Int64Array]:
+        """Return some rows with those in `RINGS` rings around them, and with one ring more."""
+        chosen = np.zeros(len(self._valid), np.uint8)
+        chosen[self._run_of[wrong // self._channels] * self._channels + wrong % self._channels] = 1
+        index, valid = array_on(CPU, self._run_index, wp.int32), array_on(CPU, self._valid, wp.uint8)
+        marks = array_on(CPU, np.zeros(len(self._first), np.uint8), wp.uint8)
+        runs = array_on(CPU, chosen, wp.uint8)
+        found = []
+        for ring in range(RINGS + 1):
+            launch(mark_levels, len(chosen), [runs, index, self._channels], [marks], CPU)
+            launch(mark_runs, len(chosen), [marks, valid, index, self._channels], [runs], CPU)
+            if ring >= RINGS - 1:
+                found.append(self._rows_of(np.flatnonzero(runs.numpy())))
+        inner, outer = found
+        return inner, outer
+
+    def _rows_of(self, runs: Int64Array) -> Int64Array:
+        """Return the rows of runs, in order; a run and a channel are numbered as a row is."""
+        run, channel = np.divmod(runs, self._channels)
+        counts = self._ends[run] - self._starts[run]
+        within = np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
+        points = np.repeat(self._starts[run], counts) + within
+        rows = points * self._channels + np.repeat(channel, counts)
+        return np.sort(rows[self._smooth.reshape(-1)[rows]])
+
+    def _levels_of(self, rows: Int64Array) -> Int64Array:
+        """Return the levels that are mixed at rows, ``int64[k, 8]``."""
+        point, channel = np.divmod(rows, self._channels)
+        return self._index[point] * np.int64(self._channels) + channel[:, None]
+
+    def _linked(self, rows: Int64Array) -> tuple[Int64Array, Int64Array, Int32Array, Int32Array]:
+        """Return the levels of rows, their columns there, and the components of rows and levels.
+
+        Rows with a common level are in one component. Its number is larger in a later channel.
+        """
+        listed = self._levels_of(rows)
+        used = _distinct(listed, len(self._first))
+        number = np.empty(len(self._first), np.int32)
+        number[used] = np.arange(len(used))
+        columns = number[listed]
+        run = self._run_of[rows // self._channels] * self._channels + rows % self._channels
+        first = np.full(len(self._valid), -1)
+        first[run[::-1]] = np.arange(len(run) - 1, -1, -1)
+        first = first[first >= 0]  # one row of each run
+        links = np.repeat(columns[first, 0], 7), columns[first, 1:].reshape(-1)
+        graph = coo_array((np.ones(len(links[0]), np.int8), links), (len(used), len(used)))
+        count, label = connected_components(graph, directed=False)
+        label = label + count * (used % self._channels)
+        return used, columns, label[columns[:, 0]], label
 
     def _least_squares(self, rows: Int64Array) -> None:
         """Minimise the change of texels and the weighted differences, with more weight where these stay."""
-        used, columns = np.unique(self._index[:, rows], return_inverse=True)
-        first = self._first[used]
-        held, aims = np.ones(len(used)), first.copy()
-        columns = columns.reshape(2, -1, 4)
-        force = np.full(len(rows), FIRST_WEIGHT)
-        chosen = rows % COARSE == 0
-        for number in range(ROUNDS):
-            self.share = 0.9 * number / ROUNDS
-            if self.stopped:
-                return
-            gaps, mixed = self._gaps(rows)
-            off = np.abs(gaps) * 255.0 / TOLERANCE
-            if off.max() <= LARGEST / TOLERANCE:
-                return
-            if number:
-                chosen |= off > 1.0
-                grown = np.minimum(force * np.clip(off, 1.0, MAX_GROWTH), MAX_WEIGHT)
-                force = np.where(off > 1.0, grown, force)
-            levels = self.levels[used]
-            of = np.flatnonzero(chosen)
-            slopes = self._slopes(levels)[columns[:, of]] * self._weights[:, rows[of]]
-            slopes /= self._slopes(mixed[:, of])[:, :, None]
-            points, shape = np.repeat(np.arange(len(of)), 4), (len(of), len(used))
-            sides = [
-                csr_array((slope.reshape(-1), (points, column.reshape(-1))), shape)
-                for slope, column in zip(slopes, columns[:, of], strict=True)
-            ]
-            change = sides[0] - sides[1]
-            weighted = change.multiply(force[of, None] ** 2).T.tocsr()
-            matrix = (weighted @ change + diags_array(held)).tocsc()
-            solution = _solved(matrix, held * aims + weighted @ (change @ levels - gaps[of]))
-            outside = (solution < 0.0) | (solution > 1.0)
-            held = np.where(outside, BOUND_WEIGHT, 1.0 + (held - 1.0) * BOUND_DECAY)
-            aims = np.where(outside, np.clip(solution, 0.0, 1.0), np.where(held > 1.5, aims, first))
-            step = np.clip(solution - levels, -MAX_CHANGE, MAX_CHANGE)
-            self.levels[used] = np.clip(levels + step, 0.0, 1.0)
+        number = (np.cumsum(self._smooth, axis=0) - 1).reshape(-1)
+        used, columns, of_row, of_level = self._linked(rows)
+        order, ranked = (np.argsort(of, kind="stable") for of in (of_row, of_level))
+        place = np.empty(len(used), np.int32)
+        place[ranked] = np.arange(len(used))
+        rows, used = rows[order], used[ranked]
+        system = _System(self._first[used], place[columns[order]], number[rows] % COARSE == 0)
+        starts, begins = (np.flatnonzero(np.diff(of, prepend=-1)) for of in (of_row[order], of_level[ranked]))
+        channel = used[begins] % self._channels
+        parts = np.flatnonzero(np.diff(channel * len(rows) + starts // PART_ROWS, prepend=-1))
+        channel, starts, begins = channel[parts], starts[parts], begins[parts]
+        bounds = [(*starts[1:], len(rows)), (*begins[1:], len(used))]
+        slices = [
+            (slice(first, last), slice(begin, end))
+            for first, last, begin, end in zip(starts, bounds[0], begins, bounds[1], strict=True)
+        ]
+        with ThreadPoolExecutor() as pool:
+            for step in range(ROUNDS):
+                gaps = self._gaps(rows, system.slopes)
+                off = np.abs(gaps) * 255.0 / TOLERANCE
+                worst = np.zeros(self._channels)
+                np.maximum.at(worst, channel, np.maximum.reduceat(off, starts))
+                if step:
+                    system.strengthen(off)
+                levels = self._levels[used]
+                running = [
+                    pool.submit(system.move, *each, gaps, levels)
+                    for each, of in zip(slices, channel, strict=True)
+                    if worst[of] > LARGEST / TOLERANCE
+                ]
+                if not running:
+                    return
+                while wait(running, REPORT_SECONDS).not_done:
+                    self._report(0.9 * step / ROUNDS)
+                for task in running:
+                    task.result()  # an error of it is raised here
+                self._levels[used] = levels
+                self._decode(used)
 
-    def _settle(self) -> None:
+    def _settle(self, rows: Int64Array) -> None:
         """Move points that still differ one by one, see `settle`."""
-        for _ in range(ATTEMPTS):
-            wrong = np.abs(self._gaps()[0]) > LARGEST / 255.0
-            if self.stopped or not wrong.any():
+        for attempt in range(ATTEMPTS):
+            self._report(0.9 + 0.1 * attempt / ATTEMPTS)
+            wrong = rows[np.abs(self._gaps(rows)) > LARGEST / 255.0]
+            if not len(wrong):
                 return
-            rows = self._rows_around(wrong)
-            index, weights = (np.hstack([*each[:, rows]]) for each in (self._index, self._weights))
-            inputs = [array_on(CPU, index, wp.int32), array_on(CPU, weights, wp.float32), self._srgb]
+            chosen, rows = self._around(wrong)
+            touched, _, component, _ = self._linked(chosen)
+            order = np.argsort(component, kind="stable")
+            starts = np.flatnonzero(np.diff(component[order], prepend=-1))
+            bounds = np.append(starts, len(chosen))
+            inputs = [array_on(CPU, each, wp.int32) for each in (bounds, chosen[order])]
+            inputs += [self._points[0], self._weights32, self._srgb]
             inputs += [SWEEPS, SETTLED / 255.0, LARGEST / 255.0]
-            states = self.levels, self._decoded(self.levels)
+            states = self._levels, self._light
             levels, light = (array_on(CPU, state, wp.float32) for state in states)
-            counts = len(self.levels), len(rows)
+            counts = len(self._levels), len(chosen)
             changed, seen = (wp.zeros(count, dtype=wp.int32, device=CPU) for count in counts)
-            launch(settle, 1, inputs, [levels, light, changed, seen], CPU)
-            self.levels = levels.numpy().astype(np.float64)
+            launch(settle, len(starts), inputs, [levels, light, changed, seen], CPU)
+            self._levels = levels.numpy().astype(np.float64)
+            self._decode(touched)
 
-    def _decoded(self, levels: Float64Array) -> Float64Array:
-        return np.asarray(decode_srgb(levels), np.float64) if self._srgb else levels
 
-    def _encoded(self, light: Float64Array) -> Float64Array:
-        return np.asarray(encode_srgb(light), np.float64) if self._srgb else light
+class _System:
+    """Least squares for levels: their changes, and the weighted differences at rows.
 
-    def _slopes(self, levels: Float64Array) -> Float64Array:
-        """Return the derivative of light by levels."""
-        if not self._srgb:
-            return np.ones(levels.shape)
-        return np.where(levels <= 0.04045, 1.0 / 12.92, 2.4 / 1.055 * ((levels + 0.055) / 1.055) ** 1.4)
+    Parameters
+    ----------
+    first : float64[n]
+        The levels of the texels.
+    columns : int32[k, 8]
+        The levels that are mixed at each row.
+    chosen : bool[k]
+        True for the rows that take part from the first.
+
+    Attributes
+    ----------
+    slopes : float64[k, 8]
+        Derivatives of the differences by the levels.
+    """
+
+    def __init__(self, first: Float64Array, columns: Int32Array, chosen: BoolArray) -> None:
+        self._first, self._columns, self._chosen = first, columns, chosen
+        self._held, self._aims = np.ones(len(first)), first.copy()
+        self._force = np.full(len(columns), FIRST_WEIGHT)
+        self.slopes: Float64Array = np.empty(columns.shape)
+
+    def strengthen(self, off: Float64Array) -> None:
+        """Give more weight to rows that differ; ``off`` are their differences beside that aimed at."""
+        self._chosen |= off > 1.0
+        grown = np.minimum(self._force * np.clip(off, 1.0, MAX_GROWTH), MAX_WEIGHT)
+        self._force = np.where(off > 1.0, grown, self._force)
+
+    def move(self, rows: slice, own: slice, gaps: Float64Array, levels: Float64Array) -> None:
+        """Change the levels ``own``, which no row but some mixes, by a step."""
+        of = rows.start + np.flatnonzero(self._chosen[rows])
+        ends, columns = np.arange(0, 8 * len(of) + 1, 8), (self._columns[of] - own.start).reshape(-1)
+        slopes, before, first = self.slopes[of], levels[own], self._first[own]
+        held, aims = self._held[own], self._aims[own]
+        weights = slopes * self._force[of, None] ** 2
+        change = csr_array((slopes.reshape(-1), columns, ends), (len(of), len(before)))
+        weighted = csc_array((weights.reshape(-1), columns, ends), (len(before), len(of))).tocsr()
+        matrix = (weighted @ change + diags_array(held)).tocsc()
+        solution = _solved(matrix, held * aims + weighted @ (change @ before - gaps[of]))
+        outside = (solution < 0.0) | (solution > 1.0)
+        self._held[own] = held = np.where(outside, BOUND_WEIGHT, 1.0 + (held - 1.0) * BOUND_DECAY)
+        self._aims[own] = np.where(outside, np.clip(solution, 0.0, 1.0), np.where(held > 1.5, aims, first))
+        step = np.clip(solution - before, -MAX_CHANGE, MAX_CHANGE)
+        levels[own] = np.clip(before + step, 0.0, 1.0)
 
 
 def _solved(matrix: csc_array, right: Float64Array) -> Float64Array:

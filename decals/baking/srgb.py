@@ -32,3 +32,32 @@ def decoded_slope(level: wp.float32) -> wp.float32:
     if level > 0.04045:
         return 2.4 / 1.055 * wp.pow((level + 0.055) / 1.055, 1.4)
     return wp.float32(1.0 / 12.92)
+
+
+LINEAR_LEVEL, LINEAR_LIGHT = wp.constant(wp.float64(0.04045)), wp.constant(wp.float64(0.0031308))
+SLOPE, SCALE, OFFSET = (wp.constant(wp.float64(value)) for value in (12.92, 1.055, 0.055))
+POWER = wp.constant(wp.float64(2.4))
+
+
+@wp.func
+def decoded64(level: wp.float64) -> wp.float64:
+    """Return what `decoded` returns, in double precision."""
+    if level > LINEAR_LEVEL:
+        return wp.pow((level + OFFSET) / SCALE, POWER)
+    return level / SLOPE
+
+
+@wp.func
+def encoded64(light: wp.float64) -> wp.float64:
+    """Return what `encoded` returns, in double precision."""
+    if light > LINEAR_LIGHT:
+        return SCALE * wp.pow(light, wp.float64(1.0) / POWER) - OFFSET
+    return SLOPE * light
+
+
+@wp.func
+def decoded_slope64(level: wp.float64) -> wp.float64:
+    """Return what `decoded_slope` returns, in double precision."""
+    if level > LINEAR_LEVEL:
+        return POWER / SCALE * wp.pow((level + OFFSET) / SCALE, POWER - wp.float64(1.0))
+    return wp.float64(1.0) / SLOPE

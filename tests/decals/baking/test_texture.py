@@ -194,6 +194,26 @@ def test_random_texels_along_a_seam_come_to_agree_and_no_others_change(seed: int
     assert len(used) < 0.2 * SIZE**2
 
 
+def test_channels_and_parts_of_seams_are_matched_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows without common texels are solved in parts, of all channels together."""
+    rng = np.random.default_rng(8)
+    before = rng.integers(0, 256, (3, SIZE, SIZE, 3)).astype(np.uint8)
+    places = np.concatenate([seams(seed)[0] for seed in range(3)])
+    tiles = np.repeat(np.arange(3), len(places) // 3)[:, None] * np.ones(2, np.int64)
+    smooth = rng.uniform(size=(len(places), 3)) > 0.1
+    srgb = [True, False, True]
+    together, alone = before.copy(), before.copy()
+    for channel in range(3):
+        own = slice(channel, channel + 1)
+        image = alone[..., own].copy()
+        match_seams(image, places, tiles, smooth[:, own], srgb[own], lambda _: None)
+        alone[..., own] = image
+    monkeypatch.setattr("decals.baking.seams.PART_ROWS", 16)
+    match_seams(together, places, tiles, smooth, srgb, lambda _: None)
+    assert (together != before).any(axis=(1, 2)).all()
+    assert np.array_equal(together, alone)
+
+
 def test_points_at_which_the_surface_has_a_step_keep_it() -> None:
     places, before = seams(1)
     image = before.astype(np.uint8)
