@@ -11,9 +11,13 @@ import numpy as np
 
 from blobtree._typing import Float64Array, Int32Array, Int64Array
 from decals.baking.seams import Seams, bilinear_texels
+from decals.sorting import stable_order
 
 FINENESS = 1 << 10
 """Steps into which the square of a texel's width is divided."""
+
+MAX_SQUARE = 4
+"""Squares of distances from the middles of texels are below this; the four around a place are within 2."""
 
 
 class Beyond(NamedTuple):
@@ -44,14 +48,14 @@ class Beyond(NamedTuple):
         for side in (0, 1):
             own = np.flatnonzero((seams.meshes[rows] == number) & (seams.tiles[rows, side] == tile))
             at = places[own, side]
-            texels, _ = bilinear_texels(at, np.zeros(len(own), np.int64), size)
+            texels = bilinear_texels(at, np.zeros(len(own), np.int64), size)
             columns, lines = texels % size + 0.5 - at[:, :1], texels // size + 0.5 - at[:, 1:]
-            away = np.minimum((columns**2 + lines**2) * FINENESS, FINENESS**2 - 1)
-            keys = texels * FINENESS**2 + away.astype(np.int64)
+            away = np.minimum((columns**2 + lines**2) * FINENESS, FINENESS * MAX_SQUARE - 1)
+            keys = texels * (FINENESS * MAX_SQUARE) + away.astype(np.int64)
             found.append((keys.reshape(-1), np.repeat(2 * rows[own] + side, texels.shape[1])))
         keys, edges = (np.concatenate(each) for each in zip(*found, strict=True))
-        order = np.argsort(keys, kind="stable")
-        texels = keys[order] // FINENESS**2
+        order = stable_order(keys)
+        texels = keys[order] // (FINENESS * MAX_SQUARE)
         first = np.flatnonzero(np.diff(texels, prepend=-1))
         edge, here = np.divmod(edges[order[first]], 2)
         corners = seams.corners

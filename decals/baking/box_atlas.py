@@ -9,6 +9,7 @@ from blobtree._typing import Float64Array, Int64Array
 from decals.baking.meshes import BakeMesh
 from decals.baking.packing import pack
 from decals.baking.unwrapped import Unwrapped
+from decals.sorting import groups, stable_order
 from decals.surfaces.topology import components, edge_twins, welded
 
 AXES = np.array([sign * row for sign in (1.0, -1.0) for row in np.eye(3)])
@@ -131,11 +132,11 @@ def _charts(mesh: BakeMesh, group: Int64Array, tick: Callable[[], None]) -> _Cha
     label = group * len(AXES) + axis
     face, side = np.nonzero((neighbors >= 0) & (label[neighbors] == label[:, None]))
     links = np.stack([face, neighbors[face, side]], axis=1)
-    chart = np.unique(components(links, len(faces)), return_inverse=True)[1].reshape(-1)
+    chart = components(links, len(faces))
     tick()
-    keys = chart[:, None] * len(mesh.vertices) + faces
-    used, copies = np.unique(keys, return_inverse=True)
-    rows, chart_of_row = used % len(mesh.vertices), used // len(mesh.vertices)
+    keys = (chart[:, None] * len(mesh.vertices) + faces).reshape(-1)
+    first, copies, _ = groups(keys)
+    chart_of_row, rows = np.divmod(keys[first], len(mesh.vertices))
     tick()
     axis_of_chart = np.zeros(int(chart.max()) + 1, np.int64)
     axis_of_chart[chart] = axis
@@ -172,7 +173,7 @@ def _projected(points: Float64Array, axis: Int64Array) -> Float64Array:
 
 def _turned(places: Float64Array, chart: Int64Array) -> tuple[Float64Array, Float64Array]:
     """Return places from the corners of the smallest rectangles around charts, and these rectangles."""
-    order = np.argsort(chart, kind="stable")
+    order = stable_order(chart)
     starts = np.flatnonzero(np.diff(chart[order], prepend=-1))
     best = np.full(len(starts), np.inf)
     turned, low, sides = places.copy(), np.zeros((len(starts), 2)), np.zeros((len(starts), 2))

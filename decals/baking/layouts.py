@@ -66,6 +66,8 @@ def lay_out(
         boxes = _boxes(meshes, size, tiles, report)
         if layout == AUTO:
             choices = [made for made in (_even_own(meshes, size, tiles), boxes) if made is not None]
+            if len(choices) == 1:
+                return choices[0]
             if choices:
                 return min(choices, key=lambda made: Seams.of(meshes, made).length)
         elif boxes is None:

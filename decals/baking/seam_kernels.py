@@ -57,6 +57,7 @@ def decode_listed(
 def linearize(
     first: wp.int32,
     rows: wp.array(dtype=wp.int32),
+    run_of: wp.array(dtype=wp.int32),
     index: wp.array2d(dtype=wp.int32),
     weights: wp.array2d(dtype=wp.float64),
     srgb: wp.array(dtype=wp.uint8),
@@ -69,10 +70,11 @@ def linearize(
     i = first + wp.tid()
     channels = srgb.shape[0]
     point = rows[i] / channels
+    run = run_of[point]
     channel = rows[i] % channels
     mixed = wp.vec2d()
     for k in range(8):
-        mixed[k / 4] += weights[point, k] * light[index[point, k] * channels + channel]
+        mixed[k / 4] += weights[point, k] * light[index[run, k] * channels + channel]
     gamma = srgb[channel] != wp.uint8(0)
     if gamma:
         for side in range(2):
@@ -82,7 +84,7 @@ def linearize(
         for k in range(8):
             value = weights[point, k]
             if gamma:
-                level = levels[index[point, k] * channels + channel]
+                level = levels[index[run, k] * channels + channel]
                 value = value * decoded_slope64(level) / decoded_slope64(mixed[k / 4])
             if k >= 4:
                 value = -value
@@ -126,6 +128,7 @@ def settle(
     first: wp.int32,
     bounds: wp.array(dtype=wp.int32),
     rows: wp.array(dtype=wp.int32),
+    run_of: wp.array(dtype=wp.int32),
     index: wp.array2d(dtype=wp.int32),
     weights: wp.array2d(dtype=wp.float32),
     kinds: wp.array(dtype=wp.uint8),
@@ -156,17 +159,17 @@ def settle(
             i = begin + at
             if sweep % 2 == 1:
                 i = begin + count - 1 - at
-            point = rows[i] / channels
+            run = run_of[rows[i] / channels]
             newest = wp.int32(-1)
             for k in range(8):
-                newest = wp.max(newest, changed[index[point, k] * channels + channel])
+                newest = wp.max(newest, changed[index[run, k] * channels + channel])
             if newest >= seen[i]:
                 seen[i] = sweep
                 mixed = wp.float32(0.0)
                 other = wp.float32(0.0)
                 for k in range(4):
-                    mixed += weights[point, k] * light[index[point, k] * channels + channel]
-                    other += weights[point, k + 4] * light[index[point, k + 4] * channels + channel]
+                    mixed += weights[i, k] * light[index[run, k] * channels + channel]
+                    other += weights[i, k + 4] * light[index[run, k + 4] * channels + channel]
                 mixed = level_of(mixed, srgb)
                 other = level_of(other, srgb)
                 gap = mixed - other
@@ -174,8 +177,8 @@ def settle(
                     slopes = wp.vector(length=8, dtype=wp.float32)
                     power = wp.float32(0.0)
                     for k in range(8):
-                        level = levels[index[point, k] * channels + channel]
-                        slopes[k] = weights[point, k] * slope(level, srgb)
+                        level = levels[index[run, k] * channels + channel]
+                        slopes[k] = weights[i, k] * slope(level, srgb)
                         if k < 4:
                             slopes[k] = slopes[k] / slope(mixed, srgb)
                         else:
@@ -187,7 +190,7 @@ def settle(
                         updates += 1
                         step = (gap - wp.clamp(gap, -aim, aim)) / power
                         for k in range(8):
-                            texel = index[point, k] * channels + channel
+                            texel = index[run, k] * channels + channel
                             level = wp.clamp(levels[texel] - step * slopes[k], 0.0, 1.0)
                             if level != levels[texel]:
                                 levels[texel] = level

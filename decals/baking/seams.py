@@ -8,6 +8,7 @@ so that the colours on both sides agree, and as little as that takes.
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import warp as wp
@@ -20,6 +21,7 @@ from blobtree.device import array_on, launch
 from decals.baking.meshes import BakeMesh
 from decals.baking.seam_kernels import decode_listed, linearize, mark_levels, mark_runs, settle
 from decals.baking.unwrapped import Unwrapped
+from decals.sorting import distinct_numbers, groups, stable_order
 from decals.surfaces.topology import welded
 
 CPU = "cpu"
@@ -125,7 +127,7 @@ def _cut_edges(
     turned = points[:, 0] > points[:, 1]
     sides[turned], points[turned] = sides[turned][:, ::-1], points[turned][:, ::-1]
     keys = points @ [len(mesh.vertices), 1]
-    order = np.argsort(keys, kind="stable")
+    order = stable_order(keys)
     first = np.flatnonzero(
         (keys[order][1:] == keys[order][:-1]) & (points[order][1:, 0] != points[order][1:, 1])
     )
@@ -140,81 +142,91 @@ def _cut_edges(
     return faces[cut], tiles[cut], ends[cut], each, np.linalg.norm(b - a, axis=1)
 
 
-def bilinear_texels(places: Float64Array, tiles: Int64Array, size: int) -> tuple[Int64Array, Float64Array]:
-    """Return the four texels that are mixed at places, ``int64[n, 4]``, and their weights."""
+def bilinear_texels(places: Float64Array, tiles: Int64Array, size: int) -> Int64Array:
+    """Return the four texels that are mixed at places, ``int64[n, 4]``."""
     corner = np.floor(places - 0.5)
-    share = places - 0.5 - corner
     columns = np.clip(corner[:, :1] + [0, 1, 0, 1], 0, size - 1).astype(np.int64)
     rows = np.clip(corner[:, 1:] + [0, 0, 1, 1], 0, size - 1).astype(np.int64)
-    along = np.stack([1.0 - share[:, 0], share[:, 0]], axis=1)[:, [0, 1, 0, 1]]
-    down = np.stack([1.0 - share[:, 1], share[:, 1]], axis=1)[:, [0, 0, 1, 1]]
-    return (tiles[:, None] * size + rows) * size + columns, along * down
+    return (tiles[:, None] * size + rows) * size + columns
+
+
+def _bilinear_weights(places: Float64Array) -> Float64Array:
+    """Return the weights of these texels, ``float64[n, 4]``."""
+    x, y = (places - 0.5 - np.floor(places - 0.5)).T
+    return np.stack([(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y], axis=1)
+
+
+class Mixed(NamedTuple):
+    """The texels that programs mix at points of seams. Points in turn whose texels are the same are a run.
+
+    Attributes
+    ----------
+    texels : int64[k]
+        Indices into all textures, in order.
+    starts : int64[r]
+        The first point of each run.
+    index : int32[r, 8]
+        Rows of ``texels`` at each run: four on each side.
+    weights : float64[n, 8]
+        Their weights at each point.
+    """
+
+    texels: Int64Array
+    starts: Int64Array
+    index: Int32Array
+    weights: Float64Array
+
+    @classmethod
+    def of(cls, places: Float64Array, tiles: Int64Array, size: int) -> "Mixed":
+        """Return the texels of points at places ``float64[n, 2, 2]`` on textures ``int64[n, 2]``."""
+        keys = np.concatenate([np.floor(places - 0.5).reshape(-1, 4), tiles], axis=1)
+        starts = np.flatnonzero(np.append(True, (keys[1:] != keys[:-1]).any(axis=1)))
+        first = places[starts], tiles[starts]
+        index = np.hstack([bilinear_texels(*(of[:, side] for of in first), size) for side in (0, 1)])
+        rows, number, _ = groups(index.reshape(-1))
+        weights = np.hstack([_bilinear_weights(places[:, side]) for side in (0, 1)])
+        return cls(index.reshape(-1)[rows], starts, number.reshape(index.shape).astype(np.int32), weights)
 
 
 def match_seams(
-    image: UInt8Array,
-    places: Float64Array,
-    tiles: Int64Array,
+    texels: UInt8Array,
+    mixed: Mixed,
     smooth: BoolArray,
     srgb: Sequence[bool],
     report: Callable[[float], None],
-) -> Int64Array:
-    """Change the texels along seams so that both sides agree.
+) -> UInt8Array:
+    """Return texels along seams whose two sides agree.
 
     Parameters
     ----------
-    image : uint8[tiles, size, size, channels]
-        The textures, which are changed.
-    places : float64[n, 2, 2]
-        Points of seams, on both sides.
-    tiles : int64[n, 2]
-        Their textures.
+    texels : uint8[k, channels]
+        The texels of ``mixed`` as they are.
+    mixed : Mixed
+        Points of the seams.
     smooth : bool[n, channels]
         True where the surface itself has no step.
     srgb : sequence of bool
         True for channels that hold sRGB, which programs decode before they mix texels.
     report : callable
         Called often with the fraction done.
-
-    Returns
-    -------
-    int64[k]
-        The texels that are mixed along seams, as indices into all textures.
     """
-    size, channels = image.shape[1], image.shape[3]
-    texels = image.reshape(-1, channels)
-    found = [bilinear_texels(places[:, side], tiles[:, side], size) for side in (0, 1)]
-    index, weights = (np.concatenate(each, axis=1) for each in zip(*found, strict=True))
-    used = _distinct(index, len(texels))
-    number = np.empty(len(texels), np.int32)
-    number[used] = np.arange(len(used))
     report(0.0)
-    work = _Match(texels[used], number[index], weights, smooth, srgb, report)
-    texels[used] = np.rint(255.0 * work.solved()).astype(np.uint8)
-    return used
-
-
-def _distinct(numbers: Int64Array, count: int) -> Int64Array:
-    """Return the distinct ones of numbers below a count, in order."""
-    marked = np.zeros(count, np.bool_)
-    marked[numbers.reshape(-1)] = True
-    return np.flatnonzero(marked)
+    levels = _Match(texels, mixed, smooth, srgb, report).solved()
+    matched: UInt8Array = np.rint(255.0 * levels).astype(np.uint8)
+    return matched
 
 
 class _Match:
     """Levels of texels, from 0 to 1, that become alike on both sides of seams, each channel by itself.
 
-    A row is a point and a channel, ``point * channels + channel``; a level is a texel and a channel. Points
-    in turn whose texels are the same are a run.
+    A row is a point and a channel, ``point * channels + channel``; a level is a texel and a channel.
 
     Parameters
     ----------
     texels : uint8[n, channels]
         The texels.
-    index : int32[m, 8]
-        The texels that are mixed at points of seams: four on each side.
-    weights : float64[m, 8]
-        Their weights.
+    mixed : Mixed
+        Points of the seams.
     smooth : bool[m, channels]
         True for the rows that are matched.
     srgb : sequence of bool
@@ -226,23 +238,21 @@ class _Match:
     def __init__(
         self,
         texels: UInt8Array,
-        index: Int32Array,
-        weights: Float64Array,
+        mixed: Mixed,
         smooth: BoolArray,
         srgb: Sequence[bool],
         report: Callable[[float], None],
     ) -> None:
         self._shape, self._channels, self._report = texels.shape, len(srgb), report
         self._first = (texels / 255.0).reshape(-1)
-        self._smooth, self._index = smooth, index
-        starts = np.flatnonzero(np.append(True, (index[1:] != index[:-1]).any(axis=1)))
-        self._starts, self._ends = starts, np.append(starts[1:], len(index))
+        self._smooth, self._index = smooth, mixed.index
+        self._starts = starts = mixed.starts
+        self._ends = np.append(starts[1:], len(smooth))
         self._run_of = np.repeat(np.arange(len(starts)), self._ends - starts)
-        self._run_index = index[starts]
         self._valid = np.logical_or.reduceat(smooth, starts, axis=0).reshape(-1).view(np.uint8)
         self._srgb = array_on(CPU, np.asarray(srgb), wp.uint8)
-        self._points = [array_on(CPU, index, wp.int32), array_on(CPU, weights, wp.float64), self._srgb]
-        self._weights32 = array_on(CPU, weights, wp.float32)
+        self._runs = [array_on(CPU, each, wp.int32) for each in (self._run_of, mixed.index)]
+        self._weights = mixed.weights
         self._levels, self._light = self._first.copy(), np.empty_like(self._first)
         self._decode(np.arange(len(self._first)))
 
@@ -259,7 +269,12 @@ class _Match:
         """Return the differences of both sides at rows, and write their derivatives, ``float64[k, 8]``."""
         gaps = np.empty(len(rows))
         known = np.empty((0, 8)) if slopes is None else slopes
-        inputs = [array_on(CPU, rows, wp.int32), *self._points]
+        inputs = [
+            array_on(CPU, rows, wp.int32),
+            *self._runs,
+            array_on(CPU, self._weights, wp.float64),
+            self._srgb,
+        ]
         states = [array_on(CPU, state, wp.float64) for state in (self._levels, self._light)]
         outputs = [array_on(CPU, values, wp.float64) for values in (gaps, known)]
         launch(linearize, len(rows), [*inputs, *states], outputs, CPU)
@@ -274,7 +289,7 @@ class _Match:
         """Return some rows with those in `RINGS` rings around them, and with one ring more."""
         chosen = np.zeros(len(self._valid), np.uint8)
         chosen[self._run_of[wrong // self._channels] * self._channels + wrong % self._channels] = 1
-        index, valid = array_on(CPU, self._run_index, wp.int32), array_on(CPU, self._valid, wp.uint8)
+        index, valid = self._runs[1], array_on(CPU, self._valid, wp.uint8)
         marks = array_on(CPU, np.zeros(len(self._first), np.uint8), wp.uint8)
         runs = array_on(CPU, chosen, wp.uint8)
         found = []
@@ -298,15 +313,15 @@ class _Match:
     def _levels_of(self, rows: Int64Array) -> Int64Array:
         """Return the levels that are mixed at rows, ``int64[k, 8]``."""
         point, channel = np.divmod(rows, self._channels)
-        return self._index[point] * np.int64(self._channels) + channel[:, None]
+        return self._index[self._run_of[point]] * np.int64(self._channels) + channel[:, None]
 
-    def _linked(self, rows: Int64Array) -> tuple[Int64Array, Int64Array, Int32Array, Int32Array]:
+    def _linked(self, rows: Int64Array) -> tuple[Int64Array, Int32Array, Int64Array, Int64Array]:
         """Return the levels of rows, their columns there, and the components of rows and levels.
 
         Rows with a common level are in one component. Its number is larger in a later channel.
         """
         listed = self._levels_of(rows)
-        used = _distinct(listed, len(self._first))
+        used = distinct_numbers(listed, len(self._first))
         number = np.empty(len(self._first), np.int32)
         number[used] = np.arange(len(used))
         columns = number[listed]
@@ -324,7 +339,7 @@ class _Match:
         """Minimise the change of texels and the weighted differences, with more weight where these stay."""
         number = (np.cumsum(self._smooth, axis=0) - 1).reshape(-1)
         used, columns, of_row, of_level = self._linked(rows)
-        order, ranked = (np.argsort(of, kind="stable") for of in (of_row, of_level))
+        order, ranked = (stable_order(of) for of in (of_row, of_level))
         place = np.empty(len(used), np.int32)
         place[ranked] = np.arange(len(used))
         rows, used = rows[order], used[ranked]
@@ -370,11 +385,15 @@ class _Match:
                 return
             chosen, rows = self._around(wrong)
             touched, _, component, _ = self._linked(chosen)
-            order = np.argsort(component, kind="stable")
+            order = stable_order(component)
             starts = np.flatnonzero(np.diff(component[order], prepend=-1))
             bounds = np.append(starts, len(chosen))
             inputs = [array_on(CPU, each, wp.int32) for each in (bounds, chosen[order])]
-            inputs += [self._points[0], self._weights32, self._srgb]
+            inputs += [
+                *self._runs,
+                array_on(CPU, self._weights[chosen[order] // self._channels], wp.float32),
+                self._srgb,
+            ]
             inputs += [SWEEPS, SETTLED / 255.0, LARGEST / 255.0]
             states = self._levels, self._light
             levels, light = (array_on(CPU, state, wp.float32) for state in states)

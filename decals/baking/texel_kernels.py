@@ -372,9 +372,33 @@ def fill_own(first: wp.int32, own: wp.array(dtype=wp.uint8), filled: wp.array(dt
 
 
 @wp.kernel
-def fill_listed(first: wp.int32, texels: wp.array(dtype=wp.int32), filled: wp.array(dtype=wp.uint8)):
-    """Mark some texels as filled."""
-    filled[texels[first + wp.tid()]] = wp.uint8(1)
+def read_listed(
+    first: wp.int32,
+    texels: wp.array(dtype=wp.int32),
+    image: wp.array(dtype=wp.uint8),
+    channels: wp.int32,
+    levels: wp.array(dtype=wp.uint8),
+):
+    """Write the levels of some texels, one after another."""
+    i = first + wp.tid()
+    for channel in range(channels):
+        levels[i * channels + channel] = image[texels[i] * channels + channel]
+
+
+@wp.kernel
+def write_listed(
+    first: wp.int32,
+    texels: wp.array(dtype=wp.int32),
+    levels: wp.array(dtype=wp.uint8),
+    channels: wp.int32,
+    image: wp.array(dtype=wp.uint8),
+    filled: wp.array(dtype=wp.uint8),
+):
+    """Write the levels of some texels, and mark these as filled."""
+    i = first + wp.tid()
+    filled[texels[i]] = wp.uint8(1)
+    for channel in range(channels):
+        image[texels[i] * channels + channel] = levels[i * channels + channel]
 
 
 @wp.func

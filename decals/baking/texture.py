@@ -22,13 +22,12 @@ from blobtree.device import array_on, known_device, launch
 from blobtree.progress import Progress
 from decals.baking.beyond import Beyond
 from decals.baking.meshes import BakeMesh
-from decals.baking.seams import CPU, Seams, match_seams
+from decals.baking.seams import CPU, Mixed, Seams, match_seams
 from decals.baking.texel_kernels import (
     compensate,
     cover_rows,
     encode_levels,
     fill_gutters,
-    fill_listed,
     fill_own,
     list_marked,
     mark_free,
@@ -38,9 +37,11 @@ from decals.baking.texel_kernels import (
     mean_samples,
     nearest_in_rows,
     points_beyond,
+    read_listed,
     sample_points,
     sum_parts,
     surface_points,
+    write_listed,
     write_texels,
 )
 from decals.baking.unwrapped import Unwrapped
@@ -177,18 +178,20 @@ def bake_texture(
         pages[tile].color(sheet, beyond, samples, partial(_report_part, report, done, len(sheets)))
     for page in pages:
         page.finish(gutter)
-    image = np.stack([page.image() for page in pages])
     if len(seams.faces):
         report("matching seams", 0.0)
         smooth = _smooth_points(seams, rows, places, sheets, channels)
-        changed = match_seams(
-            image, places, seams.tiles[rows], smooth, channels.srgb, partial(report, "matching seams")
+        mixed = Mixed.of(places, seams.tiles[rows], size)
+        bounds = np.searchsorted(mixed.texels, np.arange(tiles + 1) * size**2)
+        own = [slice(*bounds[tile : tile + 2]) for tile in range(tiles)]
+        before = [page.texels(mixed.texels[of] % size**2) for page, of in zip(pages, own, strict=True)]
+        matched = match_seams(
+            np.concatenate(before), mixed, smooth, channels.srgb, partial(report, "matching seams")
         )
-        for tile, page in enumerate(pages):
-            page.replace(image[tile], changed[changed // size**2 == tile] % size**2)
+        for page, of in zip(pages, own, strict=True):
+            page.replace(mixed.texels[of] % size**2, matched[of])
             page.finish(gutter)
-            image[tile] = page.image()
-    return image
+    return np.stack([page.image() for page in pages])
 
 
 def _report_part(report: Progress, done: int, count: int, share: float) -> None:
@@ -207,14 +210,15 @@ def _smooth_points(
         (side, own, sheet, sheet.surface(seams.faces[rows[own], side], places[own, side]))
         for side in (0, 1)
         for (tile, number), sheet in sheets.items()
-        for own in [np.flatnonzero((seams.tiles[rows, side] == tile) & (seams.meshes[rows] == number))]
+        for own in [np.flatnonzero(((seams.tiles[:, side] == tile) & (seams.meshes == number))[rows])]
     ]
     points, units = np.zeros((2, 2, len(rows), 3), np.float32)
     for side, own, _, at in parts:
         points[side, own], units[side, own] = at.points.numpy(), at.units.numpy()
     # at one point with one normal, rounding may not decide on which side of a rim it is
     alike = np.einsum("na,na->n", *units) > ALIKE
-    points[1, alike], units[1, alike] = points[0, alike], units[0, alike]
+    for values in (points, units):
+        values[1] = np.where(alike[:, None], values[0], values[1])
     levels = np.zeros((2, len(rows), channels.count), np.int16)
     for side, own, sheet, at in parts:
         device = sheet.device
@@ -428,11 +432,21 @@ class _Page:
         texels: UInt8Array = self._image.numpy()
         return texels.reshape(self._size, self._size, -1)
 
-    def replace(self, image: UInt8Array, texels: Int64Array) -> None:
-        """Take another image, of which some texels keep their colours when gutters are filled."""
-        self._image.assign(image.reshape(-1))
-        listed = array_on(self._device, texels, wp.int32)
-        launch(fill_listed, len(texels), [listed], [self._filled], self._device)
+    def texels(self, listed: Int64Array) -> UInt8Array:
+        """Return some texels, ``uint8[n, channels]``."""
+        levels = self._zeros(len(listed) * self._channels.count, wp.uint8)
+        inputs = [array_on(self._device, listed, wp.int32), self._image, self._channels.count]
+        launch(read_listed, len(listed), inputs, [levels], self._device)
+        values: UInt8Array = levels.numpy()
+        return values.reshape(-1, self._channels.count)
+
+    def replace(self, listed: Int64Array, levels: UInt8Array) -> None:
+        """Give some texels other colours, which they keep when gutters are filled."""
+        inputs = [
+            array_on(self._device, *each) for each in ((listed, wp.int32), (levels.reshape(-1), wp.uint8))
+        ]
+        outputs = [self._image, self._filled]
+        launch(write_listed, len(listed), [*inputs, self._channels.count], outputs, self._device)
 
     def color(self, sheet: Sheet, beyond: Beyond, samples: int, report: Callable[[float], None]) -> None:
         """Colour the texels of the charts of a mesh."""

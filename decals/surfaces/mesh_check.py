@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, Int64Array
+from decals.sorting import distinct_numbers, stable_order
 from decals.surfaces.topology import components, first_copies, parts_of, welded
 from decals.surfaces.windings import Triangles
 
@@ -126,7 +127,7 @@ def check_mesh(vertices: NDArray[np.floating], faces: NDArray[np.integer], name:
     open_parts[groups[edges.border_faces]] = True
     return MeshCheck(
         name=name,
-        vertices=len(np.unique(corners)),
+        vertices=len(distinct_numbers(corners, len(points))),
         faces=len(faces),
         parts=len(by_part),
         borders=len(edges.border_faces),
@@ -155,8 +156,10 @@ class _Edges:
         forward = starts < ends
         size = int(corners.max(initial=0)) + 1
         keys = np.minimum(starts, ends) * size + np.maximum(starts, ends)
-        order = np.argsort(keys, kind="stable")
-        _, first, counts = np.unique(keys[order], return_index=True, return_counts=True)
+        order = stable_order(keys)
+        ordered = keys[order]
+        first = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1])[: len(keys)])
+        counts = np.diff(np.append(first, len(keys)))
         self.border_faces: Int64Array = order[first[counts == 1]] // 3
         self.branching = int((counts > 2).sum())
         pairs = first[counts == 2]
@@ -171,10 +174,9 @@ class _Edges:
         links = [_joined_corners(corners, self._one, self._other)]
         links += [_joined_corners(corners, fan[:-1], fan[1:]) for fan in self._fans]
         fans = components(np.concatenate(links), corners.size)
-        vertices, numbers = corners.reshape(-1), fans
-        pairs = np.unique(vertices * (int(numbers.max(initial=0)) + 1) + numbers)
-        own = pairs // (int(numbers.max(initial=0)) + 1)
-        return int((np.bincount(own) > 1).sum()) if len(own) else 0
+        vertices = np.empty(int(fans.max(initial=-1)) + 1, np.int64)
+        vertices[fans] = corners.reshape(-1)  # all corners of a fan are one vertex
+        return int((np.bincount(vertices) > 1).sum())
 
 
 def _joined_corners(corners: Int64Array, sides: Int64Array, others: Int64Array) -> Int64Array:

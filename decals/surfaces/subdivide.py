@@ -6,6 +6,7 @@ import numpy as np
 
 from blobtree._typing import BoolArray, Float64Array, Int64Array
 from decals.errors import InvalidMesh
+from decals.sorting import groups
 
 MAX_FACES = 10_000_000
 """Most triangles of a subdivided mesh."""
@@ -74,7 +75,7 @@ def subdivided(
     while True:
         ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
         ends.sort(axis=1)
-        _, first, edge_of = np.unique(ends @ [len(rows), 1], return_index=True, return_inverse=True)
+        first, edge_of, _ = groups(ends @ [len(rows), 1])
         edges = ends[first]
         halved = is_long(rows[edges[:, 0], :3], rows[edges[:, 1], :3])
         if not halved.any():

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
+from decals.sorting import distinct_numbers, groups, stable_order
 
 
 def welded(vertices: Float32Array) -> Int64Array:
@@ -75,9 +76,10 @@ def first_copies(corners: NDArray[np.integer]) -> Int64Array:
     """Return for each face the first face with the same corners and winding, ``int64[m]``."""
     lowest = corners.argmin(axis=1)
     turned = np.take_along_axis(corners, (lowest[:, None] + np.arange(3)) % 3, axis=1)
-    _, first, which = np.unique(turned, axis=0, return_index=True, return_inverse=True)
-    same: Int64Array = first[which.reshape(-1)]
-    return same
+    size = int(turned.max(initial=0)) + 1
+    _, pair, _ = groups(turned[:, 0] * np.int64(size) + turned[:, 1])
+    first, which, _ = groups(pair * size + turned[:, 2])
+    return first[which]
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +137,8 @@ def _one_sided(edges: SharedEdges, turned: BoolArray, parts: Int64Array) -> Bool
 def parts_of(corners: Int64Array) -> Int64Array:
     """Return the number of the connected part of each face; parts share no vertex, ``int64[m]``."""
     links = np.concatenate([corners[:, :2], corners[:, 1:]])
-    return np.unique(components(links, int(corners.max()) + 1)[corners[:, 0]], return_inverse=True)[1]
+    labels = components(links, int(corners.max()) + 1)[corners[:, 0]]
+    return _numbered(labels, distinct_numbers(labels, int(labels.max()) + 1))
 
 
 def components(links: Int64Array, count: int) -> Int64Array:
@@ -153,7 +156,14 @@ def components(links: Int64Array, count: int) -> Int64Array:
         labels[np.maximum(first, second)] = np.minimum(first, second)
         while not np.array_equal(labels, shorter := labels[labels]):
             labels = shorter
-    return np.unique(labels, return_inverse=True)[1]
+    return _numbered(labels, np.flatnonzero(labels == np.arange(count)))
+
+
+def _numbered(labels: Int64Array, known: Int64Array) -> Int64Array:
+    """Return for each label its row among the known ones."""
+    number = np.empty(int(known.max(initial=-1)) + 1, np.int64)
+    number[known] = np.arange(len(known))
+    return number[labels]
 
 
 def _turned(edges: SharedEdges, count: int) -> BoolArray:
@@ -188,11 +198,14 @@ def edge_twins(corners: Int64Array) -> Int32Array:
     """
     starts, ends = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
     size = int(corners.max(initial=0)) + 1
-    keys, twins = starts * size + ends, ends * size + starts
-    order = np.argsort(keys, kind="stable")
-    first = np.searchsorted(keys, twins, sorter=order)
-    found = np.searchsorted(keys, twins, side="right", sorter=order) - first
-    alone = np.searchsorted(keys, keys, side="right", sorter=order)
-    alone -= np.searchsorted(keys, keys, sorter=order)
-    result = order[np.minimum(first, len(keys) - 1)]
-    return np.where((found == 1) & (alone == 1), result, -1).astype(np.int32)
+    keys = np.minimum(starts, ends) * size + np.maximum(starts, ends)
+    order = stable_order(keys)
+    ordered = keys[order]
+    first = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1])[: len(keys)])
+    pairs = first[np.diff(np.append(first, len(keys))) == 2]
+    one, other = order[pairs], order[pairs + 1]
+    against = (starts[one] == ends[other]) & (starts[one] != ends[one])
+    one, other = one[against], other[against]
+    twins = np.full(len(keys), -1, np.int32)
+    twins[one], twins[other] = other, one
+    return twins

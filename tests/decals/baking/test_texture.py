@@ -10,7 +10,7 @@ from scipy.ndimage import distance_transform_edt
 
 import decals
 from decals.baking.meshes import BakeMesh
-from decals.baking.seams import match_seams
+from decals.baking.seams import Mixed, match_seams
 from decals.baking.texture import Channels, bake_texture
 from decals.baking.unwrapped import Unwrapped
 from decals.field.evaluate import ColorEvaluator
@@ -173,6 +173,16 @@ def seams(seed: int, count: int = 40) -> tuple[Array, Array]:
     return ends[:, 0] * (1 - share) + ends[:, 1] * share, rng.integers(0, 256, (1, SIZE, SIZE, 1))
 
 
+def match(
+    image: Array, places: Array, tiles: Array, smooth: Array, srgb: list[bool], report: Any = lambda _: None
+) -> Array:
+    """Change the texels of images along seams, and return the numbers of these."""
+    mixed = Mixed.of(places, tiles, SIZE)
+    texels = image.reshape(-1, len(srgb))
+    texels[mixed.texels] = match_seams(texels[mixed.texels], mixed, smooth, srgb, report)
+    return mixed.texels
+
+
 @pytest.mark.parametrize("srgb", [True, False])
 @pytest.mark.parametrize("seed", range(6))
 def test_random_texels_along_a_seam_come_to_agree_and_no_others_change(seed: int, srgb: bool) -> None:
@@ -180,7 +190,7 @@ def test_random_texels_along_a_seam_come_to_agree_and_no_others_change(seed: int
     places, before = seams(seed)
     image = before.astype(np.uint8)
     tiles = np.zeros((len(places), 2), np.int64)
-    used = match_seams(image, places, tiles, np.ones((len(places), 1), bool), [srgb], lambda _: None)
+    used = match(image, places, tiles, np.ones((len(places), 1), bool), [srgb])
     decode, encode = (linear, srgb_levels) if srgb else (np.asarray, np.asarray)
     levels = []
     for side in (0, 1):
@@ -206,10 +216,10 @@ def test_channels_and_parts_of_seams_are_matched_each_by_itself(monkeypatch: pyt
     for channel in range(3):
         own = slice(channel, channel + 1)
         image = alone[..., own].copy()
-        match_seams(image, places, tiles, smooth[:, own], srgb[own], lambda _: None)
+        match(image, places, tiles, smooth[:, own], srgb[own])
         alone[..., own] = image
     monkeypatch.setattr("decals.baking.seams.PART_ROWS", 16)
-    match_seams(together, places, tiles, smooth, srgb, lambda _: None)
+    match(together, places, tiles, smooth, srgb)
     assert (together != before).any(axis=(1, 2)).all()
     assert np.array_equal(together, alone)
 
@@ -218,7 +228,7 @@ def test_points_at_which_the_surface_has_a_step_keep_it() -> None:
     places, before = seams(1)
     image = before.astype(np.uint8)
     tiles = np.zeros((len(places), 2), np.int64)
-    match_seams(image, places, tiles, np.zeros((len(places), 1), bool), [True], lambda _: None)
+    match(image, places, tiles, np.zeros((len(places), 1), bool), [True])
     assert np.array_equal(image, before)
 
 
@@ -231,5 +241,5 @@ def test_a_match_of_seams_can_be_cancelled() -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        match_seams(image, places, tiles, np.ones((len(places), 1), bool), [True], report)
+        match(image, places, tiles, np.ones((len(places), 1), bool), [True], report)
     assert np.array_equal(image, before)

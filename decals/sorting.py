@@ -1,0 +1,44 @@
+"""Orders and groups of whole numbers, in a fraction of the time of NumPy's stable sort."""
+
+import numpy as np
+
+from blobtree._typing import Int64Array
+
+
+def stable_order(keys: Int64Array) -> Int64Array:
+    """Return the rows of whole numbers in the order of the numbers; of equal ones the first comes first.
+
+    Number and row are sorted as one number, if they fit into one.
+    """
+    bits = len(keys).bit_length()
+    if len(keys) == 0 or int(keys.min()) < 0 or int(keys.max()) >> (63 - bits):
+        return np.argsort(keys, kind="stable")
+    packed = (keys.astype(np.int64) << bits) | np.arange(len(keys))
+    packed.sort()
+    return packed & ((1 << bits) - 1)
+
+
+def groups(keys: Int64Array) -> tuple[Int64Array, Int64Array, Int64Array]:
+    """Return what `np.unique` returns of whole numbers: first rows, the group of each, and their sizes.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> first, group, counts = groups(np.array([7, 2, 7, 5]))
+    >>> first.tolist(), group.tolist(), counts.tolist()
+    ([1, 3, 0], [2, 0, 2, 1], [1, 1, 2])
+    """
+    order = stable_order(keys)
+    ordered = keys[order]
+    starts = np.flatnonzero(np.append(True, ordered[1:] != ordered[:-1])[: len(keys)])
+    counts = np.diff(np.append(starts, len(keys)))
+    group = np.empty(len(keys), np.int64)
+    group[order] = np.repeat(np.arange(len(starts)), counts)
+    return order[starts], group, counts
+
+
+def distinct_numbers(numbers: Int64Array, count: int) -> Int64Array:
+    """Return the distinct ones of numbers from 0 to below a count, in order."""
+    marked = np.zeros(count, np.bool_)
+    marked[numbers.reshape(-1)] = True
+    return np.flatnonzero(marked)
