@@ -124,14 +124,100 @@ def mark_runs(
 
 
 @wp.kernel
+def find_lowest(
+    first: wp.int32,
+    rows: wp.array(dtype=wp.int32),
+    columns: wp.array2d(dtype=wp.int32),
+    lowest: wp.array(dtype=wp.int32),
+):
+    """Lower ``lowest`` of each level to the lowest one that is mixed with it, for parts of rows."""
+    part = first + wp.tid()
+    for row in range(rows[part], rows[part + 1]):
+        least = columns[row, 0]
+        for k in range(8):
+            least = wp.min(least, columns[row, k])
+        for k in range(8):
+            lowest[columns[row, k]] = wp.min(lowest[columns[row, k]], least)
+
+
+@wp.kernel
+def solve_parts(
+    first: wp.int32,
+    parts: wp.array(dtype=wp.int32),
+    rows: wp.array(dtype=wp.int32),
+    bounds: wp.array(dtype=wp.int32),
+    columns: wp.array2d(dtype=wp.int32),
+    chosen: wp.array(dtype=wp.uint8),
+    force: wp.array(dtype=wp.float64),
+    gaps: wp.array(dtype=wp.float64),
+    slopes: wp.array2d(dtype=wp.float64),
+    lowest: wp.array(dtype=wp.int32),
+    diagonal: wp.array(dtype=wp.int64),
+    held: wp.array(dtype=wp.float64),
+    aims: wp.array(dtype=wp.float64),
+    levels: wp.array(dtype=wp.float64),
+    factors: wp.array(dtype=wp.float64),
+    solution: wp.array(dtype=wp.float64),
+):
+    """Solve the normal equations of some parts by Cholesky's method.
+
+    Row i of the factor has the columns from ``lowest[i]`` to i, the last of them at ``diagonal[i]``.
+    """
+    part = parts[first + wp.tid()]
+    begin = bounds[part]
+    end = bounds[part + 1]
+    for i in range(begin, end):
+        base = diagonal[i] - wp.int64(i)
+        for j in range(lowest[i], i):
+            factors[base + wp.int64(j)] = wp.float64(0.0)
+        factors[diagonal[i]] = held[i]
+        solution[i] = held[i] * aims[i]
+    for row in range(rows[part], rows[part + 1]):
+        if chosen[row] != wp.uint8(0):
+            target = -gaps[row]
+            for k in range(8):
+                target += slopes[row, k] * levels[columns[row, k]]
+            for a in range(8):
+                i = columns[row, a]
+                base = diagonal[i] - wp.int64(i)
+                weighted = force[row] * force[row] * slopes[row, a]
+                solution[i] += weighted * target
+                for b in range(8):
+                    j = columns[row, b]
+                    if j <= i:
+                        factors[base + wp.int64(j)] += weighted * slopes[row, b]
+    for i in range(begin, end):
+        base = diagonal[i] - wp.int64(i)
+        low = lowest[i]
+        rest = solution[i]
+        power = factors[diagonal[i]]
+        for j in range(low, i):
+            other = diagonal[j] - wp.int64(j)
+            total = factors[base + wp.int64(j)]
+            for k in range(wp.max(low, lowest[j]), j):
+                total -= factors[base + wp.int64(k)] * factors[other + wp.int64(k)]
+            total = total / factors[diagonal[j]]
+            factors[base + wp.int64(j)] = total
+            rest -= total * solution[j]
+            power -= total * total
+        factors[diagonal[i]] = wp.sqrt(power)
+        solution[i] = rest / wp.sqrt(power)
+    for back in range(end - begin):
+        i = end - 1 - back
+        base = diagonal[i] - wp.int64(i)
+        value = solution[i] / factors[diagonal[i]]
+        solution[i] = value
+        for j in range(lowest[i], i):
+            solution[j] -= factors[base + wp.int64(j)] * value
+
+
+@wp.kernel
 def settle(
     first: wp.int32,
     bounds: wp.array(dtype=wp.int32),
-    rows: wp.array(dtype=wp.int32),
-    run_of: wp.array(dtype=wp.int32),
-    index: wp.array2d(dtype=wp.int32),
+    columns: wp.array2d(dtype=wp.int32),
     weights: wp.array2d(dtype=wp.float32),
-    kinds: wp.array(dtype=wp.uint8),
+    srgb_rows: wp.array(dtype=wp.uint8),
     sweeps: wp.int32,
     aim: wp.float32,
     limit: wp.float32,
@@ -150,26 +236,23 @@ def settle(
     part = first + wp.tid()
     begin = bounds[part]
     count = bounds[part + 1] - begin
-    channels = kinds.shape[0]
-    channel = rows[begin] % channels
-    srgb = kinds[channel] != wp.uint8(0)
+    srgb = srgb_rows[begin] != wp.uint8(0)
     for sweep in range(sweeps):
         updates = wp.int32(0)
         for at in range(count):
             i = begin + at
             if sweep % 2 == 1:
                 i = begin + count - 1 - at
-            run = run_of[rows[i] / channels]
             newest = wp.int32(-1)
             for k in range(8):
-                newest = wp.max(newest, changed[index[run, k] * channels + channel])
+                newest = wp.max(newest, changed[columns[i, k]])
             if newest >= seen[i]:
                 seen[i] = sweep
                 mixed = wp.float32(0.0)
                 other = wp.float32(0.0)
                 for k in range(4):
-                    mixed += weights[i, k] * light[index[run, k] * channels + channel]
-                    other += weights[i, k + 4] * light[index[run, k + 4] * channels + channel]
+                    mixed += weights[i, k] * light[columns[i, k]]
+                    other += weights[i, k + 4] * light[columns[i, k + 4]]
                 mixed = level_of(mixed, srgb)
                 other = level_of(other, srgb)
                 gap = mixed - other
@@ -177,7 +260,7 @@ def settle(
                     slopes = wp.vector(length=8, dtype=wp.float32)
                     power = wp.float32(0.0)
                     for k in range(8):
-                        level = levels[index[run, k] * channels + channel]
+                        level = levels[columns[i, k]]
                         slopes[k] = weights[i, k] * slope(level, srgb)
                         if k < 4:
                             slopes[k] = slopes[k] / slope(mixed, srgb)
@@ -190,7 +273,7 @@ def settle(
                         updates += 1
                         step = (gap - wp.clamp(gap, -aim, aim)) / power
                         for k in range(8):
-                            texel = index[run, k] * channels + channel
+                            texel = columns[i, k]
                             level = wp.clamp(levels[texel] - step * slopes[k], 0.0, 1.0)
                             if level != levels[texel]:
                                 levels[texel] = level

@@ -6,26 +6,23 @@ so that the colours on both sides agree, and as little as that takes.
 """
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import warp as wp
-from scipy.sparse import coo_array, csc_array, csr_array, diags_array
-from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 
 from blobtree._typing import BoolArray, Float64Array, Int32Array, Int64Array, UInt8Array
 from blobtree.device import array_on, launch
 from decals.baking.meshes import BakeMesh
 from decals.baking.seam_kernels import decode_listed, linearize, mark_levels, mark_runs, settle
+from decals.baking.seam_system import CPU, SeamSystem
 from decals.baking.unwrapped import Unwrapped
 from decals.sorting import distinct_numbers, groups, stable_order
 from decals.surfaces.topology import welded
-
-CPU = "cpu"
-"""Device on which seams are settled and layouts are checked; textures are made on the default device."""
 
 STEP = 0.1
 """Largest distance in texels between points of a seam."""
@@ -45,26 +42,11 @@ SETTLED, LARGEST = 1.5, 2.5
 ROUNDS = 6
 """Steps of the least squares."""
 
-FIRST_WEIGHT, MAX_WEIGHT, MAX_GROWTH = 3.0, 300.0, 4.0
-"""Weight of a point of a seam beside that of a texel, its limit, and its growth in a step at most."""
-
-BOUND_WEIGHT, BOUND_DECAY = 30.0, 0.5
-"""Weight of the bound on a texel that a step would darken below 0 or lighten above 1, and its decay."""
-
-MAX_CHANGE = 0.25
-"""Largest change of a texel in a step."""
-
-PART_ROWS = 1 << 14
-"""Rows from which on least squares without common texels are solved by themselves, at the same time."""
-
 SQUARES_FROM = 10.0
 """Difference of 255 from which on a point takes part in the least squares; smaller ones are settled."""
 
 RINGS = 2
 """Rings of points, linked by common texels, that are changed with the points that differ."""
-
-REPORT_SECONDS = 0.1
-"""Seconds between reports; a cancelled match ends after the step that is running."""
 
 ATTEMPTS, SWEEPS = 20, 100
 """Times that single corrections begin, and most rounds of them."""
@@ -126,7 +108,7 @@ def _cut_edges(
     points = np.stack([numbers, np.roll(numbers, -1, axis=1)], axis=2).reshape(-1, 2)
     turned = points[:, 0] > points[:, 1]
     sides[turned], points[turned] = sides[turned][:, ::-1], points[turned][:, ::-1]
-    keys = points @ [len(mesh.vertices), 1]
+    keys = points @ np.array([len(mesh.vertices), 1])
     order = stable_order(keys)
     first = np.flatnonzero(
         (keys[order][1:] == keys[order][:-1]) & (points[order][1:, 0] != points[order][1:, 1])
@@ -147,7 +129,8 @@ def bilinear_texels(places: Float64Array, tiles: Int64Array, size: int) -> Int64
     corner = np.floor(places - 0.5)
     columns = np.clip(corner[:, :1] + [0, 1, 0, 1], 0, size - 1).astype(np.int64)
     rows = np.clip(corner[:, 1:] + [0, 0, 1, 1], 0, size - 1).astype(np.int64)
-    return (tiles[:, None] * size + rows) * size + columns
+    texels: Int64Array = (tiles[:, None] * size + rows) * size + columns
+    return texels
 
 
 def _bilinear_weights(places: Float64Array) -> Float64Array:
@@ -165,7 +148,7 @@ class Mixed(NamedTuple):
         Indices into all textures, in order.
     starts : int64[r]
         The first point of each run.
-    index : int32[r, 8]
+    mixed : int32[r, 8]
         Rows of ``texels`` at each run: four on each side.
     weights : float64[n, 8]
         Their weights at each point.
@@ -173,7 +156,7 @@ class Mixed(NamedTuple):
 
     texels: Int64Array
     starts: Int64Array
-    index: Int32Array
+    mixed: Int32Array
     weights: Float64Array
 
     @classmethod
@@ -181,8 +164,8 @@ class Mixed(NamedTuple):
         """Return the texels of points at places ``float64[n, 2, 2]`` on textures ``int64[n, 2]``."""
         keys = np.concatenate([np.floor(places - 0.5).reshape(-1, 4), tiles], axis=1)
         starts = np.flatnonzero(np.append(True, (keys[1:] != keys[:-1]).any(axis=1)))
-        first = places[starts], tiles[starts]
-        index = np.hstack([bilinear_texels(*(of[:, side] for of in first), size) for side in (0, 1)])
+        at, on = places[starts], tiles[starts]
+        index = np.hstack([bilinear_texels(at[:, side], on[:, side], size) for side in (0, 1)])
         rows, number, _ = groups(index.reshape(-1))
         weights = np.hstack([_bilinear_weights(places[:, side]) for side in (0, 1)])
         return cls(index.reshape(-1)[rows], starts, number.reshape(index.shape).astype(np.int32), weights)
@@ -245,13 +228,13 @@ class _Match:
     ) -> None:
         self._shape, self._channels, self._report = texels.shape, len(srgb), report
         self._first = (texels / 255.0).reshape(-1)
-        self._smooth, self._index = smooth, mixed.index
+        self._smooth, self._index = smooth, mixed.mixed
         self._starts = starts = mixed.starts
         self._ends = np.append(starts[1:], len(smooth))
         self._run_of = np.repeat(np.arange(len(starts)), self._ends - starts)
         self._valid = np.logical_or.reduceat(smooth, starts, axis=0).reshape(-1).view(np.uint8)
         self._srgb = array_on(CPU, np.asarray(srgb), wp.uint8)
-        self._runs = [array_on(CPU, each, wp.int32) for each in (self._run_of, mixed.index)]
+        self._runs = [array_on(CPU, each, wp.int32) for each in (self._run_of, self._index)]
         self._weights = mixed.weights
         self._levels, self._light = self._first.copy(), np.empty_like(self._first)
         self._decode(np.arange(len(self._first)))
@@ -315,10 +298,10 @@ class _Match:
         point, channel = np.divmod(rows, self._channels)
         return self._index[self._run_of[point]] * np.int64(self._channels) + channel[:, None]
 
-    def _linked(self, rows: Int64Array) -> tuple[Int64Array, Int32Array, Int64Array, Int64Array]:
-        """Return the levels of rows, their columns there, and the components of rows and levels.
+    def _linked(self, rows: Int64Array) -> tuple[Int64Array, Int32Array, csr_array, Int64Array]:
+        """Return the levels of rows, their columns there, links of levels, and the component of each level.
 
-        Rows with a common level are in one component. Its number is larger in a later channel.
+        Levels of one row are in one component. Its number is larger in a later channel.
         """
         listed = self._levels_of(rows)
         used = distinct_numbers(listed, len(self._first))
@@ -330,51 +313,39 @@ class _Match:
         first[run[::-1]] = np.arange(len(run) - 1, -1, -1)
         first = first[first >= 0]  # one row of each run
         links = np.repeat(columns[first, 0], 7), columns[first, 1:].reshape(-1)
-        graph = coo_array((np.ones(len(links[0]), np.int8), links), (len(used), len(used)))
-        count, label = connected_components(graph, directed=False)
-        label = label + count * (used % self._channels)
-        return used, columns, label[columns[:, 0]], label
+        both = np.concatenate(links), np.concatenate(links[::-1])
+        graph = coo_array((np.ones(len(both[0]), np.int8), both), (len(used), len(used))).tocsr()
+        count, label = connected_components(graph, connection="weak")
+        return used, columns, graph, label + count * (used % self._channels)
 
     def _least_squares(self, rows: Int64Array) -> None:
         """Minimise the change of texels and the weighted differences, with more weight where these stay."""
         number = (np.cumsum(self._smooth, axis=0) - 1).reshape(-1)
-        used, columns, of_row, of_level = self._linked(rows)
-        order, ranked = (stable_order(of) for of in (of_row, of_level))
+        used, columns, graph, label = self._linked(rows)
+        order = stable_order(label[columns[:, 0]])
+        near = reverse_cuthill_mckee(graph, symmetric_mode=True)
+        ranked = near[stable_order(label[near])]
         place = np.empty(len(used), np.int32)
         place[ranked] = np.arange(len(used))
-        rows, used = rows[order], used[ranked]
-        system = _System(self._first[used], place[columns[order]], number[rows] % COARSE == 0)
-        starts, begins = (np.flatnonzero(np.diff(of, prepend=-1)) for of in (of_row[order], of_level[ranked]))
-        channel = used[begins] % self._channels
-        parts = np.flatnonzero(np.diff(channel * len(rows) + starts // PART_ROWS, prepend=-1))
-        channel, starts, begins = channel[parts], starts[parts], begins[parts]
-        bounds = [(*starts[1:], len(rows)), (*begins[1:], len(used))]
-        slices = [
-            (slice(first, last), slice(begin, end))
-            for first, last, begin, end in zip(starts, bounds[0], begins, bounds[1], strict=True)
-        ]
-        with ThreadPoolExecutor() as pool:
-            for step in range(ROUNDS):
-                gaps = self._gaps(rows, system.slopes)
-                off = np.abs(gaps) * 255.0 / TOLERANCE
-                worst = np.zeros(self._channels)
-                np.maximum.at(worst, channel, np.maximum.reduceat(off, starts))
-                if step:
-                    system.strengthen(off)
-                levels = self._levels[used]
-                running = [
-                    pool.submit(system.move, *each, gaps, levels)
-                    for each, of in zip(slices, channel, strict=True)
-                    if worst[of] > LARGEST / TOLERANCE
-                ]
-                if not running:
-                    return
-                while wait(running, REPORT_SECONDS).not_done:
-                    self._report(0.9 * step / ROUNDS)
-                for task in running:
-                    task.result()  # an error of it is raised here
-                self._levels[used] = levels
-                self._decode(used)
+        rows, used, columns = rows[order], used[ranked], place[columns[order]]
+        begins = np.flatnonzero(np.diff(label[ranked], prepend=-1, append=-1))
+        starts = np.flatnonzero(np.diff(label[ranked][columns[:, 0]], prepend=-1, append=-1))
+        channel = used[begins[:-1]] % self._channels
+        system = SeamSystem(self._first[used], columns, number[rows] % COARSE == 0, starts, begins)
+        for step in range(ROUNDS):
+            tick = partial(self._report, 0.9 * step / ROUNDS)
+            tick()
+            gaps = self._gaps(rows, system.slopes)
+            off = np.abs(gaps) * 255.0 / TOLERANCE
+            worst = np.zeros(self._channels)
+            np.maximum.at(worst, channel, np.maximum.reduceat(off, starts[:-1]))
+            active = (worst > LARGEST / TOLERANCE)[channel]
+            if not active.any():
+                return
+            if step:
+                system.strengthen(off)
+            self._levels[used] = system.stepped(self._levels[used], gaps, active, tick)
+            self._decode(used)
 
     def _settle(self, rows: Int64Array) -> None:
         """Move points that still differ one by one, see `settle`."""
@@ -384,76 +355,19 @@ class _Match:
             if not len(wrong):
                 return
             chosen, rows = self._around(wrong)
-            touched, _, component, _ = self._linked(chosen)
+            touched, columns, _, label = self._linked(chosen)
+            component = label[columns[:, 0]]
             order = stable_order(component)
-            starts = np.flatnonzero(np.diff(component[order], prepend=-1))
-            bounds = np.append(starts, len(chosen))
-            inputs = [array_on(CPU, each, wp.int32) for each in (bounds, chosen[order])]
-            inputs += [
-                *self._runs,
-                array_on(CPU, self._weights[chosen[order] // self._channels], wp.float32),
-                self._srgb,
-            ]
-            inputs += [SWEEPS, SETTLED / 255.0, LARGEST / 255.0]
-            states = self._levels, self._light
+            bounds = np.flatnonzero(np.diff(component[order], prepend=-1, append=-1))
+            points, channel = np.divmod(chosen[order], self._channels)
+            kinds = wp.int32, wp.int32, wp.float32, wp.uint8
+            listed = bounds, columns[order], self._weights[points], self._srgb.numpy()[channel]
+            inputs = [array_on(CPU, *each) for each in zip(listed, kinds, strict=True)]
+            states = self._levels[touched], self._light[touched]
             levels, light = (array_on(CPU, state, wp.float32) for state in states)
-            counts = len(self._levels), len(chosen)
+            counts = len(touched), len(chosen)
             changed, seen = (wp.zeros(count, dtype=wp.int32, device=CPU) for count in counts)
-            launch(settle, len(starts), inputs, [levels, light, changed, seen], CPU)
-            self._levels = levels.numpy().astype(np.float64)
+            inputs += [SWEEPS, SETTLED / 255.0, LARGEST / 255.0]
+            launch(settle, len(bounds) - 1, inputs, [levels, light, changed, seen], CPU)
+            self._levels[touched] = levels.numpy()
             self._decode(touched)
-
-
-class _System:
-    """Least squares for levels: their changes, and the weighted differences at rows.
-
-    Parameters
-    ----------
-    first : float64[n]
-        The levels of the texels.
-    columns : int32[k, 8]
-        The levels that are mixed at each row.
-    chosen : bool[k]
-        True for the rows that take part from the first.
-
-    Attributes
-    ----------
-    slopes : float64[k, 8]
-        Derivatives of the differences by the levels.
-    """
-
-    def __init__(self, first: Float64Array, columns: Int32Array, chosen: BoolArray) -> None:
-        self._first, self._columns, self._chosen = first, columns, chosen
-        self._held, self._aims = np.ones(len(first)), first.copy()
-        self._force = np.full(len(columns), FIRST_WEIGHT)
-        self.slopes: Float64Array = np.empty(columns.shape)
-
-    def strengthen(self, off: Float64Array) -> None:
-        """Give more weight to rows that differ; ``off`` are their differences beside that aimed at."""
-        self._chosen |= off > 1.0
-        grown = np.minimum(self._force * np.clip(off, 1.0, MAX_GROWTH), MAX_WEIGHT)
-        self._force = np.where(off > 1.0, grown, self._force)
-
-    def move(self, rows: slice, own: slice, gaps: Float64Array, levels: Float64Array) -> None:
-        """Change the levels ``own``, which no row but some mixes, by a step."""
-        of = rows.start + np.flatnonzero(self._chosen[rows])
-        ends, columns = np.arange(0, 8 * len(of) + 1, 8), (self._columns[of] - own.start).reshape(-1)
-        slopes, before, first = self.slopes[of], levels[own], self._first[own]
-        held, aims = self._held[own], self._aims[own]
-        weights = slopes * self._force[of, None] ** 2
-        change = csr_array((slopes.reshape(-1), columns, ends), (len(of), len(before)))
-        weighted = csc_array((weights.reshape(-1), columns, ends), (len(before), len(of))).tocsr()
-        matrix = (weighted @ change + diags_array(held)).tocsc()
-        solution = _solved(matrix, held * aims + weighted @ (change @ before - gaps[of]))
-        outside = (solution < 0.0) | (solution > 1.0)
-        self._held[own] = held = np.where(outside, BOUND_WEIGHT, 1.0 + (held - 1.0) * BOUND_DECAY)
-        self._aims[own] = np.where(outside, np.clip(solution, 0.0, 1.0), np.where(held > 1.5, aims, first))
-        step = np.clip(solution - before, -MAX_CHANGE, MAX_CHANGE)
-        levels[own] = np.clip(before + step, 0.0, 1.0)
-
-
-def _solved(matrix: csc_array, right: Float64Array) -> Float64Array:
-    """Return the solution of a symmetric system; its unknowns lie along lines, so few others fill in."""
-    factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    solution: Float64Array = factors.solve(right)
-    return solution

@@ -204,8 +204,10 @@ def test_random_texels_along_a_seam_come_to_agree_and_no_others_change(seed: int
     assert len(used) < 0.2 * SIZE**2
 
 
-def test_channels_and_parts_of_seams_are_matched_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Rows without common texels are solved in parts, of all channels together."""
+def test_channels_are_matched_each_by_itself_and_wide_parts_as_narrow_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Parts without common texels, of all channels together, are solved in envelopes or by SuperLU."""
     rng = np.random.default_rng(8)
     before = rng.integers(0, 256, (3, SIZE, SIZE, 3)).astype(np.uint8)
     places = np.concatenate([seams(seed)[0] for seed in range(3)])
@@ -218,10 +220,12 @@ def test_channels_and_parts_of_seams_are_matched_each_by_itself(monkeypatch: pyt
         image = alone[..., own].copy()
         match(image, places, tiles, smooth[:, own], srgb[own])
         alone[..., own] = image
-    monkeypatch.setattr("decals.baking.seams.PART_ROWS", 16)
     match(together, places, tiles, smooth, srgb)
     assert (together != before).any(axis=(1, 2)).all()
     assert np.array_equal(together, alone)
+    monkeypatch.setattr("decals.baking.seam_system.MAX_WIDTH", 0)
+    match(other := before.copy(), places, tiles, smooth, srgb)
+    assert np.array_equal(together, other)
 
 
 def test_points_at_which_the_surface_has_a_step_keep_it() -> None:

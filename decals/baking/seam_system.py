@@ -1,0 +1,164 @@
+"""Least squares of seams: small changes of levels after which both sides differ little."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, wait
+
+import numpy as np
+import warp as wp
+from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse.linalg import splu
+
+from blobtree._typing import BoolArray, Float64Array, Int32Array, Int64Array
+from blobtree.device import array_on, launch
+from decals.baking.seam_kernels import find_lowest, solve_parts
+
+CPU = "cpu"
+"""Device on which seams are settled and layouts are checked; textures are made on the default device."""
+
+FIRST_WEIGHT, MAX_WEIGHT, MAX_GROWTH = 3.0, 300.0, 4.0
+"""Weight of a point of a seam beside that of a texel, its limit, and its growth in a step at most."""
+
+BOUND_WEIGHT, BOUND_DECAY = 30.0, 0.5
+"""Weight of the bound on a texel that a step would darken below 0 or lighten above 1, and its decay."""
+
+MAX_CHANGE = 0.25
+"""Largest change of a texel in a step."""
+
+MAX_WIDTH = 64
+"""Mean width of a part's envelope from which on SuperLU solves it, whose factors then hold fewer numbers."""
+
+REPORT_SECONDS = 0.1
+"""Seconds between reports while it does."""
+
+
+class SeamSystem:
+    """Changes of levels, and weighted differences at rows that mix eight of them.
+
+    Rows and levels form parts: no row mixes levels of two. The levels of a part come in an order in which
+    those of a row are close to each other.
+
+    Parameters
+    ----------
+    first : float64[n]
+        The levels at first.
+    columns : int32[k, 8]
+        The levels that are mixed at each row.
+    chosen : bool[k]
+        True for the rows that take part from the first.
+    rows, levels : int64[c + 1]
+        The first row and the first level of each part, and the ends.
+
+    Attributes
+    ----------
+    slopes : float64[k, 8]
+        Derivatives of the differences by the levels, which the caller writes before each step.
+    """
+
+    def __init__(
+        self,
+        first: Float64Array,
+        columns: Int32Array,
+        chosen: BoolArray,
+        rows: Int64Array,
+        levels: Int64Array,
+    ) -> None:
+        self._first, self._columns, self._chosen = first, columns, chosen
+        self._rows, self._levels, self._sizes = rows, levels, np.diff(levels)
+        self._held, self._aims = np.ones(len(first)), first.copy()
+        self._force = np.full(len(columns), FIRST_WEIGHT)
+        self.slopes: Float64Array = np.empty(columns.shape)
+        self._bounds = [array_on(CPU, of, wp.int32) for of in (rows, levels)]
+        lowest: Int32Array = np.arange(len(first), dtype=np.int32)
+        inputs = [self._bounds[0], array_on(CPU, columns, wp.int32)]
+        launch(find_lowest, len(self._sizes), inputs, [array_on(CPU, lowest, wp.int32)], CPU)
+        widths = np.arange(1, len(first) + 1) - lowest
+        self._wide = np.add.reduceat(widths**2.0, levels[:-1]) > MAX_WIDTH**2 * self._sizes
+        kept = np.where(np.repeat(self._wide, self._sizes), 0, widths)
+        self._lowest, self._diagonal = lowest, np.cumsum(kept) - 1
+        self._factors: Float64Array = np.empty(int(kept.sum()))
+
+    def strengthen(self, off: Float64Array) -> None:
+        """Give more weight to rows that differ; ``off`` are their differences beside that aimed at."""
+        self._chosen |= off > 1.0
+        grown = np.minimum(self._force * np.clip(off, 1.0, MAX_GROWTH), MAX_WEIGHT)
+        self._force = np.where(off > 1.0, grown, self._force)
+
+    def stepped(
+        self, levels: Float64Array, gaps: Float64Array, active: BoolArray, tick: Callable[[], None]
+    ) -> Float64Array:
+        """Return the levels after a step of some parts, ``bool[c]``, from the differences at the rows."""
+        solution = levels.copy()
+        self._solve_narrow(np.flatnonzero(active & ~self._wide), levels, gaps, solution)
+        self._solve_wide(np.flatnonzero(active & self._wide), levels, gaps, solution, tick)
+        outside = (solution < 0.0) | (solution > 1.0)
+        self._held = held = np.where(outside, BOUND_WEIGHT, 1.0 + (self._held - 1.0) * BOUND_DECAY)
+        aims = np.where(held > 1.5, self._aims, self._first)
+        self._aims = np.where(outside, np.clip(solution, 0.0, 1.0), aims)
+        step = np.clip(solution - levels, -MAX_CHANGE, MAX_CHANGE)
+        return np.where(np.repeat(active, self._sizes), np.clip(levels + step, 0.0, 1.0), levels)
+
+    def _solve_narrow(
+        self, parts: Int64Array, levels: Float64Array, gaps: Float64Array, solution: Float64Array
+    ) -> None:
+        """Write the solutions of some parts, each by Cholesky's method within its envelope."""
+        columns, lowest, diagonal, chosen = (
+            array_on(CPU, of, kind)
+            for of, kind in (
+                (self._columns, wp.int32),
+                (self._lowest, wp.int32),
+                (self._diagonal, wp.int64),
+                (self._chosen, wp.uint8),
+            )
+        )
+        rows = [array_on(CPU, of, wp.float64) for of in (self._force, gaps, self.slopes)]
+        own = [array_on(CPU, of, wp.float64) for of in (self._held, self._aims, levels)]
+        inputs = [
+            array_on(CPU, parts, wp.int32),
+            *self._bounds,
+            columns,
+            chosen,
+            *rows,
+            lowest,
+            diagonal,
+            *own,
+        ]
+        outputs = [array_on(CPU, of, wp.float64) for of in (self._factors, solution)]
+        launch(solve_parts, len(parts), inputs, outputs, CPU)
+
+    def _solve_wide(
+        self,
+        parts: Int64Array,
+        levels: Float64Array,
+        gaps: Float64Array,
+        solution: Float64Array,
+        tick: Callable[[], None],
+    ) -> None:
+        """Write the solutions of some parts, each by SuperLU."""
+
+        def solve(part: int) -> None:
+            own = slice(*self._levels[part : part + 2])
+            of = np.flatnonzero(self._chosen[slice(*self._rows[part : part + 2])]) + self._rows[part]
+            ends, columns = np.arange(0, 8 * len(of) + 1, 8), (self._columns[of] - own.start).reshape(-1)
+            slopes, held = self.slopes[of], self._held[own]
+            weights = slopes * self._force[of, None] ** 2
+            change = csr_array((slopes.reshape(-1), columns, ends), (len(of), len(held)))
+            weighted = csc_array((weights.reshape(-1), columns, ends), (len(held), len(of))).tocsr()
+            matrix = (weighted @ change + diags_array(held)).tocsc()
+            right = held * self._aims[own] + weighted @ (change @ levels[own] - gaps[of])
+            solution[own] = _solved(matrix, right)
+
+        if not len(parts):
+            return
+        with ThreadPoolExecutor() as pool:
+            running = [pool.submit(solve, part) for part in parts.tolist()]
+            while wait(running, REPORT_SECONDS).not_done:
+                tick()
+        for task in running:
+            task.result()  # an error of it is raised here
+
+
+def _solved(matrix: csc_array, right: Float64Array) -> Float64Array:
+    """Return the solution of a symmetric system; its unknowns lie along lines, so few others fill in."""
+    factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    solution: Float64Array = factors.solve(right)
+    return solution
