@@ -22,7 +22,8 @@ from blobtree.device import array_on, known_device, launch
 from blobtree.progress import Progress
 from decals.baking.beyond import Beyond
 from decals.baking.meshes import BakeMesh
-from decals.baking.seams import CPU, Mixed, Seams, match_seams
+from decals.baking.seam_system import CPU
+from decals.baking.seams import Mixed, Seams, match_seams
 from decals.baking.texel_kernels import (
     compensate,
     cover_rows,
