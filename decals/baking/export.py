@@ -5,6 +5,7 @@ import logging
 import os
 import zlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -223,8 +224,10 @@ def export(
                 "creases": creases,
             }
             baked = replace(baked, made=_made(scene, path.parent, given))
-        checks = tuple(part.check for part in baked.parts)
-        content = rules.write(replace(baked, unit=unit, up=up), path.stem)
+        with ThreadPoolExecutor(1) as pool:  # meshes are checked while textures are compressed
+            checking = pool.submit(lambda: tuple(part.check for part in baked.parts))
+            content = rules.write(replace(baked, unit=unit, up=up), path.stem)
+            checks = checking.result()
         report("writing the file", 0.5)
         write_together(
             {path: content[""], **{path.with_name(name): content[name] for name in content if name}}
