@@ -1,8 +1,9 @@
 """Pages of `save_html` in a real browser, as a program.
 
-    python -m tests.frontends.in_html_page picture|use|mounts|drags|refusals [chromium|firefox]
+    python -m tests.frontends.in_html_page picture|use|touch|mounts|drags|refusals [chromium|firefox]
 
-Firefox needs a display, such as that of ``xvfb-run -a``, and a version of playwright that knows it.
+Firefox needs a display, such as that of ``xvfb-run -a``, and a version of playwright that knows it. Touch is
+for Chromium alone.
 """
 
 import asyncio
@@ -19,7 +20,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from playwright.async_api import Page, Playwright, async_playwright
+from playwright.async_api import CDPSession, Page, Playwright, async_playwright
 
 import decals
 from blobtree import Mirror, Point, Segment, polygonize
@@ -402,6 +403,88 @@ REMOUNTED = """async () => {
 }"""
 
 
+async def touch(browser: str) -> None:
+    """One finger drags a decal or turns the model; two fingers zoom and move the picture."""
+    scene = meshed(tree_scene())
+    async with shown(scene, (700, 600), browser=browser) as page:
+        fingers = Fingers(await page.context.new_cdp_session(page))
+        box = await page.locator("canvas").bounding_box()
+        assert box is not None
+        width, height = box["width"], box["height"]
+        middle = complex(box["x"] + width / 2, box["y"] + height / 2)
+        corner = complex(box["x"] + 30, box["y"] + 30)
+        before = await state(page)
+        number = await page.evaluate("viewer.pick(0, 0).number")
+        held = np.subtract(before["decals"][number]["position"], await hit(page, 0, 0))
+        await fingers.move([middle], [middle + 40 - 30j])
+        after = await state(page)
+        dragged = after["decals"][number]
+        place = await hit(page, 80 / width, 60 / height)
+        assert np.linalg.norm(np.subtract(dragged["position"], place)) < 1.5 * np.linalg.norm(held) + 0.02
+        assert dragged["position"] != before["decals"][number]["position"]
+        assert after["camera"] == before["camera"]
+        await page.keyboard.press("Control+z")
+        assert (await state(page))["decals"] == before["decals"]
+
+        await fingers.move([corner], [corner + 60 + 25j])
+        turned = await state(page)
+        assert turned["camera"]["target"] == before["camera"]["target"]
+        assert np.isclose(distance(turned), distance(before), rtol=1e-6)
+        swing = np.subtract(turned["camera"]["position"], before["camera"]["position"])
+        assert np.linalg.norm(swing) > 0.1 * distance(before)
+        assert turned["decals"] == before["decals"]
+
+        await fingers.move([middle - 50, middle + 50], [middle - 100, middle + 100])
+        nearer = await state(page)
+        assert np.isclose(distance(nearer), 0.5 * distance(turned), rtol=1e-2)
+        assert np.allclose(
+            nearer["camera"]["target"], turned["camera"]["target"], atol=0.02 * distance(turned)
+        )
+
+        two = [middle - 60j, middle + 60j]
+        await fingers.move(two, [at + 70 - 30j for at in two])
+        panned = await state(page)
+        assert np.isclose(distance(panned), distance(nearer), rtol=1e-2)
+        target = nearer["camera"]["target"]
+        seen = await page.evaluate("(point) => viewer.camera.seen(point, viewer.aspect)", target)
+        assert np.allclose(seen[:2], [140 / width, 60 / height], atol=0.02)
+        assert panned["decals"] == before["decals"]
+
+        await fingers.move(two, [at + 30 for at in two], stays=1)  # a finger that stays goes on panning
+        await fingers.move([two[1] + 30], [two[1] + 30 + 50j], down=False)
+        assert (await state(page))["decals"] == before["decals"]
+        assert await page.evaluate("[scrollX, scrollY, visualViewport.scale]") == [0, 0, 1]
+
+
+def distance(shown: dict[str, Any]) -> float:
+    """Return the distance of the camera from its target."""
+    camera = shown["camera"]
+    return float(np.linalg.norm(np.subtract(camera["position"], camera["target"])))
+
+
+class Fingers:
+    """Fingers on a page in Chromium, which makes touch and pointer events of them; places are complex."""
+
+    def __init__(self, session: CDPSession) -> None:
+        self._session = session
+
+    async def move(
+        self, starts: list[complex], ends: list[complex], *, down: bool = True, stays: int = 0
+    ) -> None:
+        """Put fingers down, unless they are, move them in five steps, and lift all but the last ``stays``."""
+        if down:
+            for count in range(1, len(starts) + 1):
+                await self._send("touchStart", starts[:count])
+        for step in range(1, 6):
+            await self._send("touchMove", [a + (b - a) * step / 5 for a, b in zip(starts, ends, strict=True)])
+        for count in range(len(ends) - 1, stays - 1, -1):
+            await self._send("touchEnd", ends[len(ends) - count :], first=len(ends) - count)
+
+    async def _send(self, kind: str, places: list[complex], first: int = 0) -> None:
+        points = [{"x": at.real, "y": at.imag, "id": first + n} for n, at in enumerate(places)]
+        await self._session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+
 async def drags(browser: str) -> None:
     """Drags of a page leave the decals where the same drags of the editor do."""
     for scene, options in (
@@ -561,7 +644,14 @@ async def accessible(page: Page) -> None:
     assert violations == [], [item["id"] for item in violations]
 
 
-CHECKS = {"picture": picture, "use": use, "mounts": mounts, "drags": drags, "refusals": refusals}
+CHECKS = {
+    "picture": picture,
+    "use": use,
+    "touch": touch,
+    "mounts": mounts,
+    "drags": drags,
+    "refusals": refusals,
+}
 
 
 if __name__ == "__main__":
