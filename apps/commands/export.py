@@ -93,7 +93,8 @@ def export(
     Parameters
     ----------
     scene
-        A saved scene. Models that render takes are written without decals. With --check alone, a mesh file.
+        A saved scene. Models that render takes are written without decals. With --check alone, a mesh file
+        that can be read.
     output
         The file: glb, gltf, obj, ply, stl, vtp, 3mf or usdz; html for a page in the browser; for the field of
         a BlobTree vti, nrrd, npz or npy.

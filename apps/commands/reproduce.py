@@ -1,6 +1,6 @@
 """``implicit-decals reproduce``: make what a file holds again from its recipe, and say what differs."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,10 +16,15 @@ from decals.apps.commands.demo import DEMO_FUNCTION, PICTURES, demo_pictures
 from decals.apps.commands.gallery import MAX_SIDE
 from decals.apps.commands.options import MAX_SAMPLES, Definitions, Trust, check_count, parse_size
 from decals.apps.commands.progress_bars import preparing
+from decals.apps.commands.sweep import experiment_of
+from decals.apps.experiments import SHIPPED
 from decals.apps.gallery.helpers import GALLERY_FUNCTION, example_picture
 from decals.apps.models.samples import sample_mesh
 from decals.baking.reproduction import NO_RECIPE, reproduce_export
 from decals.errors import ImplicitDecalsError, InvalidInput
+from decals.experiments import Results
+from decals.experiments.fingerprint import fingerprint
+from decals.experiments.reproduction import reproduce_results
 from decals.images.load import load_image
 from decals.rendering import Picture, Renderer
 from decals.rendering.picture import picture_recipe
@@ -43,6 +48,7 @@ def reproduce(
     /,
     *,
     scene: Annotated[str | None, Parameter(show_default=False)] = None,
+    experiment: Annotated[str | None, Parameter(show_default=False)] = None,
     define: Definitions = None,
     trust: Trust = False,
 ) -> int:
@@ -53,26 +59,44 @@ def reproduce(
     Parameters
     ----------
     file
-        A saved scene; a PNG file that render, animate, gallery or demo wrote; or a glb or gltf file that
-        export or bake wrote.
+        A saved scene; a PNG file that render, animate, gallery or demo wrote; a glb or gltf file that
+        export or bake wrote; or the folder of results that sweep wrote.
     scene
         The scene of a picture, which the PNG file does not hold, or of an exported file that was too large
         to hold it.
+    experiment
+        The file of the experiment whose results a folder holds; shipped experiments are found without.
     """
-    suffix = Path(file).suffix.lower()
+    suffix, is_folder = Path(file).suffix.lower(), Path(file).is_dir()
+    if not is_folder and suffix not in (".json", ".png", *EXPORTED):
+        raise InvalidInput(
+            f"expected a scene (.json), a PNG, GLB or glTF file, or a folder of results, got {file!r}; "
+            "other files do not say how they were made"
+        )
+    if experiment is not None and not is_folder:
+        raise InvalidInput(f"--experiment: expected a folder of results, got {file!r}; leave it out")
     if suffix not in (".png", *EXPORTED) and scene is not None:
         raise InvalidInput(f"--scene: expected a PNG, GLB or glTF file beside it, got {file!r}; leave it out")
-    if suffix not in (".png", ".json", *EXPORTED):
-        raise InvalidInput(f"expected a scene (.json), or a PNG, GLB or glTF file, got {file!r}")
     with preparing(define) as progress:
         held = None if scene is None else load_scene(scene, samples=sample_mesh, trust=trust)
-        if suffix == ".png":
+        if is_folder:
+            found = reproduce_results(file, _function_of(file, experiment), progress=progress)
+        elif suffix == ".png":
             found = _of_picture(Path(file), held, progress)
         elif suffix in EXPORTED:
             found = reproduce_export(Path(file), held, samples=sample_mesh, trust=trust, progress=progress)
         else:
             found = made_again(load_scene(file, samples=sample_mesh, trust=trust), progress=progress)
     return _report(file, found)
+
+
+def _function_of(folder: str, experiment: str | None) -> Callable[..., Any] | None:
+    """Return the function of an experiment, or the shipped one that gave the results; None for others."""
+    if experiment is not None:
+        return experiment_of(experiment, "design")[0]
+    digest = Results(folder).function
+    functions = (experiment_of(name, "design")[0] for name in SHIPPED)
+    return next((function for function in functions if fingerprint(function) == digest), None)
 
 
 def _of_picture(path: Path, scene: Scene | None, progress: Progress) -> Reproduction:

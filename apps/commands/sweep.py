@@ -64,7 +64,7 @@ def sweep(
         return 0
     if experiment is None:
         raise InvalidInput("expected a Python file or the name of a shipped experiment; --list shows these")
-    function, design = _loaded(experiment, "full" if full else "design")
+    function, design = experiment_of(experiment, "full" if full else "design")
     console = Console(stderr=True)
     options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "limit": limit, "memory": memory}
     if console.is_interactive:
@@ -89,7 +89,7 @@ def _list_shipped() -> None:
     Console().print(table)
 
 
-def _loaded(experiment: str, chosen: str) -> tuple[Callable[..., Any], Design]:
+def experiment_of(experiment: str, chosen: str) -> tuple[Callable[..., Any], Design]:
     """Return the function of an experiment, and one of its designs."""
     if experiment in shipped.SHIPPED:
         module = import_module(f"{shipped.__name__}.{experiment}")

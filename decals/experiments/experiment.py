@@ -102,7 +102,7 @@ def run(
     """
     folder = Path(out).resolve()
     digest = fingerprint(function)
-    trials = {trial_hash(trial): trial for trial in _fitting(function, design)}
+    trials = {trial_hash(trial): trial for trial in fitted(function, design)}
     about = {"name": getattr(function, "__qualname__", describe(function)), "function": digest}
     about["parameters"] = sorted({name for trial in trials.values() for name in trial})
     count = (
@@ -154,7 +154,7 @@ def _first_columns(key: str, digest: str, trial: Trial) -> Row:
     return {"trial": key, "function": digest, **values, **texts}
 
 
-def _fitting(function: Callable[..., Any], design: Design) -> Iterator[Trial]:
+def fitted(function: Callable[..., Any], design: Design) -> Iterator[Trial]:
     """Yield the trials of a design with values of the types that the function declares."""
     if not callable(function):
         raise InvalidInput(f"function: expected a function of the parameters, got {describe(function)}")

@@ -56,7 +56,7 @@ class Results:
         return sorted(latest.values(), key=lambda row: [_rank(row.get(name)) for name in self.parameters])
 
     def _is_current(self, row: Row) -> bool:
-        return bool(row.get("function") == self._about["function"])
+        return bool(row.get("function") == self.function)
 
     @property
     def parameters(self) -> list[str]:
@@ -73,6 +73,11 @@ class Results:
     def name(self) -> str:
         """Name of the function."""
         return str(self._about["name"])
+
+    @property
+    def function(self) -> str:
+        """Digest of the function."""
+        return str(self._about["function"])
 
     @property
     def numbers(self) -> list[str]:

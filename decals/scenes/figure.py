@@ -24,7 +24,7 @@ from decals.scenes.outlines import STEP, LineKind, chains, outlines
 from decals.scenes.render import render
 from decals.scenes.scene import Scene, require_scene
 from decals.surfaces.mesh import edges_of
-from decals.validation import checked_path, describe, finite_number, instance, optional_package
+from decals.validation import checked_path, describe, finite_number, instance, optional_package, real_number
 
 SUFFIXES = (".svg", ".pdf")
 
@@ -176,10 +176,13 @@ def _widths(widths: object) -> dict[str, float]:
     unknown = [kind for kind in widths if kind not in WIDTHS]
     if unknown:
         raise InvalidScene(f"widths: expected the kinds {', '.join(WIDTHS)}, got {describe(unknown[0])}")
-    checked = {kind: finite_number("widths", width, InvalidScene) for kind, width in widths.items()}
-    if not all(0.0 <= width <= MAX_WIDTH for width in checked.values()):
-        raise InvalidScene(f"widths: expected points from 0 to {MAX_WIDTH:g}, got {describe(dict(widths))}")
-    return WIDTHS | checked
+    expected = f"points from 0 to {MAX_WIDTH:g}"
+    return WIDTHS | {
+        kind: real_number(
+            f"width of {kind}", width, expected, lambda value: 0 <= value <= MAX_WIDTH, InvalidScene
+        )
+        for kind, width in widths.items()
+    }
 
 
 class _View:

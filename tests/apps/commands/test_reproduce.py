@@ -207,12 +207,35 @@ def test_a_texture_is_baked_again(saved: Path, capsys: Capture) -> None:
     assert "equal bit for bit" in capsys.readouterr().out
 
 
+SQUARES = """from decals.experiments import Grid
+def experiment(x: float, name: str | None):
+    return {"square": POWER(x), "same": name}
+POWER = lambda x: x**2
+design = Grid(x=[1, 2.5], name=["a", None])
+"""
+
+
+def test_results_are_made_again(folder: Path, capsys: Capture) -> None:
+    Path("squares.py").write_text(SQUARES)
+    assert run(["sweep", "squares.py", "--out", "results", "--workers", "0"]) == 0
+    assert run(["reproduce", "results"]) == 3
+    assert "the function 'experiment'" in capsys.readouterr().out
+    assert run(["reproduce", "results", "--experiment", "squares.py"]) == 0
+    assert "equal bit for bit" in capsys.readouterr().out
+    Path("squares.py").write_text(SQUARES.replace("**2", "**3"))
+    assert run(["reproduce", "results", "--experiment", "squares.py"]) == 3
+    assert "it has changed since" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["scene.json", "--scene", "scene.json"], "--scene: expected a PNG, GLB or glTF file beside it"),
         (["none.json"], "could not read the scene 'none.json'"),
         (["none.png"], "none.png"),
+        (["a.svg"], "other files do not say how they were made"),
+        (["."], "expected the folder of an experiment"),
+        (["scene.json", "--experiment", "a.py"], "--experiment: expected a folder of results"),
         (["none.glb"], "none.glb"),
         (["bad.png"], "expected a PNG file, got 'bad.png'"),
         (["bad.glb"], "could not read 'bad.glb' as glTF"),

@@ -161,7 +161,7 @@ def test_a_picture_lies_behind_the_lines(suffix: str, tmp_path: Path) -> None:
         ({"size": (0, 5)}, "size: expected sides from 0 to"),
         ({"size": (float("nan"), 5)}, "size: expected"),
         ({"widths": {"line": 1}}, "widths: expected the kinds contact, rim, model, got 'line'"),
-        ({"widths": {"rim": -1}}, "widths: expected points from 0 to 100"),
+        ({"widths": {"rim": -1}}, "width of rim: expected points from 0 to 100, got -1"),
         ({"widths": 1}, "widths: expected widths in points by kind"),
         ({"camera": 5}, "camera: expected"),
         ({"contact": "round"}, "contact: expected one of"),
