@@ -7,6 +7,9 @@ The indices of many sets of decals are built at once. Each set has the levels, t
 would have alone; the arrays of all sets lie one after the other.
 """
 
+import functools
+from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +29,9 @@ MAX_AVERAGE_CELLS = 24
 
 MIN_LARGER = 16
 """Number of decals on a level for each smaller decal that uses its cells."""
+
+FEW = 2
+"""Whole numbers up to which an array is kept from call to call, as builds of one set give to kernels."""
 
 MAX_SMALLER = 4
 """Largest number of such smaller decals with their centres in one cell."""
@@ -168,10 +174,11 @@ class _Builder:
         several = np.flatnonzero(sizes.levels > 1)
         if not len(several):
             return floors
-        exponents, rows, positions = sizes.exponents.numpy(), order.numpy(), self.positions.numpy()
+        exponents = sizes.exponents.numpy()
+        positions = functools.cache(lambda: self.positions.numpy()[order.numpy()])  # rarely needed
         for number in several:
-            part = slice(*self.starts[number : number + 2])
-            floors[number] = _floor_of(exponents[part], positions[rows[part]])
+            start, end = self.starts[number : number + 2]
+            floors[number] = _floor_of(exponents[start:end], partial(_rows, positions, start))
         return floors
 
     def sizes(self, order: Any, parities: NDArray[np.int32], floors: NDArray[np.int32]) -> "_Sizes":
@@ -210,8 +217,9 @@ class _Builder:
         scratch = 1 << (entries + entries // 4).bit_length()
         claims, slots = self.filled(scratch, EMPTY), self.empty_ints(2 * entries)
         sizes, used, numbers, heads = (self.zeros(scratch) for _ in range(4))
-        holders = self.zeros(scratch if self.several else 0)
-        counts = self.zeros(self.set_count) if self.several else holders
+        nothing = _kept(self.device.alias)
+        holders = self.zeros(scratch) if self.several else nothing
+        counts = self.zeros(self.set_count) if self.several else nothing
         starts = self.ints(self.starts[:-1]) if self.several else self.sets
         self.launch(
             kernels.claim_slots,
@@ -239,6 +247,8 @@ class _Builder:
         wp.launch(kernel, count, inputs, outputs, device=self.device)
 
     def ints(self, values: NDArray[Any]) -> Any:
+        if values.size <= FEW:
+            return _kept(self.device.alias, *values.tolist())
         numbers, copy = np.asarray(values, np.int32).ravel(), not self.device.is_cpu
         return wp.array(numbers, dtype=wp.int32, device=self.device, copy=copy)
 
@@ -253,6 +263,12 @@ class _Builder:
 
     def filled(self, count: int, value: int) -> Any:
         return wp.full(count, value, dtype=wp.int32, device=self.device)
+
+
+@functools.lru_cache(maxsize=256)
+def _kept(device: str, *numbers: int) -> Any:
+    """Return an array that kernels only read, and that is kept: making it takes as long as a small launch."""
+    return wp.array(np.array(numbers, np.int32), dtype=wp.int32, device=device)
 
 
 def starts_of(counts: ArrayLike) -> Int64Array:
@@ -275,13 +291,22 @@ def _shared_levels(used: BoolArray, parity: int) -> Int64Array:
     return counts
 
 
-def _floor_of(exponents: NDArray[np.int32], positions: NDArray[np.float32]) -> int:
-    """Return the floor of one set with several exponents; arrays are in draw order."""
+def _rows(
+    positions: Callable[[], NDArray[np.float32]], start: int, numbers: NDArray[np.int64]
+) -> NDArray[np.float32]:
+    """Return the positions of some decals of the set that begins at `start`."""
+    return positions()[start + numbers]
+
+
+def _floor_of(
+    exponents: NDArray[np.int32], positions: Callable[[NDArray[np.int64]], NDArray[np.float32]]
+) -> int:
+    """Return the floor of one set with several exponents, in draw order; `positions` takes their numbers."""
     for exponent in np.unique(exponents)[:0:-1].tolist():
-        smaller = exponents < exponent
-        if MIN_LARGER * np.count_nonzero(smaller) > np.count_nonzero(exponents == exponent):
+        smaller = np.flatnonzero(exponents < exponent)
+        if MIN_LARGER * len(smaller) > np.count_nonzero(exponents == exponent):
             continue
-        cells = np.floor(positions[smaller] / 2.0**exponent)
+        cells = np.floor(positions(smaller) / 2.0**exponent)
         if np.unique(cells, axis=0, return_counts=True)[1].max() <= MAX_SMALLER:
             return int(exponent)
     return NO_FLOOR
