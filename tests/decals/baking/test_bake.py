@@ -21,11 +21,11 @@ from decals.errors import NoGraphics
 from decals.images.texels import encode_srgb
 from decals.rendering import Lighting
 from decals.surfaces.mesh import MeshSurface
+from tests.decals.baking.evaluated import beside_evaluated, texel_length
 from tests.decals.baking.glb import (
     BALL,
     CUBE,
     Array,
-    ReadMesh,
     ball_and_cube,
     bilinear,
     expected_colors,
@@ -146,40 +146,9 @@ def test_baked_colours_differ_from_evaluated_ones_by_filtering_alone(tmp_path: P
 def test_textures_of_the_default_size_have_evaluated_colours(tmp_path: Path) -> None:
     """At 99 % of the points within 14 of 255; beside means over one and a half texels, within 8."""
     need("trimesh")
-    scene = ball_and_cube()
-    decals.bake(scene, tmp_path / "a.glb")
-    node = read_glb(tmp_path / "a.glb")["ball"]
-    points, normals, uv = node.on_surface(10_000, seed=3)
-    assert node.texture is not None
-    got = 255 * encode_srgb(bilinear(linear(node.texture / 255), uv))
-    across = np.cross(normals, [0.3, 0.5, 0.8])
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    ways = np.stack([across, np.cross(normals, across)], axis=1)
-    axis = 1.5 * texel_length(node) * ((np.arange(6) + 0.5) / 6 - 0.5)
-    offsets = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-    area = points[:, None] + np.einsum("kc,mci->mki", offsets, ways)
-    for width, places, allowed in (("point", points[:, None], 14), ("texels", area, 8)):
-        over = decals.evaluate(
-            scene.decals,
-            places.reshape(-1, 3),
-            np.repeat(normals, places.shape[1], axis=0),
-            images=[image.pixels for image in scene.images],
-        ).color
-        assert over is not None
-        light = linear(np.asarray(BALL)) * (1 - over[:, 3:]) + over[:, :3]
-        want = 255 * encode_srgb(light.reshape(places.shape).mean(axis=1))
-        assert np.quantile(np.abs(got - want).max(axis=1), 0.99) <= allowed, width
-
-
-def texel_length(node: ReadMesh) -> float:
-    """Length of a texel on the surface."""
-    assert node.uv is not None
-    assert node.texture is not None
-    solid, flat = (
-        np.linalg.norm(values[node.faces[:, 1]] - values[node.faces[:, 0]], axis=1).sum()
-        for values in (node.vertices, node.uv * len(node.texture))
-    )
-    return float(solid / flat)
+    point, texels = beside_evaluated(tmp_path / "a.glb", 2048)
+    assert point <= 14
+    assert texels <= 8
 
 
 def neighborhoods(points: Array, normals: Array, reach: float) -> Array:
