@@ -46,6 +46,9 @@ MIN_SAMPLES, MAX_SAMPLES = 20_000, 2_000_000
 CELL = 2.25
 """Area of a decal among decals without gaps, in squares of its radius."""
 
+MAX_ADDED = 200_000
+"""Most decals that one command adds; the search for further bare places takes 10 KB for each."""
+
 MAX_ROUNDS = 8
 """Most searches of `FillBarePlaces`, which ends before them where a search finds no bare place."""
 
@@ -461,6 +464,12 @@ class _Filling:
         if not len(rows):
             return False
         points, usual, depths = bare.points[rows], usual[rows], depths[rows]
+        expected = len(self.added) + (bare.distance**2 / (CELL * usual**2)).sum()
+        if expected > MAX_ADDED:
+            raise InvalidEdit(
+                f"expected bare places for at most {MAX_ADDED:,} decals, got some for about {expected:,.0f} "
+                f"of radius {np.median(usual):.3g}; enlarge the decals first, or scatter others"
+            )
         centers = OrientedPoints(self.added.positions, self.added.normals, self._surface_ids)
         radii, reached = grown_radii(points, centers, self.added.radii.astype(np.float64), self._usual)
         if reached.any():

@@ -214,6 +214,14 @@ def test_wrong_values_are_refused(command: Any, message: str) -> None:
         EditSession(upper_half()).do(command)
 
 
+def test_more_places_than_one_command_fills_are_refused() -> None:
+    scene = decals.cover(Point((0, 0, 0), radius=1.0), count=50)
+    session = EditSession(scene.replace(decals=scene.decals.replace(radii=scene.decals.radii * 0.005)))
+    with pytest.raises(InvalidEdit, match=r"at most 200,000 decals, got some for about .* of radius 0\.00"):
+        session.do(FillBarePlaces((0,)))
+    assert len(session.document.decals.numbers) == 50
+
+
 def test_a_scene_without_decals_has_nothing_to_be_like() -> None:
     session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=0, images=["eye"]))
     with pytest.raises(InvalidEdit, match="scatter some"):
