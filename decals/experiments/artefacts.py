@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from blobtree.identity import content_hash
 from decals.errors import InvalidInput
 from decals.validation import describe
 
@@ -100,14 +101,25 @@ def _arrays(decals: Any) -> dict[str, Any]:
     return arrays | {"receivers": np.array(decals.receivers.tolist(), np.str_)}
 
 
+def _digest(value: Any, file: Path) -> str:
+    """Return 32 digits that are equal for equal values; of those without a content hash, for equal files."""
+    try:
+        return content_hash(value)[:32]
+    except InvalidInput:
+        with file.open("rb") as opened:
+            return hashlib.file_digest(opened, "sha256").hexdigest()[:32]
+
+
 def _stored(value: Any, write: Callable[[Any, Path], object], folder: Path, suffix: str) -> Path:
-    """Write a file under the digest of its content; return its path."""
+    """Write a file under the content hash of a value, or under the digest of its bytes; return its path.
+
+    Equal pictures and scenes have equal paths, whenever they were made.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder, prefix=".") as temporary:
         file = Path(temporary) / f"value{suffix}"
         write(value, file)
-        with file.open("rb") as opened:
-            digest = hashlib.file_digest(opened, "sha256").hexdigest()[:32]
+        digest = _digest(value, file)
         target = folder / digest[:2] / f"{digest}{suffix}"
         target.parent.mkdir(exist_ok=True)
         if not target.exists():

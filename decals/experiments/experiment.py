@@ -108,7 +108,11 @@ def run(
     count = (
         os.cpu_count() or 1 if workers is None else count_number("workers", workers, 0, None, InvalidInput)
     )
+    if scheduler is not None and workers is not None:
+        raise InvalidInput("workers: expected none beside a scheduler, which has workers; drop one")
     if limit is not None:
+        if count == 0:
+            raise InvalidInput("limit: expected processes that can be ended, got workers=0; drop one")
         real_number("limit", limit, "seconds above 0", lambda value: value > 0, InvalidInput)
     megabytes = _megabytes(memory, max(1, count))
     with Store(folder, about) as store, reporting(progress, cancel) as report:
@@ -184,6 +188,10 @@ def _declared_types(function: Callable[..., Any]) -> dict[str, Any]:
 
 def _converted(name: str, value: Any, kind: Any) -> Any:
     """Return a value as the type that a function declares: 1e3 is a count, 1 is a length."""
+    if typing.get_origin(kind) is typing.Literal and value not in (choices := typing.get_args(kind)):
+        raise InvalidInput(
+            f"parameter {name!r}: expected one of {', '.join(map(repr, choices))}, got {value!r}"
+        )
     if kind not in CONVERTED or isinstance(value, kind):
         return value
     if kind is int and isinstance(value, float) and value.is_integer():

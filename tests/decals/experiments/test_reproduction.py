@@ -4,10 +4,13 @@ import itertools
 import math
 from pathlib import Path
 
+import numpy as np
+
 import blobtree
 from blobtree import Node, Point
 from decals.experiments import Grid, run
 from decals.experiments.reproduction import MOST_LINES, reproduce_results
+from decals.rendering import Picture
 
 CALLS = itertools.count()
 
@@ -30,6 +33,10 @@ def counts(x: int) -> int:
     return next(CALLS)
 
 
+def drawn(x: int) -> Picture:
+    return Picture(np.full((2, 2, 4), x, np.uint8), {"time": next(CALLS)})
+
+
 def size(tree: Node) -> float:
     return float(blobtree.polygonize(tree, resolution=8).vertices.max())
 
@@ -41,6 +48,8 @@ def test_equal_results(tmp_path: Path) -> None:
     assert found.equal, found
     run(fails, Grid(x=[1, 2]), tmp_path / "b", workers=0)
     assert reproduce_results(tmp_path / "b", fails, workers=0).equal
+    run(drawn, Grid(x=[1, 2]), tmp_path / "c", workers=0)
+    assert reproduce_results(tmp_path / "c", drawn, workers=0).equal
 
 
 def test_differences_are_named(tmp_path: Path) -> None:

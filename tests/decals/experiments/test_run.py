@@ -329,6 +329,10 @@ def test_wrong_measures_fail_alone(tmp_path: Path) -> None:
     [
         ((functions.measured, Grid(y=[1])), r"the design gives y, but the function takes \(x: int"),
         ((functions.measured, Grid(x=["many"])), "parameter 'x': expected int, got 'many'"),
+        (
+            (functions.chosen, Grid(kind=["big", "tall"])),
+            "parameter 'kind': expected one of 'big', 'small', got",
+        ),
         ((functions.measured, [1]), "design: expected a design"),
         ((3, DESIGN), "function: expected a function"),
         ((lambda status: 1, Grid(status=[1])), "parameter 'status': the name of a column"),
@@ -348,6 +352,8 @@ def test_wrong_arguments_are_refused(tmp_path: Path, arguments: Any, words: str)
         ({"workers": -1}, "workers: expected a whole number"),
         ({"limit": 0}, "limit: expected seconds above 0"),
         ({"memory": -1}, "memory: expected gigabytes above 0"),
+        ({"limit": 5, "workers": 0}, "limit: expected processes"),
+        ({"scheduler": "tcp://127.0.0.1:1", "workers": 2}, "workers: expected none beside a scheduler"),
     ],
 )
 def test_wrong_options_are_refused(tmp_path: Path, options: Any, words: str) -> None:
