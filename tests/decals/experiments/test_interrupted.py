@@ -27,6 +27,11 @@ if __name__ == "__main__":
     run(functions.slow, Grid(x=range(40)), sys.argv[1], workers=2)
 """
 
+ROOT = Path(__file__).parents[3]
+
+ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [*sys.path, str(ROOT)]))}
+"""Environment of scripts that import these tests."""
+
 
 def rows(results: Results) -> list[Any]:
     return [(row["x"], row["status"], row["result"]) for row in results.rows]
@@ -39,10 +44,13 @@ def test_killed_runs_resume_to_the_same_table(tmp_path: Path) -> None:
     script.write_text(SCRIPT)
     clock = random.Random(7)
     for _ in range(4):
-        child = subprocess.Popen([sys.executable, script, tmp_path / "out"], stderr=subprocess.DEVNULL)
+        child = subprocess.Popen(
+            [sys.executable, script, tmp_path / "out"], env=ENVIRONMENT, stderr=subprocess.DEVNULL
+        )
         time.sleep(clock.uniform(0.5, 4.0))
         child.kill()
-        child.wait()
+        assert child.wait() in (0, -signal.SIGKILL)
+    assert (tmp_path / "out" / "experiment.json").exists()
     results = run(functions.slow, Grid(x=range(40)), tmp_path / "out", workers=2)
     assert rows(results) == expected
 
@@ -58,7 +66,8 @@ def test_a_trial_in_which_this_process_ended_runs_in_another_one(tmp_path: Path)
         "    run(functions.ends, Grid(x=[0, 1, 2, 3], folder=sys.argv[1:]), 'out', workers=0)\n"
     )
     for code in (-signal.SIGKILL, -signal.SIGKILL, 0):
-        assert subprocess.run([sys.executable, script, tmp_path], cwd=tmp_path).returncode == code
+        ended = subprocess.run([sys.executable, script, tmp_path], cwd=tmp_path, env=ENVIRONMENT)
+        assert ended.returncode == code
     found = {
         row["x"]: (row["status"], row["error"], row.get("result")) for row in Results(tmp_path / "out").rows
     }
