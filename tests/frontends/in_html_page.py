@@ -637,8 +637,8 @@ def with_rows(scene: Scene, rows: list[Any]) -> Scene:
 async def accessible(page: Page) -> None:
     """Make sure that axe-core finds nothing in the page."""
     found = find_spec("axe_playwright_python")
-    assert found is not None
-    assert found.origin is not None, "pip install axe-playwright-python"
+    assert found is not None, "pip install axe-playwright-python"
+    assert found.origin is not None
     await page.evaluate((Path(found.origin).parent / "axe.min.js").read_text(encoding="utf-8"))
     violations = await page.evaluate("axe.run().then(result => result.violations)")
     assert violations == [], [item["id"] for item in violations]
