@@ -38,7 +38,7 @@ def groups(keys: Int64Array) -> tuple[Int64Array, Int64Array, Int64Array]:
 
 
 def distinct_numbers(numbers: Int64Array, count: int) -> Int64Array:
-    """Return the distinct ones of numbers from 0 to below a count, in order."""
+    """Return each of some numbers once, in order; all are from 0 to below `count`."""
     marked = np.zeros(count, np.bool_)
     marked[numbers.reshape(-1)] = True
     return np.flatnonzero(marked)

@@ -1,4 +1,4 @@
-"""Samples of falloffs: where one is half and steepest, and whether it falls from 1 to 0."""
+"""Samples of a falloff: where it is ½, where it is steepest, and whether it falls from 1 to 0."""
 
 from collections.abc import Callable
 from functools import partial

@@ -244,7 +244,8 @@ def result_of(
     except Exception as error:  # the function is the user's own
         raise source.refusal(f"for {where()} it fails: {type(error).__name__}: {error}") from error
     if result.shape != (size,) or not np.isfinite(result).all():
-        raise source.refusal(f"for {where()} it returns {shown(result)}; expected {size} finite numbers")
+        wanted = "a finite number" if size == 1 else f"{size} finite numbers"
+        raise source.refusal(f"for {where()} it returns {shown(result)}; expected {wanted}")
     return result
 
 

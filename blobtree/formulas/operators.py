@@ -323,7 +323,7 @@ class Operator:
     partials: wp.Function
     slope: wp.Function
     like: Like | None
-    """None for anything else; F is 0 where both operands are."""
+    """None for other operators; F is 0 where both operands are 0."""
     range: Any = None
     choice: Any = None
     commutes: bool = True

@@ -132,7 +132,7 @@ def find_owners(
     values: wp.array(dtype=wp.float32),
     owners: wp.array(dtype=wp.int32),
 ) -> None:
-    """Write the nearest primitive at samples of listed blocks of a level; −1 outside, and for single ones.
+    """Write the nearest primitive at samples of listed blocks of a level; −1 outside or without a second one.
 
     It is −1 as well where the slope of the field proves that no edge of the sample leaves the inside.
     """

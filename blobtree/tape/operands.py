@@ -28,7 +28,7 @@ class Operand:
     tool: bool
     """True if it is removed from others."""
     meets: bool
-    """True if only what it has in common with others is left."""
+    """True for an operand of an intersection, of which the part that all operands share is left."""
 
     @property
     def faces_itself(self) -> bool:

@@ -221,7 +221,7 @@ def _imported(function: FunctionType) -> Iterator[ModuleType]:
         for level, _, imported in zip(instructions, instructions[1:], instructions[2:], strict=False):
             if imported.opname == "IMPORT_NAME":
                 name = "." * int(level.argval or 0) + str(imported.argval)
-                with suppress(Exception):  # of the user's module, whatever it is; the trial shows it
+                with suppress(Exception):  # of any kind, as the module is the user's; the trial shows it
                     yield from _own_module(name, package)
 
 

@@ -66,7 +66,7 @@ def reproduce_results(
         return Reproduction((f"the function {before.name!r}: a folder of results has its digest alone",))
     if fingerprint(function) != before.function:
         return Reproduction((f"the function {before.name!r} as it was: it has changed since",))
-    rows = [row for row in before.rows if row["function"] == before.function]
+    rows = [row for row in before.rows if row.get("function") == before.function]
     trials = [_trial(function, row, before.parameters) for row in rows]
     known = [trial for trial in trials if trial is not None]
     if lost := len(trials) - len(known):
@@ -86,7 +86,9 @@ def reproduce_results(
 
 def _trial(function: Callable[..., Any], row: Row, names: list[str]) -> Trial | None:
     """Return the parameters of a row; None if they are not those that its trial had."""
-    for values in ({name: row.get(name) for name in names}, {name: row[name] for name in _given(row, names)}):
+    every = {name: row.get(name) for name in names}
+    given = {name: value for name, value in every.items() if value is not None}
+    for values in (every, given):
         try:
             (trial,) = fitted(function, Design([values]))
         except InvalidInput:  # parameters that the trial did not have
@@ -94,11 +96,6 @@ def _trial(function: Callable[..., Any], row: Row, names: list[str]) -> Trial | 
         if trial_hash(trial) == row["trial"]:
             return trial
     return None
-
-
-def _given(row: Row, names: list[str]) -> Iterator[str]:
-    """Yield the names of parameters that a row has."""
-    return (name for name in names if row.get(name) is not None)
 
 
 def _changes(before: Row, after: Row, names: list[str], results: Results) -> Iterator[str]:
@@ -111,5 +108,9 @@ def _changes(before: Row, after: Row, names: list[str], results: Results) -> Ite
 
 
 def _provenance(row: Row) -> dict[str, Any]:
-    record: dict[str, Any] = json.loads(row.get("provenance") or "{}")
-    return record
+    """Return the provenance of a row; nothing for a damaged one."""
+    try:
+        record = json.loads(row.get("provenance") or "{}")
+    except (TypeError, ValueError):
+        record = None
+    return record if isinstance(record, dict) else {}

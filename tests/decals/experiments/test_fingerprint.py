@@ -1,4 +1,4 @@
-"""Digests of functions: whatever a function of the user depends on changes them, and nothing else does."""
+"""Digests of functions change with all code and values that a function depends on, and with nothing else."""
 
 import importlib
 import os

@@ -1,6 +1,7 @@
 """Results that are made again in another folder."""
 
 import itertools
+import json
 import math
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import numpy as np
 
 import blobtree
 from blobtree import Node, Point
-from decals.experiments import Grid, run
+from decals.experiments import Grid, Results, run
 from decals.experiments.reproduction import MOST_LINES, reproduce_results
 from decals.rendering import Picture
 
@@ -59,6 +60,18 @@ def test_differences_are_named(tmp_path: Path) -> None:
     assert len(found.differences) == MOST_LINES + 1
     assert found.differences[0].startswith("x = 0: result is ")
     assert found.differences[-1] == "and 5 more"
+
+
+def test_damaged_provenance_is_left_out(tmp_path: Path) -> None:
+    run(fails, Grid(x=[1]), tmp_path, workers=0)
+    (row,) = Results(tmp_path).rows
+    for shard in (tmp_path / "rows").iterdir():
+        shard.unlink()
+    for provenance in ("no JSON", "[1]", "3"):
+        (tmp_path / "journal.jsonl").write_text(json.dumps(row | {"provenance": provenance}) + "\n")
+        found = reproduce_results(tmp_path, fails, workers=0)
+        assert found.equal
+        assert found.circumstances
 
 
 def test_what_is_missing_is_named(tmp_path: Path) -> None:
