@@ -43,20 +43,22 @@ def check_warp(source: Formula, parameters: tuple[Parameter, ...], claims: WarpC
     """Raise `InvalidDefinition` if samples contradict a claim, or the Jacobian is singular at one."""
     rng = np.random.default_rng(SEED)
     for trial, points in trials(source, parameters, 3, claims.extent, POINTS, rng):
-        _try_single_precision(trial, points)
-        jacobians = [_jacobian(trial, q, STEP * claims.extent) for q in points]
+        images = np.array([trial.at(q) for q in points])
+        _try_single_precision(trial, points, images)
+        step = STEP * claims.extent
+        jacobians = [_jacobian(trial, q, image, step) for q, image in zip(points, images, strict=True)]
         smooth = [(q, j) for q, j in zip(points, jacobians, strict=True) if j is not None]
         _try_determinants(trial, smooth)
         if claims.pullback is not None:
             _try_pullback(trial, smooth, claims.pullback, rng)
-        _try_stretch(trial, points, smooth, claims, rng)
+        _try_stretch(trial, points, images, smooth, claims, rng)
         numbers = tuple(float(x) for item in parameters for x in item.components(trial.values[item.name]))
         _try_box(trial, claims, numbers, rng)
 
 
-def _try_single_precision(trial: Trial, points: Float64Array) -> None:
-    for q in points:
-        double, single = trial.at(q), trial.at(q, np.float32)
+def _try_single_precision(trial: Trial, points: Float64Array, images: Float64Array) -> None:
+    for q, double in zip(points, images, strict=True):
+        single = trial.at(q, np.float32)
         if np.abs(single - double).max() > SINGLE_TOLERANCE * (1.0 + np.abs(double).max()):
             raise trial.source.refusal(
                 f"for q = {shown(q)} it returns {shown(single)} in single precision, {shown(double)} in "
@@ -96,6 +98,7 @@ def _try_pullback(
 def _try_stretch(
     trial: Trial,
     points: Float64Array,
+    images: Float64Array,
     smooth: list[tuple[Float64Array, Float64Array]],
     claims: WarpClaims,
     rng: np.random.Generator,
@@ -108,9 +111,10 @@ def _try_stretch(
                 f"stretch: the norm of its Jacobian at q = {shown(q)} is {norm:.6g}, more than "
                 f"{bound:.6g}{trial.with_values}"
             )
-    for q, other in zip(points, rng.permutation(points), strict=True):
+    others = rng.permutation(len(points))
+    for q, image, other, other_image in zip(points, images, points[others], images[others], strict=True):
         apart = float(np.linalg.norm(other - q))
-        moved, bound = float(np.linalg.norm(trial.at(other) - trial.at(q))), 0.0
+        moved, bound = float(np.linalg.norm(other_image - image)), 0.0
         if apart > 0.0:
             bound = trial.bound(claims.stretch, q, apart)
         if moved > bound * apart * (1.0 + SLOPE_TOLERANCE) + SLOPE_TOLERANCE:
@@ -134,11 +138,10 @@ def _try_box(trial: Trial, claims: WarpClaims, numbers: tuple[float, ...], rng: 
             )
 
 
-def _jacobian(trial: Trial, q: Float64Array, step: float) -> Float64Array | None:
-    """Return the Jacobian by differences; None at a kink."""
-    here = trial.at(q)
-    right = np.stack([trial.at(q + step * axis) - here for axis in np.eye(3)], axis=1) / step
-    left = np.stack([here - trial.at(q - step * axis) for axis in np.eye(3)], axis=1) / step
+def _jacobian(trial: Trial, q: Float64Array, image: Float64Array, step: float) -> Float64Array | None:
+    """Return the Jacobian at a point with this image by differences; None at a kink."""
+    right = np.stack([trial.at(q + step * axis) - image for axis in np.eye(3)], axis=1) / step
+    left = np.stack([image - trial.at(q - step * axis) for axis in np.eye(3)], axis=1) / step
     middle = 0.5 * (right + left)
     smooth = np.abs(right - left).max() <= 20.0 * SLOPE_TOLERANCE * (1.0 + np.abs(middle).max())
     return middle if smooth else None

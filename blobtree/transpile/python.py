@@ -93,18 +93,22 @@ _MATHS: dict[str, Callable[..., Any]] = {
 """NumPy's functions by the names that Warp gives them, for all that GLSL shares (`builtins`)."""
 
 
+_WHOLE = (int, np.integer)
+
+
 def divide(a: Any, b: Any) -> Any:
     """Return a / b as devices compute it: integers are truncated, and division by 0 is no error."""
-    if isinstance(a, int | np.integer) and isinstance(b, int | np.integer):
-        return int(np.trunc(a / b)) if b else 0
-    return np.divide(a, b)
+    if not (isinstance(a, _WHOLE) and isinstance(b, _WHOLE)):
+        return np.divide(a, b)
+    size = abs(int(a)) // abs(int(b)) if b else 0
+    return size if (a < 0) == (b < 0) else -size
 
 
 def remainder(a: Any, b: Any) -> Any:
     """Return a % b as devices compute it: with the sign of a."""
-    if isinstance(a, int | np.integer) and isinstance(b, int | np.integer):
-        return a - b * divide(a, b)
-    return np.fmod(a, b)
+    if not (isinstance(a, _WHOLE) and isinstance(b, _WHOLE)):
+        return np.fmod(a, b)
+    return a - b * divide(a, b)
 
 
 MAX_LOOP_TURNS = 65_535
