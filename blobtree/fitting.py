@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array, IndexArray
+from blobtree.declare.parameters import Quantity
 from blobtree.errors import InvalidNode, InvalidPoints
 from blobtree.formulas.falloff import ISO
 from blobtree.nodes.node import Node
@@ -25,7 +26,6 @@ from blobtree.nodes.numeric_parameters import (
     with_numeric_values,
 )
 from blobtree.nodes.parameter_gradient import gradient_sensitivities, parameter_gradient_of
-from blobtree.nodes.parameters import Quantity
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import checked_tree, gradients_at
 from blobtree.validation import items, point_array, positive_count, positive_number, real, shown

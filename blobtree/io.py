@@ -26,13 +26,14 @@ from blobtree.custom.operator import CustomCombination
 from blobtree.custom.skeleton import CustomPrimitive
 from blobtree.custom.warp import CustomWarp
 from blobtree.declare.falloff import Falloff
+from blobtree.declare.parameters import OPTIONAL, fields_of
 from blobtree.errors import ImplicitDecalsError, InvalidFile, UnusableFile
 from blobtree.files import write_atomically
 from blobtree.json_errors import json_reason
 from blobtree.nodes.attributes import Attributes, AttributeValue
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.node import Node
-from blobtree.nodes.values import OPTIONAL, fields_of, left_out, operand_names
+from blobtree.nodes.values import left_out, operand_names
 from blobtree.tape.model import checked_tree
 from blobtree.tape.program import postorder
 from blobtree.validation import Vector, shown

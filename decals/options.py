@@ -16,7 +16,7 @@ from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from blobtree.colors import Rgb, Rgba, color_rgb
-from blobtree.nodes.parameters import with_parameters
+from blobtree.declare.parameters import with_parameters
 from blobtree.validation import truth
 from decals.errors import InvalidInput
 from decals.validation import describe, member, number_of, one_of, whole_number

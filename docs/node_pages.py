@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from blobtree import Node
-from blobtree.formulas.operators import Support
+from blobtree.declare.claims import Support
+from blobtree.declare.parameters import OPTIONAL, describe, fields_of, parameters_of
 from blobtree.nodes.convolution import ConvolutionPrimitive
 from blobtree.nodes.kinds import NODE_KINDS
-from blobtree.nodes.parameters import describe, parameters_of
 from blobtree.nodes.primitives import Primitive, Profile
 from blobtree.nodes.tree import Combination, Macro
-from blobtree.nodes.values import OPTIONAL, fields_of
 
 DOCS = Path(__file__).parent
 CLASSES = {kind.__name__: kind for kind in NODE_KINDS.values()}

@@ -8,7 +8,8 @@ from tests.import_graph import module_graph
 
 EXTRAS: dict[str, str] = {
     "blobtree": "field_slice fitting",
-    "blobtree.custom": "bounds_kernels checks field_checks operator_checks skeleton_checks warp_checks",
+    "blobtree.custom": "bounds_kernels field_checks skeleton_checks warp_checks",
+    "blobtree.declare": "checks operator_checks",
     "blobtree.derivatives": "*",
     "blobtree.formulas": """
         blends contact convolution curve_skeletons deformations direct_fields falloffs flat_skeletons

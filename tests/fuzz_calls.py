@@ -11,9 +11,9 @@ import pyvista as pv
 import blobtree
 import decals
 from blobtree import Node, Point
+from blobtree.declare.parameters import fields_of
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.paths import primitive_paths
-from blobtree.nodes.values import fields_of
 from blobtree.progress import reporting
 from decals import editing, rendering, scattering
 from decals.editing import EditSession

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from blobtree.nodes.parameters import parameters_of
+from blobtree.declare.parameters import parameters_of
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.sandbox.controls import exchanged
 from decals.editing.commands import MoveDecals, SetValues

@@ -10,8 +10,8 @@ from typing import Any, Self
 from blobtree import Node
 from blobtree.colors import Rgb, Rgba
 from blobtree.declare.falloff import Falloff
+from blobtree.declare.parameters import UNITS, Parameter, Quantity, describe, parameters_of
 from blobtree.formulas.falloffs import FALLOFF_NAMES
-from blobtree.nodes.parameters import UNITS, Parameter, Quantity, describe, parameters_of
 from blobtree.transpile.python import plain_python
 from decals.editing.new_nodes import alternatives
 from decals.errors import InvalidEdit

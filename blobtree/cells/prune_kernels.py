@@ -8,8 +8,9 @@ the same value, gradient and colour as the whole one.
 
 import warp as wp
 
+from blobtree.declare.claims import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT
 from blobtree.formulas.falloff import falloff_range
-from blobtree.formulas.operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OPERATORS, SUM
+from blobtree.formulas.operators import OPERATORS, SUM
 from blobtree.formulas.skeletons import (
     HALF_DIAGONAL,
     POINT,

@@ -10,9 +10,9 @@ import numpy as np
 import warp as wp
 
 from blobtree.declare.formula import Formula, class_name, formula_of, spelled
+from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.declare.registry import Definitions
 from blobtree.nodes.node import Node
-from blobtree.nodes.parameters import Parameter, Quantity
 from blobtree.nodes.tree import AssociativeCombination
 
 _SIZES: dict[Any, int] = {

@@ -30,9 +30,9 @@ from blobtree.custom.definition import (
 )
 from blobtree.custom.field_checks import FieldClaims, check_field
 from blobtree.declare.formula import Formula, generated, kind_name, returned_type
+from blobtree.declare.parameters import Parameter
 from blobtree.formulas.fields import FieldKind
 from blobtree.nodes.fields import BoxedField
-from blobtree.nodes.parameters import Parameter
 from blobtree.transpile.derivative import partial_derivatives
 from blobtree.validation import Vector, positive_number
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from blobtree._typing import Float64Array
-from blobtree.custom.checks import SEED, SLOPE_TOLERANCE, VALUE_TOLERANCE, Trial, trials
+from blobtree.declare.checks import SEED, SLOPE_TOLERANCE, VALUE_TOLERANCE, Trial, trials
 from blobtree.declare.formula import Formula, shown
-from blobtree.nodes.parameters import Parameter
+from blobtree.declare.parameters import Parameter
 
 POINTS = 40
 """Points per set of parameters."""

@@ -19,15 +19,10 @@ from typing import Any, get_args
 import warp as wp
 
 from blobtree.custom.definition import CustomNode, Limits, custom_parameters, defined_kind
-from blobtree.custom.operator_checks import Claims, check_directed_operator, check_operator
+from blobtree.declare.claims import UNBOUNDED, Like, OperatorRow, widened_range
 from blobtree.declare.formula import Formula, derived, formula_of, generated, kind_name, returned_type
-from blobtree.formulas.operators import (
-    UNBOUNDED,
-    Like,
-    Operator,
-    widened_range,
-)
-from blobtree.nodes.parameters import Parameter
+from blobtree.declare.operator_checks import Claims, check_directed_operator, check_operator
+from blobtree.declare.parameters import Parameter
 from blobtree.nodes.tree import AssociativeCombination
 from blobtree.tape.data_region import TEXEL
 from blobtree.transpile.derivative import directional_derivative
@@ -314,7 +309,7 @@ def {name}(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: wp.array(dtype=w
 '''
 
 
-def _directed_row(kind: str, digest: str, source: Formula, claims: Claims) -> Operator:
+def _directed_row(kind: str, digest: str, source: Formula, claims: Claims) -> OperatorRow:
     """Return the row of an operator that reads gradients."""
     shape, envelope, function = _SHAPES[claims.like], claims.steepest, source.function
     assert isinstance(envelope, Formula)
@@ -324,7 +319,7 @@ def _directed_row(kind: str, digest: str, source: Formula, claims: Claims) -> Op
     texts |= _slots(len(source.parameters) - 4)
     scope: dict[str, Any] = {function.key: function, envelope.function.key: envelope.function}
     scope |= {"UNBOUNDED": UNBOUNDED, "widened_range": widened_range}
-    return Operator(
+    return OperatorRow(
         kind,
         generated(kind, digest, "partials", _DIRECTED_PARTIALS, scope, **texts),
         generated(kind, digest, "slope", _DIRECTED_SLOPE, scope, **texts),
@@ -347,7 +342,7 @@ def _slots(count: int) -> dict[str, str]:
     return {"tape": ", tape: wp.array(dtype=wp.vec4)", "passed": ", tape", "extra": "".join(readings)}
 
 
-def _row(kind: str, digest: str, source: Formula, claims: Claims) -> Operator:
+def _row(kind: str, digest: str, source: Formula, claims: Claims) -> OperatorRow:
     """Return the row of the table, with functions generated around the user's."""
     shape, bound, function = _SHAPES[claims.like], claims.steepest, source.function
     texts = _slots(len(source.parameters) - 2) | {"absent": shape.absent, "function": function.key}
@@ -360,7 +355,7 @@ def _row(kind: str, digest: str, source: Formula, claims: Claims) -> Operator:
     partials = generated(kind, digest, "partials", _PARTIALS, scope, **texts)
     texts["partials"] = partials.key
     scope[partials.key] = partials
-    return Operator(
+    return OperatorRow(
         kind,
         partials,
         generated(kind, digest, "slope", _SLOPE, scope, **texts),

@@ -35,9 +35,9 @@ from blobtree.custom.definition import (
 )
 from blobtree.custom.skeleton_checks import check_skeleton
 from blobtree.declare.formula import Formula, generated, kind_name
+from blobtree.declare.parameters import Color, Parameter, Radius
 from blobtree.errors import InvalidNode
 from blobtree.formulas.skeletons import Skeleton, min_influence_of_one
-from blobtree.nodes.parameters import Color, Parameter, Radius
 from blobtree.nodes.primitives import DEFAULT_COLOR, INFLUENCE_SLOT, Primitive
 from blobtree.tape.program import ProgramPrimitive
 from blobtree.validation import Vector

@@ -7,9 +7,9 @@ import numpy as np
 
 from blobtree._typing import Float64Array
 from blobtree.custom.bounds_kernels import FARTHEST
-from blobtree.custom.checks import SEED, TRIALS, Trial, trial_value
+from blobtree.declare.checks import SEED, TRIALS, Trial, trial_value
 from blobtree.declare.formula import Formula, shown
-from blobtree.nodes.parameters import Parameter
+from blobtree.declare.parameters import Parameter
 
 POINTS = 80
 """Query points per set, besides the vectors among the parameters and the points between them."""

@@ -36,10 +36,10 @@ from blobtree.custom.definition import (
 )
 from blobtree.custom.warp_checks import WarpClaims, check_warp
 from blobtree.declare.formula import Formula, generated, kind_name
+from blobtree.declare.parameters import Parameter
 from blobtree.errors import InvalidNode
 from blobtree.formulas.warps import SpaceWarp
 from blobtree.nodes.node import Node
-from blobtree.nodes.parameters import Parameter
 from blobtree.nodes.tree import Placed
 from blobtree.transpile.derivative import partial_derivatives
 from blobtree.validation import positive_number

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from blobtree._typing import Box, Float64Array
-from blobtree.custom.checks import SEED, SLOPE_TOLERANCE, Trial, trials
+from blobtree.declare.checks import SEED, SLOPE_TOLERANCE, Trial, trials
 from blobtree.declare.formula import Formula, shown
-from blobtree.nodes.parameters import Parameter
+from blobtree.declare.parameters import Parameter
 
 POINTS = 30
 """Points per set of parameters."""

@@ -6,13 +6,9 @@ converted, and each function states how. Operators with several parameters read 
 
 import warp as wp
 
+from blobtree.declare.claims import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OperatorRow, widened_range
 from blobtree.declare.registry import library_rows
 from blobtree.formulas.operators import (
-    KEEP_BOTH,
-    KEEP_LEFT,
-    KEEP_NONE,
-    KEEP_RIGHT,
-    Operator,
     difference_partials,
     extremum_slope,
     intersection_partials,
@@ -20,7 +16,6 @@ from blobtree.formulas.operators import (
     ricci_norm,
     ricci_partials,
     union_partials,
-    widened_range,
 )
 from blobtree.texels import Texels
 
@@ -490,7 +485,7 @@ def deepest_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
 
 # -- the table ------------------------------------------------------------------------------------------
 
-SUPERELLIPTIC = Operator(
+SUPERELLIPTIC = OperatorRow(
     "superelliptic",
     superelliptic_partials,
     superelliptic_slope,
@@ -498,8 +493,8 @@ SUPERELLIPTIC = Operator(
     choice=superelliptic_choice,
     monotone=True,
 )
-R_UNION = Operator("r_union", r_union_partials, r_union_slope, "blend", commutes=False, monotone=True)
-R_INTERSECTION = Operator(
+R_UNION = OperatorRow("r_union", r_union_partials, r_union_slope, "blend", commutes=False, monotone=True)
+R_INTERSECTION = OperatorRow(
     "r_intersection",
     r_intersection_partials,
     r_intersection_slope,
@@ -507,14 +502,14 @@ R_INTERSECTION = Operator(
     commutes=False,
     monotone=True,
 )
-R_DIFFERENCE = Operator(
+R_DIFFERENCE = OperatorRow(
     "r_difference",
     r_difference_partials,
     r_difference_slope,
     "difference",
     commutes=False,
 )
-SMOOTH_INTERSECTION = Operator(
+SMOOTH_INTERSECTION = OperatorRow(
     "smooth_intersection",
     smooth_intersection_partials,
     smooth_intersection_slope,
@@ -523,7 +518,7 @@ SMOOTH_INTERSECTION = Operator(
     commutes=False,
     monotone=True,
 )
-SMOOTH_DIFFERENCE = Operator(
+SMOOTH_DIFFERENCE = OperatorRow(
     "smooth_difference",
     smooth_difference_partials,
     smooth_difference_slope,
@@ -532,7 +527,7 @@ SMOOTH_DIFFERENCE = Operator(
     smooth_difference_choice,
     commutes=False,
 )
-CLEAN_UNION = Operator(
+CLEAN_UNION = OperatorRow(
     "clean_union",
     clean_union_partials,
     clean_union_slope,
@@ -541,7 +536,7 @@ CLEAN_UNION = Operator(
     commutes=False,
     monotone=True,
 )
-CONTROLLABLE = Operator(
+CONTROLLABLE = OperatorRow(
     "controllable",
     controllable_partials,
     controllable_slope,
@@ -550,7 +545,7 @@ CONTROLLABLE = Operator(
     commutes=False,
     monotone=True,
 )
-MASKED = Operator(
+MASKED = OperatorRow(
     "masked",
     masked_partials,
     masked_slope,
@@ -560,7 +555,7 @@ MASKED = Operator(
     monotone=True,
 )
 
-DEEPEST = Operator(
+DEEPEST = OperatorRow(
     "deepest",
     intersection_partials,
     extremum_slope,

@@ -17,8 +17,8 @@ can reach ½.
 
 import warp as wp
 
+from blobtree.declare.claims import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, OperatorRow
 from blobtree.declare.registry import library_rows
-from blobtree.formulas.operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, Operator
 from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
@@ -202,7 +202,7 @@ def rated_union_choice(a: wp.vec2, b: wp.vec2, ratio: wp.float32) -> wp.int32:
     return KEEP_BOTH
 
 
-PRESS = Operator(
+PRESS = OperatorRow(
     "press",
     press_partials,
     press_slope,
@@ -212,7 +212,7 @@ PRESS = Operator(
     commutes=False,
     paints=False,
 )
-BULGE = Operator(
+BULGE = OperatorRow(
     "bulge",
     bulge_partials,
     press_slope,
@@ -222,7 +222,7 @@ BULGE = Operator(
     commutes=False,
     paints=False,
 )
-RATED_UNION = Operator(
+RATED_UNION = OperatorRow(
     "rated_union",
     rated_union_partials,
     rated_union_slope,

@@ -1,4 +1,4 @@
-"""Blends that read the gradients of their operands: rows of operators with `Operator.gradients`.
+"""Blends that read the gradients of their operands: rows of operators with `OperatorRow.gradients`.
 
 Their functions have more parameters behind the usual ones. `partials` gets the directions ∇a and ∇b, and
 returns ∂F/∂a and ∂F/∂b for fixed directions. `slope` gets a bound on the speed at which the angle between the
@@ -7,7 +7,8 @@ directions changes, in radians per unit; it is `UNBOUNDED` where none is known.
 
 import warp as wp
 
-from blobtree.formulas.operators import UNBOUNDED, Operator, union_partials, widened_range
+from blobtree.declare.claims import UNBOUNDED, OperatorRow, widened_range
+from blobtree.formulas.operators import union_partials
 from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
@@ -137,7 +138,7 @@ def gradient_blend_range(a: wp.vec2, b: wp.vec2, parameter: wp.float32, tape: Te
     return widened_range(wp.max(a[0], b[0]), 0.75 * total + 0.25 * gap * (gap / total))
 
 
-GRADIENT_BLEND = Operator(
+GRADIENT_BLEND = OperatorRow(
     "gradient_blend",
     gradient_blend_partials,
     gradient_blend_slope,

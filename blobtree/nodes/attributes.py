@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, cast
 
+from blobtree.declare.parameters import CHECKS, Quantity
 from blobtree.errors import InvalidNode
 from blobtree.validation import finite_number, shown
 
@@ -72,3 +73,6 @@ def _value(name: str, value: object) -> AttributeValue:
     if not 1 <= len(numbers) <= LONGEST_VECTOR:
         raise InvalidNode(f"{name}: expected a number, up to three numbers or a label, got {shown(value)}")
     return tuple(finite_number(name, number) for number in numbers)
+
+
+CHECKS[Quantity.ATTRIBUTES] = checked_attributes

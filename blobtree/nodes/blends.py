@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from blobtree._typing import Float64Array
+from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.errors import InvalidNode
 from blobtree.formulas.blends import (
     CLEAN_UNION,
@@ -23,7 +24,6 @@ from blobtree.formulas.blends import (
 from blobtree.formulas.gradient_blends import GRADIENT_BLEND
 from blobtree.lazy import Lazy
 from blobtree.nodes.node import Node
-from blobtree.nodes.parameters import Parameter, Quantity
 from blobtree.nodes.tree import (
     EXPONENT,
     AssociativeCombination,

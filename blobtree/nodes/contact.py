@@ -11,6 +11,7 @@ from typing import Annotated, Any, Self, cast
 import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array
+from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.errors import InvalidNode
 from blobtree.formulas.contact import (
     BULGE,
@@ -24,7 +25,6 @@ from blobtree.meshing.clip import clipped, enclosed_volume, outlines_of
 from blobtree.meshing.mesh import Mesh
 from blobtree.meshing.polygonize import polygonize
 from blobtree.nodes.node import Node
-from blobtree.nodes.parameters import Parameter, Quantity
 from blobtree.nodes.tree import Combination, Macro, ManyOperands, Union
 
 LARGEST_RATIO = 100.0

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 
 from blobtree._typing import Box, Float64Array
+from blobtree.declare.parameters import Color, Parameter, Quantity, Radius, parameters_of
 from blobtree.errors import InvalidNode
 from blobtree.formulas.convolution import (
     CONVOLUTION_ARC,
@@ -24,7 +25,6 @@ from blobtree.nodes.curves import Arc, checked_radii
 from blobtree.nodes.fields import FieldPrimitive
 from blobtree.nodes.flats import check_corners, triangle_texels
 from blobtree.nodes.node import Node
-from blobtree.nodes.parameters import Color, Parameter, Quantity, Radius, parameters_of
 from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf, beside
 from blobtree.nodes.tree import (
     Macro,

@@ -9,12 +9,12 @@ from typing import Annotated
 import numpy as np
 
 from blobtree._typing import Float64Array
+from blobtree.declare.parameters import Color, Parameter, Quantity, Radius
 from blobtree.errors import InvalidNode
 from blobtree.formulas.curve_skeletons import ARC, CURVE, JOINED_SEGMENT
 from blobtree.formulas.skeletons import CIRCLE
 from blobtree.lazy import Lazy
 from blobtree.nodes.node import Node
-from blobtree.nodes.parameters import Color, Parameter, Quantity, Radius
 from blobtree.nodes.primitives import (
     DEFAULT_COLOR,
     OPTIONAL_FIELD,

@@ -11,11 +11,11 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from blobtree._typing import Float64Array
+from blobtree.declare.parameters import LARGEST_INTEGER, Parameter, Quantity
 from blobtree.errors import InvalidNode
 from blobtree.formulas.deformations import BEND, CURVE, LIMITED_TWIST, NOISE, SHEAR, STRETCH, TAPER
 from blobtree.formulas.warps import SpaceWarp
 from blobtree.lazy import Lazy
-from blobtree.nodes.parameters import LARGEST_INTEGER, Parameter, Quantity
 from blobtree.nodes.tree import Placed
 from blobtree.validation import Vector
 

@@ -12,12 +12,12 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 
 from blobtree._typing import Box, Float64Array
+from blobtree.declare.parameters import Color, Parameter, Quantity, columns_of, parameters_of
 from blobtree.errors import InvalidNode
 from blobtree.formulas.direct_fields import GYROID, GYROID_SLOPE, NOISE, SUPERQUADRIC
 from blobtree.formulas.falloff import RIM
 from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.noise import MEAN_NOISE_SLOPE
-from blobtree.nodes.parameters import Color, Parameter, Quantity, columns_of, parameters_of
 from blobtree.nodes.primitives import DEFAULT_COLOR, PROFILE, Columns, Leaf, Profile
 from blobtree.tape.program import ProgramField, profile_extent, profile_factor
 from blobtree.validation import Vector

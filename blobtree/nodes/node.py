@@ -15,15 +15,14 @@ from typing import Any, ClassVar, Self, get_type_hints
 import numpy as np
 from numpy.typing import ArrayLike
 
+from blobtree.declare.parameters import documented, fields_of, parameters_of
 from blobtree.declare.registry import NODE_KINDS, kind_of
 from blobtree.errors import InvalidNode
 from blobtree.nodes.model import Model
-from blobtree.nodes.parameters import documented, parameters_of
 from blobtree.nodes.values import (
     children_of,
     content_hash_of,
     equal,
-    fields_of,
     from_records,
     hash_of,
     outline,

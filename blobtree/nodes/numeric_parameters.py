@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float64Array
+from blobtree.declare.parameters import Parameter, Quantity, fields_of, parameters_of
 from blobtree.errors import InvalidNode
-from blobtree.nodes.parameters import Parameter, Quantity, parameters_of
-from blobtree.nodes.values import fields_of, left_out, parameter_values
+from blobtree.nodes.values import left_out, parameter_values
 from blobtree.tape.model import checked_tree
 from blobtree.tape.program import ProgramNode
 from blobtree.validation import finite_numbers, items

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, Float64Array
+from blobtree.declare.parameters import Quantity
 from blobtree.derivatives.sensitivity import sensitivities_at
 from blobtree.errors import InvalidNode
 from blobtree.nodes.numeric_parameters import (
@@ -31,7 +32,6 @@ from blobtree.nodes.numeric_parameters import (
     with_numeric_values,
     without_sharing,
 )
-from blobtree.nodes.parameters import Quantity
 from blobtree.tape.model import ImplicitModel
 from blobtree.tape.program import Instruction, ProgramLeaf, ProgramNode, Run, compile_program
 from blobtree.tape.tape import Tape, compile_tape

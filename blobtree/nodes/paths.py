@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array
+from blobtree.declare.parameters import Quantity, parameters_of
 from blobtree.errors import InvalidNode
 from blobtree.nodes.node import Node
 from blobtree.nodes.numeric_parameters import nodes_with_paths
-from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.primitives import Cone, Leaf, Point, Segment
 from blobtree.nodes.tree import Transform
 from blobtree.nodes.values import operands_of

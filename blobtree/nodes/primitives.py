@@ -16,12 +16,8 @@ import numpy as np
 
 from blobtree._typing import Float64Array
 from blobtree.declare.falloff import Falloff
-from blobtree.formulas.blends import DEEPEST
-from blobtree.formulas.skeletons import BOX, CIRCLE, CONE, DISC, POINT, SEGMENT, Skeleton
-from blobtree.kinds.falloff import WYVILL
-from blobtree.nodes.attributes import NO_ATTRIBUTES, AttributeMapping
-from blobtree.nodes.node import Node
-from blobtree.nodes.parameters import (
+from blobtree.declare.parameters import (
+    OPTIONAL,
     Color,
     Parameter,
     Quantity,
@@ -31,8 +27,12 @@ from blobtree.nodes.parameters import (
     parameters_of,
     unit_vectors,
 )
+from blobtree.formulas.blends import DEEPEST
+from blobtree.formulas.skeletons import BOX, CIRCLE, CONE, DISC, POINT, SEGMENT, Skeleton
+from blobtree.kinds.falloff import WYVILL
+from blobtree.nodes.attributes import NO_ATTRIBUTES, AttributeMapping
+from blobtree.nodes.node import Node
 from blobtree.nodes.tree import AssociativeCombination, Macro, Union
-from blobtree.nodes.values import OPTIONAL
 from blobtree.tape.program import ProgramPrimitive
 from blobtree.validation import Vector
 

@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 
 from blobtree._typing import Float32Array
+from blobtree.declare.parameters import CHECKS, Quantity
 from blobtree.errors import InvalidNode
 from blobtree.identity import content_hash
 from blobtree.lazy import Lazy
@@ -125,3 +126,6 @@ def _check_shape(shape: tuple[int, ...]) -> None:
         raise InvalidNode(f"samples: expected a grid of at least 2 × 2 × 2 numbers, got the shape {shape}")
     if math.prod(shape) > MAX_NUMBERS:
         raise InvalidNode(f"samples: expected at most {MAX_NUMBERS:,} numbers, got {math.prod(shape):,}")
+
+
+CHECKS[Quantity.SAMPLES] = checked_samples

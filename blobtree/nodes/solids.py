@@ -7,11 +7,11 @@ from typing import Annotated, Any
 import numpy as np
 
 from blobtree._typing import Float64Array
+from blobtree.declare.parameters import Color, Parameter, Quantity, unit_vectors
 from blobtree.errors import InvalidNode
 from blobtree.formulas.solid_skeletons import CYLINDER
 from blobtree.lazy import Lazy
 from blobtree.nodes.node import Node
-from blobtree.nodes.parameters import Color, Parameter, Quantity, unit_vectors
 from blobtree.nodes.primitives import (
     DEFAULT_COLOR,
     Columns,

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array
+from blobtree.declare.claims import Support
 from blobtree.errors import InvalidNode
-from blobtree.formulas.operators import Support
 from blobtree.nodes.contact import SolidContact
 from blobtree.nodes.node import Node
 from blobtree.nodes.paths import (

@@ -10,12 +10,12 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
+from blobtree.declare.claims import OperatorRow
+from blobtree.declare.parameters import Parameter, Quantity, fields_of, parameters_of
 from blobtree.errors import InvalidNode
-from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION, Operator
+from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION
 from blobtree.formulas.warps import TWIST, SpaceWarp
 from blobtree.nodes.node import Node
-from blobtree.nodes.parameters import Parameter, Quantity, parameters_of
-from blobtree.nodes.values import fields_of
 from blobtree.tape.program import Placement
 from blobtree.validation import Matrix
 
@@ -47,7 +47,7 @@ class Combination(Node):
     """
 
     combines = True
-    operator: ClassVar[Operator]
+    operator: ClassVar[OperatorRow]
 
     @property
     def operator_parameters(self) -> tuple[float, ...]:

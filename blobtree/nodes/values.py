@@ -5,11 +5,12 @@ functions walk the tree with a list. A shared subtree is compared, hashed and pi
 """
 
 from collections.abc import Callable
-from dataclasses import Field, fields
+from dataclasses import Field
 from itertools import chain
 from operator import attrgetter
 from typing import Annotated, Any, TypeVar, get_origin, get_type_hints
 
+from blobtree.declare.parameters import OPTIONAL, fields_of
 from blobtree.identity import content_hash
 from blobtree.tape.program import ProgramNode, postorder
 
@@ -17,24 +18,11 @@ HASH = "_hash"
 CONTENT_HASH = "_content_hash"
 """Attributes that cache a node's hashes; they are not part of the value."""
 
-OPTIONAL = "optional"
-"""Key in the metadata of a field that comes last, and that texts and files leave out at its default."""
-
 Cached = TypeVar("Cached", int, str)
 
 References = dict[str, int | tuple[int, ...]]
 Record = tuple[type[ProgramNode], dict[str, Any], References]
 """A node's type, its parameters, and the indices of the records of its operands."""
-
-
-_FIELDS: dict[type, tuple["Field[Any]", ...]] = {}
-
-
-def fields_of(kind: type) -> tuple["Field[Any]", ...]:
-    """Return the fields of a class of nodes; those that texts may leave out come last."""
-    if kind not in _FIELDS:
-        _FIELDS[kind] = tuple(sorted(fields(kind), key=lambda field: OPTIONAL in field.metadata))
-    return _FIELDS[kind]
 
 
 def left_out(field: "Field[Any]", value: Any) -> bool:

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Box, Float32Array, Float64Array
+from blobtree.declare.parameters import Color, Parameter, Quantity
 from blobtree.errors import InvalidNode
 from blobtree.formulas.falloff import RIM
 from blobtree.formulas.volumes import VOLUME
 from blobtree.nodes.fields import FieldPrimitive
-from blobtree.nodes.parameters import Color, Parameter, Quantity
 from blobtree.nodes.primitives import DEFAULT_COLOR, Falling
 from blobtree.nodes.samples import MAX_NUMBERS, Samples
 from blobtree.sampling.mesh_distances import grid_points, mesh_distances, triangles_of

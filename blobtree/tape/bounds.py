@@ -6,8 +6,8 @@ from typing import cast
 import numpy as np
 
 from blobtree._typing import Box, Float32Array
+from blobtree.declare.claims import OperatorRow, Support
 from blobtree.formulas.fields import FieldKind
-from blobtree.formulas.operators import Operator, Support
 from blobtree.tape.program import (
     EnterWarp,
     Instruction,
@@ -117,7 +117,7 @@ def field_boxes(placed_fields: list[PlacedPrimitive]) -> Box:
     return middle - half, middle + half
 
 
-def _combine_all(operator: Operator, box: Box, boxes: Box) -> Box:
+def _combine_all(operator: OperatorRow, box: Box, boxes: Box) -> Box:
     """Return a box combined with many, one after the other."""
     if operator.support is Support.LEFT:
         return box
@@ -137,7 +137,7 @@ def _warped(box: Box, entry: EnterWarp) -> Box:
     return placed.min(axis=0), placed.max(axis=0)
 
 
-def _combine(operator: Operator, left: Box, right: Box) -> Box:
+def _combine(operator: OperatorRow, left: Box, right: Box) -> Box:
     """Return the box in which the combination of two fields can differ from 0."""
     if operator.support is Support.LEFT:
         return left

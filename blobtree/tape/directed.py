@@ -18,7 +18,8 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.formulas.operators import OPERATORS, SUM, UNBOUNDED
+from blobtree.declare.claims import UNBOUNDED
+from blobtree.formulas.operators import OPERATORS, SUM
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.dispatch import (
     directed_partials,

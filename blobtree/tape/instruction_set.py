@@ -18,10 +18,11 @@ from typing import Any
 
 import warp as wp
 
+from blobtree.declare.claims import OperatorRow
 from blobtree.declare.falloff import Falloff
 from blobtree.declare.registry import LIBRARY_ROWS, load_libraries
 from blobtree.formulas.fields import FIELDS, FieldKind
-from blobtree.formulas.operators import OPERATORS, Operator
+from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.skeletons import SKELETONS, Skeleton
 from blobtree.formulas.warps import WARPS, SpaceWarp
 from blobtree.kernels import KERNEL_OPTIONS
@@ -31,11 +32,11 @@ from blobtree.tape.dispatch import CORE_TABLES
 from blobtree.transpile.derivative import derivative_along, differentiated
 from blobtree.transpile.specialize import rebind, referenced_values, row_choice, warp_function
 
-Row = Skeleton | Operator | SpaceWarp | FieldKind | Falloff
+Row = Skeleton | OperatorRow | SpaceWarp | FieldKind | Falloff
 
 _ROW_OF_TABLE: dict[str, type[Row]] = {
     "skeletons": Skeleton,
-    "operators": Operator,
+    "operators": OperatorRow,
     "warps": SpaceWarp,
     "fields": FieldKind,
     "falloffs": Falloff,
@@ -53,7 +54,7 @@ class InstructionSet:
     """The rows that codes on a tape stand for; core rows come first, then library rows."""
 
     skeletons: tuple[Skeleton, ...]
-    operators: tuple[Operator, ...]
+    operators: tuple[OperatorRow, ...]
     warps: tuple[SpaceWarp, ...]
     fields: tuple[FieldKind, ...]
     falloffs: tuple[Falloff, ...] = FALLOFFS
@@ -191,7 +192,7 @@ def instruction_set_for(rows: Iterable[Row]) -> InstructionSet:
     if needed.issubset(BUILT_IN.rows):
         return BUILT_IN
     with_library = library()
-    reads_gradients = any(isinstance(row, Operator) and row.gradients for row in needed)
+    reads_gradients = any(isinstance(row, OperatorRow) and row.gradients for row in needed)
     with _LOCK:
         fitting = [
             existing

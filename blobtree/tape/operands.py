@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from blobtree._typing import Float32Array
-from blobtree.formulas.operators import SUM, UNION, Operator, Support
+from blobtree.declare.claims import OperatorRow, Support
+from blobtree.formulas.operators import SUM, UNION
 from blobtree.tape.program import EnterWarp, Instruction, LeaveWarp, Pop, ProgramLeaf, Push, Run
 from blobtree.tape.tape import Tape
 
@@ -77,7 +78,7 @@ class _Value:
         return tuple(replace(part, tool=not part.tool) for part in self.parts)
 
 
-def removes(operator: Operator) -> bool:
+def removes(operator: OperatorRow) -> bool:
     """Return True if the operator removes from its first operand."""
     return operator.support is not Support.EITHER
 

@@ -20,11 +20,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Box, Float64Array, IndexArray
+from blobtree.declare.claims import OperatorRow, Support
 from blobtree.declare.falloff import Falloff
 from blobtree.errors import InvalidNode
 from blobtree.formulas.falloff import RIM
 from blobtree.formulas.fields import FieldKind
-from blobtree.formulas.operators import RICCI, SUM, UNION, Operator, Support
+from blobtree.formulas.operators import RICCI, SUM, UNION
 from blobtree.formulas.skeletons import Skeleton
 from blobtree.formulas.warps import SpaceWarp
 from blobtree.lazy import Lazy
@@ -85,7 +86,7 @@ class ProgramNode:
     """
 
     skeleton: ClassVar[Skeleton | None] = None
-    operator: ClassVar[Operator | None] = None
+    operator: ClassVar[OperatorRow | None] = None
     warp: ClassVar[SpaceWarp | None] = None
     signed = False
     """True for a primitive with a negative weight, whose field is below 0."""
@@ -366,7 +367,7 @@ class Run:
     kind: LeafKind
     stretched: bool
     """True if each primitive carries its inverse map and its profile: maps do not fold into parameters."""
-    operator: Operator
+    operator: OperatorRow
     parameters: tuple[float, ...]
     primitives: list[PlacedPrimitive] = field(default_factory=list)
 
@@ -393,7 +394,7 @@ class Pop:
     """Instruction: combine `register` (left operand) with the accumulator; `swapped` exchanges them."""
 
     register: int
-    operator: Operator
+    operator: OperatorRow
     parameters: tuple[float, ...]
     swapped: bool = False
 
@@ -523,7 +524,7 @@ def _expand_warp(step: _Emit, node: ProgramNode, warp: SpaceWarp) -> Iterator[_E
     yield from (entry, inner, LeaveWarp(entry))
 
 
-def _raised(step: _Emit, operator: Operator, signed: frozenset[int]) -> Iterator[_Emit | Instruction]:
+def _raised(step: _Emit, operator: OperatorRow, signed: frozenset[int]) -> Iterator[_Emit | Instruction]:
     """Yield the steps of an operand, raised to 0 where it is below, if the operator asks for it."""
     yield step
     if not operator.signed and (step.node.signed or id(step.node) in signed):
@@ -589,7 +590,7 @@ def _expand_ordered(
 
 
 def _runs(
-    primitives: Iterable[PlacedPrimitive], operator: Operator, parameters: tuple[float, ...]
+    primitives: Iterable[PlacedPrimitive], operator: OperatorRow, parameters: tuple[float, ...]
 ) -> Iterator[Run]:
     """Yield one run per kind of primitive, in the order in which the kinds first occur."""
     runs: dict[tuple[type[ProgramLeaf], bool], Run] = {}
@@ -613,7 +614,7 @@ def _runs(
     yield from runs.values()
 
 
-def _operation(node: ProgramNode) -> tuple[Operator, tuple[float, ...]]:
+def _operation(node: ProgramNode) -> tuple[OperatorRow, tuple[float, ...]]:
     """Return operator and parameters; a Ricci blend of exponent 1 is the sum (GLSL has no pow(0, 0))."""
     assert node.operator is not None
     if node.operator is RICCI and node.operator_parameters == (1.0,):

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from blobtree import Node
 from blobtree._typing import Float64Array
+from blobtree.declare.parameters import Quantity, parameters_of
 from blobtree.errors import InvalidNode
-from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.paths import Path, node_at, primitive_path
 from blobtree.nodes.places import Place
 

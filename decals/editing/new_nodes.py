@@ -14,11 +14,10 @@ import numpy as np
 from blobtree import InvalidNode, Node
 from blobtree._typing import Float64Array
 from blobtree.custom.definition import CUSTOM_KINDS
+from blobtree.declare.parameters import OPTIONAL, Parameter, Quantity, fields_of, parameters_of
 from blobtree.nodes.kinds import NODE_KINDS
-from blobtree.nodes.parameters import Parameter, Quantity, parameters_of
 from blobtree.nodes.primitives import Leaf
 from blobtree.nodes.tree import AssociativeCombination
-from blobtree.nodes.values import OPTIONAL, fields_of
 from decals.errors import InvalidEdit
 from decals.validation import one_of
 

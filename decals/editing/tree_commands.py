@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from blobtree import ISO, Node
 from blobtree._typing import Float64Array
+from blobtree.declare.parameters import Quantity, parameters_of
 from blobtree.nodes import surgery
 from blobtree.nodes.numeric_parameters import (
     NumericParameter,
@@ -17,7 +18,6 @@ from blobtree.nodes.numeric_parameters import (
     numeric_values,
     with_numeric_values,
 )
-from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.paths import (
     Path,
     mapped,

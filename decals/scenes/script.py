@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 import blobtree
 from blobtree import Node
+from blobtree.declare.parameters import Quantity, fields_of, parameters_of
 from blobtree.files import replacing, write_atomically
-from blobtree.nodes.parameters import Quantity, parameters_of
-from blobtree.nodes.values import fields_of, left_out
+from blobtree.nodes.values import left_out
 from decals.errors import InvalidScene
 from decals.model import COLUMNS, Decals
 from decals.rendering.environment import Environment

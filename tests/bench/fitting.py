@@ -36,7 +36,7 @@ from blobtree import (
     numeric_values,
     with_numeric_values,
 )
-from blobtree.nodes.parameters import Quantity
+from blobtree.declare.parameters import Quantity
 
 PRIMITIVES = 20
 SAMPLES = 10_000

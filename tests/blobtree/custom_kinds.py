@@ -19,7 +19,7 @@ from blobtree import (
     define_warp,
 )
 from blobtree._typing import Float64Array
-from blobtree.nodes.parameters import Parameter, Quantity
+from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.nodes.primitives import Columns
 from blobtree.validation import Vector
 from tests.blobtree.custom.field_kernels import lump, lump_slope, waves, waves_interval, waves_slope

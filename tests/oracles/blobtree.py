@@ -65,9 +65,9 @@ from blobtree import (
     Union,
     Volume,
 )
-from blobtree.formulas.operators import Support
+from blobtree.declare.claims import Support
+from blobtree.declare.parameters import Quantity, parameters_of
 from blobtree.nodes.deformations import Deformation
-from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.primitives import Leaf, Primitive, Profile
 from blobtree.nodes.tree import AssociativeCombination, Macro
 from blobtree.nodes.values import parameter_values

@@ -10,8 +10,8 @@ import pytest
 
 import decals
 from blobtree import Node, Point, Polygon, Twist, define_falloff
+from blobtree.declare.parameters import parameters_of
 from blobtree.formulas.falloffs import FALLOFF_NAMES
-from blobtree.nodes.parameters import parameters_of
 from decals.apps.sandbox.controls import controls_of, hex_color, parsed, parsed_option
 from decals.editing import new_nodes
 from decals.errors import InvalidEdit

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from blobtree.declare.claims import KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OperatorRow, Support
 from blobtree.formulas.blends import BLENDS
 from blobtree.formulas.gradient_blends import GRADIENT_BLEND
-from blobtree.formulas.operators import KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, Operator, Support
 from tests.blobtree.formulas.test_operators import pairs
 from tests.blobtree.transpile.warp_functions import call, python_function
 from tests.oracles import blends as oracle
@@ -31,7 +31,7 @@ EVERY_ROW = pytest.mark.parametrize(("row", "setting"), ROWS, ids=[f"{r.name}-{s
 FALLING = ("smooth_difference", "r_difference")
 
 
-def run(row: Operator, part: str, setting: dict[str, float], **arguments: Any) -> NDArray[Any]:
+def run(row: OperatorRow, part: str, setting: dict[str, float], **arguments: Any) -> NDArray[Any]:
     """Call a function of a row with its parameters, on a tape if there are several."""
     function = getattr(row, part)
     numbers = list(setting.values())
@@ -45,7 +45,7 @@ def run(row: Operator, part: str, setting: dict[str, float], **arguments: Any) -
     return call(function, **arguments, **{name: value for name, value in extra.items() if name in declared})
 
 
-def partials(row: Operator, setting: dict[str, float], a: Floats, b: Floats) -> Floats:
+def partials(row: OperatorRow, setting: dict[str, float], a: Floats, b: Floats) -> Floats:
     return run(row, "partials", setting, a=a, b=b).astype(np.float64)
 
 
@@ -53,21 +53,21 @@ def test_the_table_is_complete() -> None:
     assert set(oracle.VALUES) == {row.name for row in (*BLENDS, GRADIENT_BLEND)}
 
 
-def operands(row: Operator) -> tuple[Floats, Floats]:
+def operands(row: OperatorRow) -> tuple[Floats, Floats]:
     """Pairs of fields; those of a signed row are not positive."""
     a, b = pairs()
     return (-a, -b) if row.signed else (a, b)
 
 
 @EVERY_ROW
-def test_values(row: Operator, setting: dict[str, float]) -> None:
+def test_values(row: OperatorRow, setting: dict[str, float]) -> None:
     a, b = operands(row)
     expected = oracle.VALUES[row.name](a, b, **setting)
     np.testing.assert_allclose(partials(row, setting, a, b)[:, 0], expected, rtol=1e-5, atol=2e-6)
 
 
 @EVERY_ROW
-def test_partials_are_differences(row: Operator, setting: dict[str, float]) -> None:
+def test_partials_are_differences(row: OperatorRow, setting: dict[str, float]) -> None:
     """Away from kinks, where one-sided differences of float64 agree with each other."""
     a, b = operands(row)
     present = np.minimum(np.abs(a), np.abs(b)) > 1e-3
@@ -81,7 +81,7 @@ def test_partials_are_differences(row: Operator, setting: dict[str, float]) -> N
 
 
 @EVERY_ROW
-def test_an_absent_operand(row: Operator, setting: dict[str, float]) -> None:
+def test_an_absent_operand(row: OperatorRow, setting: dict[str, float]) -> None:
     a, _ = operands(row)
     zero = np.zeros_like(a)
     right, left = partials(row, setting, a, zero)[:, 0], partials(row, setting, zero, a)[:, 0]
@@ -91,7 +91,7 @@ def test_an_absent_operand(row: Operator, setting: dict[str, float]) -> None:
 
 
 @EVERY_ROW
-def test_results_are_finite_and_of_one_sign(row: Operator, setting: dict[str, float]) -> None:
+def test_results_are_finite_and_of_one_sign(row: OperatorRow, setting: dict[str, float]) -> None:
     tiny = np.array([0.0, 1e-38, 1e-30, 1e-19, 1e-12, 1e-7, 0.25, 0.5, 1.0, 3.0])
     a, b = (both.ravel() for both in np.meshgrid(tiny, tiny))
     sign = -1.0 if row.signed else 1.0
@@ -101,7 +101,7 @@ def test_results_are_finite_and_of_one_sign(row: Operator, setting: dict[str, fl
 
 
 @EVERY_ROW
-def test_order_matters_where_the_table_says_so(row: Operator, setting: dict[str, float]) -> None:
+def test_order_matters_where_the_table_says_so(row: OperatorRow, setting: dict[str, float]) -> None:
     if not row.commutes:
         return
     a, b = operands(row)
@@ -113,7 +113,7 @@ def test_order_matters_where_the_table_says_so(row: Operator, setting: dict[str,
 
 
 @EVERY_ROW
-def test_ranges_contain_samples_and_choices_are_exact(row: Operator, setting: dict[str, float]) -> None:
+def test_ranges_contain_samples_and_choices_are_exact(row: OperatorRow, setting: dict[str, float]) -> None:
     rng = np.random.default_rng(2)
     ends = np.sort(2.0 * rng.uniform(0.0, 1.0, (2, 1500, 2)) ** 2, axis=2)
     ends[:, ::3] = np.sort(ends[:, ::3, :1] + [0.0, 0.05], axis=2)
@@ -144,7 +144,7 @@ def test_ranges_contain_samples_and_choices_are_exact(row: Operator, setting: di
 
 
 @EVERY_ROW
-def test_no_slope_exceeds_its_bound(row: Operator, setting: dict[str, float]) -> None:
+def test_no_slope_exceeds_its_bound(row: OperatorRow, setting: dict[str, float]) -> None:
     """|∂F/∂a ∇a + ∂F/∂b ∇b| for gradients of bounded length; for monotone rows also slopes below 0."""
     rng = np.random.default_rng(1)
     a, b = operands(row)
@@ -165,7 +165,7 @@ def test_no_slope_exceeds_its_bound(row: Operator, setting: dict[str, float]) ->
 
 
 @EVERY_ROW
-def test_monotone_rows_never_fall(row: Operator, setting: dict[str, float]) -> None:
+def test_monotone_rows_never_fall(row: OperatorRow, setting: dict[str, float]) -> None:
     a, b = operands(row)
     seen = partials(row, setting, a, b)
     if row.monotone:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from blobtree.declare.claims import KEEP_BOTH, KEEP_LEFT, KEEP_NONE
 from blobtree.formulas.contact import (
     bulge_choice,
     bulge_partials,
@@ -20,7 +21,6 @@ from blobtree.formulas.contact import (
     rated_union_range,
     rated_union_slope,
 )
-from blobtree.formulas.operators import KEEP_BOTH, KEEP_LEFT, KEEP_NONE
 from tests.blobtree.transpile.warp_functions import call
 from tests.oracles.blobtree import Field, pressed_field, rated
 

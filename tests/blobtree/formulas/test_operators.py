@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, RICCI, SUM, UNION, Operator
+from blobtree.declare.claims import OperatorRow
+from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, RICCI, SUM, UNION
 from tests.blobtree.transpile.warp_functions import call
 
 Floats = NDArray[np.float64]
@@ -26,7 +27,7 @@ def difference(a: Any, b: Any, _n: float) -> Any:
     return np.where(b <= 0.0, a, np.maximum(np.minimum(a, top - b * (2.0 * top - 1.0)), 0.0))
 
 
-VALUES: dict[Operator, Callable[[Any, Any, float], Any]] = {
+VALUES: dict[OperatorRow, Callable[[Any, Any, float], Any]] = {
     SUM: lambda a, b, n: a + b,
     RICCI: norm,
     UNION: lambda a, b, n: np.maximum(a, b),
@@ -52,7 +53,7 @@ def pairs(count: int = 4000) -> tuple[Floats, Floats]:
     return a, b
 
 
-def partials(operator: Operator, a: Floats, b: Floats, n: float) -> NDArray[np.float32]:
+def partials(operator: OperatorRow, a: Floats, b: Floats, n: float) -> NDArray[np.float32]:
     return call(operator.partials, a=a, b=b, exponent=n)
 
 
@@ -62,7 +63,7 @@ def test_the_table_is_complete() -> None:
 
 
 @EVERY_ROW
-def test_values(operator: Operator, n: float) -> None:
+def test_values(operator: OperatorRow, n: float) -> None:
     a, b = pairs()
     np.testing.assert_allclose(
         partials(operator, a, b, n)[:, 0], VALUES[operator](a, b, n), rtol=2e-6, atol=2e-6
@@ -70,7 +71,7 @@ def test_values(operator: Operator, n: float) -> None:
 
 
 @EVERY_ROW
-def test_partials_are_differences(operator: Operator, n: float) -> None:
+def test_partials_are_differences(operator: OperatorRow, n: float) -> None:
     """Away from kinks, where one-sided differences of float64 agree with each other."""
     a, b = pairs()
     smooth = np.minimum(a, b) > 1e-3
@@ -87,7 +88,7 @@ def test_partials_are_differences(operator: Operator, n: float) -> None:
 
 
 @EVERY_ROW
-def test_nothing_added_changes_nothing(operator: Operator, n: float) -> None:
+def test_nothing_added_changes_nothing(operator: OperatorRow, n: float) -> None:
     a, _ = pairs()
     zero = np.zeros_like(a)
     seen = partials(operator, a, zero, n)
@@ -102,14 +103,14 @@ def test_nothing_added_changes_nothing(operator: Operator, n: float) -> None:
 
 
 @EVERY_ROW
-def test_a_fold_may_start_from_nothing_where_the_table_says_so(operator: Operator, n: float) -> None:
+def test_a_fold_may_start_from_nothing_where_the_table_says_so(operator: OperatorRow, n: float) -> None:
     _, b = pairs()
     seen = partials(operator, np.zeros_like(b), b, n)[:, 0]
     assert operator.starts_from_zero == bool(np.allclose(seen, b, rtol=2e-7, atol=0.0))
 
 
 @EVERY_ROW
-def test_operands_change_places_where_the_table_says_so(operator: Operator, n: float) -> None:
+def test_operands_change_places_where_the_table_says_so(operator: OperatorRow, n: float) -> None:
     a, b = pairs()
     there, back = partials(operator, a, b, n), partials(operator, b, a, n)
     assert operator.commutes == bool(np.allclose(there[:, 0], back[:, 0], rtol=1e-6))
@@ -119,7 +120,7 @@ def test_operands_change_places_where_the_table_says_so(operator: Operator, n: f
 
 
 @EVERY_ROW
-def test_the_field_never_falls_below_zero(operator: Operator, n: float) -> None:
+def test_the_field_never_falls_below_zero(operator: OperatorRow, n: float) -> None:
     a, b = pairs()
     seen = partials(operator, a, b, n)
     assert (seen[:, 0] >= 0.0).all()
@@ -127,7 +128,7 @@ def test_the_field_never_falls_below_zero(operator: Operator, n: float) -> None:
 
 
 @EVERY_ROW
-def test_no_slope_exceeds_its_bound(operator: Operator, n: float) -> None:
+def test_no_slope_exceeds_its_bound(operator: OperatorRow, n: float) -> None:
     """|∂F/∂a ∇a + ∂F/∂b ∇b| for any gradients of bounded length, at any operands below their bounds."""
     rng = np.random.default_rng(1)
     a, b = pairs()

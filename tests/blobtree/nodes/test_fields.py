@@ -24,8 +24,8 @@ from blobtree import (
     polygonize,
     to_json,
 )
+from blobtree.declare.parameters import Quantity, parameters_of
 from blobtree.nodes.kinds import NODE_KINDS
-from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.paths import moved, primitive_at, primitive_paths, resized
 from blobtree.nodes.surgery import dominant_primitive
 from blobtree.tape.codes import FIELD, PREFIX

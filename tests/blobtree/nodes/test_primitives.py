@@ -37,10 +37,10 @@ from blobtree import (
     polygonize,
     to_json,
 )
+from blobtree.declare.parameters import Quantity, describe, parameters_of
 from blobtree.formulas.falloff import RIM
 from blobtree.nodes.curves import JoinedSegment
 from blobtree.nodes.kinds import NODE_KINDS
-from blobtree.nodes.parameters import Quantity, describe, parameters_of
 from blobtree.nodes.paths import moved, resized
 from blobtree.nodes.primitives import PROFILE, Leaf, Primitive, Profile
 from blobtree.tape.instruction_set import library

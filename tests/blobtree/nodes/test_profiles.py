@@ -45,8 +45,8 @@ from blobtree import (
     to_json,
     with_numeric_values,
 )
+from blobtree.declare.parameters import parameters_of
 from blobtree.formulas.skeletons import JOINT_YIELD
-from blobtree.nodes.parameters import parameters_of
 from blobtree.nodes.paths import moved, resized
 from blobtree.nodes.primitives import PROFILE, Primitive
 from blobtree.tape.instruction_set import BUILT_IN

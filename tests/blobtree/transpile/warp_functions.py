@@ -24,7 +24,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
-from blobtree.formulas.operators import Operator
+from blobtree.declare.claims import OperatorRow
 from blobtree.transpile.glsl import uniforms_of
 
 _SCALARS = {wp.float32: np.float32, wp.int32: np.int32, wp.uint32: np.uint32, wp.bool: np.bool_}
@@ -45,7 +45,7 @@ class TypedFunction:
 
 def typed_functions(module: ModuleType) -> list[TypedFunction]:
     """The typed functions that `module` and its kinds define, save those that Warp specialises."""
-    kinds = [value for value in vars(module).values() if isinstance(value, type | Operator)]
+    kinds = [value for value in vars(module).values() if isinstance(value, type | OperatorRow)]
     found = {}
     for value in chain(vars(module).values(), *(vars(kind).values() for kind in kinds)):
         if (

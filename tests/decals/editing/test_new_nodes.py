@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from blobtree import Cone, InvalidNode, Node, Point, Polyline, Segment
+from blobtree.declare.parameters import parameters_of
 from blobtree.nodes.kinds import NODE_KINDS
-from blobtree.nodes.parameters import parameters_of
 from decals.editing import new_nodes
 from decals.errors import InvalidEdit
 from tests.blobtree.custom_kinds import Ring, Soft

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from blobtree import Box, Node, Point
+from blobtree.declare.parameters import Quantity, fields_of, parameters_of
 from blobtree.nodes.kinds import NODE_KINDS
-from blobtree.nodes.parameters import Quantity, parameters_of
 from blobtree.nodes.primitives import Leaf
 from blobtree.nodes.tree import Macro
-from blobtree.nodes.values import fields_of
 from blobtree.tape.model import gradients_at
 from decals.rendering.context import Context
 from decals.rendering.tracing_shader import Kinds

@@ -10,8 +10,8 @@ follow from this declaration. Fields without one hold operands.
 
 import inspect
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import KW_ONLY, dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import KW_ONLY, Field, dataclass, fields, replace
 from enum import Enum
 from functools import partial
 from itertools import chain
@@ -25,9 +25,6 @@ from blobtree.colors import ColorLike, color_rgb
 from blobtree.declare.falloff import FALLOFF_NAMES, Falloff
 from blobtree.declare.registry import load_libraries
 from blobtree.errors import InvalidNode
-from blobtree.nodes.attributes import AttributeMapping, checked_attributes
-from blobtree.nodes.samples import checked_samples
-from blobtree.nodes.values import fields_of
 from blobtree.validation import (
     Vector,
     affine_matrix,
@@ -245,15 +242,13 @@ CHECKS: dict[Quantity, Callable[[str, Any], Any]] = {
     Quantity.FACTORS: finite_numbers,
     Quantity.DISTANCES: finite_numbers,
     Quantity.NAMES: texts,
-    Quantity.SAMPLES: checked_samples,
     Quantity.COLOR: color_rgb,
-    Quantity.ATTRIBUTES: checked_attributes,
     Quantity.NAME_PAIRS: name_pairs,
     Quantity.FALLOFF: _falloff,
     Quantity.WIDTH: _width,
     Quantity.MATRIX: lambda _name, value: affine_matrix(value),
 }
-"""Functions (name, value) that return the checked value of each quantity."""
+"""Functions (name, value) that return the checked value of each quantity; extras add theirs."""
 
 Radius: TypeAlias = Annotated[float, Parameter(Quantity.RADIUS, "visible radius around the skeleton")]
 if TYPE_CHECKING:
@@ -269,6 +264,20 @@ else:
     Color = Annotated[
         Vector, Parameter(Quantity.COLOR, "red, green and blue from 0 to 1, or the name of a colour")
     ]
+
+
+OPTIONAL = "optional"
+"""Key in the metadata of a field that comes last, and that texts and files leave out at its default."""
+
+
+_FIELDS: dict[type, tuple["Field[Any]", ...]] = {}
+
+
+def fields_of(kind: type) -> tuple["Field[Any]", ...]:
+    """Return the fields of a class of nodes; those that texts may leave out come last."""
+    if kind not in _FIELDS:
+        _FIELDS[kind] = tuple(sorted(fields(kind), key=lambda field: OPTIONAL in field.metadata))
+    return _FIELDS[kind]
 
 
 _PARAMETERS: dict[type, dict[str, Parameter]] = {}
@@ -358,9 +367,8 @@ def _type_name(hint: Any) -> str:
     names = {
         float: "float",
         Vector: "(x, y, z)",
-        AttributeMapping: "dict",
         float | None: "float or None",
         Falloff | str: "Falloff or str",
         str: "str",
     }
-    return names.get(inner, "array-like")
+    return names.get(inner, "dict" if get_origin(inner) is Mapping else "array-like")

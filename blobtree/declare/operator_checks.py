@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from blobtree._typing import Float64Array
-from blobtree.custom.checks import SEED, SLOPE_TOLERANCE, VALUE_TOLERANCE, trial_value
+from blobtree.declare.checks import SEED, SLOPE_TOLERANCE, VALUE_TOLERANCE, trial_value
+from blobtree.declare.claims import Like
 from blobtree.declare.formula import Formula, result_of, shown
-from blobtree.formulas.operators import Like
-from blobtree.nodes.parameters import Parameter
+from blobtree.declare.parameters import Parameter
 from blobtree.transpile.python import Precision, vector
 
 SETTINGS = 6

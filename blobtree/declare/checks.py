@@ -12,7 +12,7 @@ import numpy as np
 
 from blobtree._typing import Float64Array
 from blobtree.declare.formula import Formula, result_of, shown
-from blobtree.nodes.parameters import Parameter
+from blobtree.declare.parameters import Parameter
 from blobtree.transpile.python import Precision, vector
 
 TRIAL_SPREAD = 2.0
