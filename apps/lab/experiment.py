@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import BoolArray, Float64Array
 from decals.apps.lab.errors import InvalidLesson
 from decals.editing.queries import nearest_points
-from decals.field.contact_mode import AnyContact
-from decals.field.mapping import ImageMapping
+from decals.field.rules import PictureRules
 from decals.model import Decals
 from decals.scenes.camera import Camera
 from decals.scenes.objects import SceneObject
@@ -86,8 +85,8 @@ class Experiment:
 
     Attributes
     ----------
-    objects, decals, contact, stiffness, mapping
-        The scene and the modes in which it is drawn. Decal 0 is the first one of the lesson.
+    objects, decals, rules
+        The scene, and the rules by which it is drawn. Decal 0 is the first one of the lesson.
     probe
         The point at which values are shown.
     camera
@@ -106,9 +105,7 @@ class Experiment:
 
     objects: tuple[SceneObject, ...]
     decals: Decals
-    contact: AnyContact
-    stiffness: float
-    mapping: ImageMapping
+    rules: PictureRules
     probe: tuple[float, float, float]
     camera: Camera
     size: float

@@ -102,7 +102,7 @@ class Lab:
     def experiment(self) -> Experiment:
         """Return the present state as immutable values."""
         document, lesson = self._window.document, self.lesson
-        settings, drawing = lesson.settings, document.drawing
+        settings = lesson.settings
         decals = document.decals.take(np.array(self.numbers, np.int64))
         relaxed = None
         if self._recording is not None:
@@ -111,9 +111,7 @@ class Lab:
         return Experiment(
             objects=document.objects,
             decals=decals,
-            contact=drawing.contact,
-            stiffness=drawing.stiffness,
-            mapping=drawing.mapping,
+            rules=document.drawing.rules,
             probe=self.probe,
             camera=lesson.scene.camera,
             size=lesson.size,

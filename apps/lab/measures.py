@@ -16,7 +16,7 @@ from decals.apps.lab.experiment import Experiment, Points, Scope, as_index
 from decals.apps.lab.formulas import Evaluate, Measure
 from decals.field.evaluate import Samples, evaluate
 from decals.field.jacobian import folds_of, stretch_of
-from decals.field.walks import walks_for
+from decals.field.walks import evaluation_options
 from decals.model import Interaction
 from decals.record import Contact
 from decals.scenes.objects import TreeObject
@@ -120,13 +120,13 @@ for _name, _column in DECAL_COLUMNS.items():
 @measure()
 def contact(scope: Scope) -> int:
     """Return the contact mode: product, min, radial or elastic."""
-    return int(scope.experiment.contact)
+    return int(scope.experiment.rules.contact)
 
 
 @measure()
 def stiffness(scope: Scope) -> float:
     """Return the stiffness of elastic contact."""
-    return scope.experiment.stiffness
+    return scope.experiment.rules.stiffness
 
 
 # -- fields of decals at points -------------------------------------------------------------------------
@@ -185,12 +185,9 @@ def _samples(scope: Scope, *, jacobian: bool = False) -> Samples:
         experiment.decals,
         points.positions.astype(np.float32),
         points.normals.astype(np.float32),
-        mapping=experiment.mapping,
-        contact=experiment.contact,
-        stiffness=experiment.stiffness,
         jacobian=jacobian,
-        walks=walks_for(experiment.mapping, experiment.decals, experiment.objects),
         device="cpu",
+        **evaluation_options(experiment.rules, experiment.decals, experiment.objects),
     )
 
 

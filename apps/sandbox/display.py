@@ -13,7 +13,6 @@ from decals.apps.sandbox.cube import cube_cells
 from decals.apps.sandbox.decal_panel import brush_values
 from decals.editing.background import Job, Worker
 from decals.editing.gizmo import AXES, Handle, Ray
-from decals.editing.overlays import MODES as SAMPLING_MODES
 from decals.editing.slicing import CHOICES as SLICES
 from decals.editing.slicing import MOVE, NONE, TILT, TILTED, SliceDrag, SlicePlane
 from decals.errors import ImplicitDecalsError, InvalidEdit
@@ -187,7 +186,7 @@ class Display:
             return self._clear()
         read: tuple[object, ...] = ()  # overlays alone show decals
         if options.overlay != OVERLAYS[0]:
-            modes = (getattr(document.drawing, name) for name in SAMPLING_MODES)
+            modes = document.drawing.modes.values()
             read = document.decals.version, *modes
         key = options, document.objects, *read
         if key == self._key:

@@ -17,7 +17,7 @@ from blobtree.validation import truth
 from decals.baking.export import VERTICES, bake_parts, export
 from decals.baking.fine_trees import middles_on
 from decals.baking.plain_files import as_polydata
-from decals.baking.surface_colors import evaluation_options
+from decals.baking.surface_colors import options_on
 from decals.errors import InvalidMesh, InvalidScene
 from decals.field.contact_mode import AnyContact
 from decals.field.evaluate import evaluate
@@ -169,7 +169,7 @@ def displace(
     if sum(fewest) > subdivide.MAX_FACES:
         raise subdivide.too_many(f"about {sum(fewest):.2g}")
     objects: list[SceneObject | PosedMesh] = []
-    options = evaluation_options(drawing, known.decals, known.objects) | {"images": known.images}
+    options = options_on(known.objects, known.decals, drawing) | {"images": known.images}
     with reporting(progress, cancel) as report:
         for number, item in enumerate(known.objects):
             report_part = partial(_report_part, report, number, len(known.objects))

@@ -14,11 +14,12 @@ from decals.baking.meshes import BakeMesh
 from decals.baking.texel_kernels import over_base
 from decals.field.evaluate import ColorEvaluator, Samples, evaluate
 from decals.field.jacobian import normal_derivatives_of_triangles, stretch_of
-from decals.field.walks import walks_for
+from decals.field.rules import PictureRules
+from decals.field.walks import evaluation_options
 from decals.index.editor import DecalEditor
 from decals.index.index import DecalIndex
 from decals.model import Decals
-from decals.rendering.options import Drawing, ImageLike, modes_of
+from decals.rendering.options import Drawing, ImageLike
 from decals.scenes.scene import DecalImage
 
 BLOCK = 1 << 18
@@ -54,8 +55,9 @@ class SurfaceColors:
         self.has_materials = any(hasattr(image, "surface_texels") for image in images)
         self._materials = list(images)
         self._images = [DecalImage(f"image {i}", image.pixels) for i, image in enumerate(images)]
-        self._options = evaluation_options(drawing, decals, objects)
-        self._evaluator = ColorEvaluator(decals, self._images, **self._options)
+        self._options = options_on(objects, decals, drawing)
+        index, walks = self._options["index"], self._options["walks"]
+        self._evaluator = ColorEvaluator(decals, self._images, drawing, index=index, walks=walks)
 
     def at_vertices(self, number: int, rows: slice = slice(None)) -> Float32Array:
         """Return linear colours of vertices of mesh ``number``, ``float32[n, 3]``."""
@@ -153,9 +155,9 @@ def _normal_derivatives(mesh: BakeMesh) -> Float64Array:
     return means
 
 
-def evaluation_options(
-    drawing: Drawing, decals: Decals | DecalEditor, objects: Sequence[object]
+def options_on(
+    objects: Sequence[object], decals: Decals | DecalEditor, rules: PictureRules
 ) -> dict[str, Any]:
     """Return the arguments of `evaluate` that are the same everywhere on some objects."""
     index = DecalIndex.of(decals) if isinstance(decals, Decals) else None
-    return modes_of(drawing) | {"index": index, "walks": walks_for(drawing.mapping, decals, objects)}
+    return evaluation_options(rules, decals, objects) | {"index": index}

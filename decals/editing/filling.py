@@ -13,10 +13,10 @@ from decals.editing.steps import columns_of, shapes_of
 from decals.errors import InvalidEdit
 from decals.field.evaluate import evaluate
 from decals.field.mapping import IMAGE_RADIUS_SQUARED
-from decals.field.walks import walks_for
+from decals.field.walks import evaluation_options
 from decals.model import Decals
 from decals.receivers import labels_of, surface_mask, takes_named_only
-from decals.rendering.options import Drawing, modes_of
+from decals.rendering.options import Drawing
 from decals.scattering.bare_places import filling_points, grown_radii, places_of
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.mean_normals import mean_normals
@@ -106,8 +106,7 @@ class Skin:
         result = np.full(len(points), np.inf)
         if not len(self.decals):
             return result
-        walks = walks_for(self.drawing.mapping, self.decals, self.objects)
-        modes = modes_of(self.drawing)
+        options = evaluation_options(self.drawing, self.decals, self.objects)
         for number in np.unique(points.surface_ids).tolist():
             item, own = self.objects[number], np.flatnonzero(points.surface_ids == number)
             for block in row_blocks(len(own), "looking for bare places"):
@@ -115,7 +114,7 @@ class Skin:
                 positions, normals = points.positions[rows], points.normals[rows]
                 if isinstance(item.surface, MeshSurface):
                     normals = item.surface.smooth_normals(positions)
-                found = evaluate(self.decals, positions, normals, **modes, on=item, walks=walks)
+                found = evaluate(self.decals, positions, normals, on=item, **options)
                 squares = ((found.uv.astype(np.float64) - 0.5) ** 2).sum(axis=1)
                 result[rows] = np.where(found.owner >= 0, squares / IMAGE_RADIUS_SQUARED, np.inf)
         return result
@@ -337,7 +336,7 @@ class FillBarePlaces:
 
     def inputs(self, document: Document) -> object:
         """Return what the command reads; new decals take their looks from decals as they are at the start."""
-        modes = tuple(modes_of(document.drawing).values())
+        modes = tuple(document.drawing.modes.values())
         return shapes_of(document.objects), columns_of(document.decals.decals), modes, document.locked_layers
 
     def compute(self, document: Document) -> Edit:

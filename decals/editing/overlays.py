@@ -9,14 +9,11 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
 from decals.editing.document import Document
 from decals.field.evaluate import evaluate
 from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of
-from decals.field.walks import walks_for
+from decals.field.walks import evaluation_options
 from decals.surfaces.surface import unit_rows
 
 INSIDE = 0.5
 """Distance of a rim from the middle of its image, in image coordinates."""
-
-MODES = "contact", "mapping", "stiffness"
-"""Options of a drawing on which the samples depend."""
 
 CROSSING_STEPS = 5
 """Halvings of an edge until the point at which the decal changes is known."""
@@ -76,8 +73,7 @@ def sample_surface(
 
 def _modes(document: Document) -> dict[str, Any]:
     """Return the modes of a document's drawing, as `decals.evaluate` takes them."""
-    modes = {name: getattr(document.drawing, name) for name in MODES}
-    return modes | {"walks": walks_for(document.drawing.mapping, document.decals, document.objects)}
+    return evaluation_options(document.drawing, document.decals, document.objects)
 
 
 def _owners(

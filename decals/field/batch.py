@@ -14,9 +14,7 @@ from blobtree.validation import axis_count, items
 from decals.errors import InvalidDevice, InvalidPoints, InvalidScene
 from decals.field.contact_mode import AnyContact
 from decals.field.evaluate import (
-    Modes,
     Samples,
-    checked_modes,
     checked_truths,
     samples_of,
     walk_texels,
@@ -37,6 +35,7 @@ from decals.field.points import (
     rows_on,
 )
 from decals.field.query import MaterialSamples, Neighbors, Query, Target, image_count
+from decals.field.rules import PictureRules
 from decals.field.sampling_kernels import color_points, sample_points
 from decals.field.walks import Walks
 from decals.images.load import AnyImage, each_image
@@ -223,14 +222,14 @@ def evaluate_batch(
     [[0, -1, -1], [0, 0, -1], [0, 0, 0]]
     """
     listed = sets.sets if isinstance(sets, DecalBatch) else checked_sets(sets)
-    modes = checked_modes(mapping, contact, stiffness)
+    rules = PictureRules(mapping=mapping, contact=contact, stiffness=stiffness)
     checked_truths(jacobian=jacobian, neighbors=neighbors, materials=materials)
     layers = None if images is None else tuple(each_image(images))
     places = _Places.of(listed, points, normals, normal_derivatives)
     device = places.device(sets.device if isinstance(sets, DecalBatch) and device is None else device)
     if isinstance(sets, DecalBatch) and device != sets.device:
         raise InvalidDevice(f"device: expected {sets.device!r}, where the sets lie, got {device!r}")
-    walked = _checked_walks(walks, listed) if modes.mapping is ImageMapping.WALKED else None
+    walked = _checked_walks(walks, listed) if rules.walked else None
     parts = []
     counts = [0 if isinstance(sets, DecalBatch) else len(part) for part in listed]
     for first, last in _chunks(counts, np.diff(places.offsets).tolist()):
@@ -239,8 +238,8 @@ def evaluate_batch(
             batch, own, set_of = sets.copied(), slice(None), set_of + np.int32(first)
         else:
             batch, own = DecalBatch(listed[first:last], device), slice(first, last)
-        _set_modes(batch, modes, on, None if walked is None else walked[own])
-        query = Query(BatchTarget(batch, set_of), *rows_on(device, rows), modes.contact)
+        _apply(rules, batch, on, None if walked is None else walked[own])
+        query = Query(BatchTarget(batch, set_of), *rows_on(device, rows), rules.contact)
         part = samples_of(query, layers, turns, jacobian=jacobian, neighbors=neighbors, materials=materials)
         parts.append(placed(part, device, stay=places.stay))
     return BatchSamples(
@@ -338,14 +337,14 @@ def _checked_walks(walks: Any, sets: Sequence[Decals]) -> list[Float32Array]:
     return [walk_texels(walk, len(part)) for walk, part in zip(listed, sets, strict=True)]
 
 
-def _set_modes(
+def _apply(
+    rules: PictureRules,
     batch: DecalBatch,
-    modes: Modes,
     on: object | str | Iterable[str] | None,
     walked: Sequence[Float32Array] | None,
 ) -> None:
-    """Give a batch the image mapping, the stiffness, the surface that the points lie on, and its walks."""
-    batch.modes.stiffness, batch.modes.mapping = modes.stiffness, int(modes.mapping)
+    """Give a batch the rules, the surface that the points lie on, and its walks."""
+    rules.apply(batch.modes)
     if on is not None or batch.joined.limited:
         masks = [mask_on(on, part.receiver_table, InvalidScene) for part in batch.sets]
         batch.limit(masks, always=takes_named_only(on))

@@ -14,11 +14,8 @@ from decals.validation import member
 class Formulas(Protocol):
     """The formulas of decals with functions of a law in them."""
 
-    def function(self, function: Any) -> Any:
-        """Return a formula of decals with this law; itself if it does not depend on it."""
-
-    def kernel(self, kernel: Any) -> Any:
-        """Return a kernel with this law, in a module of its own."""
+    def copy_of(self, formula: Any) -> Any:
+        """Return a formula or a kernel of decals with this law; itself if it does not depend on it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +69,11 @@ AnyContact = Contact | ContactLaw
 
 LAWS: Definitions[ContactLaw] = Definitions("contact law", "define_contact for it")
 """The laws that were defined, by name."""
+
+
+def with_law(formula: Any, contact: AnyContact) -> Any:
+    """Return a formula or a kernel of decals for a contact mode, or with the functions of a contact law."""
+    return contact.formulas.copy_of(formula) if isinstance(contact, ContactLaw) else formula
 
 
 def contact_mode(value: Any, error: type[ImplicitDecalsError]) -> AnyContact:

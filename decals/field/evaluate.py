@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import warp as wp
 from numpy.typing import ArrayLike
@@ -11,7 +11,7 @@ from blobtree._typing import Float32Array, Float64Array, Int32Array
 from blobtree.device import array_on, known_device, launch
 from blobtree.validation import truth
 from decals.errors import InvalidDecals, InvalidScene
-from decals.field.contact_mode import AnyContact, contact_mode
+from decals.field.contact_mode import AnyContact, with_law
 from decals.field.mapping import ImageMapping
 from decals.field.points import checked_rows, checked_turns, device_of, placed, rows_on
 from decals.field.query import (
@@ -22,9 +22,9 @@ from decals.field.query import (
     image_arrays,
     image_count,
     rows_of,
-    with_law,
     zeros,
 )
+from decals.field.rules import PictureRules
 from decals.field.sampling_kernels import color_points
 from decals.field.walks import Walks
 from decals.images.load import AnyImage, each_image, image_pixels
@@ -34,7 +34,7 @@ from decals.index.index import DecalIndex, index_on
 from decals.model import Decals
 from decals.receivers import mask_on, takes_named_only
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, RECORD
-from decals.validation import describe, member, stiffness_number
+from decals.validation import describe
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,14 +171,14 @@ def evaluate(
     >>> decals.evaluate(disk, [[0.5, 0, 0]], [[0, 0, 1]], jacobian=True).jacobian.round(2).tolist()
     [[[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]]
     """
-    modes = checked_modes(mapping, contact, stiffness)
+    rules = PictureRules(mapping=mapping, contact=contact, stiffness=stiffness)
     checked_truths(jacobian=jacobian, neighbors=neighbors, materials=materials)
     rows = checked_rows(points, normals)
     device = device_of(rows, device)
     turns = checked_turns(normal_derivatives, len(rows.points))
-    indexed = _indexed(decals, index, modes, walks, device)
+    indexed = _indexed(decals, index, rules, walks, device)
     _limit(indexed, decals, on, device)
-    query = Query(SingleTarget(decals, indexed, device), *rows_on(device, rows), modes.contact)
+    query = Query(SingleTarget(decals, indexed, device), *rows_on(device, rows), rules.contact)
     samples = samples_of(query, images, turns, jacobian=jacobian, neighbors=neighbors, materials=materials)
     shown: Samples = placed(samples, device, stay=rows.stay)
     return shown
@@ -214,24 +214,24 @@ class ColorEvaluator:
 
     Parameters
     ----------
-    decals, images, mapping, contact, stiffness, index, walks, device
+    decals, images, index, walks, device
         See `evaluate`.
+    rules : PictureRules
+        Mapping, contact and stiffness.
     """
 
     def __init__(
         self,
         decals: Decals | DecalEditor,
         images: Iterable[AnyImage],
+        rules: PictureRules,
         *,
-        mapping: ImageMapping = ImageMapping.CORRECTED,
-        contact: AnyContact = DEFAULT_CONTACT,
-        stiffness: float = DEFAULT_STIFFNESS,
         index: DecalIndex | None = None,
         walks: Walks | None = None,
         device: Any = None,
     ) -> None:
-        self._decals, self._contact, self._device = decals, contact, known_device(device)
-        self._indexed = _indexed(decals, index, Modes(mapping, contact, stiffness), walks, self._device)
+        self._decals, self._contact, self._device = decals, rules.contact, known_device(device)
+        self._indexed = _indexed(decals, index, rules, walks, self._device)
         pixels = [image_pixels(image, name=f"image {number}") for number, image in enumerate(images)]
         layers = [linear_premultiplied(image) for image in pixels]
         self._images = image_arrays(image_count(rows_of(decals)), layers, self._device)
@@ -254,23 +254,6 @@ class ColorEvaluator:
         return colors
 
 
-class Modes(NamedTuple):
-    """Image mapping, contact mode or law, and stiffness, which are checked."""
-
-    mapping: ImageMapping
-    contact: AnyContact
-    stiffness: float
-
-
-def checked_modes(mapping: object, contact: object, stiffness: object) -> Modes:
-    """Return modes, which may be given by name; raise InvalidScene for others."""
-    return Modes(
-        member("mapping", mapping, ImageMapping, InvalidScene),
-        contact_mode(contact, InvalidScene),
-        stiffness_number(stiffness, InvalidScene),
-    )
-
-
 def checked_truths(**values: object) -> None:
     """Raise InvalidScene for a value that is neither True nor False."""
     for name, value in values.items():
@@ -280,14 +263,14 @@ def checked_truths(**values: object) -> None:
 def _indexed(
     decals: Decals | DecalEditor,
     index: DecalIndex | None,
-    modes: Modes,
+    rules: PictureRules,
     walks: Walks | None,
     device: Any,
 ) -> Any:
-    """Return decals with their index and their modes on a device, an `IndexedDecals`."""
+    """Return decals with their index and their rules on a device, an `IndexedDecals`."""
     indexed = _bare_indexed(decals, index, device)
-    indexed.stiffness, indexed.mapping = modes.stiffness, int(modes.mapping)
-    if modes.mapping is ImageMapping.WALKED:
+    rules.apply(indexed)
+    if rules.walked:
         texels = walk_texels(walks, len(indexed.records) // RECORD)
         indexed.walked, indexed.walks = True, wp.array(texels, dtype=wp.vec4, device=device)
     return indexed

@@ -8,7 +8,6 @@ functions in which the callees are replaced, so all backends evaluate the same f
 # mypy: disable-error-code="operator, arg-type, return-value, no-any-return"
 # (kernel code is Python only in form: its names have Warp types)
 
-from collections.abc import Callable
 from functools import partial
 from types import FunctionType
 from typing import Any
@@ -142,19 +141,13 @@ class Formulas:
         self._replacements, self._digest = replacements, digest
         self._copies: dict[Any, Any] = {}
 
-    def function(self, function: wp.Function) -> wp.Function:
-        """Return a formula of decals with this law; itself if it does not depend on it."""
-        if function not in self._copies:
-            self._copies[function] = self._copy(REPLACED.get(function, function), warp_function)
-        return self._copies[function]
+    def copy_of(self, formula: Any) -> Any:
+        """Return a formula or a kernel of decals with this law; itself if it does not depend on it."""
+        if formula not in self._copies:
+            self._copies[formula] = self._copy(REPLACED.get(formula, formula))
+        return self._copies[formula]
 
-    def kernel(self, kernel: wp.Kernel) -> wp.Kernel:
-        """Return a kernel with this law, in a module of its own."""
-        if kernel not in self._copies:
-            self._copies[kernel] = self._copy(kernel, wp.kernel)
-        return self._copies[kernel]
-
-    def _copy(self, typed: Any, make: Callable[[FunctionType], Any]) -> Any:
+    def _copy(self, typed: Any) -> Any:
         source: FunctionType = typed.func
         module = f"{source.__module__}.{source.__name__}_{self._digest}"
         replaced = {
@@ -165,13 +158,14 @@ class Formulas:
         if not replaced:
             return typed
         wp.get_module(module).options.update(KERNEL_OPTIONS)
+        make = wp.kernel if isinstance(typed, wp.Kernel) else warp_function
         return make(rebind(source, replaced, module=module))
 
     def _substitute(self, name: str, value: Any) -> Any:
         if value is field_of or value is law_of or (name == "FIELD_SCALE" and value is FIELD_SCALE):
             return self._replacements[name]
         known = isinstance(value, wp.Function) and not value.is_builtin()
-        return self.function(value) if known else value
+        return self.copy_of(value) if known else value
 
 
 _FORMULAS: dict[str, Formulas] = {}

@@ -11,7 +11,7 @@ import warp as wp
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import launch
 from decals.errors import InvalidImage
-from decals.field.contact_mode import AnyContact, ContactLaw
+from decals.field.contact_mode import AnyContact, with_law
 from decals.field.jacobian import image_jacobians
 from decals.field.sampling_kernels import color_points, sample_points
 from decals.images.texels import Pixels, unit_levels
@@ -310,11 +310,6 @@ class Query:
             return sums
         finally:
             self._target.records = records
-
-
-def with_law(kernel: Any, contact: AnyContact) -> Any:
-    """Return a kernel for a contact mode, or with the formulas of a contact law."""
-    return contact.formulas.kernel(kernel) if isinstance(contact, ContactLaw) else kernel
 
 
 def zeros(device: Any, count: int, *kinds: Any) -> list[Any]:

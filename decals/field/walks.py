@@ -13,6 +13,7 @@ from blobtree.kernels import loaded
 from blobtree.progress import reporting
 from blobtree.validation import items
 from decals.field.mapping import ImageMapping
+from decals.field.rules import PictureRules
 from decals.field.walk import (
     CELLS,
     GRID,
@@ -204,6 +205,13 @@ def walks_for(
     if mapping is not ImageMapping.WALKED:
         return None
     return Walks.over(decals, with_surface(objects), only=only)
+
+
+def evaluation_options(
+    rules: PictureRules, decals: Decals | DecalEditor, objects: Iterable[Any]
+) -> dict[str, Any]:
+    """Return the arguments of `evaluate` for these rules, and for decals on these objects."""
+    return rules.modes | {"walks": walks_for(rules.mapping, decals, objects)}
 
 
 def with_surface(objects: Iterable[Any]) -> list[Any]:

@@ -1,16 +1,11 @@
 """GLSL of decals for other programs: each form of decals in each version of the language."""
 
 import re
-from dataclasses import dataclass, fields
 from functools import lru_cache
-from itertools import product
 from typing import NamedTuple
 
 from blobtree.transpile.builtins import RESERVED_WORDS
-from decals.field.contact_mode import AnyContact
-from decals.index.arrays import DecalArrays
-from decals.record import Contact
-from decals.rendering.decal_library import decal_library
+from decals.rendering.decal_library import Form, decal_library
 from decals.shaders import compose
 from decals.shaders.isolate import (
     Declaration,
@@ -73,41 +68,6 @@ VERSIONS = {
 """Versions of GLSL by their names."""
 
 
-@dataclass(frozen=True)
-class Form:
-    """What decides the code of a shader of decals; everything else is in its textures and uniforms.
-
-    Attributes
-    ----------
-    contact
-        Contact mode, or a law, which only our own programs may use.
-    layered
-        True if decals can cover each other.
-    limited
-        True if decals have receivers or fades.
-    nested
-        True if contact decals may be nested.
-    materials
-        True if images have maps.
-    """
-
-    contact: AnyContact
-    layered: bool = False
-    limited: bool = False
-    nested: bool = False
-    materials: bool = False
-
-    @classmethod
-    def all(cls) -> "list[Form]":
-        """Return all forms."""
-        flags = product((False, True), repeat=len(fields(cls)) - 1)
-        return [cls(contact, *row) for contact, row in product(Contact, flags)]
-
-    def covers(self, decals: DecalArrays, *, limited: bool) -> bool:
-        """Return True if the code of this form evaluates these decals."""
-        return self.layered >= decals.layered and self.limited >= limited and self.nested >= decals.nested
-
-
 class Code(NamedTuple):
     """The code of a form, and the names in it of textures and of other uniforms by those in our own files."""
 
@@ -119,9 +79,9 @@ class Code(NamedTuple):
 @lru_cache(64)
 def code_of(form: Form, version: str, stage: str, prefix: str) -> Code:
     """Return the code of a form; ComposeError if two names would be the same with the prefix."""
-    library = decal_library(form.contact, layered=form.layered, limited=form.limited, nested=form.nested)
     defines = {"MATERIALS": form.materials, "FRAGMENT": stage == "fragment"}
-    source = compose("exported_decals.glsl", slots={"functions": library}, defines=defines, version=None)
+    slots = {"functions": decal_library(form)}
+    source = compose("exported_decals.glsl", slots=slots, defines=defines, version=None)
     parts = reachable(declarations(preprocessed(source.text)), FUNCTIONS)
     uniforms = [part for part in parts if part.kind == "uniform"]
     textures = [part for part in uniforms if type_of(part) in SAMPLERS]

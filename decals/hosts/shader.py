@@ -12,7 +12,7 @@ from blobtree.immutable import Immutable
 from blobtree.validation import truth
 from decals.errors import InvalidScene
 from decals.field.mapping import ImageMapping
-from decals.hosts.code import FIRST_TEXTURE, VERSIONS, Code, Form, code_of
+from decals.hosts.code import FIRST_TEXTURE, VERSIONS, Code, code_of
 from decals.hosts.textures import ShaderTexture, data_size, data_texture, image_texture, map_texture
 from decals.hosts.unsupported import refuse_unsupported
 from decals.index.arrays import DecalArrays
@@ -20,6 +20,7 @@ from decals.index.editor import DecalEditor
 from decals.receivers import EVERYTHING, mask_on
 from decals.record import Contact
 from decals.rendering.data_texture import rectangles
+from decals.rendering.decal_library import Form
 from decals.rendering.options import SceneLike, check_scene, drawing_of, has_materials, is_limited
 from decals.scenes.origin import WORLD, Origin
 from decals.shaders import ComposeError

@@ -11,7 +11,6 @@ import numpy as np
 from blobtree.formulas.falloff import RIM
 from blobtree.progress import Progress
 from decals.errors import TooMuchData
-from decals.hosts.code import Form
 from decals.hosts.shader import shader
 from decals.images.load import embedded_image, opaque
 from decals.index.decal_cells import FINEST, LEVEL_SHIFT, NO_FLOOR, NO_PARITY, REACH_WITH_SLACK
@@ -34,6 +33,7 @@ from decals.pages.textures import (
 )
 from decals.record import MIN_KEPT_RADIUS
 from decals.rendering.context import MESA_SOFTWARE
+from decals.rendering.decal_library import Form
 from decals.rendering.environment import Environment, picture_texels
 from decals.rendering.frame_plan import AMBIENT_RADIUS
 from decals.rendering.light_pass import NO_LIGHTS

@@ -1,11 +1,13 @@
 """GLSL of all decal formulas: the text that fills the slot ``functions`` of the shaders of decals."""
 
+from dataclasses import dataclass, replace
 from functools import cache
+from itertools import product
 from typing import Any
 
 from blobtree.formulas.falloff import RIM
 from blobtree.transpile.glsl import translate_library
-from decals.field.contact_mode import AnyContact, ContactLaw
+from decals.field.contact_mode import AnyContact, with_law
 from decals.field.elastic import bump_at, image_shift, join_bumps
 from decals.field.mapping import in_image, tangent_coordinates, unroll_step
 from decals.field.ownership import contact_at, owner_at, owner_below, single_layer_at, uv_at
@@ -58,42 +60,80 @@ FILTER_FUNCTIONS = (
 """Functions that ``shaders/filtered_decals.glsl`` calls."""
 
 
+@dataclass(frozen=True)
+class Form:
+    """What decides the GLSL of decals; everything else is in its textures and uniforms.
+
+    Attributes
+    ----------
+    contact
+        Contact mode, or a law, which only our own programs may use.
+    layered
+        True if decals can cover each other.
+    limited
+        True if decals have receivers or fades.
+    nested
+        True if contact decals may be nested.
+    materials
+        True if images have maps.
+    relief
+        True if images have heights that are drawn.
+    walked
+        True for the image mapping WALKED.
+    filtered
+        True if decals are averaged over pixels.
+    """
+
+    contact: AnyContact
+    layered: bool = False
+    limited: bool = False
+    nested: bool = False
+    materials: bool = False
+    relief: bool = False
+    walked: bool = False
+    filtered: bool = False
+
+    @classmethod
+    def all(cls) -> "list[Form]":
+        """Return all forms for the shaders of other programs, which have the first flags alone."""
+        return [cls(contact, *row) for contact, row in product(Contact, product((False, True), repeat=4))]
+
+    def covers(self, decals: Any, *, limited: bool) -> bool:
+        """Return True if the code of this form evaluates decals, `DecalArrays`."""
+        return self.layered >= decals.layered and self.limited >= limited and self.nested >= decals.nested
+
+    def _values(self) -> dict[str, bool | int]:
+        """Return the values of constants by their names."""
+        return {
+            "decal_contact": int(self.contact),
+            "decal_nested": self.nested and self.contact in (Contact.RADIAL, Contact.ELASTIC),
+            "decal_limited": self.limited,
+            "decal_walked": self.walked,
+            "decal_layered": self.layered,
+            "decal_single_layer": not self.layered and self.contact != Contact.RADIAL,
+        }
+
+    @property
+    def constants(self) -> str:
+        """The GLSL constants of decals, for the slot ``functions``."""
+        return _declared(self._values())
+
+    @property
+    def functions(self) -> tuple[Any, ...]:
+        """The typed functions that ``decals.glsl`` or ``filtered_decals.glsl`` calls."""
+        functions = FILTER_FUNCTIONS if self.filtered else LIBRARY_FUNCTIONS
+        return tuple(with_law(function, self.contact) for function in functions)
+
+
+def decal_library(form: Form) -> str:
+    """Return the GLSL of all decal formulas in a form, without those that never run."""
+    return _library(replace(form, materials=False, relief=False))
+
+
 @cache
-def decal_library(
-    contact: AnyContact,
-    *,
-    layered: bool,
-    limited: bool,
-    nested: bool,
-    walked: bool = False,
-    filtered: bool = False,
-) -> str:
-    """Return the GLSL of all decal formulas in one contact mode or law, without those that never run."""
-    constants = _constants(contact, layered=layered, limited=limited, nested=nested, walked=walked)
-    law = contact if isinstance(contact, ContactLaw) else None
-    functions = translate_library(
-        decal_functions(law, filtered=filtered), constants={**constants, "contact": int(contact)}
-    )
-    return _declared(constants) + functions
-
-
-def decal_constants(contact: AnyContact, *, layered: bool, limited: bool, nested: bool, walked: bool) -> str:
-    """Return the GLSL constants of decals, for the slot ``functions``, in one contact mode or law."""
-    return _declared(_constants(contact, layered=layered, limited=limited, nested=nested, walked=walked))
-
-
-def _constants(
-    contact: AnyContact, *, layered: bool, limited: bool, nested: bool, walked: bool
-) -> dict[str, bool | int]:
-    """Return the values of constants by their names."""
-    return {
-        "decal_contact": int(contact),
-        "decal_nested": nested and contact in (Contact.RADIAL, Contact.ELASTIC),
-        "decal_limited": limited,
-        "decal_walked": walked,
-        "decal_layered": layered,
-        "decal_single_layer": not layered and contact != Contact.RADIAL,
-    }
+def _library(form: Form) -> str:
+    constants = {**form._values(), "contact": int(form.contact)}
+    return form.constants + translate_library(form.functions, constants=constants)
 
 
 def _declared(constants: dict[str, bool | int]) -> str:
@@ -108,9 +148,3 @@ def _declared(constants: dict[str, bool | int]) -> str:
         f"const {type(value).__name__} {name} = {str(value).lower()};\n"
         for name, value in (shared | constants).items()
     )
-
-
-def decal_functions(law: ContactLaw | None, *, filtered: bool = False) -> tuple[Any, ...]:
-    """Return the typed functions that ``decals.glsl`` or ``filtered_decals.glsl`` calls."""
-    functions: tuple[Any, ...] = FILTER_FUNCTIONS if filtered else LIBRARY_FUNCTIONS
-    return functions if law is None else tuple(map(law.formulas.function, functions))

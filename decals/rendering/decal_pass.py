@@ -2,17 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import moderngl
 
 from blobtree._typing import Float32Array
-from decals.field.contact_mode import AnyContact, ContactLaw
-from decals.field.mapping import ImageMapping
+from decals.field.rules import PictureRules
 from decals.rendering.context import Context
 from decals.rendering.data_texture import DataTexture
 from decals.rendering.decal_data import DecalData, stored
-from decals.rendering.decal_library import decal_constants, decal_library
+from decals.rendering.decal_library import Form, decal_library
 from decals.rendering.effect import DecalTexture, ReliefEffect
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.image_array import ImageArray
@@ -40,8 +40,8 @@ class DecalSource:
     ----------
     decals
         Records and index.
-    mapping, contact, stiffness
-        How images lie on the surface and push each other. The mapping WALKED needs ``walks``.
+    rules
+        How they share the surface. The mapping WALKED needs ``walks``.
     masks
         Masks of the objects, see `decals.receivers.object_mask`, for decals that are limited.
     materials, relief, walks
@@ -51,9 +51,7 @@ class DecalSource:
     """
 
     decals: DecalData
-    mapping: ImageMapping
-    contact: AnyContact
-    stiffness: float
+    rules: PictureRules
     masks: DataTexture | None = None
     materials: DecalTexture | None = None
     relief: ReliefEffect | None = None
@@ -61,37 +59,24 @@ class DecalSource:
     walks: DataTexture | None = None
 
     @property
-    def limited(self) -> bool:
-        """True if decals have receivers or fades."""
-        return self.decals.limited
-
-    @property
-    def law(self) -> ContactLaw | None:
-        """The formulas of a contact of one's own."""
-        return self.contact if isinstance(self.contact, ContactLaw) else None
-
-    def constants(self) -> str:
-        """Return the GLSL constants of ``decals.glsl``."""
-        return decal_constants(self.contact, **self._variant)
-
-    def library(self, *, filtered: bool = False) -> str:
-        """Return the GLSL of all formulas, see `decal_library`."""
-        return decal_library(self.contact, **self._variant, filtered=filtered)
-
-    @property
-    def _variant(self) -> dict[str, bool]:
-        decals = self.decals
-        return {
-            "layered": decals.layered,
-            "limited": decals.limited,
-            "nested": decals.nested,
-            "walked": self.walks is not None,
-        }
+    def form(self) -> Form:
+        """The form of its GLSL; relief and walked images are not averaged over pixels."""
+        relief, walked = self.relief is not None, self.walks is not None
+        return Form(
+            self.rules.contact,
+            self.decals.layered,
+            self.decals.limited,
+            self.decals.nested,
+            materials=self.materials is not None,
+            relief=relief and self.materials is not None,
+            walked=walked,
+            filtered=self.rules.filtered and not relief and not walked,
+        )
 
     def use(self, program: Program, unit: int) -> int:
         """Bind all textures to the units from ``unit`` on, and set the uniforms; return the next unit."""
-        set_uniform(program, "decal_mapping", int(self.mapping))
-        set_uniform(program, "decal_stiffness", self.stiffness)
+        set_uniform(program, "decal_mapping", int(self.rules.mapping))
+        set_uniform(program, "decal_stiffness", self.rules.stiffness)
         self.decals.use(program, unit)
         if self.relief is not None:
             self.relief.use(program, self.lights)
@@ -146,7 +131,6 @@ class DecalPass:
         gbuffer: GBuffer,
         source: "DecalSource | None",
         images: ImageArray | None,
-        filtered: bool = False,
         rest: Mapping[str, moderngl.Texture] | None = None,
         part: Part = WHOLE,
     ) -> None:
@@ -154,19 +138,7 @@ class DecalPass:
 
         Materials of the decals fill `material_targets` too. ``rest`` are the textures of a rest buffer.
         """
-        shining = source is not None and source.materials is not None
-        walked = source is not None and source.walks is not None
-        raised = source is not None and source.relief is not None
-        # relief and walked images are not averaged over pixels
-        filtered = filtered and source is not None and not raised and not walked
-        variant = {
-            "limited": source is not None and source.limited,
-            "filtered": filtered,
-            "materials": shining,
-            "relief": shining and raised,
-        }
-        library = "" if source is None else source.library(filtered=filtered)
-        painting = self._pass(library, posed=rest is not None, **variant)
+        painting = self._pass(None if source is None else source.form, posed=rest is not None)
         textures = {"g_position": gbuffer.position, "g_normal": gbuffer.normal, "g_color": gbuffer.color}
         textures |= rest or {}
         for program in painting.programs:
@@ -181,25 +153,25 @@ class DecalPass:
         """Read owner, field and uv, ``float32[h, w, 4]``, the lowest row first."""
         return read_floats(self._framebuffer, 1, tile)
 
-    def _pass(self, library: str, **variant: bool) -> PixelPass:
-        """Return the pass with a library of decal formulas; an empty one is for scenes without decals.
+    def _pass(self, form: Form | None, *, posed: bool) -> PixelPass:
+        """Return the pass for a form of decals; None is for scenes without decals.
 
         Only the last pass is kept, as it holds its programs; the context keeps those of others for a while.
         """
-        key = library, *variant.values()
-        if self._last is None or self._last[0] != key:
-            if variant["materials"] and not self.material_targets:
+        if self._last is None or self._last[0] != (form, posed):
+            materials = form is not None and form.materials
+            if materials and not self.material_targets:
                 self.material_targets["g_material"] = self._context.texture(self._size, "f4")
                 self.material_targets["g_glow"] = self._context.texture(self._size, "f2")
-            targets = [*self._targets, *(self.material_targets.values() if variant["materials"] else ())]
-            programs = decal_programs(self._context, library, len(self._targets), **variant)
+            targets = [*self._targets, *(self.material_targets.values() if materials else ())]
+            programs = decal_programs(self._context, form, len(self._targets), posed=posed)
             if self._last is not None:
                 self._last[1].release()
-            if len(programs) == 1:
-                self._last = key, PixelPass(self._context.gl, programs[0], targets)
-            else:
+            make: Any = partial(PixelPass, self._context.gl, programs[0])
+            if len(programs) > 1:
                 kind = IndirectPass if self._context.backend is PassBackend.COMPUTE else ListedPass
-                self._last = key, kind(self._context.gl, programs, targets)
+                make = partial(kind, self._context.gl, programs)
+            self._last = (form, posed), make(targets)
         return self._last[1]
 
     def release(self) -> None:
@@ -212,33 +184,28 @@ class DecalPass:
 
 
 def decal_programs(
-    context: Context,
-    library: str,
-    targets: int = 1,
-    *,
-    posed: bool = False,
-    limited: bool = False,
-    filtered: bool = False,
-    materials: bool = False,
-    relief: bool = False,
+    context: Context, form: Form | None, targets: int = 1, *, posed: bool = False
 ) -> tuple[Program, ...]:
-    """Return the program with a library of decal formulas; an empty one is for scenes without decals.
+    """Return the program for a form of decals; None is for scenes without decals.
 
     Filtered pictures take two, by `IndirectPass` or `ListedPass`, except in fragment shaders on a card.
     """
-    file = "filtered_decals.glsl" if filtered else "decals.glsl"
-    slots = {"decals": f"//@ include {file}", "functions": library} if library else {}
-    variants = {"DECALS": True, "POSED": posed, "LIMITED": limited, "FILTERED": filtered}
-    variants |= {"MATERIALS": materials, "RELIEF": relief}
-    slots |= {"relief": "//@ include relief.glsl"} if relief and library else {}
-    compute = context.backend is PassBackend.COMPUTE
-    if relief and compute:
-        slots |= {"functions": stored(library)}
-        variants |= {"STORED": True}
-    defines = {name: value and bool(library) for name, value in variants.items()}
+    slots: dict[str, str] = {}
+    defines: dict[str, bool | int] = {}
     stages: list[dict[str, bool | int]] = [{}]
-    if defines["FILTERED"] and (compute or context.software):
-        stages = [{"MARKED": targets + 2 * defines["MATERIALS"]}, {"LISTED": True, "SHARED": compute}]
+    compute = context.backend is PassBackend.COMPUTE
+    if form is not None:
+        library = decal_library(form)
+        file = "filtered_decals.glsl" if form.filtered else "decals.glsl"
+        slots = {"decals": f"//@ include {file}", "functions": library}
+        defines = {"DECALS": True, "POSED": posed, "LIMITED": form.limited, "FILTERED": form.filtered}
+        defines |= {"MATERIALS": form.materials, "RELIEF": form.relief}
+        if form.relief:
+            slots["relief"] = "//@ include relief.glsl"
+        if form.relief and compute:
+            slots["functions"], defines["STORED"] = stored(library), True
+        if form.filtered and (compute or context.software):
+            stages = [{"MARKED": targets + 2 * form.materials}, {"LISTED": True, "SHARED": compute}]
     shared = {"shared": "//@ include shared_parts.glsl"}
     return tuple(
         attach_camera(

@@ -174,10 +174,7 @@ class TargetState:
                 *(image if hasattr(image, "surface_texels") else image.pixels for image in scene.images),
             ),
             (
-                options.mapping,
-                options.contact,
-                options.stiffness,
-                options.filtered,
+                options.rules,
                 options.lights if relief else None,  # the first casts shadows
                 *_editor_formulas(decals),
             ),

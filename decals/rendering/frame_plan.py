@@ -81,7 +81,7 @@ def plan_frame(
     gbuffer, paint = targets.gbuffer, targets.decal_pass.paint
     rest = targets.rest_for(uploaded)
     places = None if rest is None else rest.textures
-    decal_arguments = gbuffer, source, uploaded.images, options.filtered, places
+    decal_arguments = gbuffer, source, uploaded.images, places
     steps += [partial(targets.decal_pass.draw, rectangle, *decal_arguments) for rectangle in dirty.paint]
     radius = AMBIENT_RADIUS * float(np.linalg.norm(np.subtract(*uploaded.bounds)))
     materials = None if uploaded.materials is None else targets.decal_pass.material_targets
@@ -97,9 +97,8 @@ def decal_source(uploaded: UploadedScene, options: RenderOptions) -> DecalSource
     """Return the decals of a scene and how options draw them; None without decals."""
     if uploaded.decals is None:
         return None
-    modes = options.mapping, options.contact, options.stiffness
     maps = uploaded.masks, uploaded.materials, uploaded.relief
-    return DecalSource(uploaded.decals, *modes, *maps, options.lights, uploaded.walks)
+    return DecalSource(uploaded.decals, options.rules, *maps, options.lights, uploaded.walks)
 
 
 def _surface_steps(

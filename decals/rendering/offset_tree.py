@@ -21,10 +21,9 @@ import numpy as np
 from blobtree import Node, polygonize
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.progress import reporting
-from decals.field.contact_mode import ContactLaw
 from decals.rendering.context import Context
 from decals.rendering.decal_data import stored
-from decals.rendering.decal_library import decal_functions
+from decals.rendering.decal_library import Form
 from decals.rendering.decal_pass import DecalSource
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.pixel_pass import GROUP, PassBackend, PixelPass, Program, attach_camera, set_uniform
@@ -188,11 +187,10 @@ class OffsetTreeDrawable(TreeDrawable):
 
     def _programs_for(self, source: DecalSource) -> tuple[Program, Program]:
         """Return the programs that find where rays begin and trace them; composing takes long."""
-        variant = source.constants(), source.law, source.limited
-        if self._offset_programs is None or self._offset_programs[0] != variant:
+        if self._offset_programs is None or self._offset_programs[0] != source.form:
             makers = start_program, offset_program
             start, offset = (make(self._context, self.kinds, source) for make in makers)
-            self._offset_programs = variant, (start, offset)
+            self._offset_programs = source.form, (start, offset)
         return self._offset_programs[1]
 
     def _shell_for(self, reach: float) -> tuple[Shell, moderngl.Texture3D]:
@@ -238,11 +236,9 @@ def start_program(context: Context, kinds: Kinds, source: DecalSource) -> Progra
 
 
 @lru_cache(maxsize=64)
-def offset_slots(
-    kinds: Kinds, constants: str, law: ContactLaw | None, *, buffers: bool
-) -> dict[str, str | Source]:
+def offset_slots(kinds: Kinds, form: Form, *, buffers: bool) -> dict[str, str | Source]:
     """Return the fillings of ``offset_foot.glsl``: the cases of `kinds` and the formulas of decals."""
-    slots = tracing_slots(kinds, decal_functions(law)) | {"constants": constants, "functions": ""}
+    slots = tracing_slots(kinds, form.functions) | {"constants": form.constants, "functions": ""}
     return slots | {"library": stored(str(slots["library"]))} if buffers else slots
 
 
@@ -251,5 +247,5 @@ def _filled(
 ) -> tuple[dict[str, str | Source], dict[str, str | int | float | bool]]:
     """Return slots and defines of ``offset_foot.glsl``."""
     compute = context.backend is PassBackend.COMPUTE
-    slots = offset_slots(kinds, source.constants(), source.law, buffers=compute)
-    return slots, {"RELIEF": True, "LIMITED": source.limited, "BLOCK": BLOCK, "STORED": compute}
+    slots = offset_slots(kinds, source.form, buffers=compute)
+    return slots, {"RELIEF": True, "LIMITED": source.form.limited, "BLOCK": BLOCK, "STORED": compute}

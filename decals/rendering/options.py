@@ -1,27 +1,28 @@
 """Options of a picture, and what the renderer reads of a scene."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Annotated, Any, Protocol, Self, TypeAlias
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeAlias
 
 import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.colors import ColorLike, Rgba, color_rgba
 from decals.errors import InvalidScene
-from decals.field.contact_mode import AnyContact, contact_mode
+from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.field.rules import PictureRules
 from decals.images.load import AnyImage
 from decals.images.texels import Pixels
 from decals.index.editor import DecalEditor
 from decals.model import Decals
-from decals.options import Values
+from decals.options import Values, inherit_descriptions
 from decals.receivers import takes_named_only
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS
 from decals.rendering.environment import Environment, as_environment
 from decals.rendering.lights import Lighting
 from decals.rendering.viewpoint import Viewpoint
-from decals.validation import count_number, describe, instance, member, stiffness_number, whole_number
+from decals.validation import count_number, describe, instance, whole_number
 
 Size: TypeAlias = tuple[int, int]
 """Width and height."""
@@ -86,28 +87,18 @@ def as_background(value: Background | ColorLike) -> Background:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drawing:
+class Drawing(PictureRules):
     """How a scene is drawn, in pictures of any size; a scene and its file keep it.
 
     Parameters
     ----------
     samples : int
         Samples along each axis of a pixel; 2 means 4 samples a pixel.
-    contact : Contact, str or ContactLaw
-        Contact mode: how decals that push each other share the surface; ``"elastic"``, ``"product"`` (the
-        paper), ``"min"`` or ``"radial"``.
-    mapping : ImageMapping or str
-        Image mapping: how images lie on curved surface; ``"corrected"``, ``"chord"`` or ``"walked"``.
     background : Background or colour
         Colours behind the objects: a gradient; or one colour, by its name such as ``"white"`` or
         ``"transparent"``, or by numbers.
     lights : Lighting, optional
         Lights in place of the studio light.
-    stiffness : float
-        Stiffness of elastic contact, from 1: how close to contact lines images are compressed.
-    filtered : bool
-        Average images, rims and contact lines over each sample, so that they are smooth with one sample a
-        pixel. Silhouettes and light still need several.
     environment : Environment or image, optional
         Picture of all directions as light, in place of the studio light; ``lights`` are added to it.
 
@@ -127,12 +118,8 @@ class Drawing:
     """
 
     samples: Annotated[int, Values(1, 8)] = 2
-    contact: AnyContact = DEFAULT_CONTACT
-    mapping: ImageMapping = ImageMapping.CORRECTED
     background: Background = STUDIO
     lights: Lighting | None = None
-    stiffness: Annotated[float, Values(1.0, 8.0)] = DEFAULT_STIFFNESS
-    filtered: bool = False
     environment: Environment | None = None
 
     if TYPE_CHECKING:  # names of modes and colours are converted
@@ -151,33 +138,21 @@ class Drawing:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        checked: dict[str, object] = {
-            "samples": count_number("samples", self.samples, 1, MAX_SAMPLES, InvalidScene),
-            "contact": contact_mode(self.contact, InvalidScene),
-            "mapping": member("mapping", self.mapping, ImageMapping, InvalidScene),
-            "stiffness": stiffness_number(self.stiffness, InvalidScene),
-            "background": as_background(self.background),
-            "filtered": instance("filtered", self.filtered, bool, InvalidScene, "such as True"),
-        }
+        super().__post_init__()
+        self._set(
+            samples=count_number("samples", self.samples, 1, MAX_SAMPLES, InvalidScene),
+            background=as_background(self.background),
+            environment=None if self.environment is None else as_environment(self.environment),
+        )
         if self.lights is not None:
             instance("lights", self.lights, Lighting, InvalidScene, "leave them out for the studio light")
-        if self.environment is not None:
-            checked["environment"] = as_environment(self.environment)
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)
-
-    def overridden(self, **options: Any) -> Self:
-        """Return the same with those of these options that are not None; errors are those of the class."""
-        return replace(self, **{name: value for name, value in options.items() if value is not None})
 
     def at(self, size: Size) -> "RenderOptions":
         """Return the options of a picture of a size, drawn like this."""
         return RenderOptions(size, **{field.name: getattr(self, field.name) for field in fields(Drawing)})
 
 
-def modes_of(drawing: Drawing) -> dict[str, Any]:
-    """Return contact mode, image mapping and stiffness, as arguments of `decals.evaluate`."""
-    return {"contact": drawing.contact, "mapping": drawing.mapping, "stiffness": drawing.stiffness}
+inherit_descriptions(Drawing)
 
 
 @dataclass(frozen=True)
@@ -223,7 +198,7 @@ class RenderOptions(Drawing):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "size", _size(self.size))
+        self._set(size=_size(self.size))
 
     @property
     def sample_size(self) -> Size:

@@ -18,12 +18,11 @@ from blobtree._typing import UInt8Array
 from blobtree.graphics import is_forked
 from blobtree.progress import reporting
 from decals.errors import InvalidPoints, InvalidScene
-from decals.field.mapping import ImageMapping
 from decals.index.editor import DecalEditor
 from decals.rendering import drawables  # noqa: F401  (registers kinds of objects)
 from decals.rendering.context import Context
 from decals.rendering.decal_data import DecalData
-from decals.rendering.decal_library import decal_library
+from decals.rendering.decal_library import Form, decal_library
 from decals.rendering.decal_pass import decal_programs
 from decals.rendering.dirty_regions import TargetState
 from decals.rendering.drawable import can_be_moved, warmup_of
@@ -414,28 +413,20 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
     """
     context = uploads.context
     objects = [warmup_of(context, item) for item in drawn_objects(scene)]
-    has_decals, environment = len(scene.decals) > 0, options.environment
-    formulas, materials, relief = None, has_materials(scene), has_relief(scene)
+    environment = options.environment
+    materials, relief = has_materials(scene), has_relief(scene)
+
+    def form() -> Form | None:  # the index tells whether decals are nested, once it is made
+        return _form(uploads, scene, options) if len(scene.decals) else None
+
     light = light_variant(options.lights, environment, materials=materials, relief=relief)
-    if has_decals:
-        formulas = options.contact, *_variant(uploads, scene, options).values()
     tasks = [WarmupTask(SHADERS, partial(context.probe, backend)) for backend in PassBackend]
     tasks += [task for plan in objects for task in plan.tasks]
     tasks += [WarmupTask(SHAPES, partial(uploads.drawable, item)) for item in drawn_objects(scene)]
-    if has_decals:
+    if len(scene.decals):
         tasks += _decal_tasks(uploads, scene, options)
     tasks += [
-        WarmupTask(
-            SHADERS,
-            lambda: decal_programs(
-                context,
-                _library(uploads, scene, options),
-                limited=is_limited(scene),
-                filtered=_is_filtered(scene, options),
-                materials=materials,
-                relief=relief,
-            ),
-        ),
+        WarmupTask(SHADERS, lambda: decal_programs(context, form())),
         WarmupTask(SHADERS, partial(light_program, context, **light)),
         WarmupTask(SHADERS, partial(depth_program, context)),
         WarmupTask(SHADERS, partial(resolve_program, context)),
@@ -447,7 +438,7 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
         tasks.append(WarmupTask(IMAGES, partial(uploads.environment, environment)))
     shown = None if environment is None else environment.picture
     kinds = frozenset(plan.key for plan in objects)
-    return WarmupPlan((kinds, formulas, tuple(light.values()), shown), tasks)
+    return WarmupPlan((kinds, form(), tuple(light.values()), shown), tasks)
 
 
 def _compile_offsets(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> None:
@@ -462,19 +453,18 @@ def _compile_offsets(uploads: Uploads, scene: SceneLike, options: RenderOptions)
 def _decal_tasks(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> list[WarmupTask]:
     decals = scene.decals
     index = [WarmupTask(DECALS, lambda: decals.index)] if isinstance(decals, DecalEditor) else []
-    translate = partial(_library, uploads, scene, options)
     return [
         *index,
         WarmupTask(DECALS, partial(uploads.decals, scene)),
         WarmupTask(DECALS, partial(uploads.walks, scene, options.mapping)),
         WarmupTask(IMAGES, partial(uploads.images, scene)),
-        WarmupTask(SHADERS, translate, threaded=True),
+        WarmupTask(SHADERS, lambda: decal_library(_form(uploads, scene, options)), threaded=True),
     ]
 
 
 def _is_filtered(scene: SceneLike, options: RenderOptions) -> bool:
     """Return True if decals are averaged over pixels; relief and walked images are not."""
-    return options.filtered and not has_relief(scene) and options.mapping is not ImageMapping.WALKED
+    return options.filtered and not has_relief(scene) and not options.walked
 
 
 def _warn_of_plain_samples(scene: SceneLike, options: RenderOptions) -> None:
@@ -496,19 +486,15 @@ def _caller_level() -> int:
     return level
 
 
-def _library(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> str:
-    """Return the formulas of the decals; nothing for a scene without decals."""
-    if not len(scene.decals):
-        return ""
-    return decal_library(options.contact, **_variant(uploads, scene, options))
-
-
-def _variant(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> dict[str, bool]:
-    """Return the arguments of `decal_library` for a scene with decals."""
-    return {
-        "layered": scene.decals.layered,
-        "limited": is_limited(scene),
-        "nested": uploads.nested(scene),
-        "walked": options.mapping is ImageMapping.WALKED,
-        "filtered": _is_filtered(scene, options),
-    }
+def _form(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> Form:
+    """Return the form of the decals of a scene."""
+    return Form(
+        options.contact,
+        scene.decals.layered,
+        is_limited(scene),
+        uploads.nested(scene),
+        materials=has_materials(scene),
+        relief=has_relief(scene),
+        walked=options.walked,
+        filtered=_is_filtered(scene, options),
+    )

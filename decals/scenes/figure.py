@@ -129,8 +129,7 @@ def save_figure(
     thickness = _widths(widths)
     if not scene.objects:
         raise InvalidScene("expected a scene with an object to draw, got none; add one")
-    modes: dict[str, Any] = {"contact": contact, "stiffness": stiffness, "mapping": mapping}
-    scene.drawing.overridden(**modes)  # checked before the long work
+    modes = scene.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping).modes
     if camera is not None:
         scene = scene.replace(camera=instance("camera", camera, Camera, InvalidScene, "give a Camera"))
     if target.suffix.lower() == ".pdf":

@@ -14,9 +14,8 @@ from decals.field.contact_mode import AnyContact
 from decals.field.evaluate import Samples, evaluate
 from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of
 from decals.field.mapping import IMAGE_RADIUS_SQUARED, ImageMapping
-from decals.field.walks import walks_for
+from decals.field.walks import evaluation_options
 from decals.model import Decals, Interaction
-from decals.rendering.options import modes_of
 from decals.scattering.center_normals import Centers
 from decals.scattering.domain import Domain, OrientedPoints, apportion
 from decals.scattering.neighbors import FacingTree, bond_orders, ideal_spacing, spacing_of_distances
@@ -245,7 +244,7 @@ def measure(
     if not scene.objects:
         raise InvalidScene("expected a scene with an object to measure, got none; add one")
     drawing = scene.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping)
-    walks = walks_for(drawing.mapping, scene.decals, scene.objects)
+    options = evaluation_options(drawing, scene.decals, scene.objects)
     with reporting(progress) as report:
         report("measuring", 0.0)
         domain = Domain([item.surface for item in scene.objects], seed)
@@ -257,7 +256,7 @@ def measure(
         for number, item in enumerate(scene.objects):
             rows = np.flatnonzero(points.surface_ids == number)
             for part, normals, turns in _drawn(item, points.positions[rows], points.normals[rows], scene):
-                sums.add(part, normals, turns, modes_of(drawing) | {"on": item, "walks": walks}, rng)
+                sums.add(part, normals, turns, options | {"on": item}, rng)
                 done += len(part)
                 report("measuring", done / samples)
         centers = Centers.of(scene.decals, domain.surfaces, ideal_spacing(domain.area, count))

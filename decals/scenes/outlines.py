@@ -20,9 +20,8 @@ from decals.errors import InvalidScene
 from decals.field.contact_mode import AnyContact
 from decals.field.evaluate import evaluate
 from decals.field.mapping import IMAGE_RADIUS_SQUARED, ImageMapping
-from decals.field.walks import walks_for
+from decals.field.walks import evaluation_options
 from decals.model import Decals, Interaction
-from decals.rendering.options import modes_of
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject
 from decals.scenes.scene import Scene, require_scene
 from decals.surfaces.normals import split_at_creases
@@ -178,7 +177,7 @@ def outlines(
     step = real_number("step", step, "a number above 0, at most 1", lambda x: 0.0 < x <= 1.0, InvalidScene)
     drawing = scene.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping)
     decals = scene.decals
-    walks = walks_for(drawing.mapping, decals, scene.objects)
+    options = evaluation_options(drawing, decals, scene.objects)
     contacts = np.where(decals.interactions == Interaction.PUSH, decals.ranks, NOTHING)
     found: list[SurfaceLine] = []
     if not len(decals):
@@ -187,7 +186,7 @@ def outlines(
         for number, item in enumerate(scene.objects):
             report("tracing lines", number / len(scene.objects))
             normals_at = _normals_of(item)
-            modes = modes_of(drawing) | {"on": item, "walks": walks}
+            modes = options | {"on": item}
 
             def labels(
                 points: Float64Array,

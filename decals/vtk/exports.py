@@ -93,8 +93,7 @@ def _baked_scene(name: str, subplot: Any) -> Baked | None:
     scene = subplot.scene
     if scene is None or not drawn_objects(scene):
         return None
-    options = {mode: getattr(subplot, mode) for mode in ("contact", "mapping", "stiffness")}
-    options |= {"size": TEXTURE_SIZE, "samples": TEXTURE_SAMPLES}
+    options = subplot.drawing.modes | {"size": TEXTURE_SIZE, "samples": TEXTURE_SAMPLES}
     with reporting() as report:
         try:
             return bake_parts(scene, TEXTURE, report, **options)

@@ -14,12 +14,12 @@ from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
 from blobtree._typing import Float64Array
 from decals.errors import InvalidScene
-from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.hosts.code import Code, Form, code_of
+from decals.hosts.code import Code, code_of
 from decals.receivers import EVERYTHING, surface_mask
-from decals.rendering import Renderer, SceneLike
+from decals.rendering import Drawing, Renderer, SceneLike
 from decals.rendering.decal_data import DecalData
+from decals.rendering.decal_library import Form
 from decals.rendering.image_array import ImageArray
 from decals.rendering.viewpoint import Projection
 from decals.shaders import compose
@@ -78,11 +78,7 @@ class InjectionTarget(Protocol):
     @property
     def applied(self) -> InjectedDecals: ...  # noqa: D102
     @property
-    def mapping(self) -> ImageMapping: ...  # noqa: D102
-    @property
-    def contact(self) -> AnyContact: ...  # noqa: D102
-    @property
-    def stiffness(self) -> float: ...  # noqa: D102
+    def drawing(self) -> Drawing: ...  # noqa: D102
     def world_matrix(self) -> Float64Array: ...  # noqa: D102
     def current(self) -> AbstractContextManager[None]: ...  # noqa: D102
     def current_if_present(self) -> AbstractContextManager[None]: ...  # noqa: D102
@@ -148,7 +144,7 @@ class Injection:
             return
         self._add_normals()  # the mapper's input may have been replaced
         subplot, data, _ = source
-        form = Form(subplot.contact, data.layered, data.limited, data.nested)
+        form = Form(subplot.drawing.contact, data.layered, data.limited, data.nested)
         self._code = code_of(form, "330 core", "fragment", PREFIX)  # computed once for each form
         self._additions.write(_additions(self._code.text, self._paint))
 
@@ -185,12 +181,13 @@ class Injection:
         units = subplot.applied.texture_units()
         uniforms = data.bind(units[1 : 1 + data.texture_count])
         images.use(units[0])
-        uniforms |= {"decal_images": units[0], "decal_mapping": int(subplot.mapping)}
+        rules = subplot.drawing
+        uniforms |= {"decal_images": units[0], "decal_mapping": int(rules.mapping)}
         uniforms["surface_receivers"] = self._mask(subplot)
         names = code.textures | code.uniforms
         for name in uniforms.keys() & names.keys():
             program.SetUniformi(names[name], uniforms[name])
-        program.SetUniformf(names["decal_stiffness"], subplot.stiffness)
+        program.SetUniformf(names["decal_stiffness"], rules.stiffness)
         subplot.vtk_renderer.GetRenderWindow().GetState().ResetGLActiveTexture()
 
     def _source(self) -> tuple[InjectionTarget, DecalData, ImageArray] | None:
@@ -284,7 +281,7 @@ class InjectedDecals:
         orientation: MeshOrientation = MeshOrientation.OUTWARD,
     ) -> None:
         """Show the decals on an actor."""
-        if self._subplot.mapping is ImageMapping.WALKED:
+        if self._subplot.drawing.walked:
             raise InvalidScene(NOT_WALKED)
         self._release(self._of(actor))
         self._injections.append(

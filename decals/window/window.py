@@ -161,7 +161,7 @@ class EditWindow:
         self.subplot: SubplotRenderer = self.plotter.decals.subplot
         self._backup = SubplotBackup(self.subplot)
         self._host.add_scene(self.document.scene)
-        modes = self.subplot.contact, self.subplot.mapping, self.subplot.stiffness
+        drawing = self.subplot.drawing.overridden(contact=contact, mapping=mapping, stiffness=stiffness)
         self.subplot.scene = self.document
         move_camera(self.subplot, np.negative(self.document.origin))
         self.frames = FrameController(self.subplot, samples, self.plotter.render, self._shown_version)
@@ -169,9 +169,8 @@ class EditWindow:
         self._end_screenshots = before_screenshots(self.plotter, weak_callback(self._before_screenshot))
         self.actions.files.camera = lambda: camera_of(self.subplot) if self._host.open else None
         self.actions.files.leave = self._host.leave
-        given = contact, mapping, stiffness
-        for name, mode, present in zip(("contact", "mapping", "stiffness"), given, modes, strict=True):
-            setattr(self.subplot, name, present if mode is None else mode)
+        for name, mode in drawing.modes.items():
+            setattr(self.subplot, name, mode)
         self.camera = self.actions.state.camera = SubplotCamera(self.subplot)
         self.tools = PointerTools(
             self.actions,

@@ -11,7 +11,7 @@ from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Points, Relaxed, Scope
 from decals.apps.lab.formulas import parse
 from decals.apps.lab.measures import MEASURES
-from decals.field.mapping import ImageMapping
+from decals.field.rules import PictureRules
 from decals.model import Decals
 from decals.record import Contact
 from decals.scenes.camera import Camera
@@ -29,9 +29,7 @@ def experiment(**changes: Any) -> Experiment:
     before = Experiment(
         objects=(PLATE,),
         decals=TWO,
-        contact=Contact.PRODUCT,
-        stiffness=2.0,
-        mapping=ImageMapping.CORRECTED,
+        rules=PictureRules(contact=Contact.PRODUCT),
         probe=(0.3, 0.05, 0.0),
         camera=CAMERA,
         size=4.0,
@@ -85,7 +83,7 @@ def test_the_four_constraints_hold() -> None:
 
 
 def test_numbers_of_the_scene() -> None:
-    state = experiment(contact=Contact.ELASTIC, stiffness=3.0)
+    state = experiment(rules=PictureRules(stiffness=3.0))
     assert value("distance(0, 1)", state) == pytest.approx(np.hypot(0.7, 0.1))
     assert value("influence(1) * 0.454202 / radius(1)", state) == pytest.approx(1.0, rel=1e-5)
     assert value("count", state) == 2
@@ -104,7 +102,7 @@ def test_a_decal_alone_is_neither_stretched_nor_folded() -> None:
 def test_radial_contact_stretches_by_the_distance_of_the_plane() -> None:
     """At the line of centres the ray is scaled by 1/R towards the plane, R in visible radii."""
     decals = Decals([[0.0, 0.0, 0.0], [0.8, 0, 0]], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, [0.5, 0.5])
-    state = experiment(decals=decals, contact=Contact.RADIAL)
+    state = experiment(decals=decals, rules=PictureRules(contact="radial"))
     assert value("at(0, 1)", state) == 1
     near = state.points_near([[0.2, 1e-4, 0.0]])
     assert float(value("stretch", state, near)[0]) == pytest.approx(1.0, abs=0.01)  # both ways by 0.5/0.4
@@ -114,7 +112,7 @@ def test_radial_contact_stretches_by_the_distance_of_the_plane() -> None:
 def test_a_small_decal_in_a_large_one_folds_it_in_the_mode_of_the_paper_only() -> None:
     decals = Decals([[0.0, 0.0, 0.0], [0.5, 0.3, 0]], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, [1.1, 0.35])
     assert value("share(folded)", experiment(decals=decals)) > 1e-3
-    assert value("share(folded)", experiment(decals=decals, contact=Contact.ELASTIC)) == 0
+    assert value("share(folded)", experiment(decals=decals, rules=PictureRules())) == 0
 
 
 @pytest.mark.parametrize(

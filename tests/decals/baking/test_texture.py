@@ -14,6 +14,7 @@ from decals.baking.seams import Mixed, match_seams
 from decals.baking.texture import Channels, bake_texture
 from decals.baking.unwrapped import Unwrapped
 from decals.field.evaluate import ColorEvaluator
+from decals.field.rules import PictureRules
 from tests.decals.baking.glb import Array, ball_and_cube, bilinear, linear, need, read_glb
 from tests.decals.baking.seam_steps import seam_steps
 from tests.decals.baking.seam_steps import srgb as srgb_levels
@@ -130,7 +131,7 @@ def test_colours_alone_are_those_of_evaluate() -> None:
         images = [image.pixels for image in scene.images]
         want = decals.evaluate(rows, points, rows.normals[owners], images=images, contact=contact).color
         assert want is not None
-        got = ColorEvaluator(rows, images, contact=contact).at(points, rows.normals[owners])
+        got = ColorEvaluator(rows, images, PictureRules(contact=contact)).at(points, rows.normals[owners])
         assert np.array_equal(got, want)
         assert (want[:, 3] > 0.61).any()
 

@@ -5,9 +5,8 @@ from typing import Any
 import numpy as np
 
 from decals.field.evaluate import evaluate
-from decals.hosts.code import Form
+from decals.rendering.decal_library import Form
 from decals.rendering.lights import Lighting
-from decals.rendering.options import modes_of
 from decals.scenes.render import render
 from decals.scenes.scene import Scene
 from tests.oracles.decals import decals_at
@@ -30,7 +29,7 @@ def wrong_values(form: Form, scene: Scene, points: Any, normals: Any, values: di
     on = frozenset({scene.objects[0].name})
     reference = decals_at(scene.decals, points, normals, contact=form.contact.name.lower(), on=on)
     options: dict[str, Any] = {"on": scene.objects[0], "images": list(scene.images), "materials": True}
-    known = evaluate(scene.decals, points, normals, **modes_of(scene.drawing), **options)
+    known = evaluate(scene.decals, points, normals, **scene.drawing.modes, **options)
     sure = (reference.doubt > DOUBT) & (reference.stretch < 20)
     owner, field = values["found"][:, 0].astype(int), values["found"][:, 1]
     assert sure.mean() > 0.9
@@ -85,7 +84,7 @@ def _steady(scene: Scene, points: Any, normals: Any, known: Any, options: dict[s
                 scene.decals,
                 points + step * np.eye(3, dtype=np.float32)[axis],
                 normals,
-                **modes_of(scene.drawing),
+                **scene.drawing.modes,
                 **options,
             )
             result &= (moved.owner == known.owner) & (np.abs(moved.uv - known.uv).max(axis=1) < 5e-4)

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from decals.hosts.code import Form
 from decals.model import Decals
+from decals.rendering.decal_library import Form
 from decals.rendering.options import Drawing
 from decals.scenes.camera import Camera
 from decals.scenes.material import DecalMaterial

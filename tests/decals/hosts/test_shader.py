@@ -14,11 +14,12 @@ import warp as wp
 import decals
 from decals.editing.document import Document
 from decals.errors import InvalidScene, TooMuchData
-from decals.hosts.code import STAGES, VERSIONS, Form, code_of
+from decals.hosts.code import STAGES, VERSIONS, code_of
 from decals.hosts.textures import MAX_ROWS, data_size
 from decals.hosts.unsupported import UNSUPPORTED
 from decals.index import DecalEditor
 from decals.rendering.context import Context
+from decals.rendering.decal_library import Form
 from decals.rendering.options import Drawing
 from decals.shaders import ComposeError
 from decals.shaders.isolate import declarations, prefixed, preprocessed, reachable

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from decals import shader
-from decals.hosts.code import Form
 from decals.record import Contact
+from decals.rendering.decal_library import Form
 from tests.decals.hosts.agreement import equal_pixels
 from tests.decals.hosts.form_scenes import name_of, scene_of
 from tests.frontends.test_browser import require

@@ -3,8 +3,8 @@
 import pytest
 
 from decals import shader
-from decals.hosts.code import Form
 from decals.record import Contact
+from decals.rendering.decal_library import Form
 from tests.decals.hosts import wgpu_host
 from tests.decals.hosts.agreement import equal_pixels
 from tests.decals.hosts.form_scenes import name_of, scene_of

@@ -17,7 +17,6 @@ from PIL import Image
 import decals
 from blobtree import Point, Segment
 from decals.errors import InvalidScene, TooMuchData
-from decals.hosts.code import Form
 from decals.index import DecalIndex
 from decals.index.index import has_nested, index_on
 from decals.pages import contents, page, viewer_script
@@ -25,6 +24,7 @@ from decals.pages.contents import index_rules, record_rules
 from decals.pages.packing import packed
 from decals.pages.page import MODULES
 from decals.rendering import Environment
+from decals.rendering.decal_library import Form
 from decals.scenes.camera import REFERENCE_ASPECT
 from decals.scenes.scene import Scene
 from decals.surfaces import BaseColor, BaseTexture

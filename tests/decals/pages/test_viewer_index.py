@@ -7,11 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from decals import Contact, Decals
-from decals.hosts.code import Form
 from decals.index import DecalIndex
 from decals.index.decal_cells import LEVEL_SHIFT
 from decals.model import LAYER_LIMIT
 from decals.pages.contents import index_rules, record_rules
+from decals.rendering.decal_library import Form
 from tests.decals.pages.viewer_scripts import needs_node, run_node
 
 Cells = dict[tuple[float, ...], list[int]]

@@ -16,7 +16,7 @@ from decals.model import Decals
 from decals.record import Contact
 from decals.rendering import viewpoint as tile
 from decals.rendering.context import Context
-from decals.rendering.decal_library import decal_library
+from decals.rendering.decal_library import Form, decal_library
 from decals.rendering.decal_pass import decal_programs
 from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
@@ -124,10 +124,10 @@ def test_every_pixel_of_walked_images(renderer: Renderer, layered: bool) -> None
 
 
 def test_no_scene_needs_more_textures_than_every_driver_has(context: Context) -> None:
-    library = decal_library(Contact.ELASTIC, layered=True, limited=True, nested=True, walked=True)
-    variant = {"posed": True, "limited": True, "materials": True, "relief": True}
-    names = {name for program in decal_programs(context, library, **variant) for name in program}
-    slots = {"decals": "//@ include decals.glsl", "functions": library, "relief": "//@ include relief.glsl"}
+    form = Form(Contact.ELASTIC, *(True,) * 6)
+    names = {name for program in decal_programs(context, form, posed=True) for name in program}
+    slots = {"decals": "//@ include decals.glsl", "functions": decal_library(form)}
+    slots |= {"relief": "//@ include relief.glsl"}
     text = compose("decal_pass.glsl", slots=slots, version=None).text
     samplers = names & set(re.findall(r"uniform i?sampler\w+ (\w+);", text))
     assert {"decal_walks", "decal_materials", "object_masks"} < samplers
