@@ -350,7 +350,7 @@ class Page:
                 active=("row.key === selected || marked.includes(row.key)",),
                 style=("`padding-left: ${8 + 14 * row.depth}px; opacity: ${row.hidden ? 0.6 : 1}`",),
                 classes="flex-grow-1",
-                click=(self._click, "[row.key, $event.ctrlKey || $event.metaKey, selected]"),
+                click=(self._click, "[row.key, $event.ctrlKey || $event.metaKey]"),
                 contextmenu=f"$event.preventDefault(); {SHOW_MENU}",
                 dragstart="$event.dataTransfer.setData('text/plain', row.key)",
                 dragover="$event.preventDefault()",
@@ -403,12 +403,9 @@ class Page:
         self.sandbox.select(key)
         self.sandbox.move_camera("frame")
 
-    def _click(self, key: str, several: bool, selected: str) -> None:
-        """Select a row, deselect the selected one, or mark several."""
-        if several:
-            self.sandbox.mark(key)
-        else:
-            self.sandbox.select("" if key == selected else key)
+    def _click(self, key: str, several: bool) -> None:
+        """Select a row, or mark several."""
+        (self.sandbox.mark if several else self.sandbox.select)(key)
 
     def _build_panel(self) -> None:
         with html.Div(v_if="panel.kind", classes="pa-3"):
@@ -423,7 +420,7 @@ class Page:
                 click=self.sandbox.unwrap,
             )
         html.P(
-            "{{ outline.some(row => row.kind === 'object') ? 'Select a node in the outline.' : "
+            "{{ outline.some(row => row.kind === 'object') ? 'Click on the model or on a row.' : "
             "outline.some(row => row.kind === 'mesh') ? 'Scatter decals, or click on one.' : "
             "'Add a primitive or drop a model.' }}",
             v_if="!panel.kind",

@@ -37,6 +37,7 @@ TILE_WIDTH = 120
 
 BRUSH_ICONS = {
     Brush.SELECT: "mdi-cursor-default-outline",
+    Brush.ADD: "mdi-plus-circle-outline",
     Brush.BOX: "mdi-selection-drag",
     Brush.LASSO: "mdi-lasso",
     Brush.PAINT: "mdi-brush-variant",
@@ -47,6 +48,9 @@ BRUSH_ICONS = {
     Brush.RELAX: "mdi-dots-hexagon",
     Brush.ALIGN: "mdi-arrow-right-bold-outline",
 }
+NOT_LISTED = CAMERA, "move", "close", "select", "select_further", "select_also", "toggle"
+"""Actions that need the pointer, or that the page has elsewhere."""
+
 SUMMARIES = {b.action: f"{b.summary} ({format_gestures(b)})" for b in KEYS.bindings}
 """What each action does, and its keys."""
 
@@ -342,7 +346,7 @@ def build_brushes(sandbox: Sandbox) -> None:
             vuetify3.VBtn(
                 value=str(brush),
                 icon=BRUSH_ICONS[brush],
-                width=34,
+                width=31,
                 title=SUMMARIES[f"brush_{brush}"],
                 raw_attrs=named(f"'{SUMMARIES[f'brush_{brush}']}'"),
             )
@@ -439,4 +443,4 @@ def build_actions(sandbox: Sandbox) -> None:
 
 
 def _offered(binding: Binding, group: Group) -> bool:
-    return binding.group is group and binding.action not in (CAMERA, "move", "close", "select", "select_also")
+    return binding.group is group and binding.action not in NOT_LISTED

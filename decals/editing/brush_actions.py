@@ -6,6 +6,7 @@ from decals.editing.key_bindings import Group
 
 BRUSHES = {
     Brush.SELECT: ("w", "select and move decals"),
+    Brush.ADD: ("Shift+s", "add decals: click to add one"),
     Brush.BOX: ("b", "box: drag to select decals"),
     Brush.LASSO: ("Shift+b", "lasso: drag around decals to select them"),
     Brush.PAINT: ("Shift+w", "paint: drag over decals to select them"),

@@ -14,10 +14,12 @@ class Brush(StrEnum):
     """What a drag with the left button does to decals.
 
     SELECT selects and moves single ones, BOX and LASSO select those in a box, or in a line around them, and
-    PAINT those that it touches. PULL drags the surface below them. ALIGN turns images along the stroke.
+    PAINT those that it touches. ADD adds a decal with each click. PULL drags the surface below them. ALIGN
+    turns images along the stroke.
     """
 
     SELECT = "select"
+    ADD = "add"
     BOX = "box"
     LASSO = "lasso"
     PAINT = "paint"

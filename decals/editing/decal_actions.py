@@ -91,7 +91,7 @@ class DecalActions(WindowActions):
     def _last_selected(self) -> Decals:
         return self._state.session.document.decals[int(self._state.selected_numbers[-1])]
 
-    @Group.DECALS.action("add_decal", "Ctrl+Click", "a", summary="add a decal under the cursor")
+    @Group.DECALS.action("add_decal", "a", summary="add a decal under the cursor")
     def add_decal(self, cursor: Cursor, **values: ArrayLike) -> None:
         """Add a decal like the last selected one, but with other values of `Decals`, and select it."""
         state, pick = self._state, require_pick(cursor)

@@ -86,7 +86,7 @@ class PointerTools:
         self.actions = instance("actions", actions, Actions, InvalidEdit, "Actions(session) makes some")
         self._ray, self._occluded, self._pixels = ray, occluded, pixels
         self.selection_line: list[tuple[float, float]] = []
-        self._press, self._press_position = Press.UP, (0.0, 0.0)
+        self._press, self._press_position, self._last_click = Press.UP, (0.0, 0.0), (-np.inf, -np.inf)
         self._drag: DecalDrag | SurfaceDrag | None = None
         self._brush: BrushStroke | None = None
         self._brush_start: object = None
@@ -104,16 +104,21 @@ class PointerTools:
 
     def at(self, x: float, y: float) -> SurfacePick | None:
         """Return the surface point at a pixel, or None."""
-        x, y = _checked_pixel(x, y)
-        ray = self._ray(x, y)
-        if ray is None:
-            return None
-        surface_pick = self.actions.state.asked(
-            "find the surface", lambda document: pick(document, *ray, contact=document.drawing.contact)
-        )
+        surface_pick = self._behind(x, y)
         if surface_pick is None or self._occluded(x, y, surface_pick.position):
             return None
         return surface_pick
+
+    def _behind(self, x: float, y: float) -> SurfacePick | None:
+        """Return the surface point at a pixel, whatever hides it, or None."""
+        ray = self._ray(*_checked_pixel(x, y))
+        return ray and self.actions.state.asked(
+            "find the surface", lambda document: pick(document, *ray, contact=document.drawing.contact)
+        )
+
+    def click_through(self, x: float, y: float) -> None:
+        """Click again on the surface behind the handle of the selected node."""
+        self.actions.perform("select_further", lambda: self._behind(x, y))
 
     def key(
         self, name: str, x: float, y: float, *, ctrl: bool = False, shift: bool = False, text: str = ""
@@ -146,7 +151,7 @@ class PointerTools:
             if surface_pick is not None and ray is not None:
                 self._drag = SurfaceDrag(self.actions, surface_pick, ray)
             return surface_pick is not None
-        if brush is not Brush.SELECT:
+        if brush not in (Brush.SELECT, Brush.ADD):
             return self._begin_brush(x, y)
         selection = self.actions.state.selection
         surface_pick = None if shift or not selection else self.at(x, y)
@@ -224,10 +229,21 @@ class PointerTools:
             self._end_brush(brush)
             return True
         if press is Press.DOWN:
-            self._perform("Click", x, y, ctrl=ctrl, shift=shift)
+            self._click(x, y, ctrl=ctrl, shift=shift)
         elif drag is not None:
             drag.end()
         return drag is not None or ctrl
+
+    def _click(self, x: float, y: float, *, ctrl: bool, shift: bool) -> None:
+        """Handle a press and release at one place; the second at a place is another gesture."""
+        again = np.hypot(x - self._last_click[0], y - self._last_click[1]) <= CLICK_DISTANCE
+        self._last_click = x, y
+        if self.actions.state.brush.brush is Brush.ADD and not ctrl and not shift:
+            self.actions.perform("add_decal", lambda: self.at(x, y))
+            return
+        self._perform(
+            "Click again" if again and not ctrl and not shift else "Click", x, y, ctrl=ctrl, shift=shift
+        )
 
     def cancel(self) -> None:
         """Forget the press of the button, and revert what its drag has changed."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from blobtree.nodes.paths import Path
 from decals.editing.action_state import ActionState, Cursor
 from decals.editing.brush_settings import Brush
 from decals.editing.commands import DeleteDecals, DuplicateDecals
@@ -37,23 +38,55 @@ class SceneActions:
 
     # -- selection --------------------------------------------------------------------------------------
 
-    @Group.SELECTION.action("select", "Click", summary="select the decal under the cursor")
-    def select(self, cursor: Cursor) -> None:
-        """Select the decal under the cursor, or none."""
-        pick = self.state.picked = cursor()
-        self.state.selection = () if pick is None else self.state.selectable([pick.owner])
-        self.state.message = f"decal {pick.owner}" if pick is not None and self.state.selection else ""
+    @Group.SELECTION.action(
+        "select", "Click", summary="select the decal under the cursor, else the primitive"
+    )
+    def select(self, cursor: Cursor, *, further: bool = False) -> None:
+        """Select the decal under the cursor, else the primitive, else nothing.
 
-    @Group.SELECTION.action("select_also", "Shift+Click", summary="add it to the selection, or remove it")
-    def select_also(self, cursor: Cursor) -> None:
-        """Add the decal under the cursor to the selection, or remove it."""
-        pick = cursor()
-        if pick is None or not self.state.selectable([pick.owner]):
+        With `further`, select what follows the selection: the primitive after a decal, then the node above.
+        """
+        state, pick = self.state, cursor()
+        state.picked, state.message = pick, ""
+        choices: list[tuple[tuple[int, ...], tuple[int, Path] | None]] = []
+        if pick is not None:
+            choices += [(owner, None)] if (owner := state.selectable([pick.owner])) else []
+            choices += [((), node) for node in self.trees.nodes_at(pick)]
+        present = state.selection, state.primitive
+        turn = choices.index(present) + 1 if further and present in choices else 0
+        self._deselect_all()
+        if pick is None or not choices:
             return
-        selection = self.state.selection
-        others = tuple(number for number in selection if number != pick.owner)
-        self.state.selection = others if pick.owner in selection else (*others, pick.owner)
-        self.state.message = f"{len(self.state.selection)} decals"
+        state.selection, node = choices[turn % len(choices)]
+        if node is None:
+            state.message = f"decal {pick.owner}"
+        else:
+            self.trees.select_picked(*node, pick)
+
+    @Group.SELECTION.action(
+        "select_further",
+        "Click again",
+        summary="select the primitive there, then the node above it",
+    )
+    def select_further(self, cursor: Cursor) -> None:
+        """Select the primitive below a selected decal, or the node above a selected one."""
+        self.select(cursor, further=True)
+
+    @Group.SELECTION.action("select_also", "Shift+Click", summary="add the decal to the selection")
+    def select_also(self, cursor: Cursor, *, toggle: bool = False) -> None:
+        """Add the decal under the cursor to the selection; with `toggle`, remove it if it is selected."""
+        state, pick = self.state, cursor()
+        if pick is None or not state.selectable([pick.owner]):
+            return
+        others = tuple(number for number in state.selection if number != pick.owner)
+        removed = toggle and pick.owner in state.selection
+        state.selection, state.primitive = others if removed else (*others, pick.owner), None
+        state.message = f"{len(state.selection)} decals"
+
+    @Group.SELECTION.action("toggle", "Ctrl+Click", summary="add the decal to the selection, or remove it")
+    def toggle(self, cursor: Cursor) -> None:
+        """Add the decal under the cursor to the selection, or remove it."""
+        self.select_also(cursor, toggle=True)
 
     @Group.SELECTION.action("select_all", "Ctrl+a", summary="select all decals")
     def select_all(self, _cursor: Cursor) -> None:

@@ -20,7 +20,7 @@ from decals.editing.document import Document
 from decals.editing.gizmo import Handle, HandleDrag, Ray, handles_of, moved_point, snap_distance
 from decals.editing.key_bindings import Group
 from decals.editing.new_nodes import alternatives, checked_kind, exchanged_node, new_node, node_above
-from decals.editing.queries import SurfacePick
+from decals.editing.queries import SurfacePick, first_hit, nearest_points
 from decals.editing.scatter_commands import AddObject, RemoveObject
 from decals.editing.session import EditSession
 from decals.editing.steps import Step, usual_inputs
@@ -64,14 +64,8 @@ FIRST_OBJECT_RADIUS = 0.2
 FIRST_LIMB_RADIUS = 0.06
 """Radius of a limb that is the first object, likewise."""
 
-NEW_NODE_EXTENT, NEW_OBJECT_SIZE = 0.6, 0.4
-"""Extent of a new node of a panel, in extents of the selected node; size of a new object, in scene sizes.
-
-So a model grows by less and less, whichever primitives are added one after another.
-"""
-
-NEW_NODE_LIFT = 0.2
-"""Height of a new node's centre above the selected node, in its sizes: blended balls keep a neck."""
+NEW_NODE_EXTENT = 0.1
+"""Extent of a new node of a panel, in extents of the model that it joins, or of the scene."""
 
 MAX_DECALS_IN_DRAG = 5_000
 """With more decals than this, dragging a primitive runs in the background."""
@@ -133,6 +127,17 @@ class TreeActions(WindowActions):
         self._select(lambda: pick)
         self._state.message = "drag its handle to move the primitive, press M on it to deselect it"
 
+    def nodes_at(self, pick: SurfacePick) -> list[tuple[int, Path]]:
+        """Return the primitive at a surface point, and the nodes above it up to the root; none on a mesh."""
+        leaf = self._selectable(pick)
+        return [] if leaf is None else [(leaf[0], leaf[1][:n]) for n in range(len(leaf[1]), -1, -1)]
+
+    def select_picked(self, number: int, path: Path, pick: SurfacePick) -> None:
+        """Select a node, with its handle at a surface point."""
+        self._state.select_primitive(number, path, pick.position - self._middle(number, path))
+        further = "; click again for the node above it" if path else ""
+        self._state.message = f"{self._selected_label}{further}"
+
     def _selectable(self, pick: SurfacePick) -> tuple[int, Path] | None:
         """Return the primitive at a point; None on a mesh."""
         item = self._state.session.document.objects[pick.object]
@@ -142,8 +147,7 @@ class TreeActions(WindowActions):
         """Select the primitive under the cursor unless one is selected, and return the selected one."""
         if self._state.primitive is None:
             pick = require_pick(cursor)
-            number, path = self._primitive_under(pick)
-            self._state.select_primitive(number, path, pick.position - self._middle(number, path))
+            self.select_picked(*self._primitive_under(pick), pick)
         assert self._state.primitive is not None
         return self._state.primitive
 
@@ -346,7 +350,7 @@ class TreeActions(WindowActions):
             self.end_drag()
 
     def add_node(self, kind: str) -> None:
-        """Blend a new primitive into the selected node and select it; without a node it is an object.
+        """Add a primitive in the middle of the view, blended into the selected node, else as an object.
 
         Parameters
         ----------
@@ -354,16 +358,16 @@ class TreeActions(WindowActions):
             Name of its class; see `decals.editing.new_nodes.kinds`.
         """
         kind, state, middle = checked_kind(kind).__name__, self._state, np.zeros(3, np.float32)
+        objects, view = state.session.document.objects, state.camera.eye_and_target()
         if state.primitive is None:
-            objects, view = state.session.document.objects, state.camera.eye_and_target()
             self._add_tree(
-                kind.lower(), lambda: new_node(kind, (), *_place_of_object(objects, *view)), middle
+                kind.lower(), lambda: new_node(kind, (), *_place_in_view(objects, *view, kind)), middle
             )
             return
         number, path = state.primitive
 
         def command(tree: Node) -> tuple[StructureCommand, ...]:
-            node = new_node(kind, (), *_place_on(node_in_world(tree, path), kind))
+            node = new_node(kind, (), *_place_in_view(objects[number : number + 1], *view, kind))
             return (AddPrimitive(number, world_space_path(tree, path), node),)
 
         self._restructure_later(f"add {kind}", number, command, middle)
@@ -675,25 +679,22 @@ def _surface_check(number: int) -> Step:
     return step
 
 
-def _place_on(node: Node, kind: str) -> tuple[Float64Array, float]:
-    """Return centre (3,) and size for a new node of a kind on top of another one."""
-    (low, high), (kind_low, kind_high) = node.bounds, new_node(kind).bounds
-    size = float((high - low).max() / (kind_high - kind_low).max()) * NEW_NODE_EXTENT
-    top = float(high[1]) + NEW_NODE_LIFT * size
-    return _rounded(np.array([(low[0] + high[0]) / 2, top, (low[2] + high[2]) / 2], np.float64), size)
-
-
-def _place_of_object(
-    objects: Sequence[SceneObject], eye: ArrayLike, target: ArrayLike
+def _place_in_view(
+    objects: Sequence[SceneObject], eye: ArrayLike, target: ArrayLike, kind: str
 ) -> tuple[Float64Array, float]:
-    """Return centre (3,) and size for a new object: beside the others, or at the camera's target."""
-    if objects:
-        low, high = bounds_of(objects)
-        size = float((high - low).max()) * NEW_OBJECT_SIZE
-        return _rounded(np.array([high[0] + size, *((low + high) / 2)[1:]], np.float64), size)
-    center = np.asarray(target, np.float64)
-    distance = float(np.linalg.norm(np.asarray(eye, np.float64) - center))
-    return _rounded(center, FIRST_OBJECT_RADIUS * distance)
+    """Return centre (3,) and size for a new node of a kind.
+
+    It is centred at the point of the surfaces in the middle of the view, else the one closest to the target;
+    without objects, at the target.
+    """
+    position, middle = np.asarray(eye, np.float64), np.asarray(target, np.float64)
+    if not objects:
+        return _rounded(middle, FIRST_OBJECT_RADIUS * float(np.linalg.norm(position - middle)))
+    hit = first_hit(objects, position, middle - position)
+    points = hit if len(hit.objects) else nearest_points(objects, middle[None])
+    (low, high), (kind_low, kind_high) = bounds_of(objects), new_node(kind).bounds
+    size = NEW_NODE_EXTENT * float((high - low).max() / (kind_high - kind_low).max())
+    return _rounded(points.positions[0].astype(np.float64), size)
 
 
 def _rounded(center: Float64Array, size: float) -> tuple[Float64Array, float]:

@@ -1,5 +1,6 @@
 """Overlay of the editing window: outlines, the handle of a primitive, a status line, and the help."""
 
+import itertools
 import math
 import textwrap
 from collections.abc import Callable
@@ -10,13 +11,13 @@ import pyvista as pv
 from vtkmodules.vtkInteractionWidgets import vtkSphereWidget
 
 from blobtree._typing import Float32Array, Float64Array
-from blobtree.nodes.paths import Path
+from blobtree.nodes.paths import Path, node_in_world
 from decals.editing.actions import KEYS, Actions
 from decals.editing.document import Document
 from decals.editing.queries import ANGLES, outlines
 from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.scenes.objects import bounds_of
+from decals.scenes.objects import SceneObject, TreeObject, bounds_of
 from decals.vtk.adapters import weak_callback
 
 MAX_OUTLINES = 64
@@ -105,16 +106,26 @@ class Overlay:
         self._help.SetVisibility(False)
 
     def outline(
-        self, document: Document, numbers: tuple[int, ...], contact: AnyContact, mapping: ImageMapping
+        self,
+        document: Document,
+        numbers: tuple[int, ...],
+        node: tuple[int, Path] | None,
+        contact: AnyContact,
+        mapping: ImageMapping,
     ) -> None:
-        """Outline the visible parts of decals."""
-        key = (document.objects, document.decals.version, numbers, contact, mapping) if numbers else ()
+        """Outline the visible parts of decals, else a node by the box around its own surface."""
+        drawn = (document.decals.version, numbers, contact, mapping) if numbers else node
+        key = (document.objects, drawn) if drawn else ()
         if key == self._outlined:
             return
         self._outlined = key
         last = numbers[-MAX_OUTLINES:]
         angles = ANGLES if len(last) == 1 else ANGLES // 2
-        lines = list(outlines(document, last, contact=contact, mapping=mapping, angles=angles))
+        lines = (
+            list(outlines(document, last, contact=contact, mapping=mapping, angles=angles)) if last else []
+        )
+        if not last and node is not None:
+            lines = _box_edges(document.objects[node[0]], node[1])
         self._lines.copy_from(_polylines(lines))
         self._actor.SetVisibility(bool(lines))
 
@@ -200,6 +211,17 @@ class Overlay:
         return self._lines
 
 
+def _box_edges(item: SceneObject, path: Path) -> list[Float32Array]:
+    """Return the edges of the box around the surface of a node, shape (2, 3) each."""
+    if not isinstance(item, TreeObject):
+        return []
+    low, high = node_in_world(item.tree, path).bounds
+    corners = [
+        np.where(side, high, low).astype(np.float32) for side in itertools.product((False, True), repeat=3)
+    ]
+    return [np.stack([corners[i], corners[i | bit]]) for i in range(8) for bit in (1, 2, 4) if not i & bit]
+
+
 def _polylines(lines: list[Float32Array]) -> pv.PolyData:
     """Return lines, shape (k, 3) each, as one dataset."""
     if not lines:
@@ -231,6 +253,8 @@ class PrimitiveHandle:
         Actions of the window.
     redraw
         Called after each step with False, and at the end of a drag with True.
+    click
+        Called after a press and a release at one place.
 
     Attributes
     ----------
@@ -240,9 +264,16 @@ class PrimitiveHandle:
         False if a page around the plotter shows handles of its own.
     """
 
-    def __init__(self, renderer: Any, actions: Actions, redraw: Callable[[bool], None]) -> None:
-        self._renderer, self._actions, self._redraw = renderer, actions, redraw
+    def __init__(
+        self,
+        renderer: Any,
+        actions: Actions,
+        redraw: Callable[[bool], None],
+        click: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._renderer, self._actions, self._redraw, self._click = renderer, actions, redraw, click
         self._widget: Any = None
+        self._released: Any = None
         self._primitive: tuple[int, Path] | None = None
         self._drag_start: Float64Array = np.zeros(3)
         self.dragging, self.visible = False, True
@@ -291,8 +322,11 @@ class PrimitiveHandle:
 
     def end(self) -> None:
         """End the drag."""
+        moved = (np.array(self._widget.GetCenter()) != self._drag_start).any()
         self._actions.trees.end_drag()
         self.dragging = False
+        if not moved:
+            self._click()
         self._redraw(True)
 
     @property
@@ -301,8 +335,9 @@ class PrimitiveHandle:
         return self._widget
 
     def release(self) -> None:
-        """Remove the ball."""
+        """Remove the ball; VTK may be in the middle of one of its events, so it is kept for a while."""
         if self._widget is not None:
+            self._released = self._widget
             self._widget.RemoveAllObservers()
             if self._renderer.GetRenderWindow() is not None:  # else the plotter was closed before
                 self._widget.Off()

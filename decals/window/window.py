@@ -180,7 +180,10 @@ class EditWindow:
         )
         self.overlay = Overlay(self.plotter, lambda: self.subplot.draw_scale)
         self.handle = PrimitiveHandle(
-            self.subplot.vtk_renderer, self.actions, lambda whole: self.redraw(whole=whole)
+            self.subplot.vtk_renderer,
+            self.actions,
+            lambda whole: self.redraw(whole=whole),
+            lambda: self.tools.click_through(*self._host.interactor.GetEventPosition()),
         )
         self._bindings = EventBindings(self, self._host.interactor)
         self._ticker = AsyncTicker(self)
@@ -277,8 +280,9 @@ class EditWindow:
         dragging = self.tools.dragging or self.handle.dragging or self.background.following
         if not dragging:
             self.handle.update()
-        outlined = () if dragging else self.actions.state.selection  # outlines take longer than the drag
-        self.overlay.outline(self.document, outlined, self.subplot.contact, self.subplot.shown_mapping)
+        state = self.actions.state
+        outlined = ((), None) if dragging else (state.selection, state.primitive)  # outlines take longer
+        self.overlay.outline(self.document, *outlined, self.subplot.contact, self.subplot.shown_mapping)
         self.actions.help_pages = self.overlay.show_help(self.actions.help_page)
         self.overlay.show_status(self._status())
         self._host.set_title(self.actions.files.title)

@@ -186,6 +186,7 @@ async def sandbox(picture: str | None = None) -> None:
             await browser.get_by_role("slider", name="radius").press(f"Control+{key}")
             await until(lambda labels=labels: window.session.labels == labels)  # type: ignore[misc]
         await by_keys(browser)
+        await clicks(browser, window)
         await browser.get_by_role("button", name="Add", exact=True).click()
         await browser.get_by_text("Torus", exact=True).click()
         await until(lambda: window.session.labels[-1:] == ("add Torus",))
@@ -237,6 +238,23 @@ async def sandbox(picture: str | None = None) -> None:
         await until(lambda: window.session.undone_labels == (*slid, "add Torus", "set ring_radius"))
         assert all("127.0.0.1" in url for url in requests)
     window.close()
+
+
+async def clicks(browser: Page, window: EditWindow) -> None:
+    """Clicks at one place of the view select a decal, its primitive and the sum, and rows follow."""
+    state, rows = window.actions.state, browser.locator(".v-list-item--active")
+    number, at = next(Driver(window).visible())
+    await drag(browser, window.plotter, at)
+    await until(lambda: state.selection == (number,) and state.primitive is None)
+    for name, depth in (("Point", 1), ("Sum", 0)):
+        await drag(browser, window.plotter, at)
+        await until(lambda depth=depth: state.primitive is not None and len(state.primitive[1]) == depth)  # type: ignore[misc]
+        await rows.get_by_text(name, exact=True).wait_for()
+        assert state.selection == ()
+    await drag(browser, window.plotter, (4, 4))
+    await until(lambda: state.primitive is None)
+    await browser.get_by_text("Point").nth(1).click()
+    await until(lambda: state.primitive == (0, (1,)))
 
 
 async def pinch(browser: Page, *reaches: float) -> None:
@@ -302,8 +320,10 @@ async def creature(picture: str | None = None) -> None:
         assert len(tree.children) == 12
         assert tree.children[3].end == (-0.9, -1.5, 0.8)
         await browser.keyboard.press("Escape")
-        await browser.get_by_text("Sum", exact=True).click()  # another click deselects
-        await browser.get_by_role("button", name="Sum", exact=True).click()
+        await browser.get_by_text("Sum", exact=True).click()
+        await browser.get_by_role("button", name="Sum", exact=True).click()  # selects no less
+        await until(lambda: window.actions.state.primitive == (0, ()))
+        await browser.keyboard.press("Escape")
         await until(lambda: window.actions.state.primitive is None)
         window.subplot.vtk_renderer.ResetCamera()
         window.redraw(whole=True)

@@ -13,7 +13,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import decals
-from blobtree import Point, Torus, Twist, Union
+from blobtree import Point, Segment, Torus, Twist, Union
+from blobtree.nodes.paths import node_at
 from decals.apps.sandbox.outline import outline
 from decals.apps.sandbox.sandbox import REST_SECONDS, Sandbox
 from decals.editing import tree_actions
@@ -21,6 +22,7 @@ from decals.editing.action_state import SLOW_STEP
 from decals.editing.actions import KEYS
 from decals.editing.commands import ReplaceScene
 from decals.editing.document import Document
+from decals.editing.queries import first_hit, nearest_points
 from decals.editing.tree_commands import SetParameter
 from decals.errors import InvalidEdit
 from decals.scenes.camera import Camera
@@ -553,17 +555,28 @@ def test_the_outline_lists_objects_nodes_and_images() -> None:
     assert len(outline(Document.from_scene(Scene(objects=(many,), camera=CAMERA)))) == 2002
 
 
-def test_primitives_that_are_added_one_after_another_grow_by_less_and_less(vtk_display: None) -> None:
-    with EditWindow(Scene(objects=(), camera=CAMERA), off_screen=True, size=(80, 60)) as window:
+@pytest.mark.parametrize("toward", [(0.0, 0.0, 1.0), (1.0, 0.4, -0.3)])
+def test_added_primitives_lie_where_the_view_looks(vtk_display: None, toward: tuple[float, ...]) -> None:
+    body = TREE + Segment((0, 0, 0), (3, 0, 0), radius=0.4)
+    scene = Scene(objects=(TreeObject("body", body),), camera=CAMERA)
+    with EditWindow(scene, off_screen=True, size=(80, 60)) as window:
         window.show()
-        sandbox, extents = Sandbox(window), list[float]()
+        sandbox, state = Sandbox(window), window.actions.state
         for kind in ("Point", "Box", "Torus", "Cylinder", "Polyline"):
+            state.camera.look(toward, (0, 1, 0))
+            before = tree_of(window.document)
+            eye, target = (np.asarray(point, np.float64) for point in state.camera.eye_and_target())
+            hit = first_hit(window.document.objects, eye, target - eye)
+            seen = hit if len(hit.objects) else nearest_points(window.document.objects, target[None])
+            size = float((before.bounds[1] - before.bounds[0]).max())
+            sandbox.select("0/0")
             sandbox.add(kind)
             finish(window)
-            node: Any = tree_of(window.document)
-            low, high = (node.children[-1] if node.children else node).bounds
-            extents.append((high - low).max())
-    np.testing.assert_allclose(np.divide(extents[1:], extents[:-1]), 0.6, rtol=0.02)
+            assert state.primitive is not None
+            low, high = node_at(tree_of(window.document), state.primitive[1]).bounds
+            assert (high - low).max() == pytest.approx(0.1 * size, rel=0.02)
+            assert (low - 0.01 * size <= seen.positions[0]).all()
+            assert (seen.positions[0] <= high + 0.01 * size).all()
 
 
 def test_the_queue_lists_work_and_each_entry_can_be_removed(window: EditWindow) -> None:

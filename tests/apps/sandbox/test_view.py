@@ -43,7 +43,7 @@ def test_each_action_shows_its_key_and_is_in_the_menu(vtk_display: None) -> None
     page = str(server.state.trame__template_main)
     bindings = {binding.action: binding for binding in KEYS.bindings if binding.action != "camera"}
     menu = page[page.index("Actions") :]
-    by_pointer = {"select", "select_also", "move", "close"}
+    by_pointer = {"select", "select_further", "select_also", "toggle", "move", "close"}
     assert all(html.escape(bindings[name].summary) in menu for name in bindings.keys() - by_pointer)
     assert all(format_gestures(binding) for binding in bindings.values())
     buttons = [

@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 
 from blobtree import Node, Point
 from blobtree.nodes.paths import primitive_at
+from blobtree.nodes.surgery import dominant_primitive
 from decals.editing import EditSession
 from decals.editing.actions import Actions
 from decals.editing.brush_settings import Brush
+from decals.editing.commands import DeleteDecals
 from decals.editing.decal_actions import SCALE_STEP
 from decals.editing.pointer_tools import PointerTools
 from decals.editing.queries import inside_polygon
@@ -97,7 +99,9 @@ def test_clicks_select_and_leave_the_camera_its_events(user: UserInput) -> None:
     user.click(there, shift=True)
     assert list(user.actions.state.selection) == [first, second]
     user.click(at, shift=True)
-    assert list(user.actions.state.selection) == [second]
+    assert list(user.actions.state.selection) == [second, first]
+    user.click(there, ctrl=True)
+    assert list(user.actions.state.selection) == [first]
     user.click((1, 1))
     assert list(user.actions.state.selection) == []
     assert user.key("a", ctrl=True)
@@ -205,9 +209,53 @@ def test_escape_takes_a_drag_back(user: UserInput) -> None:
     assert number in user.document.decals.numbers
 
 
-def test_ctrl_click_places_a_decal_like_the_selected_one(user: UserInput) -> None:
+def test_clicks_at_one_place_select_the_decal_the_primitive_and_the_nodes_above(user: UserInput) -> None:
+    (decal, at), (other, there) = user.visible()[:2]
+    leaf = dominant_primitive(user.tree, user.tools.at(*at).position)  # type: ignore[union-attr]
+    seen = []
+    for _ in range(len(leaf) + 3):
+        user.click(at)
+        seen.append((user.actions.state.selection, user.actions.state.primitive))
+    nodes = [((), (0, leaf[:count])) for count in range(len(leaf), -1, -1)]
+    assert len(nodes) == 3  # a primitive in the sum in the difference
+    assert seen == [((decal,), None), *nodes, ((decal,), None)]
+    user.click(at)
+    user.click(there)
+    assert (user.actions.state.selection, user.actions.state.primitive) == ((other,), None)
+    assert digest(user.document) == user.first
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_click_on_bare_surface_selects_the_primitive_there(user: UserInput, seed: int) -> None:
+    user.session.do(DeleteDecals(user.document.decals.numbers))
+    rng, selected = np.random.default_rng(seed), set()
+    for _ in range(20):
+        at = tuple(rng.uniform((120, 60), (280, 240)).tolist())
+        pick = user.tools.at(*at)
+        user.click(at)
+        expected = None
+        if pick is not None and pick.object == 0:
+            expected = 0, dominant_primitive(user.tree, pick.position)
+        assert user.actions.state.primitive == expected
+        selected.add(expected)
+    assert len(selected) > 1
+    user.click((1, 1))
+    assert user.actions.state.primitive is None
+
+
+def test_a_click_on_a_mesh_selects_its_decals_alone(user: UserInput) -> None:
+    on_mesh = set(decals_on(user.document, [1]))
+    decal, at = next((n, at) for n, at in user.visible() if n in on_mesh)
+    for _ in range(3):
+        user.click(at)
+        assert (user.actions.state.selection, user.actions.state.primitive) == ((decal,), None)
+
+
+def test_the_add_tool_adds_a_decal_like_the_selected_one(user: UserInput) -> None:
     (_, at), (_, there) = user.visible()[:2]
-    assert user.click(at, ctrl=True)
+    user.key("s", shift=True)
+    assert user.actions.state.brush.brush is Brush.ADD
+    assert not user.click(at)
     assert user.actions.state.selection == (60,)
     x, y = user.pixel(user.document.decals[60].positions[0])
     assert np.hypot(x - at[0], y - at[1]) < 0.5
@@ -216,8 +264,12 @@ def test_ctrl_click_places_a_decal_like_the_selected_one(user: UserInput) -> Non
     assert user.tools.key("a", *there)
     model, new = user.document.decals[60], user.document.decals[61]
     assert (new.images, new.radii) == (model.images, model.radii)
-    user.click((1, 1), ctrl=True)
+    user.click((1, 1))
     assert user.actions.state.message == "no surface under the cursor; point at one"
+    user.drag(there, (there[0] + 40, there[1]))
+    assert len(user.document.decals) == 62
+    user.key("Escape")
+    user.click(there)
     assert len(user.document.decals) == 62
 
 

@@ -11,6 +11,7 @@ import pyvista as pv
 from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
 from blobtree.nodes.paths import node_in_world
+from decals.editing.brush_settings import Brush
 from decals.editing.commands import ScaleDecals
 from decals.editing.scatter_commands import RemoveObject, decals_on
 from decals.errors import InvalidEdit
@@ -22,6 +23,7 @@ from decals.scenes.scene import DecalImage, Scene
 from decals.window import EditWindow, press_key
 from decals.window.host_plotter import pixels_of
 from decals.window.overlay import OUTLINE_COLOR
+from tests.decals.editing.scenes import tree_of
 from tests.decals.window.driver import Driver
 
 
@@ -82,7 +84,8 @@ def test_the_camera_is_left_its_drags_and_wheel(driver: Driver) -> None:
 def test_a_click_places_on_either_object(driver: Driver) -> None:
     for number in (0, 1):
         shown, at = next((n, at) for n, at in driver.visible() if n in decals_on(driver.document, [number]))
-        driver.click(at, ctrl=True)
+        driver.window.actions.state.brush.brush = Brush.ADD
+        driver.click(at)
         (placed,) = driver.window.actions.state.selection
         assert placed in decals_on(driver.document, [number])
         seen = driver.window.tools.at(*at)
@@ -214,6 +217,28 @@ def test_what_is_selected_is_outlined(driver: Driver) -> None:
     assert driver.window.overlay.lines.n_lines == 2
     driver.key("Escape")
     assert driver.window.overlay.lines.n_points == 0
+
+
+def test_clicks_at_one_place_lead_to_the_root_and_boxes_show_it(driver: Driver) -> None:
+    decal, at = next((n, at) for n, at in driver.visible() if n in decals_on(driver.document, [0]))
+    state, overlay, tree = driver.window.actions.state, driver.window.overlay, tree_of(driver.document)
+    first, seen = driver.state, []
+    for _ in range(5):
+        driver.click(at)  # from the third time on, it meets the handle
+        seen.append(state.primitive and state.primitive[1])
+        if state.primitive is None:
+            assert state.selection == (decal,)
+            continue
+        low, high = node_in_world(tree, state.primitive[1]).bounds
+        points = overlay.lines.points
+        np.testing.assert_allclose((points.min(axis=0), points.max(axis=0)), (low, high))
+        lengths = [np.linalg.norm(a - b) for a, b in points.reshape(-1, 2, 3)]
+        np.testing.assert_allclose(sorted(lengths), np.repeat(sorted(high - low), 4), rtol=1e-5)
+    assert seen[1] is not None
+    assert seen == [None, seen[1], seen[1][:1], (), None]
+    driver.click((1, 1))
+    assert overlay.lines.n_points == 0
+    assert driver.state == first
 
 
 @pytest.mark.parametrize("parallel", [False, True])
