@@ -6,8 +6,9 @@ from collections.abc import Callable
 from functools import partial
 
 from blobtree import Node
+from blobtree.nodes.paths import Path
 from decals import MeshObject, TreeObject
-from decals.apps.models.shapes import creature, spheres, torus_knot
+from decals.apps.models.shapes import CREATURE_PARTS, creature, spheres, torus_knot
 from decals.errors import InvalidInput
 from decals.scenes.camera import UPRIGHT, Axes
 from decals.scenes.objects import SceneObject
@@ -41,6 +42,10 @@ _MESHES: dict[str, Callable[[], MeshArrays]] = {
     "knot": torus_knot,
 }
 _TREES: dict[str, Callable[[], Node]] = {"creature": creature, "spheres": spheres}
+_NAMES: dict[str, dict[Path, str]] = {
+    "creature": {(place,): part for place, part in enumerate(CREATURE_PARTS)}
+}
+"""Names of nodes, by their paths."""
 
 _AXES = {"horse": Axes(up=(0.0, 0.0, 1.0), front=(1.0, 0.0, 0.0))}
 
@@ -69,6 +74,6 @@ def sample(name: str) -> SceneObject:
         If the sample does not exist or cannot be downloaded.
     """
     if name in _TREES:
-        return TreeObject(name, _TREES[name]())
+        return TreeObject(name, _TREES[name](), names=_NAMES.get(name, {}))
     vertices, faces = sample_mesh(name)
     return MeshObject(name, vertices, faces, source=SAMPLE + name)

@@ -37,6 +37,18 @@ _BLEND = 3.0
 """Exponent of the Ricci blend: its joints are smooth and bulge less than those of a sum."""
 
 
+CREATURE_PARTS = (
+    *("hips", "belly", "chest", "neck", "head", "muzzle"),
+    *(f"tail {number}" for number in range(1, 6)),
+    *(
+        f"{side} {part}"
+        for side in ("right", "left")
+        for part in ("thigh", "foot", "upper arm", "forearm", "eye socket", "nostril", "horn")
+    ),
+)
+"""Names of the creature's parts, in the order of its operands."""
+
+
 def creature() -> Node:
     """Return the creature: 3 units long, 2.6 high, facing +x, its feet on y = 0."""
     parts = [*_trunk(), *_tail(), *_side(1.0), *_side(-1.0)]
@@ -68,7 +80,7 @@ def _tail() -> list[Node]:
 
 
 def _side(z: float) -> list[Node]:
-    """Return the leg, arm, eye socket, nostril and horn of the left (``z`` = 1) or right side (-1)."""
+    """Return the leg, arm, eye socket, nostril and horn of the right (``z`` = 1) or left side (-1)."""
     return [
         Point((-0.42, 0.44, 0.46 * z), radius=0.38, color=_SKIN),
         Segment((-0.22, 0.20, 0.60 * z), (0.26, 0.13, 0.68 * z), radius=0.17, color=_SKIN),

@@ -23,6 +23,38 @@ PICTURE_SIZE = 32
 MAX_ROWS = 2000
 """Most rows of one object: a page with more is slow."""
 
+ICONS = {
+    "object": "cube-outline",
+    "mesh": "vector-triangle",
+    "layer": "layers-outline",
+    "combination": "set-center",
+    "modifier": "tune-variant",
+    "primitive": "circle-medium",
+    **dict.fromkeys(("Point", "Disc"), "circle"),
+    **dict.fromkeys(("Segment", "ConvolutionSegment"), "vector-line"),
+    **dict.fromkeys(("Arc", "ConvolutionArc"), "vector-curve"),
+    **dict.fromkeys(("QuadraticBezier", "CubicBezier", "TaperedBezier"), "vector-bezier"),
+    **dict.fromkeys(("Polyline", "Stroke", "ConvolutionStroke"), "vector-polyline"),
+    **dict.fromkeys(("Triangle", "ConvolutionTriangle"), "triangle"),
+    **dict.fromkeys(("Ellipsoid", "Superquadric"), "ellipse"),
+    **dict.fromkeys(("Twist", "LimitedTwist"), "screw-lag"),
+    **dict.fromkeys(("Noise", "NoiseWarp", "Gyroid"), "waves"),
+    **dict.fromkeys(("Difference", "SmoothDifference", "RDifference"), "set-left"),
+    **dict.fromkeys(("Union", "RUnion", "CleanUnion", "RatedUnion"), "set-all"),
+    **dict.fromkeys(("Sum", "Ricci", "SuperellipticBlend"), "plus-circle-outline"),
+    "Box": "cube",
+    "Circle": "circle-outline",
+    "Cone": "cone",
+    "Cylinder": "cylinder",
+    "Mirror": "flip-horizontal",
+    "Polygon": "vector-polygon",
+    "Rectangle": "vector-rectangle",
+    "Torus": "circle-double",
+    "Transform": "axis-arrow",
+    "Volume": "cube-scan",
+}
+"""Icons of rows by their class, else by their kind."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -38,6 +70,8 @@ class Row:
         "object", "combination", "modifier", "primitive", "mesh", "layer", "image" or "more".
     depth
         Indentation.
+    type
+        Name of the class of a node; "" for other rows.
     hidden, locked
         True if the user hid or locked it.
     picture
@@ -51,6 +85,13 @@ class Row:
     hidden: bool = False
     locked: bool = False
     picture: str = ""
+    type: str = ""
+
+    @property
+    def icon(self) -> str:
+        """Icon of the class, else of the kind."""
+        name = ICONS.get(self.type, ICONS.get(self.kind))
+        return f"mdi-{name}" if name else ""
 
 
 def outline(document: Document) -> list[dict[str, Any]]:
@@ -69,7 +110,7 @@ def outline(document: Document) -> list[dict[str, Any]]:
     for number, image in enumerate(document.images):
         name = Path(image.source).name
         rows.append(Row(f"image {number}", name, "image", 0, picture=picture(image)))
-    return [vars(row) for row in rows]
+    return [{**vars(row), "icon": row.icon} for row in rows]
 
 
 _pictures: WeakKeyDictionary[DecalImage, dict[int, str]] = WeakKeyDictionary()
@@ -101,7 +142,8 @@ def _nodes(number: int, item: TreeObject) -> list[Row]:
         count = len(node.children)
         kind = "primitive" if count == 0 else "modifier" if count == 1 else "combination"
         hidden, locked = (bool(path) and path in paths for paths in (item.hidden, item.locked))
-        label = item.names.get(path, type(node).__name__)
-        rows.append(Row(Part("node", number, path).key, label, kind, 1 + len(path), hidden, locked))
+        name, key = type(node).__name__, Part("node", number, path).key
+        label = item.names.get(path, name)
+        rows.append(Row(key, label, kind, 1 + len(path), hidden, locked, type=name))
         pending.extend(((*path, i), child) for i, child in reversed(list(enumerate(node.children))))
     return rows

@@ -84,6 +84,20 @@
       if (size) trame.utils.download(name.trim().split("/").pop(), new Blob(parts));
     },
 
+    // Return true for a row that is found, or that lies below no folded row while nothing is sought.
+    shown(row, folded, sought) {
+      if (sought) return `${row.label} ${row.type}`.toLowerCase().includes(sought.trim().toLowerCase());
+      const inside = (key) =>
+        key.startsWith("object ")
+          ? row.depth > 0 && `${row.key}/`.startsWith(`${key.slice(7)}/`)
+          : row.key.startsWith(`${key}/`);
+      return !folded.some(inside);
+    },
+    // Fold a row, or unfold it.
+    fold(row, folded) {
+      return folded.includes(row.key) ? folded.filter((key) => key !== row.key) : [...folded, row.key];
+    },
+
     // Send the name in the field of a row, unless it is as before, and return the hidden field.
     rename(field, row) {
       if (field.key && field.name !== row.label) trame.trigger("rename", [field.key, field.name]);

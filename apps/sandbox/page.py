@@ -58,11 +58,11 @@ TOOLBAR = {
 }
 """Icons of the actions in the toolbar."""
 
-ROW_ICONS = (
-    "({object: 'mdi-cube-outline', mesh: 'mdi-vector-triangle', combination: 'mdi-set-center', "
-    "modifier: 'mdi-tune-variant', primitive: 'mdi-circle-medium', layer: 'mdi-layers-outline', "
-    "image: 'mdi-image-outline'})[row.kind]"
-)
+FOLDS = "['object', 'combination', 'modifier'].includes(row.kind)"
+"""True for a row that others lie below."""
+
+LONG_OUTLINE = 12
+"""Number of rows from which on the outline has a field to search in it."""
 
 ROW_CHANGES = {
     "duplicate": "mdi-content-duplicate",
@@ -161,9 +161,12 @@ class Page:
         self._shown: dict[str, Any] = {}
         self._task: asyncio.Task[None] | None = None
         self._end: asyncio.Task[None] | None = None
-        server.state.client_only("left_open", "right_open", "theme")  # another browser has its own
+        server.state.client_only(
+            "left_open", "right_open", "theme", "folded", "sought"
+        )  # another browser has its own
         server.state.update({**self.values(), "catalog": self.sandbox.catalog(), "thumbnails": thumbnails()})
         server.state.update({"theme": "light", "dropped": None, "dropped_on": ""})
+        server.state.folded, server.state.sought = [], ""
         server.state.renamed = {"key": "", "name": ""}
         server.state.menu = {"open": False, "x": 0, "y": 0}
         server.state.change("dropped")(self._take_dropped)
@@ -321,12 +324,20 @@ class Page:
 
     def _build_outline(self) -> None:
         vuetify3.VListSubheader("Outline", raw_attrs=['role="heading" aria-level="2"'])
+        vuetify3.VTextField(
+            v_model="sought",
+            v_if=f"outline.length > {LONG_OUTLINE}",
+            prepend_inner_icon="mdi-magnify",
+            clearable=True,
+            classes="mx-2",
+            raw_attrs=named("'search in the outline'"),
+        )
         with (
             vuetify3.VList(nav=True, raw_attrs=["data-roving"]),
             html.Div(
                 v_for="row in outline",
                 key="row.key",
-                classes="d-flex align-center",
+                classes=("utils.sandbox.shown(row, folded, sought) ? 'd-flex align-center' : 'd-none'",),
                 raw_attrs=['role="listitem"'],
             ),
         ):
@@ -345,7 +356,7 @@ class Page:
                 v_if="renamed.key !== row.key",
                 title=("row.label",),
                 raw_attrs=['role="button"', 'draggable="true"'],
-                prepend_icon=(f"row.picture ? '' : {ROW_ICONS}",),
+                prepend_icon=("row.icon",),
                 prepend_avatar=("row.picture",),
                 active=("row.key === selected || marked.includes(row.key)",),
                 style=("`padding-left: ${8 + 14 * row.depth}px; opacity: ${row.hidden ? 0.6 : 1}`",),
@@ -357,6 +368,15 @@ class Page:
                 drop="utils.sandbox.take($event, row.key)",
                 dblclick=RENAME_ROW,
                 __events=["dragstart", "dragover", "drop", "dblclick", "contextmenu"],
+            )
+            html.Button(
+                v_if=f"{FOLDS} && renamed.key !== row.key",
+                classes=("'mdi row-flag mdi-chevron-' + (folded.includes(row.key) ? 'right' : 'down')",),
+                click="folded = utils.sandbox.fold(row, folded)",
+                raw_attrs=[
+                    ':aria-expanded="!folded.includes(row.key)"',
+                    *named("'nodes below ' + row.label"),
+                ],
             )
             for change, flag, icons in ROW_FLAGS:
                 html.Button(

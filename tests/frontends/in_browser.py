@@ -320,6 +320,7 @@ async def creature(picture: str | None = None) -> None:
         assert len(tree.children) == 12
         assert tree.children[3].end == (-0.9, -1.5, 0.8)
         await browser.keyboard.press("Escape")
+        await outline_rows(browser)
         await browser.get_by_text("Sum", exact=True).click()
         await browser.get_by_role("button", name="Sum", exact=True).click()  # selects no less
         await until(lambda: window.actions.state.primitive == (0, ()))
@@ -376,6 +377,27 @@ async def creature(picture: str | None = None) -> None:
                     await asyncio.sleep(0.1)
             assert np.abs(again - last).mean() < 0.5
     fresh.close()
+
+
+async def outline_rows(browser: Page) -> None:
+    """Rows are found by a part of their name, and those below a folded row are not shown."""
+
+    async def shown() -> list[str]:
+        rows = browser.locator(".v-list[data-roving] [role=listitem]:visible .v-list-item-title")
+        return [text.strip() for text in await rows.all_inner_texts()]
+
+    rows, search = await shown(), browser.get_by_role("textbox", name="search in the outline")
+    assert len(rows) == 15
+    assert rows[1:4] == ["Sum", "Point", "Point"]
+    await search.fill("SEG")
+    assert await shown() == ["Segment"] * 7
+    await search.fill("")
+    for name, kept in (("Sum", 2), (rows[0], 1)):
+        await browser.get_by_label(f"nodes below {name}").click()
+        assert await shown() == rows[:kept] + rows[-1:]
+    for name in (rows[0], "Sum"):
+        await browser.get_by_label(f"nodes below {name}").click()
+    assert await shown() == rows
 
 
 class Builder:

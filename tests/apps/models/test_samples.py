@@ -73,6 +73,21 @@ def test_all_samples_are_listed_and_generated_ones_need_no_network() -> None:
     assert np.array_equal(knot.vertices, sample_mesh("knot")[0])
 
 
+def test_the_parts_of_the_creature_have_names() -> None:
+    made = sample("creature")
+    assert isinstance(made, TreeObject)
+    parts = dict(zip(made.names.values(), made.tree.children, strict=True))
+    assert list(made.names) == [(place,) for place in range(len(parts))]
+    middles = {name: np.mean(part.bounds, axis=0) for name, part in parts.items()}
+    for name, right in middles.items():
+        if name.startswith("right "):
+            left = middles[name.replace("right", "left")]
+            np.testing.assert_allclose(left, right * [1, 1, -1], atol=1e-6)
+            assert right[2] > 0  # the creature looks along x, and y points upward
+    assert middles["head"][1] > middles["chest"][1] > middles["right foot"][1]
+    assert middles["muzzle"][0] > middles["hips"][0] > middles["tail 1"][0]
+
+
 def test_an_unknown_sample_mesh_is_refused() -> None:
     with pytest.raises(InvalidInput, match="dragon, horse, knot"):
         sample_mesh("spheres")

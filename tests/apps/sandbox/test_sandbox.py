@@ -551,6 +551,9 @@ def test_the_outline_lists_objects_nodes_and_images() -> None:
         ("Point", "primitive", 3),
         ("crate", "mesh", 0),
     ]
+    assert [row["type"] for row in rows] == ["", "Twist", "Sum", "Point", "Point", ""]
+    icons = ("cube-outline", "screw-lag", "plus-circle-outline", "circle", "circle", "vector-triangle")
+    assert [row["icon"] for row in rows] == [f"mdi-{icon}" for icon in icons]
     many = TreeObject("many", Union(tuple(Point((3.0 * i, 0, 0), radius=1.0) for i in range(2500))))
     assert len(outline(Document.from_scene(Scene(objects=(many,), camera=CAMERA)))) == 2002
 
