@@ -6,7 +6,7 @@ import numpy as np
 
 from blobtree._typing import Float32Array, UInt8Array
 from decals.baking.unwrapped import Unwrapped
-from decals.field.query import MaterialSamples
+from decals.field.image_texels import MaterialSamples
 from decals.images.texels import encode_srgb
 
 ROUGHNESS = 0.7

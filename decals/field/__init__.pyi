@@ -1,6 +1,7 @@
 from .batch import BatchSamples
 from .evaluate import Samples
-from .query import MaterialSamples, Neighbors
+from .image_texels import MaterialSamples
+from .query import Neighbors
 from .walks import Walks
 
 __all__ = [

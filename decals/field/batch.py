@@ -19,6 +19,7 @@ from decals.field.evaluate import (
     samples_of,
     walk_texels,
 )
+from decals.field.image_texels import MaterialSamples, UploadedImages
 from decals.field.mapping import ImageMapping
 from decals.field.points import (
     Rows,
@@ -34,11 +35,11 @@ from decals.field.points import (
     placed,
     rows_on,
 )
-from decals.field.query import MaterialSamples, Neighbors, Query, Target, image_count
+from decals.field.query import Neighbors, Query, Target, image_count
 from decals.field.rules import PictureRules
-from decals.field.sampling_kernels import color_points, sample_points
+from decals.field.sampling_kernels import sample_images, sample_points
 from decals.field.walks import Walks
-from decals.images.load import AnyImage, each_image
+from decals.images.load import AnyImage
 from decals.index.batch import DecalBatch, checked_sets
 from decals.index.build import starts_of
 from decals.model import Decals
@@ -59,16 +60,7 @@ class BatchTarget:
     def __init__(self, batch: DecalBatch, sets: Int32Array) -> None:
         self._batch, self._sets, self.device = batch, sets, batch.device
         self._sets_on_device: Any = wp.array(sets, dtype=wp.int32, device=batch.device)
-        self.image_count = image_count(batch.joined)
-
-    @property
-    def records(self) -> Any:
-        """Records of all decals."""
-        return self._batch.records
-
-    @records.setter
-    def records(self, records: Any) -> None:
-        self._batch.records = records
+        self.image_count, self.records = image_count(batch.joined), batch.records
 
     def kernel(self, single: Any) -> Any:
         """Return the kernel for these decals."""
@@ -76,8 +68,8 @@ class BatchTarget:
 
         if single is sample_points:
             return kernels.sample_sets
-        if single is color_points:
-            return kernels.color_sets
+        if single is sample_images:
+            return kernels.sample_images_of_sets
         from decals.field.batch_neighbor_kernels import list_neighbors_of_sets
 
         return list_neighbors_of_sets
@@ -224,12 +216,12 @@ def evaluate_batch(
     listed = sets.sets if isinstance(sets, DecalBatch) else checked_sets(sets)
     rules = PictureRules(mapping=mapping, contact=contact, stiffness=stiffness)
     checked_truths(jacobian=jacobian, neighbors=neighbors, materials=materials)
-    layers = None if images is None else tuple(each_image(images))
     places = _Places.of(listed, points, normals, normal_derivatives)
     device = places.device(sets.device if isinstance(sets, DecalBatch) and device is None else device)
     if isinstance(sets, DecalBatch) and device != sets.device:
         raise InvalidDevice(f"device: expected {sets.device!r}, where the sets lie, got {device!r}")
     walked = _checked_walks(walks, listed) if rules.walked else None
+    texels = None if images is None else UploadedImages.of(images, device, materials=materials)
     parts = []
     counts = [0 if isinstance(sets, DecalBatch) else len(part) for part in listed]
     for first, last in _chunks(counts, np.diff(places.offsets).tolist()):
@@ -239,8 +231,8 @@ def evaluate_batch(
         else:
             batch, own = DecalBatch(listed[first:last], device), slice(first, last)
         _apply(rules, batch, on, None if walked is None else walked[own])
-        query = Query(BatchTarget(batch, set_of), *rows_on(device, rows), rules.contact)
-        part = samples_of(query, layers, turns, jacobian=jacobian, neighbors=neighbors, materials=materials)
+        query = Query(BatchTarget(batch, set_of), *rows_on(device, rows), rules.contact, texels)
+        part = samples_of(query, texels, turns, jacobian=jacobian, neighbors=neighbors)
         parts.append(placed(part, device, stay=places.stay))
     return BatchSamples(
         places.offsets,

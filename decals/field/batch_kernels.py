@@ -11,7 +11,7 @@ import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
 from decals.field.ownership import NO_OWNER, owner_at
-from decals.field.sampling_kernels import color_at, image_point
+from decals.field.sampling_kernels import ImageSums, ImageTexels, image_point, write_sums
 from decals.index.lookup import IndexedDecals
 
 wp.set_module_options(KERNEL_OPTIONS)
@@ -37,13 +37,13 @@ def sample_sets(
     owner = owner_at(points[row], n_q, contact, index)
     owners[i] = owner
     if owner != NO_OWNER:
-        image = image_point(points[row], n_q, owner, contact, index)
-        uv[i] = wp.vec2(image[0], image[1])
-        fields[i] = 1.0 - image[2]
+        place = image_point(points[row], n_q, owner, contact, index)
+        uv[i] = wp.vec2(place[0], place[1])
+        fields[i] = 1.0 - place[2]
 
 
 @wp.kernel
-def color_sets(
+def sample_images_of_sets(
     first: wp.int32,
     points: wp.array(dtype=wp.vec3),
     normals: wp.array(dtype=wp.vec3),
@@ -52,13 +52,12 @@ def color_sets(
     sets: wp.array(dtype=wp.int32),
     owners: wp.array(dtype=wp.int32),
     uv: wp.array(dtype=wp.vec2),
-    extents: wp.array(dtype=wp.vec3i),
-    texels: wp.array(dtype=wp.vec4),
-    colors: wp.array(dtype=wp.vec4),
+    fields: wp.array(dtype=wp.float32),
+    images: ImageTexels,
+    sums: ImageSums,
 ):
-    """Do the same as `color_points` with the topmost decals of `sample_sets`."""
+    """Do the same as `sample_images`."""
     i = first + wp.tid()
     row = i % points.shape[0]
-    index = indices[sets[i]]
     n_q = wp.normalize(normals[row])
-    colors[i] = color_at(points[row], n_q, owners[i], uv[i], True, contact, index, extents, texels)
+    write_sums(i, points[row], n_q, contact, indices[sets[i]], owners, uv, fields, images, sums)

@@ -12,23 +12,14 @@ from blobtree.device import array_on, known_device, launch
 from blobtree.validation import truth
 from decals.errors import InvalidDecals, InvalidScene
 from decals.field.contact_mode import AnyContact, with_law
+from decals.field.image_texels import MaterialSamples, UploadedImages
 from decals.field.mapping import ImageMapping
 from decals.field.points import checked_rows, checked_turns, device_of, placed, rows_on
-from decals.field.query import (
-    MaterialSamples,
-    Neighbors,
-    Query,
-    SingleTarget,
-    image_arrays,
-    image_count,
-    rows_of,
-    zeros,
-)
+from decals.field.query import Neighbors, Query, SingleTarget, image_count, rows_of, zeros
 from decals.field.rules import PictureRules
-from decals.field.sampling_kernels import color_points
+from decals.field.sampling_kernels import sample_images
 from decals.field.walks import Walks
-from decals.images.load import AnyImage, each_image, image_pixels
-from decals.images.texels import linear_premultiplied
+from decals.images.load import AnyImage
 from decals.index.editor import RECORDS, DecalEditor
 from decals.index.index import DecalIndex, index_on
 from decals.model import Decals
@@ -178,35 +169,30 @@ def evaluate(
     turns = checked_turns(normal_derivatives, len(rows.points))
     indexed = _indexed(decals, index, rules, walks, device)
     _limit(indexed, decals, on, device)
-    query = Query(SingleTarget(decals, indexed, device), *rows_on(device, rows), rules.contact)
-    samples = samples_of(query, images, turns, jacobian=jacobian, neighbors=neighbors, materials=materials)
+    texels = None if images is None else UploadedImages.of(images, device, materials=materials)
+    query = Query(SingleTarget(decals, indexed, device), *rows_on(device, rows), rules.contact, texels)
+    samples = samples_of(query, texels, turns, jacobian=jacobian, neighbors=neighbors)
     shown: Samples = placed(samples, device, stay=rows.stay)
     return shown
 
 
 def samples_of(
     query: Query,
-    images: AnyImage | Iterable[AnyImage] | None,
+    images: UploadedImages | None,
     normal_derivatives: Float64Array | None,
     *,
     jacobian: bool,
     neighbors: bool,
-    materials: bool,
 ) -> Samples:
     """Return what `evaluate` returns, in arrays of NumPy and of the device; the arguments are checked."""
-    color = height = maps = None
-    if images is not None:
-        listed = each_image(images)
-        pixels = [image_pixels(image, name=f"image {number}") for number, image in enumerate(listed)]
-        color = query.colors([linear_premultiplied(image) for image in pixels])
-        reliefs = [image.relief_texels() if hasattr(image, "relief_texels") else None for image in listed]
-        if any(relief is not None for relief in reliefs):
-            height = query.heights(reliefs, pixels)
-        if materials and any(hasattr(image, "surface_texels") for image in listed):
-            maps = query.materials(listed, pixels)
-    derivative = query.jacobians(normal_derivatives) if jacobian else None
-    near = query.neighbors() if neighbors else None
-    return Samples(query.owners, query.uv, query.fields, color, derivative, near, height, maps)
+    return Samples(
+        query.owners,
+        query.uv,
+        query.fields,
+        jacobian=query.jacobians(normal_derivatives) if jacobian else None,
+        neighbors=query.neighbors() if neighbors else None,
+        **({} if images is None else images.samples(query.sums)),
+    )
 
 
 class ColorEvaluator:
@@ -232,10 +218,9 @@ class ColorEvaluator:
     ) -> None:
         self._decals, self._contact, self._device = decals, rules.contact, known_device(device)
         self._indexed = _indexed(decals, index, rules, walks, self._device)
-        pixels = [image_pixels(image, name=f"image {number}") for number, image in enumerate(images)]
-        layers = [linear_premultiplied(image) for image in pixels]
-        self._images = image_arrays(image_count(rows_of(decals)), layers, self._device)
-        self._nothing = zeros(self._device, 0, wp.int32, wp.vec2)
+        self._images = UploadedImages.of(images, self._device, heights=False, materials=False)
+        self._images.check(image_count(rows_of(decals)))
+        self._nothing = zeros(self._device, 0, wp.int32, wp.vec2, wp.float32)
 
     def at(
         self, points: Float32Array, normals: Float32Array, on: object | str | Iterable[str] | None = None
@@ -248,10 +233,10 @@ class ColorEvaluator:
     def on_device(self, points: Any, normals: Any, on: object | str | Iterable[str] | None = None) -> Any:
         """Return what `at` returns, for arrays of Warp on the device of the evaluator."""
         _limit(self._indexed, self._decals, on, self._device)
-        inputs = [points, normals, int(self._contact), self._indexed, *self._nothing, *self._images]
-        (colors,) = zeros(self._device, len(points), wp.vec4)
-        launch(with_law(color_points, self._contact), len(points), inputs, [colors], self._device)
-        return colors
+        sums = self._images.sums(len(points), self._device)
+        inputs = [points, normals, int(self._contact), self._indexed, *self._nothing, self._images.texels]
+        launch(with_law(sample_images, self._contact), len(points), inputs, [sums], self._device)
+        return sums.color
 
 
 def checked_truths(**values: object) -> None:

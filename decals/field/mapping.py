@@ -115,6 +115,13 @@ def unroll_step(step: wp.vec3, n_p: wp.vec3, n_q: wp.vec3) -> wp.vec3:
 
 
 @wp.func
+def roll_step(step: wp.vec3, n_p: wp.vec3, n_q: wp.vec3) -> wp.vec3:
+    """Return a direction in the image as one on the surface at q; the inverse of `unroll_step`."""
+    share = wp.dot(step, n_q) / wp.max(1.0 + wp.dot(n_p, n_q), MIN_COSINE)
+    return step - share * (n_p + n_q)
+
+
+@wp.func
 def image_distance(rim: wp.float32, chord: wp.float32, length: wp.float32) -> wp.float32:
     """Return the distance ℓ in the image of a point that the field puts at distance `rim`, in visible radii.
 

@@ -9,10 +9,9 @@ from blobtree.kernels import KERNEL_OPTIONS
 from decals.field.contact import contact_push
 from decals.field.elastic import plane_push
 from decals.field.mapping import in_image
-from decals.field.ownership import NO_OWNER, owner_below, uv_at
+from decals.field.ownership import NO_OWNER, contact_at, owner_below, uv_at
 from decals.field.radial import MIN_ADVANCE, are_nested, plane_distance
 from decals.field.receivers import acts, complement_of
-from decals.field.sampling_kernels import image_point
 from decals.index.lookup import IndexedDecals, cell_range
 from decals.record import (
     RECORD,
@@ -90,8 +89,8 @@ def shows_at(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, contact: wp.int32, index
     if not is_contact_rank(rank):
         return shows * wp.static(SHOWS_ALONE + SHOWS_IN_LAYER)
     if owner_below(q, n_q, rank + 1, 0, contact, index) == decal:
-        image = image_point(q, n_q, decal, contact, index)
-        if in_image(wp.vec2(image[0], image[1])):
+        pushed = contact_at(q, n_q, decal, contact, index)
+        if in_image(uv_at(q, n_q, decal, pushed, index)):
             shows += wp.static(SHOWS_IN_LAYER)
     return shows
 

@@ -1,6 +1,5 @@
 """Decals on a device that are evaluated at points: one set of them, or many sets at once."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
@@ -10,11 +9,10 @@ import warp as wp
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import launch
-from decals.errors import InvalidImage
 from decals.field.contact_mode import AnyContact, with_law
+from decals.field.image_texels import UploadedImages
 from decals.field.jacobian import image_jacobians
-from decals.field.sampling_kernels import color_points, sample_points
-from decals.images.texels import Pixels, unit_levels
+from decals.field.sampling_kernels import sample_images, sample_points
 from decals.index.editor import DecalEditor
 from decals.index.index import index_on
 from decals.model import NO_IMAGE, Decals
@@ -52,31 +50,6 @@ class Neighbors:
     in_layer: BoolArray
 
 
-@dataclass(frozen=True, eq=False)
-class MaterialSamples:
-    """Maps of materials at m points, mixed by the part that is seen of each decal.
-
-    Attributes
-    ----------
-    part : float32[m]
-        Part of the surface that materials cover. The other values are sums over it: 0 without materials.
-    normal : float32[m, 3]
-        Sum of unit normals. Where decals with several normals lie over each other, their maps are turned as
-        that of the topmost one.
-    roughness, metallic, occlusion : float32[m]
-        Sums of the maps.
-    emission : float32[m, 3]
-        Light that the surface sheds itself, in linear light.
-    """
-
-    part: Float32Array
-    normal: Float32Array
-    roughness: Float32Array
-    metallic: Float32Array
-    occlusion: Float32Array
-    emission: Float32Array
-
-
 class Target(Protocol):
     """Decals on a device, as arguments of kernels.
 
@@ -87,7 +60,7 @@ class Target(Protocol):
     image_count : int
         Number of images to which the decals refer.
     records : wp.array(dtype=vec4)
-        Records of all decals; others may take their place for a while.
+        Records of all decals.
     """
 
     device: str
@@ -115,16 +88,7 @@ class SingleTarget:
 
     def __init__(self, decals: Decals | DecalEditor, indexed: Any, device: str) -> None:
         self._decals, self._indexed, self.device = decals, indexed, device
-        self.image_count = image_count(rows_of(decals))
-
-    @property
-    def records(self) -> Any:
-        """Records of all decals."""
-        return self._indexed.records
-
-    @records.setter
-    def records(self, records: Any) -> None:
-        self._indexed.records = records
+        self.image_count, self.records = image_count(rows_of(decals)), indexed.records
 
     def kernel(self, single: Any) -> Any:
         """Return the kernel for these decals."""
@@ -160,19 +124,25 @@ class SingleTarget:
 
 
 class Query:
-    """Decals at points, in a contact mode or law.
+    """Decals at points, in a contact mode or law, and the images of the decals.
 
     Attributes
     ----------
     owners, uv, fields
         See `Samples`; arrays on the device.
+    sums
+        What the images give, an `ImageSums`; None without images.
     """
 
-    def __init__(self, target: Target, points: Any, normals: Any, contact: AnyContact) -> None:
+    def __init__(
+        self, target: Target, points: Any, normals: Any, contact: AnyContact, images: UploadedImages | None
+    ) -> None:
         self._target, self._contact, self._device = target, contact, target.device
         self._points, self._normals = points, normals
         self._count = target.count(points)
-        self.owners, self.uv, self.fields = self._sample(points, normals)
+        if images is not None:
+            images.check(target.image_count)
+        self.owners, self.uv, self.fields, self.sums = self._sampled(points, normals, images)
 
     def _inputs(self, points: Any, normals: Any) -> list[Any]:
         return [points, normals, int(self._contact), *self._target.arguments()]
@@ -182,10 +152,15 @@ class Query:
             with_law(self._target.kernel(kernel), self._contact), self._count, inputs, outputs, self._device
         )
 
-    def _sample(self, points: Any, normals: Any) -> list[Any]:
+    def _sampled(self, points: Any, normals: Any, images: UploadedImages | None = None) -> list[Any]:
         outputs = zeros(self._device, self._count, wp.int32, wp.vec2, wp.float32)
-        self._launch(sample_points, self._inputs(points, normals), outputs)
-        return outputs
+        inputs = self._inputs(points, normals)
+        if images is None:
+            self._launch(sample_points, inputs, outputs)
+            return [*outputs, None]
+        sums = images.sums(self._count, self._device)
+        self._launch(sample_images, [*inputs, *outputs, images.texels], [sums])
+        return [*outputs, sums]
 
     def _on_device(self, rows: Float32Array) -> Any:
         return wp.array(rows, dtype=wp.vec3, device=self._device)
@@ -211,7 +186,7 @@ class Query:
         radii[owned] = RIM_RADIUS * spheres[places[owned]]
 
         def sampled(points: Float32Array, normals: Float32Array) -> tuple[Int32Array, Float32Array]:
-            owner, uv, _ = self._sample(self._on_device(points), self._on_device(normals))
+            owner, uv, *_ = self._sampled(self._on_device(points), self._on_device(normals))
             return owner.numpy(), uv.numpy()
 
         center = self._host_owners, self.uv.numpy()
@@ -247,70 +222,6 @@ class Query:
         alone, in_layer = ((shows & bit) > 0 for bit in (SHOWS_ALONE, SHOWS_IN_LAYER))
         return Neighbors(offsets, numbers, fields, pushes, alone, in_layer)
 
-    def colors(self, layers: Sequence[Float32Array]) -> Any:
-        """Return the colours of images, linear and premultiplied, over each other, on the device."""
-        (colors,) = zeros(self._device, self._count, wp.vec4)
-        images = image_arrays(self._target.image_count, layers, self._device)
-        inputs = self._inputs(self._points, self._normals)
-        self._launch(color_points, [*inputs, self.owners, self.uv, *images], [colors])
-        return colors
-
-    def heights(self, reliefs: Sequence[Float32Array | None], pixels: Sequence[Pixels]) -> Float32Array:
-        """Return heights in model units, mixed as a colour is, with the radius of each decal as its tint."""
-        layers = []
-        for relief, image in zip(reliefs, pixels, strict=True):
-            layer = np.zeros(image.shape, np.float32)
-            layer[..., 3] = unit_levels(image[..., 3])
-            if relief is not None:
-                layer[..., 0] = relief
-            layers.append(layer)
-        radii = RIM_RADIUS * self._target.records.numpy()[::RECORD, 3:]
-        return self._map_sums(layers, np.repeat(radii, 3, axis=1))[:, 0]
-
-    def materials(self, images: Sequence[Any], pixels: Sequence[Pixels]) -> MaterialSamples:
-        """Return the maps of materials, mixed as colours are, with the axes of each decal as its tint."""
-        given = []  # x, y, z of normals; roughness, metalness, 1; emission; occlusion
-        for image, pixel in zip(images, pixels, strict=True):
-            maps = np.zeros((*pixel.shape[:2], 12), np.float32)
-            if hasattr(image, "surface_texels"):
-                first, second = image.surface_texels()
-                maps[..., :2], maps[..., 3:5] = first[..., :2], first[..., 2:]
-                maps[..., 2] = np.sqrt(np.maximum(1.0 - (first[..., :2] ** 2).sum(axis=-1), 0.0))
-                maps[..., 5], maps[..., 6:10] = 1.0, second
-            alpha = unit_levels(pixel[..., 3:])
-            given.append(np.concatenate([maps * alpha, alpha], axis=-1))
-
-        def sums(columns: list[int], tints: Float32Array | float) -> Float32Array:
-            layers = [np.ascontiguousarray(maps[..., [*columns, -1]]) for maps in given]
-            return self._map_sums(layers, tints)[:, :3]
-
-        records, (_, normals) = self._target.records.numpy(), self._host_rows
-        facing, axis = records[1::RECORD, :3], records[2::RECORD, :3]
-        tilt = sums([0, 0, 0], axis) + sums([1, 1, 1], np.cross(facing, axis))
-        upright, roughness, metallic = sums([2, 3, 4], 1.0).T
-        emission = sums([6, 7, 8], 1.0)
-        part, occlusion, _ = sums([5, 9, 10], 1.0).T
-        unit = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.float32(1e-30))
-        places = self._target.places(self._host_owners)
-        owner_facing = facing[np.maximum(places, 0)] if len(facing) else unit
-        # turned as the normal is on the way to the point; the inverse of `unroll_step`
-        cosine = np.maximum(1.0 + (owner_facing * unit).sum(axis=1, keepdims=True), 1e-4)
-        turned = tilt - (tilt * unit).sum(axis=1, keepdims=True) / cosine * (owner_facing + unit)
-        normal = (turned + upright[:, None] * unit).astype(np.float32)
-        return MaterialSamples(part, normal, roughness, metallic, occlusion, emission)
-
-    def _map_sums(self, layers: Sequence[Float32Array], tints: Float32Array | float) -> Float32Array:
-        """Return layers ``[h, w, 4]`` mixed as colours are, with other tints; without image, decals add 0."""
-        records = self._target.records
-        tinted = records.numpy().copy()
-        tinted[3::RECORD, :3] = np.where(tinted[2::RECORD, 3:] >= 0.0, tints, 0.0)
-        self._target.records = wp.array(tinted, dtype=wp.vec4, device=self._device)
-        try:
-            sums: Float32Array = self.colors(layers).numpy()
-            return sums
-        finally:
-            self._target.records = records
-
 
 def zeros(device: Any, count: int, *kinds: Any) -> list[Any]:
     """Return arrays of zeros of several types."""
@@ -325,27 +236,3 @@ def rows_of(decals: Decals | DecalEditor) -> Decals:
 def image_count(decals: Decals) -> int:
     """Return the number of images to which decals refer."""
     return int(decals.images.max(initial=NO_IMAGE)) + 1
-
-
-def image_arrays(min_count: int, layers: Sequence[Float32Array], device: Any) -> tuple[Any, Any]:
-    """Return at least so many images ``float32[h, w, 4]`` on a device, row after row, the upper row first.
-
-    Returns
-    -------
-    extents : vec3i[k]
-        First texel, width and height of each image.
-    texels : vec4[t]
-    """
-    if len(layers) < min_count:
-        raise InvalidImage(
-            f"images: expected {min_count} or more, got {len(layers)}; decals refer to them by number"
-        )
-    sizes = np.array([(layer.shape[1], layer.shape[0]) for layer in layers], np.int32).reshape(-1, 2)
-    counts = sizes.prod(axis=1)
-    extents = np.column_stack([np.cumsum(counts) - counts, sizes]).astype(np.int32)
-    texels = np.concatenate([np.zeros((0, 4), np.float32), *(layer.reshape(-1, 4) for layer in layers)])
-    arrays: list[Any] = [
-        wp.array(values, dtype=kind, device=device)
-        for values, kind in ((extents, wp.vec3i), (texels, wp.vec4))
-    ]
-    return arrays[0], arrays[1]

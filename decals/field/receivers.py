@@ -78,3 +78,9 @@ def fade_at(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, index: IndexedDecals) -> 
         depth = wp.abs(wp.dot(q - xyz(index.records[RECORD * decal]), normal))
         fade = fade * smooth_step(2.0 - 2.0 * depth / (own[2] * visible_radius(decal, index.records)))
     return fade
+
+
+@wp.func
+def opacity_at(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, index: IndexedDecals) -> wp.float32:
+    """Return the opacity of a decal at q: its own, times the part that its fades leave."""
+    return index.records[RECORD * decal + 3][3] * fade_at(q, n_q, decal, index)
