@@ -1,4 +1,4 @@
-// The environment of a picture, prefiltered for lobes of GGX, see decals/rendering/environment.py. Before it stand its
+// The environment of a picture, prefiltered for lobes of GGX, see decals/rendering/prefiltering.py. Before it stand its
 // constants. Directions are those of the picture: right, up, back.
 uniform sampler2D environment_levels;  // grids of directions one below the other, from mirrors on; then a table
 uniform float environment_strength;

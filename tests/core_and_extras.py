@@ -41,7 +41,10 @@ EXTRAS: dict[str, str] = {
     "decals.images": "radiance",
     "decals.index": "batch",
     "decals.pages": "*",
-    "decals.rendering": "environment lights materials offset_tree posed_mesh rest_buffer walk_cache",
+    "decals.rendering": """
+        environment_textures filter_library materials offset_tree posed_mesh prefiltering rest_buffer
+        walk_cache
+        """,
     "decals.scattering": """
         bare_places boundary boundary_kernels center_normals covering creases deform density gap_filling
         image_projections mean_normals owned_points polish relocation remesh trial_points turned_normals
@@ -63,9 +66,9 @@ EXTRAS: dict[str, str] = {
 LISTS = (
     "blobtree.nodes.kinds",
     "decals.editing.actions",
-    "decals.rendering.drawables",
+    "decals.rendering.extras",
 )
-"""Modules that list all kinds of nodes, of drawn objects, and of actions; what they import does not count."""
+"""Modules that list kinds of nodes, actions, and what extends the renderer: they may import extras."""
 
 
 def is_extra(module: str) -> bool:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = {"blobtree": "blobtree", "decals": "decals", "apps": "decals.apps", "shaders": "decals.shaders"}
 """The folder of each package, and its name in an installed copy."""
 

@@ -39,7 +39,7 @@ PYVISTA_FILES = (
 )  # fmt: skip
 """The files of `blobtree` that use pyvista; a test checks that they import it late."""
 
-CORE_TO_EXTRAS = 89
+CORE_TO_EXTRAS = 71
 """Number of imports of extras by modules of the core: it may only fall."""
 
 EXTRAS = {

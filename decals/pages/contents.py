@@ -34,10 +34,11 @@ from decals.pages.textures import (
 from decals.record import MIN_KEPT_RADIUS
 from decals.rendering.context import MESA_SOFTWARE
 from decals.rendering.decal_library import Form
-from decals.rendering.environment import Environment, picture_texels
+from decals.rendering.environment import Environment
 from decals.rendering.frame_plan import AMBIENT_RADIUS
 from decals.rendering.light_pass import NO_LIGHTS
 from decals.rendering.options import Drawing
+from decals.rendering.prefiltering import picture_texels, prefiltered
 from decals.rendering.viewpoint import TILE_MARGIN
 from decals.scenes.camera import REFERENCE_ASPECT
 from decals.scenes.files import to_json
@@ -127,7 +128,7 @@ def environment_textures(environment: Environment | None) -> dict[str, PageTextu
     if environment is None:
         return {}
     panorama = environment.picture
-    textures = {"environment_levels": panorama_texture(panorama.texels, CLAMP)}
+    textures = {"environment_levels": panorama_texture(prefiltered(panorama), CLAMP)}
     if environment.visible:
         seen = picture_texels(panorama.light, MAX_SIDE)
         textures["environment_picture"] = panorama_texture(seen, "REPEAT")

@@ -8,21 +8,11 @@ from typing import Any
 from blobtree.formulas.falloff import RIM
 from blobtree.transpile.glsl import translate_library
 from decals.field.contact_mode import AnyContact, with_law
-from decals.field.elastic import bump_at, image_shift, join_bumps
 from decals.field.mapping import in_image, tangent_coordinates, unroll_step
 from decals.field.ownership import contact_at, owner_at, owner_below, single_layer_at, uv_at
-from decals.field.pixel_filter import (
-    contact_distance,
-    image_steps,
-    inner_part,
-    pixel_line,
-    push_gradient,
-    pushed_steps,
-)
-from decals.field.radial import is_above, lies_on_top, power
-from decals.field.receivers import acts, fade_at
+from decals.field.receivers import fade_at
 from decals.index.lookup import next_number_below
-from decals.record import NEIGHBOR_REACH, OPAQUE_ALPHA, Contact, balls_nested, has_cells
+from decals.record import NEIGHBOR_REACH, OPAQUE_ALPHA, Contact
 
 LIBRARY_FUNCTIONS = (
     single_layer_at,
@@ -38,26 +28,8 @@ LIBRARY_FUNCTIONS = (
 )
 """Functions that ``shaders/decals.glsl`` calls."""
 
-
-FILTER_FUNCTIONS = (
-    *LIBRARY_FUNCTIONS,
-    acts,
-    contact_distance,
-    power,
-    balls_nested,
-    is_above,
-    lies_on_top,
-    has_cells,
-    pixel_line,
-    inner_part,
-    push_gradient,
-    pushed_steps,
-    image_steps,
-    bump_at,
-    join_bumps,
-    image_shift,
-)
-"""Functions that ``shaders/filtered_decals.glsl`` calls."""
+FUNCTIONS: dict[str, tuple[Any, ...]] = {"decals.glsl": LIBRARY_FUNCTIONS}
+"""Functions that shader files call, by the names of the files."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +93,7 @@ class Form:
     @property
     def functions(self) -> tuple[Any, ...]:
         """The typed functions that ``decals.glsl`` or ``filtered_decals.glsl`` calls."""
-        functions = FILTER_FUNCTIONS if self.filtered else LIBRARY_FUNCTIONS
+        functions = FUNCTIONS["filtered_decals.glsl" if self.filtered else "decals.glsl"]
         return tuple(with_law(function, self.contact) for function in functions)
 
 

@@ -45,7 +45,7 @@ class DecalSource:
     masks
         Masks of the objects, see `decals.receivers.object_mask`, for decals that are limited.
     materials, relief, walks
-        Maps and heights of images, and walks of decals, see `Uploads.walks`; None without any.
+        Maps and heights of images, and walks of decals, see `Effect`; None without any.
     lights
         Of these the first casts shadows of ``relief``; None for the studio's key.
     """
@@ -56,7 +56,7 @@ class DecalSource:
     materials: DecalTexture | None = None
     relief: ReliefEffect | None = None
     lights: Any = None
-    walks: DataTexture | None = None
+    walks: DecalTexture | None = None
 
     @property
     def form(self) -> Form:

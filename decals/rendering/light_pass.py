@@ -8,39 +8,18 @@ import numpy as np
 
 from blobtree._typing import UInt8Array
 from decals.rendering.context import Context
-from decals.rendering.environment import Environment, Panorama, environment_constants, picture_texels
+from decals.rendering.environment import Environment
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.lights import Lighting
 from decals.rendering.options import Background
 from decals.rendering.pixel_pass import PixelPass, Program, attach_camera, set_uniform, use_textures
-from decals.rendering.studio import studio_ambient, studio_constants
+from decals.rendering.studio import ENVIRONMENTS, studio_ambient
 from decals.rendering.viewpoint import TILE_MARGIN, WHOLE, Part, Rectangle, Tile
 from decals.shaders import compose
 
 BODY = "light_pass.glsl"
 STUDIO_LIGHT, SCENE_LIGHTS, IMAGE_LIGHT = "studio_light.glsl", "lights.glsl", "image_light.glsl"
 """Shader files of the kinds of light."""
-
-
-class EnvironmentTextures:
-    """A panorama on the GPU: prefiltered, and, if it is visible, as it is."""
-
-    def __init__(self, context: Context, panorama: Panorama, visible: bool) -> None:
-        arrays = {"environment_levels": panorama.texels}
-        if visible:
-            arrays["environment_picture"] = picture_texels(panorama.light, context.max_texture_size)
-        self.textures: dict[str, moderngl.Texture] = {}
-        for name, texels in arrays.items():
-            size = texels.shape[1], texels.shape[0]
-            texture = context.gl.texture(size, 3, np.ascontiguousarray(texels), alignment=1, dtype="f2")
-            texture.repeat_x, texture.repeat_y = name == "environment_picture", False
-            texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
-            self.textures[name] = texture
-
-    def release(self) -> None:
-        """Release the memory."""
-        for texture in self.textures.values():
-            texture.release()
 
 
 NO_LIGHTS = Lighting(())
@@ -144,8 +123,8 @@ def light_text(
     """Return the slots and the definitions of the shader of a kind of light."""
     slots, image = {"lighting": f"//@ include {file}"}, file == IMAGE_LIGHT
     if materials or image:
-        kind, constants = ("image", environment_constants()) if image else ("studio", studio_constants())
-        environment = f"{constants}//@ include {kind}_environment.glsl"
+        kind = "image" if image else "studio"
+        environment = f"{ENVIRONMENTS[kind]()}//@ include {kind}_environment.glsl"
         slots |= {"material": "//@ include material.glsl", "environment": environment}
     defines: dict[str, str | bool] = {
         **studio_ambient(),

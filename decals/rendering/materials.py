@@ -9,8 +9,18 @@ from blobtree._typing import Float32Array, Float64Array
 from decals.images.texels import resized_texels, unit_levels
 from decals.index.editor import DecalEditor
 from decals.rendering.context import Context
+from decals.rendering.decal_data import DecalData
+from decals.rendering.effect import Effect, SceneUploads
 from decals.rendering.lights import Lighting
-from decals.rendering.options import ImageLike, SceneLike, relief_ranges, relief_texels
+from decals.rendering.options import (
+    Drawing,
+    ImageLike,
+    SceneLike,
+    has_materials,
+    has_relief,
+    relief_ranges,
+    relief_texels,
+)
 from decals.rendering.pixel_pass import Program, set_uniform
 from decals.shaders import constants
 
@@ -41,10 +51,6 @@ class MaterialArray:
 
 STEPS_PER_RADIUS = constants("offset_foot.glsl")["STEPS_PER_RADIUS"]
 """Steps of a ray over the radius of the smallest decal with relief."""
-
-RELIEF_LOOKUPS = 64
-"""Most points at which heights are looked up for a pixel, see ``shaders/relief.glsl``."""
-
 
 SLOPE_CELLS = 24
 """Most cells along each side of an image for which slopes are known."""
@@ -275,3 +281,44 @@ def map_texels(image: ImageLike, shape: tuple[int, int]) -> Iterator[Float32Arra
     alpha = unit_levels(image.pixels[..., 3:])
     for texels in image.surface_texels():
         yield resized_texels(texels * alpha, shape)
+
+
+class MaterialEffect(Effect):
+    """The maps of a scene's images."""
+
+    def of(self, scene: SceneLike, drawing: Drawing) -> MaterialArray | None:
+        """Return the maps; None without any."""
+        images = self._uploads.images(scene)
+        if images is None or not has_materials(scene):
+            return None
+        shape = images.height, images.width
+        maps: MaterialArray = self._cache.get(
+            lambda: MaterialArray(self._uploads.context, scene.images, shape), images, *scene.images
+        )
+        return maps
+
+
+class HeightEffect(Effect):
+    """The relief of a scene's decals."""
+
+    def __init__(self, uploads: SceneUploads) -> None:
+        super().__init__(uploads)
+        self._relief: tuple[ReliefArray, DecalData, int, Relief] | None = None
+
+    def of(self, scene: SceneLike, drawing: Drawing) -> Relief | None:
+        """Return the relief; None without any."""
+        images = self._uploads.images(scene)
+        if images is None or not has_relief(scene):
+            self._relief = None
+            return None
+        heights, widths = zip(*(image.pixels.shape[:2] for image in scene.images), strict=True)
+        shape = min(max(heights), images.height), min(max(widths), images.width)  # no texel is averaged
+        array = self._cache.get(
+            lambda: ReliefArray(self._uploads.context, scene.images, shape), images, *scene.images
+        )
+        decals = self._uploads.decals(scene)
+        assert decals is not None
+        kept, stepped = self._relief, decals.layered or decals.nested or decals.limited
+        if kept is None or kept[:2] != (array, decals) or kept[2] != decals.version:
+            self._relief = kept = array, decals, decals.version, Relief(array, scene, stepped=stepped)
+        return kept[3]

@@ -33,6 +33,9 @@ MAX_PICTURE_SIDE = 1 << 20
 MAX_SAMPLES = 1024
 """Samples along each axis of a pixel, at most."""
 
+RELIEF_LOOKUPS = 64
+"""Most points at which heights are looked up for a pixel, see ``shaders/relief.glsl``."""
+
 
 @dataclass(frozen=True, slots=True)
 class Background:
@@ -287,6 +290,11 @@ def has_relief(scene: SceneLike) -> bool:
     """Return True if decals of a scene have relief that is drawn: posed objects are drawn without it."""
     posed = any(hasattr(item, "rest") for item in scene.objects)
     return has_materials(scene) and not posed and any(getattr(image, "relief", 0.0) for image in scene.images)
+
+
+def relief_lookups(scene: SceneLike) -> int:
+    """Return the number of points at which decals of a scene are looked up for a pixel."""
+    return RELIEF_LOOKUPS if has_relief(scene) else 1
 
 
 def has_materials(scene: SceneLike) -> bool:

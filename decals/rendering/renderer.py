@@ -19,7 +19,7 @@ from blobtree.graphics import is_forked
 from blobtree.progress import reporting
 from decals.errors import InvalidPoints, InvalidScene
 from decals.index.editor import DecalEditor
-from decals.rendering import drawables  # noqa: F401  (registers kinds of objects)
+from decals.rendering import extras  # noqa: F401  (registers kinds of objects and effects)
 from decals.rendering.context import Context
 from decals.rendering.decal_data import DecalData
 from decals.rendering.decal_library import Form, decal_library
@@ -357,7 +357,7 @@ class Renderer:
 
         Otherwise the walks are being computed in a thread. A new state of the scene cancels the former one's.
         """
-        return not len(scene.decals) or self._uploads.walk_cache.ready(scene)
+        return self._uploads.ready(scene)
 
     @property
     def backend(self) -> PassBackend:
@@ -433,9 +433,7 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
     ]
     if relief:
         tasks.append(WarmupTask(SHADERS, partial(_compile_offsets, uploads, scene, options)))
-    if environment is not None:
-        tasks.append(WarmupTask(IMAGES, lambda: environment.picture.texels, threaded=True))
-        tasks.append(WarmupTask(IMAGES, partial(uploads.environment, environment)))
+    tasks += uploads.effect_tasks(scene, options)
     shown = None if environment is None else environment.picture
     kinds = frozenset(plan.key for plan in objects)
     return WarmupPlan((kinds, form(), tuple(light.values()), shown), tasks)
@@ -456,7 +454,6 @@ def _decal_tasks(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
     return [
         *index,
         WarmupTask(DECALS, partial(uploads.decals, scene)),
-        WarmupTask(DECALS, partial(uploads.walks, scene, options.mapping)),
         WarmupTask(IMAGES, partial(uploads.images, scene)),
         WarmupTask(SHADERS, lambda: decal_library(_form(uploads, scene, options)), threaded=True),
     ]

@@ -6,6 +6,7 @@ through a lobe. The convolution of two such Gaussians is nearly one again, so th
 for every roughness in closed form, without a texture.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,6 +47,10 @@ def studio_constants() -> str:
         f"const vec4 environment_axes[{count}] = vec4[]({', '.join(axes)});\n"
         f"const vec3 environment_colors[{count}] = vec3[]({', '.join(colors)});\n"
     )
+
+
+ENVIRONMENTS: dict[str, Callable[[], str]] = {"studio": studio_constants}
+"""Functions that return the constants of each kind of environment, by the beginning of its shader's name."""
 
 
 def studio_ambient() -> dict[str, str]:

@@ -1,15 +1,16 @@
 """The textures that all passes draw into."""
 
 from collections.abc import Iterator
+from typing import Any
 
 from decals.rendering.context import DEPTH, Context
 from decals.rendering.decal_pass import DecalPass
 from decals.rendering.dirty_regions import TargetState, same_objects
 from decals.rendering.drawable import has_rest_pose
+from decals.rendering.effect import BUFFERS
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.light_pass import LightPass, ResolvePass
 from decals.rendering.options import Size
-from decals.rendering.rest_buffer import RestBuffer
 from decals.rendering.uploads import UploadedScene
 
 TEXTURE_KINDS = ("f4", "f4", "f2", DEPTH, "f2", "f2", "f1")
@@ -33,18 +34,18 @@ class Targets:
         self.frame: object = None
         self.gbuffer = GBuffer(context, size)
         self._context = context
-        self._rest: RestBuffer | None = None
+        self._rest: Any = None
         self.decal_pass = DecalPass(context, size, buffers=buffers)
         self.light_pass = LightPass(context, size)
         self.resolve = ResolvePass(context, size)
 
-    def rest_for(self, uploaded: UploadedScene) -> RestBuffer | None:
+    def rest_for(self, uploaded: UploadedScene) -> Any:
         """Return the rest buffer if some objects are posed, or moved by heights, else None."""
         drawables = uploaded.drawables
         if not any(map(has_rest_pose, drawables)) and not any(map(uploaded.moves, drawables)):
             return None
         if self._rest is None:
-            self._rest = RestBuffer(self._context, self.gbuffer)
+            self._rest = BUFFERS["rest"](self._context, self.gbuffer)
         return self._rest
 
     def release(self) -> None:

@@ -1,79 +1,31 @@
 """Scenes on the GPU, and their caches."""
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 
-from decals.field.mapping import ImageMapping
 from decals.index.editor import DecalEditor
 from decals.receivers import object_mask
 from decals.rendering.context import Context
 from decals.rendering.data_texture import DataTexture
 from decals.rendering.decal_data import DecalData
 from decals.rendering.drawable import Drawable, can_be_moved, drawable_for
-from decals.rendering.environment import Environment
+from decals.rendering.effect import EFFECTS, DecalTexture, Effect, LightTextures, ReliefEffect
+from decals.rendering.gpu_cache import GpuCache
 from decals.rendering.image_array import ImageArray
-from decals.rendering.light_pass import EnvironmentTextures
-from decals.rendering.materials import RELIEF_LOOKUPS, MaterialArray, Relief, ReliefArray
 from decals.rendering.options import (
     Drawing,
     SceneLike,
     check_scene,
     drawn_objects,
-    has_materials,
-    has_relief,
     is_limited,
+    relief_lookups,
 )
 from decals.rendering.viewpoint import Bounds
-from decals.rendering.walk_cache import WalkCache
-
-
-class Releasable(Protocol):
-    """A resource on the GPU."""
-
-    def release(self) -> None:
-        """Release the memory."""
-        ...
-
-
-Resource = TypeVar("Resource", bound=Releasable)
-
-
-class GpuCache(Generic[Resource]):
-    """Resources on the GPU, each made once for the (immutable) objects that it represents.
-
-    Objects are compared by identity, and kept alive as long as their resources.
-    """
-
-    def __init__(self) -> None:
-        self._entries: dict[Hashable, tuple[tuple[object, ...], Resource]] = {}
-        self._used: set[Hashable] = set()
-
-    def get(self, make: Callable[[], Resource], *objects: object) -> Resource:
-        """Return the resource of these objects; make it at the first call."""
-        key = tuple(id(item) for item in objects)
-        if key not in self._entries:
-            self._entries[key] = objects, make()
-        self._used.add(key)
-        return self._entries[key][1]
-
-    def find(self, *objects: object) -> Resource | None:
-        """Return the resource of these objects, or None before the first call of `get`."""
-        return self._entries.get(tuple(id(item) for item in objects), (None, None))[1]
-
-    def sweep(self) -> None:
-        """Release the resources that `get` did not return since the last sweep."""
-        for key in set(self._entries) - self._used:
-            self._entries.pop(key)[1].release()
-        self._used.clear()
-
-    def release(self) -> None:
-        """Release everything."""
-        self._used.clear()
-        self.sweep()
+from decals.rendering.warmup import WarmupTask
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +36,10 @@ class UploadedScene:
     decals: DecalData | None
     images: ImageArray | None
     masks: DataTexture | None = None
-    materials: MaterialArray | None = None
-    relief: Relief | None = None
-    walks: DataTexture | None = None
-    environment: EnvironmentTextures | None = None
+    materials: DecalTexture | None = None
+    relief: ReliefEffect | None = None
+    walks: DecalTexture | None = None
+    environment: LightTextures | None = None
 
     @cached_property
     def bounds(self) -> Bounds:
@@ -111,11 +63,6 @@ class Uploads:
     """Objects, decals and images of scenes on the GPU; they stay until a `sweep` after which they are unused.
 
     The context must be current.
-
-    Attributes
-    ----------
-    walk_cache
-        The walks of the last scene in the mapping WALKED.
     """
 
     def __init__(self, context: Context) -> None:
@@ -123,22 +70,8 @@ class Uploads:
         self._drawables: GpuCache[Drawable] = GpuCache()
         self._decals: GpuCache[DecalData] = GpuCache()
         self._images: GpuCache[ImageArray] = GpuCache()
-        self._materials: GpuCache[MaterialArray] = GpuCache()
-        self._reliefs: GpuCache[ReliefArray] = GpuCache()
-        self._environments: GpuCache[EnvironmentTextures] = GpuCache()
-        self._walks: GpuCache[DataTexture] = GpuCache()
-        self._caches: tuple[GpuCache[Any], ...] = (
-            self._drawables,
-            self._decals,
-            self._images,
-            self._materials,
-            self._reliefs,
-            self._environments,
-            self._walks,
-        )
+        self._effects: dict[str, Effect] = {name: kind(self) for name, kind in EFFECTS.items()}
         self._masks: tuple[tuple[int, ...], DataTexture] | None = None
-        self._relief: tuple[ReliefArray, DecalData, int, Relief] | None = None
-        self.walk_cache = WalkCache()
 
     def scene(self, scene: SceneLike, drawing: Drawing) -> UploadedScene:
         """Return a whole scene, with what a way of drawing needs; errors are those of `check_scene`."""
@@ -147,53 +80,16 @@ class Uploads:
         drawables = [self.drawable(item) for item in objects]
         masks = self._masks_of(scene, objects)
         images = self.images(scene)
-        materials = self._materials_of(scene, images)
-        relief, walks = self._relief_of(scene, images), self.walks(scene, drawing.mapping)
-        environment = self.environment(drawing.environment)
-        decals = self.decals(scene)
-        return UploadedScene(drawables, decals, images, masks, materials, relief, walks, environment)
+        extended: dict[str, Any] = {name: effect.of(scene, drawing) for name, effect in self._effects.items()}
+        return UploadedScene(drawables, self.decals(scene), images, masks, **extended)
 
-    def environment(self, environment: Environment | None) -> EnvironmentTextures | None:
-        """Return the textures of an environment."""
-        if environment is None:
-            return None
-        panorama, visible = environment.picture, environment.visible
-        return self._environments.get(
-            lambda: EnvironmentTextures(self.context, panorama, visible), panorama, visible
-        )
+    def effect_tasks(self, scene: SceneLike, drawing: Drawing) -> list[WarmupTask]:
+        """Return the tasks of a warm-up that effects add."""
+        return [task for effect in self._effects.values() for task in effect.tasks(scene, drawing)]
 
-    def walks(self, scene: SceneLike, mapping: ImageMapping) -> DataTexture | None:
-        """Return the walks of a scene's decals; None in other mappings, or without decals."""
-        if mapping is not ImageMapping.WALKED or not len(scene.decals):
-            return None
-        walks = self.walk_cache.get(scene)
-        return self._walks.get(lambda: DataTexture(self.context, walks.texels), walks)
-
-    def _materials_of(self, scene: SceneLike, images: ImageArray | None) -> MaterialArray | None:
-        """Return the maps of a scene's images; None without any."""
-        if images is None or not has_materials(scene):
-            return None
-        shape = images.height, images.width
-        return self._materials.get(
-            lambda: MaterialArray(self.context, scene.images, shape), images, *scene.images
-        )
-
-    def _relief_of(self, scene: SceneLike, images: ImageArray | None) -> Relief | None:
-        """Return the relief of a scene's decals; None without any."""
-        if images is None or not has_relief(scene):
-            self._relief = None
-            return None
-        heights, widths = zip(*(image.pixels.shape[:2] for image in scene.images), strict=True)
-        shape = min(max(heights), images.height), min(max(widths), images.width)  # no texel is averaged
-        array = self._reliefs.get(
-            lambda: ReliefArray(self.context, scene.images, shape), images, *scene.images
-        )
-        decals = self.decals(scene)
-        assert decals is not None
-        kept, stepped = self._relief, decals.layered or decals.nested or decals.limited
-        if kept is None or kept[:2] != (array, decals) or kept[2] != decals.version:
-            self._relief = kept = array, decals, decals.version, Relief(array, scene, stepped=stepped)
-        return kept[3]
+    def ready(self, scene: SceneLike) -> bool:
+        """Return True if no effect of a scene waits for a computation in a thread."""
+        return all(effect.ready(scene) for effect in self._effects.values())
 
     def _masks_of(self, scene: SceneLike, objects: Sequence[object]) -> DataTexture | None:
         """Return the masks of objects of a scene; None if its decals are not limited."""
@@ -221,7 +117,7 @@ class Uploads:
         if not len(decals):
             return None
         limited = is_limited(scene)
-        lookups = RELIEF_LOOKUPS if has_relief(scene) else 1
+        lookups = relief_lookups(scene)
         data = self._decals.get(
             lambda: DecalData(self.context, decals, limited=limited, lookups=lookups),
             decals,
@@ -236,8 +132,7 @@ class Uploads:
         """Return True if decals of a scene are nested, as far as known without their index."""
         if isinstance(scene.decals, DecalEditor):
             return scene.decals.nested
-        lookups = RELIEF_LOOKUPS if has_relief(scene) else 1
-        data = self._decals.find(scene.decals, is_limited(scene), lookups)
+        data = self._decals.find(scene.decals, is_limited(scene), relief_lookups(scene))
         return data is not None and data.nested
 
     def images(self, scene: SceneLike) -> ImageArray | None:
@@ -249,13 +144,15 @@ class Uploads:
 
     def sweep(self) -> None:
         """Release everything that was not used since the last sweep."""
-        for cache in self._caches:
-            cache.sweep()
-        self.walk_cache.sweep()
+        for held in self._held():
+            held.sweep()
 
     def release(self) -> None:
         """Release everything."""
-        for cache in self._caches:
-            cache.release()
+        for held in self._held():
+            held.release()
         self._release_masks()
-        self.walk_cache.release()
+
+    def _held(self) -> Iterator[GpuCache[Any] | Effect]:
+        yield from (self._drawables, self._decals, self._images)
+        yield from self._effects.values()

@@ -1,13 +1,18 @@
 """The walks of a scene's decals, computed in a thread while frames show the corrected mapping."""
 
 import threading
+from functools import partial
 
 from blobtree._typing import Float32Array
 from blobtree.device import core_left_free
 from blobtree.progress import reporting
+from decals.field.mapping import ImageMapping
 from decals.field.walks import Walks, walk_rows, with_surface
 from decals.index.editor import DecalEditor
-from decals.rendering.options import SceneLike, drawn_objects
+from decals.rendering.data_texture import DataTexture
+from decals.rendering.effect import Effect, SceneUploads
+from decals.rendering.options import Drawing, SceneLike, drawn_objects
+from decals.rendering.warmup import DECALS, WarmupTask
 
 FIRST_WAIT = 0.02
 """Seconds to wait for walks that were just begun: those of a few decals are done by then."""
@@ -136,3 +141,42 @@ class WalkCache:
         """Cancel the thread, wait for its end, and forget all walks."""
         self._forget()
         self._ended(None)
+
+
+class WalkEffect(Effect):
+    """The walks of a scene's decals in the mapping WALKED."""
+
+    def __init__(self, uploads: SceneUploads) -> None:
+        super().__init__(uploads)
+        self._walks = WalkCache()
+
+    def of(self, scene: SceneLike, drawing: Drawing) -> DataTexture | None:
+        """Return the walks; None in other mappings, or without decals."""
+        if not self._walked(scene, drawing):
+            return None
+        walks = self._walks.get(scene)
+        texture: DataTexture = self._cache.get(
+            lambda: DataTexture(self._uploads.context, walks.texels), walks
+        )
+        return texture
+
+    def tasks(self, scene: SceneLike, drawing: Drawing) -> list[WarmupTask]:
+        """Return the computation of the walks."""
+        return [WarmupTask(DECALS, partial(self.of, scene, drawing))] if self._walked(scene, drawing) else []
+
+    def _walked(self, scene: SceneLike, drawing: Drawing) -> bool:
+        return drawing.mapping is ImageMapping.WALKED and len(scene.decals) > 0
+
+    def ready(self, scene: SceneLike) -> bool:
+        """Return True if pictures in the mapping WALKED need not wait."""
+        return not len(scene.decals) or self._walks.ready(scene)
+
+    def sweep(self) -> None:
+        """Release everything that was not used since the last sweep."""
+        super().sweep()
+        self._walks.sweep()
+
+    def release(self) -> None:
+        """Release everything."""
+        super().release()
+        self._walks.release()

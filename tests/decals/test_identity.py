@@ -23,6 +23,7 @@ from blobtree.identity import Value
 from decals import Camera, DecalImage, DecalMaterial, Decals, MeshObject, Scene, TreeObject, content_hash
 from decals.rendering import Background, Drawing, Environment, Light, Lighting
 from decals.rendering.environment import Panorama
+from decals.rendering.prefiltering import prefiltered
 from decals.scenes.files import from_json, to_json
 from decals.scenes.objects import flagged
 from decals.surfaces import BaseColor, BaseTexture, MeshSurface
@@ -301,7 +302,7 @@ def surface_arrays(resolution: int) -> tuple[Any, Any]:
 
 
 def seen(environment: Environment) -> Environment:
-    environment.picture.texels  # noqa: B018
+    prefiltered(environment.picture)
     return environment
 
 

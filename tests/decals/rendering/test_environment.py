@@ -11,7 +11,7 @@ import decals
 from decals.errors import ImplicitDecalsError, InvalidImage, InvalidScene
 from decals.images.texels import decode_srgb, encode_srgb
 from decals.rendering import Drawing, Environment, Lighting, Renderer, RenderOptions
-from decals.rendering.environment import (
+from decals.rendering.prefiltering import (
     GRID_ROWS,
     TABLE_SHAPE,
     level_alpha,

@@ -1,0 +1,27 @@
+"""What extends the renderer, in a fixed order: effects, and kinds of objects.
+
+The first kind that an object is like draws it.
+"""
+
+from decals.rendering import filter_library  # noqa: F401  (registers its functions)
+from decals.rendering.drawable import register
+from decals.rendering.effect import BUFFERS, EFFECTS
+from decals.rendering.environment_textures import EnvironmentEffect
+from decals.rendering.materials import HeightEffect, MaterialEffect
+from decals.rendering.mesh import ColoredMesh, MeshDrawable
+from decals.rendering.offset_tree import OffsetTreeDrawable
+from decals.rendering.posed_mesh import PosedColoredMesh, PosedMeshDrawable
+from decals.rendering.rest_buffer import RestBuffer
+from decals.rendering.tree import TreeHolder
+from decals.rendering.walk_cache import WalkEffect
+
+EFFECTS |= {
+    "materials": MaterialEffect,
+    "relief": HeightEffect,
+    "walks": WalkEffect,
+    "environment": EnvironmentEffect,
+}
+BUFFERS["rest"] = RestBuffer
+register(PosedColoredMesh, PosedMeshDrawable, PosedMeshDrawable.warmup)
+register(ColoredMesh, MeshDrawable, MeshDrawable.warmup)
+register(TreeHolder, OffsetTreeDrawable, OffsetTreeDrawable.warmup)
