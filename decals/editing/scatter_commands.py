@@ -17,7 +17,7 @@ from decals.errors import InvalidEdit
 from decals.model import MAX_COORDINATE, Decals
 from decals.scattering.appearance import Appearance
 from decals.scattering.domain import Domain, OrientedPoints
-from decals.scattering.polish import PUSHING_RADIUS, relax_near
+from decals.scattering.local_relaxation import PUSHING_RADIUS, relax_near
 from decals.scattering.scatter import check_regularity, scatter
 from decals.scenes.objects import (
     MeshObject,

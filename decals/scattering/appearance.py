@@ -1,6 +1,7 @@
 """Decals of oriented points: radii, tangents and images by a set of rules."""
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,14 +10,10 @@ from numpy.typing import ArrayLike
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from decals.errors import InvalidScattering
 from decals.model import Decals
-from decals.scattering.covering import covering_radii
 from decals.scattering.domain import Domain, OrientedPoints
-from decals.scattering.gap_filling import EVEN, center_outsized
 from decals.scattering.mean_normals import mean_normals
-from decals.scattering.neighbors import NearestFacing
 from decals.scattering.orientation import Direction, as_direction, max_curvatures, tangents
-from decals.scattering.sizing import Sizing, delaunay_radii, touching_radii
-from decals.scattering.turned_normals import turned_normals
+from decals.scattering.sizing import EXPECTED_RADIUS, RULES, Sizing, delaunay_radii, touching_radii
 from decals.scattering.variation import ImageChoice, Jitter, image_shares, random_images, ranked_images
 from decals.validation import member, real_number
 
@@ -25,15 +22,6 @@ SAMPLES_PER_DECAL = 64
 
 MIN_SAMPLES = 4096
 """Least number of samples, so that the radii of few decals are accurate as well."""
-
-LARGEST_ON_THIN_PARTS = 6.0
-"""Largest covering radius over the expected one where parts may be thinner than decals lie apart.
-
-On a hair, a decal has its area in a piece that is far longer than its radius.
-"""
-
-EXPECTED_RADIUS = 0.6
-"""Radius of a decal before it is measured, in spacings: that of a hexagonal tiling without gaps."""
 
 _SAMPLE_STREAM, _TRIAL_STREAM, _ANGLE_STREAM, _IMAGE_STREAM = 3, 4, 5, 6
 _POSITION_JITTER_STREAM, _SIZE_JITTER_STREAM, _ANGLE_JITTER_STREAM = 7, 8, 9
@@ -153,9 +141,6 @@ class Appearance:
     ) -> tuple[OrientedPoints, Float64Array]:
         """Return the decals at centres, with their own normals, and radii by the sizing.
 
-        For covering radii at even density, some are moved by `center_outsized` and turned by
-        `turned_normals`.
-
         A surface without particles is not sampled.
         """
         if self.sizing is Sizing.TOUCHING:
@@ -168,40 +153,10 @@ class Appearance:
             points = self._with_mean_normals(domain, centers, spacings)
             return points, delaunay_radii(points, samples)
 
-        def project(trials: OrientedPoints) -> tuple[OrientedPoints, Int64Array]:
-            projected, allowed = domain.project(trials)
-            rows = np.flatnonzero(allowed)
-            return projected[rows], rows
-
-        expected = EXPECTED_RADIUS * spacings.astype(np.float64)
-        bent = self._with_mean_normals(domain, centers, spacings)
-        bent_at = centers.positions
-        nearest = NearestFacing(samples.positions, samples.normals)
-
-        def aim(centers: OrientedPoints) -> OrientedPoints:
-            nonlocal bent, bent_at
-            moved = np.flatnonzero((centers.positions != bent_at).any(axis=1))
-            normals = bent.normals.copy()
-            normals[moved] = self._with_mean_normals(domain, centers[moved], spacings[moved]).normals
-            bent = OrientedPoints(centers.positions, normals, centers.surface_ids)
-            bent_at = centers.positions
-            normals = turned_normals(bent, centers.normals, samples, nearest, expected)
-            return OrientedPoints(centers.positions, normals, centers.surface_ids)
-
-        even = bool(spacings.max() <= EVEN * spacings.min())
-        decals = center_outsized(domain, centers, movable, spacings, samples, aim) if even else aim(centers)
-        trials = _stream(seed, _TRIAL_STREAM)
-        radii = covering_radii(
-            decals,
-            samples,
-            project,
-            trials,
-            shade=domain.shaded,
-            even=even,
-            nearest=nearest,
-            bounds=LARGEST_ON_THIN_PARTS * expected if domain.has_thin_parts else None,
+        aim = partial(self._with_mean_normals, domain)
+        return RULES[self.sizing](
+            domain, centers, spacings, movable, samples, aim, _stream(seed, _TRIAL_STREAM)
         )
-        return decals, radii
 
     def _chosen_images(self, points: OrientedPoints, radii: Float64Array, seed: int) -> Int32Array:
         if self.choice is ImageChoice.SIZE:

@@ -23,6 +23,13 @@ _Points: TypeAlias = tuple[Float32Array, Float32Array]
 """Positions and normals."""
 
 
+def carried(
+    before: Domain, after: Domain, points: OrientedPoints, spacing: float, fixed: BoolArray, *, stream: int
+) -> OrientedPoints:
+    """Return points as `carry` does; those that became forbidden, the fixed ones aside, at random places."""
+    return resample_forbidden(after, carry(before, after, points, spacing), fixed, stream=stream)
+
+
 def carry(before: Domain, after: Domain, points: OrientedPoints, spacing: float) -> OrientedPoints:
     """Carry points, sorted by surface, from the surfaces of one domain to those of another.
 

@@ -1,4 +1,4 @@
-"""Polish: part the last close pairs by trial, and relax the neighbourhood of one point."""
+"""Polish: part the last close pairs by trial."""
 
 from collections.abc import Callable
 from typing import Any
@@ -8,11 +8,11 @@ import warp as wp
 
 from blobtree._typing import BoolArray, Float32Array, Int64Array
 from blobtree.device import launch
-from decals.scattering.domain import Domain, OrientedPoints, crosses_density_step
+from decals.scattering.domain import crosses_density_step
 from decals.scattering.neighbors import CLOSE_DISTANCE, NeighborQuery, index_array, local_maxima
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.projection import spans_of
-from decals.scattering.repulsion import LOCAL_LAW, particle_struct
+from decals.scattering.repulsion import particle_struct
 from decals.scattering.search_kernels import Candidates, ChoiceRule, move_to_best, sample_around
 
 MIN_TRIALS, TRIALS_PER_ROUND = 60, 1000
@@ -41,12 +41,6 @@ FULL_SEARCH_INTERVAL = 5
 
 MAX_IDLE_ROUNDS = 30
 """Rounds without any move after which the search ends."""
-
-MOVING_RADIUS, PUSHING_RADIUS = 4.0, 6.5
-"""Radius of the particles that move in a local relaxation, and of those that repel them, in spacings."""
-
-LOCAL_STEPS = 16
-"""Steps of a local relaxation."""
 
 
 def polish(
@@ -167,32 +161,3 @@ def _try_candidates(
 
 def _zeros(dtype: Any, count: int, device: str) -> Any:
     return wp.zeros(count, dtype=dtype, device=device)
-
-
-def relax_near(
-    domain: Domain,
-    points: OrientedPoints,
-    movable: BoolArray,
-    sizes: Float32Array,
-    center: Float32Array,
-    reach: float | None = None,
-) -> OrientedPoints:
-    """Relax the particles around a point, or those within a reach, and leave all others where they are."""
-    distances = np.linalg.norm(points.positions - center, axis=1)
-    spacing = float(sizes[distances.argmin()])
-    pushing, moved = PUSHING_RADIUS * spacing, MOVING_RADIUS * spacing
-    if reach is not None:
-        pushing, moved = reach + pushing - moved, reach
-    near = np.flatnonzero(distances < pushing)
-    moving = (distances[near] < moved) & movable[near]
-    if not moving.any():
-        return points
-    state = ParticleState(domain, points[near], moving, sizes[near])
-    for _ in range(LOCAL_STEPS):
-        if state.epoch_over:
-            state.begin_epoch(LOCAL_LAW)
-        state.step()
-    relaxed = state.points()
-    positions, normals = points.positions.copy(), points.normals.copy()
-    positions[near], normals[near] = relaxed.positions, relaxed.normals
-    return OrientedPoints(positions, normals, points.surface_ids)

@@ -11,7 +11,7 @@ from blobtree.validation import point_array, truth
 from decals.errors import InvalidScattering
 from decals.model import Decals
 from decals.scattering.appearance import Appearance
-from decals.scattering.deform import carry, resample_forbidden
+from decals.scattering.density_anchors import DensityAnchors
 from decals.scattering.domain import (
     Density,
     Domain,
@@ -21,7 +21,8 @@ from decals.scattering.domain import (
     particle_count,
     remaining_counts,
 )
-from decals.scattering.gap_filling import fill_gaps
+from decals.scattering.extras import CARRIERS, FILLINGS, RELOCATIONS, SEPARATIONS
+from decals.scattering.local_relaxation import relax_near
 from decals.scattering.neighbors import (
     CLOSE_DISTANCE,
     NeighborQuery,
@@ -31,8 +32,6 @@ from decals.scattering.neighbors import (
 )
 from decals.scattering.orientation import Direction
 from decals.scattering.particle_state import ParticleState
-from decals.scattering.polish import polish, relax_near
-from decals.scattering.relocation import CandidatePoints, DensityAnchors, crowded_particles, relocate
 from decals.scattering.repulsion import CUTOFF, law_at
 from decals.scattering.sizing import Sizing
 from decals.scattering.variation import ImageChoice, Jitter
@@ -146,7 +145,7 @@ class Relaxation:
         self._fixed: BoolArray = (np.arange(count) < len(fixed_points))[order]
         first, last, interval = (int(part * self.iterations) for part in RELOCATION_SCHEDULE)
         self._relocation_steps = set(range(max(first, 1), last + 1, max(interval, MIN_RELOCATION_INTERVAL)))
-        self._candidates = CandidatePoints(self.domain, self.sizes_at)
+        self._relocations = [make(self.domain, self.sizes_at) for make in RELOCATIONS]
         self._anchors = DensityAnchors(self.sizes_at)
         self._points: OrientedPoints | None = joined[order]
         self._state: ParticleState | None = None
@@ -281,7 +280,8 @@ class Relaxation:
         if self.count > 1:
             state = self._device_state()
             self._restore_density(state)
-            polish(state, rounds=rounds, seed=self._seed, close=close, sizes_at=self.sizes_at)
+            for separate in SEPARATIONS:
+                separate(state, rounds=rounds, seed=self._seed, close=close, sizes_at=self.sizes_at)
             self._anchors.set(state, np.arange(self.count))
             self._points = None
             if rounds:
@@ -290,7 +290,9 @@ class Relaxation:
     def _fill_gaps(self) -> None:
         """Move particles beside wide gaps, and begin again with the others' state."""
         before = self.points
-        points = fill_gaps(self.domain, before, ~self._fixed, self.sizes_at(before.positions), CLOSE_DISTANCE)
+        points, sizes = before, self.sizes_at(before.positions)
+        for fill in FILLINGS:
+            points = fill(self.domain, points, ~self._fixed, sizes, CLOSE_DISTANCE)
         if points is not before:
             self._restart(points)
 
@@ -307,16 +309,10 @@ class Relaxation:
         if self.steps == 1:
             return
         state = self._device_state()
-        movers = crowded_particles(state)
-        if len(movers):
-            self._restore_density(state)
-            candidates, sizes = self._candidates.next_batch(len(movers), self.count)
-            if self.domain.has_thin_parts:
-                thick = np.flatnonzero(~self._candidates.on_thin_parts(candidates.positions, self.count))
-                candidates, sizes = candidates[thick], sizes[thick]
-                movers = movers[~self._candidates.on_thin_parts(state.positions.numpy()[movers], self.count)]
-            moved = relocate(state, movers, candidates, sizes)
-            self._anchors.set(state, moved)
+        for relocate in self._relocations:
+            moved = relocate(state, self._restore_density)
+            if len(moved):
+                self._anchors.set(state, moved)
 
     def _repel(self) -> None:
         """Move every particle against its neighbours, in a new epoch if the last one is over."""
@@ -428,11 +424,12 @@ class Relaxation:
             cannot follow. Nothing has changed then.
         """
         domain = self.domain.deformed(surfaces)
-        points = carry(self.domain, domain, self.points, self.spacing)
-        points = resample_forbidden(domain, points, self._fixed, stream=self.steps)
+        points = self.points
+        for carry in CARRIERS:
+            points = carry(self.domain, domain, points, self.spacing, self._fixed, stream=self.steps)
         self.domain = domain
         self.spacing = ideal_spacing(domain.mass, self.count)
-        self._candidates = CandidatePoints(domain, self.sizes_at)
+        self._relocations = [make(domain, self.sizes_at) for make in RELOCATIONS]
         self._deformed_at = self.steps
         intervals = range(
             MIN_RELOCATION_INTERVAL, RELOCATION_STEPS_AFTER_DEFORMATION + 1, MIN_RELOCATION_INTERVAL

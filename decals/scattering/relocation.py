@@ -1,4 +1,4 @@
-"""Relocation: crowded particles move to gaps, and drifted ones return across steps of the density."""
+"""Relocation: crowded particles move to gaps."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 import warp as wp
 
 from blobtree._typing import BoolArray, Float32Array, Int64Array
-from decals.scattering.domain import Domain, OrientedPoints, apportion, crosses_density_step
+from decals.scattering.domain import Domain, OrientedPoints, apportion
 from decals.scattering.neighbors import NeighborQuery, index_array, local_maxima
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.repulsion import particle_struct
@@ -37,8 +37,8 @@ THIN_REACH, THIN_SHARE = 4.0, 0.45
 _CANDIDATE_STREAM = 1000
 
 
-class CandidatePoints:
-    """Points all over the domain where gaps are looked for, drawn once and used in turn.
+class Relocation:
+    """Moves crowded particles to gaps, looked for at points all over the domain, drawn once and used in turn.
 
     Parameters
     ----------
@@ -55,7 +55,20 @@ class CandidatePoints:
         self._thin: BoolArray | None = None
         self._next = 0
 
-    def next_batch(self, mover_count: int, count: int) -> tuple[OrientedPoints, Float32Array]:
+    def __call__(self, state: ParticleState, restore: Callable[[ParticleState], None]) -> Int64Array:
+        """Move the crowded particles, before which `restore` is called; return those that moved."""
+        movers = crowded_particles(state)
+        if len(movers) == 0:
+            return movers
+        restore(state)
+        candidates, sizes = self._next_batch(len(movers), state.count)
+        if self._domain.has_thin_parts:
+            thick = np.flatnonzero(~self._on_thin_parts(candidates.positions, state.count))
+            candidates, sizes = candidates[thick], sizes[thick]
+            movers = movers[~self._on_thin_parts(state.positions.numpy()[movers], state.count)]
+        return relocate(state, movers, candidates, sizes)
+
+    def _next_batch(self, mover_count: int, count: int) -> tuple[OrientedPoints, Float32Array]:
         """Return enough points for some movers of `count` particles, and the spacings there."""
         points, sizes = self._drawn(CANDIDATES_PER_PARTICLE * count)
         batch_size = min(len(points), CANDIDATES_PER_MOVER * mover_count + 1000)
@@ -70,7 +83,7 @@ class CandidatePoints:
             self._sizes = self._sizes_at(self._points.positions)
         return self._points, self._sizes
 
-    def on_thin_parts(self, positions: Float32Array, count: int) -> BoolArray:
+    def _on_thin_parts(self, positions: Float32Array, count: int) -> BoolArray:
         """Return True for positions on parts thinner than `count` particles lie apart.
 
         Particles neither come nor leave there. Their distances say nothing: those of the right number of
@@ -85,43 +98,6 @@ class CandidatePoints:
             flat = CANDIDATES_PER_PARTICLE * np.pi * THIN_REACH**2 / (0.5 * np.sqrt(3.0))
             self._thin = nearby < THIN_SHARE * flat
         return np.asarray(self._thin[tree.query(positions)[1]], np.bool_)
-
-
-class DensityAnchors:
-    """Spacing at which each particle began, and the last position where it had about that spacing.
-
-    The initial sample follows the density. Afterwards no force keeps the counts at a step of the density:
-    pressures are equal on both sides, and the gap between the last two rows belongs to neither, so the coarse
-    side gains about half a row. Hence particles that drift across a step of the density return.
-
-    Parameters
-    ----------
-    sizes_at
-        Spacing at positions, a function of ``points[n, 3]`` to ``[n]``.
-    """
-
-    def __init__(self, sizes_at: Callable[[Float32Array], Float32Array]) -> None:
-        self._sizes_at = sizes_at
-        self._sizes: Float32Array | None = None
-        self._points: OrientedPoints | None = None
-
-    def restore(self, state: ParticleState) -> None:
-        """Return drifted particles to their last anchors, and update the spacings of all particles."""
-        sizes = self._sizes_at(state.positions.numpy())
-        if self._sizes is None or self._points is None:
-            self._sizes = sizes
-        else:
-            drifted = np.flatnonzero(crosses_density_step(self._sizes, sizes))
-            state.move_to(drifted, self._points.positions[drifted], self._points.normals[drifted])
-            sizes[drifted] = self._sizes_at(self._points.positions[drifted])
-        state.resize(sizes)
-        self._points = state.points()
-
-    def set(self, state: ParticleState, rows: Int64Array) -> None:
-        """Anchor some particles where they are now."""
-        if self._sizes is not None:
-            self._points = state.points()
-            self._sizes[rows] = self._sizes_at(self._points.positions[rows])
 
 
 def crowded_particles(state: ParticleState) -> Int64Array:

@@ -1,14 +1,15 @@
 """Radii of decals: the rules, and those of touching decals and of the paper."""
 
+from collections.abc import Callable
 from enum import Enum
+from typing import TypeAlias
 
 import numpy as np
 
-from blobtree._typing import Float64Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array
 from blobtree.formulas.falloff import RIM
-from decals.scattering.domain import OrientedPoints
+from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.neighbors import FacingTree
-from decals.scattering.owned_points import Centers
 
 
 class Sizing(Enum):
@@ -33,6 +34,23 @@ class Sizing(Enum):
     """The paper's rule: the field ends at the farthest Delaunay neighbour. It leaves small gaps."""
 
 
+EXPECTED_RADIUS = 0.6
+"""Radius of a decal before it is measured, in spacings: that of a hexagonal tiling without gaps."""
+
+WithNormals: TypeAlias = Callable[[OrientedPoints, Float32Array], OrientedPoints]
+"""A function of centres and spacings there, to the centres with the normals of decals."""
+
+Rule: TypeAlias = Callable[
+    [Domain, OrientedPoints, Float32Array, BoolArray, OrientedPoints, WithNormals, int],
+    tuple[OrientedPoints, Float64Array],
+]
+"""A function of a domain, of centres, with their spacings and True for those that may move, of samples of the
+surfaces, of the normals of decals, and of a seed, to the decals and their radii."""
+
+RULES: dict[Sizing, Rule] = {}
+"""Rules by their names, besides those of this file."""
+
+
 def touching_radii(decals: OrientedPoints) -> Float64Array:
     """Return half the distance to the nearest facing decal; the median radius without such a decal."""
     tree = FacingTree(decals.positions, decals.normals)
@@ -46,8 +64,9 @@ def delaunay_radii(decals: OrientedPoints, samples: OrientedPoints) -> Float64Ar
     Two decals are neighbours in the surface's own Delaunay triangulation if their Voronoi cells meet: if a
     sample is nearest to the one and next nearest to the other.
     """
-    owned = Centers.of(decals).find(samples)
-    pairs = owned.decals[(owned.decals[:, :2] >= 0).all(axis=1), :2]
+    tree = FacingTree(decals.positions, decals.normals)
+    nearest = tree.nearest(samples.positions, samples.normals, count=2)[1]
+    pairs = nearest[(nearest >= 0).all(axis=1)]
     starts, ends = decals.positions[pairs[:, 0]], decals.positions[pairs[:, 1]]
     lengths = np.linalg.norm(starts.astype(np.float64) - ends, axis=1)
     farthest = np.full(len(decals), -np.inf)
