@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 import blobtree
 from blobtree import InvalidNode, Node, from_json, to_json
 from blobtree.declare.parameters import OPTIONAL, Parameter, Quantity, fields_of, parameters_of
-from blobtree.nodes.primitives import Falling, Leaf, Pieces
+from blobtree.nodes.pieces import Pieces
+from blobtree.nodes.primitives import Falling, Leaf
 from blobtree.tape.model import gradients_at
 from tests.blobtree.tape.evaluations import bounds_along
 from tests.blobtree.trees import BUILT_IN_FALLOFFS, points_around, random_leaf, random_profile, triple

@@ -7,7 +7,7 @@ folder of the product, or a file, on which the core should not depend.
 from tests.import_graph import module_graph
 
 EXTRAS: dict[str, str] = {
-    "blobtree": "field_slice fitting",
+    "blobtree": "field_slice fitting slicing",
     "blobtree.custom": "bounds_kernels field_checks skeleton_checks warp_checks",
     "blobtree.declare": "checks operator_checks",
     "blobtree.derivatives": "*",
@@ -22,8 +22,8 @@ EXTRAS: dict[str, str] = {
         part_kernels parts thickening thickening_kernels wall_kernels walls
         """,
     "blobtree.nodes": """
-        attributes blends contact convolution curves deformations fields flats parameter_gradient samples
-        solids tree_volumes volumes
+        blends contact convolution curves deformations fields flats parameter_gradient pieces questions
+        samples solids tree_volumes volumes
         """,
     "blobtree.sampling": "*",
     "blobtree.tape": "attributes directed directed_along grown operands part_sizes poses rest_kernels",
@@ -46,12 +46,11 @@ EXTRAS: dict[str, str] = {
         walk_cache
         """,
     "decals.scattering": """
-        bare_places boundary boundary_kernels center_normals covering creases deform density gap_filling
-        image_projections mean_normals owned_points polish relocation remesh trial_points turned_normals
-        variation
+        bare_places center_normals covering covering_rule creases deform density gap_filling
+        image_projections owned_points polish relocation remesh trial_points turned_normals
         """,
     "decals.scenes": """
-        animation area_gradient figure gaps material material_record measure outlines pose reproduction
+        animation area_gradient figure gaps measure outlines pose reproduction
         script tables
         """,
     "decals.surfaces": """
@@ -65,10 +64,12 @@ EXTRAS: dict[str, str] = {
 
 LISTS = (
     "blobtree.nodes.kinds",
+    "blobtree.nodes.extras",
     "decals.editing.actions",
     "decals.rendering.extras",
+    "decals.scattering.extras",
 )
-"""Modules that list kinds of nodes, actions, and what extends the renderer: they may import extras."""
+"""Modules that list kinds of nodes, actions, refinements of particles, and what extends the renderer."""
 
 
 def is_extra(module: str) -> bool:

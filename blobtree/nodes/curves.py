@@ -15,12 +15,12 @@ from blobtree.formulas.curve_skeletons import ARC, CURVE, JOINED_SEGMENT
 from blobtree.formulas.skeletons import CIRCLE
 from blobtree.lazy import Lazy
 from blobtree.nodes.node import Node
+from blobtree.nodes.pieces import Pieces
 from blobtree.nodes.primitives import (
     DEFAULT_COLOR,
     OPTIONAL_FIELD,
     Columns,
     JoinedPrimitive,
-    Pieces,
     Primitive,
     RoundPrimitive,
     Segment,

@@ -13,7 +13,8 @@ from blobtree.errors import InvalidNode
 from blobtree.formulas.flat_skeletons import RECTANGLE, TRIANGLE
 from blobtree.lazy import Lazy
 from blobtree.nodes.node import Node
-from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, JoinedPrimitive, Pieces, Primitive, beside
+from blobtree.nodes.pieces import Pieces
+from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, JoinedPrimitive, Primitive, beside
 from blobtree.validation import Vector
 
 SMALLEST_SINE = 1e-6

@@ -4,7 +4,7 @@
     model = (body | Point((2, 1, 0), radius=0.5)) - Point((0, 0, 1), radius=0.5)
 
 A node finds the classes of other nodes by their tags, because their files import this one. What can be asked
-of a tree lies in `blobtree.nodes.model`.
+of a tree lies in `blobtree.nodes.model` and `blobtree.nodes.questions`.
 """
 
 import math
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from blobtree.declare.parameters import documented, fields_of, parameters_of
 from blobtree.declare.registry import NODE_KINDS, kind_of
 from blobtree.errors import InvalidNode
-from blobtree.nodes.model import Model
+from blobtree.nodes.extras import NodeMethods
 from blobtree.nodes.values import (
     children_of,
     content_hash_of,
@@ -32,7 +32,7 @@ from blobtree.nodes.values import (
 from blobtree.validation import affine_matrix, finite_number, finite_vector
 
 
-class Node(Model):
+class Node(NodeMethods):
     """Part of a BlobTree: a field that is 0 far away and larger than ISO inside.
 
     A node is a value: it never changes, and equal trees compare equal. `==`, `hash`, `repr`, pickling and

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.formulas.warps import SpaceWarp
-from blobtree.nodes.blends import Mirror
 from blobtree.nodes.node import Node
 from blobtree.nodes.paths import Path, nodes_along, square_matrix
 from blobtree.nodes.tree import Transform
@@ -166,8 +165,8 @@ def mirror_maps(tree: Node, path: Path) -> list[Float64Array]:
             world = world @ square_matrix(node.matrix)
         elif node.warp is not None:
             break
-        elif isinstance(node, Mirror):
-            image = world @ node.reflection @ np.linalg.inv(world)
+        elif (reflection := getattr(node, "reflection", None)) is not None:  # a mirror
+            image = world @ reflection @ np.linalg.inv(world)
             found += [one @ image for one in found]
     return found
 

@@ -7,7 +7,7 @@ the order of declaration, `texels` need not be written. Falloff, width and weigh
 """
 
 import inspect
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from itertools import product
 from typing import Annotated, Any, ClassVar, Self, cast
@@ -27,12 +27,10 @@ from blobtree.declare.parameters import (
     parameters_of,
     unit_vectors,
 )
-from blobtree.formulas.blends import DEEPEST
 from blobtree.formulas.skeletons import BOX, CIRCLE, CONE, DISC, POINT, SEGMENT, Skeleton
 from blobtree.kinds.falloff import WYVILL
 from blobtree.nodes.attributes import NO_ATTRIBUTES, AttributeMapping
 from blobtree.nodes.node import Node
-from blobtree.nodes.tree import AssociativeCombination, Macro, Union
 from blobtree.tape.program import ProgramPrimitive
 from blobtree.validation import Vector
 
@@ -137,27 +135,6 @@ class Leaf(LeafKeywords, Node):
         if self.profile != PLAIN:
             object.__setattr__(self, "profiled", True)
             object.__setattr__(self, "signed", self.weight < 0.0)
-
-
-class Pieces(Profile, Macro, Leaf):
-    """A leaf that stands for several, whose field is a falloff of the distance from all of them."""
-
-    def united(self, pieces: Iterable[Node]) -> Node:
-        """Return the pieces as one shape: the strongest of their fields at each point."""
-        kind = Deepest if self.signed else Union
-        return kind(tuple(pieces))
-
-    @property
-    def shared(self) -> dict[str, Any]:
-        """The keywords of all pieces."""
-        return {name: getattr(self, name) for name in (*PROFILE, "color", "attributes")}
-
-
-@dataclass(frozen=True, eq=False, repr=False, init=False)
-class Deepest(AssociativeCombination):
-    """Union of operands with negative weights, F = min fᵢ."""
-
-    operator = DEEPEST
 
 
 class Primitive(Profile, Leaf, ProgramPrimitive):

@@ -12,10 +12,10 @@ from blobtree.errors import InvalidNode
 from blobtree.formulas.solid_skeletons import CYLINDER
 from blobtree.lazy import Lazy
 from blobtree.nodes.node import Node
+from blobtree.nodes.pieces import Pieces
 from blobtree.nodes.primitives import (
     DEFAULT_COLOR,
     Columns,
-    Pieces,
     Point,
     Primitive,
     beside,

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array
 from blobtree.declare.claims import Support
 from blobtree.errors import InvalidNode
-from blobtree.nodes.contact import SolidContact
 from blobtree.nodes.node import Node
 from blobtree.nodes.paths import (
     Path,
@@ -446,8 +445,9 @@ def _cuts(node: Node) -> bool:
 
 def _without_child(parent: Node, step: int) -> Node | None:
     """Return a combination without one of its children, None if it had no other."""
-    if isinstance(parent, SolidContact) and len(parent.operands) > 1:
-        return parent.without(step)
+    if len(parent.children) > 1 and hasattr(parent, "without"):  # it has parameters of each operand
+        left: Node = parent.without(step)
+        return left
     others = (*parent.children[:step], *parent.children[step + 1 :])
     if len(others) > 1:
         return replace(parent, operands=others)  # type: ignore[type-var]  # every node is a dataclass

@@ -13,6 +13,7 @@ import decals
 from blobtree import Node
 from blobtree.errors import ImplicitDecalsError
 from blobtree.nodes.model import Model
+from blobtree.nodes.questions import Questions
 from blobtree.tape.model import ImplicitModel
 from decals import Scene
 from tests.decals.baking.glb import need
@@ -50,7 +51,11 @@ def public_objects() -> Iterator[tuple[str, Any]]:
 
 OBJECTS = dict(public_objects())
 
-BASES = {"blobtree.tape.model.ImplicitModel": ImplicitModel, "blobtree.nodes.model.Model": Model}
+BASES = {
+    "blobtree.tape.model.ImplicitModel": ImplicitModel,
+    "blobtree.nodes.model.Model": Model,
+    "blobtree.nodes.questions.Questions": Questions,
+}
 EXAMPLES = OBJECTS | BASES
 """Objects whose examples run: the public ones, and bases from which public classes have methods."""
 
