@@ -31,7 +31,8 @@ from .io import from_json, load, save, to_json
 from .meshing.batch import polygonize_batch
 from .meshing.creases import split_creases
 from .meshing.mesh import Mesh
-from .meshing.polygonize import Polygonizer, polygonize
+from .meshing.polygonize import polygonize
+from .meshing.polygonizer import Polygonizer
 from .nodes.blends import (
     BlendGraph,
     CleanUnion,

@@ -17,9 +17,9 @@ EXTRAS: dict[str, str] = {
         """,
     "blobtree.meshing": """
         adaptive adaptive_cell_kernels adaptive_cells adaptive_kernels adaptive_mesh batch
-        block_tree clip crease_branches crease_intersections crease_kernels
+        block_tree chord_error clip crease_branches crease_intersections crease_kernels
         crease_sheets creases crumbs distance_kernels gap_kernels gaps leaf_changes leaf_gaps
-        part_kernels parts thickening thickening_kernels wall_kernels walls
+        part_kernels parts thickening thickening_kernels thin_parts wall_kernels walls
         """,
     "blobtree.nodes": """
         blends contact convolution curves deformations fields flats parameter_gradient pieces questions
@@ -63,13 +63,14 @@ EXTRAS: dict[str, str] = {
 """The modules of each package that are extras, ``*`` for all."""
 
 LISTS = (
-    "blobtree.nodes.kinds",
+    "blobtree.meshing.polygonize",
     "blobtree.nodes.extras",
+    "blobtree.nodes.kinds",
     "decals.editing.actions",
     "decals.rendering.extras",
     "decals.scattering.extras",
 )
-"""Modules that list kinds of nodes, actions, refinements of particles, and what extends the renderer."""
+"""Modules that list kinds of nodes, ways of meshing, actions, refinements, and what extends the renderer."""
 
 
 def is_extra(module: str) -> bool:

@@ -13,14 +13,9 @@ from blobtree.joint_work import checked_trees, is_small, of_tree, work_together
 from blobtree.meshing.dual_kernels import sample_blocks
 from blobtree.meshing.gaps import samples_without_gaps
 from blobtree.meshing.mesh import Mesh, download, extract_mesh
-from blobtree.meshing.polygonize import (
-    DEFAULT_RESOLUTION,
-    cell_size_of,
-    grid_around,
-    load_kernels,
-    polygonize,
-    shows_thin_parts,
-)
+from blobtree.meshing.polygonize import polygonize
+from blobtree.meshing.polygonizer import DEFAULT_RESOLUTION, cell_size_of, grid_around, load_kernels
+from blobtree.meshing.thin_parts import shows_thin_parts
 from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import ImplicitModel

@@ -18,6 +18,7 @@ from blobtree.cells.grid import CHILDREN
 from blobtree.device import launch
 from blobtree.errors import InvalidPoints
 from blobtree.meshing.mesh import DeviceMesh, Mesh, patch_tables, vertex_arrays
+from blobtree.meshing.polygonizer import SHARPENERS
 from blobtree.progress import Progress
 from blobtree.tape.model import ImplicitModel, checked_tree
 
@@ -62,6 +63,16 @@ def sharpened(mesh: DeviceMesh, report: Progress) -> tuple[DeviceMesh, NDArray[n
     report("finding creases", 1.0)
     sharp = replace(mesh, vertices=vertices, normals=normals, colors=colors, faces=faces)
     return sharp, sheet_counts.numpy()
+
+
+def _kernel() -> wp.Kernel:
+    from blobtree.meshing.crease_kernels import move_onto_creases  # imported here: most meshes need none
+
+    kernel: wp.Kernel = move_onto_creases
+    return kernel
+
+
+SHARPENERS.append((_kernel, sharpened))
 
 
 def split_creases(tree: ImplicitModel, mesh: Mesh) -> Mesh:

@@ -14,7 +14,7 @@ from blobtree.device import known_device, launch
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, UNION
 from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
-from blobtree.meshing.polygonize import polygonize_parts, shows_small_parts
+from blobtree.meshing.thin_parts import polygonize_parts, shows_small_parts
 from blobtree.tape.grown import runs_of_leaves
 from blobtree.tape.model import values_at
 from blobtree.tape.operands import leaves_of

@@ -20,7 +20,7 @@ from blobtree import (
     polygonize,
 )
 from blobtree._typing import Float64Array
-from blobtree.meshing.polygonize import polygonize_parts
+from blobtree.meshing.thin_parts import polygonize_parts
 from decals.surfaces import ImplicitSurface
 from tests.blobtree.trees import random_tree as plain_tree
 from tests.thin_trees import is_closed, mesh_areas, random_tree

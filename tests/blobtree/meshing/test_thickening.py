@@ -8,7 +8,7 @@ import pytest
 from blobtree import Box, Disc, Node, Point, Segment, Shell, polygonize
 from blobtree._typing import Float64Array
 from blobtree.meshing.leaf_gaps import limit_by_gaps
-from blobtree.meshing.polygonize import polygonize_parts
+from blobtree.meshing.thin_parts import polygonize_parts
 from blobtree.tape.grown import runs_of_leaves
 from tests.thin_trees import is_closed, mesh_areas
 

@@ -8,7 +8,7 @@ import pytest
 from blobtree import Box, Mesh, Node, Point, Segment, Shell, SmoothDifference, polygonize
 from blobtree.errors import InvalidResolution
 from blobtree.meshing.adaptive_mesh import AdaptiveMesh, AdaptiveMesher
-from blobtree.meshing.polygonize import polygonize_parts
+from blobtree.meshing.thin_parts import polygonize_parts
 from blobtree.progress import Progress
 from tests.thin_trees import is_closed, mesh_areas
 
