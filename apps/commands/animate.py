@@ -12,11 +12,9 @@ from decals import animate as write_animation
 from decals.apps.commands.options import (
     MAX_SAMPLES,
     ContactName,
-    Definitions,
+    Inputs,
     MappingName,
     OptionalWhole,
-    TableFile,
-    Trust,
     UpAxis,
     check_count,
     parse_size,
@@ -64,9 +62,7 @@ def animate(
     contact: ContactName = None,
     mapping: MappingName = None,
     seed: OptionalWhole = None,
-    table: TableFile = None,
-    define: Definitions = None,
-    trust: Trust = False,
+    inputs: Inputs = Inputs(),
 ) -> None:
     """Draw a turntable, or a scene in a sequence of poses.
 
@@ -118,11 +114,11 @@ def animate(
         check_count("--frames", frames, 1, MAX_FRAMES)
     count = frames or (len(meshes) if meshes else DEFAULT_FRAMES)
     check_animation(output, VIDEO_SUFFIXES)
-    with preparing(define) as progress:
+    with preparing(inputs.define) as progress:
         function = _pose_function(poses) if poses is not None else None
-        loaded = load_models(model, trust=trust, table=table, images=image)
+        loaded = load_models(model, trust=inputs.trust, table=inputs.table, images=image)
         if isinstance(loaded, Scene):
-            refuse_scattering(decals, image, seed, table)
+            refuse_scattering(decals, image, seed, inputs.table)
             scene = loaded
             if camera is not None or up is not None:
                 scene = scene.replace(camera=frame(scene.objects, view, pixels))

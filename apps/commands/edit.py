@@ -8,14 +8,12 @@ from cyclopts import Parameter
 from decals.apps.commands.opening import check_options, opened, report_unsaved
 from decals.apps.commands.options import (
     ContactName,
-    Definitions,
+    Inputs,
     MappingName,
     OptionalWhole,
     Seed,
     StartImages,
     Stiffness,
-    TableFile,
-    Trust,
     UpAxis,
     parse_size,
 )
@@ -39,9 +37,7 @@ def edit(
     mapping: MappingName = None,
     seed: Seed = None,
     save: Path | None = None,
-    table: TableFile = None,
-    define: Definitions = None,
-    trust: Trust = False,
+    inputs: Inputs = Inputs(),
 ) -> None:
     """Open models or a scene in an editor window.
 
@@ -72,18 +68,8 @@ def edit(
     if stiffness is not None:
         stiffness_number(stiffness, InvalidInput)
     EditWindow.require_screen()
-    import_definitions(define)
-    opening = opened(
-        model,
-        decals=decals,
-        image=image,
-        up=up,
-        pixels=pixels,
-        seed=seed,
-        save=save,
-        table=table,
-        trust=trust,
-    )
+    import_definitions(inputs.define)
+    opening = opened(model, inputs, decals=decals, image=image, up=up, pixels=pixels, seed=seed, save=save)
     window = EditWindow(
         opening.scene,
         path=opening.path,

@@ -14,21 +14,7 @@ from blobtree import field_grid
 from blobtree.sampling.field_grid import GRID_FORMATS
 from decals import Scene, TreeObject, save_html
 from decals import export as export_scene
-from decals.apps.commands.options import (
-    MAX_SAMPLES,
-    ContactName,
-    CreaseAngle,
-    Definitions,
-    LayoutName,
-    MappingName,
-    OptionalWhole,
-    Stiffness,
-    TableFile,
-    Trust,
-    Whole,
-    check_count,
-    given,
-)
+from decals.apps.commands.options import CreaseAngle, Inputs, Rules, Surfaces, Texture, given
 from decals.apps.commands.progress_bars import preparing
 from decals.apps.models.loading import load_model
 from decals.apps.output import check_output, print_path
@@ -73,20 +59,12 @@ def export(
         Parameter(show_default=False),
     ] = None,
     up: Annotated[Literal["y", "z"] | None, Parameter(show_default=False)] = None,
-    size: Whole = 2048,
-    samples: Whole = 2,
-    layout: LayoutName = "auto",
-    tiles: Whole = 1,
-    contact: ContactName = None,
-    stiffness: Stiffness = None,
-    mapping: MappingName = None,
+    texture: Texture = Texture(),
+    rules: Rules = Rules(),
     surface: Annotated[Literal["mesh", "traced"] | None, Parameter(show_default=False)] = None,
-    resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None,
-    creases: Annotated[bool, Parameter(negative=())] = False,
+    surfaces: Surfaces = Surfaces(),
     crease_angle: CreaseAngle = None,
-    table: TableFile = None,
-    define: Definitions = None,
-    trust: Trust = False,
+    inputs: Inputs = Inputs(),
 ) -> None:
     """Write a scene as a file of another program, the field of a model on a grid, or check a mesh file.
 
@@ -113,27 +91,8 @@ def export(
         Unit of the scene's lengths, for formats that have one.
     up
         The axis of the scene that points upward, for formats that have one.
-    size
-        Width and height of the texture in texels, from 16 to 8192.
-    samples
-        Samples per texel along each axis: 1 is fast, 2 smooth, 4 fine.
-    layout
-        How surfaces lie on the texture: box, xatlas, own (texture coordinates of the meshes), or auto, the
-        one with the shortest seams.
-    tiles
-        Textures of that size over which the surfaces are spread, as UDIM tiles (glb, gltf, obj).
-    contact
-        Contact mode, as for render.
-    stiffness
-        Stiffness of elastic contact, as for render.
-    mapping
-        Image mapping, as for render.
     surface
         How a page shows implicit objects: as a mesh (default) or traced, which is exact and slower.
-    resolution
-        Cells along the longest side of each implicit object. Default: 64.
-    creases
-        Keep the edges that unions, intersections and differences leave.
     """
     if output is None:
         if not check:
@@ -142,9 +101,9 @@ def export(
         return
     check_output(output, (*FORMATS, *GRID_FORMATS, *SUFFIXES))
     if output.suffix.lower() in GRID_FORMATS:
-        with preparing(define) as progress:
-            tree = _only_tree(load_model(scene, trust=trust), scene)
-            grid = field_grid(tree.tree, resolution=resolution, distance=distance, progress=progress)
+        with preparing(inputs.define) as progress:
+            tree = _only_tree(load_model(scene, trust=inputs.trust), scene)
+            grid = field_grid(tree.tree, resolution=surfaces.resolution, distance=distance, progress=progress)
             x, y, z = (np.array(grid.origin) + tree.origin).tolist()
             replace(grid, origin=(x, y, z)).save(output)
         print_path(output)
@@ -155,17 +114,16 @@ def export(
         raise InvalidInput(
             f"--distance: expected an output that ends in {' or '.join(GRID_FORMATS)}, got {str(output)!r}"
         )
-    check_count("--samples", samples, 1, MAX_SAMPLES)
-    modes = given(contact=contact, stiffness=stiffness, mapping=mapping)
+    baked, modes = texture.checked(), rules.given()
     in_file = given(colors=colors, unit=unit, up=up)
     checks: Sequence[MeshCheck] = ()
-    with preparing(define) as progress:
-        loaded = load_model(scene, trust=trust, crease_angle=crease_angle, table=table)
+    with preparing(inputs.define) as progress:
+        loaded = load_model(scene, trust=inputs.trust, crease_angle=crease_angle, table=inputs.table)
         if output.suffix.lower() in SUFFIXES:
             if in_file or attributes or instances or check:
                 raise InvalidInput("export: a page takes no options of mesh files; leave them out")
             shown = given(surface=surface)
-            save_html(loaded, output, resolution=resolution, progress=progress, **shown, **modes)
+            save_html(loaded, output, resolution=surfaces.resolution, progress=progress, **shown, **modes)
         elif surface is not None:
             raise InvalidInput(
                 f"--surface: expected an output that ends in {' or '.join(SUFFIXES)}, got {str(output)!r}"
@@ -176,13 +134,9 @@ def export(
                 output,
                 attributes=attributes or (),
                 instances=instances,
-                size=size,
-                samples=samples,
-                layout=layout,
-                tiles=tiles,
-                resolution=resolution,
-                creases=creases,
                 progress=progress,
+                **baked,
+                **vars(surfaces),
                 **in_file,
                 **modes,
             )

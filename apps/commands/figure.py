@@ -6,15 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from decals import Scene, save_figure
-from decals.apps.commands.options import (
-    ContactName,
-    Definitions,
-    MappingName,
-    Stiffness,
-    TableFile,
-    Trust,
-    given,
-)
+from decals.apps.commands.options import Inputs, Rules, given
 from decals.apps.commands.progress_bars import preparing
 from decals.apps.models.loading import load_models
 from decals.apps.output import check_output, print_path
@@ -36,12 +28,8 @@ def figure(
     model_width: Width = None,
     picture: Annotated[bool, Parameter(negative=())] = False,
     step: float = 0.05,
-    contact: ContactName = None,
-    stiffness: Stiffness = None,
-    mapping: MappingName = None,
-    table: TableFile = None,
-    define: Definitions = None,
-    trust: Trust = False,
+    rules: Rules = Rules(),
+    inputs: Inputs = Inputs(),
 ) -> None:
     """Write the contact lines and rims of a saved scene, and the edges of its models, without hidden lines.
 
@@ -65,17 +53,11 @@ def figure(
         Draw the rendered picture behind the lines.
     step
         Greatest distance of points of a line, in visible radii.
-    contact
-        Contact mode: product, min, radial or elastic. Default: that of the scene, as for the next two.
-    stiffness
-        Stiffness of elastic contact, from 1 to 64.
-    mapping
-        Image mapping: corrected, chord or walked.
     """
     check_output(output, SUFFIXES)
     widths = given(contact=contact_width, rim=rim_width, model=model_width)
-    with preparing(define) as progress:
-        loaded = load_models([scene], trust=trust, table=table)
+    with preparing(inputs.define) as progress:
+        loaded = load_models([scene], trust=inputs.trust, table=inputs.table)
         if not isinstance(loaded, Scene):
             raise InvalidInput(f"expected a saved scene in JSON, got the model {scene!r}; give --table too")
         save_figure(
@@ -86,6 +68,6 @@ def figure(
             picture=picture,
             step=step,
             progress=progress,
-            **given(contact=contact, stiffness=stiffness, mapping=mapping),
+            **rules.given(),
         )
     print_path(output)

@@ -9,17 +9,7 @@ from rich.table import Table
 
 from decals import Scene
 from decals import measure as measured
-from decals.apps.commands.options import (
-    ContactName,
-    Definitions,
-    MappingName,
-    OptionalWhole,
-    Stiffness,
-    TableFile,
-    Trust,
-    Whole,
-    given,
-)
+from decals.apps.commands.options import Inputs, OptionalWhole, Rules, Whole
 from decals.apps.commands.progress_bars import preparing
 from decals.apps.models.loading import load_models
 from decals.errors import InvalidInput
@@ -58,15 +48,11 @@ def measure(
     scene: str,
     /,
     *,
-    contact: ContactName = None,
-    stiffness: Stiffness = None,
-    mapping: MappingName = None,
+    rules: Rules = Rules(),
     samples: OptionalWhole = None,
     seed: Whole = 0,
     json_output: Annotated[bool, Parameter(name="--json", negative=())] = False,
-    table: TableFile = None,
-    define: Definitions = None,
-    trust: Trust = False,
+    inputs: Inputs = Inputs(),
 ) -> None:
     """Measure coverage, gaps, overlaps, stretch, folds and contact lines of a saved scene.
 
@@ -74,12 +60,6 @@ def measure(
     ----------
     scene
         A saved scene in JSON.
-    contact
-        Contact mode: product, min, radial or elastic. Default: that of the scene, as for the next two.
-    stiffness
-        Stiffness of elastic contact, from 1 to 64.
-    mapping
-        Image mapping: corrected, chord or walked.
     samples
         Number of random points on the models. Default: 200 for each decal.
     seed
@@ -87,17 +67,11 @@ def measure(
     json_output
         Print one JSON object in place of a table, with the measures of each decal.
     """
-    with preparing(define) as progress:
-        loaded = load_models([scene], trust=trust, table=table)
+    with preparing(inputs.define) as progress:
+        loaded = load_models([scene], trust=inputs.trust, table=inputs.table)
         if not isinstance(loaded, Scene):
             raise InvalidInput(f"expected a saved scene in JSON, got the model {scene!r}; scatter makes one")
-        found = measured(
-            loaded,
-            samples=samples,
-            seed=seed,
-            progress=progress,
-            **given(contact=contact, stiffness=stiffness, mapping=mapping),
-        )
+        found = measured(loaded, samples=samples, seed=seed, progress=progress, **rules.given())
     if json_output:
         print(json.dumps(found.to_dict()))
         return

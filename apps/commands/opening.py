@@ -8,7 +8,7 @@ from rich.console import Console
 
 from blobtree.files import exists, is_file
 from decals import DecalImage, Scene
-from decals.apps.commands.options import DEFAULT_IMAGES, MAX_DECALS, MAX_SEED, check_count
+from decals.apps.commands.options import DEFAULT_IMAGES, MAX_DECALS, MAX_SEED, Inputs, check_count
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.commands.scatter_options import ScatterOptions
 from decals.apps.models.loading import load_models
@@ -61,6 +61,7 @@ def check_options(decals: int | None, seed: int | None, save: Path | None) -> No
 
 def opened(
     model: list[str] | None,
+    inputs: Inputs,
     *,
     decals: int | None,
     image: list[str] | None,
@@ -68,14 +69,12 @@ def opened(
     pixels: tuple[int, int],
     seed: int | None,
     save: Path | None,
-    table: Path | None,
-    trust: bool,
 ) -> Opened:
     """Return the scene that the arguments of a command name; see `decals.apps.commands.edit.edit`."""
     added: tuple[DecalImage, ...] = ()
     path = save
     if not model or _is_unsaved(model):
-        if decals is not None or seed is not None or table is not None:
+        if decals is not None or seed is not None or inputs.table is not None:
             raise InvalidInput(
                 "an empty scene has no decals; name a model, or leave out --decals, --seed and --table"
             )
@@ -84,14 +83,14 @@ def opened(
     else:
         with progress_bars() as progress:
             progress(PREPARING, 0.0)
-            loaded = load_models(model, trust=trust, table=table, images=image)
+            loaded = load_models(model, trust=inputs.trust, table=inputs.table, images=image)
             if isinstance(loaded, Scene):
                 if decals is not None or seed is not None:
                     raise InvalidInput(
                         "a saved scene or table has its own decals; leave out --decals and --seed"
                     )
                 scene = loaded
-                if table is None:
+                if inputs.table is None:
                     path, added = path or Path(model[0]), tuple(map(DecalImage.load, image or ()))
                 else:
                     path = path or new_file(Path(), f"{Path(model[0]).stem}-decals", recover=True)
@@ -102,7 +101,7 @@ def opened(
                 path = path or new_file(Path(), f"{Path(model[0]).stem}-decals", recover=True)
 
     def load_recovered(path: Path) -> Scene:
-        recovered = load_models([str(path)], trust=trust)
+        recovered = load_models([str(path)], trust=inputs.trust)
         if not isinstance(recovered, Scene):
             raise InvalidInput(f"expected a scene in the recovery file {str(path)!r}, got a model")
         return recovered

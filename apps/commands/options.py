@@ -5,6 +5,7 @@ This module imports nothing heavy, so a command that only prints a list is fast.
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -89,9 +90,6 @@ Stiffness = Annotated[float | None, Parameter(show_default=False)]
 MappingName = Annotated[Literal["corrected", "chord", "walked"] | None, Parameter(show_default=False)]
 """An optional image mapping on the command line."""
 
-LayoutName = Literal["auto", "box", "xatlas", "own"]
-"""A layout of textures on the command line."""
-
 CreaseAngle = Annotated[
     float | None,
     Parameter(
@@ -101,17 +99,6 @@ CreaseAngle = Annotated[
     ),
 ]
 """An optional crease angle of meshes, in degrees, on the command line."""
-
-TableFile = Annotated[
-    Path | None,
-    Parameter(
-        name="--table",
-        show_default=False,
-        help="Table of decals (csv or parquet), as scatter writes it: the decals of the models, in place of "
-        "those of a saved scene.",
-    ),
-]
-"""An optional table of decals on the command line."""
 
 Trust = Annotated[
     bool,
@@ -123,6 +110,94 @@ Trust = Annotated[
     ),
 ]
 """Permission for a scene to read files outside its folder."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Rules:
+    """Options of the rules by which decals are drawn; None leaves the rule to the scene.
+
+    Parameters
+    ----------
+    contact
+        Contact mode: product, min, radial or elastic. Default: that of the scene, as for the next two.
+    stiffness
+        Stiffness of elastic contact, from 1 to 64.
+    mapping
+        Image mapping: corrected, chord or walked.
+    """
+
+    contact: ContactName = None
+    stiffness: Stiffness = None
+    mapping: MappingName = None
+
+    def given(self) -> dict[str, Any]:
+        """Return the rules that are given."""
+        return given(**vars(self))
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Texture:
+    """Options of the texture of a baked scene.
+
+    Parameters
+    ----------
+    size
+        Width and height of the texture in texels, from 16 to 8192.
+    samples
+        Samples per texel along each axis: 1 is fast, 2 smooth, 4 fine.
+    layout
+        How surfaces lie on the texture: box, xatlas, own (texture coordinates of the meshes), or auto, the
+        one with the shortest seams.
+    tiles
+        Textures of that size over which the surfaces are spread, as UDIM tiles (glb, gltf, obj).
+    """
+
+    size: Whole = 2048
+    samples: Whole = 2
+    layout: Literal["auto", "box", "xatlas", "own"] = "auto"
+    tiles: Whole = 1
+
+    def checked(self) -> dict[str, Any]:
+        """Return the options by their names; raise `InvalidInput` for too many samples."""
+        check_count("--samples", self.samples, 1, MAX_SAMPLES)
+        return vars(self)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Surfaces:
+    """Options of the meshes of implicit objects.
+
+    Parameters
+    ----------
+    resolution
+        Cells along the longest side of each implicit object. Default: 64.
+    creases
+        Keep the edges that unions, intersections and differences leave.
+    """
+
+    resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None
+    creases: Annotated[bool, Parameter(negative=())] = False
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Inputs:
+    """Options of what a command reads beside its models.
+
+    Parameters
+    ----------
+    table
+        Table of decals that scatter wrote (csv or parquet), in place of the decals of a saved scene.
+    define, trust
+        See `Definitions` and `Trust`.
+    """
+
+    table: Annotated[Path | None, Parameter(show_default=False)] = None
+    define: Definitions = None
+    trust: Trust = False
 
 
 def parse_size(text: str) -> "Size":

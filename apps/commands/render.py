@@ -13,13 +13,11 @@ from decals.apps.commands.options import (
     TILE,
     ContactName,
     CreaseAngle,
-    Definitions,
+    Inputs,
     MappingName,
     OptionalWhole,
     Seed,
     Stiffness,
-    TableFile,
-    Trust,
     UpAxis,
     check_count,
     given,
@@ -59,9 +57,7 @@ def render(
     seed: Seed = None,
     save: Path | None = None,
     crease_angle: CreaseAngle = None,
-    table: TableFile = None,
-    define: Definitions = None,
-    trust: Trust = False,
+    inputs: Inputs = Inputs(),
 ) -> None:
     """Cover models with decals and draw a picture.
 
@@ -131,10 +127,12 @@ def render(
     if save is not None:
         check_output(save, (".json",))
     with ExitStack() as stack:
-        progress = stack.enter_context(preparing(define))
-        loaded = load_models(model, trust=trust, crease_angle=crease_angle, table=table, images=image)
+        progress = stack.enter_context(preparing(inputs.define))
+        loaded = load_models(
+            model, trust=inputs.trust, crease_angle=crease_angle, table=inputs.table, images=image
+        )
         if isinstance(loaded, Scene):
-            refuse_scattering(decals, image, seed, table)
+            refuse_scattering(decals, image, seed, inputs.table)
         drawing = (loaded.drawing if isinstance(loaded, Scene) else Drawing()).overridden(**options)
         if changes and environment is None:
             drawing = drawing.overridden(environment=_changed(drawing.environment, changes))

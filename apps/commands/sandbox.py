@@ -26,12 +26,10 @@ from rich.console import Console
 
 from blobtree.files import exists
 from decals.apps.commands.options import (
-    Definitions,
+    Inputs,
     OptionalWhole,
     Seed,
     StartImages,
-    TableFile,
-    Trust,
     UpAxis,
     Whole,
     check_count,
@@ -62,8 +60,6 @@ def sandbox(
     up: UpAxis = None,
     seed: Seed = None,
     save: Path | None = None,
-    table: TableFile = None,
-    define: Definitions = None,
     port: Whole = 8080,
     host: str = HOST,
     allow_host: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
@@ -71,7 +67,7 @@ def sandbox(
     sessions: Whole = 8,
     browser: bool = True,
     desktop: Annotated[bool, Parameter(negative=())] = False,
-    trust: Trust = False,
+    inputs: Inputs = Inputs(),
     lab: Annotated[bool, Parameter(negative=())] = False,
     lessons: Path | None = None,
     done: Annotated[bool, Parameter(negative=())] = False,
@@ -121,8 +117,8 @@ def sandbox(
     if model and (lab or lessons is not None):
         raise InvalidInput("the lab has its own scenes; leave out the model, or --lab and --lessons")
     if desktop or not (share or done or session):
-        options: dict[str, Any] = {"decals": decals, "image": image, "up": up, "seed": seed, "define": define}
-        options |= {"table": table, "trust": trust, "lab": lab, "lessons": lessons}
+        options: dict[str, Any] = {"decals": decals, "image": image, "up": up, "seed": seed, **vars(inputs)}
+        options |= {"lab": lab, "lessons": lessons}
         command = _commands(model, options, save)
         if desktop:
             return _show_window(command(1))
@@ -139,17 +135,9 @@ def sandbox(
     serve, page = _toolkit(lessons)
     given = _read_token() if session else os.environ.pop(TOKEN, "")
     guard = _guard(host, allow_host, given, framed=done)
-    import_definitions(define)
+    import_definitions(inputs.define)
     opening = opened(
-        model,
-        decals=decals,
-        image=image,
-        up=up,
-        pixels=FIRST_SIZE,
-        seed=seed,
-        save=save,
-        table=table,
-        trust=trust,
+        model, inputs, decals=decals, image=image, up=up, pixels=FIRST_SIZE, seed=seed, save=save
     )
     plotter = new_plotter(True, FIRST_SIZE)
     window = EditWindow(opening.scene, path=opening.path, plotter=plotter, recover=opening.recover)
