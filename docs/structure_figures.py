@@ -149,6 +149,26 @@ def figures() -> dict[str, str]:
     }
 
 
+def chapter_table() -> str:
+    """Return the table of contents of the book, with files and code lines of each chapter."""
+    from tests.chapters import chapter_pages, chapters_of, title_of
+
+    sizes: dict[str, list[int]] = {}
+    for file, chapters in chapters_of().items():
+        for chapter in chapters:
+            sizes.setdefault(chapter, []).append(code_lines(ROOT / file))
+    links = {page.stem: f"[{title_of(page)}](architecture/{page.name})" for page in chapter_pages()}
+    links["trust"] = "taken on trust"
+    rows = [f"| {link} | {len(sizes[name])} | {sum(sizes[name]):,} |" for name, link in links.items()]
+    return "\n".join(["| chapter | files | code lines |", "|---|---:|---:|", *rows])
+
+
+def with_part(text: str, name: str, part: str) -> str:
+    """Return a page with other text between two marks."""
+    marks = rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)"
+    return re.sub(marks, lambda found: f"{found[1]}{part}\n{found[2]}", text, flags=re.DOTALL)
+
+
 def more_figures() -> dict[str, int]:
     """Return all figures that `--json` prints."""
     import blobtree
@@ -191,9 +211,8 @@ def main() -> None:
     table = "\n".join(["| figure | before | now |", "|---|---:|---:|", *rows])
     page = ROOT / "docs" / "architecture.md"
     text = page.read_text(encoding="utf-8")
-    text = re.sub(
-        r"(<!-- figures -->\n).*?(\n<!-- /figures -->)", rf"\g<1>{table}\g<2>", text, flags=re.DOTALL
-    )
+    text = with_part(text, "figures", table)
+    text = with_part(text, "chapters", chapter_table())
     page.write_text(text, encoding="utf-8")
 
 

@@ -19,6 +19,17 @@ def test_paths_on_the_page_exist(page: Path) -> None:
     assert [path for path in paths if not (ROOT / path).exists()] == []
 
 
+def test_the_contributing_guide_names_what_its_files_have() -> None:
+    text = PAGES[1].read_text(encoding="utf-8")
+    pairs = re.findall(r"`(\w+)` (?:in|of) `(\w+/[\w./]+\.\w+)`", text)
+    assert len(pairs) > 12
+    assert [
+        pair
+        for pair in pairs
+        if not re.search(rf"\b{pair[0]}\b", (ROOT / pair[1]).read_text(encoding="utf-8"))
+    ] == []
+
+
 def test_every_package_is_named() -> None:
     text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     packages = [
