@@ -29,6 +29,9 @@ SUFFIXES = {
 }
 NAMES = {"Makefile", "run", "apt-install", "install-gl", "make-venv"}
 INDEFINITE_PERSON = re.compile(r"\b(?:some|no|every)body\b|\bwho(?:so)?ever\b", re.IGNORECASE)
+UNNAMED = re.compile(
+    r"\b(?:none|ones?) such\b(?! as)|\bsuch a one\b|\bthe (?:latter|former ones?)\b", re.IGNORECASE
+)
 QUOTED = re.compile(r"`[^`]*`")
 
 
@@ -48,6 +51,14 @@ def indefinite_persons(path: Path, text: str) -> Iterator[str]:
             yield f"{path.relative_to(ROOT)}:{number}: {match.group()!r}; name the subject"
 
 
+def unnamed_things(path: Path, text: str) -> Iterator[str]:
+    """Yield a message for each word that stands for a noun of another sentence."""
+    for number, line in enumerate(text.splitlines(), 1):
+        prose = QUOTED.sub("", line) if path.suffix in {".md", ".rst"} else line
+        for match in UNNAMED.finditer(prose):
+            yield f"{path.relative_to(ROOT)}:{number}: {match.group()!r}; repeat the noun"
+
+
 def whether_docstrings(path: Path, text: str) -> Iterator[str]:
     """Yield a message for each docstring, of an attribute too, that begins with "Whether"."""
     for node in ast.walk(ast.parse(text)):
@@ -63,6 +74,7 @@ def findings() -> list[str]:
     for path in source_files():
         text = path.read_text(encoding="utf-8")
         messages += indefinite_persons(path, text)
+        messages += unnamed_things(path, text)
         if path.suffix in {".py", ".pyi"}:
             messages += whether_docstrings(path, text)
     return messages

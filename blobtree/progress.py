@@ -4,7 +4,7 @@ Long functions do their work within `reporting`. Their reports go to the first o
 
 1. the function that the caller passed as ``progress``;
 2. the innermost display (`displayed`), such as the title of a window;
-3. once this work, or one such work after another, takes long: the output of the notebook's cell, the logger
+3. once this work, or a series of such works, takes long: the output of the notebook's cell, the logger
    ``blobtree.progress`` if logging is configured, or else stderr. A thread repeats the last report with the
    elapsed seconds.
 

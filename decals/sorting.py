@@ -19,7 +19,7 @@ def stable_order(keys: Int64Array) -> Int64Array:
 
 
 def groups(keys: Int64Array) -> tuple[Int64Array, Int64Array, Int64Array]:
-    """Return what `np.unique` returns of whole numbers: first rows, the group of each, and their sizes.
+    """Return, as `np.unique`, the first row of each group of equal numbers, the group of each, and the sizes.
 
     Examples
     --------

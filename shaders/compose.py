@@ -121,7 +121,7 @@ def compose(
 
 def _define(name: str, value: Define) -> str:
     if not _NAME.match(name):
-        raise ComposeError(f"a define wants an identifier as its name, got {name!r}")
+        raise ComposeError(f"expected an identifier as the name of a define, got {name!r}")
     return f"#define {name}" if value is True else f"#define {name} {value}"
 
 

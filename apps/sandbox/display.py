@@ -54,7 +54,7 @@ CAMERA_VALUES = "position", "focal_point", "up", "view_angle", "parallel_scale",
 class Display:
     """Modes, overlays, handles and cameras of a window.
 
-    Meshes are made in a thread. The view shows the former ones meanwhile.
+    Meshes are made in a thread. The view shows the old meshes meanwhile.
 
     Parameters
     ----------

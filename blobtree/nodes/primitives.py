@@ -226,7 +226,7 @@ class JoinedPrimitive(Primitive):
     """A primitive that may be a piece of a longer one, which goes on at its joints (`JOINT_YIELD`)."""
 
     joint_texels: ClassVar[tuple[int, ...]]
-    """Texels of the parameters whose last number tells of a joint."""
+    """Texels of the parameters whose last number marks a joint."""
     joints: tuple[float, ...] = ()
     """These numbers; none if no other piece goes on. They are no parameters of the node."""
 

@@ -339,7 +339,7 @@ class SetParameter(PrimitiveCommand):
         return self.compute_exchange(document, node, quick=self.quick)
 
     def changed_node(self, document: Document) -> Node:
-        """Return the node with the new value; raise `InvalidEdit` or `InvalidNode` if it takes none such."""
+        """Return the node with the new value; raise `InvalidEdit` or `InvalidNode` if it cannot take it."""
         node: Any = node_at(self.tree(document), self.path)
         declared = parameters_of(type(node))
         if not isinstance(self.name, str) or self.name not in declared:

@@ -355,7 +355,7 @@ class Renderer:
     def walks_ready(self, scene: SceneLike) -> bool:
         """Return True if pictures in the mapping WALKED need not wait for walks of the decals of a scene.
 
-        Otherwise the walks are being computed in a thread. A new state of the scene cancels the former one's.
+        Otherwise the walks are being computed in a thread. A new state of the scene cancels them.
         """
         return self._uploads.ready(scene)
 

@@ -197,7 +197,7 @@ class OwnedPoints:
         return result
 
     def risky(self, radii: Float64Array, share: float, apart: float) -> "OwnedPoints":
-        """Return points beyond a share of the radius: the ones nearest to bare in each cube of side `apart`.
+        """Return points beyond a share of the radius: those nearest to bare in each cube of side `apart`.
 
         Points of one cube are compared if the same three decals meet there.
         """

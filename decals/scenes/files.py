@@ -170,7 +170,7 @@ def load_scene(
         Function that returns the vertices and faces of a source ``"sample:NAME"``, by NAME.
     trust : bool
         True reads meshes and images at any path, and images of any number. By default a scene may name
-        files in its own folder and below alone, and at most `MAX_IMAGES` images of `MAX_IMAGE_PIXELS` pixels.
+        files in its own folder or below it, and at most `MAX_IMAGES` images of `MAX_IMAGE_PIXELS` pixels.
 
     Returns
     -------

@@ -77,7 +77,7 @@ def _processor() -> str:
 
 
 def provenance(device: str) -> dict[str, Any]:
-    """Return where a result comes from that is made now on a device: plain values.
+    """Return the provenance of a result that is made now on a device, as plain values.
 
     Keys are ``"time"`` (UTC), ``"platform"``, ``"device"``, and in a checkout ``"commit"`` and ``"dirty"``.
 

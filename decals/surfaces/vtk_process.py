@@ -38,7 +38,7 @@ MEMORY, MEMORY_PER_BYTE = 2 << 30, 64
 
 
 def read_isolated(path: Path) -> MeshData:
-    """Read a mesh file by pyvista in the process of its own.
+    """Read a mesh file by pyvista in a process of its own.
 
     Returns
     -------
@@ -50,7 +50,7 @@ def read_isolated(path: Path) -> MeshData:
     InvalidMesh
         The file is no surface mesh, or the reader crashed, took too long or took too much memory.
     Cancelled
-        The work that reads the file is to stop; the process has ended.
+        The caller cancelled the work that reads the file; the process has ended.
     """
     return _process.read(path)
 

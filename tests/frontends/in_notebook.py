@@ -1,7 +1,7 @@
 """Decals in a live notebook, as a program: ``python -m tests.frontends.in_notebook``.
 
-A kernel runs a scene as the last line of a cell, and the cell of docs/pyvista.md; a browser opens the frame
-that the latter shows.
+A kernel runs a scene as the last line of a cell, and then the cell of docs/pyvista.md. A browser opens the
+frame that the second cell shows.
 """
 
 import asyncio
