@@ -58,7 +58,7 @@ class Option:
     Attributes
     ----------
     name
-        Name of the parameter; "background.top" for one of a class in it.
+        Name of the parameter; "background.top" for the field `top` of its value.
     kind
         Its type: `int`, `float`, `bool`, a subclass of `Enum`, or `Rgb` or `Rgba` for a colour.
     doc

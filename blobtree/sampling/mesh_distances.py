@@ -68,12 +68,12 @@ class Triangles:
 
 
 def triangles_of(mesh: Any) -> Triangles:
-    """Return the triangles of a mesh of pyvista, of one with vertices and faces, or of a pair of arrays.
+    """Return the triangles of a mesh of pyvista, of an object with vertices and faces, or of two arrays.
 
     Raises
     ------
     InvalidNode
-        It is no such mesh, has no triangles, or its arrays are wrong.
+        The argument is none of these, has no triangles, or its arrays are wrong.
     """
     pyvista = sys.modules.get("pyvista")
     if pyvista is not None and isinstance(mesh, pyvista.DataSet):

@@ -73,7 +73,7 @@ def load_image(reference: str, *, folder: Path | None = None) -> Pixels:
     Returns
     -------
     uint8, uint16 or float32[h, w, 4]
-        Straight alpha, row 0 at the top. Integers hold sRGB; floats, of Radiance files, linear light.
+        Straight alpha, row 0 at the top. Integers hold sRGB. Radiance files give floats in linear light.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def image_pixels(
     Returns
     -------
     uint8, uint16 or float32[h, w, 4]
-        Straight alpha, row 0 at the top. Integers hold sRGB; floats, of Radiance files, linear light.
+        Straight alpha, row 0 at the top. Integers hold sRGB. Radiance files give floats in linear light.
 
     Raises
     ------
@@ -289,7 +289,7 @@ def read_image(path: Path, *, advice: str = _ADVICE) -> Pixels:
     Returns
     -------
     uint8, uint16 or float32[h, w, 4]
-        Straight alpha, row 0 at the top. Integers hold sRGB; floats, of Radiance files, linear light.
+        Straight alpha, row 0 at the top. Integers hold sRGB. Radiance files give floats in linear light.
 
     Raises
     ------

@@ -234,7 +234,7 @@ class Camera:
     def shows(self, points: ArrayLike, aspect: float, *, least: float = FILLED[0]) -> bool:
         """Return True if points take a share of the picture of at least ``least``, and none is near its rim.
 
-        The share is that of the width or that of the height, whichever is larger.
+        The larger one of the shares of the width and of the height counts.
         """
         x, y, z = self.axes @ (_points(points) - self.position).T
         if z.max() >= 0.0:  # behind the eye

@@ -198,8 +198,9 @@ def measure(
 
     Random points, uniform by area, are evaluated with the normals with which the scene is drawn. So areas and
     lengths are estimates. For m points the error of a share p is about √(p (1 − p)/m), and often far less,
-    because the points are stratified. That of the contact length is about 3/√m of it for decals that touch
-    all around; single decals have only their part of the points. Transparent images count as visible.
+    because the points are stratified. The error of the contact length is about 3/√m of this length for
+    decals that touch all around. Figures of a single decal rest on the
+    points in it alone. Transparent images count as visible.
 
     Parameters
     ----------

@@ -153,8 +153,8 @@ def render_batch(
 ) -> Iterator[Picture]:
     """Draw many scenes, or one scene from many viewpoints, in one OpenGL context.
 
-    Each picture is that of `render`. Programs and uploads are kept from picture to picture. A picture is
-    drawn when it is taken, so that any number of them needs little memory.
+    Each picture equals the picture of `render`. Programs and uploads are kept from picture to picture. A
+    picture is drawn when it is taken, so that any number of them needs little memory.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ def welded(vertices: Float32Array) -> Int64Array:
 
 @dataclass(frozen=True, eq=False)
 class SharedEdges:
-    """Edges of two faces, and whether there are others.
+    """Edges that exactly two faces share, and the sides of faces at other edges.
 
     Attributes
     ----------

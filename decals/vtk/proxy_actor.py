@@ -42,7 +42,7 @@ class ProxyActor:
 
     VTK updates its mapper while it draws opaque actors, and sends an EndEvent. A scene that is drawn then
     lies under translucent actors, volumes, text and widgets. The actor has faces without area at the corners
-    of the bounds: VTK would skip an actor without cells, and cull one without bounds.
+    of the bounds: VTK would skip an actor without cells, and cull an actor without bounds.
 
     Parameters
     ----------
