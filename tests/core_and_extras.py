@@ -29,13 +29,13 @@ EXTRAS: dict[str, str] = {
     "blobtree.tape": "attributes directed directed_along grown operands part_sizes poses rest_kernels",
     "decals.baking": "*",
     "decals.editing": """
-        background bare_watch brush_actions brushes carrying filling formats outline_actions overlays
-        recovery slicing visibility visibility_actions
+        bare_watch brush_actions brushes filling formats outline_actions overlays recovery slicing visibility
+        visibility_actions
         """,
     "decals.experiments": "*",
     "decals.field": """
-        batch batch_kernels batch_neighbor_kernels jacobian law neighbor_kernels pixel_filter walk
-        walk_kernels walks
+        batch batch_kernels batch_neighbor_kernels jacobian law neighbor_kernels pixel_filter walk_kernels
+        walks
         """,
     "decals.hosts": "*",
     "decals.images": "radiance",
@@ -58,7 +58,7 @@ EXTRAS: dict[str, str] = {
         """,
     "decals.surfaces.files": "*",
     "decals.vtk": "exports injection mapper",
-    "decals.window": "browser notebook view_modes",
+    "decals.window": "browser notebook opening view_modes",
 }
 """The modules of each package that are extras, ``*`` for all."""
 
@@ -67,6 +67,7 @@ LISTS = (
     "blobtree.nodes.extras",
     "blobtree.nodes.kinds",
     "decals.editing.actions",
+    "decals.images.extras",
     "decals.rendering.extras",
     "decals.scattering.extras",
 )

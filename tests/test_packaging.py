@@ -39,7 +39,7 @@ PYVISTA_FILES = (
 )  # fmt: skip
 """The files of `blobtree` that use pyvista; a test checks that they import it late."""
 
-CORE_TO_EXTRAS = 32
+CORE_TO_EXTRAS = 24
 """Number of imports of extras by modules of the core: it may only fall."""
 
 EXTRAS = {

@@ -86,7 +86,7 @@ class Actions(SceneActions):
         state = ActionState(session, threaded=threaded)
         super().__init__(state, TreeActions(state))
         self.bare = BareWatch(session)
-        self.decals = DecalActions(state, self.bare)
+        self.decals = DecalActions(state, self.bare.filling)
         self.files = FileActions(state, path)
         self.visibility = VisibilityActions(state)
         self.outline = OutlineActions(state, self.trees, self.visibility)

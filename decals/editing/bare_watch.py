@@ -43,6 +43,10 @@ class BareWatch:
         """The command that fills the places; None without any."""
         return self._offer if self.places and self._seen is self._session.position else None
 
+    def filling(self, pick: Callable[[], int]) -> FillBarePlaces:
+        """Return the offer, else the command that fills all bare places of the object that `pick` returns."""
+        return self.offer or FillBarePlaces((pick(),))
+
     @property
     def busy(self) -> bool:
         """True while places are being counted."""

@@ -1,7 +1,7 @@
 """Actions on decals: add, resize, turn, recolour, reorder, relax and scatter."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,10 +9,8 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, Int32Array
 from blobtree.progress import Progress
 from decals.editing.action_state import ActionState, Cursor, WindowActions, require_pick
-from decals.editing.bare_watch import BareWatch
 from decals.editing.commands import AddDecals, MapValues, OrderDecals, ScaleDecals, TurnDecals
 from decals.editing.document import Document
-from decals.editing.filling import FillBarePlaces
 from decals.editing.key_bindings import Group
 from decals.editing.queries import mean_normal, nearest_points
 from decals.editing.scatter_commands import RelaxDecals, ScatterDecals
@@ -66,6 +64,10 @@ def new_decal(document: Document, position: Float32Array, normal: Float32Array, 
     )
 
 
+Filling: TypeAlias = Callable[[Callable[[], int]], Any]
+"""A function of a pick of an object, which it may leave out, to the command that fills bare places."""
+
+
 class DecalActions(WindowActions):
     """Actions on the selected decals, and on decals under the cursor.
 
@@ -73,15 +75,15 @@ class DecalActions(WindowActions):
     ----------
     state
         State of the window.
-    bare
-        Counts the bare places that edits open.
+    filling
+        Returns the command that fills the places that the last edit opened, else those of the picked object.
     """
 
     _scatter_count = 0
 
-    def __init__(self, state: ActionState, bare: BareWatch) -> None:
+    def __init__(self, state: ActionState, filling: Filling) -> None:
         super().__init__(state)
-        self._bare = bare
+        self._filling = filling
 
     def _map(self, label: str, name: str, function: Callable[[Decals], ArrayLike]) -> None:
         """Set a value of the selected decals to a function of them."""
@@ -211,7 +213,7 @@ class DecalActions(WindowActions):
     @Group.MANY.action("fill", "Shift+g", summary="fill bare places: those of the last pull, else all here")
     def fill(self, cursor: Cursor) -> None:
         """Fill the places that the last edit of a shape opened, else all of the object under the cursor."""
-        command = self._bare.offer or FillBarePlaces((require_pick(cursor).object,))
+        command = self._filling(lambda: require_pick(cursor).object)
 
         def step(session: EditSession) -> str:
             count = len(session.do(command).after.numbers)

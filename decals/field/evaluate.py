@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import warp as wp
 from numpy.typing import ArrayLike
@@ -18,7 +18,6 @@ from decals.field.points import checked_rows, checked_turns, device_of, placed, 
 from decals.field.query import Neighbors, Query, SingleTarget, image_count, rows_of, zeros
 from decals.field.rules import PictureRules
 from decals.field.sampling_kernels import sample_images
-from decals.field.walks import Walks
 from decals.images.load import AnyImage
 from decals.index.editor import RECORDS, DecalEditor
 from decals.index.index import DecalIndex, index_on
@@ -26,6 +25,15 @@ from decals.model import Decals
 from decals.receivers import mask_on, takes_named_only
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, RECORD
 from decals.validation import describe
+
+
+@runtime_checkable
+class ImageWalks(Protocol):
+    """Walks of decals, such as `decals.field.walks.Walks`."""
+
+    @property
+    def texels(self) -> Float32Array: ...  # noqa: D102
+    def __len__(self) -> int: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +88,7 @@ def evaluate(
     neighbors: bool = False,
     materials: bool = False,
     on: object | str | Iterable[str] | None = None,
-    walks: Walks | None = None,
+    walks: ImageWalks | None = None,
     device: Any = None,
 ) -> Samples:
     """Evaluate decals at surface points: owner, image coordinates, field and colour.
@@ -213,7 +221,7 @@ class ColorEvaluator:
         rules: PictureRules,
         *,
         index: DecalIndex | None = None,
-        walks: Walks | None = None,
+        walks: ImageWalks | None = None,
         device: Any = None,
     ) -> None:
         self._decals, self._contact, self._device = decals, rules.contact, known_device(device)
@@ -249,7 +257,7 @@ def _indexed(
     decals: Decals | DecalEditor,
     index: DecalIndex | None,
     rules: PictureRules,
-    walks: Walks | None,
+    walks: ImageWalks | None,
     device: Any,
 ) -> Any:
     """Return decals with their index and their rules on a device, an `IndexedDecals`."""
@@ -278,10 +286,10 @@ def _bare_indexed(decals: Decals | DecalEditor, index: DecalIndex | None, device
     return index.on(device, records=decals.packed(), layered=decals.layered, copy=False)
 
 
-def walk_texels(walks: Walks | None, count: int) -> Float32Array:
+def walk_texels(walks: ImageWalks | None, count: int) -> Float32Array:
     """Return the texels of walks of so many decals."""
-    if not isinstance(walks, Walks) or len(walks) != count:
-        got = f"those of {len(walks)} decals" if isinstance(walks, Walks) else describe(walks)
+    if not isinstance(walks, ImageWalks) or len(walks) != count:
+        got = f"those of {len(walks)} decals" if isinstance(walks, ImageWalks) else describe(walks)
         raise InvalidScene(
             f"walks: expected walks of these {count} decals for the mapping WALKED, got {got}; "
             "decals.field.Walks.over(decals, [surface]) makes them"

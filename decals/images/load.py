@@ -19,7 +19,7 @@ from blobtree._typing import Float32Array
 from blobtree.files import is_file
 from decals.errors import InvalidImage
 from decals.images.builtin import BUILTIN_IMAGES, generate_image, is_builtin
-from decals.images.radiance import decode_radiance, is_radiance
+from decals.images.extras import DECODERS
 from decals.images.texels import MAX_IMAGE_EDGE, Pixels, check_size
 from decals.validation import MAX_LIGHT, describe, require_rgba
 
@@ -314,8 +314,9 @@ def read_image(path: Path, *, advice: str = _ADVICE) -> Pixels:
     try:
         with path.open("rb") as file:
             start = file.read(PNG_DEPTH + 1)
-            if is_radiance(start):
-                return decode_radiance(start + file.read(MAX_FILE_BYTES), str(path))
+            for begins, decode in DECODERS:
+                if begins(start):
+                    return decode(start + file.read(MAX_FILE_BYTES), str(path))
     except OSError as error:
         raise InvalidImage(f"could not read the image {str(path)!r} ({error.strerror})") from error
     pixels = _read_picture(path, str(path), advice=advice)

@@ -2,7 +2,7 @@
 
 import os
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ import pyvista as pv
 import decals.vtk  # noqa: F401  (registers `plotter.decals`)
 from blobtree._typing import Float32Array
 from blobtree.graphics import require_gl, require_screen
-from blobtree.progress import displayed, in_notebook
+from blobtree.progress import displayed
 from decals.editing.actions import Actions
 from decals.editing.background import BackgroundJobs
 from decals.editing.document import Document
@@ -22,11 +22,7 @@ from decals.editing.session import EditSession
 from decals.errors import InvalidEdit, InvalidScene
 from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.scenes.cover import as_scene
-from decals.scenes.files import load_scene
-from decals.scenes.objects import SceneObject
 from decals.scenes.scene import Scene
-from decals.surfaces.convert import Model
 from decals.validation import count_number, describe
 from decals.vtk.adapters import weak_callback
 from decals.vtk.subplot import MAX_SAMPLES, SubplotRenderer
@@ -434,71 +430,3 @@ class EditWindow:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def edit(
-    scene: Scene | EditSession | SceneObject | Model | Sequence[SceneObject | Model],
-    *,
-    path: str | os.PathLike[str] | None = None,
-    size: tuple[int, int] = DEFAULT_SIZE,
-    contact: AnyContact | str | None = None,
-    mapping: ImageMapping | str | None = None,
-    stiffness: float | None = None,
-) -> Scene:
-    """Open a window to edit a scene, and return the edited scene when the window is closed.
-
-    In a notebook, the page of the sandbox appears below the cell instead, until its Done is pressed. There,
-    modes are chosen in the page.
-
-    Parameters
-    ----------
-    scene : Scene, EditSession, SceneObject or Model
-        A scene or a session; or a model as `decals.cover` takes it, a list of such models, or the path of a
-        model or a scene.
-    path : str or path-like, optional
-        File to save to with Ctrl + S. Unsaved changes that an earlier window left in its recovery file are
-        opened, as one undo entry.
-    size : (int, int)
-        Width and height of the window in pixels.
-    contact : Contact or str, optional
-        Contact mode at the beginning. Default: that of the scene's ``drawing``, which the editor changes.
-    mapping : ImageMapping or str, optional
-        Image mapping at the beginning, likewise.
-    stiffness : float, optional
-        Stiffness of elastic contact at the beginning, likewise.
-
-    Returns
-    -------
-    Scene
-        The edited scene.
-
-    Raises
-    ------
-    NoGraphics
-        There is no OpenGL, or no screen for a window.
-    InvalidScene
-        The scene, path or size is not valid.
-
-    Examples
-    --------
-    >>> import decals
-    >>> from blobtree import Point
-    >>> scene = decals.cover(Point((0, 0, 0), radius=1.0), count=30, images=["eye"])
-    >>> edited = decals.edit(scene)  # doctest: +SKIP
-    """
-    edited = scene if isinstance(scene, EditSession) else as_scene(scene)
-    if isinstance(edited, Scene) and in_notebook():
-        from decals.window.notebook import edit_in_notebook
-
-        return edit_in_notebook(edited, None if path is None else Path(path))
-    with EditWindow(
-        edited,
-        path=path,
-        size=size,
-        recover=load_scene,
-        contact=contact,
-        mapping=mapping,
-        stiffness=stiffness,
-    ) as window:
-        window.show()
-        return window.document.scene

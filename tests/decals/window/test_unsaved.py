@@ -157,7 +157,7 @@ def test_edit_opens_the_recovery_file_and_the_given_modes(
             super().__init__(*arguments, **{**options, "off_screen": True, "size": (60, 40)})
             seen.append((self.subplot.contact, self.subplot.mapping))
 
-    monkeypatch.setattr("decals.window.window.EditWindow", Window)
+    monkeypatch.setattr("decals.window.opening.EditWindow", Window)
     result = edit(scene(), path=path, contact="min", mapping="chord")
     assert len(result.decals) == len(first.document.decals)
     assert seen == [(Contact.MIN, ImageMapping.CHORD)]
