@@ -64,6 +64,12 @@ class Grid:
         """Return the number of cells along the side of a block of a level, 0 being the root's."""
         return 1 << (BRANCHING_BITS * (self.depth - level + 1))
 
+    def divided(self, times: int) -> "Grid":
+        """Return the grid of the same root, each of whose cells is cut into BRANCHING³, so many times."""
+        factor = BRANCHING**times
+        i, j, k = (first * factor for first in self.base)
+        return Grid(self.cell_size / factor, (i, j, k), self.depth + times, self.corner)
+
     def base_of(self, level: int) -> tuple[int, int, int]:
         """Return the root's lowest block of a level, in blocks of that level from `corner`."""
         i, j, k = (first // self.cells_along(level) for first in self.base)

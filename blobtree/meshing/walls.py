@@ -2,13 +2,15 @@
 
 What a difference leaves between its body and its tool, the lens of an intersection and the walls of a shell
 have both their sides on surfaces of operands. These surfaces are far smoother than the wall is thin, so cells
-of any size show them. Points on them are the samples: from each, a ray into the solid finds the other side.
-Where the wall is thin, more samples lie between them, as close as the blocks of the next level.
+as large as the operands' leaves show them. Points on them are the samples: from each, a ray into the solid
+finds the other side. Where the wall is thin, more samples lie between them, as close as the blocks of the
+next level.
 
 A wedge is thin at its edge, whatever the size of cells. In a strip along it, a small part of a cell of the
 base wide, cells are as large as at the strip's inner side.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,19 +19,21 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray
+from blobtree.cells.grid import BRANCHING, Grid
 from blobtree.cells.sparse_cells import SparseCells, build_cells
 from blobtree.device import launch
 from blobtree.formulas.falloff import ISO
-from blobtree.formulas.skeletons import PLATE_CELLS
+from blobtree.formulas.skeletons import BALL_CELLS, PLATE_CELLS
 from blobtree.meshing.adaptive_cells import CELL_OFFSETS, CORNERS, cell_codes
 from blobtree.meshing.block_tree import BlockTree, on_device
 from blobtree.meshing.part_kernels import UNLIMITED
 from blobtree.meshing.patches import EDGES
 from blobtree.meshing.wall_kernels import climb, measure_walls, place_samples
 from blobtree.tape.model import ImplicitModel
-from blobtree.tape.operands import Operand, operands_of
+from blobtree.tape.operands import Operand, leaves_of, operands_of
+from blobtree.tape.part_sizes import leaf_boxes, part_sizes
 from blobtree.tape.program import ProgramLeaf
-from blobtree.tape.tape import DeviceTape
+from blobtree.tape.tape import DeviceTape, Tape
 
 WALL_CELLS = 2.0 * PLATE_CELLS
 """Cells across a wall, for the corners of cells to lie in it."""
@@ -73,6 +77,9 @@ CLIMBS = 3
 
 NEAR_CELLS = 2.0
 """Side of bins in cells: the other side of a wall is at most WALL_CELLS away, and so in one beside."""
+
+LEAF_CELLS = 64.0
+"""Most cells along a small leaf, with which its surface is found."""
 
 MAX_BINS = 64
 """Most bins along a side."""
@@ -165,7 +172,11 @@ class Walls:
         cells = blocks.cells
         self._device, self._kernel = cells.device, cells.tape.instruction_set.kernel_for
         self._operands = operands = operands_of(tree._program, tree.tape)
-        lines = [_crossed_edges(build_cells(one.tape, cells.grid, device=self._device)) for one in operands]
+        leaves = self._small_leaves(tree) if operands else {}
+        lines = [
+            _joined([self._lines(one.tape, cells.grid), *(leaves[at] for at in one.numbers if at in leaves)])
+            for one in operands
+        ]
         self._samples: list[_Samples] = []
         self._thick: list[float] = []
         """Cells that the thicker places of each operand's walls need."""
@@ -182,6 +193,24 @@ class Walls:
                 samples = self._first_samples(replace(samples, rim=rim), low[near], high[near])
             self._samples.append(samples)
             self._thick.append(thick)
+
+    def _lines(self, tape: Tape, grid: Grid) -> Ends:
+        """Return both ends of an edge of each cell of a grid that the surface of a tape crosses."""
+        return _crossed_edges(build_cells(tape, grid, device=self._device))
+
+    def _small_leaves(self, tree: ImplicitModel) -> dict[int, Ends]:
+        """Return lines across the surfaces of leaves that fall between the samples of the base."""
+        grid, radii = self._blocks.cells.grid, part_sizes(tree)[0]
+        small = np.flatnonzero(radii < grid.cell_size)
+        if not len(small):
+            return {}
+        lower, upper = leaf_boxes(tree)
+        needed = np.maximum(radii / BALL_CELLS, (upper - lower).max(axis=1) / LEAF_CELLS)
+        tapes, result = list(leaves_of(tree._program, tree.tape)), dict[int, Ends]()
+        for number in small[needed[small] < grid.cell_size].tolist():
+            divisions = math.ceil(math.log(grid.cell_size / needed[number], BRANCHING))
+            result[number] = self._lines(tapes[number], grid.divided(divisions))
+        return result
 
     def _closely(self, samples: _Samples) -> tuple[Float64Array, float]:
         """Return the sizes of cells that the walls of an operand need in enough places, and their radius.
@@ -384,6 +413,12 @@ class Walls:
         reach = (LENS_REACH if like.operand.meets else WALL_REACH) * float(np.sqrt(len(seeds) / np.pi))
         reach = reach * spacing + 2.0 * self._blocks.grid(0).cell_size
         return samples.chosen(cKDTree(seeds).query(samples.places)[0] < reach)
+
+
+def _joined(lines: list[Ends]) -> Ends:
+    """Return all lines as one list."""
+    starts, ends = zip(*lines, strict=True)
+    return np.concatenate(starts), np.concatenate(ends)
 
 
 def _of_neighbors(values: NDArray[Any], pick: np.ufunc, axis: int) -> NDArray[Any]:

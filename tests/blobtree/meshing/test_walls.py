@@ -10,7 +10,7 @@ from blobtree.errors import InvalidResolution
 from blobtree.meshing.adaptive_mesh import AdaptiveMesh, AdaptiveMesher
 from blobtree.meshing.thin_parts import polygonize_parts
 from blobtree.progress import Progress
-from tests.thin_trees import is_closed, mesh_areas
+from tests.thin_trees import is_closed, mesh_areas, pieces
 
 BALL = Point((0, 0, 0), radius=1.0)
 CUBE = Box((0, 0, 0), (1, 1, 1), radius=0.1)
@@ -75,6 +75,20 @@ def test_a_flat_lens_smaller_than_cells_has_its_area() -> None:
     flat = BALL & BALL.translate((1.98, 0, 0))
     tree = BALL.translate((-60, 0, 0)) | flat.scale(0.8).rotate((1, 2, 3), 40.0).translate((10, 0, 0))
     assert lens_area(polygonize(tree)) == pytest.approx(0.64 * 2.0 * np.pi * 0.02, rel=0.12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_case_smaller_than_cells_has_walls_without_holes(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    place, size = tuple(rng.uniform(9.0, 10.0, 3).tolist()), float(rng.uniform(0.6, 1.2))
+    turn = float(rng.uniform(0.0, 90.0))
+    case = WALLS["case"][0].scale(size).rotate((1, 2, 3), turn).translate(place)
+    mesh = polygonize(BALL.translate((-60, 0, 0)) | case)
+    assert is_closed(mesh.faces)
+    of_case = np.unique(pieces(mesh)[mesh.vertices[:, 0] > 0.0])
+    assert len(of_case) == 2
+    centers, areas = mesh_areas(mesh)
+    assert areas[centers[:, 0] > 0.0].sum() == pytest.approx(size**2 * WALLS["case"][1], rel=0.08)
 
 
 def test_walls_far_thinner_than_parts_that_count_are_named(caplog: pytest.LogCaptureFixture) -> None:
