@@ -52,6 +52,10 @@ MAX_SEARCHES, CLEAN_SEARCHES, MAX_REPEATS = 12, 2, 4
 """Largest number of rounds, number of those without a bare point after which they end, and largest number of
 repeats of all rounds around decals that grew."""
 
+FAR_POINTS = 4.0
+"""Points for each decal that are beyond the largest radii of all decals and searched around: those of a few
+folds. More are those of scraps without decals, and searches around them find ever more of these."""
+
 EVEN_RADIUS_RATIO = 1.495
 """Ratio of a radius to the median at even density, beyond which other decals grow first."""
 
@@ -171,12 +175,13 @@ def covering_radii(
             stages = [(np.full(len(radii), largest), -CLEARANCE), (limits, SPECK)]
         radii = (1.0 + RADIUS_MARGIN) * _without_zeros(radii, centers.tree, decals)
         owned = owned.joined(first.with_shading(shade, radii))
+        last = (1.0 + RADIUS_MARGIN) * limits
         for limits, speck in stages:
             if speck > 0.0 and not (owned.shares(radii) > 1.0 + speck).any():
                 break
             largest_radii = (1.0 + RADIUS_MARGIN) * limits
             growth = _Growth(
-                largest_radii, speck, project_reporting, shade, sample_distance, rng, bounds is not None
+                largest_radii, last, speck, project_reporting, shade, sample_distance, rng, bounds is not None
             )
             owned = growth.close_gaps(radii, owned)
     return radii
@@ -215,6 +220,8 @@ class _Growth:
     ----------
     limits
         Largest radius of each decal, ``float64[n]``.
+    last_limits
+        The same for the last of several growths. Points beyond those of all their decals stay bare.
     speck
         Share of its radius by which an image may end before a point; below zero, it must end beyond.
     project, shade
@@ -224,10 +231,11 @@ class _Growth:
     rng
         Draws the random points.
     drops_far_points
-        True if points beyond the limits of all their decals are not searched around.
+        True if points beyond the limits of all their decals are not searched around, however few.
     """
 
     limits: Float64Array
+    last_limits: Float64Array
     speck: float
     project: Project
     shade: Shade | None
@@ -268,8 +276,9 @@ class _Growth:
             spread, share, count = SEARCHES[min(turn, finest)]
             reach = spread * self.sample_distance
             owned = owned.risky(radii, share, CUBE * self.sample_distance)
-            if self.drops_far_points:
-                owned = owned[np.flatnonzero(owned.within(self.limits))]
+            near = owned.within(self.limits if self.drops_far_points else self.last_limits)
+            if self.drops_far_points or np.count_nonzero(~near) > FAR_POINTS * len(radii):
+                owned = owned[np.flatnonzero(near)]
             latest = np.where(owned.decals >= 0, changed[owned.decals], 0).max(axis=1, initial=0)
             settled = turn - latest >= CLEAN_SEARCHES
             done.append(owned[np.flatnonzero(settled)])

@@ -5,11 +5,15 @@ import pytest
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from blobtree import Point, Torus
 from blobtree._typing import Float32Array, Float64Array, Int64Array
 from decals.scattering.covering import RADIUS_MARGIN, covering_radii
 from decals.scattering.domain import OrientedPoints
+from decals.scattering.neighbors import FacingTree
 from decals.scattering.orientation import Orientation, gradient_of, tangents
+from decals.scattering.relaxation import Relaxation
 from decals.scattering.sizing import delaunay_radii, touching_radii
+from decals.surfaces import ImplicitSurface
 from tests.decals.meshes import plane
 
 
@@ -175,3 +179,21 @@ def test_delaunay_radii() -> None:
         np.maximum.at(expected, other.ravel(), gaps.ravel())
     assert (np.abs(result - expected) < 1e-5).mean() > 0.85
     assert (result < expected + 1e-5).mean() > 0.95
+
+
+@pytest.mark.parametrize("count", [60, 120])
+def test_scraps_without_decals_are_not_searched_again_and_again(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ring = Torus((0, 0, 0), (0.1, 0.2, 1), 1.35, radius=0.012)
+    surface = ImplicitSurface(Point((0, 0, 0), radius=1.0) | ring, resolution=64)
+    relaxation = Relaxation(surface, count=count, seed=1, iterations=20)
+    searched, nearest = [], FacingTree.nearest_and_doubts
+
+    def counted(tree: FacingTree, points: Float32Array, normals: Float32Array, **options: Any) -> Any:
+        searched.append(len(points))
+        return nearest(tree, points, normals, **options)
+
+    monkeypatch.setattr(FacingTree, "nearest_and_doubts", counted)
+    relaxation.to_decals()
+    assert sum(searched) < 800 * count
