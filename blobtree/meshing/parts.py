@@ -10,15 +10,16 @@ between parts may be narrower than cells: `gaps` finds these.
 """
 
 import logging
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import warp as wp
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray
-from blobtree.cells.grid import CHILDREN, Grid
+from blobtree.cells.grid import BRANCHING, CHILDREN, Grid
 from blobtree.cells.sparse_cells import SparseCells, build_cells
 from blobtree.device import launch
 from blobtree.errors import InvalidResolution
@@ -37,7 +38,15 @@ from blobtree.meshing.walls import Walls
 from blobtree.progress import Progress
 from blobtree.tape.model import ImplicitModel, values_at
 from blobtree.tape.operands import has_walls, leaves_of
-from blobtree.tape.part_sizes import fitting_scale, fitting_wall_scale, leaf_boxes, part_sizes, sized_tape
+from blobtree.tape.part_sizes import (
+    WARP_MARGIN,
+    fitting_scale,
+    fitting_wall_scale,
+    has_warps,
+    leaf_boxes,
+    part_sizes,
+    sized_tape,
+)
 from blobtree.tape.program import (
     PROGRAM_CHILDREN,
     ProgramLeaf,
@@ -90,6 +99,9 @@ MAX_SECOND_BLOCKS = 40_000
 OTHER_CELLS = 0.87
 """Size of the cells of the second mesh over that of the first; rims then lie elsewhere in cells."""
 
+WARPED_BLOCKS = 64.0
+"""Blocks along a leaf below a warp in which its thickness is measured."""
+
 LATER_GROWTH = 0.6
 """Growth of a part's blocks in later levels, over that in the last one, which is larger at ends and edges."""
 
@@ -114,6 +126,8 @@ class ThinPart:
     """A leaf beside a wall that no primitive is as thin as."""
     is_gap: bool = False
     """True for a gap between parts, which the mesh bridges."""
+    leaf: ProgramLeaf | None = None
+    """The leaf that is too thin, where it is known."""
 
 
 def needed_sizes(
@@ -355,7 +369,7 @@ def mesh_of_parts(
         first = first_cells(tree, grid_of, device, report)
     blocks, walls = first.blocks, first.walls
     needed = walls.sizes if walls is not None else np.empty(0, np.float32)
-    unresolved = _too_thin(tree, smallest)
+    unresolved = _too_thin(tree, blocks.cells, smallest)
     if walls is not None:
         unresolved += [ThinPart(*wall) for wall in walls.too_thin]
     if len(needed):
@@ -411,8 +425,7 @@ def _all_parts(first: FirstCells, least: float) -> list[ThinPart]:
     grid = cells.grid
     thinnest = int(needed.argmin())
     if needed[thinnest] < grid.cell_size:
-        at = cells.leaves.blocks.numpy()[thinnest]
-        found.append(ThinPart(float(needed[thinnest]), grid.origin + (at + 0.5) * 4 * grid.cell_size))
+        found.append(ThinPart(float(needed[thinnest]), _block_middle(cells, thinnest)))
     return found
 
 
@@ -422,16 +435,34 @@ def _size_keys(needed: Float32Array) -> IndexArray:
     return keys
 
 
-def _too_thin(tree: ImplicitModel, smallest: float) -> list[ThinPart]:
-    """Return the leaves that need cells below `smallest`.
+def _too_thin(tree: ImplicitModel, cells: SparseCells, smallest: float) -> list[ThinPart]:
+    """Return the leaves that need cells below `smallest`, here or there.
 
     Tips of cones are left out: only their end is missing.
     """
-    needed = part_sizes(tree)[1] / BALL_CELLS
-    lower, upper = leaf_boxes(tree)
-    return [
-        ThinPart(float(needed[i]), 0.5 * (lower[i] + upper[i])) for i in np.flatnonzero(needed < smallest)
-    ]
+    needed, (lower, upper) = part_sizes(tree)[1] / BALL_CELLS, leaf_boxes(tree)
+    leaves, middles = _leaves(tree), 0.5 * (lower + upper)
+    found = {at: ThinPart(float(needed[at]), middles[at]) for at in np.flatnonzero(needed < smallest)}
+    if has_warps(tree):
+        tapes = list(leaves_of(tree._program, cells.tape))
+        extents = (upper - lower).max(axis=1)
+        for at in np.flatnonzero(needed < WARP_MARGIN * smallest):
+            divisions = math.ceil(
+                math.log(max(4.0 * WARPED_BLOCKS * cells.grid.cell_size / extents[at], 1.0), BRANCHING)
+            )
+            own = build_cells(tapes[at], cells.grid.divided(divisions), device=cells.device)
+            sizes = needed_sizes(own, own.grid, own.leaves.arrays, 0, len(own.leaves), 0.0)
+            if sizes.min(initial=np.inf) < smallest:
+                least = int(sizes.argmin())
+                found[at] = ThinPart(float(sizes[least]), _block_middle(own, least))
+    return [replace(part, leaf=leaves[at]) for at, part in sorted(found.items())]
+
+
+def _block_middle(cells: SparseCells, number: int) -> Float64Array:
+    """Return the centre of a block of the finest level."""
+    grid, at = cells.grid, cells.leaves.blocks.numpy()[number]
+    middle: Float64Array = grid.origin + (at + 0.5) * 4 * grid.cell_size
+    return middle
 
 
 def warn_of_thin_parts(tree: ImplicitModel, unresolved: list[ThinPart]) -> None:
@@ -474,7 +505,9 @@ def _name_of_part(tree: ImplicitModel, part: ThinPart) -> str:
             tree, lambda child: _has_leaf(child, beside) and has_walls(compile_program(child))
         )
         return f"a wall of the {type(node).__name__} at path {path}"
-    leaves = [placed.primitive for run in tree._program if isinstance(run, Run) for placed in run.primitives]
+    if part.leaf is not None:
+        return _name_of_leaf(tree, part.leaf)
+    leaves = _leaves(tree)
     if part.is_gap:
         fields = [values_at(tape, part.place[None])[0] for tape in leaves_of(tree._program, tree.tape)]
         nearest = np.argsort(fields)[::-1][:2].tolist()
@@ -484,6 +517,11 @@ def _name_of_part(tree: ImplicitModel, part: ThinPart) -> str:
     lower, upper = leaf_boxes(tree)
     gaps = np.linalg.norm(np.maximum(lower - part.place, part.place - upper).clip(0.0), axis=1)
     return _name_of_leaf(tree, leaves[np.lexsort([gaps, misfit])[0]])
+
+
+def _leaves(tree: ImplicitModel) -> list[ProgramLeaf]:
+    """Return the leaves, in the order of the program."""
+    return [placed.primitive for run in tree._program if isinstance(run, Run) for placed in run.primitives]
 
 
 def _name_of_leaf(tree: ImplicitModel, leaf: ProgramLeaf) -> str:

@@ -165,3 +165,15 @@ def test_a_ball_that_a_warp_makes_thin_has_the_smallest_cells() -> None:
     )
     assert is_closed(mesh.faces)
     assert areas[np.linalg.norm(centers, axis=1) > 3.0].sum() == pytest.approx(ellipsoid, rel=0.1)
+
+
+def test_a_hair_that_a_warp_makes_too_thin_is_named(caplog: pytest.LogCaptureFixture) -> None:
+    hairs = [Segment((6, y, 0), (7, y, 1), radius=radius) for y, radius in ((-2, 6e-4), (2, 0.08))]
+    tree = Point((0, 0, 0), radius=1.0) | hairs[0] | hairs[1]
+    with caplog.at_level(logging.WARNING):
+        polygonize(tree)
+        assert not caplog.records
+        polygonize(tree.twist(12.0))
+    (record,) = caplog.records
+    assert "the Segment at path (0, 1)" in record.getMessage()
+    assert record.getMessage().count("the Segment") == 1
