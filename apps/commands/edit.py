@@ -1,6 +1,5 @@
 """``implicit-decals edit``: the editor window."""
 
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -10,11 +9,8 @@ from decals.apps.commands.options import (
     ContactName,
     Inputs,
     MappingName,
-    OptionalWhole,
-    Seed,
-    StartImages,
+    Start,
     Stiffness,
-    UpAxis,
     parse_size,
 )
 from decals.apps.memory import import_ahead, keep_memory_low, share_heap
@@ -28,15 +24,11 @@ def edit(
     model: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
     /,
     *,
-    decals: OptionalWhole = None,
-    image: StartImages = None,
-    up: UpAxis = None,
+    start: Start = Start(),
     size: str = "1200x800",
     contact: ContactName = None,
     stiffness: Stiffness = None,
     mapping: MappingName = None,
-    seed: Seed = None,
-    save: Path | None = None,
     inputs: Inputs = Inputs(),
 ) -> None:
     """Open models or a scene in an editor window.
@@ -48,8 +40,6 @@ def edit(
     model
         Mesh files, BlobTrees in JSON, samples, or one saved scene, as for render. Default: an empty scene, in
         which N adds a ball.
-    decals
-        Number of decals scattered at the start. Default: 500.
     size
         Width and height of the window in pixels.
     contact
@@ -58,18 +48,15 @@ def edit(
         Stiffness of elastic contact at the beginning, likewise. Shift + P changes it.
     mapping
         Image mapping at the beginning, likewise. U changes it in the window.
-    save
-        The JSON file that Ctrl + S writes. Default: the opened scene, or a new file such as MODEL-decals.json
-        or scene.json.
     """
     share_heap()
     pixels = parse_size(size)
-    check_options(decals, seed, save)
+    check_options(start)
     if stiffness is not None:
         stiffness_number(stiffness, InvalidInput)
     EditWindow.require_screen()
     import_definitions(inputs.define)
-    opening = opened(model, inputs, decals=decals, image=image, up=up, pixels=pixels, seed=seed, save=save)
+    opening = opened(model, start, inputs, pixels)
     window = EditWindow(
         opening.scene,
         path=opening.path,

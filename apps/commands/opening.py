@@ -8,7 +8,7 @@ from rich.console import Console
 
 from blobtree.files import exists, is_file
 from decals import DecalImage, Scene
-from decals.apps.commands.options import DEFAULT_IMAGES, MAX_DECALS, MAX_SEED, Inputs, check_count
+from decals.apps.commands.options import DEFAULT_IMAGES, MAX_DECALS, MAX_SEED, Inputs, Start, check_count
 from decals.apps.commands.progress_bars import PREPARING, progress_bars
 from decals.apps.commands.scatter_options import ScatterOptions
 from decals.apps.models.loading import load_models
@@ -49,54 +49,44 @@ class Opened:
             window.session.do(AddImage(picture))
 
 
-def check_options(decals: int | None, seed: int | None, save: Path | None) -> None:
+def check_options(start: Start) -> None:
     """Raise `InvalidInput` for options out of range, before anything slow."""
-    if decals is not None:
-        check_count("--decals", decals, 0, MAX_DECALS)
-    if seed is not None:
-        check_count("--seed", seed, 0, MAX_SEED)
-    if save is not None:
-        check_output(save, (".json",))
+    if start.decals is not None:
+        check_count("--decals", start.decals, 0, MAX_DECALS)
+    if start.seed is not None:
+        check_count("--seed", start.seed, 0, MAX_SEED)
+    if start.save is not None:
+        check_output(start.save, (".json",))
 
 
-def opened(
-    model: list[str] | None,
-    inputs: Inputs,
-    *,
-    decals: int | None,
-    image: list[str] | None,
-    up: str | None,
-    pixels: tuple[int, int],
-    seed: int | None,
-    save: Path | None,
-) -> Opened:
+def opened(model: list[str] | None, start: Start, inputs: Inputs, pixels: tuple[int, int]) -> Opened:
     """Return the scene that the arguments of a command name; see `decals.apps.commands.edit.edit`."""
     added: tuple[DecalImage, ...] = ()
-    path = save
+    path = start.save
     if not model or _is_unsaved(model):
-        if decals is not None or seed is not None or inputs.table is not None:
+        if start.decals is not None or start.seed is not None or inputs.table is not None:
             raise InvalidInput(
                 "an empty scene has no decals; name a model, or leave out --decals, --seed and --table"
             )
-        scene = empty_scene(image or DEFAULT_IMAGES, UPRIGHT[up or "y"])
+        scene = empty_scene(start.image or DEFAULT_IMAGES, UPRIGHT[start.up or "y"])
         path = path or (Path(model[0]) if model else new_file(Path(), "scene", recover=True))
     else:
         with progress_bars() as progress:
             progress(PREPARING, 0.0)
-            loaded = load_models(model, trust=inputs.trust, table=inputs.table, images=image)
+            loaded = load_models(model, trust=inputs.trust, table=inputs.table, images=start.image)
             if isinstance(loaded, Scene):
-                if decals is not None or seed is not None:
+                if start.decals is not None or start.seed is not None:
                     raise InvalidInput(
                         "a saved scene or table has its own decals; leave out --decals and --seed"
                     )
                 scene = loaded
                 if inputs.table is None:
-                    path, added = path or Path(model[0]), tuple(map(DecalImage.load, image or ()))
+                    path, added = path or Path(model[0]), tuple(map(DecalImage.load, start.image or ()))
                 else:
                     path = path or new_file(Path(), f"{Path(model[0]).stem}-decals", recover=True)
             else:
-                options = ScatterOptions.from_arguments(decals, image, seed)
-                where = parse_view(None, axes_of(model[0]) if up is None else UPRIGHT[up])
+                options = ScatterOptions.from_arguments(start.decals, start.image, start.seed)
+                where = parse_view(None, axes_of(model[0]) if start.up is None else UPRIGHT[start.up])
                 scene = options.scene(loaded, where, pixels, progress)
                 path = path or new_file(Path(), f"{Path(model[0]).stem}-decals", recover=True)
 

@@ -63,18 +63,6 @@ Seed = Annotated[
 ]
 """An optional seed of scattered decals."""
 
-StartImages = Annotated[
-    list[str] | None,
-    Parameter(
-        name=("--image", "--images"),
-        negative=(),
-        show_default=False,
-        help="Image of the decals, as for render. Can be repeated. A saved scene keeps its images, and these "
-        "are added. Default: scale.",
-    ),
-]
-"""Images that an editor opens with."""
-
 UpAxis = Annotated[
     Literal["x", "y", "z"] | None,
     Parameter(show_default=False, help="The axis that points upward. Default: y, or the axis of the sample."),
@@ -180,6 +168,34 @@ class Surfaces:
 
     resolution: Annotated[OptionalWhole, Parameter(name=("--resolution", "--cells"))] = None
     creases: Annotated[bool, Parameter(negative=())] = False
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Start:
+    """Options of what `edit` and `sandbox` open with.
+
+    Parameters
+    ----------
+    decals
+        Number of decals scattered at the start. Default: 500.
+    image
+        Image of the decals, as for render. Can be repeated. A saved scene keeps its images, and these are
+        added. Default: scale.
+    up, seed
+        See `UpAxis` and `Seed`.
+    save
+        The JSON file that Ctrl + S writes. Default: the opened scene, or a new file such as MODEL-decals.json
+        or scene.json.
+    """
+
+    decals: OptionalWhole = None
+    image: Annotated[
+        list[str] | None, Parameter(name=("--image", "--images"), negative=(), show_default=False)
+    ] = None
+    up: UpAxis = None
+    seed: Seed = None
+    save: Path | None = None
 
 
 @Parameter(name="*")

@@ -27,10 +27,7 @@ from rich.console import Console
 from blobtree.files import exists
 from decals.apps.commands.options import (
     Inputs,
-    OptionalWhole,
-    Seed,
-    StartImages,
-    UpAxis,
+    Start,
     Whole,
     check_count,
 )
@@ -55,11 +52,7 @@ def sandbox(
     model: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
     /,
     *,
-    decals: OptionalWhole = None,
-    image: StartImages = None,
-    up: UpAxis = None,
-    seed: Seed = None,
-    save: Path | None = None,
+    start: Start = Start(),
     port: Whole = 8080,
     host: str = HOST,
     allow_host: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
@@ -83,11 +76,6 @@ def sandbox(
     ----------
     model
         Mesh files, BlobTrees in JSON, samples, or one saved scene, as for render. Default: a start page.
-    decals
-        Number of decals scattered at the start. Default: 500.
-    save
-        The JSON file that Ctrl + S writes. Default: the opened scene, or a new file such as MODEL-decals.json
-        or scene.json.
     port
         Port of the page; 0 takes a free one.
     host
@@ -117,9 +105,8 @@ def sandbox(
     if model and (lab or lessons is not None):
         raise InvalidInput("the lab has its own scenes; leave out the model, or --lab and --lessons")
     if desktop or not (share or done or session):
-        options: dict[str, Any] = {"decals": decals, "image": image, "up": up, "seed": seed, **vars(inputs)}
-        options |= {"lab": lab, "lessons": lessons}
-        command = _commands(model, options, save)
+        options = {**vars(start), **vars(inputs), "lab": lab, "lessons": lessons}
+        command = _commands(model, options, options.pop("save"))
         if desktop:
             return _show_window(command(1))
         guard = _guard(host, allow_host, os.environ.pop(TOKEN, ""))
@@ -131,14 +118,12 @@ def sandbox(
     from decals.window.host_plotter import new_plotter
 
     share_heap()
-    check_options(decals, seed, save)
+    check_options(start)
     serve, page = _toolkit(lessons)
     given = _read_token() if session else os.environ.pop(TOKEN, "")
     guard = _guard(host, allow_host, given, framed=done)
     import_definitions(inputs.define)
-    opening = opened(
-        model, inputs, decals=decals, image=image, up=up, pixels=FIRST_SIZE, seed=seed, save=save
-    )
+    opening = opened(model, start, inputs, FIRST_SIZE)
     plotter = new_plotter(True, FIRST_SIZE)
     window = EditWindow(opening.scene, path=opening.path, plotter=plotter, recover=opening.recover)
     opening.add_images(window)
@@ -147,8 +132,8 @@ def sandbox(
             window.show()
             server = serve(f"sandbox {id(window)}", client_type="vue3")
             in_lesson = lab or lessons is not None
-            start = not model and not in_lesson and not window.session.modified  # nothing was recovered
-            page(server, window, guard=guard, in_lesson=in_lesson, start=start, done=done, shared=share)
+            fresh = not model and not in_lesson and not window.session.modified  # nothing was recovered
+            page(server, window, guard=guard, in_lesson=in_lesson, start=fresh, done=done, shared=share)
             ready = server.controller.on_server_ready
             if session:
                 ready.add(lambda **_: print(guard.address(server.port), flush=True))
