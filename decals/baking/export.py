@@ -30,9 +30,10 @@ from decals.baking.unwrapped import Unwrapped
 from decals.errors import InvalidScene
 from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.images.load import HasPixels
 from decals.index.editor import DecalEditor
 from decals.model import Decals
-from decals.rendering.options import Drawing, ImageLike, SceneLike, drawing_of, drawn_objects
+from decals.rendering.options import Drawing, SceneLike, drawing_of, drawn_objects
 from decals.scenes.cover import scene_or_objects
 from decals.scenes.files import to_json
 from decals.scenes.objects import SceneObject
@@ -178,7 +179,7 @@ def export(
     samples = count_number("samples", samples, 1, MAX_SAMPLES, InvalidScene)
     if resolution is not None:
         whole_number("resolution", resolution, 1, None, InvalidResolution)
-    modes = {"contact": contact, "mapping": mapping, "stiffness": stiffness}
+    modes: dict[str, Any] = {"contact": contact, "mapping": mapping, "stiffness": stiffness}
     Drawing().overridden(**modes)  # checked before a model is read
     creases = truth("creases", creases, InvalidScene)
     one_of("layout", layout, LAYOUTS, InvalidScene)
@@ -192,21 +193,16 @@ def export(
     needs_xatlas = place == TEXTURE and layout == XATLAS
     for package, extra in (*rules.packages, *([("xatlas", "bake")] if needs_xatlas else [])):
         optional_package(package, extra)
+    shape: dict[str, Any] = {
+        "size": size,
+        "samples": samples,
+        "layout": layout,
+        "tiles": tiles,
+        "resolution": resolution,
+        "creases": creases,
+    }
     with reporting(progress, cancel) as report:
-        baked = bake_parts(
-            scene,
-            place,
-            report,
-            attributes=names,
-            instances=instances,
-            size=size,
-            samples=samples,
-            layout=layout,
-            tiles=tiles,
-            resolution=resolution,
-            creases=creases,
-            **modes,
-        )
+        baked = bake_parts(scene, place, report, attributes=names, instances=instances, **shape, **modes)
         report("writing the file", 0.0)
         if rules.recipe:
             given = {
@@ -216,12 +212,7 @@ def export(
                 "instances": instances,
                 "unit": unit,
                 "up": up,
-                "size": size,
-                "samples": samples,
-                "layout": layout,
-                "tiles": tiles,
-                "resolution": resolution,
-                "creases": creases,
+                **shape,
             }
             baked = replace(baked, made=_made(scene, path.parent, given))
         with ThreadPoolExecutor(1) as pool:  # meshes are checked while textures are compressed
@@ -347,7 +338,7 @@ class _Source:
 
     objects: Sequence[object]
     decals: Decals | DecalEditor
-    images: list[ImageLike]
+    images: list[HasPixels]
     drawing: Drawing
     recipe: Recipe | None
 

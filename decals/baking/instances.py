@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, UInt8Array
+from decals.images.load import HasPixels
 from decals.images.texels import as_bytes, decode_srgb
 from decals.model import Decals
-from decals.rendering.options import ImageLike
 
 EXTENSION = "EXT_mesh_gpu_instancing"
 
@@ -44,7 +44,7 @@ class Instances:
     attributes: Mapping[str, Float32Array]
 
 
-def decal_instances(decals: Decals, images: Sequence[ImageLike], taken: Collection[str]) -> list[Instances]:
+def decal_instances(decals: Decals, images: Sequence[HasPixels], taken: Collection[str]) -> list[Instances]:
     """Return the decals by their images, under other names than those that are taken."""
     found = []
     for number in np.unique(decals.images).tolist():

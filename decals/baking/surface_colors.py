@@ -16,10 +16,11 @@ from decals.field.evaluate import ColorEvaluator, Samples, evaluate
 from decals.field.jacobian import normal_derivatives_of_triangles, stretch_of
 from decals.field.rules import PictureRules
 from decals.field.walks import evaluation_options
+from decals.images.load import HasPixels
 from decals.index.editor import DecalEditor
 from decals.index.index import DecalIndex
 from decals.model import Decals
-from decals.rendering.options import Drawing, ImageLike
+from decals.rendering.options import Drawing
 from decals.scenes.scene import DecalImage
 
 BLOCK = 1 << 18
@@ -48,7 +49,7 @@ class SurfaceColors:
         meshes: Sequence[BakeMesh],
         objects: Sequence[object],
         decals: Decals | DecalEditor,
-        images: Sequence[ImageLike],
+        images: Sequence[HasPixels],
         drawing: Drawing,
     ) -> None:
         self._meshes, self._objects, self._decals = meshes, objects, decals

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from blobtree._typing import Float32Array, UInt8Array
 from blobtree.immutable import Immutable
 from decals.errors import TooMuchData
+from decals.images.load import HasPixels
 from decals.images.texels import decode_srgb, encode_srgb
 from decals.rendering.data_texture import ROW_TEXELS, padded_rows, texel_rows
 from decals.rendering.image_array import color_texels, common_shape
 from decals.rendering.materials import map_texels
-from decals.rendering.options import ImageLike
 
 MAX_ROWS = 16_384
 """Rows of a texture, at most: a usual limit of graphics cards, and room for 67 million elements."""
@@ -136,7 +136,7 @@ def data_size(array: NDArray[Any]) -> tuple[int, int]:
     return ROW_TEXELS, rows
 
 
-def image_texture(name: str, images: Sequence[ImageLike], binding: int | None) -> ShaderTexture:
+def image_texture(name: str, images: Sequence[HasPixels], binding: int | None) -> ShaderTexture:
     """Return the texture of images, premultiplied: in bytes if all images are, else in half floats."""
     pixels = [image.pixels for image in images] or [np.zeros((1, 1, 4), np.uint8)]
     shape = image_shape(images)
@@ -146,14 +146,14 @@ def image_texture(name: str, images: Sequence[ImageLike], binding: int | None) -
     return _array_texture(name, HALF, light.astype(np.float16), binding)
 
 
-def map_texture(name: str, images: Sequence[ImageLike], binding: int | None) -> ShaderTexture:
+def map_texture(name: str, images: Sequence[HasPixels], binding: int | None) -> ShaderTexture:
     """Return the texture of the maps of images, two layers for each."""
     shape = image_shape(images)
     layers = [texels[::-1] for image in images for texels in map_texels(image, shape)]
     return _array_texture(name, HALF, np.stack(layers).astype(np.float16), binding)
 
 
-def image_shape(images: Sequence[ImageLike]) -> tuple[int, int]:
+def image_shape(images: Sequence[HasPixels]) -> tuple[int, int]:
     """Return height and width of all images."""
     shapes = [(image.pixels.shape[0], image.pixels.shape[1]) for image in images]
     return common_shape(shapes, limit=MAX_IMAGE_SIDE)

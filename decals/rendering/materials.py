@@ -6,6 +6,7 @@ import moderngl
 import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array
+from decals.images.load import HasPixels
 from decals.images.texels import resized_texels, unit_levels
 from decals.index.editor import DecalEditor
 from decals.rendering.context import Context
@@ -14,7 +15,6 @@ from decals.rendering.effect import Effect, SceneUploads
 from decals.rendering.lights import Lighting
 from decals.rendering.options import (
     Drawing,
-    ImageLike,
     SceneLike,
     has_materials,
     has_relief,
@@ -33,7 +33,7 @@ class MaterialArray:
     for both keeps the decal pass within the 16 texture units that every driver has.
     """
 
-    def __init__(self, context: Context, images: Sequence[ImageLike], shape: tuple[int, int]) -> None:
+    def __init__(self, context: Context, images: Sequence[HasPixels], shape: tuple[int, int]) -> None:
         self.texture = context.gl.texture_array((shape[1], shape[0], 2 * len(images)), 4, dtype="f2")
         layers = (texels for image in images for texels in map_texels(image, shape))
         for layer, texels in enumerate(layers):
@@ -148,7 +148,7 @@ class ReliefArray:
     images. One array for both keeps the decal pass within the 16 texture units that every driver has.
     """
 
-    def __init__(self, context: Context, images: Sequence[ImageLike], shape: tuple[int, int]) -> None:
+    def __init__(self, context: Context, images: Sequence[HasPixels], shape: tuple[int, int]) -> None:
         self.count = len(images)
         self.cells = min(max(min(shape) // 2, 1), SLOPE_CELLS)
         self.steepest, self.ranges = 0.0, relief_ranges(images)
@@ -272,7 +272,7 @@ def _first_light(lights: Lighting | None) -> tuple[float, ...]:
     return (*(inverse[:3, :3] @ first.position + inverse[:3, 3]).tolist(), 2.0)
 
 
-def map_texels(image: ImageLike, shape: tuple[int, int]) -> Iterator[Float32Array]:
+def map_texels(image: HasPixels, shape: tuple[int, int]) -> Iterator[Float32Array]:
     """Yield the two layers of an image, the upper row first."""
     if not hasattr(image, "surface_texels"):
         for _ in range(2):

@@ -12,8 +12,7 @@ from decals.errors import InvalidScene
 from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.field.rules import PictureRules
-from decals.images.load import AnyImage
-from decals.images.texels import Pixels
+from decals.images.load import AnyImage, HasPixels
 from decals.index.editor import DecalEditor
 from decals.model import Decals
 from decals.options import Values, inherit_descriptions
@@ -226,20 +225,13 @@ def _size(size: Any) -> Size:
     return width, height
 
 
-class ImageLike(Protocol):
-    """An image of a scene: straight RGBA, row 0 at the top."""
-
-    @property
-    def pixels(self) -> Pixels: ...  # noqa: D102
-
-
-def relief_texels(image: ImageLike) -> Float32Array | None:
+def relief_texels(image: HasPixels) -> Float32Array | None:
     """Return the heights of an image in radii, times alpha; None without relief."""
     texels: Float32Array | None = image.relief_texels() if hasattr(image, "relief_texels") else None
     return texels
 
 
-def relief_ranges(images: Sequence[ImageLike]) -> Float64Array:
+def relief_ranges(images: Sequence[HasPixels]) -> Float64Array:
     """Return the least and the greatest height of each image in radii, 0 included.
 
     The last row of float64[n + 1, 2] is that of decals without image, which have number -1.
@@ -270,7 +262,7 @@ class SceneLike(Protocol):
     @property
     def decals(self) -> Decals | DecalEditor: ...  # noqa: D102
     @property
-    def images(self) -> Sequence[ImageLike]: ...  # noqa: D102
+    def images(self) -> Sequence[HasPixels]: ...  # noqa: D102
     @property
     def camera(self) -> Viewpoint: ...  # noqa: D102
 
