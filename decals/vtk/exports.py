@@ -63,7 +63,10 @@ def _exporter(name: str, method: Any) -> Any:
             f"in the file. Call decals.bake(plotter.decals.scene, 'scene.glb'), or one of "
             f"{', '.join(BAKING_EXPORTS)}, which write baked decals"
         )
-        with _silent_views():
+        with ExitStack() as stack:
+            for subplot in method.__self__.decals.subplots:
+                stack.enter_context(_hidden(subplot.actor))
+            stack.enter_context(_silent_views())
             return method(*arguments, **options)
 
     return export
@@ -105,14 +108,23 @@ def _baked_scene(name: str, subplot: Any) -> Baked | None:
 @contextmanager
 def _shown(baked: Baked, subplot: Any) -> Iterator[None]:
     """Show what is baked as an actor in place of the objects of a subplot."""
-    renderer, proxy = subplot.vtk_renderer, subplot.actor
+    renderer = subplot.vtk_renderer
+    with _hidden(subplot.actor):
+        actor, _ = renderer.add_actor(_actor(baked), name=BAKED, reset_camera=False, render=False)
+        try:
+            yield
+        finally:
+            renderer.remove_actor(actor, reset_camera=False, render=False)
+
+
+@contextmanager
+def _hidden(proxy: Any) -> Iterator[None]:
+    """Hide a proxy actor, which an exporter would draw, also before the window has OpenGL."""
     visible = proxy.GetVisibility()
     proxy.SetVisibility(False)
-    actor, _ = renderer.add_actor(_actor(baked), name=BAKED, reset_camera=False, render=False)
     try:
         yield
     finally:
-        renderer.remove_actor(actor, reset_camera=False, render=False)
         proxy.SetVisibility(visible)
 
 

@@ -168,6 +168,20 @@ def test_other_exports_name_bake(plotter: Factory, tmp_path: Path, name: str) ->
     assert name not in pl.__dict__
 
 
+def test_an_export_before_the_first_frame_only_warns(
+    plotter: Factory, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pl = plotter()
+    pl.add_mesh(pv.Sphere(radius=0.2, center=(0, 0, -3)))
+    pl.decals.add_scene(both(), camera=True)
+    with pytest.warns(UserWarning, match="own actors"):
+        pl.export_vrml(tmp_path / "a.vrml")
+    assert "Traceback" not in capfd.readouterr().err
+    assert "Shape" in (tmp_path / "a.vrml").read_text()
+    assert pl.decals.subplot.actor.GetVisibility()
+    assert np.ptp(shot(pl)) > 0
+
+
 def test_decals_on_actors_are_left_out_with_a_warning(plotter: Factory, tmp_path: Path) -> None:
     pl = plotter()
     actor = pl.add_mesh(pv.Sphere(), color="tan")
