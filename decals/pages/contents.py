@@ -16,7 +16,15 @@ from decals.images.load import embedded_image, opaque
 from decals.index.decal_cells import FINEST, LEVEL_SHIFT, NO_FLOOR, NO_PARITY, REACH_WITH_SLACK
 from decals.index.index import DecalIndex
 from decals.index.lookup import HALF_RANGE, MIX_ALL, MIX_X, MIX_Y, MIX_Z, NESTING_SLACK
-from decals.model import LAYER_LIMIT, MAX_COORDINATE, MIN_RADIUS, Interaction
+from decals.model import (
+    FADE_ANGLES,
+    FADE_DEPTHS,
+    LAYER_LIMIT,
+    MAX_COORDINATE,
+    MIN_RADIUS,
+    NO_IMAGE,
+    Interaction,
+)
 from decals.pages.programs import PREFIX, VERSION, picture_programs
 from decals.pages.surfaces import Surfaces, mesh_objects
 from decals.pages.textures import (
@@ -49,6 +57,9 @@ from decals.validation import MAX_STIFFNESS
 
 MAX_DECALS = 100_000
 """Most decals of a page: its index is built by the page's script."""
+
+WHOLE, OR_ZERO = {"test": "isInteger"}, {"zero": True}
+"""What the limits of some values add: whole numbers alone, or 0 too."""
 
 SAMPLES = (0.0, 0.0), (0.125, 0.375), (0.375, -0.125), (-0.125, -0.375), (-0.375, 0.125)
 """Places in a pixel at which a page draws it, one after the other: its picture is their mean."""
@@ -95,7 +106,7 @@ def page_contents(
         "images": len(scene.images),
         "mode": code.form.contact.name.lower(),
         "stiffness": scene.drawing.stiffness,
-        "rules": record_rules(code.receiver_table, code.form)
+        "rules": record_rules(code.receiver_table, code.form, len(scene.images))
         | {"index": index_rules(DecalIndex.of(scene.decals))},
         "scene": _scene_record(scene),
     }, arrays
@@ -135,20 +146,39 @@ def environment_textures(environment: Environment | None) -> dict[str, PageTextu
     return textures
 
 
-def record_rules(receivers: Sequence[str], form: Form) -> dict[str, Any]:
-    """Return the constants of records, and for which decals the plain form of the shaders is right."""
+def record_rules(receivers: Sequence[str], form: Form, images: int) -> dict[str, Any]:
+    """Return the constants and the limits of records, and for which decals the plain shaders are right."""
+    interactions = {item.name.lower(): int(item) for item in Interaction}
     return {
         "rim": float(RIM),
         "layerLimit": LAYER_LIMIT,
         "receivers": receivers,
-        "interactions": {item.name.lower(): int(item) for item in Interaction},
-        "minRadius": MIN_RADIUS,
-        "maxCoordinate": MAX_COORDINATE,
+        "interactions": interactions,
+        "values": {
+            **{
+                name: _limits(-MAX_COORDINATE, MAX_COORDINATE, 3)
+                for name in ("position", "normal", "tangent")
+            },
+            "number": _limits(0, 2 * MAX_DECALS) | WHOLE,
+            "radius": _limits(MIN_RADIUS, MAX_COORDINATE),
+            "image": _limits(NO_IMAGE, images - 1) | WHOLE,
+            "layer": _limits(-LAYER_LIMIT, LAYER_LIMIT - 1) | WHOLE,
+            "tint": _limits(0, 1, 3),
+            "opacity": _limits(0, 1),
+            "fade_angle": _limits(*FADE_ANGLES) | OR_ZERO,
+            "fade_depth": _limits(*FADE_DEPTHS) | OR_ZERO,
+        },
+        "choices": {"interaction": list(interactions), "spill": [False, True], "receivers": receivers},
         "maxStiffness": MAX_STIFFNESS,
         "keptRadius": MIN_KEPT_RADIUS,
         "nestingSlack": NESTING_SLACK,
         "plain": {name: getattr(form, name) for name in ("layered", "limited", "nested")},
     }
+
+
+def _limits(low: float, high: float, count: int = 0) -> dict[str, Any]:
+    """Return the least and the greatest value of a number, or of each of some numbers."""
+    return {"test": "isFinite", "low": low, "high": high, "count": count}
 
 
 def index_rules(index: DecalIndex) -> dict[str, Any]:

@@ -1,9 +1,9 @@
 """Pages of `save_html` in a real browser, as a program.
 
-    python -m tests.frontends.in_html_page picture|use|touch|mounts|drags|refusals [chromium|firefox]
+    python -m tests.frontends.in_html_page picture|use|touch|mounts|losses|drags|refusals [chromium|firefox]
 
-Firefox needs a display, such as that of ``xvfb-run -a``, and a version of playwright that knows it. Touch is
-for Chromium alone.
+Firefox needs a display, such as that of ``xvfb-run -a``, and a version of playwright that knows it: Debian's
+Firefox 153 is driven by playwright 1.60, but not by 1.65. Touch is for Chromium alone.
 """
 
 import asyncio
@@ -403,6 +403,52 @@ REMOUNTED = """async () => {
 }"""
 
 
+LOSE = """() => {
+  window.lost = viewer.painter.gl.getExtension("WEBGL_lose_context");
+  window.lost.loseContext();
+  return new Promise((resolve) => setTimeout(resolve, 200));
+}"""
+"""Takes the graphics card away from a page, as its reset or a full memory does."""
+
+
+async def losses(browser: str) -> None:
+    """A page goes on without a graphics card, says so, and shows all edits once it is back."""
+    scene = meshed(tree_scene())
+    async with shown(scene, (700, 600), browser=browser) as page:
+        row = (await state(page))["decals"][3] | {"radius": 0.3, "tint": [1, 0, 0]}
+        await page.evaluate(LOSE)
+        line = page.locator("[role=status]")
+        assert "graphics card" in await line.inner_text()
+        assert await page.evaluate("viewer.pick(0, 0)") == {"number": -1, "surface": None}
+        await page.mouse.move(200, 100)
+        await page.mouse.down()
+        await page.mouse.up()
+        await page.evaluate("(row) => viewer.set({ decals: { 3: row } })", row)
+        assert "graphics card" in await line.inner_text()
+        await page.evaluate("window.lost.restoreContext()")
+        await page.wait_for_function("() => !viewer.painter.gl.isContextLost() && viewer.sample > 0")
+        assert await line.inner_text() == ""
+        radii, tints = scene.decals.radii.copy(), scene.decals.tints.copy()
+        radii[3], tints[3] = row["radius"], row["tint"]
+        changed = scene.replace(decals=scene.decals.replace(radii=radii, tints=tints))
+        assert share_of_equal(await pixels(page), changed) >= EQUAL
+        assert await page.evaluate("viewer.pick(0, 0).number") >= 0
+
+        before = (await state(page))["decals"]
+        await page.evaluate("viewer.set({ decals: { 3: { ...viewer.get().decals[3], opacity: 2 } } })")
+        assert (await state(page))["decals"] == before
+        assert await line.inner_text() == "Decal 3 stays: no scene can have its opacity."
+        await page.evaluate("viewer.set({ mode: 'elastic', stiffness: 64 })")
+        assert await line.inner_text() == ""
+        slider = page.locator("[name=stiffness]")
+        await state(page)
+        assert await slider.evaluate("input => [input.value, input.max]") == ["6", "6"]
+        assert await slider.get_attribute("aria-valuetext") == "64"
+        await slider.focus()
+        await page.keyboard.press("Home")
+        assert (await state(page))["stiffness"] == 1
+
+
 async def touch(browser: str) -> None:
     """One finger drags a decal or turns the model; two fingers zoom and move the picture."""
     scene = meshed(tree_scene())
@@ -649,6 +695,7 @@ CHECKS = {
     "use": use,
     "touch": touch,
     "mounts": mounts,
+    "losses": losses,
     "drags": drags,
     "refusals": refusals,
 }

@@ -53,7 +53,7 @@ def test_in_a_browser(check: str) -> None:
     assert "done" in run_module("tests.frontends.in_browser", check)
 
 
-@pytest.mark.parametrize("check", ["picture", "use", "touch", "mounts", "drags", "refusals"])
+@pytest.mark.parametrize("check", ["picture", "use", "touch", "mounts", "losses", "drags", "refusals"])
 def test_html_pages(check: str) -> None:
     require("playwright", "axe_playwright_python")
     assert "done" in run_module("tests.frontends.in_html_page", check)

@@ -78,8 +78,7 @@ export class Camera {
   // Move the picture by parts of half its sides.
   pan(x, y, aspect) {
     const [right, up] = this.frame(aspect);
-    const away = length(subtract(this.position, this.target));
-    const move = scaled(add(scaled(right, x), scaled(up, y)), -away);
+    const move = scaled(add(scaled(right, x), scaled(up, y)), -length(subtract(this.position, this.target)));
     this.position = add(this.position, move);
     this.target = add(this.target, move);
   }

@@ -3,8 +3,7 @@ import { copyLink, save } from "./files.mjs";
 import { turned } from "./vectors.mjs";
 
 const TURN = Math.PI / 12; // of a decal, at a press
-const SCALE = 1.1;
-const ZOOM = 1.1; // of the camera, at a press
+const SCALE = 1.1; // of a decal and of the camera's distance, at a press
 
 // What buttons and keys do, by the names of the buttons and of the keys without one.
 const COMMANDS = {
@@ -26,12 +25,12 @@ const COMMANDS = {
   arrowright: (viewer) => viewer.arrow(1, 0),
   arrowup: (viewer) => viewer.arrow(0, 1),
   arrowdown: (viewer) => viewer.arrow(0, -1),
-  "+": (viewer) => viewer.moveCamera("zoom", 1 / ZOOM),
-  "-": (viewer) => viewer.moveCamera("zoom", ZOOM),
+  "+": (viewer) => viewer.moveCamera("zoom", 1 / SCALE),
+  "-": (viewer) => viewer.moveCamera("zoom", SCALE),
 };
 
 export class Controls {
-  constructor(root, { markup, controls }, viewer) {
+  constructor(root, { markup, controls, rules }, viewer) {
     root.classList.add("decal-viewer");
     root.innerHTML = markup;
     const [canvas, bar, status] = root.children;
@@ -39,7 +38,9 @@ export class Controls {
     Object.assign(this, { root, canvas, status, mode, stiffness, buttons: bar.querySelectorAll("button") });
     bar.hidden = !controls;
     bar.addEventListener("click", ({ target }) => COMMANDS[target.name]?.(viewer));
-    bar.addEventListener("input", ({ target }) => viewer.set({ [target.name]: target.value }));
+    stiffness.max = Math.log2(rules.maxStiffness); // equal steps double it
+    const chosen = ({ name, value }) => ({ [name]: name === "stiffness" ? 2 ** value : value });
+    bar.addEventListener("input", ({ target }) => viewer.set(chosen(target)));
     for (const part of [canvas, bar]) part.addEventListener("keydown", (event) => this.press(event, viewer));
   }
 
@@ -57,7 +58,8 @@ export class Controls {
   // Show the state, and what can be done.
   show({ mode, stiffness, selected, history }) {
     this.mode.value = mode;
-    Object.assign(this.stiffness, { value: stiffness, disabled: mode !== "elastic" });
+    Object.assign(this.stiffness, { value: Math.log2(stiffness), disabled: mode !== "elastic" });
+    this.stiffness.ariaValueText = stiffness.toPrecision(2);
     const can = { undo: history.at > 0, redo: history.at + 1 < history.states.length, change: selected >= 0 };
     for (const button of this.buttons) button.disabled = can[button.dataset.needs] === false;
     if (this.root.querySelector("button:disabled:focus")) this.canvas.focus(); // else keys reach nothing

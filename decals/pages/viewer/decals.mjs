@@ -5,20 +5,21 @@ import { length, subtract, tangential, unit } from "./vectors.mjs";
 
 const linear = (c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
 
-// A decal with a normal and a tangent that are perpendicular and of length 1.
+// A decal with a normal and a tangent that are perpendicular and of length 1; they are no numbers if that cannot be.
 export function framed({ normal = [], tangent = [], ...row }) {
   const up = unit(normal);
   return { ...row, normal: up, tangent: tangential(tangent, up) };
 }
 
-// True for a decal that a scene file may have, with a frame of unit vectors.
-export function isDecal({ position, normal, tangent, radius, image = 0 }, rules, images) {
-  const { maxCoordinate, minRadius } = rules;
-  const isWithin = (x, least) => Number.isFinite(x) && x >= least && x <= maxCoordinate;
-  const isVector = (v) => v?.length === 3 && v.every((x) => isWithin(x, -maxCoordinate));
-  const isUnit = (v) => isVector(v) && Math.abs(length(v) - 1) < 1e-6;
-  const isImage = Number.isInteger(image) && image >= -1 && image < images;
-  return isVector(position) && isUnit(normal) && isUnit(tangent) && isWithin(radius, minRadius) && isImage;
+// The name of the first value of a decal, with a frame, that a scene file cannot have; undefined if there is none.
+export function wrongValue(row, { values, choices }) {
+  const isRight = (name, value) => {
+    if (Object.hasOwn(choices, name)) return choices[name].includes(value);
+    const { test, count, low, high, zero } = values[name] ?? {};
+    const isWithin = (x) => Number[test]?.(x) && ((low <= x && x <= high) || (zero && x === 0));
+    return count ? Array.isArray(value) && value.length === count && value.every(isWithin) : isWithin(value);
+  };
+  return Object.keys({ position: 0, radius: 0, ...row }).find((name) => !isRight(name, row[name]));
 }
 
 export class DecalSet {

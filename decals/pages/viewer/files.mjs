@@ -21,10 +21,8 @@ export function copyLink({ controls, ...state }) {
 export function sceneText({ header: { scene }, arrays, mode, stiffness, camera, home, decals }) {
   const text = (name) =>
     btoa(Array.from(new Uint8Array(arrays[name].buffer), (byte) => String.fromCharCode(byte)).join(""));
-  const objects = scene.objects.map((object, i) => {
-    if (object.type !== "mesh") return object;
-    return { ...object, data: { vertices: text(`vertices of ${i}`), faces: text(`faces of ${i}`) } };
-  });
+  const data = (i) => ({ vertices: text(`vertices of ${i}`), faces: text(`faces of ${i}`) });
+  const objects = scene.objects.map((item, i) => (item.type === "mesh" ? { ...item, data: data(i) } : item));
   const drawing = { ...scene.drawing, contact: mode, stiffness };
   const moved = camera.position !== home.position && { ...camera.pose, fit: undefined };
   const rows = decals.rows.filter((row) => row);

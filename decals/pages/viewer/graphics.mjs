@@ -27,9 +27,8 @@ export class Program {
     let unit = 0;
     for (const [name, value] of Object.entries(values)) {
       const place = gl.getUniformLocation(program, name);
-      if (place && Array.isArray(value)) {
-        gl[`uniform${value[0]}`](place, ...value.slice(1));
-      } else if (place) {
+      if (Array.isArray(value)) gl[`uniform${value[0]}`](place, ...value.slice(1));
+      else if (place) {
         gl.activeTexture(gl.TEXTURE0 + unit);
         gl.bindTexture(textures[value].target, textures[value].texture);
         gl.uniform1i(place, unit++);
@@ -59,26 +58,24 @@ export function makeTexture(gl, description, levels = [null], texture = gl.creat
   return { target, texture };
 }
 
-// Bring `Texels` to the graphics card, all or the rows that changed, and return their texture.
-export function uploaded(gl, texels, description) {
-  const { array, changes, onCard } = texels;
-  const numbers = ROW * texels.width;
-  const rows = array.length / numbers;
-  if (onCard?.array !== array) {
-    if (rows > gl.getParameter(gl.MAX_TEXTURE_SIZE))
-      throw new Error("this device has no room for the decals");
-    const made = makeTexture(gl, { ...description, size: [ROW, rows] }, [array], onCard?.texture);
-    texels.onCard = { ...made, array };
-  } else {
-    const inMemory = description.format.slice(1).map((word) => gl[word]);
-    gl.bindTexture(gl.TEXTURE_2D, onCard.texture);
-    for (const row of changes) {
-      const part = array.subarray(row * numbers, (row + 1) * numbers);
-      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, ROW, 1, ...inMemory, part);
-    }
-  }
+// Bring `Texels` to the graphics card, all or the rows that changed, and return their texture, which may be there.
+export function uploaded(gl, { array, changes, width }, description, onCard) {
+  const numbers = ROW * width;
+  const size = [ROW, array.length / numbers];
+  const rows = [...changes];
   changes.clear();
-  return texels.onCard;
+  if (onCard?.array !== array) {
+    if (size[1] > gl.getParameter(gl.MAX_TEXTURE_SIZE))
+      throw new Error("this device has no room for the decals");
+    return { ...makeTexture(gl, { ...description, size }, [array], onCard?.texture), array };
+  }
+  const inMemory = description.format.slice(1).map((word) => gl[word]);
+  gl.bindTexture(gl.TEXTURE_2D, onCard.texture);
+  for (const row of rows) {
+    const part = array.subarray(row * numbers, (row + 1) * numbers);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, ROW, 1, ...inMemory, part);
+  }
+  return onCard;
 }
 
 // Make a target of drawing with textures and a depth buffer; or give one another size.

@@ -7,8 +7,7 @@ export class History {
 
   // Change decals at once, and return the step; one that is given goes on, as in a drag, unless another came between.
   change(pairs, last) {
-    const rows = this.decals.rows.slice();
-    for (const [number, row] of pairs) rows[number] = row;
+    const rows = Object.assign(this.decals.rows.slice(), Object.fromEntries(pairs));
     const steps = last && last === this.states[this.at] ? 0 : 1;
     this.states.splice(this.at + steps, Infinity, rows);
     this.go(steps);

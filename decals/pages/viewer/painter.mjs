@@ -88,8 +88,10 @@ export class Painter {
   // Draw over a whole target what decals and light make of the surfaces, or what lies at a place, from −1 to 1.
   paint(kind, { framebuffer, size }, { mode, decals, stiffness, selected }, place = [0, 0]) {
     const { gl, header, textures } = this;
-    for (const [name, texels] of Object.entries(decals.texels))
-      textures[`decal_${name}`] = uploaded(gl, texels, header.targets[`decal_${name}`]);
+    for (const [ending, texels] of Object.entries(decals.texels)) {
+      const name = `decal_${ending}`;
+      textures[name] = uploaded(gl, texels, header.targets[name], textures[name]);
+    }
     const { position = [0, 0, 0], radius = 0 } = decals.rows[selected] ?? {};
     const values = {
       ...header.uniforms,
@@ -140,6 +142,6 @@ export class Painter {
     gl.readPixels(0, 0, 2, 1, gl.RGBA, gl.FLOAT, numbers);
     const [x, y, z, number, ...normal] = numbers;
     const surface = normal.pop() > 0 ? { position: [x, y, z], normal } : null;
-    return { number, surface };
+    return { number: surface ? number : -1, surface };
   }
 }

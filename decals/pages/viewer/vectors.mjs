@@ -5,7 +5,7 @@ export const subtract = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 export const scaled = (a, k) => [a[0] * k, a[1] * k, a[2] * k];
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const length = (a) => Math.hypot(a[0], a[1], a[2]);
-export const unit = (a) => scaled(a, 1 / (length(a) || 1));
+export const unit = (a) => scaled(a, 1 / length(a)); // no numbers for a vector of length 0
 export const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
 
 // A vector turned about a unit axis, counter-clockwise (Rodrigues).
@@ -23,6 +23,4 @@ export function carried(v, from, to) {
 }
 
 // The part of a vector across a unit normal, at length 1.
-export function tangential(v, normal) {
-  return unit(subtract(v, scaled(normal, dot(v, normal))));
-}
+export const tangential = (v, normal) => unit(subtract(v, scaled(normal, dot(v, normal))));

@@ -1,7 +1,7 @@
 // A page's viewer: the model with its decals, which are picked, dragged, turned, scaled, added and deleted.
 import { Camera } from "./camera.mjs";
 import { Controls } from "./controls.mjs";
-import { DecalSet, framed, isDecal } from "./decals.mjs";
+import { DecalSet, framed, wrongValue } from "./decals.mjs";
 import { History } from "./history.mjs";
 import { read, written } from "./link.mjs";
 import { unpacked } from "./packing.mjs";
@@ -14,12 +14,13 @@ const ROUNDS = 4; // in which the closest surface is found
 const NARROW = 1; // angle of view, in degrees, of a look along one ray
 const STEP = 0.25; // of a decal, in radii, at a press
 const ORBIT = Math.PI / 24; // of the model, at a press
+const LOST = "The graphics card has let this picture go. It returns as soon as the browser allows it.";
 
 class Viewer {
   constructor(root, { header, arrays }, options) {
     const { mode, stiffness, scene, rules } = header;
-    Object.assign(this, { header, arrays, mode, stiffness, selected: -1, listeners: new Map(), sample: 0 });
-    this.originals = scene.decals;
+    Object.assign(this, { header, arrays, mode, stiffness, originals: scene.decals });
+    Object.assign(this, { selected: -1, sample: 0, listeners: new Map() });
     this.controls = new Controls(root, { ...header, ...options }, this);
     this.canvas = this.controls.canvas;
     this.painter = new Painter(this.canvas, header, arrays);
@@ -30,6 +31,8 @@ class Viewer {
     this.pointer = new Pointer(this);
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.canvas);
+    for (const change of ["lost", "restored"])
+      this.canvas.addEventListener(`webglcontext${change}`, (event) => this.renew(event));
   }
 
   // -- the five functions ---------------------------------------------------------------------------------
@@ -64,19 +67,24 @@ class Viewer {
 
   // -- the picture ----------------------------------------------------------------------------------------
 
-  get aspect() {
-    return this.canvas.width / this.canvas.height;
-  }
-
   resize() {
     const { canvas } = this;
     canvas.width = Math.max(1, Math.round(canvas.clientWidth * devicePixelRatio));
     canvas.height = Math.max(1, Math.round(canvas.clientHeight * devicePixelRatio));
+    this.aspect = canvas.width / canvas.height;
+    this.changed("view");
+  }
+
+  // The browser has taken all textures away, as when the graphics card is reset, or allows new ones.
+  renew(event) {
+    event.preventDefault(); // without that it never allows any
+    if (!this.painter.gl.isContextLost()) this.painter = new Painter(this.canvas, this.header, this.arrays);
     this.changed("view");
   }
 
   changed(event) {
-    this.controls.say("");
+    this.controls.say(this.painter.gl.isContextLost() ? LOST : (this.refused ?? ""));
+    if (event === "view") this.refused = "";
     for (const call of this.listeners.get(event) ?? []) call(this.get());
     this.sample = 0;
     this.request();
@@ -90,7 +98,7 @@ class Viewer {
   // Draw the next sample of the picture; further ones follow, each after the one before it, until it changes.
   refine() {
     if (this.sample > 0 && this.painter.isBusy) this.request();
-    else this.draw();
+    else if (!this.painter.gl.isContextLost()) this.draw();
   }
 
   draw() {
@@ -109,27 +117,24 @@ class Viewer {
   }
 
   // The visible surface that is closest to a point beside it: it lies there along the normal.
-  closestTo(point) {
-    let [found, place] = [null, point];
-    for (let round = 0; round < ROUNDS; round++) {
-      const seen = this.camera.seen(place, this.aspect);
-      const hit = seen && this.pick(...seen).surface;
-      if (!hit) break;
-      found = hit;
-      place = add(point, scaled(hit.normal, dot(subtract(hit.position, point), hit.normal)));
-    }
-    return found;
+  closestTo(point, place = point, rounds = ROUNDS, found = null) {
+    const seen = rounds && this.camera.seen(place, this.aspect);
+    const hit = seen && this.pick(...seen).surface;
+    if (!hit) return found;
+    const above = scaled(hit.normal, dot(subtract(hit.position, point), hit.normal));
+    return this.closestTo(point, add(point, above), rounds - 1, hit);
   }
 
   // -- edits ----------------------------------------------------------------------------------------------
 
-  // Change decals, with normals and tangents made perpendicular and of length 1; others than valid ones stay. What is
-  // returned continues the step.
+  // Change decals, with normals and tangents made perpendicular and of length 1; decals with a value that a scene cannot
+  // have stay, and a line says so. What is returned continues the step.
   edit(pairs, step) {
-    const { rules, images } = this.header;
-    const changes = pairs
-      .map(([number, row]) => [number, row && framed(row)])
-      .filter(([number, row]) => number >>> 0 === number && (!row || isDecal(row, rules, images)));
+    const given = pairs.map(([number, row]) => [number, row && framed(row)]);
+    const wrong = ([number, row]) => row && wrongValue({ ...row, number }, this.header.rules);
+    const refused = given.find(wrong);
+    this.refused = refused && `Decal ${refused[0]} stays: no scene can have its ${wrong(refused)}.`;
+    const changes = given.filter((pair) => !wrong(pair));
     return changes.length ? this.history.change(changes, step) : step;
   }
 

@@ -395,8 +395,8 @@ def test_vectors_are_carried_by_the_smallest_turn() -> None:
 
 
 @needs_node
-def test_decals_of_links_are_those_that_files_may_have() -> None:
-    """With infinite numbers the loops of the index would not end."""
+def test_wrong_values_of_decals_are_named() -> None:
+    """With infinite numbers the loops of the index would not end; `load_scene` refuses the others."""
     good: dict[str, Any] = {
         "position": [1, 2, 3],
         "normal": [0, 0, 1],
@@ -404,27 +404,54 @@ def test_decals_of_links_are_those_that_files_may_have() -> None:
         "radius": 0.5,
         "image": 1,
     }
+    right: list[dict[str, Any]] = [
+        {"image": -1},
+        {"number": 7},
+        {"tint": [0, 0.5, 1], "opacity": 0.25, "layer": -3, "interaction": "overlap", "spill": True},
+        {"receivers": "hull", "fade_angle": 0, "fade_depth": 0.5},
+    ]
     wrong: list[dict[str, Any]] = [
         {"position": [1e300, 0, 0]},
         {"position": [0, 0]},
+        {"position": ["1", "2", "3"]},
         {"normal": [0, 0, 0]},
-        {"tangent": [0, 0, 0]},
+        {"normal": [1e-320, 0, 0]},
         {"radius": 1e300},
         {"radius": 0},
+        {"radius": "0.5"},
         {"image": 2},
         {"image": -2},
         {"image": 0.5},
-        {"radius": "0.5"},
-        {"position": ["1", "2", "3"]},
+        {"number": -1},
+        {"number": 4e9},
+        {"tint": [0, 0, 2]},
+        {"tint": "red"},
+        {"tint": None},
+        {"opacity": 1.5},
+        {"opacity": None},
+        {"layer": 0.5},
+        {"layer": 1e9},
+        {"interaction": "constructor"},
+        {"spill": 1},
+        {"receivers": "lid"},
+        {"fade_angle": 0.5},
+        {"fade_depth": -1},
+        {"colour": "red"},
+        {"constructor": 1},
     ]
-    lacking = [{name: good[name] for name in good if name != left} for left in list(good)[:4]]
+    lacking = ["position", "normal", "radius"]
     script = """
-    const { framed, isDecal } = await import("./decals.mjs");
-    console.log(JSON.stringify(data.rows.map((row) => isDecal(framed(row), data.rules, 2))));
+    const { framed, wrongValue } = await import("./decals.mjs");
+    console.log(JSON.stringify(data.rows.map((row) => wrongValue(framed(row), data.rules) ?? null)));
     """
-    rows = [good, {**good, "image": -1}, *({**good, **change} for change in wrong), *lacking, {}]
-    rules = record_rules([""], Form(decals.Contact.ELASTIC))
-    assert run_node(script, {"rows": rows, "rules": rules}) == [True, True, *[False] * (len(rows) - 2)]
+    rows = [good, *({**good, **change} for change in [*right, *wrong])]
+    rows += [{name: good[name] for name in good if name != left} for left in lacking]
+    rows += [{**good, "tangent": [0, 0, 0]}]
+    rules = record_rules(["", "hull"], Form(decals.Contact.ELASTIC), 2)
+    expected = (
+        [None] * (1 + len(right)) + [name for change in wrong for name in change] + lacking + ["tangent"]
+    )
+    assert run_node(script, {"rows": rows, "rules": rules}) == expected
 
 
 @needs_node
@@ -443,7 +470,7 @@ def test_the_page_finds_nested_decals(seed: int) -> None:
     nested = [
         [bool(has_nested(index_on(given[[a, b]]), 2)) for b in range(count) if b != a] for a in range(count)
     ]
-    rules = record_rules([""], Form(decals.Contact.ELASTIC)) | {"index": index_rules(DecalIndex.of(given))}
+    rules = record_rules([""], Form(decals.Contact.ELASTIC), 1) | {"index": index_rules(DecalIndex.of(given))}
     script = """
     const { DecalSet } = await import("./decals.mjs");
     const set = new DecalSet(data.rows, data.rules);
@@ -461,7 +488,7 @@ def test_an_edit_takes_the_full_shaders_where_it_must() -> None:
         positions=[[0, 0, 0], [5, 0, 0]], normals=[[0, 0, 1]] * 2, tangents=[[1, 0, 0]] * 2, radii=[1, 1]
     )
     rows = rows_of(given)
-    rules = record_rules([""], Form(decals.Contact.ELASTIC)) | {"index": index_rules(DecalIndex.of(given))}
+    rules = record_rules([""], Form(decals.Contact.ELASTIC), 1) | {"index": index_rules(DecalIndex.of(given))}
     edits = {
         "moved": {"position": [4, 0, 0]},
         "nested": {"position": [5, 0, 0], "radius": 0.1},

@@ -95,7 +95,11 @@ def page_index(rows: list[Any], rules: dict[str, Any], edits: list[Any]) -> tupl
     """Return the cells, the levels and the records of the index that a page has after edits."""
     found = run_node(
         SCRIPT,
-        {"rows": rows, "edits": edits, "rules": record_rules([""], Form(Contact.ELASTIC)) | {"index": rules}},
+        {
+            "rows": rows,
+            "edits": edits,
+            "rules": record_rules([""], Form(Contact.ELASTIC), 1) | {"index": rules},
+        },
     )
     levels = np.array(found["levels"], np.float32).reshape(-1, 4)
     listed = [(*row[:3], row[3:]) for row in found["cells"]]
