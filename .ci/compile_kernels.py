@@ -38,8 +38,8 @@ def compile_all(source: Path, cache: Path) -> None:
     os.environ["WARP_CACHE_PATH"] = str(cache)
     import warp as wp
 
+    from blobtree import GradientBlend
     from blobtree.device import start_warp
-    from blobtree.formulas.gradient_blends import GRADIENT_BLEND
     from blobtree.tape.instruction_set import BUILT_IN, instruction_set_for, library
 
     start_warp()
@@ -49,7 +49,9 @@ def compile_all(source: Path, cache: Path) -> None:
         for value in vars(importlib.import_module(name)).values()
         if isinstance(value, wp.Kernel) and value.module.name == name
     ]
-    with_gradients = [instruction_set_for((*base.rows, GRADIENT_BLEND)) for base in (BUILT_IN, library())]
+    with_gradients = [
+        instruction_set_for((*base.rows, GradientBlend.operator)) for base in (BUILT_IN, library())
+    ]
     instances = [library().kernel_for(kernel) for kernel in kernels]
     instances += [
         blends.kernel_for(kernel)

@@ -1,3 +1,4 @@
+from . import par
 from ._version import __version__
 from .custom.field import CustomField, define_field
 from .custom.operator import CustomCombination, define_operator
@@ -68,6 +69,7 @@ from .nodes.numeric_parameters import (
     numeric_values,
     with_numeric_values,
 )
+from .nodes.operator import Operator
 from .nodes.parameter_gradient import ParameterGradient
 from .nodes.primitives import Box, Cone, Disc, Point, Segment, Torus
 from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
@@ -142,6 +144,7 @@ __all__ = [
     "NoiseWarp",
     "NumericParameter",
     "Offset",
+    "Operator",
     "ParameterGradient",
     "Point",
     "Polygon",
@@ -198,6 +201,7 @@ __all__ = [
     "load",
     "numeric_parameters",
     "numeric_values",
+    "par",
     "polygonize",
     "polygonize_batch",
     "raycast_batch",

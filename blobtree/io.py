@@ -20,19 +20,19 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Union, cast, get_type_
 
 import msgspec
 
-from blobtree.custom.definition import CUSTOM_KINDS
 from blobtree.custom.field import CustomField
-from blobtree.custom.operator import CustomCombination
 from blobtree.custom.skeleton import CustomPrimitive
 from blobtree.custom.warp import CustomWarp
 from blobtree.declare.falloff import Falloff
 from blobtree.declare.parameters import OPTIONAL, fields_of
+from blobtree.declare.registry import CUSTOM_KINDS
 from blobtree.errors import ImplicitDecalsError, InvalidFile, UnusableFile
 from blobtree.files import write_atomically
 from blobtree.json_errors import json_reason
 from blobtree.nodes.attributes import Attributes, AttributeValue
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.node import Node
+from blobtree.nodes.operator import Operator
 from blobtree.nodes.values import left_out, operand_names
 from blobtree.tape.model import checked_tree
 from blobtree.tape.program import postorder
@@ -110,9 +110,7 @@ CUSTOM_RECORDS: dict[Any, list[type[NodeRecord]]] = {
         for tag in ("custom_skeleton", "own skeleton")
     ],
     CustomField: [_record_type(CustomField, "custom_field", CustomRecord)],
-    CustomCombination: [
-        _record_type(CustomCombination, tag, CustomRecord) for tag in ("custom_operator", "own operator")
-    ],
+    Operator: [_record_type(Operator, tag, CustomRecord) for tag in ("custom_operator", "own operator")],
     CustomWarp: [_record_type(CustomWarp, "custom_warp", CustomRecord)],
 }
 """Records of custom nodes by the bases of their classes: those of today, then those of older files."""

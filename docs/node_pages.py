@@ -14,8 +14,9 @@ from blobtree.declare.claims import Support
 from blobtree.declare.parameters import OPTIONAL, describe, fields_of, parameters_of
 from blobtree.nodes.convolution import ConvolutionPrimitive
 from blobtree.nodes.kinds import NODE_KINDS
+from blobtree.nodes.operator import Combination
 from blobtree.nodes.primitives import Primitive, Profile
-from blobtree.nodes.tree import Combination, Macro
+from blobtree.nodes.tree import Macro
 
 DOCS = Path(__file__).parent
 CLASSES = {kind.__name__: kind for kind in NODE_KINDS.values()}

@@ -12,8 +12,8 @@ EXTRAS: dict[str, str] = {
     "blobtree.declare": "checks operator_checks",
     "blobtree.derivatives": "*",
     "blobtree.formulas": """
-        blends contact convolution curve_skeletons deformations direct_fields falloffs flat_skeletons
-        gradient_blends noise solid_skeletons volumes
+        contact convolution curve_skeletons deformations direct_fields falloffs flat_skeletons noise
+        solid_skeletons volumes
         """,
     "blobtree.meshing": """
         adaptive adaptive_cell_kernels adaptive_cells adaptive_kernels adaptive_mesh batch

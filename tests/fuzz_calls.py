@@ -27,9 +27,7 @@ from tests.decals.editing.scenes import scene
 
 Calls = dict[str, tuple[Callable[..., object], dict[str, Any]]]
 
-CUSTOM = (
-    blobtree.CustomCombination, blobtree.CustomField, blobtree.CustomPrimitive, blobtree.CustomWarp,
-)  # fmt: skip
+CUSTOM = blobtree.CustomField, blobtree.CustomPrimitive, blobtree.CustomWarp
 
 
 def _report(progress: Any, cancel: Any) -> None:
@@ -42,8 +40,8 @@ def _report(progress: Any, cancel: Any) -> None:
 UNCALLED = {
     "Actions", "Cancel", "ContactLaw", "ContactSurface", "Curvatures", "CustomCombination",
     "CustomField", "CustomPrimitive", "CustomWarp", "Document", "EditSession", "Falloff", "FieldGrid",
-    "FieldPrimitive", "Fit", "Hits", "Node", "NumericParameter", "ParameterGradient", "PointerTools",
-    "Progress", "SignedDistances", "Tape", "UndoEntry", "edit", "show",
+    "FieldPrimitive", "Fit", "Hits", "Node", "NumericParameter", "Operator", "ParameterGradient",
+    "PointerTools", "Progress", "SignedDistances", "Tape", "UndoEntry", "edit", "show",
 }  # fmt: skip
 """Types that users only get from functions, extend, or start for a whole session; and windows."""
 

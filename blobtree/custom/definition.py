@@ -1,6 +1,5 @@
 """Definitions of custom kinds: parameters and claims read from typed functions, and a registry by name."""
 
-import copyreg
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import make_dataclass
@@ -11,9 +10,10 @@ import warp as wp
 
 from blobtree.declare.formula import Formula, class_name, formula_of, spelled
 from blobtree.declare.parameters import Parameter, Quantity
-from blobtree.declare.registry import Definitions
+from blobtree.declare.registry import CUSTOM_KINDS as CUSTOM_KINDS
+from blobtree.declare.registry import CustomKind
+from blobtree.declare.registry import unpickled_kind as _unpickled  # noqa: F401  (old pickles name it here)
 from blobtree.nodes.node import Node
-from blobtree.nodes.tree import AssociativeCombination
 
 _SIZES: dict[Any, int] = {
     wp.float32: 1,
@@ -188,19 +188,10 @@ def node_class(
     kind: str, source: Formula, fields: list[Any], base: type[Node], namespace: dict[str, Any]
 ) -> Any:
     """Return a node class with these fields, in the module of the function."""
-    inherits_init = issubclass(base, AssociativeCombination)
-    options: dict[str, Any] = {"frozen": True, "eq": False, "repr": False, "init": not inherits_init}
+    options: dict[str, Any] = {"frozen": True, "eq": False, "repr": False}
     node_type = make_dataclass(class_name(kind), fields, bases=(base,), namespace=namespace, **options)
     node_type.__module__ = source.python.__module__
     return node_type
-
-
-class CustomKind(type):
-    """The type of node classes that definitions make."""
-
-    kind: str
-    digest: str
-    parameters: tuple[Any, ...]
 
 
 class CustomNode(metaclass=CustomKind):
@@ -219,13 +210,6 @@ class CustomNode(metaclass=CustomKind):
     def values(self) -> dict[str, Any]:
         """The function's parameters by name."""
         return {parameter.name: getattr(self, parameter.name) for parameter in self.parameters}
-
-
-CUSTOM_KINDS: Definitions[CustomKind] = Definitions(
-    "custom kind",
-    "define_skeleton, define_operator, define_field or define_warp for it (on the command line: --define)",
-)
-"""All kinds that are defined in this process, in the order of their definition."""
 
 
 def defined_kind(
@@ -253,14 +237,3 @@ def defined_kind(
     node: Any = node_class(kind, source, [*declared, *fields], base, namespace)
     CUSTOM_KINDS[kind] = node
     return node
-
-
-def _unpickled(name: str, module: str) -> CustomKind:
-    return CUSTOM_KINDS.unpickled(name, module)
-
-
-def _pickled(kind: CustomKind) -> tuple[Any, ...]:
-    return _unpickled, (kind.kind, kind.__module__)
-
-
-copyreg.pickle(CustomKind, _pickled)

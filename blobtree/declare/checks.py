@@ -12,11 +12,14 @@ import numpy as np
 
 from blobtree._typing import Float64Array
 from blobtree.declare.formula import Formula, result_of, shown
-from blobtree.declare.parameters import Parameter
+from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.transpile.python import Precision, vector
 
 TRIAL_SPREAD = 2.0
 """Distance from their limits, or from 0, up to which numbers are drawn for trials."""
+
+LEAST_LENGTH = 1e-3
+"""Least length that is drawn for trials."""
 
 SEED = 20
 TRIALS = 14
@@ -45,6 +48,8 @@ def trial_value(parameter: Parameter, rng: np.random.Generator, trial: int) -> A
 
 def _trial_number(parameter: Parameter, rng: np.random.Generator, trial: int) -> float | int:
     low, high = parameter.low, parameter.high
+    if parameter.quantity is Quantity.LENGTH:
+        low = max(low, LEAST_LENGTH)
     low = low if low > -math.inf else min(high, TRIAL_SPREAD) - 2.0 * TRIAL_SPREAD
     high = high if high < math.inf else max(low, -TRIAL_SPREAD) + 2.0 * TRIAL_SPREAD
     near = min(high, low + TRIAL_SPREAD)

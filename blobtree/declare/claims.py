@@ -12,7 +12,10 @@ Two more prune the operands of a cell; a = (smallest, largest) value of the oper
 * `range(a, b, parameter) -> (smallest, largest)` of F;
 * `choice(a, b) -> KEEP_…`: the operands on which F depends there.
 
-An operator with several parameters reads them from the tape, which its functions then take too.
+An operator with several parameters reads them from the tape, which its functions then take too. One that
+reads gradients takes more behind that. `partials` gets the directions ∇a and ∇b, and returns ∂F/∂a and ∂F/∂b
+for fixed directions. `slope` gets a bound on the speed at which the angle between the directions changes, in
+radians per unit; it is `UNBOUNDED` where none is known.
 """
 
 from dataclasses import dataclass
@@ -149,7 +152,7 @@ class OperatorRow:
     signed: bool = False
     """Operands below 0 act as they are; those of other operators are raised to 0."""
     gradients: bool = False
-    """`partials` also takes ∇a and ∇b, and `slope` a bound on their turning; see `gradient_blends`."""
+    """`partials` also takes ∇a and ∇b, and `slope` a bound on their turning."""
     digest: str = ""
     """Digest of the sources of a custom operator."""
 

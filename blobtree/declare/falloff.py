@@ -85,6 +85,8 @@ class Falloff:
         cls._formulas = declared_formulas(cls, cls.name, {"value": wp.float32, "slope": wp.float32})
         if "value" not in cls._formulas:
             raise InvalidDefinition(f"{cls.__qualname__}: expected a falloff with the formula `value`")
+        for name, declared in cls._formulas.items():
+            setattr(cls, name, declared.function)
         falloff = object.__new__(cls)
         if is_own(cls):
             library_rows(falloff)

@@ -73,7 +73,7 @@ class Declared:
         self.function = function
 
 
-def formula(function: Callable[..., Any]) -> Any:
+def formula(function: Callable[..., Any] | Formula) -> Any:
     """Mark a function in the body of a kind as one of its formulas: a static, typed function.
 
     Examples
@@ -112,7 +112,7 @@ def tag_of(kind: type) -> str:
 
 
 def declared_formulas(kind: type, tag: str, results: Mapping[str, Any]) -> dict[str, Formula]:
-    """Return the formulas in the body of a class by name, and put their typed functions there.
+    """Take the formulas out of the body of a class, and return them by name.
 
     `results` has the type of the result of each formula that the sort of the kind knows.
 
@@ -136,7 +136,7 @@ def declared_formulas(kind: type, tag: str, results: Mapping[str, Any]) -> dict[
                 formulas[name] = _own_formula(declared.function, f"{tag}_{name}")
             else:
                 formulas[name] = formula_of(declared.function, returns=results[name])
-            setattr(kind, name, formulas[name].function)
+            delattr(kind, name)
     return formulas
 
 
@@ -148,7 +148,7 @@ def _own_formula(python: FunctionType, name: str) -> Formula:
 
 
 def formula_of(function: Any, *, returns: Any) -> Formula:
-    """Read a user's function without compiling it.
+    """Read a user's function without compiling it; one that has been read is returned as it is.
 
     Raises
     ------
@@ -157,6 +157,8 @@ def formula_of(function: Any, *, returns: Any) -> Formula:
     UntranslatableFunction
         It leaves the subset of Python that Warp and GLSL share; the message names file and line.
     """
+    if isinstance(function, Formula):
+        return function
     python = python_function(function)
     _require_source(python)
     hints = _hints(python)
@@ -199,9 +201,12 @@ def class_name(kind: str) -> str:
 def generated(
     kind: str, digest: str, part: str, template: str, scope: dict[str, Any], **texts: str
 ) -> wp.Function:
-    """Return the typed function of a template, a part of a custom kind; `scope` has what it calls."""
-    name = f"custom_{kind}_{part}_{digest}"
-    known = {"wp": wp, **scope, "__name__": f"blobtree.custom.{name}"}
+    """Return the typed function of a template, a part of a kind; `scope` has what it calls.
+
+    Kinds of this package have no digest.
+    """
+    name = f"custom_{kind}_{part}_{digest}" if digest else f"made_{kind}_{part}"
+    known = {"wp": wp, "__name__": f"blobtree.custom.{name}", **scope}
     return warp_function(defined(name, template.format(name=name, **texts), known))
 
 

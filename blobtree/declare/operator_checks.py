@@ -1,6 +1,6 @@
 """Checks of custom operators: samples of operands that may contradict a definition."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import product
@@ -10,8 +10,8 @@ import numpy as np
 
 from blobtree._typing import Float64Array
 from blobtree.declare.checks import SEED, SLOPE_TOLERANCE, VALUE_TOLERANCE, trial_value
-from blobtree.declare.claims import Like
 from blobtree.declare.formula import Formula, result_of, shown
+from blobtree.declare.operator import Claims, OperatorFormulas
 from blobtree.declare.parameters import Parameter
 from blobtree.transpile.python import Precision, vector
 
@@ -32,23 +32,13 @@ MAX_KINK_SHARE = 0.2
 """Share of the samples that may lie on kinks, where finite differences are useless."""
 
 
-@dataclass(frozen=True)
-class Claims:
-    """The claims of a definition about its operator."""
-
-    steepest: float | Formula
-    like: Like | None
-    monotone: bool
-    order_free: bool
-
-
 @dataclass(frozen=True, eq=False)
 class _Trial:
     """An operator with one value of its parameter."""
 
     source: Formula
     parameters: tuple[float, ...]
-    steepest: Callable[..., Any]
+    lipschitz: Callable[..., Any]
     precision: Precision = np.float64
     gradients: tuple[Float64Array, ...] = ()
     """The gradients of both operands, if the operator reads them."""
@@ -71,7 +61,7 @@ class _Trial:
         """Return the claimed bounds of |∂F/∂a| and |∂F/∂b| for operands up to these."""
         arguments = [np.float64(x) for x in (max_a, max_b, *self.parameters)]
         return result_of(
-            self.source, self.steepest, arguments, lambda: f"steepest of {self.call(max_a, max_b)}", 2
+            self.source, self.lipschitz, arguments, lambda: f"lipschitz of {self.call(max_a, max_b)}", 2
         )
 
     def call(self, *operands: float) -> str:
@@ -79,13 +69,15 @@ class _Trial:
         return f"F({', '.join([*numbers, *map(shown, (*self.gradients, *self.parameters))])})"
 
 
-def check_operator(source: Formula, parameters: tuple[Parameter, ...], claims: Claims) -> None:
+def check_operator(formulas: OperatorFormulas, parameters: Sequence[Parameter]) -> None:
     """Raise `InvalidDefinition` if sampled operands contradict a claim."""
-    rng = np.random.default_rng(SEED)
-    steepest = _steepest(claims.steepest)
+    if formulas.reads_gradients:
+        _check_directed(formulas, parameters)
+        return
+    rng, source, claims = np.random.default_rng(SEED), formulas.partials(), formulas.claims
     for setting in range(SETTINGS if parameters else 1):
         values = tuple(float(trial_value(parameter, rng, setting)) for parameter in parameters)
-        trial = _Trial(source, values, steepest)
+        trial = _Trial(source, values, _lipschitz(formulas))
         operands = _operands(rng)
         _try_values(trial, operands, claims)
         _try_partials(trial, operands)
@@ -93,15 +85,17 @@ def check_operator(source: Formula, parameters: tuple[Parameter, ...], claims: C
         _try_tiny_operands(trial)
         if claims.monotone:
             _try_monotone(trial, rng, falls_with_b=claims.like == "difference")
-        if claims.order_free:
+        if claims.associative:
             _try_order(trial, rng)
+        for name, check in _CHECKS_OF_FORMULAS.items():
+            if name in formulas.given:
+                check(trial, formulas, formulas.given[name])
 
 
-def check_directed_operator(source: Formula, parameters: tuple[Parameter, ...], claims: Claims) -> None:
+def _check_directed(formulas: OperatorFormulas, parameters: Sequence[Parameter]) -> None:
     """Raise `InvalidDefinition` if samples contradict a claim about an operator that reads gradients."""
-    rng = np.random.default_rng(SEED)
-    assert isinstance(claims.steepest, Formula)
-    envelope = claims.steepest.reference()
+    rng, source, claims = np.random.default_rng(SEED), formulas.partials(), formulas.claims
+    envelope = formulas.given["envelope"].reference()
     for setting, gradients in enumerate(_gradient_pairs(rng)):
         values = tuple(float(trial_value(parameter, rng, setting)) for parameter in parameters)
         trial = _Trial(source, values, lambda *_operands: (1e30, 1e30), gradients=gradients)
@@ -234,7 +228,7 @@ def _try_partials(trial: _Trial, operands: Float64Array) -> None:
 
 
 def _try_continuity(trial: _Trial, operands: Float64Array, rng: np.random.Generator) -> None:
-    """Check that F changes no faster between operands than `steepest` says, so that it does not jump."""
+    """Check that F changes no faster between operands than `lipschitz` says, so that it does not jump."""
     steps = rng.uniform(-1.0, 1.0, operands.shape) * 10.0 ** rng.uniform(-3.0, 0.0, (len(operands), 1))
     for one, other in zip(operands, np.abs(operands + steps), strict=True):
         bounds = trial.bounds(*np.maximum(one, other).tolist())
@@ -242,14 +236,22 @@ def _try_continuity(trial: _Trial, operands: Float64Array, rng: np.random.Genera
         if change > float(bounds @ np.abs(one - other)) + VALUE_TOLERANCE * (1.0 + change):
             raise trial.source.refusal(
                 f"{trial.call(*one)} and {trial.call(*other)} are {change:.6g}, farther apart than "
-                f"steepest = {bounds.tolist()} allows; F must be continuous and its partial derivatives right"
+                f"lipschitz = {bounds.tolist()} allows; F must be continuous, with right partial derivatives"
             )
 
 
-def _steepest(claim: float | Formula) -> Callable[..., Any]:
-    if isinstance(claim, float):
-        return lambda *_operands: (claim, claim)
-    return claim.reference()
+def _lipschitz(formulas: OperatorFormulas) -> Callable[..., Any]:
+    """Return the function of the claimed bounds of both partial derivatives."""
+    if "lipschitz" in formulas.given:
+        return formulas.given["lipschitz"].reference()
+    if formulas.claims.lipschitz is None:
+        slope = formulas.given["slope"].reference()
+        rises = [vector(*rise, precision=np.float64) for rise in np.eye(2)]
+        return lambda a, b, *given: [
+            slope(rise, vector(a, b, precision=np.float64), *given) for rise in rises
+        ]
+    claim = float(formulas.claims.lipschitz)
+    return lambda *_operands: (claim, claim)
 
 
 def _try_steepness(trial: _Trial, a: float, b: float, partials: list[float]) -> None:
@@ -257,7 +259,7 @@ def _try_steepness(trial: _Trial, a: float, b: float, partials: list[float]) -> 
     for name, slope, bound in zip("ab", partials, bounds, strict=True):
         if abs(slope) > bound * (1.0 + VALUE_TOLERANCE) + NO_SLOPE:
             raise trial.source.refusal(
-                f"|∂F/∂{name}| of {trial.call(a, b)} is {abs(slope):.6g}, more than steepest = {bound:.6g}"
+                f"|∂F/∂{name}| of {trial.call(a, b)} is {abs(slope):.6g}, more than lipschitz = {bound:.6g}"
             )
 
 
@@ -292,11 +294,94 @@ def _try_order(trial: _Trial, rng: np.random.Generator) -> None:
         one, other = trial.value(a, b), trial.value(b, a)
         if not _near(one, other):
             raise trial.source.refusal(
-                f"order_free: {trial.call(a, b)} = {one:.6g} but {trial.call(b, a)} = {other:.6g}"
+                f"associative: {trial.call(a, b)} = {one:.6g} but {trial.call(b, a)} = {other:.6g}"
             )
         left, right = trial.value(one, c), trial.value(a, trial.value(b, c))
         if not _near(left, right):
             raise trial.source.refusal(
-                f"order_free: with a, b, c = {a:.6g}, {b:.6g}, {c:.6g}, F(F(a, b), c) = {left:.6g} but "
+                f"associative: with a, b, c = {a:.6g}, {b:.6g}, {c:.6g}, F(F(a, b), c) = {left:.6g} but "
                 f"F(a, F(b, c)) = {right:.6g}"
             )
+
+
+def _try_slope(trial: _Trial, formulas: OperatorFormulas, bound: Formula) -> None:
+    """Check that no slope of F exceeds `slope`; those of operands that fall act where F is monotone."""
+    rng, signed = (
+        np.random.default_rng(SEED),
+        formulas.claims.monotone and formulas.claims.like != "difference",
+    )
+    for a, b in _operands(rng).tolist():
+        partials = trial.at(a, b)[1:]
+        slopes = rng.uniform(-1.0 if signed else 0.0, 1.0, 2)
+        steepest = float((partials if signed else np.abs(partials)) @ slopes)
+        pairs = [vector(*pair, precision=np.float64) for pair in (slopes, (a, b))]
+        arguments = [*pairs, *map(np.float64, trial.parameters)]
+        (most,) = result_of(bound, _single(bound), arguments, partial("slopes {}".format, shown(slopes)), 1)
+        if steepest > most + VALUE_TOLERANCE * (1.0 + abs(most)):
+            raise bound.refusal(
+                f"{trial.call(a, b)} rises by {steepest:.6g} where its operands rise by {shown(slopes)}, "
+                f"more than slope = {most:.6g}"
+            )
+
+
+def _try_interval(trial: _Trial, _formulas: OperatorFormulas, interval: Formula) -> None:
+    """Check that F lies in its interval."""
+    for low, high, arguments, where in _boxes(trial):
+        least, most = result_of(interval, interval.reference(), arguments, where, 2)
+        for share in (0.0, 0.3, 1.0):
+            for other in (0.0, 0.6, 1.0):
+                a, b = low + np.array([share, other]) * (high - low)
+                value = trial.value(a, b)
+                slack = VALUE_TOLERANCE * (1.0 + abs(value))
+                if not least - slack <= value <= most + slack:
+                    raise interval.refusal(
+                        f"{trial.call(a, b)} = {value:.6g}, outside [{least:.6g}, {most:.6g}] {where()}"
+                    )
+
+
+def _try_keeps(trial: _Trial, _formulas: OperatorFormulas, keeps: Formula) -> None:
+    """Check that F is the operand, or 0, that `keeps` says."""
+    for low, high, arguments, where in _boxes(trial):
+        (kept,) = result_of(keeps, _single(keeps), arguments, where, 1)
+        if kept not in KEPT:
+            raise keeps.refusal(f"expected 0, 1, 2 or 3 {where()}, got {kept:g}")
+        for a, b in (low, high, 0.5 * (low + high)):
+            value, expected = trial.value(a, b), KEPT[kept](a, b)
+            if expected is not None and not _near(value, expected):
+                raise keeps.refusal(
+                    f"{trial.call(a, b)} = {value:.6g}, but it keeps {kept:g}, which says {expected:.6g}, "
+                    f"{where()}"
+                )
+
+
+KEPT: dict[float, Callable[[float, float], float | None]] = {
+    0.0: lambda a, b: None,
+    1.0: lambda a, b: a,
+    2.0: lambda a, b: b,
+    3.0: lambda a, b: 0.0,
+}
+"""F by what `keeps` returns; None for anything."""
+
+_CHECKS_OF_FORMULAS: dict[str, Callable[[_Trial, OperatorFormulas, Formula], None]] = {
+    "slope": _try_slope,
+    "interval": _try_interval,
+    "keeps": _try_keeps,
+}
+"""Checks of formulas that replace what follows from claims."""
+
+
+def _single(formula: Formula) -> Callable[..., Any]:
+    """Return a formula of one number as a function that returns it in a list."""
+    function = formula.reference()
+    return lambda *arguments: [function(*arguments)]
+
+
+def _boxes(trial: _Trial) -> Iterator[tuple[Float64Array, Float64Array, list[Any], Callable[[], str]]]:
+    """Yield smallest and largest operands, the arguments of a formula of their ranges, and words for both."""
+    rng = np.random.default_rng(SEED)
+    for one, other in zip(_operands(rng), _operands(rng), strict=True):
+        near = one + rng.choice([0.02, 1.0]) * (other - one) if rng.uniform() < 0.7 else one * [1.0, 0.0]
+        low, high = np.minimum(one, near), np.maximum(one, near)
+        ranges = [vector(low[i], high[i], precision=np.float64) for i in range(2)]
+        arguments = [*ranges, *map(np.float64, trial.parameters)]
+        yield low, high, arguments, partial("for operands from {} to {}".format, shown(low), shown(high))

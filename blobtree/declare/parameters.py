@@ -11,7 +11,7 @@ follow from this declaration. Fields without one hold operands.
 import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import KW_ONLY, Field, dataclass, fields, replace
+from dataclasses import KW_ONLY, Field, dataclass, field, fields, replace
 from enum import Enum
 from functools import partial
 from itertools import chain
@@ -134,6 +134,8 @@ class Parameter:
         `Quantity.NUMBERS` holds whole numbers.
     choices
         Texts that `Quantity.CHOICE` allows.
+    natural
+        Value of a new node in an editor.
     """
 
     quantity: Quantity
@@ -146,6 +148,7 @@ class Parameter:
     size: int = 1
     whole: bool = False
     choices: tuple[str, ...] = ()
+    natural: float | None = field(default=None, repr=False)
 
     @property
     def check(self) -> Callable[[Any], Any]:
@@ -278,6 +281,19 @@ def fields_of(kind: type) -> tuple["Field[Any]", ...]:
     if kind not in _FIELDS:
         _FIELDS[kind] = tuple(sorted(fields(kind), key=lambda field: OPTIONAL in field.metadata))
     return _FIELDS[kind]
+
+
+SPECIFIED = "parameter"
+"""Key in the metadata of a field that a specifier of `blobtree.par` made."""
+
+
+def annotate(kind: type) -> None:
+    """Move the parameters that specifiers declare in the body of a class into its annotations."""
+    hints = dict(inspect.get_annotations(kind))
+    for name, value in vars(kind).items():
+        if isinstance(value, Field) and SPECIFIED in value.metadata and name in hints:
+            hints[name] = Annotated[hints[name], value.metadata[SPECIFIED]]
+    kind.__annotations__ = hints
 
 
 _PARAMETERS: dict[type, dict[str, Parameter]] = {}

@@ -5,6 +5,7 @@ by its tag, and need not import it. The package's root says how to load the libr
 which is done when a kind is looked up that is not loaded.
 """
 
+import copyreg
 from collections.abc import Callable
 from importlib import import_module
 from typing import Any, TypeVar
@@ -93,3 +94,31 @@ class Definitions(dict[str, Definition]):
         """Return what a pickle names by its name and its module."""
         self.load(name, module)
         return self.find(name)
+
+
+class CustomKind(type):
+    """The type of node classes that definitions make."""
+
+    kind: str
+    digest: str
+    parameters: tuple[Any, ...]
+
+
+CUSTOM_KINDS: Definitions[CustomKind] = Definitions(
+    "custom kind",
+    "define_skeleton, define_operator, define_field or define_warp for it (on the command line: --define)",
+)
+"""All kinds that are defined in this process, in the order of their definition."""
+
+
+def unpickled_kind(name: str, module: str) -> CustomKind:
+    """Return the class that a pickle names."""
+    return CUSTOM_KINDS.unpickled(name, module)
+
+
+def _pickled(kind: CustomKind) -> str | tuple[Any, ...]:
+    """Return how a class is pickled: by its name as a definition, or as a global of its module."""
+    return (unpickled_kind, (kind.kind, kind.__module__)) if "kind" in vars(kind) else kind.__qualname__
+
+
+copyreg.pickle(CustomKind, _pickled)

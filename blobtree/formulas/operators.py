@@ -14,6 +14,7 @@ not know of them.
 import warp as wp
 
 from blobtree.declare.claims import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OperatorRow
+from blobtree.declare.registry import library_rows
 
 wp.set_module_options({"enable_backward": False})
 
@@ -220,3 +221,28 @@ DIFFERENCE = OperatorRow(
 
 OPERATORS = (SUM, RICCI, UNION, INTERSECTION, DIFFERENCE)
 """Every operator; its index here is its code on the tape."""
+
+
+@wp.func
+def deepest_choice(a: wp.vec2, b: wp.vec2) -> wp.int32:
+    """Return the dependence of a minimum: on one operand where that one is always the smaller."""
+    if a[1] <= b[0]:
+        return KEEP_LEFT
+    if b[1] <= a[0]:
+        return KEEP_RIGHT
+    return KEEP_BOTH
+
+
+DEEPEST = OperatorRow(
+    "deepest",
+    intersection_partials,
+    extremum_slope,
+    "blend",
+    intersection_range,
+    deepest_choice,
+    monotone=True,
+    signed=True,
+)
+"""min(f, g) of fields that are 0 or less: the union of pieces with a negative weight."""
+
+library_rows(DEEPEST)

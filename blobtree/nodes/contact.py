@@ -25,7 +25,8 @@ from blobtree.meshing.clip import clipped, enclosed_volume, outlines_of
 from blobtree.meshing.mesh import Mesh
 from blobtree.meshing.polygonize import polygonize
 from blobtree.nodes.node import Node
-from blobtree.nodes.tree import Combination, Macro, ManyOperands, Union
+from blobtree.nodes.operator import Combination, ManyOperands
+from blobtree.nodes.tree import Macro, Union
 
 LARGEST_RATIO = 100.0
 """Largest ratio of two stiffnesses; beyond it the stiffer solid is rigid for any purpose."""

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Self, get_type_hints
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree.declare.parameters import documented, fields_of, parameters_of
+from blobtree.declare.parameters import annotate, documented, fields_of, parameters_of
 from blobtree.declare.registry import NODE_KINDS, kind_of
 from blobtree.errors import InvalidNode
 from blobtree.nodes.extras import NodeMethods
@@ -39,8 +39,8 @@ class Node(NodeMethods):
     copying work for trees of any depth. ``a + b`` blends, ``a | b`` is the union, ``a & b`` the intersection
     and ``a - b`` the difference of two nodes.
 
-    A class of nodes is a dataclass with `eq=False, repr=False` whose fields declare a `Parameter` or hold
-    operands.
+    A class of nodes is a dataclass with `eq=False, repr=False` whose fields declare a `Parameter`, best by a
+    specifier of `blobtree.par`, or hold operands.
 
     Examples
     --------
@@ -61,6 +61,7 @@ class Node(NodeMethods):
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
+        annotate(cls)
         if "file_tag" in vars(cls):
             cls.__doc__ = documented(cls.__doc__ or "", cls)
             NODE_KINDS[cls.file_tag] = cls

@@ -4,10 +4,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from blobtree.formulas.blends import DEEPEST
+from blobtree.formulas.operators import DEEPEST
 from blobtree.nodes.node import Node
+from blobtree.nodes.operator import Operator
 from blobtree.nodes.primitives import PROFILE, Leaf, Profile
-from blobtree.nodes.tree import AssociativeCombination, Macro, Union
+from blobtree.nodes.tree import Macro, Union
 
 
 class Pieces(Profile, Macro, Leaf):
@@ -25,7 +26,7 @@ class Pieces(Profile, Macro, Leaf):
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class Deepest(AssociativeCombination):
+class Deepest(Operator):
     """Union of operands with negative weights, F = min fᵢ."""
 
     operator = DEEPEST

@@ -4,18 +4,18 @@
 """
 
 import math
-from collections.abc import Iterable
-from dataclasses import MISSING, dataclass, field, replace
-from typing import Annotated, Any, ClassVar
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from blobtree.declare.claims import OperatorRow
-from blobtree.declare.parameters import Parameter, Quantity, fields_of, parameters_of
-from blobtree.errors import InvalidNode
+from blobtree import par
+from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION
 from blobtree.formulas.warps import TWIST, SpaceWarp
 from blobtree.nodes.node import Node
+from blobtree.nodes.operator import Combination, Operator
 from blobtree.tape.program import Placement
 from blobtree.validation import Matrix
 
@@ -40,52 +40,8 @@ class Macro(Node):
         return (self.expanded,)
 
 
-class Combination(Node):
-    """An operator folded over its operands from left to right.
-
-    The operator takes the parameters that the class declares, in their order.
-    """
-
-    combines = True
-    operator: ClassVar[OperatorRow]
-
-    @property
-    def operator_parameters(self) -> tuple[float, ...]:
-        """The numbers that the operator takes besides its operands."""
-        values = ((p, getattr(self, name)) for name, p in parameters_of(type(self)).items())
-        return tuple(number for p, value in values for number in p.components(value))
-
-
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class ManyOperands(Node):
-    """A node with any number of `operands`, which come one by one or as one iterable.
-
-    Its parameters follow them, best by name.
-    """
-
-    operands: tuple[Node, ...]
-
-    def __init__(self, *arguments: "Node | Iterable[Node] | float", **named: Any) -> None:
-        for name, value in _bound(type(self), arguments, named).items():
-            object.__setattr__(self, name, value)
-        self.__post_init__()
-
-
-@dataclass(frozen=True, eq=False, repr=False, init=False)
-class AssociativeCombination(ManyOperands, Combination):
-    """A combination of `operands`: any number of them, or two if their order matters to the operator."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.operator.commutes and len(self.operands) != 2:
-            raise InvalidNode(
-                f"operands: expected two, got {len(self.operands)}; {type(self).__name__} does not "
-                "claim that operands may come in any order, so nest it"
-            )
-
-
-@dataclass(frozen=True, eq=False, repr=False, init=False)
-class Sum(AssociativeCombination):
+class Sum(Operator):
     """Smooth blend F = Σ fᵢ (Blinn 1982; Wyvill et al. 1986).
 
     Examples
@@ -101,7 +57,7 @@ class Sum(AssociativeCombination):
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class Union(AssociativeCombination):
+class Union(Operator):
     """Sharp union F = max fᵢ (Ricci 1973).
 
     Examples
@@ -117,7 +73,7 @@ class Union(AssociativeCombination):
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class Intersection(AssociativeCombination):
+class Intersection(Operator):
     """Sharp intersection F = min fᵢ (Ricci 1973).
 
     Examples
@@ -132,18 +88,19 @@ class Intersection(AssociativeCombination):
     operator = INTERSECTION
 
 
-EXPONENT = Parameter(
-    Quantity.FACTOR,
+exponent_field = partial(
+    par.factor,
     "exponent n",
     low=1.0,
     high=LARGEST_EXPONENT,
+    natural=3.0,
     hint="1 is the sum; for more use a union",
 )
-"""Exponent of the sum of powers in a blend."""
+"""The exponent of the sum of powers in a blend."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class Ricci(AssociativeCombination):
+class Ricci(Operator):
     """Blend F = (Σ fᵢⁿ)^(1/n) (Ricci 1973): exponent 1 is the sum, a large one nears the union.
 
     Examples
@@ -158,7 +115,7 @@ class Ricci(AssociativeCombination):
     file_tag = "ricci"
     operator = RICCI
 
-    exponent: Annotated[float, EXPONENT] = field(kw_only=True)
+    exponent: float = exponent_field()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -262,23 +219,3 @@ class Twist(Placed):
     def warp_parameters(self) -> tuple[float, ...]:
         """The angle per unit of height in radians."""
         return (math.radians(self.degrees),)
-
-
-def _bound(kind: type[Node], arguments: tuple[Any, ...], named: dict[str, Any]) -> dict[str, Any]:
-    """Return the values of a combination's fields; nodes in front of all other arguments are its operands."""
-    names = [item.name for item in fields_of(kind)]
-    values = {item.name: item.default for item in fields_of(kind) if item.default is not MISSING}
-    count = next((i for i, item in enumerate(arguments) if not isinstance(item, Node)), len(arguments))
-    positional = (arguments[:count], *arguments[count:]) if count else arguments
-    given = dict(zip(names, positional, strict=False)) | named
-    missing = [name for name in names if name not in values | given]
-    unknown = [name for name in named if name not in names]
-    if missing or unknown or len(positional) > len(names) or len(given) < len(positional) + len(named):
-        expected = ", ".join(f"{name}=…" for name in names[1:]) or "nothing else"
-        problem = f"got {len(positional)} arguments by position and {', '.join(named) or 'none'} by name"
-        if missing:
-            problem = f"{', '.join(missing)} missing"
-        elif unknown:
-            problem = f"{', '.join(unknown)} unknown"
-        raise TypeError(f"{kind.__name__}: expected operands and {expected}; {problem}")
-    return values | given

@@ -13,11 +13,11 @@ import numpy as np
 
 from blobtree import InvalidNode, Node
 from blobtree._typing import Float64Array
-from blobtree.custom.definition import CUSTOM_KINDS
 from blobtree.declare.parameters import OPTIONAL, Parameter, Quantity, fields_of, parameters_of
+from blobtree.declare.registry import CUSTOM_KINDS
 from blobtree.nodes.kinds import NODE_KINDS
+from blobtree.nodes.operator import Operator
 from blobtree.nodes.primitives import Leaf
-from blobtree.nodes.tree import AssociativeCombination
 from decals.errors import InvalidEdit
 from decals.validation import one_of
 
@@ -38,10 +38,7 @@ SHARES: dict[Quantity, float | tuple[float, ...]] = {
 ANGLE = 30.0
 """Degrees; per size where a class counts them per unit."""
 
-NAMED_ANGLES = {"full_angle": 90.0}
-
 NATURAL = {
-    "exponent": 3.0,
     "factor": 1.5,
     "slope_x": 0.5,
     "height": 0.05,
@@ -87,7 +84,7 @@ def checked_kind(name: object) -> type[Node]:
 def operand_range(kind: type[Node]) -> tuple[int, float]:
     """Return the least and the largest number of operands: 0 for primitives, 1 for warps."""
     several = _operand_fields(kind).values()  # type: ignore[arg-type]  # classes are hashable
-    ordered = issubclass(kind, AssociativeCombination) and not kind.operator.commutes
+    ordered = issubclass(kind, Operator) and not kind.operator.commutes
     return len(several) + sum(several), math.inf if any(several) and not ordered else len(several) + ordered
 
 
@@ -214,10 +211,11 @@ def _natural(parameter: Parameter, turn: int, center: Float64Array, size: float,
         case Quantity.DIRECTION:
             return DIRECTIONS[turn % len(DIRECTIONS)]
         case Quantity.ANGLE:
-            angle = NAMED_ANGLES.get(parameter.name, ANGLE)
+            angle = ANGLE if parameter.natural is None else parameter.natural
             return min(angle, parameter.high) if parameter.is_bounded else angle / size
         case Quantity.FACTOR | Quantity.NUMBERS:
-            number = float(np.clip(NATURAL.get(parameter.name, 1.0), parameter.low, parameter.high))
+            natural = NATURAL.get(parameter.name, 1.0) if parameter.natural is None else parameter.natural
+            number = float(np.clip(natural, parameter.low, parameter.high))
             if parameter.size > 1:
                 return (number,) * parameter.size
             return int(number) if parameter.whole else number

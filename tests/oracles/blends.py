@@ -137,14 +137,14 @@ def deepest(a: Floats, b: Floats) -> Floats:
 
 
 VALUES: dict[str, Callable[..., Floats]] = {
-    "superelliptic": superelliptic,
+    "superelliptic_blend": superelliptic,
     "r_union": r_union,
     "r_intersection": r_intersection,
     "r_difference": r_difference,
     "smooth_intersection": smooth_intersection,
     "smooth_difference": smooth_difference,
     "clean_union": clean_union,
-    "controllable": controllable,
+    "controllable_blend": controllable,
     "masked": masked,
     "deepest": deepest,
     "gradient_blend": opened,

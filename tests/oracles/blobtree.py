@@ -25,7 +25,6 @@ from blobtree import (
     ConvolutionStroke,
     ConvolutionTriangle,
     CurveWarp,
-    CustomCombination,
     CustomPrimitive,
     Difference,
     Disc,
@@ -68,8 +67,9 @@ from blobtree import (
 from blobtree.declare.claims import Support
 from blobtree.declare.parameters import Quantity, parameters_of
 from blobtree.nodes.deformations import Deformation
+from blobtree.nodes.operator import Operator
 from blobtree.nodes.primitives import Leaf, Primitive, Profile
-from blobtree.nodes.tree import AssociativeCombination, Macro
+from blobtree.nodes.tree import Macro
 from blobtree.nodes.values import parameter_values
 from tests.oracles import (
     blends,
@@ -170,7 +170,7 @@ def signed(node: Node, points: ArrayLike) -> Field:
         case CustomPrimitive(radius=radius, color=color):
             closest, clearance = custom_kinds.CLOSEST[node.kind](q, **node.values)
             return replace(_leaf(q - closest, radius, color), margin=clearance)
-        case CustomCombination():
+        case Operator() if node.digest:
             return reduce(
                 lambda a, b: _custom(a, b, node), [evaluate(operand, q) for operand in node.operands]
             )
@@ -217,7 +217,7 @@ def signed(node: Node, points: ArrayLike) -> Field:
             return reduce(lambda a, b: _choose(a, b, a.value <= b.value), [evaluate(x, q) for x in operands])
         case GradientBlend(operands=(first, second)):
             return _blended(evaluate(first, q), evaluate(second, q), node, opening=opening_of(node, q))
-        case AssociativeCombination() if node.operator.name in blends.VALUES:
+        case Operator() if node.operator.name in blends.VALUES:
             values = parameter_values(node)
             fields = [evaluate(x, q) for x in node.operands]
             return reduce(lambda a, b: _blended(a, b, node, **values), fields)
@@ -267,9 +267,9 @@ def grown(node: Node, distance: float) -> Node:
     if isinstance(node, Profile) and node.weight < 0.0:
         distance = -distance
     match node:
-        case AssociativeCombination(operands=(solid, tool)) if node.operator.support is Support.LEFT:
+        case Operator(operands=(solid, tool)) if node.operator.support is Support.LEFT:
             return replace(node, operands=(grown(solid, distance), grown(tool, -distance)))
-        case AssociativeCombination():
+        case Operator():
             return replace(node, operands=tuple(grown(operand, distance) for operand in node.operands))
         case ConvolutionArc() | ConvolutionTriangle():
             return replace(node, radius=node.radius + distance)
@@ -491,7 +491,7 @@ def _closest_on_segment(q: Floats, start: Floats, end: Floats) -> Floats:
     return closest
 
 
-def _custom(a: Field, b: Field, node: CustomCombination) -> Field:
+def _custom(a: Field, b: Field, node: Operator) -> Field:
     value, by_a, by_b, kink = custom_kinds.OPERATORS[node.kind](a.value, b.value, **node.values)
     weights = np.abs(by_a) * a.value, np.abs(by_b) * b.value
     total = weights[0] + weights[1]
@@ -500,7 +500,7 @@ def _custom(a: Field, b: Field, node: CustomCombination) -> Field:
     return Field(value, _mixed(a, b, 1.0 - share, share), margin)
 
 
-def _blended(a: Field, b: Field, node: AssociativeCombination, **values: Any) -> Field:
+def _blended(a: Field, b: Field, node: Operator, **values: Any) -> Field:
     """A blend of the library; its partial derivatives are differences."""
     name = node.operator.name
     value = blends.VALUES[name](a.value, b.value, **values)

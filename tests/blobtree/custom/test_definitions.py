@@ -24,7 +24,7 @@ from blobtree import (
     from_json,
     to_json,
 )
-from blobtree.custom.definition import CUSTOM_KINDS, CustomKind
+from blobtree.declare.registry import CUSTOM_KINDS, CustomKind
 from blobtree.transpile.python import plain_python
 from tests.blobtree import custom_kinds, kernels
 from tests.blobtree.custom_kinds import CUSTOM_TREES, SOFTEST, Carve, Mean, Ring, Soft, Swell, Tent
@@ -123,7 +123,7 @@ def test_derivatives_that_are_not_given_are_derived() -> None:
 
 def test_wrong_functions_without_derivatives_are_refused() -> None:
     limits = {"hardness": (0.1, 1.0)}
-    with pytest.raises(InvalidDefinition, match=r"more than steepest = 0\.1"):
+    with pytest.raises(InvalidDefinition, match=r"more than lipschitz = 0\.1"):
         define_operator(kernels.soft_alone, steepest=0.1, like="blend", limits=limits)
     with pytest.raises(InvalidDefinition, match="but like='intersection' says 0"):
         define_operator(kernels.soft_alone, steepest=1.0, like="intersection", limits=limits)
@@ -159,7 +159,7 @@ def test_a_file_of_an_unknown_kind_says_which_and_what_to_do() -> None:
         (b'"size": 1.0', b'"size": -1.0', "size: expected a number from 0"),
         (b'"size": 1.0', b'"size": "wide"', "not a BlobTree"),
         (b'"size": 1.0', b'"size": [1, 2, 3]', "size: expected a finite number"),
-        (b'"kind": "ring"', b'"kind": "soft"', "is defined as CustomCombination, not CustomPrimitive"),
+        (b'"kind": "ring"', b'"kind": "soft"', "is defined as Operator, not CustomPrimitive"),
     ],
 )
 def test_a_file_that_does_not_fit_the_definition_is_refused(

@@ -13,7 +13,7 @@ from blobtree import (
     define_operator,
     define_skeleton,
 )
-from blobtree.custom.definition import CUSTOM_KINDS
+from blobtree.declare.registry import CUSTOM_KINDS
 from tests.blobtree import kernels as valid
 from tests.blobtree.custom import kernels
 
@@ -142,10 +142,10 @@ REFUSED_OPERATORS = [
     (kernels.negative, {}, "is negative"),
     (kernels.never_empty, {}, "where both operands are absent"),
     (kernels.wrong_partials, {}, "by differences"),
-    (kernels.jumps, {}, "farther apart than steepest"),
+    (kernels.jumps, {}, "farther apart than lipschitz"),
     (kernels.vanishes_in_single_precision, {"like": "blend"}, "finite numbers"),
     (kernels.takes_a_vector, {}, "parameters of type wp.float32"),
-    (kernels.plus, {"steepest": 0.9}, "more than steepest"),
+    (kernels.plus, {"steepest": 0.9}, "more than lipschitz"),
     (kernels.plus, {"steepest": 0.0}, "expected a number above 0"),
     (kernels.plus, {"steepest": "much"}, "expected a finite number"),
     (kernels.plus, {"steepest": kernels.one_number}, "expected it to return wp.vec2"),
@@ -154,10 +154,10 @@ REFUSED_OPERATORS = [
     (kernels.plus, {"like": "difference"}, "like='difference' says 0"),
     (kernels.plus, {"like": "sum"}, "like: expected one of 'blend'"),
     (kernels.plus, {"like": "difference", "order_free": True}, "depends on the order"),
-    (valid.mean, {"order_free": True}, "order_free: with a, b, c"),
-    (valid.carve, {"steepest": valid.carve_steepest, "order_free": True}, "order_free: F"),
+    (valid.mean, {"order_free": True}, "associative: with a, b, c"),
+    (valid.carve, {"steepest": valid.carve_steepest, "order_free": True}, "associative: F"),
     (valid.carve, {"steepest": valid.carve_steepest, "monotone": True}, "monotone: F"),
-    (valid.carve, {"steepest": 1.0}, "more than steepest"),
+    (valid.carve, {"steepest": 1.0}, "more than lipschitz"),
     (valid.soft, {}, "finite numbers"),
 ]
 

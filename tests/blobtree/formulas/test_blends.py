@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from blobtree import GradientBlend
 from blobtree.declare.claims import KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OperatorRow, Support
-from blobtree.formulas.blends import BLENDS
-from blobtree.formulas.gradient_blends import GRADIENT_BLEND
+from blobtree.formulas.operators import DEEPEST
+from blobtree.nodes import blends
 from tests.blobtree.formulas.test_operators import pairs
 from tests.blobtree.transpile.warp_functions import call, python_function
 from tests.oracles import blends as oracle
@@ -16,16 +17,18 @@ from tests.oracles import blends as oracle
 Floats = NDArray[np.float64]
 
 SETTINGS: dict[str, list[dict[str, float]]] = {
-    "superelliptic": [
+    "superelliptic_blend": [
         {"width": width, "exponent": exponent} for width in (0.05, 0.3, 0.5) for exponent in (1.0, 2.0, 30.0)
     ],
     "smooth_intersection": [{"width": width} for width in (1e-3, 0.1, 0.5)],
     "smooth_difference": [{"width": width} for width in (1e-3, 0.1, 0.5)],
-    "controllable": [
+    "controllable_blend": [
         {"left_angle": left, "right_angle": right}
         for left, right in ((0, 0), (0, 30), (20, 5), (44, 44), (10, 43))
     ],
 }
+DECLARED = [kind.operator for kind in vars(blends).values() if "tag" in getattr(kind, "__dict__", ())]
+BLENDS = [*(row for row in DECLARED if not row.gradients), DEEPEST]
 ROWS = [(row, setting) for row in BLENDS for setting in SETTINGS.get(row.name, [{}])]
 EVERY_ROW = pytest.mark.parametrize(("row", "setting"), ROWS, ids=[f"{r.name}-{s}" for r, s in ROWS])
 FALLING = ("smooth_difference", "r_difference")
@@ -35,7 +38,7 @@ def run(row: OperatorRow, part: str, setting: dict[str, float], **arguments: Any
     """Call a function of a row with its parameters, on a tape if there are several."""
     function = getattr(row, part)
     numbers = list(setting.values())
-    if row.name == "controllable":
+    if row.name == "controllable_blend":
         numbers = np.tan(np.radians(numbers)).tolist()
     declared = python_function(function).__annotations__
     several = {"parameter": 0.0, "tape": [numbers + [0.0] * (4 - len(numbers))]}
@@ -50,7 +53,7 @@ def partials(row: OperatorRow, setting: dict[str, float], a: Floats, b: Floats) 
 
 
 def test_the_table_is_complete() -> None:
-    assert set(oracle.VALUES) == {row.name for row in (*BLENDS, GRADIENT_BLEND)}
+    assert set(oracle.VALUES) == {row.name for row in (*BLENDS, GradientBlend.operator)}
 
 
 def operands(row: OperatorRow) -> tuple[Floats, Floats]:
@@ -190,6 +193,6 @@ def test_a_clean_union_has_the_surface_of_the_union_and_is_smooth_off_its_crease
 
 def test_a_blend_of_width_one_half_is_that_of_ricci() -> None:
     a, b = pairs()
-    row = next(row for row in BLENDS if row.name == "superelliptic")
+    row = next(row for row in BLENDS if row.name == "superelliptic_blend")
     seen = partials(row, {"width": 0.5, "exponent": 3.0}, a, b)[:, 0]
     np.testing.assert_allclose(seen, (a**3 + b**3) ** (1 / 3), rtol=1e-5, atol=1e-6)

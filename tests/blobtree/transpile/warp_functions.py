@@ -45,7 +45,8 @@ class TypedFunction:
 
 def typed_functions(module: ModuleType) -> list[TypedFunction]:
     """The typed functions that `module` and its kinds define, save those that Warp specialises."""
-    kinds = [value for value in vars(module).values() if isinstance(value, type | OperatorRow)]
+    kinds: list[Any] = [value for value in vars(module).values() if isinstance(value, type | OperatorRow)]
+    kinds += [kind.operator for kind in kinds if isinstance(vars(kind).get("operator"), OperatorRow)]
     found = {}
     for value in chain(vars(module).values(), *(vars(kind).values() for kind in kinds)):
         if (

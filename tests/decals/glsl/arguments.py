@@ -168,8 +168,8 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
         for kind in ("range", "choice")
     },
     **{
-        name: {"a": interval(2.0), "b": interval(2.0)}
-        for name in ("intersection_like_choice", "difference_like_choice", "unclaimed_choice")
+        f"{name}_choice": {"a": interval(2.0), "b": interval(2.0)}
+        for name in ("intersection_like", "difference_like", "unclaimed", "deepest")
     },
     "newton_step": {"gap": uniform(0.0, 0.01), "rise": uniform(-1.0, 3.0), "tolerance": uniform(1e-3, 0.1)},
     "widened_range": {"smallest": field, "largest": field},

@@ -37,6 +37,7 @@ MODULES = (
     "blobtree.formulas.falloffs",
     "blobtree.kinds.falloff",
     "blobtree.formulas.skeletons",
+    "blobtree.declare.claims",
     "blobtree.formulas.operators",
     "blobtree.tape.dispatch",
     "blobtree.tape.evaluators",

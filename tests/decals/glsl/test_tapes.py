@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from blobtree import Box, Node, Point, Polyline, Segment, SolidContact, Superquadric, from_sdf
-from blobtree.formulas.blends import BLENDS
 from blobtree.tape.instruction_set import library
 from blobtree.tape.model import colors_at, gradients_at
 from blobtree.tracing.trace import trace
@@ -13,6 +12,7 @@ from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
 from decals.rendering.tracing_shader import Kinds, tracing_shader
 from decals.scenes.camera import Camera
+from tests.blobtree.formulas.test_blends import BLENDS
 from tests.blobtree.nodes.test_blends import NODES as BLEND_NODES
 from tests.blobtree.nodes.test_deformations import STRONG
 from tests.blobtree.nodes.test_gradient_blends import CORE as GRADIENT_BLENDS

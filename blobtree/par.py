@@ -1,0 +1,50 @@
+"""Specifiers of fields: what a parameter of a kind means, its range and its natural value.
+
+    class Soft(Operator):
+        hardness: float = par.factor("how sharp the blend is", low=0.0, high=4.0, natural=1.0)
+
+Checks, documentation, files, panels and handles follow from it. Every specifier takes a description, a noun
+phrase, and by name:
+
+* `low` and `high`, the range of the number;
+* `hint`, what to do about a number out of range;
+* `default`, which makes the parameter optional;
+* `natural`, the value of a new node in an editor; by default the default.
+"""
+
+import math
+from dataclasses import MISSING, field
+from functools import partial
+from typing import Any
+
+from blobtree.declare.parameters import SPECIFIED, Parameter, Quantity
+
+
+def _field(
+    quantity: Quantity,
+    doc: str,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    hint: str = "",
+    default: Any = MISSING,
+    natural: float | None = None,
+) -> Any:
+    """Return a field of a dataclass that declares a parameter."""
+    if natural is None and default is not MISSING:
+        natural = default
+    parameter = Parameter(quantity, doc, low=low, high=high, hint=hint, natural=natural)
+    return field(default=default, metadata={SPECIFIED: parameter})
+
+
+factor = partial(_field, Quantity.FACTOR)
+"""A number without unit."""
+
+angle = partial(_field, Quantity.ANGLE)
+"""An angle or a rate of turning, in degrees."""
+
+length = partial(_field, Quantity.LENGTH)
+"""A length above 0, in model units."""
+
+distance = partial(_field, Quantity.DISTANCE)
+"""A signed length, in model units."""
