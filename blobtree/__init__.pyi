@@ -1,5 +1,6 @@
 from . import par
 from ._version import __version__
+from .conformance.laws import check_kind
 from .custom.field import CustomField, define_field
 from .custom.operator import CustomCombination, define_operator
 from .custom.skeleton import CustomPrimitive, define_skeleton
@@ -186,6 +187,7 @@ __all__ = [
     "UnusableFile",
     "Volume",
     "__version__",
+    "check_kind",
     "content_hash",
     "define_falloff",
     "define_field",

@@ -7,9 +7,10 @@ import numpy as np
 
 from blobtree import Node
 from blobtree._typing import Float64Array
+from blobtree.conformance.samples import Rng
 from tests.blobtree.tape.evaluations import bounds_along, bounds_at
 from tests.blobtree.trees import points_around
-from tests.conformance import Rng, sample
+from tests.conformance import sample
 
 NODES = 20
 """Nodes of a class among which the samples are divided."""

@@ -8,6 +8,7 @@ from tests.import_graph import module_graph
 
 EXTRAS: dict[str, str] = {
     "blobtree": "field_slice fitting slicing",
+    "blobtree.conformance": "*",
     "blobtree.custom": "bounds_kernels field_checks skeleton_checks warp_checks",
     "blobtree.declare": "checks operator_checks",
     "blobtree.derivatives": "*",

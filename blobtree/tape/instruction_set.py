@@ -103,6 +103,11 @@ class InstructionSet:
                 self._kernels[kernel] = self._instantiate_kernel(kernel)
             return self._kernels[kernel]
 
+    def function_for(self, function: wp.Function) -> wp.Function:
+        """Return a typed function for tapes of this instruction set; itself if it reads no table."""
+        with _LOCK:
+            return self._instantiate(self._exchanged(function))
+
     def _instantiate_kernel(self, kernel: wp.Kernel) -> wp.Kernel:
         """Return the kernel in a Warp module of its own, so that adding a kernel compiles no other again."""
         source = _python_function(kernel)

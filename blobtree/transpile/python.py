@@ -42,12 +42,17 @@ def vector(*components: Any, size: int = 0, precision: Precision = np.float64) -
 
 def plain_python(function: FunctionType, precision: Precision = np.float64) -> FunctionType:
     """Return `function` and all its callees as plain Python of this precision."""
-    return _PythonTranslation(precision).function(function)
+    return PythonTranslation(precision).function(function)
 
 
 def _normalize(v: Any) -> Any:
     length = np.linalg.norm(v)
     return v / length if length > 0.0 else v * 0.0
+
+
+def _filled(shape: tuple[int, ...], kind: type[np.generic], *components: Any) -> NDArray[Any]:
+    """Return an array of these components, of zeros without any."""
+    return np.array(components, kind).reshape(shape) if components else np.zeros(shape, kind)
 
 
 def _whole_vector(size: int) -> Callable[..., NDArray[np.int64]]:
@@ -133,7 +138,7 @@ _OPERATOR_CALLS: dict[type[ast.operator], str] = {ast.Div: "_divide", ast.Mod: "
 
 
 class _DeviceArithmetic(ast.NodeTransformer):
-    """Transformer: operators whose meaning differs on devices become calls, and loops count their turns."""
+    """Transformer: operators whose meaning differs on devices change, and loops count their turns."""
 
     def __init__(self, first: int) -> None:
         self._first = first
@@ -157,9 +162,7 @@ class _DeviceArithmetic(ast.NodeTransformer):
         return ast.Call(ast.Name(_OPERATOR_CALLS[type(node.op)], ast.Load()), [node.left, node.right], [])
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt:
-        if type(node.op) not in _OPERATOR_CALLS:
-            self.generic_visit(node)
-            return node
+        """Write ``a += b`` as ``a = a + b``: arrays would change in place, vectors on devices do not."""
         read = ast.parse(ast.unparse(node.target), mode="eval").body
         return self.visit(ast.Assign([node.target], ast.BinOp(read, node.op, node.value)))  # type: ignore[no-any-return]  # ast.visit is untyped
 
@@ -192,8 +195,8 @@ class _Warp:
         return self._maths[name] if name in self._maths else getattr(wp, name)
 
 
-class _PythonTranslation:
-    """Plain Python of functions, all in one precision."""
+class PythonTranslation:
+    """Plain Python of functions, all in one precision; each is translated once."""
 
     def __init__(self, precision: Precision) -> None:
         vectors = {f"vec{size}": partial(vector, size=size, precision=precision) for size in (2, 3, 4)}
@@ -204,6 +207,7 @@ class _PythonTranslation:
         self._translated: dict[FunctionType, FunctionType] = {}
 
     def function(self, function: FunctionType) -> FunctionType:
+        """Return a function as plain Python."""
         if function not in self._translated:
             seen = {name: self._substitute(value) for name, value in referenced_values(function).items()}
             scope = {**function.__globals__, **seen, "float": self._float, **_HELPERS}
@@ -218,8 +222,15 @@ class _PythonTranslation:
         if isinstance(value, wp.uint32 | wp.int32 | wp.float32):
             return self._stand_ins[id(type(value))](value.value)
         if isinstance(value, wp.Function) and isinstance(value.func, FunctionType):
-            return self.function(value.func)
+            return self._callee(value.func)
+        if isinstance(value, type) and hasattr(value, "_shape_"):  # a vector or matrix of another size
+            whole = vars(value)["_wp_scalar_type_"] in (wp.int32, wp.uint32)
+            return partial(_filled, value._shape_, np.int64 if whole else self._float)
         return value
+
+    def _callee(self, function: FunctionType) -> Callable[..., Any]:
+        """Return a function that is translated when it is first called: tables name many, and use few."""
+        return lambda *arguments: self.function(function)(*arguments)
 
 
 def find_changed_constants(definition: ast.FunctionDef) -> Iterator[tuple[str, int]]:

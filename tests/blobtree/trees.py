@@ -65,6 +65,7 @@ from blobtree import (
     Twist,
     Union,
 )
+from blobtree.conformance.samples import points_around as points_around
 from blobtree.nodes.primitives import Falling, Leaf, Primitive, Profile
 from blobtree.validation import Vector
 
@@ -380,16 +381,6 @@ class RandomTrees(Sequence[Node]):
 def random_trees(seed: int, count: int, depth: int = 4, more: MoreKinds | None = None) -> list[Node]:
     """Return `RandomTrees` as a list."""
     return list(RandomTrees(seed, count, depth, more))
-
-
-def points_around(rng: np.random.Generator, tree: Node, count: int) -> NDArray[np.float32]:
-    """Points in the tree's support widened by a tenth, most of them where there is a field."""
-    lower, upper = (corner.astype(np.float64) for corner in tree.support)
-    margin = 0.1 * (upper - lower)
-    pool = rng.uniform(lower - margin, upper + margin, (8 * count, 3)).astype(np.float32)
-    empty = tree(pool) == 0.0
-    empty[: count // 4] = False
-    return pool[np.argsort(empty, kind="stable")[:count]]
 
 
 _coordinate = st.floats(-10.0, 10.0)

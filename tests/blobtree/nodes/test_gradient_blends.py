@@ -26,7 +26,7 @@ from blobtree import (
 )
 from blobtree.tape.model import colors_at, gradients_at
 from tests.blobtree.trees import points_around
-from tests.conformance import _box, _ranges, _slopes, _texts
+from tests.conformance import broken_laws
 from tests.oracles import blobtree as oracle
 from tests.soundness import failures_of
 
@@ -128,7 +128,7 @@ def test_a_custom_operator_reads_gradients() -> None:
     sides = [(expected(points + e) - expected(points - e)) / (2.0 * step) for e in step * np.eye(3)]
     error = np.linalg.norm(seen[:, 1:] - np.column_stack(sides), axis=1)
     assert np.quantile(error, 0.95) < 1e-3
-    assert list(_ranges(tree, rng)) == []
+    assert broken_laws(tree, rng, "interval") == []
     assert tree == from_json(to_json(tree))
 
 
@@ -175,7 +175,7 @@ def problems(tree: Node) -> list[str]:
     length = np.maximum(1.0, np.linalg.norm(expected, axis=1))
     error = np.linalg.norm(seen[smooth, 1:] - expected, axis=1) / length
     assert np.quantile(error, 0.98) < 1e-3
-    return [*_ranges(tree, rng), *_slopes(tree, rng), *_box(tree, rng), *_texts(tree)]
+    return broken_laws(tree, rng, "interval", "Lipschitz bound", "box", "file", "pickle")
 
 
 @pytest.mark.slow_cases("a cube and a bar")

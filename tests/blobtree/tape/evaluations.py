@@ -7,11 +7,12 @@ import warp as wp
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array
+from blobtree.conformance.bound_kernels import evaluate_bounds
 from blobtree.kernels import loaded
 from blobtree.tape.model import evaluate
 from blobtree.tape.tape import Tape
 from blobtree.validation import point_array
-from tests.blobtree.tape.evaluation_kernels import evaluate_bounds, project_points
+from tests.blobtree.tape.evaluation_kernels import project_points
 
 
 def bounds_at(tape: Tape, points: ArrayLike, reach: ArrayLike) -> Float32Array:

@@ -26,6 +26,13 @@ def whole_numbers(x: wp.float32, y: wp.float32) -> wp.float32:
 
 
 @wp.func
+def added_to_a_copy(q: wp.vec3, d: wp.vec3) -> wp.vec3:
+    moved = q
+    moved += d
+    return wp.cross(moved, q)
+
+
+@wp.func
 def real_numbers(x: wp.float32, y: wp.float32) -> wp.float32:
     r = x % 0.7 + wp.floor(y) + wp.ceil(x) + wp.trunc(y) + wp.sign(x) * wp.abs(y)
     r += wp.pow(wp.abs(x) + 0.1, y) + wp.exp(-x) + wp.log(wp.abs(y) + 1.0) + wp.sqrt(wp.abs(x))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from blobtree import Box, Node, Point
+from blobtree.conformance.samples import DRAWS, Rng
 from blobtree.declare.parameters import Quantity, fields_of, parameters_of
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.primitives import Leaf
@@ -17,7 +18,7 @@ from decals.rendering.context import Context
 from decals.rendering.tracing_shader import Kinds
 from tests.blobtree.csg_trees import PRIMITIVES, csg_primitive
 from tests.blobtree.trees import triple
-from tests.conformance import AWAY, DRAWS, EXACT, Rng, sample
+from tests.conformance import AWAY, EXACT, sample
 from tests.decals.glsl.arguments import Array
 from tests.decals.glsl.tapes import BOUND_AND_VALUE, COLOR, GRADIENT
 from tests.decals.glsl.test_tapes import read_tape

@@ -1,0 +1,1 @@
+"""Conformance: laws of kinds, tried on samples."""
