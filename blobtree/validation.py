@@ -58,10 +58,13 @@ def real(values: Any) -> NDArray[Any]:
 
 
 def real_number(value: Any) -> float:
-    """Return a number as a float; raise `TypeError` for texts, truth values and complex numbers."""
-    if isinstance(value, str | bytes | bool):
+    """Return a number as a float; raise `TypeError` for lists, texts, truth values and complex numbers."""
+    if isinstance(value, float | int) and not isinstance(value, bool):
+        return float(value)
+    array = real(value)
+    if array.ndim or isinstance(value, str | bytes | bool):
         raise TypeError(f"no real number: {type(value).__name__}")
-    return float(value if isinstance(value, float | int) else real(value))
+    return float(array)
 
 
 def is_whole(value: object) -> TypeGuard[int | np.integer]:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import warp as wp
 
+import blobtree
 from blobtree import (
     CustomCombination,
     CustomPrimitive,
@@ -29,6 +30,8 @@ from blobtree.transpile.python import plain_python
 from tests.blobtree import custom_kinds, kernels
 from tests.blobtree.custom_kinds import CUSTOM_TREES, SOFTEST, Carve, Mean, Ring, Soft, Swell, Tent
 from tests.blobtree.transpile.warp_functions import python_function
+
+PUBLIC = {name: getattr(blobtree, name) for name in blobtree.__all__}
 
 BALL = Point((0, 0, 0), radius=1.0)
 RING_DOC = "A circle of radius `size` around `axis`."
@@ -58,7 +61,7 @@ def test_a_definition_gives_a_node_class() -> None:
 
 def test_trees_of_own_kinds_are_what_their_repr_says() -> None:
     for tree in CUSTOM_TREES[:40]:
-        assert eval(repr(tree), {**vars(__import__("blobtree")), **vars(custom_kinds)}) == tree
+        assert eval(repr(tree), PUBLIC | vars(custom_kinds)) == tree
 
 
 def test_the_same_definition_twice_is_one_kind_and_another_one_takes_its_name() -> None:
