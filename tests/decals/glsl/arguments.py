@@ -122,6 +122,7 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
         f"profile_{name}": {"u": uniform(0.0, 1.5)} for name in ("distance", "value", "slope", "steepest")
     },
     "unroll_step": {"step": place},
+    "roll_step": {"step": place},
     "bound_pullback_affine": {"f": uniform(0, 3, 3)},
     "gradient_pullback_affine": {"f": four},
     "bound_pullback_warp": {"f": uniform(0, 3, 3)},
