@@ -260,8 +260,20 @@ def _fine_mesh(item: MeshObject, are_long: Callable[..., BoolArray]) -> FineMesh
     color = item.color
     if isinstance(color, BaseColor):
         color = _carried(color, item, vertices[joined])
+    coordinates: Float32Array | None = None
+    if item.coordinates is not None:
+        places = np.arange(3 * len(item.faces)).reshape(-1, 3)
+        spare = BaseColor(coordinates=item.coordinates.reshape(-1, 2), corners=places)
+        carried = _carried(spare, item, vertices[joined]).coordinates
+        coordinates = None if carried is None else carried.reshape(-1, 3, 2)
     rest = replace(
-        item, vertices=vertices, faces=joined, color=color, source=None, orientation=MeshOrientation.KEEP
+        item,
+        vertices=vertices,
+        faces=joined,
+        color=color,
+        source=None,
+        orientation=MeshOrientation.KEEP,
+        coordinates=coordinates,
     )
     return rest, unit_rows(sums), None
 

@@ -20,7 +20,7 @@ from blobtree.validation import truth
 from decals.baking.fine_trees import below_texture
 from decals.baking.formats import FORMATS
 from decals.baking.instances import Instances, decal_instances
-from decals.baking.layouts import AUTO, LAYOUTS, MAX_TILES, XATLAS, lay_out
+from decals.baking.layouts import AUTO, LAYOUTS, MAX_TILES, OWN, XATLAS, lay_out
 from decals.baking.materials import SRGB, Maps, material_bytes, split_maps, vertex_tangents
 from decals.baking.meshes import BakeMesh, bake_mesh
 from decals.baking.parts import METRES, TILE_ROW, UP, Baked, Part
@@ -274,7 +274,8 @@ def bake_parts(
         source = replace(source, decals=Decals.empty())
     textured = place == TEXTURE
     texels = tiles * size**2 if textured else 0
-    work = _Work(source, source.drawing.overridden(**modes), resolution, creases, texels, report)
+    own = textured and layout == OWN
+    work = _Work(source, source.drawing.overridden(**modes), resolution, creases, texels, own, report)
     parts, maps = work.textured(size, samples, layout, tiles) if textured else (work.plain(place), [])
     parts = [work.with_attributes(number, part, attributes) for number, part in enumerate(parts)]
     return Baked(parts, maps, source.origin, recipe=source.recipe, instances=copies)
@@ -366,10 +367,12 @@ class _Work:
         resolution: int | None,
         creases: bool,
         texels: int,
+        own: bool,
         report: Progress,
     ) -> None:
         self._meshes = [
-            bake_mesh(item, resolution=resolution, creases=creases, report=report) for item in source.objects
+            bake_mesh(item, resolution=resolution, creases=creases, report=report, own=own)
+            for item in source.objects
         ]
         if texels and resolution is None:
             self._meshes = below_texture(self._meshes, source.objects, texels, report)

@@ -181,8 +181,7 @@ def _own_coordinates(mesh: BakeMesh) -> Float32Array:
     uv = None if mesh.base is None else mesh.base.coordinates
     if uv is None:
         raise InvalidMesh(
-            f"layout 'own': expected texture coordinates below a texture or colours, object {mesh.name!r} "
-            "has none; give it a texture, or use layout='box'"
+            f"layout 'own': expected texture coordinates, object {mesh.name!r} has none; use layout='box'"
         )
     if uv.min() < -OUTSIDE or uv.max() > 1.0 + OUTSIDE:
         raise InvalidMesh(

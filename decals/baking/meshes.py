@@ -20,7 +20,7 @@ from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.pose import PosedMesh
 from decals.surfaces.base_color import WHITE, BaseColor, Color
 from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.normals import SplitMesh, split_at_colors, vertex_normals
+from decals.surfaces.normals import SplitMesh, split_at_colors, split_at_creases, vertex_normals
 from decals.surfaces.windings import MeshOrientation
 from decals.validation import describe
 
@@ -75,10 +75,13 @@ class BakeMesh:
         return decode_srgb(np.asarray(colors, np.float64)).astype(np.float32)
 
 
-def bake_mesh(item: object, *, resolution: int | None, creases: bool, report: Progress) -> BakeMesh:
+def bake_mesh(
+    item: object, *, resolution: int | None, creases: bool, report: Progress, own: bool = False
+) -> BakeMesh:
     """Return an object of a scene as a mesh; a tree is polygonized.
 
-    A posed mesh keeps all its vertices and faces.
+    A posed mesh keeps all its vertices and faces. With ``own``, the base has the mesh's coordinates too, and
+    vertices are split where these jump.
 
     Raises
     ------
@@ -90,7 +93,12 @@ def bake_mesh(item: object, *, resolution: int | None, creases: bool, report: Pr
         If polygonization refuses the resolution.
     """
     if isinstance(item, MeshObject):
-        split = split_mesh(item)
+        placed = _placed(item) if own else None
+        if placed is None:
+            split = split_mesh(item)
+        else:
+            split = split_at_creases(item.vertices, item.faces, item.crease_angle)
+            split = split_at_colors(split, placed)
         surface = MeshSurface(item.vertices[split.rows], split.faces, orientation=MeshOrientation.KEEP)
         return _used_parts(item.name, surface, split.normals, _plain(item.color), split.color)
     if isinstance(item, TreeObject):
@@ -99,8 +107,11 @@ def bake_mesh(item: object, *, resolution: int | None, creases: bool, report: Pr
         normals, facings = (vertex_normals(at, item.faces) for at in (item.vertices, item.rest.vertices))
         colors = _plain(item.rest.color) if item.colors is None else _nearest(item)
         split = SplitMesh(np.arange(len(item.vertices)), item.faces, normals)
-        if isinstance(item.color, BaseColor):
-            split = split_at_colors(split, item.color)
+        placed = _placed(item.rest) if own else None
+        if placed is None and isinstance(item.color, BaseColor):
+            placed = item.color
+        if placed is not None:
+            split = split_at_colors(split, placed)
         rows, places = split.rows, item.rest.vertices[split.rows]
         posed = item.vertices[rows]
         return BakeMesh(
@@ -139,6 +150,16 @@ def _used_parts(
     if base is not None:
         base = base.of_part(surface.sound).of_rows(rows)
     return BakeMesh(name, vertices, corners, facings, base_colors, vertices, facings, base)
+
+
+def _placed(item: MeshObject) -> BaseColor | None:
+    """Return the colour of a mesh with the coordinates that the mesh has beside it; None if it has none."""
+    color = item.color
+    if item.coordinates is None or (isinstance(color, BaseColor) and color.coordinates is not None):
+        return None
+    if not isinstance(color, BaseColor):
+        color = BaseColor(decode_srgb(np.array([color])), corners=np.zeros_like(item.faces))
+    return color.with_coordinates(item.coordinates, item.faces)
 
 
 def _plain(color: Color | BaseColor) -> Color:

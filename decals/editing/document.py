@@ -192,7 +192,7 @@ def _parts_bytes(parts: SceneParts, known: set[int]) -> dict[int, int]:
     for item in parts.objects or ():
         if isinstance(item, MeshObject):
             colors = item.color.held_arrays if isinstance(item.color, BaseColor) else []
-            held |= _arrays([item.vertices, item.faces, *colors])
+            held |= _arrays([item.vertices, item.faces, item.coordinates, *colors])
             continue
         if id(item) in known:
             continue

@@ -74,6 +74,10 @@ class MeshObject(Value):
         ``"keep"``: all parts stay as they are. ``"flip"``: all faces are turned once; the object then keeps
         them, and has no source.
 
+    coordinates : float32[m, 3, 2], optional
+        Texture coordinates of each corner of each face, u to the right and v upward, by which
+        ``decals.bake(layout="own")`` places a mesh whose colour has none. With a source, those of the source.
+
     hidden, locked : tuple of paths
         ``((),)`` for an object that is not drawn, and for one that the editor does not change; ``()`` else.
 
@@ -106,6 +110,7 @@ class MeshObject(Value):
     labels: tuple[str, ...] = ()
     named_only: bool = False
     orientation: MeshOrientation = field(default=MeshOrientation.OUTWARD, compare=False)
+    coordinates: Float32Array | None = field(default=None, repr=False)
     surface: MeshSurface = field(init=False, repr=False, compare=False)
 
     if TYPE_CHECKING:  # lists of numbers and names of colours are converted
@@ -124,6 +129,7 @@ class MeshObject(Value):
             labels: str | Iterable[str] = (),
             named_only: bool = False,
             orientation: MeshOrientation | str = MeshOrientation.OUTWARD,
+            coordinates: ArrayLike | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -144,9 +150,17 @@ class MeshObject(Value):
             "vertices": surface.vertices,
             "faces": surface.faces,
             "orientation": MeshOrientation.KEEP if flipped else rule,
+            "coordinates": _coordinates(self.name, self.coordinates, np.asarray(self.faces), surface),
         }
         for key, value in checked.items():
             object.__setattr__(self, key, value)
+
+    def _contents(self) -> dict[str, Any]:
+        """Return what counts of the object; coordinates only where it has some."""
+        contents: dict[str, Any] = super()._contents()
+        if self.coordinates is None:
+            del contents["coordinates"]
+        return contents
 
     def __repr__(self) -> str:
         """Return the name and the numbers of vertices and faces, as arrays would fill the screen."""
@@ -416,7 +430,10 @@ def as_object(
         return TreeObject(name, shape)
     if color is None:
         color = shape_color(shape, texture, source)
-    return MeshObject(name, *shape.arrays, color, source, angle, orientation=orientation)
+    coordinates = spare_coordinates(shape, color)
+    return MeshObject(
+        name, *shape.arrays, color, source, angle, orientation=orientation, coordinates=coordinates
+    )
 
 
 def shape_color(
@@ -441,6 +458,16 @@ def shape_color(
     if isinstance(color, BaseColor):
         return color if source is None else replace(color, source=source)
     return CLAY if color is None else color
+
+
+def spare_coordinates(shape: MeshData, color: ColorLike | BaseColor) -> Float32Array | None:
+    """Return the coordinates of corners, ``float32[m, 3, 2]``, of a mesh whose colour has none; or None."""
+    base = shape.color
+    if base is None or base.coordinates is None:
+        return None
+    if isinstance(color, BaseColor) and color.coordinates is not None:
+        return None
+    return base.coordinates[base.rows_of(shape.faces)]
 
 
 def relative_to(item: SceneObject, origin: Origin) -> SceneObject:
@@ -533,6 +560,27 @@ def _mesh_color(name: str, color: object, faces: NDArray[Any], surface: MeshSurf
         return color_rgb(f"object {name!r}, colour", color, InvalidScene)
     color.check_mesh(f"object {name!r}", len(surface.vertices), len(surface.faces))
     return color.turned(faces, surface.faces)
+
+
+def _coordinates(
+    name: str, coordinates: object, faces: NDArray[Any], surface: MeshSurface
+) -> Float32Array | None:
+    """Return checked coordinates of corners, for a surface that may have turned some of the given faces."""
+    if coordinates is None:
+        return None
+    expected = (len(faces), 3, 2)
+    try:
+        array = np.asarray(coordinates)
+    except (TypeError, ValueError, OverflowError):  # rows of different lengths
+        array = np.empty(0)
+    if array.shape != expected:
+        got = describe(coordinates) if array.ndim == 0 or not array.size else f"shape {list(array.shape)}"
+        raise InvalidMesh(f"object {name!r}, coordinates: expected shape {list(expected)}, got {got}")
+    corners = np.arange(3 * len(faces)).reshape(-1, 3)
+    turned = BaseColor(coordinates=array.reshape(-1, 2), corners=corners).turned(faces, surface.faces)
+    placed: Float32Array = cast("Float32Array", turned.coordinates)[turned.rows_of(surface.faces)]
+    placed.setflags(write=False)
+    return placed
 
 
 def _source(name: str, source: object) -> str | None:

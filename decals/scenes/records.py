@@ -9,6 +9,7 @@ import numpy as np
 from msgspec import UNSET, Meta, Struct, UnsetType
 from numpy.typing import NDArray
 
+from blobtree._typing import Float32Array, Int32Array
 from blobtree.files import is_file
 from blobtree.io import TreeFile, from_tree_file, to_tree_file
 from decals.errors import ImplicitDecalsError, InvalidScene
@@ -16,7 +17,7 @@ from decals.images.builtin import is_builtin
 from decals.images.load import embedded_image, is_embedded, load_image, opaque
 from decals.model import NO_IMAGE, Decals, Interaction
 from decals.scenes.camera import Vector
-from decals.scenes.objects import MeshObject, Paths, SceneObject, TreeObject, shape_color
+from decals.scenes.objects import MeshObject, Paths, SceneObject, TreeObject, shape_color, spare_coordinates
 from decals.scenes.origin import WORLD
 from decals.surfaces.base_color import COLOR_ARRAYS, BaseColor, BaseTexture, Color
 from decals.surfaces.mesh_data import MeshData
@@ -36,11 +37,12 @@ _OPTIONS = "hidden", "locked", "labels", "named_only"
 """Options of an object that its record has under the same names."""
 
 
-class _InlineMesh(Struct, forbid_unknown_fields=True):
+class _InlineMesh(Struct, forbid_unknown_fields=True, omit_defaults=True):
     """Little-endian float32 and int32 rows; msgspec writes bytes as base64."""
 
     vertices: bytes
     faces: bytes
+    coordinates: bytes | None = None
 
 
 class _TextureRecord(Struct, forbid_unknown_fields=True):
@@ -72,7 +74,7 @@ MAX_TEXELS = 1 << 27
 """Most pixels of all textures of a mesh."""
 
 OF_SOURCE: Literal["source"] = "source"
-"""Colour of a mesh that has those of its source."""
+"""Colour or coordinates of a mesh that has those of its source."""
 
 
 class MeshRecord(Struct, tag="mesh", tag_field="type", forbid_unknown_fields=True, omit_defaults=True):
@@ -89,6 +91,7 @@ class MeshRecord(Struct, tag="mesh", tag_field="type", forbid_unknown_fields=Tru
     labels: tuple[str, ...] = ()
     named_only: bool = False
     orientation: Literal["outward", "keep"] = "keep"
+    coordinates: Literal["source"] | None = None
 
 
 class TreeRecord(Struct, tag="tree", tag_field="type", forbid_unknown_fields=True, omit_defaults=True):
@@ -114,9 +117,11 @@ def record_of(item: SceneObject, folder: Path) -> MeshRecord | TreeRecord:
         kept["crease_angle"] = item.crease_angle
     if item.source is not None:
         kept["orientation"] = item.orientation.value
+        kept["coordinates"] = None if item.coordinates is None else OF_SOURCE
         color = _color_record(item.color, item.source)
         return MeshRecord(item.name, color, source=relative(item.source, folder), **kept)
-    data = _InlineMesh(_packed(item.vertices, "<f4"), _packed(item.faces, "<i4"))
+    placed = None if item.coordinates is None else _packed(item.coordinates, "<f4")
+    data = _InlineMesh(_packed(item.vertices, "<f4"), _packed(item.faces, "<i4"), placed)
     return MeshRecord(item.name, _color_record(item.color, None), data=data, **kept)
 
 
@@ -137,13 +142,14 @@ def object_of(record: MeshRecord | TreeRecord, folder: Path, samples: SampleLoad
     origin, angle = record.origin or WORLD, record.crease_angle
     kept["orientation"] = record.orientation
     if record.data is not None:
-        vertices, faces = _unpacked(record.name, record.data)
+        vertices, faces, kept["coordinates"] = _unpacked(record.name, record.data)
         color = _color_of(record, None, None)
         return MeshObject(record.name, vertices, faces, color, None, angle, origin, **kept)
     mesh = _mesh(str(record.source), folder, samples)
     source = absolute(str(record.source), folder)
     local = mesh.vertices - np.array(origin)
     color = _color_of(record, mesh, source)
+    kept["coordinates"] = None if record.coordinates is None else spare_coordinates(mesh, color)
     return MeshObject(record.name, local, mesh.faces, color, source, angle, origin, **kept)
 
 
@@ -217,13 +223,17 @@ def _packed(array: NDArray[Any], kind: str) -> bytes:
     return np.ascontiguousarray(array, kind).tobytes()
 
 
-def _unpacked(name: str, data: _InlineMesh) -> MeshArrays:
+def _unpacked(name: str, data: _InlineMesh) -> tuple[Float32Array, Int32Array, Float32Array | None]:
+    """Return vertices, faces and, if there are any, coordinates of corners."""
+    placed = None
     try:
         vertices = np.frombuffer(data.vertices, "<f4").reshape(-1, 3)
         faces = np.frombuffer(data.faces, "<i4").reshape(-1, 3)
+        if data.coordinates is not None:
+            placed = np.frombuffer(data.coordinates, "<f4").reshape(-1, 3, 2).astype(np.float32)
     except ValueError as error:
-        raise InvalidScene(f"mesh {name!r}: expected rows of three 4-byte numbers ({error})") from error
-    return vertices.astype(np.float32), faces.astype(np.int32)
+        raise InvalidScene(f"mesh {name!r}: expected rows of 4-byte numbers ({error})") from error
+    return vertices.astype(np.float32), faces.astype(np.int32), placed
 
 
 def check_inside(sources: Iterable[str], folder: Path) -> None:

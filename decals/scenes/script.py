@@ -148,9 +148,12 @@ class _Script:
             vertices = self._array(f"vertices_{number}_{item.name}", item.vertices)
             faces = self._array(f"faces_{number}_{item.name}", item.faces)
             self._names[id(item)] = item.name
+            placed = ""
+            if item.coordinates is not None:
+                placed = f", coordinates={self._array(f'places_{number}_{item.name}', item.coordinates)}"
             return (
                 f"decals.MeshObject({item.name!r}, {vertices}, {faces}, {self._color(item)}, "
-                f"source={item.source!r}, crease_angle={item.crease_angle!r}{_more(item)})"
+                f"source={item.source!r}, crease_angle={item.crease_angle!r}{_more(item)}{placed})"
             )
         return f"decals.TreeObject({item.name!r}, {self._tree(item.tree)}{_more(item)})"
 

@@ -332,6 +332,17 @@ class BaseColor(Value):
         corners[changed] = np.take_along_axis(corners[changed], places, axis=1)
         return replace(self, corners=corners)
 
+    def with_coordinates(self, coordinates: Float32Array, faces: Int32Array) -> Self:
+        """Return the same colours with coordinates of corners, ``float32[m, 3, 2]``, in place of its own."""
+        keys = np.column_stack([self.rows_of(faces).reshape(-1), coordinates.reshape(-1, 2)])
+        distinct, corners = np.unique(keys.astype(np.float64), axis=0, return_inverse=True)
+        return replace(
+            self,
+            colors=None if self.colors is None else self.colors[distinct[:, 0].astype(np.int64)],
+            coordinates=distinct[:, 1:].astype(np.float32),
+            corners=corners.reshape(-1, 3).astype(np.int32),
+        )
+
     def of_rows(self, rows: NDArray[np.integer[Any]]) -> Self:
         """Return the base colour of a mesh with the same faces, whose vertices take these rows."""
         return replace(

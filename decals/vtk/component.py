@@ -22,7 +22,7 @@ from decals.model import NO_IMAGE, Decals
 from decals.rendering import Environment, SceneLike
 from decals.scenes.camera import Camera
 from decals.scenes.cover import as_scene
-from decals.scenes.objects import MeshObject, SceneObject, TreeObject, shape_color
+from decals.scenes.objects import MeshObject, SceneObject, TreeObject, shape_color, spare_coordinates
 from decals.scenes.scene import Scene, as_images
 from decals.surfaces.base_color import BaseColor, BaseTexture
 from decals.surfaces.convert import Model, as_shape
@@ -158,7 +158,14 @@ class DecalsComponent(KnownAttributes):
                 raise InvalidScene(f"{label}: expected a mesh, got a BlobTree; `add_implicit` adds it")
             if color is None:
                 color = shape_color(shape, texture, None)
-            item = MeshObject(label, *shape.arrays, color, crease_angle=crease_angle, orientation=orientation)
+            item = MeshObject(
+                label,
+                *shape.arrays,
+                color,
+                crease_angle=crease_angle,
+                orientation=orientation,
+                coordinates=spare_coordinates(shape, color),
+            )
         self._add_object(item)
         return item
 

@@ -40,7 +40,7 @@ BALL = Point((0, 0, 0), radius=1.0)
         ({"layout": 3}, "layout: expected one of"),
         (
             {"layout": "own"},
-            "expected texture coordinates below a texture or colours, object 'model 1' has none; give",
+            "expected texture coordinates, object 'model 1' has none; use layout='box'",
         ),
         ({"contact": 9}, "contact: expected one of"),
         ({"mapping": "planar"}, "mapping: expected one of"),
