@@ -35,6 +35,7 @@ EXPLAINED: dict[Kind, str] = {
 
 BY_KIND: dict[Kind, str] = {
     "processor": """
+        blobtree.check_kind
         blobtree.content_hash blobtree.define_falloff blobtree.define_field blobtree.define_operator
         blobtree.define_skeleton blobtree.define_warp blobtree.formula blobtree.from_json blobtree.from_sdf
         blobtree.load blobtree.numeric_parameters blobtree.numeric_values blobtree.save blobtree.to_json
