@@ -67,7 +67,7 @@ LONG_FILES = (
     "decals/window/test_long_work.py",
     "blobtree/nodes/test_values.py",
     "decals/index/test_index.py",
-    "blobtree/formulas/test_blends.py",
+    "blobtree/formulas/test_operators.py",
     "blobtree/transpile/test_specialize.py",
     "decals/scattering/test_shares.py",
     "decals/window/test_frames.py",

@@ -153,10 +153,9 @@ VALUES: dict[str, Callable[..., Floats]] = {
 
 
 def partials(
-    name: str, a: Floats, b: Floats, step: float = 1e-6, **parameters: Any
+    value: Callable[..., Floats], a: Floats, b: Floats, step: float = 1e-6, **parameters: Any
 ) -> tuple[Floats, Floats, Floats]:
     """Partial derivatives by a and b, and the largest change of them within a step: large near kinks."""
-    value = VALUES[name]
     at_a = [value(moved(a, s * step), b, **parameters) for s in (-1.0, 0.0, 1.0)]
     at_b = [value(a, moved(b, s * step), **parameters) for s in (-1.0, 0.0, 1.0)]
     below, above = ((f[1] - f[0]) / step for f in (at_a, at_b)), ((f[2] - f[1]) / step for f in (at_a, at_b))
@@ -172,11 +171,12 @@ def moved(f: Floats, step: float) -> Floats:
 def kink(name: str, a: Floats, b: Floats, reach: float = 2e-3, **parameters: Any) -> Floats:
     """Infinite where the partial derivatives change little within `reach` of (a, b), and 0 elsewhere."""
     margin = np.full(len(a), np.inf)
-    middle = partials(name, a, b, **parameters)[:2]
+    value = VALUES[name]
+    middle = partials(value, a, b, **parameters)[:2]
     for da in (-reach, 0.0, reach):
         for db in (-reach, 0.0, reach):
             near = np.maximum(a + da, 0.5 * a), np.maximum(b + db, 0.5 * b)
-            by_a, by_b, _ = partials(name, near[0], near[1], **parameters)
+            by_a, by_b, _ = partials(value, near[0], near[1], **parameters)
             change = np.maximum(np.abs(by_a - middle[0]) * (a > 0.0), np.abs(by_b - middle[1]) * (b > 0.0))
             margin[change > 0.2] = 0.0
     return margin

@@ -254,7 +254,7 @@ def direction(node: Node, q: Floats) -> Floats:
         case GradientBlend(operands=(first, second)):
             opening = opening_of(node, q)
             a, b = value(first, q), value(second, q)
-            by_a, by_b, _ = blends.partials("gradient_blend", a, b, opening=opening)
+            by_a, by_b, _ = blends.partials(blends.opened, a, b, opening=opening)
             towards: Floats = by_a[:, None] * direction(first, q) + by_b[:, None] * direction(second, q)
             return towards
         case Sum(operands=operands):
@@ -504,7 +504,7 @@ def _blended(a: Field, b: Field, node: Operator, **values: Any) -> Field:
     """A blend of the library; its partial derivatives are differences."""
     name = node.operator.name
     value = blends.VALUES[name](a.value, b.value, **values)
-    by_a, by_b, _ = blends.partials(name, a.value, b.value, **values)
+    by_a, by_b, _ = blends.partials(blends.VALUES[name], a.value, b.value, **values)
     weights = np.abs(by_a) * a.value, np.abs(by_b) * b.value
     total = weights[0] + weights[1]
     share = np.where(total > 0.0, weights[1] / np.where(total > 0.0, total, 1.0), b.value > a.value)
