@@ -13,11 +13,13 @@ phrase, and by name:
 """
 
 import math
-from dataclasses import MISSING, field
+from dataclasses import MISSING, field, replace
 from functools import partial
 from typing import Any
 
 from blobtree.declare.parameters import SPECIFIED, Parameter, Quantity
+from blobtree.errors import InvalidDefinition, InvalidNode
+from blobtree.validation import real_number, shown
 
 
 def _field(
@@ -31,10 +33,28 @@ def _field(
     natural: float | None = None,
 ) -> Any:
     """Return a field of a dataclass that declares a parameter."""
+    if not isinstance(doc, str):
+        raise InvalidDefinition(f"par.{quantity.value}: expected a description, got {shown(doc)}")
+    if not _in_order(low, high):
+        raise InvalidDefinition(f"{doc}: expected numbers low ≤ high, got {shown(low)} and {shown(high)}")
     if natural is None and default is not MISSING:
         natural = default
     parameter = Parameter(quantity, doc, low=low, high=high, hint=hint, natural=natural)
+    for name, value in (("default", default), ("natural", natural)):
+        if value is not None and value is not MISSING:
+            try:
+                replace(parameter, name=name).check(value)
+            except InvalidNode as error:
+                raise InvalidDefinition(f"{doc}: {error}") from None
     return field(default=default, metadata={SPECIFIED: parameter})
+
+
+def _in_order(low: object, high: object) -> bool:
+    """Return True for two numbers of which the first is not the larger one."""
+    try:
+        return real_number(low) <= real_number(high)
+    except (TypeError, ValueError):
+        return False
 
 
 factor = partial(_field, Quantity.FACTOR)

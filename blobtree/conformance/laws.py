@@ -29,6 +29,7 @@ from blobtree.io import from_json, to_json
 from blobtree.nodes.node import Node
 from blobtree.nodes.primitives import Point
 from blobtree.tape.model import evaluate, gradients_at
+from blobtree.validation import is_whole, positive_count
 
 Oracle = Callable[..., Any]
 """The field in double precision: values (n,) of (node, points); or of (distances) for a falloff."""
@@ -55,6 +56,9 @@ NO_KINK = 1e-3
 
 STEP = 1e-6
 """Step of differences, over the size of the node."""
+
+MAX_TEXT = 300
+"""Letters of a node in a report."""
 
 POINTS, PLAIN_POINTS, CUBES, PRUNED_CUBES, RAYS, STEPS = 100, 40, 24, 16, 60, 12
 
@@ -162,14 +166,28 @@ class Case:
             return self.node.interval(center - half, center + half)
         return self.exact.pruned(center, half)[0]
 
+    def told(self, points: ArrayLike) -> tuple[Float64Array, Float64Array | None]:
+        """Return the oracle's values (n,), and how far a kink is from each if it tells."""
+        assert self.oracle is not None
+        places = np.asarray(points, np.float64)
+        try:
+            answer = self.oracle(self.node, places)
+        except Exception as error:  # whatever an oracle does wrong
+            raise InvalidNode(f"oracle: it fails: {type(error).__name__}: {error}") from error
+        values, away = answer if isinstance(answer, tuple) else (answer, None)
+        values = np.asarray(values, np.float64)
+        if values.shape != (len(places),):
+            raise InvalidNode(f"oracle: expected values of shape ({len(places)},), got {values.shape}")
+        return values, away
+
     def reference(self, points: ArrayLike) -> tuple[Float64Array, Float64Array]:
         """Return values (n,) in double precision that may be differenced, and how far a kink is from each.
 
         They are the oracle's if it knows of kinks, and otherwise those of the kind's own formulas.
         """
-        known = None if self.oracle is None else self.oracle(self.node, np.asarray(points, np.float64))
-        if isinstance(known, tuple):
-            return known
+        values, away = (None, None) if self.oracle is None else self.told(points)
+        if values is not None and away is not None:
+            return values, away
         return self.exact.values(points), np.full(len(np.asarray(points)), np.inf)
 
 
@@ -202,10 +220,8 @@ def values_match(case: Case) -> Contradictions:
     if case.oracle is None:
         raise NotChecked("no oracle is given")
     points = case.points(POINTS)
-    known = case.oracle(case.node, points.astype(np.float64))
-    expected = np.asarray(known[0] if isinstance(known, tuple) else known, np.float64)
     tolerance = SINGLE if case.compiled else DOUBLE
-    yield from _compared("the field", case.values(points), expected, points, tolerance)
+    yield from _compared("the field", case.values(points), case.told(points)[0], points, tolerance)
 
 
 def single_precision_suffices(case: Case) -> Contradictions:
@@ -444,7 +460,8 @@ def check_kind(
     Raises
     ------
     InvalidNode
-        `kind` is no class of nodes or falloffs, or no drawn parameters make a valid node.
+        `kind` is no class of nodes or falloffs, no drawn parameters make a valid node, or another argument is
+        invalid.
 
     Examples
     --------
@@ -457,14 +474,22 @@ def check_kind(
     >>> check_kind(Union, right, samples=1, show=None).conforms
     True
     """
+    for name, function in (("oracle", oracle), ("sample", sample), ("show", show)):
+        if function is not None and not callable(function):
+            raise InvalidNode(f"{name}: expected a function or None, got {function!r:.200}")
+    samples = positive_count("samples", samples, InvalidNode)
+    if not is_whole(seed) or seed < 0:
+        raise InvalidNode(f"seed: expected a whole number from 0, got {seed!r:.200}")
     draw = sample
-    if isinstance(kind, type) and issubclass(kind, Falloff):
+    if isinstance(kind, type) and issubclass(kind, Falloff) and kind is not Falloff:
         draw, oracle = draw or falling_ball(kind()), oracle and _of_balls(oracle)
     elif not (isinstance(kind, type) and issubclass(kind, Node)):
         raise InvalidNode(f"kind: expected a class of nodes or of falloffs, got {kind!r:.200}")
     elif draw is None:
         draw = partial(drawn_node, kind)
     nodes = [draw(np.random.default_rng([seed, number])) for number in range(samples)]
+    if sample is not None and not all(isinstance(node, Node) for node in nodes):
+        raise InvalidNode(f"sample: expected a function that returns a node, got {nodes[0]!r:.200} from it")
     rows = []
     for place, (name, law) in enumerate(LAWS.items()):
         cases = (
@@ -490,13 +515,22 @@ def _tried(name: str, law: LawFunction, cases: Iterator[Case]) -> Law:
             found = [Contradiction(np.inf, f"{type(error).__name__}: {error}")]
         for one in found:
             if worst is None or one.size > worst.size:
-                worst = replace(one, text=f"{one.text}, for {case.node!r:.300}")
+                worst = replace(one, text=f"{one.text}, for {_shortened(repr(case.node))}")
     return Law(name, "holds") if worst is None else Law(name, "fails", worst.text)
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= MAX_TEXT else f"{text[:MAX_TEXT]}…"
 
 
 def _of_balls(oracle: Oracle) -> Oracle:
     """Return the oracle of balls with a falloff whose own oracle is given."""
-    rim = find_rim(lambda distances: np.asarray(oracle(distances), np.float64))
+    try:
+        rim = find_rim(lambda distances: np.asarray(oracle(distances), np.float64))
+    except Exception as error:  # whatever an oracle does wrong
+        raise InvalidNode(
+            f"oracle: expected a function of distances (n,) that returns the falloff (n,); it fails: {error}"
+        ) from error
 
     def field(ball: Point, points: Float64Array) -> Float64Array:
         radii = np.linalg.norm(points - np.array(ball.center), axis=1) / ball.radius

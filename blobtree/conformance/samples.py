@@ -31,11 +31,19 @@ def _triple(numbers: Float64Array) -> tuple[float, float, float]:
 def _factor(rng: Rng, parameter: Parameter) -> float:
     low = parameter.low if np.isfinite(parameter.low) else -0.5
     high = min(parameter.high, 3.0) if np.isfinite(parameter.high) else max(0.5, low + 1.0)
+    if low > high:
+        return _within(rng, parameter, -0.5, 0.5)
     return float(rng.uniform(max(low, 0.3) if high > 0.3 > low >= 0.0 else low, high))
 
 
-def _angle(rng: Rng, parameter: Parameter) -> float:
-    return float(rng.uniform(max(parameter.low, -40.0), min(parameter.high, 40.0)))
+def _within(rng: Rng, parameter: Parameter, low: float, high: float) -> float:
+    """Return a number between `low` and `high` if the parameter allows one, else one close to them."""
+    least, most = max(low, parameter.low), min(high, parameter.high)
+    if least > most and parameter.low > high:
+        most = min(parameter.high, least + high - low)
+    elif least > most:
+        least = max(parameter.low, most - (high - low))
+    return float(rng.uniform(least, most))
 
 
 def _numbers(rng: Rng, parameter: Parameter) -> Any:
@@ -50,12 +58,12 @@ DRAWS: dict[Quantity, Draw] = {
     Quantity.POINTS: lambda rng, _: tuple(map(_triple, rng.uniform(-0.8, 0.8, (4, 3)))),
     Quantity.DIRECTION: lambda rng, _: _triple(rng.normal(size=3)),
     Quantity.EXTENTS: lambda rng, _: _triple(rng.uniform(0.3, 1.2, 3)),
-    Quantity.LENGTH: lambda rng, _: float(rng.uniform(0.2, 0.9)),
+    Quantity.LENGTH: lambda rng, p: _within(rng, p, 0.2, 0.9),
     Quantity.RADIUS: lambda rng, _: float(rng.uniform(0.15, 0.45)),
     Quantity.RADII: lambda rng, _: tuple(rng.uniform(0.2, 0.3, 4).tolist()),
     Quantity.SEMI_AXES: lambda rng, _: _triple(rng.uniform(0.3, 0.9, 3)),
-    Quantity.DISTANCE: lambda rng, _: float(rng.uniform(-0.08, 0.2)),
-    Quantity.ANGLE: _angle,
+    Quantity.DISTANCE: lambda rng, p: _within(rng, p, -0.08, 0.2),
+    Quantity.ANGLE: lambda rng, p: _within(rng, p, -40.0, 40.0),
     Quantity.FACTOR: _factor,
     Quantity.WIDTH: lambda rng, _: float(rng.uniform(0.1, 0.4)),
     Quantity.NUMBERS: _numbers,

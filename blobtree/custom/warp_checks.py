@@ -133,8 +133,8 @@ def _try_box(trial: Trial, claims: WarpClaims, numbers: tuple[float, ...], rng: 
         slack = 1e-6 * claims.extent
         if (q < lower - slack).any() or (q > upper + slack).any():
             raise trial.source.refusal(
-                f"box: {shown(q)} comes from {shown(image)}, but the box {shown(lower)} to "
-                f"{shown(upper)} around that does not hold it{trial.with_values}"
+                f"box: {shown(image)} of the child moves to {shown(q)}, but the claimed box "
+                f"{shown(lower)} to {shown(upper)} does not hold it{trial.with_values}"
             )
 
 

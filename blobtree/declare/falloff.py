@@ -1,5 +1,6 @@
 """Falloffs: how a field falls off with the distance. A falloff is a class with one formula."""
 
+from dataclasses import Field
 from typing import Any, ClassVar, Self, cast
 
 import warp as wp
@@ -83,6 +84,9 @@ class Falloff:
     def __init_subclass__(cls) -> None:
         cls.name = tag_of(cls)
         cls._formulas = declared_formulas(cls, cls.name, {"value": wp.float32, "slope": wp.float32})
+        fields = [name for name, value in vars(cls).items() if isinstance(value, Field)]
+        if fields:
+            raise InvalidDefinition(f"{cls.__qualname__}: {fields[0]!r}: a falloff has no parameters")
         if "value" not in cls._formulas:
             raise InvalidDefinition(f"{cls.__qualname__}: expected a falloff with the formula `value`")
         for name, declared in cls._formulas.items():
@@ -160,7 +164,7 @@ class Falloff:
         return self
 
 
-FALLOFF_NAMES: Definitions[Falloff] = Definitions("falloff", "define_falloff or a subclass of Falloff for it")
+FALLOFF_NAMES: Definitions[Falloff] = Definitions("falloff")
 """Every falloff by its name in files; the definition of a subclass adds to it."""
 
 

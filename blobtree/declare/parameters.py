@@ -24,7 +24,7 @@ from blobtree._typing import Float64Array
 from blobtree.colors import ColorLike, color_rgb
 from blobtree.declare.falloff import FALLOFF_NAMES, Falloff
 from blobtree.declare.registry import load_libraries
-from blobtree.errors import InvalidNode
+from blobtree.errors import InvalidDefinition, InvalidNode
 from blobtree.validation import (
     Vector,
     affine_matrix,
@@ -163,7 +163,10 @@ class Parameter:
         result = CHECKS[self.quantity](self.name, value)
         if self.low <= result <= self.high:
             return result
-        raise InvalidNode(f"{self.name}: expected {self.low:g} to {self.high:g}, got {result!r}; {self.hint}")
+        ends = math.isfinite(self.low) and math.isfinite(self.high)
+        span = f"{self.low:g} to {self.high:g}" if ends else f"a number {self.range}"
+        hint = f"; {self.hint}" if self.hint else ""
+        raise InvalidNode(f"{self.name}: expected {span}, got {result!r}{hint}")
 
     @property
     def is_bounded(self) -> bool:
@@ -291,7 +294,11 @@ def annotate(kind: type) -> None:
     """Move the parameters that specifiers declare in the body of a class into its annotations."""
     hints = dict(inspect.get_annotations(kind))
     for name, value in vars(kind).items():
-        if isinstance(value, Field) and SPECIFIED in value.metadata and name in hints:
+        if isinstance(value, Field) and SPECIFIED in value.metadata:
+            if name not in hints:
+                raise InvalidDefinition(
+                    f"{kind.__qualname__}: parameter {name!r}: expected a type, as in `{name}: float = …`"
+                )
             hints[name] = Annotated[hints[name], value.metadata[SPECIFIED]]
     kind.__annotations__ = hints
 

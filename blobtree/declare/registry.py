@@ -48,14 +48,11 @@ def kind_of(tag: str) -> type[Any]:
 
 
 class Definitions(dict[str, Definition]):
-    """Definitions of one sort by their names in files.
+    """Definitions of one sort by their names in files; `noun` names one in messages."""
 
-    In messages, `noun` names a definition, and `makers` the functions that make one.
-    """
-
-    def __init__(self, noun: str, makers: str) -> None:
+    def __init__(self, noun: str) -> None:
         super().__init__()
-        self.noun, self.makers = noun, makers
+        self.noun = noun
 
     def find(self, name: str) -> Definition:
         """Return the definition of this name.
@@ -68,8 +65,8 @@ class Definitions(dict[str, Definition]):
         if name not in self:
             raise UnknownKind(
                 f"{self.noun} {name!r} is not defined in this process (defined: "
-                f"{', '.join(sorted(self)) or 'none'}); import the module that calls {self.makers}, "
-                "then try again"
+                f"{', '.join(sorted(self)) or 'none'}); import the module that defines it (on the "
+                "command line: --define), then try again"
             )
         return self[name]
 
@@ -104,10 +101,7 @@ class CustomKind(type):
     parameters: tuple[Any, ...]
 
 
-CUSTOM_KINDS: Definitions[CustomKind] = Definitions(
-    "custom kind",
-    "define_skeleton, define_operator, define_field or define_warp for it (on the command line: --define)",
-)
+CUSTOM_KINDS: Definitions[CustomKind] = Definitions("custom kind")
 """All kinds that are defined in this process, in the order of their definition."""
 
 

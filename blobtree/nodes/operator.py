@@ -35,9 +35,7 @@ class Combination(Node, metaclass=CustomKind):
 
     def __init_subclass__(cls) -> None:
         own, declares = is_own(cls), any(isinstance(value, Declared) for value in vars(cls).values())
-        if not declares and not own and cls.operator is None:
-            raise InvalidDefinition(f"{cls.__qualname__}: expected an operator with the formula `value`")
-        if not declares:
+        if not declares and (own or "operator" in vars(cls)):
             super().__init_subclass__()
             return
         tag = tag_of(cls)
@@ -181,6 +179,8 @@ class Operator(ManyOperands, Combination):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if type(self) is Operator:
+            raise InvalidNode("Operator: expected a subclass of it with the formula `value`")
         if not self.operator.commutes and len(self.operands) != 2:
             raise InvalidNode(
                 f"operands: expected two, got {len(self.operands)}; {type(self).__name__} does not "
@@ -191,7 +191,7 @@ class Operator(ManyOperands, Combination):
 def _require_free_names(kind: type[Combination]) -> None:
     """Raise `InvalidDefinition` if a parameter has the name of what each node has."""
     for name, value in vars(kind).items():
-        if isinstance(value, Field) and (hasattr(Operator, name) or name in RESULTS):
+        if isinstance(value, Field) and (hasattr(Operator, name) or name in ("operands", *RESULTS)):
             raise InvalidDefinition(
                 f"{kind.__qualname__}: parameter {name!r}: every node of this sort has an attribute of that "
                 "name; choose another"

@@ -67,7 +67,7 @@ class ContactLaw(Value):
 AnyContact = Contact | ContactLaw
 """A contact mode, or a law in place of one."""
 
-LAWS: Definitions[ContactLaw] = Definitions("contact law", "define_contact for it")
+LAWS: Definitions[ContactLaw] = Definitions("contact law")
 """The laws that were defined, by name."""
 
 

@@ -80,7 +80,7 @@ def test_files_and_pickles_name_the_kind(node: CustomField) -> None:
     node = replace(node, weight=-0.5, attributes={"age": 3.0})
     assert from_json(to_json(node)) == node == pickle.loads(pickle.dumps(node))
     assert eval(repr(node), {"Lump": Lump, "Waves": Waves}) == node
-    with pytest.raises(InvalidFile, match=r"calls .* define_field"):
+    with pytest.raises(InvalidFile, match="import the module that defines it"):
         from_json(to_json(node).replace(f'"{node.kind}"'.encode(), b'"nothing"'))
 
 

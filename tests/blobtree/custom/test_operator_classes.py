@@ -6,7 +6,19 @@ from typing import Any
 import pytest
 import warp as wp
 
-from blobtree import InvalidDefinition, InvalidNode, Node, Operator, Point, formula, from_json, par, to_json
+from blobtree import (
+    Falloff,
+    InvalidDefinition,
+    InvalidNode,
+    Node,
+    Operator,
+    Point,
+    Union,
+    formula,
+    from_json,
+    par,
+    to_json,
+)
 from blobtree.declare.parameters import parameters_of
 from blobtree.declare.registry import CUSTOM_KINDS, CustomKind
 from decals.editing.new_nodes import new_node
@@ -144,3 +156,49 @@ def test_fields_need_a_specifier_and_a_free_name() -> None:
             CustomKind("Wrong", (Operator,), body)
     with pytest.raises(InvalidDefinition, match="the formula `value`"):
         CustomKind("Wrong", (Operator,), claims)
+    with pytest.raises(InvalidDefinition, match="every node of this sort has an attribute"):
+        CustomKind("Wrong", (Operator,), {**claims, "operands": par.factor("x"), **_annotated("operands")})
+    with pytest.raises(InvalidDefinition, match="'share': expected a type"):
+        CustomKind("Wrong", (Operator,), {**claims, "share": par.factor("a factor")})
+    with pytest.raises(InvalidDefinition, match="'share': a falloff has no parameters"):
+        type("Wrong", (Falloff,), {"__module__": __name__, "share": par.factor("a factor")})
+    with pytest.raises(InvalidNode, match="expected a subclass of it"):
+        Operator(LEFT, RIGHT)
+
+
+def _annotated(name: str) -> dict[str, Any]:
+    return {"__annotations__": {name: float}}
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"low": 2.0, "high": 1.0}, "numbers low ≤ high, got 2.0 and 1.0"),
+        ({"low": float("nan")}, "numbers low ≤ high, got nan"),
+        ({"high": "x"}, "numbers low ≤ high, got -inf and 'x'"),
+        ({"low": 0.0, "high": 1.0, "default": 3.0}, "a share: default: expected 0 to 1, got 3.0"),
+        ({"low": 0.0, "natural": -1.0}, "a share: natural: expected a number from 0, got -1.0$"),
+        ({"default": "x"}, "default: expected a finite number"),
+    ],
+)
+@pytest.mark.parametrize("specifier", [par.factor, par.angle, par.distance])
+def test_impossible_ranges_and_defaults_are_refused(
+    specifier: Any, values: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InvalidDefinition, match=message):
+        specifier("a share", **values)
+    with pytest.raises(InvalidDefinition, match="expected a description, got 3"):
+        specifier(3)
+
+
+def test_a_subclass_of_a_kind_is_a_kind_with_its_formulas_and_own_claims() -> None:
+    class Gentle(Share):
+        monotone = False
+
+    node = Gentle(LEFT, RIGHT, share=0.5)
+    assert (Gentle.kind, Gentle.operator.monotone, Gentle.operator.like) == ("gentle", False, "blend")
+    assert (Share.kind, Share.operator.monotone) == ("share", True)
+    assert type(from_json(to_json(node))) is Gentle
+    assert node != Share(LEFT, RIGHT, share=0.5)
+    with pytest.raises(InvalidDefinition, match="the formula `value`"):
+        CustomKind("Larger", (Union,), {"__module__": __name__})
