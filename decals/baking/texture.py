@@ -303,7 +303,7 @@ class Sheet:
         """
         rows = (bottom - top) * steps
         found: Any = wp.full(rows * size * steps, -1, dtype=wp.int32, device=self.device)
-        overlaps: Any = wp.zeros(rows, dtype=wp.int32, device=self.device)
+        overlaps: Any = wp.empty(rows, dtype=wp.int32, device=self.device)
         use: Any = wp.empty(0, dtype=wp.uint8, device=self.device) if wanted is None else wanted
         lists = self._faces_of_rows(size)
         inputs = [*lists, *self._arrays[:2], top, steps, size * steps, margin, use]
@@ -435,7 +435,7 @@ class _Page:
 
     def texels(self, listed: Int64Array) -> UInt8Array:
         """Return some texels, ``uint8[n, channels]``."""
-        levels = self._zeros(len(listed) * self._channels.count, wp.uint8)
+        levels = self._empty(len(listed) * self._channels.count, wp.uint8)
         inputs = [array_on(self._device, listed, wp.int32), self._image, self._channels.count]
         launch(read_listed, len(listed), inputs, [levels], self._device)
         values: UInt8Array = levels.numpy()
@@ -457,7 +457,7 @@ class _Page:
             self._color_centers(sheet, own, top, bottom)
         self._color_beyond(sheet, beyond, own, samples)
         if samples > 1:
-            uneven = self._zeros(self._texels, wp.uint8)
+            uneven = self._empty(self._texels, wp.uint8)
             inputs = [own, self._filled, self._image, self._size, self._channels.count, FINE_STEP]
             launch(mark_uneven, self._texels, inputs, [uneven], self._device)
             for top, bottom in self._blocks(samples):
@@ -471,6 +471,10 @@ class _Page:
     def _zeros(self, count: int, kind: Any) -> Any:
         return wp.zeros(count, dtype=kind, device=self._device)
 
+    def _empty(self, count: int, kind: Any) -> Any:
+        """Return an array for a kernel that writes all of it."""
+        return wp.empty(count, dtype=kind, device=self._device)
+
     def _blocks(self, steps: int) -> Iterator[tuple[int, int]]:
         rows = max(1, self._block // (self._size * steps**2))
         for top in range(0, self._size, rows):
@@ -478,10 +482,10 @@ class _Page:
 
     def _chosen(self, kernel: Any, count: int, inputs: list[Any], begin: int = 0) -> Any:
         """Return the numbers that a kernel marks, from ``begin`` on, in order."""
-        marks, ends = (self._zeros(count, wp.int32) for _ in range(2))
+        marks, ends = (self._empty(count, wp.int32) for _ in range(2))
         launch(kernel, count, inputs, [marks], self._device)
         wp.utils.array_scan(marks, ends, inclusive=True)
-        numbers = self._zeros(int(ends[-1:].numpy()[0]) if count else 0, wp.int32)
+        numbers = self._empty(int(ends[-1:].numpy()[0]) if count else 0, wp.int32)
         launch(list_marked, count, [marks, ends, begin], [numbers], self._device)
         return numbers
 
@@ -494,7 +498,7 @@ class _Page:
     def _write(self, texels: Any, values: Any, own: Any, mark: int, counts: Any = None) -> None:
         """Write values to texels, and mark them as own ones."""
         if counts is None:
-            counts = self._zeros(0, wp.int32)
+            counts = self._empty(0, wp.int32)
         inputs = [texels, self._channels.levels(values), counts, mark, self._channels.count]
         launch(write_texels, len(texels), inputs, [self._image, own], self._device)
 
@@ -506,7 +510,7 @@ class _Page:
             return
         values = sheet.colors(sheet.samples(texels, found, top, self._size, 1))
         self._write(texels, values, own, CHART)
-        sums: Any = self._zeros(-(-len(texels) // PART_ROWS) * self._channels.count, wp.float64)
+        sums: Any = self._empty(-(-len(texels) // PART_ROWS) * self._channels.count, wp.float64)
         inputs = [values, self._channels.count, PART_ROWS]
         launch(sum_parts, len(sums) // self._channels.count, inputs, [sums], self._device)
         self._sum += sums.numpy().reshape(-1, self._channels.count).sum(axis=0)
@@ -515,8 +519,8 @@ class _Page:
     def _means(self, values: Any, faces: Any, samples: int) -> tuple[Any, Any]:
         """Return the means of the samples of texels that have a face, and how many these are."""
         count = len(faces) // samples**2
-        means = self._zeros(count * self._channels.count, wp.float32)
-        counts = self._zeros(count, wp.int32)
+        means = self._empty(count * self._channels.count, wp.float32)
+        counts = self._empty(count, wp.int32)
         inputs = [values, faces, samples**2, self._channels.count]
         launch(mean_samples, count, inputs, [means, counts], self._device)
         return means, counts

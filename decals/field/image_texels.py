@@ -71,14 +71,13 @@ class UploadedImages:
         layers = np.zeros((count, counts.sum(), 4), np.float32)
         starts = np.cumsum(counts) - counts
         for image, own, relief, first in zip(listed, pixels, reliefs, starts.tolist(), strict=True):
-            part = np.zeros((count, *own.shape[:2], 4), np.float32)
+            part = layers[:, first : first + own.shape[0] * own.shape[1]].reshape(count, *own.shape[:2], 4)
             if shining and hasattr(image, "surface_texels"):
                 _write_maps(image, part)
                 part *= unit_levels(own[..., 3:])
             part[COLORS] = linear_premultiplied(own)
             if relief is not None:
                 part[SURFACES, ..., 3] = relief
-            layers[:, first : first + own.shape[0] * own.shape[1]] = part.reshape(count, -1, 4)
         texels: Any = ImageTexels()
         extents = np.column_stack([starts, sizes]).astype(np.int32)
         texels.extents = wp.array(extents, dtype=wp.vec3i, device=device)
