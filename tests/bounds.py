@@ -1,14 +1,10 @@
 """Bounds of nodes against many samples: intervals in cubes, slopes along rays, and the box of the support."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 
 from blobtree import Node
-from blobtree._typing import Float64Array
 from blobtree.conformance.samples import Rng
-from tests.blobtree.tape.evaluations import bounds_along, bounds_at
+from tests.blobtree.tape.evaluations import bounds_along
 from tests.blobtree.trees import points_around
 from tests.conformance import sample
 
@@ -20,24 +16,6 @@ STEPS = 50
 
 ROUNDING = 2e-6
 """Rounding of a value in float32, relative to the largest one."""
-
-
-def assert_bounds_hold(
-    node: Node, exact: Callable[[Any, Any], Float64Array], rng: Rng, *, count: int, rounding: float
-) -> None:
-    """Check slopes in random balls, and intervals in some cubes, against exact values of the field."""
-    centers = points_around(rng, node, count)
-    reach = (10.0 ** rng.uniform(-3.0, 0.3, count)).astype(np.float32)
-    bounds = bounds_at(node.tape, centers, reach)[:, 1]
-    for _ in range(10):
-        offsets = rng.normal(size=(count, 3))
-        offsets *= (reach * rng.uniform(0, 1, count) / np.linalg.norm(offsets, axis=1))[:, None]
-        change: Float64Array = np.abs(np.subtract(exact(node, centers + offsets), exact(node, centers)))
-        assert (change <= bounds * np.linalg.norm(offsets, axis=1) + rounding).all()
-    for center, radius in zip(centers[: count // 5], reach[: count // 5], strict=True):
-        smallest, largest = node.interval(center - radius, center + radius)
-        inside = exact(node, rng.uniform(center - radius, center + radius, (200, 3)))
-        assert smallest - rounding <= inside.min() <= inside.max() <= largest + rounding
 
 
 def violations_of(kind: type[Node], seed: int, samples: int) -> list[str]:

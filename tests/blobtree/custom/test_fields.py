@@ -16,6 +16,7 @@ from blobtree import (
     Node,
     Point,
     UntranslatableFunction,
+    check_kind,
     define_field,
     from_json,
     polygonize,
@@ -26,7 +27,6 @@ from tests.blobtree.custom import field_kernels as kernels
 from tests.blobtree.custom_kinds import Lump, Waves
 from tests.blobtree.meshing.test_polygonize import assert_closed
 from tests.blobtree.trees import points_around
-from tests.bounds import assert_bounds_hold
 from tests.oracles import direct_fields
 
 LUMP = Lump((0.2, 0.0, 0.1), (3.0, 2.5, 3.0), (0.1, 0.2, 0.0), 0.6, color=(1, 0, 0))
@@ -59,8 +59,8 @@ def test_values_and_gradients_are_those_of_float64(node: Node) -> None:
 
 
 @EACH
-def test_bounds_hold(node: Node) -> None:
-    assert_bounds_hold(node, value, np.random.default_rng(2), count=200, rounding=1e-6)
+def test_all_laws_hold(node: Node) -> None:
+    assert check_kind(type(node), value, sample=lambda _: node, samples=1, show=None).failed == ()
 
 
 @EACH

@@ -1,13 +1,11 @@
 """Blends and their macros as nodes: operands, files, text, and what they refuse."""
 
-import pickle
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pytest
 
-import blobtree
 from blobtree import (
     BlendGraph,
     CleanUnion,
@@ -31,9 +29,7 @@ from blobtree import (
     SuperellipticBlend,
     SymmetricDifference,
     Union,
-    from_json,
     polygonize,
-    to_json,
 )
 from tests.blobtree.custom_kinds import Soft, Stew, Swell
 
@@ -97,15 +93,6 @@ def test_messages_name_what_is_missing_or_unknown() -> None:
         Ricci(A, B)
     with pytest.raises(TypeError, match=r"^Sum: expected operands and nothing else; exponent unknown$"):
         Sum(A, B, exponent=2.0)
-
-
-@EVERY_NODE
-def test_files_text_and_copies(node: Node) -> None:
-    names: dict[str, Any] = {name: getattr(blobtree, name) for name in blobtree.__all__}
-    for same in (from_json(to_json(node)), pickle.loads(pickle.dumps(node)), eval(repr(node), names)):
-        assert same == node
-        assert hash(same) == hash(node)
-        np.testing.assert_array_equal(same.tape.data, node.tape.data)
 
 
 @EVERY_NODE

@@ -43,16 +43,6 @@ def test_values_and_gradients_are_those_of_quadrature(node: Node) -> None:
     np.testing.assert_allclose(node.gradient(points), reference[:, 1:], rtol=1e-4, atol=5e-5)
 
 
-@EACH
-def test_the_field_is_exactly_zero_outside_its_box(node: Node) -> None:
-    lower, upper = node.support
-    points = np.random.default_rng(6).uniform(-3.0, 4.0, (4000, 3))
-    outside = ((points < lower) | (points > upper)).any(axis=1)
-    assert outside.sum() > 1000
-    assert not node(points[outside]).any()
-    assert not node.gradient(points[outside]).any()
-
-
 @given(FRACTIONS, st.integers(0, 2**32 - 1))
 @settings(max_examples=25, deadline=None)
 def test_parts_of_a_segment_add_up_to_it(t: float, seed: int) -> None:

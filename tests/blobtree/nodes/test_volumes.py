@@ -30,7 +30,7 @@ from blobtree.nodes.paths import moved, resized
 from blobtree.nodes.samples import Samples
 from tests.blobtree.meshing.test_polygonize import assert_closed
 from tests.blobtree.trees import points_around
-from tests.bounds import assert_bounds_hold
+from tests.conformance import broken_laws
 from tests.oracles.blobtree import value
 
 
@@ -85,15 +85,7 @@ def test_a_sampled_ball_is_a_point() -> None:
 
 @EACH
 def test_bounds_hold(node: Volume) -> None:
-    assert_bounds_hold(node, value, np.random.default_rng(4), count=300, rounding=1e-5)
-
-
-@EACH
-def test_outside_the_support_the_field_is_exactly_zero(node: Volume) -> None:
-    lower, upper = node.support
-    points = np.random.default_rng(5).uniform(lower - 1.0, upper + 1.0, (3000, 3)).astype(np.float32)
-    beyond = ((points < lower) | (points > upper)).any(axis=1)
-    assert (node(points[beyond]) == 0.0).all()
+    assert broken_laws(node, np.random.default_rng(4), "interval", "Lipschitz bound", "box") == []
 
 
 def test_volumes_blend_under_maps_and_are_traced() -> None:
