@@ -16,6 +16,7 @@ from decals.editing.queries import mean_normal, nearest_points
 from decals.editing.scatter_commands import RelaxDecals, ScatterDecals
 from decals.editing.session import Command, EditSession
 from decals.editing.steps import inputs_of
+from decals.errors import InvalidEdit
 from decals.model import LAYER_LIMIT, NO_IMAGE, Decals, Interaction
 from decals.scattering.orientation import tangents
 from decals.scenes.objects import bounds_of
@@ -98,8 +99,14 @@ class DecalActions(WindowActions):
         """Add a decal like the last selected one, but with other values of `Decals`, and select it."""
         state, pick = self._state, require_pick(cursor)
         model = state.selection[-1] if state.selection else None
-        decal = new_decal(state.session.document, pick.position, pick.normal, model)
-        state.run(AddDecals(decal.replace(**values)))
+        document = state.session.document
+        decal = new_decal(document, pick.position, pick.normal, model).replace(**values)
+        layer = int(decal.layers[0])
+        if layer in document.locked_layers:
+            raise InvalidEdit(
+                f"layer {layer} is locked; unlock it in the outline, or select a decal of another layer"
+            )
+        state.run(AddDecals(decal))
         state.selection = (state.session.document.decals.next_number - 1,)
 
     @Group.DECALS.action("larger", "Ctrl+WheelUp", "plus", "equal", "KP_Add", summary="larger", repeats=True)

@@ -273,6 +273,18 @@ def test_the_add_tool_adds_a_decal_like_the_selected_one(user: UserInput) -> Non
     assert len(user.document.decals) == 62
 
 
+def test_the_add_tool_adds_no_decal_to_a_locked_layer(user: UserInput) -> None:
+    (_, at), *_ = user.visible()
+    user.key("s", shift=True)
+    user.actions.outline.change("layer 0", "lock")
+    assert not user.click(at)
+    assert user.actions.state.message.startswith("layer 0 is locked; unlock it")
+    assert len(user.document.decals) == 60
+    user.actions.outline.change("layer 0", "lock")
+    user.click(at)
+    assert user.actions.state.selection == (60,)
+
+
 def test_turning_the_wheel_is_one_entry_for_each_selection(user: UserInput) -> None:
     (first, at), (_, there) = user.visible()[:2]
     assert not user.tools.wheel(True, *at)
