@@ -104,20 +104,21 @@ def _cut_edges(
     """Return faces, tiles, ends, corners and lengths of the edges that lie at two places; see `Seams`."""
     corners = part.faces.astype(np.int64)
     numbers = welded(mesh.vertices)[part.rows[corners]]
-    sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
-    points = np.stack([numbers, np.roll(numbers, -1, axis=1)], axis=2).reshape(-1, 2)
-    turned = points[:, 0] > points[:, 1]
-    sides[turned], points[turned] = sides[turned][:, ::-1], points[turned][:, ::-1]
-    keys = points @ np.array([len(mesh.vertices), 1])
-    order = stable_order(keys)
-    first = np.flatnonzero(
-        (keys[order][1:] == keys[order][:-1]) & (points[order][1:, 0] != points[order][1:, 1])
+    begin, end, one, other = (
+        of.reshape(-1) for rows in (corners, numbers) for of in (rows, np.roll(rows, -1, axis=1))
     )
+    turned = one > other
+    sides = np.stack([np.where(turned, end, begin), np.where(turned, begin, end)], axis=1)
+    keys = np.minimum(one, other) * len(mesh.vertices) + np.maximum(one, other)
+    order = stable_order(keys)
+    ordered = keys[order]
+    first = np.flatnonzero((ordered[1:] == ordered[:-1]) & (one != other)[order[1:]])
     pairs = np.stack([order[first], order[first + 1]], axis=1)
     faces = pairs // 3
     tiles = part.tile_of_face[faces].astype(np.int64)
     ends = part.places[sides[pairs]].astype(np.float64)
-    cut = (np.abs(ends[:, 0] - ends[:, 1]).max(axis=(1, 2)) > SAME_PLACE) | (tiles[:, 0] != tiles[:, 1])
+    apart = np.abs(ends[:, 0] - ends[:, 1]).reshape(-1, 4).T > SAME_PLACE
+    cut = apart.any(axis=0) | (tiles[:, 0] != tiles[:, 1])
     a, b = np.moveaxis(mesh.vertices[part.rows[sides[pairs[cut, 0]]]].astype(np.float64), 1, 0)
     thirds = np.roll(corners, -2, axis=1).reshape(-1)[pairs[cut]]
     each = np.concatenate([sides[pairs[cut]], thirds[:, :, None]], axis=2)
