@@ -45,7 +45,7 @@ _LEADING: dict[str, dict[str, Any]] = {
 """The parameters in front of those of the operator."""
 
 _SLOPES = dict.fromkeys(("slope_a", "slope_b", "max_a", "max_b"), wp.float32)
-"""What a row's function of the slope takes in place of both pairs."""
+"""What a row's function of the slope takes in place of `rise` and `most`."""
 
 _PARAMETER = {"parameter": wp.float32}
 _BEHIND: dict[str, dict[str, Any]] = {
@@ -53,7 +53,7 @@ _BEHIND: dict[str, dict[str, Any]] = {
     "partials": _DIRECTIONS,
     "slope": {"turn": wp.float32},
 }
-"""Further ones, in front of those too, of an operator that reads gradients."""
+"""What these functions also take for an operator that reads gradients; formulas take it before parameters."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ class OperatorFormulas:
         return derived(self.source, (a, b), template, LEAST_OPERAND)
 
     def require(self, names: Sequence[str]) -> None:
-        """Raise `InvalidDefinition` for formulas or claims that do not fit to each other.
+        """Raise `InvalidDefinition` for formulas or claims that do not fit each other.
 
         `names` are those of the parameters that the class declares.
         """
@@ -235,7 +235,7 @@ class OperatorFormulas:
     def digest(self, parameters: Sequence[Any]) -> str:
         """Return a digest of the formulas, the claims, and the declared parameters."""
         bound = self.given.get("lipschitz") or self.given.get("envelope")
-        claim = self.claims.lipschitz if self.claims.lipschitz is None else float(self.claims.lipschitz)
+        claim = None if self.claims.lipschitz is None else float(self.claims.lipschitz)
         more = {
             name: self.given[name].digest for name in ("slope", "interval", "keeps") if name in self.given
         }
