@@ -43,9 +43,10 @@ def panels() -> Sequence[Panel]:
     rays = camera.rays(SIDE, SIDE)
     tools = PointerTools(Actions(session), lambda x, y: (rays.origin, rays.directions(x, y)))
     scenes = []
+    tools.key("s", *DRAG[0], shift=True)
     for number, (x, y, keys) in enumerate(CLICKS, start=1):
-        tools.press(x, y, ctrl=True)
-        tools.release(x, y, ctrl=True)
+        tools.press(x, y)
+        tools.release(x, y)
         for key in keys:
             tools.key(KEYS[key], x, y)
         if number in SHOWN:
@@ -57,6 +58,7 @@ def panels() -> Sequence[Panel]:
 def _dragged(tools: PointerTools, session: EditSession) -> Scene:
     """Select a decal and drag it."""
     start, *moves = DRAG
+    tools.key("w", *start)
     tools.press(*start)
     tools.release(*start)
     tools.press(*start)

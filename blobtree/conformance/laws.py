@@ -504,19 +504,24 @@ def check_kind(
 
 
 def _tried(name: str, law: LawFunction, cases: Iterator[Case]) -> Law:
-    """Return what comes of a law."""
+    """Return what comes of a law; it is not checked if no case can be."""
     worst: Contradiction | None = None
+    checked, reason = False, ""
     for case in cases:
         try:
             found = list(law(case))
-        except NotChecked as reason:
-            return Law(name, "not checked", str(reason))
+        except NotChecked as obstacle:
+            reason = str(obstacle)
+            continue
         except Exception as error:  # whatever a kind does wrong
             found = [Contradiction(np.inf, f"{type(error).__name__}: {error}")]
+        checked = True
         for one in found:
             if worst is None or one.size > worst.size:
                 worst = replace(one, text=f"{one.text}, for {_shortened(repr(case.node))}")
-    return Law(name, "holds") if worst is None else Law(name, "fails", worst.text)
+    if worst is not None:
+        return Law(name, "fails", worst.text)
+    return Law(name, "holds") if checked else Law(name, "not checked", reason)
 
 
 def _shortened(text: str) -> str:

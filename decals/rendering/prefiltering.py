@@ -9,6 +9,7 @@ Fourier transform computes without noise.
 
 from functools import cache
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,13 +38,14 @@ MIN_FACING = constants("material.glsl")["MIN_FACING"]
 def prefiltered(panorama: Panorama) -> NDArray[np.float16]:
     """Return what ``shaders/image_environment.glsl`` reads: all grids, and the table below them.
 
-    The panorama keeps it.
+    It is kept as long as the panorama.
     """
-    kept = vars(panorama)
-    if "_texels" not in kept:
-        kept["_texels"] = _prefiltered(panorama.light)
-    texels: NDArray[np.float16] = kept["_texels"]
-    return texels
+    if panorama not in _kept:
+        _kept[panorama] = _prefiltered(panorama.light)
+    return _kept[panorama]
+
+
+_kept: WeakKeyDictionary[Panorama, NDArray[np.float16]] = WeakKeyDictionary()
 
 
 def _prefiltered(light: Float32Array) -> NDArray[np.float16]:

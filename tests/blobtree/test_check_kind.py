@@ -8,6 +8,7 @@ import pytest
 import warp as wp
 
 from blobtree import Falloff, InvalidNode, Operator, Point, Union, check_kind, formula, par
+from blobtree.conformance import laws
 from blobtree.conformance.samples import drawn_node
 from blobtree.declare.registry import CUSTOM_KINDS, CustomKind
 
@@ -86,3 +87,35 @@ def test_parameters_of_any_range_are_drawn(specifier: Any, low: float, high: flo
     del CUSTOM_KINDS["drawn"]
     nodes: list[Any] = [drawn_node(kind, np.random.default_rng(seed)) for seed in range(4)]
     assert all(low <= node.size <= high for node in nodes)
+
+
+@pytest.mark.parametrize(
+    ("found", "state"),
+    [
+        ("-", "not checked"),
+        ("-h", "holds"),
+        ("h-", "holds"),
+        ("-f", "fails"),
+        ("f-", "fails"),
+        ("hf", "fails"),
+    ],
+)
+def test_samples_that_cannot_be_checked_hide_no_failure(found: str, state: str) -> None:
+    """Of the samples of a law, "h" holds, "f" fails, and "-" cannot be checked."""
+
+    def law(case: laws.Case) -> Any:
+        letter = found[int(case.rng.integers(100))]
+        if letter == "-":
+            raise laws.NotChecked("no reason")
+        if letter == "f":
+            yield laws.Contradiction(1.0, "wrong")
+
+    class Place:
+        """A generator that returns the number of the sample."""
+
+        def __init__(self, number: int) -> None:
+            self.integers = lambda _: number
+
+    ball = Point((0, 0, 0), radius=1.0)
+    cases = (laws.Case(ball, None, False, Place(n)) for n in range(len(found)))  # type: ignore[arg-type]
+    assert laws._tried("some", law, cases).state == state

@@ -109,7 +109,7 @@ def steps(window: EditWindow, user: UserInput, path: Path) -> Iterator[Step]:
     yield "no help", lambda: user.key("F1"), lambda: not window.overlay.help_visible
     yield "click", lambda: user.click(at), lambda: actions.state.selection == (number,)
     yield "one more", lambda: user.click(there, "Shift_L"), lambda: actions.state.selection == (number, other)
-    yield "one less", lambda: user.click(there, "Shift_L"), lambda: actions.state.selection == (number,)
+    yield "one less", lambda: user.click(there, "Control_L"), lambda: actions.state.selection == (number,)
     yield "press", press, lambda: window.tools.drags_decals
     yield "drag", lambda: user.move((at[0] + 9, at[1] + 4)), lambda: window.tools.dragging
     yield "drop", lambda: user.button(1, down=False), entries(1)
@@ -117,7 +117,8 @@ def steps(window: EditWindow, user: UserInput, path: Path) -> Iterator[Step]:
     count = len(document.decals)
     yield "duplicate", lambda: user.key("d"), lambda: len(document.decals) == count + 1
     yield "delete", lambda: user.key("Delete"), lambda: len(document.decals) == count
-    yield "place", lambda: user.click(there, "Control_L"), lambda: len(document.decals) == count + 1
+    yield "aim", lambda: user.move(there), lambda: tuple(place()) == there
+    yield "place", lambda: user.key("a"), lambda: len(document.decals) == count + 1
     placed = actions.state.selection[0]
     radius = document.decals[placed].radii[0]
     yield (
