@@ -21,10 +21,11 @@ from decals.record import NEIGHBOR_REACH
 
 
 def some(rng: np.random.Generator, count: int, *, space: float = 1.0) -> Any:
+    places, normals, others = rng.normal(size=(3, count, 3))
     return Decals(
-        rng.normal(size=(count, 3)) * space,
-        rng.normal(size=(count, 3)),
-        rng.normal(size=(count, 3)),
+        places * space,
+        normals,
+        np.cross(normals, others),
         10.0 ** rng.uniform(-2, 0, count),
         layers=rng.integers(-1, 2, count),
         interactions=rng.integers(0, 3, count),
