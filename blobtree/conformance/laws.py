@@ -377,7 +377,7 @@ def bad_values_are_refused(case: Case) -> Contradictions:
     for name, parameter in parameters_of(type(node)).items():
         for wrong in _bad_values(parameter, getattr(node, name)):
             try:
-                replace(node, **{name: wrong}).tape  # noqa: B018
+                replace(node, **{name: wrong}).tape  # noqa: B018  (kinds may refuse as late as here)
             except InvalidNode:
                 continue
             yield Contradiction(1.0, f"{name} = {wrong!r} is accepted")

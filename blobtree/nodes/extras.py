@@ -1,4 +1,4 @@
-"""What extends a node: the base from which it has its methods; those of the core alone are in `Model`."""
+"""The base class from which a node has all its methods; `Model` has the methods of the core alone."""
 
 from blobtree.nodes.questions import Questions as NodeMethods
 

@@ -1,4 +1,4 @@
-"""What extends the formats of images: a test of the first bytes, and a function of bytes and name."""
+"""Further formats of images: for each, a test of the first bytes and a function of bytes and name."""
 
 from decals.images.radiance import decode_radiance, is_radiance
 

@@ -1,6 +1,6 @@
-"""What extends the renderer, in a fixed order: effects, and kinds of objects.
+"""Extensions of the renderer, in a fixed order: effects, and classes that draw kinds of objects.
 
-The first kind that an object is like draws it.
+The first class that fits an object draws it.
 """
 
 from decals.rendering import filter_library  # noqa: F401  (registers its functions)
