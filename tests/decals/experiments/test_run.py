@@ -46,7 +46,7 @@ def test_each_trial_has_the_row_of_its_call(tmp_path: Path, workers: int) -> Non
     for row in results.rows:
         assert row["status"] == "done"
         assert row["error"] is None
-        assert 0 <= row["seconds"] < 5
+        assert 0 <= row["seconds"] < 60
         found = json.loads(row["provenance"])
         assert found["implicit-decals"] == decals.__version__
         assert found["device"].startswith(("cpu (", "cuda:"))

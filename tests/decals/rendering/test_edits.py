@@ -1,7 +1,5 @@
 """Edits on the card: after every edit it holds what the editor holds, and little was sent."""
 
-import time
-
 import numpy as np
 import pytest
 
@@ -59,13 +57,9 @@ def test_an_edit_among_many_sends_little(context: Context) -> None:
     rng = np.random.default_rng(1)
     editor = DecalEditor(some(rng, 30_000))
     data = DecalData(context, editor)
-    seconds, sent = [], []
+    sent = []
     for number in range(40):
-        start = time.perf_counter()
         editor.change(number, positions=editor[number].positions * np.float32(1.0001))
         sent.append(data.update(editor))
-        seconds.append(time.perf_counter() - start)
-    print(f"an edit: {1e3 * np.median(seconds):.3f} ms, {max(sent)} bytes")
     assert max(sent) < 10_000
-    assert np.median(seconds) < 3e-3
     data.release()
