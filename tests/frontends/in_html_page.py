@@ -51,7 +51,10 @@ SOFTWARE = "--use-angle=swiftshader"
 FIREFOX = {"webgl.force-enabled": True}
 """Settings without which Firefox leaves WebGL out where there is no graphics card."""
 
-STARTED = """() => viewer.set || document.body.textContent.includes("cannot be turned here")"""
+STARTED = (
+    """() => viewer.set || document.querySelector("main").textContent.includes("cannot be turned here")"""
+)
+"""True once a page is ready or says why it is not; its script, outside `main`, has these words too."""
 PIXELS = """() => {
   const { canvas, painter } = viewer;
   painter.draw({ ...viewer, selected: -1 });

@@ -62,7 +62,8 @@ export class Controls {
     this.stiffness.ariaValueText = stiffness.toPrecision(2);
     const can = { undo: history.at > 0, redo: history.at + 1 < history.states.length, change: selected >= 0 };
     for (const button of this.buttons) button.disabled = can[button.dataset.needs] === false;
-    if (this.root.querySelector("button:disabled:focus")) this.canvas.focus(); // else keys reach nothing
+    const { activeElement } = this.root.getRootNode(); // a window without the focus has no `:focus`
+    if (activeElement?.disabled && this.root.contains(activeElement)) this.canvas.focus(); // else keys reach nothing
   }
 
   say(text) {
