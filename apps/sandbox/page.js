@@ -10,6 +10,13 @@
     return [(a.clientX + b.clientX) / 2 / height, (a.clientY + b.clientY) / 2 / height, distance / height];
   };
 
+  // Return true for the key of a node below that of another node or of an object.
+  const isBelow = (key, top) =>
+    top.startsWith("object ") ? `${key}/`.startsWith(`${top.slice(7)}/`) : key.startsWith(`${top}/`);
+
+  const HOVER_MS = 60;
+  const hovering = { key: "", told: null };
+
   trame.utils.sandbox = {
     // Two fingers move and zoom the view; the first does what the mouse does, until another one comes.
     touchstart(event) {
@@ -37,6 +44,7 @@
       const view = event.currentTarget;
       const box = view.getBoundingClientRect();
       if (view.fingers) event.stopPropagation();
+      this.hover(event.buttons ? "" : this.place(event), event);
       view.style.setProperty("--x", `${event.clientX - box.left}px`);
       view.style.setProperty("--y", `${event.clientY - box.top}px`);
     },
@@ -50,6 +58,22 @@
       const x = (event.clientX - box.left) / box.width;
       const y = (event.clientY - box.top) / box.height;
       trame.trigger("handle", [name, phase, x, y, event.ctrlKey || event.metaKey]);
+    },
+
+    // Send the row or the place of the view at which the pointer is, the newest one only.
+    async hover(key, event) {
+      hovering.key = event?.pointerType === "touch" ? "" : key;
+      if (hovering.told !== null) return;
+      while (hovering.told !== hovering.key) {
+        hovering.told = hovering.key;
+        await trame.trigger("hover", [hovering.told]);
+        await new Promise((done) => setTimeout(done, HOVER_MS));
+      }
+      hovering.told = null;
+    },
+    // Return true for a row that lights up, and for a folded one above it.
+    lit(row, keys, folded) {
+      return keys.some((key) => key === row.key || (folded.includes(row.key) && isBelow(key, row.key)));
     },
 
     // Return the key of the place of the pointer in the view.
@@ -87,11 +111,7 @@
     // Return true for a row that is found, or that lies below no folded row while nothing is sought.
     shown(row, folded, sought) {
       if (sought) return `${row.label} ${row.type}`.toLowerCase().includes(sought.trim().toLowerCase());
-      const inside = (key) =>
-        key.startsWith("object ")
-          ? row.depth > 0 && `${row.key}/`.startsWith(`${key.slice(7)}/`)
-          : row.key.startsWith(`${key}/`);
-      return !folded.some(inside);
+      return !folded.some((key) => isBelow(row.key, key));
     },
     // Fold a row, or unfold it.
     fold(row, folded) {

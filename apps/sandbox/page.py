@@ -176,6 +176,7 @@ class Page:
         trigger("look")(lambda side: self.sandbox.move_camera("look", side))
         trigger("rename")(lambda key, name: change_row(key, "rename", name))
         trigger("drop_work")(self.sandbox.drop_work)
+        trigger("hover")(self.sandbox.hover)
         trigger("read")(self.sandbox.read_file)
         trigger("place")(self.sandbox.place_image)
         trigger("move")(lambda key, target: change_row(key, "move", target))
@@ -253,6 +254,7 @@ class Page:
                             'role="application"',
                             *named("'view of the scene'"),
                             f'data-ctrl-keys="{CTRL_KEYS}"',
+                            """@pointerleave="utils.sandbox.hover('')\"""",
                             *(f'@{name}.capture="utils.sandbox.{name}($event)"' for name in TOUCH_EVENTS),
                         ],
                         **browser_keys(self._window),
@@ -360,14 +362,24 @@ class Page:
                 prepend_avatar=("row.picture",),
                 active=("row.key === selected || marked.includes(row.key)",),
                 style=("`padding-left: ${8 + 14 * row.depth}px; opacity: ${row.hidden ? 0.6 : 1}`",),
-                classes="flex-grow-1",
-                click=(self._click, "[row.key, $event.ctrlKey || $event.metaKey]"),
+                classes=("'flex-grow-1' + (utils.sandbox.lit(row, hovered.rows, folded) ? ' lit' : '')",),
+                pointerenter="utils.sandbox.hover(row.key, $event)",
+                pointerleave="utils.sandbox.hover('')",
+                click=(self._click, "[row.key, $event.ctrlKey || $event.metaKey || $event.shiftKey]"),
                 contextmenu=f"$event.preventDefault(); {SHOW_MENU}",
                 dragstart="$event.dataTransfer.setData('text/plain', row.key)",
                 dragover="$event.preventDefault()",
                 drop="utils.sandbox.take($event, row.key)",
                 dblclick=RENAME_ROW,
-                __events=["dragstart", "dragover", "drop", "dblclick", "contextmenu"],
+                __events=[
+                    "pointerenter",
+                    "pointerleave",
+                    "dragstart",
+                    "dragover",
+                    "drop",
+                    "dblclick",
+                    "contextmenu",
+                ],
             )
             html.Button(
                 v_if=f"{FOLDS} && renamed.key !== row.key",

@@ -19,8 +19,10 @@ from decals.apps.sandbox.display import PHASES, Display
 from decals.apps.sandbox.fields import Fields
 from decals.apps.sandbox.files import SandboxFiles
 from decals.apps.sandbox.folder import MAX_UPLOADS
+from decals.apps.sandbox.hover import Hover
 from decals.apps.sandbox.outline import outline
 from decals.editing import new_nodes
+from decals.editing.action_state import joined
 from decals.editing.outline_actions import Part
 from decals.editing.session import UndoEntry
 from decals.editing.tree_actions import FollowedNode
@@ -107,7 +109,7 @@ class Sandbox:
     ) -> None:
         self._window, actions = window, window.actions
         self._state, self._trees = actions.state, actions.trees
-        self.display = Display(window)
+        self.display, self._hover = Display(window), Hover(window)
         self.add, self.wrap = self._event(self._trees.add_node), self._event(self._trees.wrap_node)
         self.combine = self._event(self._trees.combine_operands)
         self.unwrap, self.go_to = self._event(self._trees.unwrap_node), self._event(actions.go_to)
@@ -138,8 +140,7 @@ class Sandbox:
         self.schedule: Callable[[], None] = self.take_step
         self._step: Callable[[], None] | None = None
         self._rows: list[dict[str, Any]] = []
-        self._marked: list[str] = []
-        self._image: int | None = None
+        self._keys: tuple[str, ...] = ()
         self._scattering: dict[str, Any] = {}
         self._fields = Fields()
         self._background = window.document.drawing.background
@@ -166,6 +167,7 @@ class Sandbox:
             "outline": self._outline(),
             "selected": self._selected(),
             "marked": self._marked,
+            "hovered": self._hover.values(),
             "panel": self._panel(),
             "done": list(session.labels[-MAX_HISTORY:]),
             "earlier": max(len(session.labels) - MAX_HISTORY, 0),
@@ -231,10 +233,7 @@ class Sandbox:
         layers = document.locked_layers, document.layer_names, document.decals.version
         shown = document.objects, document.images, *layers
         if shown != self._outlined:
-            rows = outline(document)
-            if rows != self._rows:  # a key may stand for another node now
-                self._rows, self._marked = rows, []
-            self._outlined = shown
+            self._outlined, self._rows = shown, outline(document)
         return self._rows
 
     def _panel(self) -> dict[str, Any]:
@@ -265,43 +264,48 @@ class Sandbox:
     @event
     def mark(self, key: str) -> None:
         """Mark a layer or the node of a row too, or no longer; marked ones are changed together."""
-        if (part := Part.named(key)).kind != "layer":
-            part = Part.node(key)
-            self._trees.select_node(part.number, part.path)
-        self._outline()  # forgets the marks of a former tree
-        others = [k for k in self._marked if k != part.key and Part.named(k).kind == part.kind]
-        self._marked = others + ([] if part.key in self._marked else [part.key])
+        if Part.named(key).kind == "layer":
+            self._state.primitive = None
+            layers = self._keys if self._shown_image is None else ()
+            self._keys = joined(layers, key, toggle=True)
+            return
+        _, number, path = Part.node(key)
+        self._trees.select_also(number, path, toggle=True)
 
     @event
     def select(self, key: str) -> None:
         """Select a node, the root of an object, the decals of a layer, or an image; "" selects nothing."""
-        self._marked, self._image = [key] if key else [], None
         state, document = self._state, self._window.document
+        self._keys, state.primitive = (), None
         if key == "":
-            state.primitive = None
             return
         kind, number, path = Part.named(key)
         if kind == "layer":
+            self._keys = (key,)
             state.selection = state.selectable(document.decals_of_layer(number))
         elif kind == "image":
-            self._image = whole_number("image", number, 0, len(document.images) - 1, InvalidEdit)
-            state.primitive, state.selection = None, ()
+            whole_number("image", number, 0, len(document.images) - 1, InvalidEdit)
+            self._keys, state.selection = (key,), ()
         else:
             self._trees.select_node(number, path)
-            self._marked = [Part("node", number, path).key]
 
     def _deselect_rows(self) -> bool:
         """Deselect the image and all marked rows; return True if there were any."""
-        selected = bool(self._marked) or self._shown_image is not None
-        self._marked, self._image = [], None
+        selected, self._keys = bool(self._keys), ()
         return selected
+
+    @property
+    def _marked(self) -> list[str]:
+        """Keys of the selected nodes, else of the layers or the image whose rows are selected."""
+        return [Part("node", *place).key for place in self._state.nodes] or [*self._keys]
 
     @property
     def _shown_image(self) -> int | None:
         """The selected image, unless something else has been selected since, or it was removed."""
-        state, count = self._state, len(self._window.document.images)
-        kept = state.primitive is None and not state.selection and (self._image or 0) < count
-        return self._image if kept else None
+        part = Part.named(self._keys[0]) if self._keys else None
+        if part is None or part.kind != "image" or self._state.nodes or self._state.selection:
+            return None
+        return part.number if part.number < len(self._window.document.images) else None
 
     def set_control(self, panel: str, name: str, raw: Any, last: bool = True, index: object = ()) -> None:
         """Set what a control of a panel stands for.
@@ -458,6 +462,16 @@ class Sandbox:
             self.attempt(partial(self._files.take, file, key))
 
     # -- view, decals and outline -----------------------------------------------------------------------
+
+    def hover(self, key: str) -> None:
+        """Light up what the pointer is at: the row of a key in the view, or the part at a place of the view.
+
+        A place that has no part, and a key that the scene does not have, light up nothing.
+        """
+        if not str(key).startswith("view "):
+            self._hover.at_row(key)
+        elif not self._window.background.busy_editing:
+            self._hover.at_place(self._files.surface_at(key))
 
     @event
     def move_camera(self, name: str, value: Any = None) -> None:

@@ -33,6 +33,7 @@ COMPILING = "kernels are compiled for this machine, once; try again in a moment"
 """Message after input that needs them."""
 
 Answer = TypeVar("Answer")
+Item = TypeVar("Item")
 
 SLOW_STEP = 0.08
 """Processor time in seconds from which on a step of a drag counts as slow."""
@@ -82,6 +83,12 @@ class StillCamera:
         self.look(low, high)
 
 
+def joined(items: tuple[Item, ...], item: Item, *, toggle: bool) -> tuple[Item, ...]:
+    """Return items with another one as the last; with `toggle`, without it if it is one of them."""
+    others = tuple(one for one in items if one != item)
+    return others if toggle and item in items else (*others, item)
+
+
 def require_pick(cursor: Cursor) -> SurfacePick:
     """Return the surface point under the cursor, or raise `InvalidEdit`."""
     pick = cursor()
@@ -104,8 +111,10 @@ class ActionState:
     ----------
     selection
         Numbers of the selected decals, in the order of their selection.
+    nodes
+        Object and path of each selected node, in the order of their selection.
     primitive
-        Object and path of the selected primitive, if any.
+        The last of them, if any; setting it deselects the others.
     handle_offset
         Offset of the primitive's handle from the middle of its box, shape (3,).
     picked
@@ -131,7 +140,7 @@ class ActionState:
     def __init__(self, session: EditSession, *, threaded: bool = False) -> None:
         self.session = instance("session", session, EditSession, InvalidEdit, "EditSession(scene) makes one")
         self.selection: tuple[int, ...] = ()
-        self.primitive: tuple[int, Path] | None = None
+        self.nodes: tuple[tuple[int, Path], ...] = ()
         self.handle_offset: Float32Array = np.zeros(3, np.float32)
         self.picked: SurfacePick | None = None
         self.message, self.refusal, self.refusals = "", "", 0
@@ -201,6 +210,15 @@ class ActionState:
         return tuple(free[on_shown_surfaces(document, free)].tolist())
 
     @property
+    def primitive(self) -> tuple[int, Path] | None:
+        """Object and path of the node that was selected last."""
+        return self.nodes[-1] if self.nodes else None
+
+    @primitive.setter
+    def primitive(self, place: tuple[int, Path] | None) -> None:
+        self.nodes = () if place is None else (place,)
+
+    @property
     def primitive_is_subject(self) -> bool:
         """True if duplicate and delete apply to the primitive: one is selected, and no decal is."""
         return self.primitive is not None and not self.selection
@@ -212,13 +230,12 @@ class ActionState:
             self.handle_offset = handle_offset
 
     def _drop_deleted(self, edit: Edit) -> None:
-        """Deselect decals that an edit deleted or hid, and the primitive if its path leads elsewhere now."""
+        """Deselect decals that an edit deleted or hid, and nodes whose paths lead elsewhere now."""
         before, after = edit.parts_before.objects, edit.parts_after.objects
-        if self.primitive is not None and before is not None:
-            number = self.primitive[0]
-            exists = number < min(len(before), len(after))
-            if not exists or not same_structure(before[number], after[number]):
-                self.primitive = None
+        if self.nodes and before is not None:
+            common = min(len(before), len(after))
+            kept = [n for n in range(common) if same_structure(before[n], after[n])]
+            self.nodes = tuple(place for place in self.nodes if place[0] in kept)
         exist = self.session.document.decals.has(np.array(self.selection, np.int64))
         self.selection = tuple(n for n, kept in zip(self.selection, exist, strict=True) if kept)
         if self.selection and _hidden_paths(before) != _hidden_paths(after):

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from blobtree.nodes.paths import Path
-from decals.editing.action_state import ActionState, Cursor
+from decals.editing.action_state import ActionState, Cursor, joined
 from decals.editing.brush_settings import Brush
 from decals.editing.commands import DeleteDecals, DuplicateDecals
 from decals.editing.key_bindings import Group
@@ -72,20 +72,27 @@ class SceneActions:
         """Select the primitive below a selected decal, or the node above a selected one."""
         self.select(cursor, further=True)
 
-    @Group.SELECTION.action("select_also", "Shift+Click", summary="add the decal to the selection")
+    @Group.SELECTION.action(
+        "select_also", "Shift+Click", summary="add the decal to the selection, or the primitive to others"
+    )
     def select_also(self, cursor: Cursor, *, toggle: bool = False) -> None:
-        """Add the decal under the cursor to the selection; with `toggle`, remove it if it is selected."""
-        state, pick = self.state, cursor()
-        if pick is None or not state.selectable([pick.owner]):
-            return
-        others = tuple(number for number in state.selection if number != pick.owner)
-        removed = toggle and pick.owner in state.selection
-        state.selection, state.primitive = others if removed else (*others, pick.owner), None
-        state.message = f"{len(state.selection)} decals"
+        """Add the decal under the cursor to the selection; with `toggle`, remove it if it is selected.
 
-    @Group.SELECTION.action("toggle", "Ctrl+Click", summary="add the decal to the selection, or remove it")
+        Beside selected nodes, or where no decal is and none is selected, the primitive is added or removed.
+        """
+        state, pick = self.state, cursor()
+        if pick is None:
+            return
+        owner = () if state.primitive_is_subject else state.selectable([pick.owner])
+        if owner:
+            state.selection, state.primitive = joined(state.selection, owner[0], toggle=toggle), None
+            state.message = f"{len(state.selection)} decals"
+        elif not state.selection and (nodes := self.trees.nodes_at(pick)):
+            self.trees.select_also(*nodes[0], toggle=toggle)
+
+    @Group.SELECTION.action("toggle", "Ctrl+Click", summary="add them likewise, or remove them")
     def toggle(self, cursor: Cursor) -> None:
-        """Add the decal under the cursor to the selection, or remove it."""
+        """Add the decal or the primitive under the cursor to the selection, or remove it."""
         self.select_also(cursor, toggle=True)
 
     @Group.SELECTION.action("select_all", "Ctrl+a", summary="select all decals")
@@ -145,14 +152,16 @@ class SceneActions:
         state.run(DuplicateDecals(state.selected_numbers), select)
 
     @Group.SELECTION.action(
-        "delete", "Delete", "BackSpace", summary="delete the selected decals, else the selected primitive"
+        "delete", "Delete", "BackSpace", summary="delete the selected decals, else the selected nodes"
     )
     def delete(self, _cursor: Cursor) -> None:
-        """Delete the selected decals, or the selected primitive."""
-        if self.state.primitive_is_subject:
-            self.trees.delete_selected()
-        else:
+        """Delete the selected decals, or the selected nodes."""
+        if not self.state.primitive_is_subject:
             self.state.run(DeleteDecals(self.state.selected_numbers))
+        elif len(self.state.nodes) > 1:
+            self.trees.delete_nodes(self.state.nodes)
+        else:
+            self.trees.delete_selected()
 
     # -- scene ------------------------------------------------------------------------------------------
 

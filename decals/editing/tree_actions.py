@@ -14,7 +14,7 @@ from blobtree.formulas.falloff import RIM
 from blobtree.nodes.paths import Path, node_at, node_in_world, primitive_at
 from blobtree.nodes.places import Place
 from blobtree.nodes.surgery import Join, dominant_primitive, join_of, path_of, paths_after, world_space_path
-from decals.editing.action_state import Cursor, WindowActions, require_pick
+from decals.editing.action_state import Cursor, WindowActions, joined, require_pick
 from decals.editing.decal_actions import TINTS
 from decals.editing.document import Document
 from decals.editing.gizmo import Handle, HandleDrag, Ray, handles_of, moved_point, snap_distance
@@ -319,6 +319,13 @@ class TreeActions(WindowActions):
         eye, _ = self._state.camera.eye_and_target()
         toward = unit_rows((np.asarray(eye) - (low + high) / 2)[None])[0]
         self._state.select_primitive(number, path, float((high - low).min()) / 2 * toward)
+
+    def select_also(self, number: int, path: Path, *, toggle: bool) -> None:
+        """Add a node to the selected ones; with `toggle`, remove a selected one. Decals are deselected."""
+        nodes = joined(self._state.nodes, (number, path), toggle=toggle)
+        self.select_node(*(nodes or [(number, path)])[-1])
+        self._state.nodes = nodes
+        self._state.message = f"{len(nodes)} {'node' if len(nodes) == 1 else 'nodes'}"
 
     def set_parameter(self, node: FollowedNode, name: str, value: Any, *, last: bool = True) -> None:
         """Set a parameter of a node.

@@ -3,11 +3,12 @@
 import itertools
 import math
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import pyvista as pv
+from numpy.typing import ArrayLike
 from vtkmodules.vtkInteractionWidgets import vtkSphereWidget
 
 from blobtree._typing import Float32Array, Float64Array
@@ -17,7 +18,7 @@ from decals.editing.document import Document
 from decals.editing.queries import ANGLES, outlines
 from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.scenes.objects import SceneObject, TreeObject, bounds_of
+from decals.scenes.objects import TreeObject, bounds_of
 from decals.vtk.adapters import weak_callback
 
 MAX_OUTLINES = 64
@@ -109,12 +110,12 @@ class Overlay:
         self,
         document: Document,
         numbers: tuple[int, ...],
-        node: tuple[int, Path] | None,
+        nodes: Sequence[tuple[int, Path]],
         contact: AnyContact,
         mapping: ImageMapping,
     ) -> None:
-        """Outline the visible parts of decals, else a node by the box around its own surface."""
-        drawn = (document.decals.version, numbers, contact, mapping) if numbers else node
+        """Outline the visible parts of decals, else nodes by the boxes around their own surfaces."""
+        drawn = (document.decals.version, numbers, contact, mapping) if numbers else nodes
         key = (document.objects, drawn) if drawn else ()
         if key == self._outlined:
             return
@@ -124,8 +125,14 @@ class Overlay:
         lines = (
             list(outlines(document, last, contact=contact, mapping=mapping, angles=angles)) if last else []
         )
-        if not last and node is not None:
-            lines = _box_edges(document.objects[node[0]], node[1])
+        if not last:
+            trees = [(document.objects[number], path) for number, path in nodes]
+            lines = [
+                edge
+                for item, path in trees
+                if isinstance(item, TreeObject)
+                for edge in box_edges(*node_in_world(item.tree, path).bounds)
+            ]
         self._lines.copy_from(_polylines(lines))
         self._actor.SetVisibility(bool(lines))
 
@@ -211,11 +218,8 @@ class Overlay:
         return self._lines
 
 
-def _box_edges(item: SceneObject, path: Path) -> list[Float32Array]:
-    """Return the edges of the box around the surface of a node, shape (2, 3) each."""
-    if not isinstance(item, TreeObject):
-        return []
-    low, high = node_in_world(item.tree, path).bounds
+def box_edges(low: ArrayLike, high: ArrayLike) -> list[Float32Array]:
+    """Return the edges of a box, given by its corners, shape (2, 3) each."""
     corners = [
         np.where(side, high, low).astype(np.float32) for side in itertools.product((False, True), repeat=3)
     ]

@@ -277,7 +277,7 @@ class EditWindow:
         if not dragging:
             self.handle.update()
         state = self.actions.state
-        outlined = ((), None) if dragging else (state.selection, state.primitive)  # outlines take longer
+        outlined = ((), ()) if dragging else (state.selection, state.nodes)  # outlines take longer
         self.overlay.outline(self.document, *outlined, self.subplot.contact, self.subplot.shown_mapping)
         self.actions.help_pages = self.overlay.show_help(self.actions.help_page)
         self.overlay.show_status(self._status())

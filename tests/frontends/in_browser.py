@@ -187,6 +187,7 @@ async def sandbox(picture: str | None = None) -> None:
             await until(lambda labels=labels: window.session.labels == labels)  # type: ignore[misc]
         await by_keys(browser)
         await clicks(browser, window)
+        await hovers(browser, window)
         await browser.get_by_role("button", name="Add", exact=True).click()
         await browser.get_by_text("Torus", exact=True).click()
         await until(lambda: window.session.labels[-1:] == ("add Torus",))
@@ -255,6 +256,46 @@ async def clicks(browser: Page, window: EditWindow) -> None:
     await until(lambda: state.primitive is None)
     await browser.get_by_text("Point").nth(1).click()
     await until(lambda: state.primitive == (0, (1,)))
+
+
+async def hovers(browser: Page, window: EditWindow) -> None:
+    """Nodes are added by Shift in the view; rows light up with places, and places with rows."""
+    state, lit = window.actions.state, browser.locator(".lit")
+    places = {}
+    for _, at in Driver(window).visible():
+        pick = window.tools.at(*at)
+        assert pick is not None
+        places[window.actions.trees.nodes_at(pick)[0]] = at
+    at, there = places[0, (0,)], places[0, (1,)]
+    await point(browser, window.plotter, at)
+    await lit.get_by_text("Point").wait_for()
+    await lit.get_by_text("layer 0").wait_for()
+    await point(browser, window.plotter, (4, 4))
+    await lit.first.wait_for(state="detached")
+    await browser.get_by_text("Point").nth(1).hover()
+    await until_count(browser.locator(".hovered line"), 12)
+    await browser.get_by_text("layer 0").hover()
+    await browser.locator(".hovered circle").first.wait_for()
+    await browser.get_by_text("Point").nth(0).click()
+    await until(lambda: state.nodes == ((0, (0,)),))
+    rows = browser.locator("[data-roving] .v-list-item--active")
+    await until_count(rows, 1)
+    await browser.keyboard.down("Shift")
+    await drag(browser, window.plotter, there)
+    await browser.keyboard.up("Shift")
+    await until(lambda: state.nodes == ((0, (0,)), (0, (1,))))
+    await until_count(rows, 2)
+    await browser.keyboard.down("Control")
+    await drag(browser, window.plotter, at)
+    await browser.keyboard.up("Control")
+    await until(lambda: state.nodes == ((0, (1,)),))
+
+
+async def until_count(found: Any, count: int) -> None:
+    """Wait until so many elements are found."""
+    async with asyncio.timeout(PATIENCE):
+        while await found.count() != count:
+            await asyncio.sleep(0.05)
 
 
 async def pinch(browser: Page, *reaches: float) -> None:

@@ -115,6 +115,7 @@ EVENTS: dict[str, list[list[Any]]] = {
     "read_file": [["../x.json", "scene.json", "mine.py"], [0, 5, -1]],
     "write_file": [["../x.py", "x.exe", "no/x.json"]],
     "place_image": [KEYS_OF_ROWS, ["view 5000/5000", "view 0/0", "view 1", "0"]],
+    "hover": [[*KEYS_OF_ROWS, "layer 0", "view 5000/5000", "view x"]],
     "upload": [[[{}], [{"name": "a.ply", "content": b"x"}], 3], [*KEYS_OF_ROWS, "light", "view 5000/5000"]],
 }
 """Arguments of the page's events, by their names; a second word tells two kinds of one event apart."""

@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Iterator
 from functools import cache, partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 import decals
 from blobtree import Point, Segment, Torus, Twist, Union
 from blobtree.nodes.paths import node_at
+from blobtree.nodes.surgery import dominant_primitive
 from decals.apps.sandbox.outline import outline
 from decals.apps.sandbox.sandbox import REST_SECONDS, Sandbox
 from decals.editing import tree_actions
@@ -121,7 +123,7 @@ def test_marked_nodes_are_grouped_and_removed_together(window: EditWindow) -> No
     sandbox.add("Torus")
     finish(window)
     field, at = tree_of(window.document)(POINTS), digest(window.document)
-    sandbox.mark("0/0")
+    sandbox.select("0/0")
     sandbox.change_row("0/0", "group")
     assert "select two or more operands" in sandbox.status
     sandbox.mark("0/2")
@@ -131,8 +133,8 @@ def test_marked_nodes_are_grouped_and_removed_together(window: EditWindow) -> No
     assert shapes(window) == ["Sum", "Sum", "Point", "Torus", "Point"]
     assert sandbox.values()["selected"] == "0/0"
     np.testing.assert_allclose(tree_of(window.document)(POINTS), field, atol=1e-6)
-    sandbox.values()
-    for key in ("0/0/0", "0/0/1", "0/1"):
+    sandbox.select("0/0/0")
+    for key in ("0/0/1", "0/1"):
         sandbox.mark(key)
     sandbox.change_row("0/0/1", "remove")
     finish(window)
@@ -147,9 +149,8 @@ def test_marked_nodes_are_grouped_and_removed_together(window: EditWindow) -> No
     assert "row: expected" in sandbox.status
     sandbox.change_row("object 0", "duplicate")
     finish(window)
-    sandbox.values()
-    for key in ("0/1", "1/0/0"):
-        sandbox.mark(key)
+    sandbox.select("0/1")
+    sandbox.mark("1/0/0")
     sandbox.change_row("0/1", "hide")
     assert [item.hidden for item in window.document.objects] == [((1,),), ((0, 0),)]
     for key in ("layer 0", "layer 1", "layer 1"):
@@ -159,6 +160,41 @@ def test_marked_nodes_are_grouped_and_removed_together(window: EditWindow) -> No
     assert sandbox.values()["marked"] == ["layer 0"]
     sandbox.select("")
     assert sandbox.values()["marked"] == []
+
+
+def test_the_pointer_lights_up_rows_and_rows_light_up_the_view(window: EditWindow) -> None:
+    sandbox, (width, height) = Sandbox(window), window.plotter.window_size
+    message = sandbox.status
+    seen: set[str] = set()
+    for x in range(1000, 10000, 500):
+        sandbox.hover(f"view {x}/5000")
+        pick = window.tools.at(x * width / 10_000, height / 2)
+        rows = sandbox.values()["hovered"]["rows"]
+        if pick is None:
+            assert rows == []
+            continue
+        leaf = dominant_primitive(tree_of(window.document), pick.position)
+        assert rows == [f"0/{leaf[0]}", *(["layer 0"] if pick.owner >= 0 else [])]
+        seen.add(rows[0])
+    assert seen == {"0/0", "0/1"}
+    matrix = window.document.camera.clip_matrix((width, height), window.document.objects[0].bounds)
+    for key, bounds in (("0/1", TREE.children[1].bounds), ("object 0", TREE.bounds)):
+        sandbox.hover(key)
+        corners = np.array(list(product(*np.transpose(bounds))))
+        clip = np.column_stack([corners, np.ones(8)]) @ np.transpose(matrix)
+        expected = clip[:, :2] / clip[:, 3:] * (0.5, -0.5) + 0.5
+        lines = np.reshape(sandbox.values()["hovered"]["lines"], (12, 2, 2))
+        near = np.linalg.norm(lines.reshape(-1, 1, 2) - expected, axis=-1) < 0.002
+        assert near.sum(axis=0).tolist() == [3] * 8  # each corner ends three edges
+    sandbox.hover("layer 0")
+    dots = sandbox.values()["hovered"]["dots"]
+    assert 0 < len(dots) < len(window.document.decals)  # those on the far side have none
+    sandbox.hover("image 0")
+    assert sandbox.values()["hovered"]["dots"] == dots
+    for key in ("", "q", "0/7", "object 5", "more 0", "view x", "layer 9"):
+        sandbox.hover(key)
+        assert sandbox.values()["hovered"] == {"rows": [], "lines": [], "dots": []}
+    assert (sandbox.status, window.session.labels) == (message, ())
 
 
 def shapes(window: EditWindow) -> list[str]:

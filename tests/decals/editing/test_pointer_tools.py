@@ -243,6 +243,53 @@ def test_a_click_on_bare_surface_selects_the_primitive_there(user: UserInput, se
     assert user.actions.state.primitive is None
 
 
+def test_shift_adds_nodes_and_ctrl_toggles_them(user: UserInput) -> None:
+    state: Any = user.actions.state
+    places = {}
+    user.session.do(DeleteDecals(user.document.decals.numbers))
+    for x, y in np.random.default_rng(0).uniform((120, 60), (280, 240), (40, 2)).tolist():
+        pick = user.tools.at(x, y)
+        if pick is not None and pick.object == 0:
+            places[0, dominant_primitive(user.tree, pick.position)] = x, y
+    first, second = (0, (1,)), (0, (0, 1))  # the ball that cuts, and the limb
+    at, there = places[first], places[second]
+    user.click(at, shift=True)
+    user.click(there, shift=True)
+    assert state.nodes == (first, second)
+    user.click(at, shift=True)
+    assert (state.nodes, state.primitive) == ((second, first), first)
+    user.click((1, 1), shift=True)  # beside the model
+    assert state.nodes == (second, first)
+    user.click(there, ctrl=True)
+    assert state.nodes == (first,)
+    user.click(at, ctrl=True)
+    assert state.nodes == ()
+    user.click(at)
+    user.click(there, ctrl=True)
+    assert state.nodes == (first, second)
+    user.key("Delete")
+    assert isinstance(user.tree, Point)
+    assert (state.nodes, user.session.labels[-1]) == ((), "remove a primitive")
+    user.session.undo()
+    user.session.undo()
+    assert digest(user.document) == user.first
+
+
+def test_decals_and_nodes_are_not_selected_together(user: UserInput) -> None:
+    state: Any = user.actions.state
+    (decal, at), (other, there) = user.visible()[:2]
+    user.click(at)
+    user.click(there, shift=True)
+    assert (state.selection, state.nodes) == ((decal, other), ())
+    user.click(at)
+    user.click(at)
+    assert len(state.nodes) == 1
+    node = state.primitive
+    user.click(there, ctrl=True)  # a decal is there, but nodes are selected
+    assert state.selection == ()
+    assert state.nodes in ((), (node, state.primitive))
+
+
 def test_a_click_on_a_mesh_selects_its_decals_alone(user: UserInput) -> None:
     on_mesh = set(decals_on(user.document, [1]))
     decal, at = next((n, at) for n, at in user.visible() if n in on_mesh)

@@ -1,0 +1,101 @@
+"""What the pointer is at: its rows in the outline, and the shape of a row in the view."""
+
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from blobtree._typing import Float32Array
+from blobtree.nodes.paths import node_in_world
+from decals.editing.document import Document
+from decals.editing.outline_actions import Part
+from decals.editing.queries import SurfacePick
+from decals.errors import ImplicitDecalsError
+from decals.scenes.objects import TreeObject
+from decals.window import EditWindow
+from decals.window.host_plotter import pixels_of
+from decals.window.overlay import box_edges
+
+MAX_DOTS = 300
+"""Most decals of a row that get a dot."""
+
+NOTHING: dict[str, Any] = {"rows": [], "lines": [], "dots": []}
+"""Values of a page while the pointer is at nothing."""
+
+
+class Hover:
+    """Lights up rows for a place of the view, and the place in the view for a row.
+
+    Parameters
+    ----------
+    window
+        The edited window.
+    """
+
+    def __init__(self, window: EditWindow) -> None:
+        self._window = window
+        self._rows: list[str] = []
+        self._key = ""
+        self._known: tuple[object, ...] = ()
+        self._lines = self._dots = np.zeros((0, 2, 3), np.float32)
+
+    def at_place(self, pick: SurfacePick | None) -> None:
+        """Light up the rows of the primitive and of the layer of the decal at a surface point."""
+        self._key, self._rows = "", []
+        if pick is not None:
+            nodes = self._window.actions.trees.nodes_at(pick)[:1]
+            self._rows = [Part("node", *place).key for place in nodes]
+            if pick.owner >= 0:
+                layer = int(self._window.document.decals[pick.owner].layers[0])
+                self._rows.append(Part("layer", layer).key)
+
+    def at_row(self, key: str) -> None:
+        """Light up a row, the box of its node or object, or its decals; "" lights up nothing."""
+        self._key, self._rows = str(key), []
+
+    def values(self) -> dict[str, Any]:
+        """Return the keys of the lit rows; and lines and dots in parts of the view, which cost no frame."""
+        if not self._key:
+            return {**NOTHING, "rows": self._rows}
+        document = self._window.document
+        shown = self._key, document.objects, document.decals.version
+        if shown != self._known:
+            self._known = shown
+            self._lines = self._dots = np.zeros((0, 2, 3), np.float32)
+            with suppress(ImplicitDecalsError):  # the scene need not have what a page asks for
+                part = Part.named(self._key)
+                if part.kind in ("layer", "image"):
+                    self._dots = _decals_of(document, part)
+                else:
+                    self._lines = _box_of(document, part)
+        eye = np.asarray(self._window.camera.eye_and_target()[0])
+        centers, normals = self._dots[:, 0], self._dots[:, 1]
+        facing = ((eye - centers) * normals).sum(axis=1) > 0.0
+        return {
+            "rows": [],
+            "lines": self._in_view(self._lines.reshape(-1, 3), 4),
+            "dots": self._in_view(centers[facing][:MAX_DOTS], 2),
+        }
+
+    def _in_view(self, points: Float32Array, width: int) -> list[list[float]]:
+        """Return points as parts of the view's width, and of its height from the top, in rows of a width."""
+        places = pixels_of(self._window.subplot, points) + 0.5
+        rows = (places / self._window.plotter.window_size * (1, -1) + (0, 1)).reshape(-1, width)
+        listed: list[list[float]] = rows[np.isfinite(rows).all(axis=1)].round(4).tolist()
+        return listed
+
+
+def _box_of(document: Document, part: Part) -> Float32Array:
+    """Return the edges of the box of a node or an object, shape (12, 2, 3)."""
+    item = document.object(part.number)
+    if part.kind == "node" and isinstance(item, TreeObject):
+        return np.stack(box_edges(*node_in_world(item.tree, part.path).bounds))
+    return np.stack(box_edges(*item.bounds))
+
+
+def _decals_of(document: Document, part: Part) -> Float32Array:
+    """Return centres and normals of the decals of a layer, or of those with an image, shape (n, 2, 3)."""
+    column = {"layer": "layers", "image": "images"}[part.kind]
+    of_row = document.decals.column(column) == part.number
+    places = [document.decals.column(name)[of_row] for name in ("positions", "normals")]
+    return np.stack(places, axis=1).astype(np.float32)
