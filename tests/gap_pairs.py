@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from blobtree import Box, Disc, Node, Point, Segment
+from blobtree import Box, Disc, Node, Point, Segment, Union
 from blobtree._typing import Float64Array
 
 KINDS = ("ball", "rod", "box", "plate")
@@ -18,7 +18,7 @@ KINDS = ("ball", "rod", "box", "plate")
 class Pair:
     """Two primitives, and their distance over the longest side of their box."""
 
-    tree: Node
+    tree: Union
     kinds: tuple[str, str]
     share: float
 
@@ -44,7 +44,7 @@ def random_pair(seed: int, *, nearest: float = 1e-4) -> Pair:
     left = _placed(first, _turn(rng, first.direction, normal), np.zeros(3), scale)
     turn, distance = _turn(rng, second.direction, -normal), share
     for _round in range(20):  # the box grows with the distance
-        tree = left | _placed(second, turn, distance * normal, scale)
+        tree = Union((left, _placed(second, turn, distance * normal, scale)))
         box = float((tree.support[1] - tree.support[0]).max()) / scale
         distance = share * box
     return Pair(tree, (first.kind, second.kind), share)

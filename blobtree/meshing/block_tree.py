@@ -5,7 +5,6 @@ a quarter as large. All blocks are numbered in the order in which they are made;
 identifies a cell of any level.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -57,9 +56,9 @@ class Rows:
 
 
 class BlockTree:
-    """Blocks of several levels, the base being level 0."""
+    """Blocks of several levels, the base being level 0; `samples` holds its field, if it is known."""
 
-    def __init__(self, cells: SparseCells, step: Callable[[float], None] | None = None) -> None:
+    def __init__(self, cells: SparseCells, samples: DeviceArray | None = None) -> None:
         self._cells, self._device = cells, cells.device
         self._kernel = cells.tape.instruction_set.kernel_for
         leaves = cells.leaves
@@ -69,9 +68,7 @@ class BlockTree:
         self._coordinates = Rows(leaves.blocks.numpy().reshape(-1, 3))
         self._children = Rows(np.full(blocks * CHILDREN, UNREFINED, np.int32))
         self._parents = Rows(np.full(blocks, -1, np.int64))
-        self.first_samples = self._sample(0, 0, blocks, step)
-        """The field at the samples of the base, block by block, on the device."""
-        self._values = Rows(_by_block(self.first_samples))
+        self._values = Rows(_by_block(self._sample(0, 0, blocks) if samples is None else samples))
 
     def __len__(self) -> int:
         return len(self.levels)
@@ -223,9 +220,7 @@ class BlockTree:
             self._coordinates.append(self._level_rows[0].all[old:].numpy().reshape(-1, 3))
             self._values.append(_by_block(self._sample(level + 1, old, blocks)))
 
-    def _sample(
-        self, level: int, first: int, end: int, step: Callable[[float], None] | None = None
-    ) -> DeviceArray:
+    def _sample(self, level: int, first: int, end: int) -> DeviceArray:
         """Return the field at the corners of the cells of blocks of one level."""
         grid, count = self.grid(level), end - first
         listed = on_device(np.arange(first, end), wp.int32, self._device)
@@ -233,7 +228,7 @@ class BlockTree:
         arrays = self.level_arrays()
         inputs: list[Any] = [listed, arrays.blocks, arrays.keys, arrays.spans, arrays.tape]
         inputs += [child_grid(grid, grid.depth), Lattices()]
-        launch(self._kernel(sample_blocks), count * SAMPLES, inputs, [values], self._device, step=step)
+        launch(self._kernel(sample_blocks), count * SAMPLES, inputs, [values], self._device)
         return values
 
 

@@ -34,6 +34,9 @@ CELLS = wp.constant(float(BRANCHING))
 SAMPLES = SAMPLES_PER_SIDE**3
 """Samples of a block."""
 
+FACING = wp.constant(0.5)
+"""Cosine between the normals at the ends of an edge, below which the edge may bridge a gap."""
+
 _Neighbours = wp.types.vector(length=8, dtype=wp.int32)
 _Quad = wp.vec4i
 
@@ -265,3 +268,23 @@ def edge_rank(axis: wp.int32, du: wp.int32, dv: wp.int32) -> wp.int32:
     if axis == 1:
         return dv + 2 * du
     return du + 2 * dv
+
+
+@wp.kernel
+def mark_bridging(
+    first: wp.int32,
+    faces: wp.array(dtype=wp.vec3i),
+    positions: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    bridging: wp.array(dtype=wp.bool),
+) -> None:
+    """Mark triangles with an edge that leaves the surface at both ends, where the normals differ much."""
+    i = first + wp.tid()
+    face = faces[i]
+    for side in range(3):
+        a = face[side]
+        b = face[(side + 1) % 3]
+        if wp.dot(normals[a], normals[b]) < FACING:
+            step = positions[b] - positions[a]
+            if wp.dot(normals[a], step) > 0.0 and wp.dot(normals[b], step) < 0.0:
+                bridging[i] = True

@@ -19,11 +19,14 @@ wp.set_module_options(KERNEL_OPTIONS)
 OWNER_HALVINGS = 16
 """Halvings until the place is known where the nearest primitive changes."""
 
-PROOF = 1
-"""Halvings before a bound of the field, which proves for most edges that they stay inside."""
+PROOFS = wp.constant(4)
+"""Halvings from one bound of the field to the next; these prove for most edges that they stay inside."""
 
 ROUNDING = wp.constant(1e-5)
 """Relative error of the field in float32, which a proof allows for."""
+
+UNKNOWN = wp.constant(-2)
+"""Mark of a sample whose nearest primitive is not known."""
 
 HALF_BLOCK = wp.constant(0.5 * BRANCHING)
 """Half the side of a block, in cells."""
@@ -33,6 +36,9 @@ SIDE_HALVINGS = 12
 
 TOUCHING = wp.constant(4e-6)
 """Width of a gap over the largest coordinate, below which its sides touch in float32."""
+
+STRIDES = wp.constant(wp.vec3i(SAMPLES_PER_SIDE**2, SAMPLES_PER_SIDE, 1))
+"""Distance of neighbours along each axis in the numbers of samples."""
 
 _Points = wp.types.matrix(shape=(WARP_REGISTERS, 3), dtype=wp.float32)
 
@@ -86,103 +92,24 @@ def nearest_primitive(q: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.int32:
     return nearest
 
 
-@wp.kernel
-def bound_slopes(
-    first: wp.int32,
-    listed: wp.array(dtype=wp.int32),
-    level: LevelBlocks,
-    base: wp.vec3i,
-    corner: wp.vec3,
-    cell: wp.float32,
-    slopes: wp.array(dtype=wp.float32),
-) -> None:
-    """Write a Lipschitz bound of the field in listed blocks of a level."""
-    i = first + wp.tid()
-    block = listed[i]
-    low = sample_index(base + level.blocks[block], 0, 0, 0)
-    middle = grid_point(low, corner, cell) + wp.vec3(HALF_BLOCK * cell)
-    reach = wp.sqrt(3.0) * HALF_BLOCK * cell
-    bound = field_bound(middle, wp.vec3(0.0), reach, level.tape, level.spans[block])
-    slopes[i] = wp.max(bound[1], bound[2])
-
-
 @wp.func
-def may_leave(
-    i: wp.int32, place: wp.int32, stride: wp.int32, least: wp.float32, values: wp.array(dtype=wp.float32)
-) -> wp.bool:
-    """Return True if an edge of a sample along an axis has its ends inside with a sum of at most `least`."""
-    for side in range(2):
-        other = place + 2 * side - 1
-        if other >= 0 and other < SAMPLES_PER_SIDE:
-            value = values[i + (2 * side - 1) * stride]
-            if value >= ISO and values[i] + value <= least:
-                return True
-    return False
+def gap_across(start: wp.vec3, step: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.vec2:
+    """Return the width of the gap that an edge crosses, and the share of the edge before a place in the gap.
 
-
-@wp.kernel
-def find_owners(
-    first: wp.int32,
-    listed: wp.array(dtype=wp.int32),
-    level: LevelBlocks,
-    base: wp.vec3i,
-    corner: wp.vec3,
-    cell: wp.float32,
-    slopes: wp.array(dtype=wp.float32),
-    values: wp.array(dtype=wp.float32),
-    owners: wp.array(dtype=wp.int32),
-) -> None:
-    """Write the nearest primitive at samples of listed blocks of a level; −1 outside or without a second one.
-
-    It is −1 as well where the slope of the field proves that no edge of the sample leaves the inside.
+    The width is 0 without a gap. The ends of the edge belong to different primitives. A gap between these is
+    where the nearest primitive changes, as its middle is as far from both.
     """
-    i = first + wp.tid()
-    row = i // SAMPLES
-    sample = i % SAMPLES
-    owners[i] = -1
-    if values[i] < ISO:
-        return
-    x = sample // (SAMPLES_PER_SIDE * SAMPLES_PER_SIDE)
-    y = (sample // SAMPLES_PER_SIDE) % SAMPLES_PER_SIDE
-    z = sample % SAMPLES_PER_SIDE
-    least = 2.0 * ISO * (1.0 + ROUNDING) + slopes[row] * cell
-    unproved = may_leave(i, x, SAMPLES_PER_SIDE * SAMPLES_PER_SIDE, least, values)
-    unproved = unproved or may_leave(i, y, SAMPLES_PER_SIDE, least, values)
-    if unproved or may_leave(i, z, 1, least, values):
-        block = listed[row]
-        index = sample_index(base + level.blocks[block], x, y, z)
-        owners[i] = nearest_primitive(grid_point(index, corner, cell), level.tape, level.spans[block])
-
-
-@wp.kernel
-def measure_gaps(
-    first: wp.int32,
-    starts: wp.array(dtype=wp.vec3),
-    steps: wp.array(dtype=wp.vec3),
-    blocks: wp.array(dtype=wp.int32),
-    spans: wp.array(dtype=wp.vec2i),
-    tape: Texels,
-    widths: wp.array(dtype=wp.float32),
-    places: wp.array(dtype=wp.vec3),
-) -> None:
-    """Write the width of the gap that each edge crosses, and a place in the gap; 0 for edges without one.
-
-    `steps` lead from the starts to the ends of edges. The ends belong to different primitives. A gap between
-    these is where the nearest primitive changes, as its middle is as far from both.
-    """
-    i = first + wp.tid()
-    span = spans[blocks[i]]
-    owner = nearest_primitive(starts[i], tape, span)
+    owner = nearest_primitive(start, tape, span)
     low = float(0.0)
     high = float(1.0)
     for halving in range(OWNER_HALVINGS):
         middle = 0.5 * (low + high)
-        place = starts[i] + middle * steps[i]
-        if halving == PROOF:
-            reach = 0.5 * (high - low) * wp.length(steps[i])
+        place = start + middle * step
+        if halving % PROOFS == 1:
+            reach = 0.5 * (high - low) * wp.length(step)
             bound = field_bound(place, wp.vec3(0.0), reach, tape, span)
             if bound[0] - reach * bound[1] > ISO:
-                return
+                return wp.vec2(0.0)
         if nearest_primitive(place, tape, span) == owner:
             low = middle
         else:
@@ -191,14 +118,15 @@ def measure_gaps(
     within = float(0.0)
     beyond = gap
     first_side = float(0.0)
+    width = float(0.0)
     for turn in range(2 * SIDE_HALVINGS + 1):  # at the middle first, then to both sides
         t = gap
         if turn > 0:
             t = 0.5 * (within + beyond)
-        if field_value(starts[i] + t * steps[i], tape, span) < ISO:
+        if field_value(start + t * step, tape, span) < ISO:
             beyond = t
         elif turn == 0:
-            break
+            return wp.vec2(0.0)
         else:
             within = t
         if turn == SIDE_HALVINGS:
@@ -206,9 +134,109 @@ def measure_gaps(
             within = 1.0
             beyond = gap
         elif turn == 2 * SIDE_HALVINGS:
-            p = starts[i] + gap * steps[i]
-            farthest = wp.max(wp.max(wp.abs(p[0]), wp.abs(p[1])), wp.abs(p[2]))
-            width = (beyond - first_side) * wp.length(steps[i])
-            if width > TOUCHING * farthest:
-                widths[i] = width
-                places[i] = p
+            width = (beyond - first_side) * wp.length(step)
+    p = start + gap * step
+    if width <= TOUCHING * wp.max(wp.max(wp.abs(p[0]), wp.abs(p[1])), wp.abs(p[2])):
+        return wp.vec2(0.0)
+    return wp.vec2(width, gap)
+
+
+@wp.func
+def sample_place(sample: wp.int32) -> wp.vec3i:
+    """Return the place of a sample in its block."""
+    side = SAMPLES_PER_SIDE
+    return wp.vec3i(sample // (side * side), (sample // side) % side, sample % side)
+
+
+@wp.func
+def root_of(i: wp.int32, labels: wp.array(dtype=wp.int32)) -> wp.int32:
+    """Return the lowest known sample that is joined with a sample."""
+    root = i
+    while labels[root] != root:
+        root = labels[root]
+    return root
+
+
+@wp.func
+def join(i: wp.int32, other: wp.int32, labels: wp.array(dtype=wp.int32)) -> None:
+    """Join two samples."""
+    a = root_of(i, labels)
+    b = root_of(other, labels)
+    labels[wp.max(a, b)] = wp.min(a, b)
+
+
+@wp.func
+def is_unjoined(
+    i: wp.int32, axis: wp.int32, values: wp.array(dtype=wp.float32), labels: wp.array(dtype=wp.int32)
+) -> wp.bool:
+    """Return True if both ends of a sample's edge along an axis are inside, and not joined."""
+    if sample_place(i % SAMPLES)[axis] == BRANCHING or values[i] < ISO:
+        return False
+    other = i + STRIDES[axis]
+    if values[other] < ISO:
+        return False
+    return root_of(i, labels) != root_of(other, labels)
+
+
+@wp.func
+def owner_of(
+    i: wp.int32, q: wp.vec3, tape: Texels, span: wp.vec2i, owners: wp.array(dtype=wp.int32)
+) -> wp.int32:
+    """Return the nearest primitive of a sample at q, and keep it."""
+    if owners[i] == UNKNOWN:
+        owners[i] = nearest_primitive(q, tape, span)
+    return owners[i]
+
+
+@wp.kernel
+def find_crossing_edges(
+    first: wp.int32,
+    listed: wp.array(dtype=wp.int32),
+    level: LevelBlocks,
+    base: wp.vec3i,
+    corner: wp.vec3,
+    cell: wp.float32,
+    values: wp.array(dtype=wp.float32),
+    owners: wp.array(dtype=wp.int32),
+    labels: wp.array(dtype=wp.int32),
+    widths: wp.array(dtype=wp.float32),
+    shares: wp.array(dtype=wp.float32),
+) -> None:
+    """Write the gaps that edges in listed blocks of a level cross, 3 for each sample, see `gap_across`.
+
+    They are 0 for edges whose ends are joined by edges of the block that stay inside: between samples whose
+    values exceed what the slope of the field can take away, between samples of one primitive, or else by
+    measure. `values` belong to the samples of these blocks; `owners` and `labels` are room to work in.
+    """
+    row = first + wp.tid()
+    block = listed[row]
+    low = base + level.blocks[block]
+    span = level.spans[block]
+    middle = grid_point(sample_index(low, 0, 0, 0), corner, cell) + wp.vec3(HALF_BLOCK * cell)
+    bound = field_bound(middle, wp.vec3(0.0), wp.sqrt(3.0) * HALF_BLOCK * cell, level.tape, span)
+    least = 2.0 * ISO * (1.0 + ROUNDING) + wp.max(bound[1], bound[2]) * cell
+    for i in range(row * SAMPLES, (row + 1) * SAMPLES):
+        owners[i] = UNKNOWN
+        labels[i] = i
+    for stage in range(4):
+        for i in range(row * SAMPLES, (row + 1) * SAMPLES):
+            for axis in range(3):
+                if is_unjoined(i, axis, values, labels):
+                    other = i + STRIDES[axis]
+                    place = sample_place(i % SAMPLES)
+                    start = grid_point(sample_index(low, place[0], place[1], place[2]), corner, cell)
+                    step = wp.vec3(0.0)
+                    step[axis] = cell
+                    inside = values[i] + values[other] > least
+                    if stage == 1:
+                        owner = owner_of(i, start, level.tape, span, owners)
+                        inside = owner == owner_of(other, start + step, level.tape, span, owners)
+                    elif stage == 2:
+                        gap = gap_across(start, step, level.tape, span)
+                        inside = gap[0] == 0.0
+                        widths[3 * i + axis] = gap[0]
+                        shares[3 * i + axis] = gap[1]
+                    if inside:
+                        join(i, other, labels)
+                elif stage == 3:
+                    widths[3 * i + axis] = 0.0

@@ -7,11 +7,13 @@ far from one primitive as from the other.
 Beside a concave crease, edges cross the outside too, but other edges, which stay inside, join the same
 samples. So the samples and the edges that stay inside are a graph. An edge crosses a gap if its ends lie in
 different components of the graph. Cells beside such edges are divided until no such edge is left.
+
+A mesh that bridges a gap has triangles with corners on both sides, whose normals face each other. Few meshes
+without gaps have any, and only these are searched.
 """
 
 from dataclasses import dataclass
 from functools import partial
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -19,17 +21,16 @@ import warp as wp
 
 from blobtree._typing import BoolArray, Float64Array, IndexArray, Int32Array, Int64Array
 from blobtree.cells.grid import BRANCHING, CHILDREN
-from blobtree.cells.scan import DeviceArray
+from blobtree.cells.scan import arange
 from blobtree.cells.sparse_cells import SparseCells
 from blobtree.device import launch
 from blobtree.formulas.falloff import ISO
 from blobtree.meshing.block_tree import BlockTree, on_device
-from blobtree.meshing.gap_kernels import bound_slopes, find_owners, measure_gaps
+from blobtree.meshing.gap_kernels import find_crossing_edges
+from blobtree.meshing.mesh import DeviceMesh, bridging_faces, extract_mesh, sample_cells
 from blobtree.progress import Progress
-from blobtree.tape.grown import runs_of_leaves
-from blobtree.tape.model import ImplicitModel
 
-NEAR_BLOCKS = 2
+NEAR_BLOCKS = 3
 """Distance, in blocks of the base, within which edges inside join two samples."""
 
 
@@ -102,7 +103,13 @@ class Gaps:
         cells = self._crossing.cells
         beside = np.asarray(((cells >= 0) & leaves[cells]).any(axis=1))
         crossing = self._crossing.chosen(beside)
-        return crossing.chosen(self._apart(crossing)) if len(crossing) else crossing
+        if not len(crossing):
+            return crossing
+        return crossing.chosen(self._apart(crossing))
+
+    def cross(self, blocks: IndexArray) -> bool:
+        """Return True if there are edges across gaps, if there are any in blocks of the base."""
+        return len(self._crossing_in(blocks, 0)) > 0 and len(self.edges()) > 0
 
     def _search(self) -> None:
         """Look for edges that cross the outside in new blocks."""
@@ -117,46 +124,26 @@ class Gaps:
             self._roots[of_level] = self._roots[tree.parents[of_level] // CHILDREN]
         for level in np.unique(tree.levels[first:]):
             listed = first + np.flatnonzero(tree.levels[first:] == level)
-            rows, lowest, axes = _changes(self._owners(listed, int(level)))
-            self._crossing = self._crossing.then(self._measured(listed[rows], lowest, axes))
+            self._crossing = self._crossing.then(self._crossing_in(listed, int(level)))
 
-    def _owners(self, listed: IndexArray, level: int) -> Int32Array:
-        """Return the nearest primitive (n, 5, 5, 5) at samples of blocks of a level.
-
-        It is −1 outside, and where the field's slope proves that all edges of the sample stay inside.
-        """
+    def _crossing_in(self, listed: IndexArray, level: int) -> CrossingEdges:
+        """Return the edges across the outside in blocks of a level, but for those with a way round there."""
         tree, device = self._tree, self._tree.cells.device
         grid, values = tree.grid(level), tree.values[listed]
-        blocks: list[Any] = [on_device(listed, wp.int32, device), tree.level_arrays()]
-        blocks += [wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner), grid.cell_size]
-        kernel_for = tree.cells.tape.instruction_set.kernel_for
-        slopes: Any = wp.empty(len(listed), dtype=wp.float32, device=device)
-        launch(kernel_for(bound_slopes), len(listed), blocks, [slopes], device)
-        owners: Any = wp.empty(values.size, dtype=wp.int32, device=device)
-        inputs = [*blocks, slopes, on_device(values.ravel(), wp.float32, device)]
-        launch(kernel_for(find_owners), values.size, inputs, [owners], device)
-        result: Int32Array = owners.numpy().reshape(values.shape)
-        return result
-
-    def _measured(self, blocks: IndexArray, lowest: IndexArray, axes: IndexArray) -> CrossingEdges:
-        """Return the edges that cross the outside, with their widths and places."""
-        tree, device, count = self._tree, self._tree.cells.device, len(blocks)
-        if not count:
-            return CrossingEdges.none()
-        sizes = tree.grid(0).cell_size / 4.0 ** tree.levels[blocks]
-        origins = np.array([tree.grid(level).origin for level in range(tree.depth + 1)])
-        starts = tree.coordinates[blocks] * BRANCHING + lowest
-        starts = origins[tree.levels[blocks]] + starts * sizes[:, None]
-        steps = np.eye(3)[axes] * sizes[:, None]
-        widths: Any = wp.zeros(count, dtype=wp.float32, device=device)
-        places: Any = wp.zeros(count, dtype=wp.vec3, device=device)
-        inputs = [on_device(array.astype(np.float32), wp.vec3, device) for array in (starts, steps)]
-        inputs += [on_device(blocks, wp.int32, device), tree.spans, tree.tape]
-        kernel = tree.cells.tape.instruction_set.kernel_for(measure_gaps)
-        launch(kernel, count, inputs, [widths, places], device)
-        lengths = widths.numpy().astype(np.float64)
-        found = CrossingEdges(blocks, lowest, axes, lengths, places.numpy().astype(np.float64))
-        return found.chosen(lengths > 0.0)
+        inputs: list[Any] = [on_device(listed, wp.int32, device), tree.level_arrays()]
+        inputs += [wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner), grid.cell_size]
+        inputs += [on_device(values.ravel(), wp.float32, device)]
+        inputs += [wp.empty(values.size, dtype=wp.int32, device=device) for _ in range(2)]
+        widths, shares = (wp.zeros(3 * values.size, dtype=wp.float32, device=device) for _ in range(2))
+        kernel = tree.cells.tape.instruction_set.kernel_for(find_crossing_edges)
+        launch(kernel, len(listed), inputs, [widths, shares], device)
+        lengths = widths.numpy()
+        found = np.flatnonzero(lengths)
+        row, *lowest, axes = np.unravel_index(found, (*values.shape, 3))
+        blocks, places = listed[row], np.stack(lowest, axis=1)
+        starts = grid.origin + (tree.coordinates[blocks] * BRANCHING + places) * grid.cell_size
+        between = shares.numpy()[found, None] * np.eye(3)[axes] * grid.cell_size
+        return CrossingEdges(blocks, places, axes, lengths[found].astype(np.float64), starts + between)
 
     def _apart(self, crossing: CrossingEdges) -> BoolArray:
         """Return True for edges whose ends no edges join that stay inside."""
@@ -206,11 +193,18 @@ class Gaps:
         return keys
 
 
-def samples_without_gaps(tree: ImplicitModel, cells: SparseCells, report: Progress) -> DeviceArray | None:
-    """Return the field at the samples of cells of one size; None if their mesh bridges a gap."""
-    blocks = BlockTree(cells, partial(report, "sampling the field"))
-    several = len(list(islice(runs_of_leaves(tree._program), 2))) > 1
-    return None if several and len(Gaps(blocks).edges()) else blocks.first_samples
+def mesh_without_gaps(cells: SparseCells, report: Progress) -> DeviceMesh | None:
+    """Return the mesh of cells of one size; None if it bridges a gap."""
+    every = arange(len(cells.leaves), cells.device)
+    samples = sample_cells(cells, every, partial(report, "sampling the field"))
+    mesh = extract_mesh(cells, report, samples=samples)
+    bridging = bridging_faces(mesh)
+    if len(bridging):
+        corners = np.unique(mesh.faces.numpy()[bridging])
+        blocks = np.unique(np.searchsorted(mesh.vertex_starts.numpy(), corners, side="right") - 1)
+        if Gaps(BlockTree(cells, samples)).cross(blocks):
+            return None
+    return mesh
 
 
 def connected_blocks(coordinates: Int32Array) -> IndexArray:
@@ -222,16 +216,3 @@ def connected_blocks(coordinates: Int32Array) -> IndexArray:
     beside = search.sparse_distance_matrix(search, 1.5, p=np.inf)
     groups: IndexArray = connected_components(beside, directed=False)[1]
     return groups
-
-
-def _changes(owners: Int32Array) -> tuple[IndexArray, IndexArray, IndexArray]:
-    """Return edges whose ends are inside and have different owners (n, 5, 5, 5): rows, lower ends, axes."""
-    found = [np.empty((0, 5), np.intp)]
-    for axis in range(3):
-        along = np.moveaxis(owners, axis + 1, 1)
-        low, high = along[:, :-1], along[:, 1:]
-        row, at, *across = np.nonzero((low != high) & (low >= 0) & (high >= 0))
-        lowest = np.stack([*across[:axis], at, *across[axis:]], axis=1)
-        found.append(np.column_stack([row, lowest, np.full(len(row), axis)]))
-    every = np.concatenate(found)
-    return every[:, 0], every[:, 1:4], every[:, 4]

@@ -16,7 +16,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from blobtree._typing import Float32Array, Int32Array
+from blobtree._typing import Float32Array, IndexArray, Int32Array
 from blobtree.cells.grid import CHILDREN
 from blobtree.cells.scan import DeviceArray, arange, compact, exclusive_scan, where_negative
 from blobtree.cells.sparse_cells import SparseCells, child_grid
@@ -31,6 +31,7 @@ from blobtree.meshing.dual_kernels import (
     choose_rows,
     classify_cells,
     connect_vertices,
+    mark_bridging,
     sample_blocks,
 )
 from blobtree.meshing.patches import KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
@@ -169,6 +170,25 @@ def vertex_arrays(positions: DeviceArray, normals: DeviceArray, colors: DeviceAr
     return vertices
 
 
+def sample_cells(cells: SparseCells, listed: DeviceArray, step: Callable[[float], None]) -> DeviceArray:
+    """Return the field at the samples of listed blocks."""
+    count, arrays, grid = len(listed) * SAMPLES, cells.arrays, cells.grid
+    values: DeviceArray = wp.empty(count, dtype=wp.float32, device=cells.device)
+    inputs = [listed, arrays.blocks, arrays.keys, arrays.spans, arrays.tape]
+    inputs += [child_grid(grid, grid.depth), arrays.models]
+    kernel = cells.tape.instruction_set.kernel_for(sample_blocks)
+    launch(kernel, count, inputs, [values], cells.device, step=step)
+    return values
+
+
+def bridging_faces(mesh: DeviceMesh) -> IndexArray:
+    """Return the triangles that may bridge a gap: an edge has outward normals that face each other."""
+    count, device = len(mesh.faces), mesh.cells.device
+    bridging: Any = wp.zeros(count, dtype=wp.bool, device=device)
+    launch(mark_bridging, count, [mesh.faces, mesh.vertices, mesh.normals], [bridging], device)
+    return np.flatnonzero(bridging.numpy())
+
+
 def extract_mesh(
     cells: SparseCells,
     report: Progress,
@@ -220,7 +240,7 @@ class _Extraction:
         needed = len(changed) * SAMPLES * SAMPLE_BYTES + self._count * BLOCK_BYTES
         demand_memory(needed, self._device, f"the surface in {self._count:,} blocks of cells")
         if values is None:
-            values = self._sample(changed, partial(report, "sampling the field"))
+            values = sample_cells(self._cells, changed, partial(report, "sampling the field"))
         codes, rows, offsets, vertex_counts, quad_counts = self._classify(changed, unchanged, values)
         vertex_starts, vertex_total = exclusive_scan(vertex_counts, "vertices")
         quad_starts, quad_total = exclusive_scan(quad_counts, "triangles")
@@ -276,16 +296,6 @@ class _Extraction:
         self._launch(mark, len(listed), [listed, self._arrays], [flags])
         self._launch(self._reuse.invert_flags, self._count, [flags], [others])
         return compact(flags), compact(others)
-
-    def _sample(self, changed: DeviceArray, step: Callable[[float], None]) -> DeviceArray:
-        """Return the field at the samples of changed blocks."""
-        count = len(changed) * SAMPLES
-        values = self._empty(count, wp.float32)
-        cells, grid = self._arrays, self._cells.grid
-        inputs = [changed, cells.blocks, cells.keys, cells.spans, cells.tape]
-        inputs += [child_grid(grid, grid.depth), cells.models]
-        self._launch(self._kernel(sample_blocks), count, inputs, [values], step)
-        return values
 
     def _classify(
         self, changed: DeviceArray, unchanged: DeviceArray, values: DeviceArray

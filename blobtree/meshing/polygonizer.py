@@ -13,8 +13,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree.cells.grid import Grid, aligned_grid
-from blobtree.cells.scan import DeviceArray
-from blobtree.cells.sparse_cells import CELL_KERNELS, SparseCells, build_cells
+from blobtree.cells.sparse_cells import CELL_KERNELS, build_cells
 from blobtree.device import known_device
 from blobtree.errors import InvalidResolution
 from blobtree.kernels import load_together
@@ -149,22 +148,16 @@ class Polygonizer:
         grid = grid_around(tree, self._cell_size)
         old_cells = previous.cells if previous is not None else None
         cells = build_cells(tree.tape, grid, device=self._device, previous=old_cells, report=report)
-        return extracted(cells, previous, self._creases, report)
+        mesh = extract_mesh(cells, report, previous)
+        return mesh, *sharpened(mesh, self._creases, report)
 
 
-def extracted(
-    cells: SparseCells,
-    previous: DeviceMesh | None,
-    creases: bool,
-    report: Progress,
-    samples: DeviceArray | None = None,
-) -> tuple[DeviceMesh, DeviceMesh, NDArray[np.uint8] | None]:
-    """Return a mesh of cells, the same with vertices on creases if asked for, and its sheet counts."""
-    mesh = extract_mesh(cells, report, previous, samples)
-    moved, sheet_counts = mesh, None
-    for _, sharpened in SHARPENERS if creases else ():
-        moved, sheet_counts = sharpened(moved, report)
-    return mesh, moved, sheet_counts
+def sharpened(mesh: DeviceMesh, creases: bool, report: Progress) -> Sharpened:
+    """Return a mesh with vertices on creases if asked for, and its sheet counts."""
+    sheet_counts = None
+    for _, sharpen in SHARPENERS if creases else ():
+        mesh, sheet_counts = sharpen(mesh, report)
+    return mesh, sheet_counts
 
 
 def cell_size_of(tree: ImplicitModel, resolution: int | None, cell_size: float | None) -> float:

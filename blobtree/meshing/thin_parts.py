@@ -10,9 +10,9 @@ from blobtree.meshing.polygonizer import (
     DEFAULT_RESOLUTION,
     Polygonizer,
     cell_size_of,
-    extracted,
     grid_around,
     load_kernels,
+    sharpened,
 )
 from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, reporting
@@ -32,7 +32,7 @@ def polygonize_parts(
     cancel: Cancel | None = None,
 ) -> Mesh:
     """Return the mesh with cells of `resolution`, and smaller ones where parts are thin, see `polygonize`."""
-    from blobtree.meshing.gaps import samples_without_gaps  # imported here: cells of one size need none
+    from blobtree.meshing.gaps import mesh_without_gaps  # imported here: cells of one size need none
 
     truth("creases", creases, InvalidResolution)
     with reporting(progress, cancel) as report:
@@ -40,10 +40,9 @@ def polygonize_parts(
         if not shows_thin_parts(tree, resolution, device):
             load_kernels(tree, device, creases, sample_blocks, place_vertices)
             cells = build_cells(tree.tape, grid_around(tree, size), device=device, report=report)
-            samples = samples_without_gaps(tree, cells, report)
-            if samples is not None:
-                _, mesh, sheet_counts = extracted(cells, None, creases, report, samples)
-                return download(mesh, sheet_counts)
+            mesh = mesh_without_gaps(cells, report)
+            if mesh is not None:
+                return download(*sharpened(mesh, creases, report))
         return _mesh_of_thin_parts(tree, size, creases, device, report)
 
 

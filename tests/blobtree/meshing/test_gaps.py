@@ -6,7 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from blobtree import Box, Node, Point, Segment, Union, polygonize
+from blobtree import Box, Node, Point, Polygonizer, Segment, Sum, Union, polygonize
+from blobtree.meshing.block_tree import BlockTree
+from blobtree.meshing.gaps import Gaps
+from blobtree.meshing.mesh import DeviceMesh, bridging_faces
 from tests.gap_pairs import random_pair
 from tests.thin_trees import is_closed, pieces
 
@@ -73,6 +76,57 @@ def test_parts_that_meet_keep_cells_of_one_size(tree: Node, caplog: pytest.LogCa
     uniform, default = polygonize(tree, resolution=64), polygonize(tree)
     assert np.array_equal(uniform.vertices, default.vertices)
     assert not caplog.records
+
+
+def meshed(tree: Node, resolution: int = 32) -> DeviceMesh:
+    """Return the mesh in cells of one size."""
+    return Polygonizer(tree, resolution=resolution).device_mesh
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_only_triangles_across_gaps_and_creases_may_bridge(seed: int) -> None:
+    places = np.random.default_rng(seed).uniform(-1.0, 1.0, (6, 3)).tolist()
+    parts = [Point((x, y, z), radius=0.8) for x, y, z in places]
+    blend, union = meshed(Sum(tuple(parts))), meshed(Union(tuple(parts)))
+    assert not len(bridging_faces(blend))
+    bridging, owners = bridging_faces(union), np.stack([part(union.vertices.numpy()) for part in parts])
+    corners = owners.argmax(axis=0)[union.faces.numpy()[bridging]]
+    assert len(bridging)
+    assert (corners != corners[:, :1]).any(axis=1).all()
+
+
+@pytest.mark.parametrize("seed", [0, 4, 43, 56, *BRIDGED])
+def test_triangles_across_gaps_bridge(seed: int) -> None:
+    first, second = random_pair(seed).tree.operands
+    mesh = meshed(first | second, 64)
+    side = first(mesh.vertices.numpy()) > second(mesh.vertices.numpy())
+    across = side[mesh.faces.numpy()].any(axis=1) & ~side[mesh.faces.numpy()].all(axis=1)
+    assert across.any()
+    assert set(np.flatnonzero(across)) & set(bridging_faces(mesh))
+
+
+@pytest.mark.parametrize("seed", [0, 2, 10, 43])
+def test_edges_across_gaps_are_those_that_dense_samples_find(seed: int) -> None:
+    tree = random_pair(seed).tree
+    first, _second = tree.operands
+    blocks = BlockTree(meshed(tree, 64).cells)
+    found, grid, shares = Gaps(blocks).edges(), blocks.grid(0), np.linspace(0.0, 1.0, 257)
+    expected = set()
+    for axis, step in enumerate(np.eye(3, dtype=int)):
+        block, *low = np.nonzero(np.ones_like(blocks.values[:, :4, :4, :4]))
+        places = np.stack(low, axis=1)
+        ends = [blocks.values[block, *(places + end * step).T] >= 0.5 for end in (0, 1)]
+        inside = np.flatnonzero(ends[0] & ends[1])
+        starts = grid.origin + (4 * blocks.coordinates[block] + places)[inside] * grid.cell_size
+        left, right = (first(starts + end * grid.cell_size * step) >= 0.5 for end in (0, 1))
+        inside, starts = inside[left != right], starts[left != right]  # within a convex part an edge stays
+        samples = tree((starts[:, None] + shares[:, None] * grid.cell_size * step).reshape(-1, 3))
+        for row in inside[samples.reshape(-1, len(shares)).min(axis=1) < 0.5].tolist():
+            expected.add((block[row], *places[row], axis))
+    own = (found.lowest < 4).all(axis=1)  # those of the loop above
+    rows = np.column_stack([found.blocks, found.lowest, found.axes])[own]
+    assert set(map(tuple, rows.tolist())) == expected
+    assert expected
 
 
 def test_a_gap_too_narrow_for_memory_is_named_once(caplog: pytest.LogCaptureFixture) -> None:
