@@ -61,7 +61,7 @@ from .nodes.convolution import (
 )
 from .nodes.curves import Arc, Circle, CubicBezier, Polyline, QuadraticBezier, Stroke, TaperedBezier
 from .nodes.deformations import Bend, CurveWarp, LimitedTwist, NoiseWarp, Shear, Stretch, Taper
-from .nodes.fields import FieldPrimitive, Gyroid, Noise, Superquadric
+from .nodes.fields import BoxedField, FieldPrimitive, Gyroid, Noise, Superquadric
 from .nodes.flats import Polygon, Rectangle, Triangle
 from .nodes.node import Node
 from .nodes.numeric_parameters import (
@@ -93,6 +93,7 @@ __all__ = [
     "Bend",
     "BlendGraph",
     "Box",
+    "BoxedField",
     "Bulge",
     "Cancel",
     "Cancelled",

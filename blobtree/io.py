@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Union, cast, get_type_
 
 import msgspec
 
-from blobtree.custom.field import CustomField
 from blobtree.custom.skeleton import CustomPrimitive
 from blobtree.custom.warp import CustomWarp
 from blobtree.declare.falloff import Falloff
@@ -30,6 +29,7 @@ from blobtree.errors import ImplicitDecalsError, InvalidFile, UnusableFile
 from blobtree.files import write_atomically
 from blobtree.json_errors import json_reason
 from blobtree.nodes.attributes import Attributes, AttributeValue
+from blobtree.nodes.fields import BoxedField, FieldPrimitive
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.node import Node
 from blobtree.nodes.operator import Operator
@@ -65,6 +65,12 @@ class CustomRecord(NodeRecord, frozen=True):
     def make(self, values: dict[str, Any]) -> Node:
         """Return the node of its kind."""
         return _custom_node(self.node_kind, values)
+
+
+class CustomLeafRecord(CustomRecord, frozen=True):
+    """A leaf of a custom kind, whose class declares this in each definition."""
+
+    color: Vector
 
 
 class CustomSkeletonRecord(CustomRecord, frozen=True):
@@ -109,7 +115,8 @@ CUSTOM_RECORDS: dict[Any, list[type[NodeRecord]]] = {
         _record_type(CustomPrimitive, tag, CustomSkeletonRecord)
         for tag in ("custom_skeleton", "own skeleton")
     ],
-    CustomField: [_record_type(CustomField, "custom_field", CustomRecord)],
+    BoxedField: [_record_type(BoxedField, "custom_field", CustomRecord)],
+    FieldPrimitive: [_record_type(FieldPrimitive, "custom_free_field", CustomLeafRecord)],
     Operator: [_record_type(Operator, tag, CustomRecord) for tag in ("custom_operator", "own operator")],
     CustomWarp: [_record_type(CustomWarp, "custom_warp", CustomRecord)],
 }

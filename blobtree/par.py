@@ -30,7 +30,8 @@ def _field(
     high: float = math.inf,
     hint: str = "",
     default: Any = MISSING,
-    natural: float | None = None,
+    natural: Any = None,
+    is_whole: bool = False,
 ) -> Any:
     """Return a field of a dataclass that declares a parameter."""
     if not isinstance(doc, str):
@@ -39,7 +40,7 @@ def _field(
         raise InvalidDefinition(f"{doc}: expected numbers low ≤ high, got {shown(low)} and {shown(high)}")
     if natural is None and default is not MISSING:
         natural = default
-    parameter = Parameter(quantity, doc, low=low, high=high, hint=hint, natural=natural)
+    parameter = Parameter(quantity, doc, low=low, high=high, hint=hint, natural=natural, whole=is_whole)
     for name, value in (("default", default), ("natural", natural)):
         if value is not None and value is not MISSING:
             try:
@@ -68,3 +69,21 @@ length = partial(_field, Quantity.LENGTH)
 
 distance = partial(_field, Quantity.DISTANCE)
 """A signed length, in model units."""
+
+radius = partial(_field, Quantity.RADIUS)
+"""A visible radius above 0, in model units; offsets and resizing change it."""
+
+point = partial(_field, Quantity.POINT)
+"""A point (3,); it moves with the node."""
+
+direction = partial(_field, Quantity.DIRECTION)
+"""A vector (3,) of any length above 0; rotations turn it. Formulas get it at length 1."""
+
+extents = partial(_field, Quantity.EXTENTS)
+"""Lengths (3,) along the axes, 0 or more, in model units."""
+
+semi_axes = partial(_field, Quantity.SEMI_AXES)
+"""Visible radii (3,) along the axes, above 0, in model units; resizing changes them."""
+
+whole = partial(_field, Quantity.NUMBERS, is_whole=True)
+"""A whole number."""

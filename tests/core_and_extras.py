@@ -9,12 +9,11 @@ from tests.import_graph import module_graph
 EXTRAS: dict[str, str] = {
     "blobtree": "field_slice fitting slicing",
     "blobtree.conformance": "*",
-    "blobtree.custom": "bounds_kernels field_checks skeleton_checks warp_checks",
-    "blobtree.declare": "checks operator_checks",
+    "blobtree.custom": "bounds_kernels field skeleton_checks warp_checks",
+    "blobtree.declare": "checks field_checks operator_checks",
     "blobtree.derivatives": "*",
     "blobtree.formulas": """
-        contact convolution curve_skeletons deformations direct_fields falloffs flat_skeletons noise
-        solid_skeletons volumes
+        contact curve_skeletons deformations falloffs flat_skeletons noise solid_skeletons
         """,
     "blobtree.meshing": """
         adaptive adaptive_cell_kernels adaptive_cells adaptive_kernels adaptive_mesh batch

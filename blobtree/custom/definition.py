@@ -8,11 +8,12 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import warp as wp
 
-from blobtree.declare.formula import Formula, class_name, formula_of, spelled
+from blobtree.declare.formula import Formula, class_name, formula, formula_of, spelled
 from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.declare.registry import CUSTOM_KINDS as CUSTOM_KINDS
 from blobtree.declare.registry import CustomKind
 from blobtree.declare.registry import unpickled_kind as _unpickled  # noqa: F401  (old pickles name it here)
+from blobtree.nodes.declared import DeclaredNode
 from blobtree.nodes.node import Node
 
 _SIZES: dict[Any, int] = {
@@ -182,6 +183,34 @@ def tape_readings(
 def texel_lines(count: int) -> str:
     """Return the lines of a generated function that read its texels."""
     return "".join(f"    t{i} = tape[at + {i}]\n" for i in range(count))
+
+
+def short_form(
+    base: type[DeclaredNode],
+    kind: str,
+    source: Formula,
+    parameters: tuple[Parameter, ...],
+    parts: Mapping[str, Any],
+    **claims: Any,
+) -> Any:
+    """Return the class of a definition: the registered one of the same formulas, or a new one.
+
+    Parts are formulas, or numbers, by their names in classes; None for none.
+    """
+    given = {name: part for name, part in parts.items() if part is not None}
+    body: dict[str, Any] = {
+        "tag": kind,
+        "__annotations__": {parameter.name: Annotated[Any, parameter] for parameter in parameters},
+        "__module__": source.python.__module__,
+        "__doc__": source.python.__doc__ or f"A node of the custom kind {kind!r}.",
+        **claims,
+        **{name: p if name == "lipschitz" and not callable(p) else formula(p) for name, p in given.items()},
+    }
+    known: Any = CUSTOM_KINDS.get(kind)
+    made: Any = CustomKind(class_name(kind), (base,), body)
+    same = issubclass(known or object, base) and known.digest == made.digest
+    CUSTOM_KINDS[kind] = known if same else made
+    return CUSTOM_KINDS[kind]
 
 
 def node_class(

@@ -12,14 +12,13 @@
 """
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Any
 
 import warp as wp
 
-from blobtree.custom.definition import Limits, custom_parameters
+from blobtree.custom.definition import Limits, custom_parameters, short_form
 from blobtree.declare.claims import Like
-from blobtree.declare.formula import class_name, formula, formula_of, kind_name, returned_type
-from blobtree.declare.registry import CUSTOM_KINDS, CustomKind
+from blobtree.declare.formula import formula_of, kind_name, returned_type
 from blobtree.nodes.operator import Operator
 
 CustomCombination = Operator
@@ -103,24 +102,14 @@ def define_operator(
         )
     parameters = custom_parameters(source, list(source.parameters)[4 if gradients else 2 :], limits, Operator)
     kind = kind_name(source, name)
-    body: dict[str, Any] = {
-        "tag": kind,
-        "like": like,
-        "monotone": monotone,
-        "associative": order_free,
-        "value" if value_alone else "partials": formula(source),
-        "__annotations__": {parameter.name: Annotated[Any, parameter] for parameter in parameters},
-        "__module__": source.python.__module__,
-        "__doc__": source.python.__doc__ or f"A node of the custom kind {kind!r}.",
-    }
-    for claim, bound in (("lipschitz", steepest), ("envelope", envelope)):
-        if callable(bound):
-            body[claim] = formula(bound)
-        elif bound is not None:
-            body[claim] = bound
-    known: Any = CUSTOM_KINDS.get(kind)
-    made: Any = CustomKind(class_name(kind), (Operator,), body)
-    same = known is not None and issubclass(known, Operator) and known.digest == made.digest
-    node: type[Operator] = known if same else made
-    CUSTOM_KINDS[kind] = node
+    node: type[Operator] = short_form(
+        Operator,
+        kind,
+        source,
+        parameters,
+        {"value" if value_alone else "partials": source, "lipschitz": steepest, "envelope": envelope},
+        like=like,
+        monotone=monotone,
+        associative=order_free,
+    )
     return node

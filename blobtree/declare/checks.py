@@ -4,7 +4,7 @@ They cannot prove a claim, but a wrong function seldom passes.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,10 @@ TRIAL_SPREAD = 2.0
 LEAST_LENGTH = 1e-3
 """Least length that is drawn for trials."""
 
+LENGTHS = (Quantity.EXTENTS, Quantity.SEMI_AXES)
+VECTORS = (Quantity.POINT, Quantity.DIRECTION, *LENGTHS)
+"""Quantities of three numbers, some of which are lengths."""
+
 SEED = 20
 TRIALS = 14
 """Number of sets of parameters."""
@@ -29,15 +33,25 @@ SLOPE_TOLERANCE = 1e-4
 VALUE_TOLERANCE = 1e-6
 
 
+Packed = Callable[[dict[str, Any]], dict[str, Any]]
+"""A function from values of parameters to the numbers that formulas take, by name."""
+
+
 def trial_value(parameter: Parameter, rng: np.random.Generator, trial: int) -> Any:
     """Return a value within the limits for a trial; the first trials take axes, zeros and limits."""
-    if parameter.size == 1:
+    size = 3 if parameter.quantity in VECTORS else parameter.size
+    if size == 1:
         return _trial_number(parameter, rng, trial)
-    size, low, high = parameter.size, parameter.low, parameter.high
+    low, high = parameter.low, parameter.high
     if trial < size + 1:
         vector = np.eye(size)[trial] if trial < size else np.zeros(size)
     else:
         vector = rng.uniform(-1.0, 1.0, size)
+    if parameter.quantity in LENGTHS:
+        vector = np.abs(vector) + LEAST_LENGTH
+    elif parameter.quantity is Quantity.DIRECTION:
+        vector /= float(np.linalg.norm(vector)) or math.inf
+        vector = vector if vector.any() else np.eye(3)[0]
     length = float(np.linalg.norm(vector))
     allowed = min(max(length, low), high)
     if allowed == length:
@@ -48,7 +62,7 @@ def trial_value(parameter: Parameter, rng: np.random.Generator, trial: int) -> A
 
 def _trial_number(parameter: Parameter, rng: np.random.Generator, trial: int) -> float | int:
     low, high = parameter.low, parameter.high
-    if parameter.quantity is Quantity.LENGTH:
+    if parameter.quantity in (Quantity.LENGTH, Quantity.RADIUS):
         low = max(low, LEAST_LENGTH)
     low = low if low > -math.inf else min(high, TRIAL_SPREAD) - 2.0 * TRIAL_SPREAD
     high = high if high < math.inf else max(low, -TRIAL_SPREAD) + 2.0 * TRIAL_SPREAD
@@ -117,9 +131,10 @@ def trials(
     extent: float,
     points: int,
     rng: np.random.Generator,
+    packed: Packed = dict,
 ) -> Iterator[tuple[Trial, Float64Array]]:
     """Yield trials with values within the limits, each with points (n, 3) around the origin."""
     for number in range(TRIALS if parameters else 2):
         values = {parameter.name: trial_value(parameter, rng, number) for parameter in parameters}
         spread = extent * rng.choice([0.1, 0.4, 1.0], (points, 1))
-        yield Trial(source, values, size), rng.uniform(-1.0, 1.0, (points, 3)) * spread
+        yield Trial(source, packed(values), size), rng.uniform(-1.0, 1.0, (points, 3)) * spread

@@ -140,11 +140,14 @@ def declared_formulas(kind: type, tag: str, results: Mapping[str, Any]) -> dict[
     return formulas
 
 
-def _own_formula(python: FunctionType, name: str) -> Formula:
-    """Return a formula of this package under a name."""
-    python.__qualname__ = name
+def _own_formula(given: FunctionType | wp.Function, name: str) -> Formula:
+    """Return a formula of this package under a name, or a function of the module as it is."""
+    python = python_function(given)
+    if python is given:
+        python.__qualname__ = name
     hints = {key: hint for key, hint in python.__annotations__.items() if key != "return"}
-    return Formula(name, hints, warp_function(python), python, "")
+    function = given if isinstance(given, wp.Function) else warp_function(python)
+    return Formula(name, hints, function, python, "")
 
 
 def formula_of(function: Any, *, returns: Any) -> Formula:

@@ -167,12 +167,13 @@ class OperatorFormulas:
         template = _WITH_PARTIALS.replace("{a}", a).replace("{b}", b)
         return derived(self.source, (a, b), template, LEAST_OPERAND)
 
-    def require(self, names: Sequence[str]) -> None:
+    def require(self, names: Sequence[str] | None) -> None:
         """Raise `InvalidDefinition` for formulas or claims that do not fit each other.
 
         `names` are those of the parameters that the class declares.
         """
         source, claims = self.source, self.claims
+        names = names or ()
         if len(self.given.keys() & {"value", "partials"}) == 2:
             raise source.refusal("expected one of the formulas `value` and `partials`, got both")
         hints = [wp.float32 if hint is float else hint for hint in source.parameters.values()]

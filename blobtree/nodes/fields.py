@@ -1,36 +1,87 @@
 """Direct fields as leaves of a tree: each a function of position, with a bounded support and a colour.
 
-A new one is a row of a table of `FieldKind` and a class here. The class names that row, declares its
-parameters, and returns a box outside which the field is 0. If the formula reads its parameters in the order
-of declaration, `texels` need not be written.
+A kind is a class with parameters, formulas, claims, and a box outside which the field is 0.
 """
 
+import math
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, replace
-from typing import Annotated, Any, ClassVar, Self
+from dataclasses import KW_ONLY, field, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
+import warp as wp
 
+from blobtree import par
 from blobtree._typing import Box, Float64Array
-from blobtree.declare.parameters import Color, Parameter, Quantity, columns_of, parameters_of
-from blobtree.errors import InvalidNode
-from blobtree.formulas.direct_fields import GYROID, GYROID_SLOPE, NOISE, SUPERQUADRIC
+from blobtree.declare.field import RESULTS, FieldFormulas, FieldKind
+from blobtree.declare.field_checks import check_box, check_field
+from blobtree.declare.formula import formula, is_own
+from blobtree.declare.parameters import Color, Quantity, columns_of, parameters_of
+from blobtree.declare.readers import SIZES
+from blobtree.errors import InvalidDefinition, InvalidNode
 from blobtree.formulas.falloff import RIM
-from blobtree.formulas.fields import FieldKind
-from blobtree.formulas.noise import MEAN_NOISE_SLOPE
-from blobtree.nodes.primitives import DEFAULT_COLOR, PROFILE, Columns, Leaf, Profile
+from blobtree.formulas.noise import LARGEST_NOISE, MEAN_NOISE_SLOPE, STEEPEST_NOISE, gradient_noise
+from blobtree.formulas.operators import ricci_partials
+from blobtree.formulas.windows import smooth_step, smooth_step_slope, steepest_smooth_step
+from blobtree.nodes.primitives import DEFAULT_COLOR, PROFILE, Columns, DeclaredLeaf, Falling, Profile
 from blobtree.tape.program import ProgramField, profile_extent, profile_factor
 from blobtree.validation import Vector
+
+wp.set_module_options({"enable_backward": False})
 
 BOX_MARGIN = 2e-6
 """Relative widening of boxes, so that float32 leaves nothing of a field outside."""
 
+NORM_MARGIN = wp.constant(4e-6)
+"""Relative error of powers in float32."""
 
-class FieldPrimitive(Leaf, ProgramField):
+STEEPEST_GYROID = math.sqrt(3.0)
+"""Largest |∇G| of G = sin x cos y + sin y cos z + sin z cos x."""
+
+GYROID_SLOPE = 1.529
+"""Mean |∇G| on the surface G = 0; it varies there from √2 to √3."""
+
+LARGEST_GYROID = 1.5
+"""Largest |G|."""
+
+
+class FieldPrimitive(DeclaredLeaf, ProgramField):
     """A direct field and a colour: a leaf of the tree.
 
     Its field is a function of the point itself, not of the distance from a skeleton. Every one has a
     `weight`. Only those whose function is some distance take a `falloff`.
+
+    A kind is a subclass with typed formulas, claims and parameters, which specifiers of `blobtree.par`
+    declare. A `BoxedField` ends at a box; a kind that ends by itself has the class method `box`. Formulas are
+    static functions after `@formula`. Behind the point or ball they take the parameters as they are declared,
+    or else the numbers that the class method `numbers` returns:
+
+    * ``value(q)`` returns the field at a point q: wp.vec3 as wp.float32, 0 or more and continuous: ½ on the
+      surface, larger inside. Its gradient is derived.
+    * ``value_gradient(q)``, in place of it, returns the field and its gradient as wp.vec4.
+    * ``lipschitz()`` or ``lipschitz(center, radius)``, in place of the number `lipschitz`, returns a bound on
+      the length of the gradient as wp.float32: everywhere, or in a ball.
+    * ``interval(center, radius)``, optional, returns bounds of the field in a ball as wp.vec2.
+    * ``bounds(center, radius)``, in place of both, returns the smallest and the largest value, and the
+      largest slope in a ball as wp.vec3.
+
+    Attributes
+    ----------
+    tag
+        Name of the kind in files; by default that of the class, in lower case with underscores.
+    lipschitz
+        Upper bound of the length of the gradient.
+    trial_extent
+        Half side of the cube around the origin in which samples try the claims.
+
+    Raises
+    ------
+    InvalidDefinition
+        At the definition of a subclass: a formula has no types or no source, or samples contradict a claim.
+        Nothing has been compiled by then.
+    UntranslatableFunction
+        A formula leaves the shared subset; the message names file and line.
 
     Examples
     --------
@@ -39,7 +90,20 @@ class FieldPrimitive(Leaf, ProgramField):
     [True, True, False]
     """
 
+    sort = "a field"
+    hash_name = "CustomField"
+    row_name = "field_kind"
+    formula_results = RESULTS
+    needed = ("value", "value_gradient")
+    methods = ("numbers", "box")
     field_kind: ClassVar[FieldKind]
+    lipschitz: ClassVar[float | None] = None
+    trial_extent: ClassVar[float] = 4.0
+    texels_read: ClassVar[int] = 0
+    """Number of texels that formulas take which read the tape themselves."""
+
+    if TYPE_CHECKING:
+        color: Color = field(default=DEFAULT_COLOR, kw_only=True)
 
     def __new__(cls, *_: Any, **named: Any) -> Self:
         """Refuse a falloff or a width that has no meaning."""
@@ -49,6 +113,34 @@ class FieldPrimitive(Leaf, ProgramField):
                     f"{name}: expected none, a {cls.__name__} is no function of a distance; it takes a weight"
                 )
         return super().__new__(cls)
+
+    @classmethod
+    def _declaration(cls, tag: str) -> FieldFormulas:
+        boxed, distance = issubclass(cls, BoxedField), issubclass(cls, Falling)
+        claims = cls.lipschitz, cls.trial_extent, distance, boxed, cls.texels_read
+        return FieldFormulas(tag, cls._formulas, *claims)
+
+    @classmethod
+    def _check(cls, declaration: FieldFormulas) -> None:
+        """Raise `InvalidDefinition` if samples contradict the class."""
+        packed = dict if is_own(cls.numbers) else lambda values: cls._formula_values(values, declaration)
+        check_field(declaration, cls.parameters, packed)
+        if is_own(cls.box) and not declaration.windowed:
+            raise InvalidDefinition(
+                f"{cls.__qualname__}: expected the class method `box`, or the base BoxedField"
+            )
+        if not declaration.windowed:
+            check_box(declaration, cls.parameters, packed, lambda values: cls.box(_rows(values)))
+
+    @classmethod
+    def _formula_values(cls, values: dict[str, Any], declaration: FieldFormulas) -> dict[str, Any]:
+        """Return the numbers of the formulas for values of the parameters."""
+        numbers = cls.numbers(_rows(values))[0].tolist()
+        found: dict[str, Any] = {}
+        for name, kind in declaration.numbers.items():
+            taken, numbers = numbers[: SIZES[kind]], numbers[SIZES[kind] :]
+            found[name] = tuple(taken) if SIZES[kind] > 1 else taken[0]
+        return found
 
     @property
     def mean_radius(self) -> float:
@@ -98,9 +190,18 @@ class FieldPrimitive(Leaf, ProgramField):
         raise NotImplementedError
 
     @classmethod
+    def numbers(cls, columns: Columns) -> Float64Array:
+        """Return the numbers (n, ·) of the formulas; by default the parameters as declared."""
+        return np.concatenate(list(columns.values()), axis=1)
+
+    @classmethod
     def texels(cls, columns: Columns) -> Float64Array:
-        """Return parameters as texels (n, ·, 4); by default the numbers follow each other as declared."""
-        numbers = np.concatenate(list(columns.values()), axis=1)
+        """Return the numbers as texels (n, ·, 4)."""
+        return cls._padded(cls.numbers(columns))
+
+    @classmethod
+    def _padded(cls, numbers: Float64Array) -> Float64Array:
+        """Return numbers (n, ·) as texels (n, ·, 4)."""
         texels = 4 * cls.field_kind.parameters
         return np.pad(numbers, ((0, 0), (0, texels - numbers.shape[1]))).reshape(len(numbers), -1, 4)
 
@@ -114,7 +215,101 @@ class FieldPrimitive(Leaf, ProgramField):
         }
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+def _rows(values: dict[str, Any]) -> Columns:
+    """Return values of one leaf as columns."""
+    return {name: np.atleast_2d(np.asarray(value, np.float64)) for name, value in values.items()}
+
+
+class BoxedField(FieldPrimitive):
+    """A field that has no end of its own and fills a box: the base of such kinds, see `FieldPrimitive`.
+
+    Its formulas see points from the middle of the box. The field is multiplied by a window that falls from 1
+    to 0 inside the faces of the box, see `formulas.windows`.
+
+    Examples
+    --------
+    >>> import warp as wp
+    >>> from blobtree import BoxedField, formula, par
+    >>> class Layers(BoxedField):
+    ...     period: float = par.length("distance between layers")
+    ...     lipschitz = 3.2
+    ...     @formula
+    ...     def value(q: wp.vec3, period: wp.float32) -> wp.float32:
+    ...         return 0.5 + 0.5 * wp.cos(6.2831853 * q[2] / wp.max(period, 1.0))
+    >>> Layers((0, 0, 0), (2, 2, 2), period=1.0)([[0, 0, 0], [0, 0, 0.25], [0, 0, 2]]).round(3).tolist()
+    [1.0, 0.5, 0.0]
+    """
+
+    center: Vector = par.point("middle of the box, and origin of the function")
+    size: Vector = par.extents("lengths of the box along x, y and z, above 0")
+    _: KW_ONLY
+    fade: float = par.factor(
+        "share of the way from each face to the middle on which the field fades",
+        low=0.001,
+        high=1.0,
+        hint="a field needs some way to fade to 0",
+        default=0.2,
+        natural=0.25,
+    )
+    color: Color = DEFAULT_COLOR
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if min(self.size) <= 0.0:
+            raise InvalidNode(f"size: expected three numbers above 0, got {self.size!r}")
+
+    @classmethod
+    def box(cls, columns: Columns) -> Box:
+        """Return the boxes."""
+        half = 0.5 * columns["size"]
+        return columns["center"] - half, columns["center"] + half
+
+    @classmethod
+    def texels(cls, columns: Columns) -> Float64Array:
+        """Return the middle and `fade`, the half lengths, then the numbers of the formulas."""
+        head = [columns["center"], columns["fade"], 0.5 * columns["size"]]
+        return cls._padded(np.concatenate([*head, cls.numbers(columns)], axis=1))
+
+    @classmethod
+    def numbers(cls, columns: Columns) -> Float64Array:
+        """Return the numbers (n, ·) of the formulas; by default the kind's own parameters as declared."""
+        own = {name: columns[name] for name in columns if name not in parameters_of(BoxedField)}
+        return super().numbers(own) if own else np.empty((len(columns["fade"]), 0))
+
+
+@wp.func
+def signed(magnitude: wp.float32, number: wp.float32) -> wp.float32:
+    """Return `magnitude` with the sign of `number`."""
+    if number < 0.0:
+        return -magnitude
+    return magnitude
+
+
+@wp.func
+def superquadric_norm(q: wp.vec3, middle: wp.vec3, m: wp.float32, inverse: wp.vec3, n: wp.float32) -> wp.vec4:
+    """Return (h, ∇h) of h = ((|x/a|ᵐ + |y/b|ᵐ)^(n/m) + |z/c|ⁿ)^(1/n), which is 1 on the superquadric.
+
+    This is Barr's inside–outside function to the power ε₁/2, with m = 2/ε₂ and n = 2/ε₁. As a norm it grows
+    linearly along rays from the centre. `inverse` is (1/a, 1/b, 1/c).
+    """
+    x = (q[0] - middle[0]) * inverse[0]
+    y = (q[1] - middle[1]) * inverse[1]
+    z = (q[2] - middle[2]) * inverse[2]
+    across = ricci_partials(wp.abs(x), wp.abs(y), m)
+    both = ricci_partials(across[0], wp.abs(z), n)
+    return wp.vec4(
+        both[0],
+        signed(both[1] * across[1] * inverse[0], x),
+        signed(both[1] * across[2] * inverse[1], y),
+        signed(both[2] * inverse[2], z),
+    )
+
+
+_exponent = partial(
+    par.factor, low=0.1, high=2.0, hint="above 2 edges are concave, without a slope bound", default=1.0
+)
+
+
 class Superquadric(Profile, FieldPrimitive):
     """A superquadric ellipsoid: a box with rounded edges, a cylinder, an ellipsoid, a diamond (Barr 1981).
 
@@ -130,23 +325,10 @@ class Superquadric(Profile, FieldPrimitive):
     [0.5, 0.5, 1.0]
     """
 
-    file_tag = "superquadric"
-    field_kind = SUPERQUADRIC
-
-    center: Annotated[Vector, Parameter(Quantity.POINT, "centre")]
-    semi_axes: Annotated[Vector, Parameter(Quantity.SEMI_AXES, "visible radii along x, y and z, above 0")]
-    vertical: Annotated[
-        float,
-        Parameter(Quantity.FACTOR, "exponent ε₁ between z and the others: 0.1 square, 1 round, 2 a diamond",
-                  low=0.1, high=2.0, hint="above 2 edges are concave, without a slope bound"),
-    ] = 1.0  # fmt: skip
-    horizontal: Annotated[
-        float,
-        Parameter(Quantity.FACTOR, "exponent ε₂ between x and y", low=0.1, high=2.0,
-                  hint="above 2 edges are concave, without a slope bound"),
-    ] = 1.0  # fmt: skip
-    _: KW_ONLY
-    color: Color = DEFAULT_COLOR
+    center: Vector = par.point("centre")
+    semi_axes: Vector = par.semi_axes("visible radii along x, y and z, above 0")
+    vertical: float = _exponent("exponent ε₁ between z and the others: 0.1 square, 1 round, 2 a diamond")
+    horizontal: float = _exponent("exponent ε₂ between x and y")
 
     @property
     def mean_radius(self) -> float:
@@ -167,61 +349,57 @@ class Superquadric(Profile, FieldPrimitive):
         return columns["center"] - half, columns["center"] + half
 
     @classmethod
-    def texels(cls, columns: Columns) -> Float64Array:
+    def numbers(cls, columns: Columns) -> Float64Array:
         """Return centre and 2/ε₂; reciprocals of the semi-axes and 2/ε₁; the largest slope of the norm."""
         inverses = 1.0 / columns["semi_axes"]
         powers = 2.0 / np.concatenate([columns["horizontal"], columns["vertical"]], axis=1)
         # A p-norm of two numbers exceeds their Euclidean norm by at most 2^(1/p − 1/2), for p < 2.
         excess = 2.0 ** np.maximum(1.0 / powers - 0.5, 0.0).sum(axis=1, keepdims=True)
         slopes = inverses.max(axis=1, keepdims=True) * excess
-        rest = np.zeros((len(inverses), 3))
-        numbers = [columns["center"], powers[:, :1], inverses, powers[:, 1:], slopes, rest]
-        return np.concatenate(numbers, axis=1).reshape(-1, 3, 4)
+        return np.concatenate([columns["center"], powers[:, :1], inverses, powers[:, 1:], slopes], axis=1)
+
+    @formula
+    def value_gradient(
+        q: wp.vec3, middle: wp.vec3, m: wp.float32, inverse: wp.vec3, n: wp.float32, steepest: wp.float32
+    ) -> wp.vec4:
+        """Return (u, ∇u) of u = RIM · h."""
+        return superquadric_norm(q, middle, m, inverse, n) * RIM
+
+    @formula
+    def bounds(
+        center: wp.vec3,
+        radius: wp.float32,
+        middle: wp.vec3,
+        m: wp.float32,
+        inverse: wp.vec3,
+        n: wp.float32,
+        steepest: wp.float32,
+    ) -> wp.vec3:
+        """Bound u over a ball; `steepest` is the largest slope of h, which is that of a norm."""
+        slope = RIM * steepest
+        u = RIM * superquadric_norm(center, middle, m, inverse, n)[0]
+        nearest = u * (1.0 - NORM_MARGIN) - slope * radius
+        return wp.vec3(nearest, u * (1.0 + NORM_MARGIN) + slope * radius, slope)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class BoxedField(FieldPrimitive):
-    """A field that has no end of its own and fills a box: the base of such leaves.
-
-    Its function sees points from the middle of the box. It is multiplied by a window that falls from 1 to 0
-    inside the faces of the box, see `formulas.windows`.
-    """
-
-    center: Annotated[Vector, Parameter(Quantity.POINT, "middle of the box, and origin of the function")]
-    size: Annotated[Vector, Parameter(Quantity.EXTENTS, "lengths of the box along x, y and z, above 0")]
-    _: KW_ONLY
-    fade: Annotated[
-        float,
-        Parameter(Quantity.FACTOR, "share of the way from each face to the middle on which the field fades",
-                  low=0.001, high=1.0, hint="a field needs some way to fade to 0"),
-    ] = 0.2  # fmt: skip
-    color: Color = DEFAULT_COLOR
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if min(self.size) <= 0.0:
-            raise InvalidNode(f"size: expected three numbers above 0, got {self.size!r}")
-
-    @classmethod
-    def box(cls, columns: Columns) -> Box:
-        """Return the boxes."""
-        half = 0.5 * columns["size"]
-        return columns["center"] - half, columns["center"] + half
-
-    @classmethod
-    def texels(cls, columns: Columns) -> Float64Array:
-        """Return the middle and `fade`, the half lengths, then the numbers of the kind."""
-        numbers = [columns["center"], columns["fade"], 0.5 * columns["size"], cls.numbers(columns)]
-        return super().texels({str(place): part for place, part in enumerate(numbers)})
-
-    @classmethod
-    def numbers(cls, columns: Columns) -> Float64Array:
-        """Return the numbers (n, ·) of the function; by default its parameters as declared."""
-        own = [columns[name] for name in columns if name not in parameters_of(BoxedField)]
-        return np.concatenate([np.empty((len(columns["fade"]), 0)), *own], axis=1)
+@wp.func
+def gyroid(x: wp.vec3, rate: wp.float32) -> wp.vec4:
+    """Return (G, ∇G) of G = sin X cos Y + sin Y cos Z + sin Z cos X with X = rate · x (Schoen 1970)."""
+    p = x * rate
+    sx = wp.sin(p[0])
+    sy = wp.sin(p[1])
+    sz = wp.sin(p[2])
+    cx = wp.cos(p[0])
+    cy = wp.cos(p[1])
+    cz = wp.cos(p[2])
+    return wp.vec4(
+        sx * cy + sy * cz + sz * cx,
+        rate * (cx * cy - sz * sx),
+        rate * (cy * cz - sx * sy),
+        rate * (cz * cx - sy * sz),
+    )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Gyroid(Profile, BoxedField):
     """A wall along a gyroid, the minimal surface without straight lines (Schoen 1970).
 
@@ -236,11 +414,8 @@ class Gyroid(Profile, BoxedField):
     [1.0, 0.0]
     """
 
-    file_tag = "gyroid"
-    field_kind = GYROID
-
-    period: Annotated[float, Parameter(Quantity.LENGTH, "length after which the wall repeats")]
-    thickness: Annotated[float, Parameter(Quantity.LENGTH, "mean thickness of the wall")]
+    period: float = par.length("length after which the wall repeats")
+    thickness: float = par.length("mean thickness of the wall")
 
     @property
     def mean_radius(self) -> float:
@@ -259,8 +434,24 @@ class Gyroid(Profile, BoxedField):
         rate = 2.0 * np.pi / columns["period"]
         return np.concatenate([rate, RIM / (0.5 * columns["thickness"] * rate * GYROID_SLOPE)], axis=1)
 
+    @formula
+    def value_gradient(q: wp.vec3, rate: wp.float32, scale: wp.float32) -> wp.vec4:
+        """Return (u, ∇u) of u = |G| · scale."""
+        u = gyroid(q, rate) * scale
+        if u[0] < 0.0:
+            return -u
+        return u
 
-@dataclass(frozen=True, eq=False, repr=False)
+    @formula
+    def bounds(center: wp.vec3, radius: wp.float32, rate: wp.float32, scale: wp.float32) -> wp.vec3:
+        """Bound u over a ball, in which |G| changes by at most √3 · rate · radius."""
+        steepest = STEEPEST_GYROID * rate * scale
+        u = wp.abs(gyroid(center, rate)[0] * scale)
+        nearest = wp.max(u - steepest * radius, 0.0)
+        farthest = wp.min(u + steepest * radius, LARGEST_GYROID * scale)
+        return wp.vec3(nearest, wp.max(farthest, nearest), steepest)
+
+
 class Noise(BoxedField):
     """Random lumps: where gradient noise n (Perlin 2002) is above a level.
 
@@ -275,20 +466,17 @@ class Noise(BoxedField):
     [0.5, 0.0]
     """
 
-    file_tag = "noise"
-    field_kind = NOISE
-
-    wavelength: Annotated[float, Parameter(Quantity.LENGTH, "distance between the noise's lattice points")]
-    level: Annotated[float, Parameter(Quantity.FACTOR, "value of the noise on the surface")] = 0.0
-    softness: Annotated[
-        float,
-        Parameter(Quantity.FACTOR, "difference of the noise over which the field fades", low=0.01, high=10.0,
-                  hint="a smaller one makes the field too steep"),
-    ] = 0.3  # fmt: skip
-    seed: Annotated[
-        int,
-        Parameter(Quantity.NUMBERS, "whole number that chooses the noise", low=0, high=288, whole=True),
-    ] = 0
+    wavelength: float = par.length("distance between the noise's lattice points")
+    level: float = par.factor("value of the noise on the surface", default=0.0)
+    softness: float = par.factor(
+        "difference of the noise over which the field fades",
+        low=0.01,
+        high=10.0,
+        hint="a smaller one makes the field too steep",
+        default=0.3,
+        natural=0.2,
+    )
+    seed: int = par.whole("whole number that chooses the noise", low=0, high=288, default=0, natural=1)
 
     def grown(self, distance: float) -> "Noise":
         """Return this noise at a lower level, so that its surface moves by about the distance."""
@@ -299,3 +487,30 @@ class Noise(BoxedField):
         """Return 1 / wavelength, the level, 1 / (2 softness) and the seed."""
         parts = [1.0 / columns["wavelength"], columns["level"], 0.5 / columns["softness"], columns["seed"]]
         return np.concatenate(parts, axis=1)
+
+    @formula
+    def value_gradient(
+        q: wp.vec3, rate: wp.float32, level: wp.float32, steepness: wp.float32, seed: wp.int32
+    ) -> wp.vec4:
+        """Return (f, ∇f) of f = s(½ + (n − level) · steepness), s being `smooth_step`."""
+        n = gradient_noise(q * rate, seed)
+        t = 0.5 + (n[0] - level) * steepness
+        slope = smooth_step_slope(t) * steepness * rate
+        return wp.vec4(smooth_step(t), slope * n[1], slope * n[2], slope * n[3])
+
+    @formula
+    def bounds(
+        center: wp.vec3,
+        radius: wp.float32,
+        rate: wp.float32,
+        level: wp.float32,
+        steepness: wp.float32,
+        seed: wp.int32,
+    ) -> wp.vec3:
+        """Bound f over a ball, in which the noise changes by at most STEEPEST_NOISE · radius / wavelength."""
+        n = gradient_noise(center * rate, seed)[0]
+        change = STEEPEST_NOISE * radius * rate
+        low = 0.5 + (wp.max(n - change, -LARGEST_NOISE) - level) * steepness
+        high = 0.5 + (wp.min(n + change, LARGEST_NOISE) - level) * steepness
+        slope = STEEPEST_NOISE * rate * steepness * steepest_smooth_step(low, high)
+        return wp.vec3(smooth_step(low), smooth_step(high), slope)

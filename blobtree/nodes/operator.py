@@ -1,100 +1,51 @@
 """Operators: combinations of the fields of operands. A kind is a class with formulas and claims."""
 
 from collections.abc import Iterable
-from dataclasses import MISSING, Field, dataclass
+from dataclasses import MISSING, dataclass
 from typing import Any, ClassVar
 
 from blobtree.declare.claims import Like, OperatorRow
-from blobtree.declare.formula import Declared, Formula, declared_formulas, is_own, tag_of
 from blobtree.declare.operator import RESULTS, Claims, OperatorFormulas
 from blobtree.declare.operator_checks import check_operator
-from blobtree.declare.parameters import Parameter, documented, fields_of, parameters_of
-from blobtree.declare.registry import CUSTOM_KINDS, CustomKind, library_rows
-from blobtree.errors import InvalidDefinition, InvalidNode
+from blobtree.declare.parameters import fields_of, parameters_of
+from blobtree.errors import InvalidNode
+from blobtree.nodes.declared import DeclaredNode
 from blobtree.nodes.node import Node
 
 
-class Combination(Node, metaclass=CustomKind):
+class Combination(DeclaredNode):
     """An operator folded over its operands from left to right, see `Operator`.
 
     The operator takes the parameters that the class declares, in their order.
     """
 
     combines = True
+    sort = "an operator"
+    hash_name = "CustomCombination"
+    row_name = "operator"
+    formula_results = RESULTS
+    needed = ("value", "partials")
     operator: ClassVar[OperatorRow]
-    kind: ClassVar[str]
-    digest: ClassVar[str] = ""
-    """Digest of the formulas, claims and parameters of an operator that this package does not define."""
-    parameters: ClassVar[tuple[Parameter, ...]]
     like: ClassVar[Like | None] = None
     monotone: ClassVar[bool] = False
     associative: ClassVar[bool] = False
     lipschitz: ClassVar[float | None] = None
     paints: ClassVar[bool] = True
-    _formulas: ClassVar[dict[str, Formula]] = {}
-
-    def __init_subclass__(cls) -> None:
-        own, declares = is_own(cls), any(isinstance(value, Declared) for value in vars(cls).values())
-        if not declares and (own or "operator" in vars(cls)):
-            super().__init_subclass__()
-            return
-        tag = tag_of(cls)
-        cls._formulas = given = {**cls._formulas, **declared_formulas(cls, tag, RESULTS)}
-        if own:
-            cls.file_tag = tag
-        else:
-            _require_free_names(cls)
-        super().__init_subclass__()
-        if issubclass(cls, ManyOperands):
-            dataclass(frozen=True, eq=False, repr=False, init=False)(cls)
-        claims = Claims(cls.like, cls.monotone, cls.associative, cls.lipschitz, cls.paints)
-        formulas = OperatorFormulas(tag, given, claims)
-        if own:
-            cls.operator = formulas.row()
-            if not cls.operator.gradients:
-                library_rows(cls.operator)
-        else:
-            cls._define(formulas)
 
     @classmethod
-    def _define(cls, formulas: OperatorFormulas) -> None:
-        """Check a user's operator, unless it is known, and register it."""
-        if not {"value", "partials"} & formulas.given.keys():
-            raise InvalidDefinition(f"{cls.__qualname__}: expected an operator with the formula `value`")
-        declared = parameters_of(cls)
-        unknown = [item.name for item in fields_of(cls) if item.name not in ("operands", *declared)]
-        if unknown:
-            raise InvalidDefinition(
-                f"{cls.__qualname__}: field {unknown[0]!r}: expected a specifier of blobtree.par, such as "
-                f"`{unknown[0]}: float = par.factor('what it is')`"
-            )
-        cls.__doc__ = documented(cls.__doc__ or "", cls)
-        cls.kind, cls.parameters = formulas.kind, tuple(declared.values())
-        formulas.require([parameter.name for parameter in cls.parameters])
-        cls.digest = formulas.digest(cls.parameters)
-        known: Any = CUSTOM_KINDS.get(cls.kind)
-        if known is not None and issubclass(known, Combination) and known.digest == cls.digest:
-            cls.operator = known.operator
-        else:
-            check_operator(formulas, cls.parameters)
-            cls.operator = formulas.row(cls.digest)
-        CUSTOM_KINDS[cls.kind] = cls
+    def _declaration(cls, tag: str) -> OperatorFormulas:
+        claims = Claims(cls.like, cls.monotone, cls.associative, cls.lipschitz, cls.paints)
+        return OperatorFormulas(tag, cls._formulas, claims)
+
+    @classmethod
+    def _check(cls, declaration: OperatorFormulas) -> None:
+        check_operator(declaration, cls.parameters)
 
     @property
     def operator_parameters(self) -> tuple[float, ...]:
         """The numbers that the operator takes besides its operands."""
         values = ((p, getattr(self, name)) for name, p in parameters_of(type(self)).items())
         return tuple(number for p, value in values for number in p.components(value))
-
-    @classmethod
-    def content_key(cls) -> tuple[str, ...]:
-        """Return what names the kind in content hashes: with the digest of a user's formulas."""
-        return ("CustomCombination", cls.kind, cls.digest) if cls.digest else super().content_key()
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """The parameters by name."""
-        return {name: getattr(self, name) for name in parameters_of(type(self))}
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
@@ -104,6 +55,7 @@ class ManyOperands(Node):
     Its parameters follow them, best by name.
     """
 
+    has_init: ClassVar[bool] = True
     operands: tuple[Node, ...]
 
     def __init__(self, *arguments: "Node | Iterable[Node] | float", **named: Any) -> None:
@@ -185,16 +137,6 @@ class Operator(ManyOperands, Combination):
             raise InvalidNode(
                 f"operands: expected two, got {len(self.operands)}; {type(self).__name__} does not "
                 "claim that operands may come in any order, so nest it"
-            )
-
-
-def _require_free_names(kind: type[Combination]) -> None:
-    """Raise `InvalidDefinition` if a parameter has the name of what each node has."""
-    for name, value in vars(kind).items():
-        if isinstance(value, Field) and (hasattr(Operator, name) or name in ("operands", *RESULTS)):
-            raise InvalidDefinition(
-                f"{kind.__qualname__}: parameter {name!r}: every node of this sort has an attribute of that "
-                "name; choose another"
             )
 
 

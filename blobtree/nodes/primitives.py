@@ -8,14 +8,16 @@ the order of declaration, `texels` need not be written. Falloff, width and weigh
 
 import inspect
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, Field, dataclass, field
 from itertools import product
-from typing import Annotated, Any, ClassVar, Self, cast
+from typing import Annotated, Any, ClassVar, Self, cast, dataclass_transform
 
 import numpy as np
 
+from blobtree import par
 from blobtree._typing import Float64Array
 from blobtree.declare.falloff import Falloff
+from blobtree.declare.formula import Declared
 from blobtree.declare.parameters import (
     OPTIONAL,
     Color,
@@ -30,6 +32,7 @@ from blobtree.declare.parameters import (
 from blobtree.formulas.skeletons import BOX, CIRCLE, CONE, DISC, POINT, SEGMENT, Skeleton
 from blobtree.kinds.falloff import WYVILL
 from blobtree.nodes.attributes import NO_ATTRIBUTES, AttributeMapping
+from blobtree.nodes.declared import DeclaredNode
 from blobtree.nodes.node import Node
 from blobtree.tape.program import ProgramPrimitive
 from blobtree.validation import Vector
@@ -135,6 +138,38 @@ class Leaf(LeafKeywords, Node):
         if self.profile != PLAIN:
             object.__setattr__(self, "profiled", True)
             object.__setattr__(self, "signed", self.weight < 0.0)
+
+
+@dataclass_transform(
+    frozen_default=True,
+    eq_default=False,
+    field_specifiers=(
+        field,
+        par.factor,
+        par.angle,
+        par.length,
+        par.distance,
+        par.radius,
+        par.point,
+        par.direction,
+        par.extents,
+        par.semi_axes,
+        par.whole,
+    ),
+)
+class DeclaredLeaf(Leaf, DeclaredNode):
+    """A leaf of a class with formulas, which ends with the keyword `color`."""
+
+    common = ("color",)
+
+    def __init_subclass__(cls) -> None:
+        declares = any(isinstance(value, Declared) for value in vars(cls).values())
+        if declares and "color" not in getattr(cls, "__dataclass_fields__", ()):
+            cls.__annotations__ = {**inspect.get_annotations(cls), "color": Color}
+            cls.color = field(default=DEFAULT_COLOR, kw_only=True)
+        super().__init_subclass__()
+        if not declares and any(isinstance(value, Field) for value in vars(cls).values()):
+            dataclass(frozen=True, eq=False, repr=False)(cls)
 
 
 class Primitive(Profile, Leaf, ProgramPrimitive):

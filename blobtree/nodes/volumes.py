@@ -1,24 +1,39 @@
-"""Volumes: solids by sampled distances, from grids, triangle meshes and functions."""
+"""Volumes: solids by sampled distances, from grids, triangle meshes and functions.
+
+The data region holds a texel for each grid point but those of the last column and row: the samples at (i, j),
+(i + 1, j), (i, j + 1) and (i + 1, j + 1) of a layer. So two texels hold the corners of a cell. Samples are in
+units of the spacing. Outside the grid the distance is that of the nearest point of the grid, or the distance
+from the grid's box if that is larger: the solid ends at the box.
+
+From a distance d, below 0 inside, the field is a falloff of u = RIM + d / s. So it is ½ on the surface, 0
+from d = (1 − RIM) s outward, and 1 from −RIM s inward. For a ball of radius RIM · s that is the field of a
+`Point`.
+"""
 
 from collections.abc import Callable
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import KW_ONLY, replace
 from functools import lru_cache
 from typing import Annotated, Any
 
 import numpy as np
+import warp as wp
 from numpy.typing import ArrayLike
 
+from blobtree import par
 from blobtree._typing import Box, Float32Array, Float64Array
-from blobtree.declare.parameters import Color, Parameter, Quantity
+from blobtree.declare.formula import formula
+from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.errors import InvalidNode
 from blobtree.formulas.falloff import RIM
-from blobtree.formulas.volumes import VOLUME
 from blobtree.nodes.fields import FieldPrimitive
 from blobtree.nodes.primitives import DEFAULT_COLOR, Falling
 from blobtree.nodes.samples import MAX_NUMBERS, Samples
 from blobtree.sampling.mesh_distances import grid_points, mesh_distances, triangles_of
 from blobtree.sized_cache import sized_cache
+from blobtree.texels import Texels
 from blobtree.validation import Vector, finite_vector, positive_number
+
+wp.set_module_options({"enable_backward": False})
 
 STEEPEST = 2.0
 """Change per unit of length beyond which numbers count as no distances."""
@@ -33,7 +48,103 @@ MAX_TEXELS_BYTES = 1 << 28
 """Bytes of texels that are kept for the next tapes, at most; they take four times the samples."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@wp.func
+def box_distance(x: wp.vec3, half: wp.vec3) -> wp.vec4:
+    """Return (d, ∇d) of a box, seen from its middle (Quilez, Distance functions)."""
+    a = wp.abs(x[0]) - half[0]
+    b = wp.abs(x[1]) - half[1]
+    c = wp.abs(x[2]) - half[2]
+    sx = wp.where(x[0] < 0.0, -1.0, 1.0)
+    sy = wp.where(x[1] < 0.0, -1.0, 1.0)
+    sz = wp.where(x[2] < 0.0, -1.0, 1.0)
+    beyond = wp.vec3(wp.max(a, 0.0), wp.max(b, 0.0), wp.max(c, 0.0))
+    length = wp.length(beyond)
+    if length > 0.0:
+        return wp.vec4(length, sx * beyond[0] / length, sy * beyond[1] / length, sz * beyond[2] / length)
+    if a >= b and a >= c:
+        return wp.vec4(a, sx, 0.0, 0.0)
+    if b >= c:
+        return wp.vec4(b, 0.0, sy, 0.0)
+    return wp.vec4(c, 0.0, 0.0, sz)
+
+
+@wp.func
+def sampled_distance(u: wp.vec3, counts: wp.vec4, tape: Texels, data: wp.int32) -> wp.vec4:
+    """Return (d, ∇d) in cells at u, in cells from the first grid point, without the box."""
+    x = wp.clamp(u[0], 0.0, counts[0] - 1.0)
+    y = wp.clamp(u[1], 0.0, counts[1] - 1.0)
+    z = wp.clamp(u[2], 0.0, counts[2] - 1.0)
+    i = wp.min(int(x), int(counts[0]) - 2)
+    j = wp.min(int(y), int(counts[1]) - 2)
+    k = wp.min(int(z), int(counts[2]) - 2)
+    layer = (int(counts[0]) - 1) * (int(counts[1]) - 1)
+    at = data + (k * (int(counts[1]) - 1) + j) * (int(counts[0]) - 1) + i
+    low = tape[at]
+    high = tape[at + layer]
+    s = x - float(i)
+    t = y - float(j)
+    r = z - float(k)
+    near = low * (1.0 - r) + high * r
+    beside = high - low
+    front = near[0] + s * (near[1] - near[0])
+    back = near[2] + s * (near[3] - near[2])
+    along_x = (1.0 - t) * (near[1] - near[0]) + t * (near[3] - near[2])
+    along_y = back - front
+    along_z = (1.0 - t) * (beside[0] + s * (beside[1] - beside[0]))
+    along_z += t * (beside[2] + s * (beside[3] - beside[2]))
+    if x != u[0]:
+        along_x = 0.0
+    if y != u[1]:
+        along_y = 0.0
+    if z != u[2]:
+        along_z = 0.0
+    return wp.vec4(front + t * (back - front), along_x, along_y, along_z)
+
+
+@wp.func
+def grid_box_distance(u: wp.vec3, counts: wp.vec4) -> wp.vec4:
+    """Return (d, ∇d) in cells of the grid's box at u."""
+    half = wp.vec3(counts[0] - 1.0, counts[1] - 1.0, counts[2] - 1.0) * 0.5
+    return box_distance(u - half, half)
+
+
+@wp.func
+def volume_distance(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
+    """Return (u, ∇u) of sampled distances d: u = RIM + d / s.
+
+    tape[at] = (first texel of the samples, first grid point); tape[at + 1] = (1 / spacing, 1 / s, growth in
+    cells, largest slope of the samples); tape[at + 2] = (numbers of grid points, spacing).
+    """
+    first = tape[at]
+    shape = tape[at + 1]
+    counts = tape[at + 2]
+    u = (q - wp.vec3(first[1], first[2], first[3])) * shape[0]
+    d = sampled_distance(u, counts, tape, int(first[0]))
+    box = grid_box_distance(u, counts)
+    if box[0] > d[0]:
+        d = box
+    return wp.vec4(
+        RIM + (d[0] - shape[2]) * counts[3] * shape[1], d[1] * shape[1], d[2] * shape[1], d[3] * shape[1]
+    )
+
+
+@wp.func
+def volume_bounds(center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32) -> wp.vec3:
+    """Bound u over a ball by the largest slope of the samples; the box's distance has slope 1."""
+    first = tape[at]
+    shape = tape[at + 1]
+    counts = tape[at + 2]
+    u = (center - wp.vec3(first[1], first[2], first[3])) * shape[0]
+    reach = radius * shape[0]
+    d = sampled_distance(u, counts, tape, int(first[0]))[0]
+    box = grid_box_distance(u, counts)[0]
+    slope = wp.max(shape[3], 1.0)
+    low = wp.max(d - slope * reach, box - reach) - shape[2]
+    high = wp.max(d + slope * reach, box + reach) - shape[2]
+    rate = counts[3] * shape[1]
+    return wp.vec3(RIM + low * rate, RIM + high * rate, slope * shape[1])
+
+
 class Volume(Falling, FieldPrimitive):
     """A solid by a grid of signed distances: below 0 inside, 0 on the surface.
 
@@ -52,20 +163,20 @@ class Volume(Falling, FieldPrimitive):
     [0.5, 0.0]
     """
 
-    file_tag = "volume"
-    field_kind = VOLUME
+    texels_read = 3
+    value_gradient = formula(volume_distance)
+    bounds = formula(volume_bounds)
 
     samples: Annotated[
         Samples, Parameter(Quantity.SAMPLES, "signed distances at the grid points, in spacings")
     ]
-    corner: Annotated[Vector, Parameter(Quantity.POINT, "first point of the grid")]
-    spacing: Annotated[float, Parameter(Quantity.LENGTH, "distance between neighbouring grid points")]
+    corner: Vector = par.point("first point of the grid")
+    spacing: float = par.length("distance between neighbouring grid points")
     _: KW_ONLY
-    width: Annotated[float, Parameter(Quantity.LENGTH, "distance from the surface at which the field is 0")]
-    growth: Annotated[
-        float, Parameter(Quantity.DISTANCE, "distance by which the surface lies outside that of the samples")
-    ] = 0.0
-    color: Color = DEFAULT_COLOR
+    width: float = par.length("distance from the surface at which the field is 0")
+    growth: float = par.distance(
+        "distance by which the surface lies outside that of the samples", default=0.0
+    )
 
     @property
     def profile_factor(self) -> float:
@@ -78,7 +189,7 @@ class Volume(Falling, FieldPrimitive):
 
     @property
     def data(self) -> ArrayLike:
-        """The samples as texels (nz, ny − 1, nx − 1, 4), see `formulas.volumes`."""
+        """The samples as texels (nz, ny − 1, nx − 1, 4), see the head of this file."""
         return _texels_of(self.samples)
 
     @classmethod
@@ -94,7 +205,7 @@ class Volume(Falling, FieldPrimitive):
 
     @classmethod
     def packed_fields(cls, leaves: Any) -> Float64Array:
-        """Return the numbers that `formulas.volumes` reads; the index of the samples is filled in later."""
+        """Return the numbers that the formulas read; the index of the samples is filled in later."""
         rows = [
             [0.0, *leaf.corner, 1.0 / leaf.spacing, (1.0 - RIM) / leaf.width, leaf.growth / leaf.spacing,
              _steepest_of(leaf.samples), *leaf.samples.shape, leaf.spacing]
@@ -261,7 +372,7 @@ def _sampled(
 
 @sized_cache(MAX_TEXELS_BYTES)
 def _texels_of(samples: Samples) -> Float32Array:
-    """Return samples as the texels that `formulas.volumes` reads."""
+    """Return samples as the texels that the formulas read."""
     v = samples.array
     corners = [v[:-1, :-1], v[1:, :-1], v[:-1, 1:], v[1:, 1:]]
     return np.ascontiguousarray(np.stack(corners, axis=-1).transpose(2, 1, 0, 3))

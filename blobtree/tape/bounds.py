@@ -7,7 +7,7 @@ import numpy as np
 
 from blobtree._typing import Box, Float32Array
 from blobtree.declare.claims import OperatorRow, Support
-from blobtree.formulas.fields import FieldKind
+from blobtree.declare.field import FieldKind
 from blobtree.tape.program import (
     EnterWarp,
     Instruction,

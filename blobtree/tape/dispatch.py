@@ -11,7 +11,6 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.formulas.fields import FIELDS
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.skeletons import SKELETONS
 from blobtree.formulas.warps import WARPS
@@ -26,7 +25,7 @@ CORE_TABLES: dict[str, tuple[Any, ...]] = {
     "skeletons": SKELETONS,
     "operators": OPERATORS,
     "warps": WARPS,
-    "fields": FIELDS,
+    "fields": (),
     "falloffs": FALLOFFS,
 }
 """The tables of core kinds by their names in instruction sets."""

@@ -20,8 +20,8 @@ import warp as wp
 
 from blobtree.declare.claims import OperatorRow
 from blobtree.declare.falloff import Falloff
+from blobtree.declare.field import FieldKind
 from blobtree.declare.registry import LIBRARY_ROWS, load_libraries
-from blobtree.formulas.fields import FIELDS, FieldKind
 from blobtree.formulas.operators import OPERATORS
 from blobtree.formulas.skeletons import SKELETONS, Skeleton
 from blobtree.formulas.warps import WARPS, SpaceWarp
@@ -170,7 +170,7 @@ def _python_function(typed: wp.Function | wp.Kernel) -> FunctionType:
     return function
 
 
-BUILT_IN = InstructionSet(SKELETONS, OPERATORS, WARPS, FIELDS)
+BUILT_IN = InstructionSet(SKELETONS, OPERATORS, WARPS, ())
 """The instruction set of trees of core kinds."""
 
 _created: list[InstructionSet] = []
@@ -216,4 +216,4 @@ def instruction_set_for(rows: Iterable[Row]) -> InstructionSet:
 @cache
 def single_skeleton_set(skeleton: Skeleton) -> InstructionSet:
     """Return the instruction set of one skeleton, whose code is 0."""
-    return InstructionSet((skeleton,), OPERATORS, WARPS, FIELDS)
+    return InstructionSet((skeleton,), OPERATORS, WARPS, ())

@@ -44,9 +44,9 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array
+from blobtree.declare.field import FieldKind
 from blobtree.device import known_device
 from blobtree.errors import InvalidNode
-from blobtree.formulas.fields import FieldKind
 from blobtree.formulas.operators import SUM
 from blobtree.formulas.skeletons import Skeleton
 from blobtree.kinds.falloff import WYVILL

@@ -60,6 +60,24 @@ def with_row(kind: Any, label: str, **changed: Any) -> Any:
     return type(kind.__name__, (kind,), body)
 
 
+def formula_in(kind: Any, part: str) -> wp.Function:
+    """Return a formula of a leaf as its class has it, or that of a row."""
+    name, row = row_of(kind)
+    given = kind._formulas if name == "field_kind" else {}
+    found: wp.Function = given[part].function if part in given else getattr(row, part)
+    return found
+
+
+def with_formula(kind: Any, label: str, part: str, function: wp.Function) -> Any:
+    """Return a fresh class like a kind, with another formula."""
+    if formula_in(kind, part) is getattr(row_of(kind)[1], part):
+        return with_row(kind, label, **{part: function})
+    declaration = kind._declaration(kind.file_tag)
+    changed = replace(declaration.given[part], function=function)
+    row = replace(declaration, given={**declaration.given, part: changed}).row()
+    return with_row(kind, label, **{part: getattr(row, part)})
+
+
 def source_of(function: wp.Function) -> ast.Module:
     """Return the syntax tree of a typed function."""
     return ast.parse(textwrap.dedent(inspect.getsource(python_function(function))))
@@ -107,15 +125,17 @@ def faults(tag: str) -> Iterator[tuple[str, Any]]:
     kind: Any = NODE_KINDS[tag]
     name, row = row_of(kind)
     for part in ROWS[name]:
-        for number, (change, tree) in enumerate(mutations(getattr(row, part))):
+        function = formula_in(kind, part)
+        for number, (change, tree) in enumerate(mutations(function)):
             label = f"{part}_{number}"
             yield (
                 f"{tag} {part}: {change}",
-                with_row(kind, label, **{part: compiled(getattr(row, part), tree, label)}),
+                with_formula(kind, label, part, compiled(function, tree, label)),
             )
     if name in BOUNDS:
         part = BOUNDS[name]
-        yield f"{tag} {part} × 0.7", with_row(kind, part, **{part: scaled(getattr(row, part), "less")})
+        less = scaled(formula_in(kind, part), "less")
+        yield f"{tag} {part} × 0.7", with_formula(kind, part, part, less)
     if name == "operator":
         choices: tuple[Any, ...] = (union_choice, intersection_like_choice, difference_like_choice)
         for choice in choices:

@@ -103,3 +103,9 @@ def makes_a_list(q: wp.vec3) -> wp.float32:
 @wp.func
 def divides_by_zero(q: wp.vec3) -> wp.float32:
     return 1.0 / float(int(0.0 * q[0]))
+
+
+@wp.func
+def hill(q: wp.vec3) -> wp.float32:
+    """A Cauchy field without an end."""
+    return bump(wp.dot(q, q))

@@ -101,7 +101,7 @@ def test_parameters_of_a_leaf_are_checked() -> None:
     [
         (kernels.negative, {"steepest": 1.0}, "negative, and a field is not"),
         (kernels.jumping, {"steepest": 1.0}, "claim a larger slope"),
-        (kernels.waves, {"steepest": 0.1}, "more than steepest = 0.1 allows"),
+        (kernels.waves, {"steepest": 0.1}, "more than lipschitz = 0.1 allows"),
         (kernels.not_finite, {"steepest": 1.0}, "not_finite: for q = .* it (fails|returns)"),
         (kernels.wrong_gradient, {"steepest": 1.0}, "∂f/∂x at .* by differences, but 1 is returned"),
         (kernels.returns_a_point, {"steepest": 1.0}, "expected it to return wp.float32"),
@@ -112,10 +112,10 @@ def test_parameters_of_a_leaf_are_checked() -> None:
             "'size': every node of this sort has an attribute of that name",
         ),
         (kernels.imprecise, {"steepest": 2e6}, "in single precision"),
-        (kernels.waves, {"steepest": -1.0}, "steepest: expected a number from 0"),
-        (kernels.waves, {"steepest": float("nan")}, "steepest: expected a number from 0"),
-        (kernels.waves, {"steepest": "steep"}, "write it with `def`"),
-        (kernels.waves, {"steepest": kernels.of_other_parameters}, "steepest: expected a function of"),
+        (kernels.waves, {"steepest": -1.0}, "lipschitz: expected a number from 0"),
+        (kernels.waves, {"steepest": float("nan")}, "lipschitz: expected a number from 0"),
+        (kernels.waves, {"steepest": "steep"}, "or a typed function, got .steep."),
+        (kernels.waves, {"steepest": kernels.of_other_parameters}, "lipschitz: expected a function of"),
         (
             kernels.waves,
             {"steepest": kernels.waves_slope, "interval": kernels.narrow_interval},

@@ -21,7 +21,6 @@ from blobtree import (
     polygonize,
     to_json,
 )
-from blobtree.formulas.convolution import CONVOLUTION_FIELDS
 from blobtree.transpile.python import plain_python, vector
 from tests.bench.convolution_surfaces import elbow_error, even, joint_bulge, plain, surface_distances
 from tests.blobtree.trees import points_around
@@ -32,6 +31,7 @@ LIMB = ConvolutionSegment((0.1, 0.2, 0.3), (1.2, -0.3, 0.5), radius=0.4, end_rad
 HOOK = ConvolutionArc((1, 0, 0), (0.2, 0.9, 0.3), (-0.9, -0.2, 0), radius=0.2)
 SAIL = ConvolutionTriangle((0, 0, 0), (1.5, 0.2, 0.1), (0.3, 1.1, -0.4), radius=0.2)
 EACH = pytest.mark.parametrize("node", [LIMB, HOOK, SAIL], ids=["segment", "arc", "triangle"])
+CONVOLUTION_FIELDS = [type(node).field_kind for node in (LIMB, HOOK, SAIL)]
 FRACTIONS = st.floats(0.02, 0.98)
 
 

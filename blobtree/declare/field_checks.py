@@ -1,13 +1,26 @@
-"""Checks of custom fields: samples in double precision that may contradict a definition."""
+"""Checks of users' direct fields: samples in double precision that may contradict a definition."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from blobtree._typing import Float64Array
-from blobtree.declare.checks import SEED, SLOPE_TOLERANCE, VALUE_TOLERANCE, Trial, trials
-from blobtree.declare.formula import Formula, shown
+from blobtree._typing import Box, Float64Array
+from blobtree.declare.checks import (
+    SEED,
+    SLOPE_TOLERANCE,
+    TRIALS,
+    VALUE_TOLERANCE,
+    Packed,
+    Trial,
+    trial_value,
+    trials,
+)
+from blobtree.declare.field import FieldFormulas
+from blobtree.declare.formula import shown
 from blobtree.declare.parameters import Parameter
+
+BoxOf = Callable[[dict[str, Any]], Box]
 
 POINTS = 40
 """Points per set of parameters."""
@@ -19,35 +32,19 @@ SINGLE_TOLERANCE = 1e-4
 """Relative error in single precision that is accepted."""
 
 
-@dataclass(frozen=True)
-class FieldClaims:
-    """The claims of a definition about its field."""
-
-    steepest: float | Formula
-    interval: Formula | None
-    extent: float
-    derived: bool
-    """True if the function returns its value alone, and its gradient is derived."""
-
-    @property
-    def digest(self) -> tuple[object, ...]:
-        """What of the claims enters the kernels."""
-        slope = self.steepest if isinstance(self.steepest, float) else self.steepest.digest
-        return slope, self.interval and self.interval.digest
-
-
-def check_field(source: Formula, parameters: tuple[Parameter, ...], claims: FieldClaims) -> None:
+def check_field(formulas: FieldFormulas, parameters: tuple[Parameter, ...], packed: Packed) -> None:
     """Raise `InvalidDefinition` if samples contradict a claim, or a value is negative or not finite."""
     rng = np.random.default_rng(SEED)
-    sampled = trials(source, parameters, 1 if claims.derived else 4, claims.extent, POINTS, rng)
+    given, extent = formulas.given, formulas.extent
+    sampled = trials(formulas.source, parameters, formulas.size, extent, POINTS, rng, packed)
     for trial, points in sampled:
         found = np.array([trial.at(q) for q in points])
         _try_values(trial, points, found)
         if found.shape[1] == 4:
-            _try_gradients(trial, points, found, claims)
-        _try_steepness(trial, points, found, claims, rng)
-        if claims.interval is not None:
-            _try_intervals(trial, points, claims, claims.interval, rng)
+            _try_gradients(trial, points, found, extent)
+        _try_steepness(trial, points, found, formulas, rng)
+        if "bounds" in given or "interval" in given:
+            _try_intervals(trial, points, formulas, rng)
 
 
 def _try_values(trial: Trial, points: Float64Array, found: Float64Array) -> None:
@@ -64,15 +61,15 @@ def _try_values(trial: Trial, points: Float64Array, found: Float64Array) -> None
             )
 
 
-def _try_gradients(trial: Trial, points: Float64Array, found: Float64Array, claims: FieldClaims) -> None:
+def _try_gradients(trial: Trial, points: Float64Array, found: Float64Array, extent: float) -> None:
     """Check that the returned gradients are those of f, except at kinks."""
-    step = STEP * claims.extent
+    step = STEP * extent
     for q, row in zip(points, found, strict=True):
         for axis in range(3):
             offset = step * np.eye(3)[axis]
             right = (trial.at(q + offset)[0] - row[0]) / step
             left = (row[0] - trial.at(q - offset)[0]) / step
-            scale = SLOPE_TOLERANCE * (1.0 + abs(row[1 + axis]) + row[0] / claims.extent)
+            scale = SLOPE_TOLERANCE * (1.0 + abs(row[1 + axis]) + row[0] / extent)
             smooth = abs(right - left) <= 100.0 * scale
             if smooth and abs(row[1 + axis] - 0.5 * (right + left)) > 10.0 * scale:
                 raise trial.source.refusal(
@@ -85,34 +82,35 @@ def _try_steepness(
     trial: Trial,
     points: Float64Array,
     found: Float64Array,
-    claims: FieldClaims,
+    formulas: FieldFormulas,
     rng: np.random.Generator,
 ) -> None:
     """Check that f changes no faster than `steepest` says, so that it does not jump."""
     for q, row in zip(points, found, strict=True):
         offset = rng.normal(size=3)
-        offset *= claims.extent * 10.0 ** rng.uniform(-4.0, 0.0) / np.linalg.norm(offset)
+        offset *= formulas.extent * 10.0 ** rng.uniform(-4.0, 0.0) / np.linalg.norm(offset)
         distance = float(np.linalg.norm(offset))
-        bound = trial.bound(claims.steepest, q, distance)
+        bound = _slope(trial, formulas, q, distance)
         change = abs(trial.at(q + offset)[0] - row[0])
         if change > bound * distance * (1.0 + VALUE_TOLERANCE) + VALUE_TOLERANCE * (1.0 + row[0]):
             raise trial.source.refusal(
                 f"f changes by {change:.6g} from {shown(q)} to {shown(q + offset)}, {distance:.6g} away, "
-                f"more than steepest = {bound:.6g} allows{trial.with_values}; claim a larger slope"
+                f"more than lipschitz = {bound:.6g} allows{trial.with_values}; claim a larger slope"
             )
 
 
 def _try_intervals(
     trial: Trial,
     points: Float64Array,
-    claims: FieldClaims,
-    interval: Formula,
+    formulas: FieldFormulas,
     rng: np.random.Generator,
 ) -> None:
     """Check that values in balls lie in the claimed intervals."""
+    given = formulas.given
+    claim = given.get("bounds") or given["interval"]
     for q in points:
-        radius = claims.extent * 10.0 ** rng.uniform(-3.0, 0.0)
-        bounds = trial.call(interval, (tuple(q), radius), 2)
+        radius = formulas.extent * 10.0 ** rng.uniform(-3.0, 0.0)
+        bounds = trial.call(claim, (tuple(q), radius), 3 if claim is given.get("bounds") else 2)
         for direction in rng.normal(size=(3, 3)):
             p = q + direction * (radius * rng.uniform() / np.linalg.norm(direction))
             value = trial.at(p)[0]
@@ -121,5 +119,30 @@ def _try_intervals(
                 raise trial.source.refusal(
                     f"interval: f({shown(p)}) = {value:.6g} is not between {bounds[0]:.6g} and "
                     f"{bounds[1]:.6g}, claimed for the ball of radius {radius:.6g} around {shown(q)}"
+                    f"{trial.with_values}"
+                )
+
+
+def _slope(trial: Trial, formulas: FieldFormulas, center: Float64Array, radius: float) -> float:
+    """Return the claimed slope in a ball."""
+    if "bounds" in formulas.given:
+        return float(trial.call(formulas.given["bounds"], (tuple(center), radius), 3)[2])
+    return trial.bound(formulas.given.get("lipschitz") or float(formulas.lipschitz), center, radius)
+
+
+def check_box(formulas: FieldFormulas, parameters: tuple[Parameter, ...], packed: Packed, box: BoxOf) -> None:
+    """Raise `InvalidDefinition` if samples show a field outside its box, which `box` returns for values."""
+    rng = np.random.default_rng(SEED)
+    for number in range(TRIALS if parameters else 1):
+        values = {parameter.name: trial_value(parameter, rng, number) for parameter in parameters}
+        trial = Trial(formulas.source, packed(values), formulas.size)
+        (lower,), (upper,) = box(values)
+        size = upper - lower
+        points = rng.uniform(lower - size, upper + size, (POINTS, 3))
+        for q in points[((points < lower) | (points > upper)).any(axis=1)]:
+            value = trial.at(q)[0]
+            if value > 0.0:
+                raise trial.source.refusal(
+                    f"box: f({shown(q)}) = {value:.6g} outside the box from {shown(lower)} to {shown(upper)}"
                     f"{trial.with_values}"
                 )

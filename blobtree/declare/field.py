@@ -1,0 +1,190 @@
+"""Rows of direct fields: leaves whose field is a function of position itself, not a falloff of a distance.
+
+A row is two typed functions, which read their parameters from `tape[at:]`; `FieldFormulas` makes them:
+
+* `value_gradient(q, tape, at) -> vec4(f, ∇f)`;
+* `bounds(center, radius, tape, at) -> vec3(smallest f, largest f, largest |∇f|)` over a ball, or wider ones.
+  Cells are pruned by the range, and rays take steps by the slope.
+
+f is 0 far away, ½ on the surface and larger inside. It is exactly 0 outside a bounded box, which the node
+class states, and there its bounds are 0 too as soon as the ball does not reach the box.
+
+A kind with `distance` returns a distance u in place of f, which is RIM on the surface and 1 where the field
+ends by default. The field is a falloff of u, which the leaf chooses. The field of a kind with `windowed` has
+no end of its own: it is multiplied by the window of a box (`formulas.windows`). Both are done around these
+functions, and so is the factor `weight` (`tape.evaluators.direct_value_gradient`).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from blobtree.declare.formula import Formula
+from blobtree.declare.readers import PLACE, Reader, number_types
+from blobtree.transpile.derivative import partial_derivatives
+
+wp.set_module_options({"enable_backward": False})
+
+RESULTS: dict[str, Any] = {
+    "value": wp.float32,
+    "value_gradient": wp.vec4,
+    "lipschitz": wp.float32,
+    "interval": wp.vec2,
+    "bounds": wp.vec3,
+}
+"""The formulas of a direct field, and the types of their results."""
+
+ROUNDING = 4e-6
+"""Widening of the range of a field that claims no `bounds`, for the rounding errors of its formula."""
+
+BEHIND_BOX = 7
+"""Place of the first number of a field in a box, in floats: behind middle, `fade` and half lengths."""
+
+_CLAIMS = ("lipschitz", "interval", "bounds")
+_BALL: dict[str, Any] = {"center": wp.vec3, "radius": wp.float32}
+
+
+@dataclass(frozen=True, eq=False)
+class FieldKind:
+    """The name, functions and size on the tape of a direct field."""
+
+    name: str
+    value_gradient: wp.Function
+    bounds: wp.Function
+    parameters: int
+    """Number of texels (vec4) of its parameters on the tape."""
+    distance: bool = False
+    """The functions return a distance, of which the field is a falloff."""
+    windowed: bool = False
+    """The field ends at a box with tape[at] = (middle, fade) and tape[at + 1] = (half lengths, ·)."""
+    digest: str = ""
+    """Digest of the sources of a custom kind."""
+
+    @property
+    def stride(self) -> int:
+        """Number of texels on the tape behind the map: the parameters and the colour."""
+        return self.parameters + 1
+
+
+@dataclass(frozen=True)
+class FieldFormulas:
+    """The formulas and claims of a direct field, whose row they make."""
+
+    kind: str
+    given: Mapping[str, Formula]
+    lipschitz: Any
+    extent: float
+    distance: bool
+    windowed: bool
+    texels: int = 0
+    """Number of texels of a kind whose formulas read the tape."""
+
+    @property
+    def source(self) -> Formula:
+        """The formula of the field: `value_gradient`, or `value`."""
+        return self.given.get("value_gradient") or self.given["value"]
+
+    @property
+    def size(self) -> int:
+        """Number of numbers that it returns."""
+        return 1 if "value" in self.given else 4
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """The types of the numbers that the formulas take, by name."""
+        return number_types(self.source, 1)
+
+    def require(self, declared: Sequence[str] | None) -> None:
+        """Raise `InvalidDefinition` for formulas or claims that do not fit each other.
+
+        `declared` are the names of the parameters that formulas take, None for other numbers.
+        """
+        source = self.source
+        first, *names = source.parameters or {"": None}
+        if source.parameters.get(first) is not wp.vec3:
+            raise source.refusal("expected the point `q: wp.vec3` as its first parameter")
+        if declared is not None and names != [*declared]:
+            raise source.refusal(
+                f"expected the parameters of the class, {', '.join(declared) or 'none'}, behind the point; "
+                f"got {', '.join(names) or 'none'}"
+            )
+        own = [wp.float32 if kind is float else kind for kind in self.numbers.values()]
+        for name, part in self.given.items():
+            types = [wp.float32 if kind is float else kind for kind in part.parameters.values()]
+            alone = name == "lipschitz" and types == own
+            if part is not source and not alone and types != [*_BALL.values(), *own]:
+                wanted = ", ".join([*(f"{key}: {kind.__name__}" for key, kind in _BALL.items()), *names])
+                raise source.refusal(
+                    f"{name}: expected a function of ({wanted}), got one of ({', '.join(part.parameters)})"
+                )
+        if len(self.given.keys() & {"value", "value_gradient"}) == 2:
+            raise source.refusal("expected one of the formulas `value` and `value_gradient`, got both")
+        bound = self.lipschitz
+        number = isinstance(bound, int | float | np.number) and not isinstance(bound, bool)
+        if not self.given.keys() & {"lipschitz", "bounds"} and not (number and 0.0 <= bound < np.inf):
+            raise source.refusal(f"lipschitz: expected a number from 0 or a typed function, got {bound!r}")
+
+    def digest(self, parameters: Sequence[Any]) -> str:
+        """Return a digest of the formulas, the claims, and the declared parameters."""
+        claims = [self.given[name].digest if name in self.given else None for name in _CLAIMS]
+        slope = claims[0] or float(self.lipschitz or 0.0)
+        more = [claims[2]] * bool(claims[2]) + ["free"] * (not self.windowed)
+        return self.source.digest_with(self.kind, tuple(parameters), (slope, claims[1]), *more)
+
+    def row(self, digest: str = "") -> FieldKind:
+        """Return the row of the field; one with a digest is a user's."""
+        flags: dict[str, Any] = {"distance": self.distance, "windowed": self.windowed, "digest": digest}
+        if self.numbers == PLACE:
+            value, bounds = (self.given[name].function for name in ("value_gradient", "bounds"))
+            return FieldKind(self.kind, value, bounds, self.texels, **flags)
+        first, module = BEHIND_BOX if self.windowed else 0, "" if digest else self.source.python.__module__
+        reader = Reader(self.kind, digest, self.numbers, first, module=module)
+        x = "{} - wp.vec3(t0[0], t0[1], t0[2])" if self.windowed else "{}"
+        value = self._value(reader, x.format("q"))
+        bounds = self._bounds(reader, x.format("center"))
+        return FieldKind(self.kind, value, bounds, reader.texels, **flags)
+
+    def _value(self, reader: Reader, x: str) -> wp.Function:
+        """Return the function of the field and its gradient, which is derived from `value`."""
+        at_point, source = {"q": wp.vec3}, self.source
+        if "value" not in self.given:
+            lines = f"    return {reader.call(source, x)}\n"
+            return reader.written("value_gradient", at_point, wp.vec4, lines, source.function)
+        partials = partial_derivatives(source.function, [next(iter(source.parameters))])
+        call = f"{partials.key}({', '.join([x, *reader.readings])})"
+        lines = (
+            f"    f, along_x, along_y, along_z = {call}\n    return wp.vec4(f, along_x, along_y, along_z)\n"
+        )
+        return reader.written("value_gradient", at_point, wp.vec4, lines, partials)
+
+    def _bounds(self, reader: Reader, x: str) -> wp.Function:
+        """Return the function of the smallest and the largest value and slope in a ball."""
+        if "bounds" in self.given:
+            bounds = self.given["bounds"]
+            lines = f"    return {reader.call(bounds, x, 'radius')}\n"
+            return reader.written("bounds", _BALL, wp.vec3, lines, bounds.function)
+        called, slope = [], repr(float(self.lipschitz or 0.0))
+        if "lipschitz" in self.given:
+            claim = self.given["lipschitz"]
+            called.append(claim.function)
+            ball = ["x", "radius"] if len(claim.parameters) > len(self.numbers) else []
+            slope = f"{claim.function.key}({', '.join([*ball, *reader.readings])})"
+        between = self.given.get("interval", self.source)
+        called.append(between.function)
+        if between is self.source:
+            value = reader.call(between, "x") + ("" if "value" in self.given else "[0]")
+            interval = f"    f = {value}\n    r = wp.vec2(f - slope * radius, f + slope * radius)\n"
+        else:
+            interval = f"    r = {reader.call(between, 'x', 'radius')}\n"
+        lines = f"    x = {x}\n    slope = {slope}\n{interval}{_WIDENED}"
+        return reader.written("bounds", _BALL, wp.vec3, lines, *called)
+
+
+_WIDENED = f"""\
+    low = wp.max(r[0] - {ROUNDING} * (1.0 + wp.abs(r[0])), 0.0)
+    high = wp.max(r[1] + {ROUNDING} * (1.0 + wp.abs(r[1])), 0.0)
+    return wp.vec3(low, high, slope)
+"""

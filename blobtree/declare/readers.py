@@ -1,0 +1,96 @@
+"""Readers: functions of rows that read the numbers of a formula from the tape and call it."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import warp as wp
+
+from blobtree.declare.formula import Formula, generated, spelled
+from blobtree.texels import Texels
+
+SIZES: dict[Any, int] = {
+    wp.float32: 1,
+    float: 1,
+    wp.int32: 1,
+    int: 1,
+    wp.vec2: 2,
+    wp.vec3: 3,
+    wp.vec4: 4,
+}
+"""The types of a formula's numbers, with their sizes."""
+
+PLACE = {"tape": Texels, "at": wp.int32}
+"""The parameters of a formula that reads the tape itself."""
+
+
+def number_types(formula: Formula, leading: int) -> dict[str, Any]:
+    """Return the types of what a formula takes behind its leading parameters, by name."""
+    return dict(list(formula.parameters.items())[leading:])
+
+
+@dataclass(frozen=True)
+class Reader:
+    """Where the numbers that a kind's formulas take lie on the tape: one after the other."""
+
+    kind: str
+    digest: str
+    numbers: dict[str, Any]
+    """Their types, by name."""
+    first: int = 0
+    """Place of the first, in floats."""
+    named: dict[str, int] = field(default_factory=dict)
+    """Places of numbers that stand elsewhere, by name, in floats."""
+    taken: int = -1
+    """A place that they leave out."""
+    module: str = ""
+    """Name of the module of what is written, for a kind of this package."""
+
+    @property
+    def places(self) -> dict[str, list[int]]:
+        """The places of the components of each number."""
+        places, place = {}, self.first
+        for name, kind in self.numbers.items():
+            if name in self.named:
+                places[name] = [self.named[name]]
+                continue
+            places[name] = []
+            for _ in range(SIZES[kind]):
+                place += place == self.taken
+                places[name].append(place)
+                place += 1
+        return places
+
+    @property
+    def texels(self) -> int:
+        """The number of texels up to the last number."""
+        taken = (self.first - 1, self.taken, *(place for places in self.places.values() for place in places))
+        return max(taken) // 4 + 1
+
+    @property
+    def readings(self) -> list[str]:
+        """The expressions of the numbers."""
+        found = []
+        for name, places in self.places.items():
+            kind = self.numbers[name]
+            parts = ", ".join(f"t{place // 4}[{place % 4}]" for place in places)
+            if SIZES[kind] > 1:
+                parts = f"wp.vec{SIZES[kind]}({parts})"
+            found.append(f"int({parts})" if kind in (wp.int32, int) else parts)
+        return found
+
+    def call(self, formula: Formula, *leading: str) -> str:
+        """Return the call of a formula with leading arguments, and with the numbers if it takes any."""
+        rest = self.readings if len(formula.parameters) > len(leading) else []
+        return f"{formula.function.key}({', '.join([*leading, *rest])})"
+
+    def written(
+        self, part: str, leading: dict[str, Any], returns: Any, lines: str, *called: wp.Function
+    ) -> wp.Function:
+        """Return the typed function of some lines, which read texels t0, t1 and so on."""
+        typed = ", ".join(f"{name}: {spelled(kind)}" for name, kind in leading.items())
+        text = f"def {{name}}({typed}, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> {spelled(returns)}:\n"
+        reads = "".join(f"    t{i} = tape[at + {i}]\n" for i in range(self.texels) if f"t{i}[" in lines)
+        scope: dict[str, Any] = {function.key: function for function in called}
+        if self.module:
+            scope["__name__"] = self.module
+        return generated(self.kind, self.digest, part, text + reads + lines, scope)
