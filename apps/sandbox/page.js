@@ -6,7 +6,7 @@
   const fingersOf = (event) => {
     const [a, b] = event.touches;
     const height = event.currentTarget.clientHeight;
-    const distance = Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY);
+    const distance = Math.max(Math.hypot(a.clientX - b.clientX, a.clientY - b.clientY), 1);
     return [(a.clientX + b.clientX) / 2 / height, (a.clientY + b.clientY) / 2 / height, distance / height];
   };
 
@@ -18,22 +18,26 @@
   const hovering = { key: "", told: null };
 
   trame.utils.sandbox = {
-    // Two fingers move and zoom the view; the first does what the mouse does, until another one comes.
+    // Two fingers turn and zoom the view, three move it; the first does what the mouse does, until others come.
     touchstart(event) {
-      if (event.touches.length === 2) {
+      if (event.touches.length > 1) {
         event.currentTarget.fingers = fingersOf(event);
         trame.trigger("pinch", [0, 0, 1, "begin"]);
       }
     },
     touchmove(event) {
-      if (event.touches.length === 2) {
+      const count = event.touches.length;
+      if (count > 1) {
         const last = event.currentTarget.fingers;
         const now = (event.currentTarget.fingers = fingersOf(event));
-        if (last) trame.trigger("pinch", [now[0] - last[0], last[1] - now[1], now[2] / last[2], "move"]);
+        if (last) {
+          trame.trigger("pinch", [now[0] - last[0], last[1] - now[1], now[2] / last[2], "move", count]);
+        }
       }
     },
     touchend(event) {
-      if (event.currentTarget.fingers) trame.trigger("pinch", [0, 0, 1, "end"]);
+      if (event.touches.length > 1) event.currentTarget.fingers = fingersOf(event);
+      else if (event.currentTarget.fingers) trame.trigger("pinch", [0, 0, 1, "end"]);
     },
     pointerdown(event) {
       if (event.isPrimary) event.currentTarget.fingers = null;

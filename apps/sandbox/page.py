@@ -37,7 +37,13 @@ UPRIGHT_TABLET = (
 ONE_ROW = 1260
 """Width of a window, in pixels, from which on the toolbar is one row."""
 
-TOOLBAR_HEIGHT = f"$vuetify.display.width < {ONE_ROW} + (driving.shared ? 320 : 0) ? 96 : 64"
+PHONE = 600
+"""Width of a window, in pixels, below which each part of the toolbar has a row of its own."""
+
+TOOLBAR_HEIGHT = (
+    f"$vuetify.display.width < {PHONE} ? 166 + (driving.shared ? 40 : 0) : "
+    f"$vuetify.display.width < {ONE_ROW} + (driving.shared ? 320 : 0) ? 96 : 64"
+)
 """Height of the toolbar, of which its density takes 16."""
 
 STYLE, SCRIPT, ABOVE_VIEW = (
@@ -300,29 +306,33 @@ class Page:
             ),
             html.Div(style="display: contents", raw_attrs=['role="toolbar" data-roving', *named("'tools'")]),
         ):
-            html.H1("{{ title }}", classes="text-h6 mx-3")
-            if self._ends:
-                vuetify3.VBtn("Done", color="primary", variant="flat", click=self._finish)
-            for side, icon in (("left", "mdi-file-tree-outline"), ("right", "mdi-tune")):
-                panels.icon_button(icon, f"{side} panel", f"{side}_open = !{side}_open", v_if=NARROW_WINDOW)
-            panels.build_driver()
-            panels.build_files(self.sandbox)
-            panels.build_view_menu(self.sandbox)
-            for title, icon, family, event in (
-                ("Add", "mdi-plus", "primitives", self.sandbox.add),
-                ("Modify", "mdi-tune-variant", "modifiers", self.sandbox.wrap),
-                ("Combine", "mdi-set-center", "combinations", self.sandbox.combine),
-            ):
-                with panels.menu(title, icon, max_height=480, max_width=380):
-                    panels.build_list(f"catalog.{family}", "e", "catalog.docs[e]", event, "e")
-            vuetify3.VDivider(vertical=True, classes="mx-2")
-            panels.build_actions(self.sandbox)
+            html.H1("{{ title }}", title=("title",))
+            with html.Div(classes="bar"):
+                if self._ends:
+                    vuetify3.VBtn("Done", color="primary", variant="flat", click=self._finish)
+                panels.build_driver()
+                panels.build_files(self.sandbox)
+                panels.build_view_menu(self.sandbox)
+                for title, icon, family, event in (
+                    ("Add", "mdi-plus", "primitives", self.sandbox.add),
+                    ("Modify", "mdi-tune-variant", "modifiers", self.sandbox.wrap),
+                    ("Combine", "mdi-set-center", "combinations", self.sandbox.combine),
+                ):
+                    with panels.menu(title, icon, max_height=480, width=360):
+                        panels.build_list(f"catalog.{family}", "e", "catalog.docs[e]", event, "e")
+                panels.build_actions(self.sandbox)
             panels.build_brushes(self.sandbox)
-            vuetify3.VDivider(vertical=True, classes="mx-2")
-            for action, icon in TOOLBAR.items():
-                panels.icon_button(icon, panels.SUMMARIES[action], (self.sandbox.perform, f"['{action}']"))
-            theme = "theme = theme === 'light' ? 'dark' : 'light'"
-            panels.icon_button("mdi-theme-light-dark", "light or dark", theme)
+            with html.Div(classes="bar first"):
+                for side, icon in (("left", "mdi-file-tree-outline"), ("right", "mdi-tune")):
+                    panels.icon_button(
+                        icon, f"{side} panel", f"{side}_open = !{side}_open", v_if=NARROW_WINDOW
+                    )
+                for action, icon in TOOLBAR.items():
+                    panels.icon_button(
+                        icon, panels.SUMMARIES[action], (self.sandbox.perform, f"['{action}']")
+                    )
+                theme = "theme = theme === 'light' ? 'dark' : 'light'"
+                panels.icon_button("mdi-theme-light-dark", "light or dark", theme)
 
     def _build_outline(self) -> None:
         vuetify3.VListSubheader("Outline", raw_attrs=['role="heading" aria-level="2"'])

@@ -429,7 +429,7 @@ def build_queue(sandbox: Sandbox) -> None:
 def build_actions(sandbox: Sandbox) -> None:
     """Build the menu of all actions, with their keys, by group."""
     shown = {"model_value": ("help && driving.drives",), "update_modelValue": (sandbox.show_help, "[$event]")}
-    with menu("Actions", "mdi-keyboard-outline", max_height=560, **shown), vuetify3.VList():
+    with menu("Actions", "mdi-keyboard-outline", max_height=560, width=360, **shown), vuetify3.VList():
         for group in Group:
             bindings = [binding for binding in KEYS.bindings if _offered(binding, group)]
             if bindings:

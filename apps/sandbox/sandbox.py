@@ -484,15 +484,17 @@ class Sandbox:
         }
         moves[one_of("camera", name, moves, InvalidEdit)]()
 
-    def pinch(self, right: object, up: object, factor: object, phase: str) -> None:
-        """Move the scene in heights of the view and enlarge it, as two fingers do.
+    def pinch(self, right: object, up: object, factor: object, phase: str, fingers: object = 2) -> None:
+        """Turn the scene and enlarge it, as two fingers do, or move it, as three do.
 
         Parameters
         ----------
         right, up, factor
-            The move and the enlargement since the last call.
+            The move of the fingers in heights of the view, and the enlargement, since the last call.
         phase
             "begin", which cancels what the first finger did alone, "move", or "end".
+        fingers
+            Their number.
         """
 
         def pinched() -> None:
@@ -502,7 +504,10 @@ class Sandbox:
             moved, raised, ratio = (finite_number("pinch", one, InvalidEdit) for one in (right, up, factor))
             self._window.begin_motion()
             ratio = min(max(ratio, 1.0 / MAX_ZOOM), MAX_ZOOM)
-            self._window.camera.move_and_zoom(min(max(moved, -1.0), 1.0), min(max(raised, -1.0), 1.0), ratio)
+            shift = min(max(moved, -1.0), 1.0), min(max(raised, -1.0), 1.0)
+            if fingers == 2:
+                self._window.camera.turn(*shift)
+            self._window.camera.move_and_zoom(*((0.0, 0.0) if fingers == 2 else shift), ratio)
 
         self.attempt(pinched, whole=phase == "end")
 

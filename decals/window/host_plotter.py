@@ -159,6 +159,9 @@ def move_camera(subplot: SubplotRenderer, shift: ArrayLike) -> None:
     subplot.vtk_renderer.reset_camera_clipping_range()
 
 
+TURN_DEGREES = 200.0
+"""Degrees of a turn by the height of the view, as VTK's camera turns with the mouse."""
+
 VIEW_HEIGHTS = 1e-5, 1e4
 """Smallest and largest height of the view that zooming reaches, in diagonals of the scene."""
 
@@ -225,6 +228,14 @@ class SubplotCamera:
     def frame(self, low: ArrayLike, high: ArrayLike) -> None:
         """Show a box, given by its corners, as large as it fits."""
         self._renderer.ResetCamera(np.stack([low, high], axis=1).ravel().astype(float).tolist())
+
+    def turn(self, right: float, up: float) -> None:
+        """Turn around the target as a drag by parts of the view's height does."""
+        camera = self._renderer.camera
+        camera.Azimuth(-TURN_DEGREES * right)
+        camera.Elevation(-TURN_DEGREES * up)
+        camera.OrthogonalizeViewUp()
+        self._renderer.reset_camera_clipping_range()
 
     def move_and_zoom(self, right: float, up: float, factor: float) -> None:
         """Move what lies at the target, in heights of the view, then enlarge it by a factor.

@@ -43,7 +43,9 @@ def firefox_path() -> str | None:
 
 
 @asynccontextmanager
-async def opened(url: str, *, size: tuple[int, int] = SIZE, ends: bool = False) -> AsyncIterator[Page]:
+async def opened(
+    url: str, *, size: tuple[int, int] = SIZE, ends: bool = False, touch: bool = False
+) -> AsyncIterator[Page]:
     """A page in a browser without a screen, which must end without an error; its server may end before.
 
     The console of the sandbox's pages, whose address has a token, stays empty.
@@ -52,7 +54,7 @@ async def opened(url: str, *, size: tuple[int, int] = SIZE, ends: bool = False) 
         browser = await player.chromium.launch(
             executable_path=browser_path(), args=["--no-sandbox", "--disable-gpu"]
         )
-        page = await browser.new_page(viewport={"width": size[0], "height": size[1]})
+        page = await browser.new_page(viewport={"width": size[0], "height": size[1]}, has_touch=touch)
         page.set_default_timeout(1000 * PATIENCE)
         written: list[str] = []
         page.on("console", lambda message: written.extend(lines_of(message)))
@@ -75,7 +77,7 @@ def lines_of(message: ConsoleMessage) -> list[str]:
 
 @asynccontextmanager
 async def served(
-    server: Any, *, size: tuple[int, int] = SIZE, guard: Guard | None = None
+    server: Any, *, size: tuple[int, int] = SIZE, guard: Guard | None = None, touch: bool = False
 ) -> AsyncIterator[Page]:
     """The page of a trame server of this process, which may have a guard."""
     task = server.start(
@@ -88,7 +90,7 @@ async def served(
     )
     await server.ready
     url = guard.url(server.port) if guard else f"http://127.0.0.1:{server.port}/"
-    async with opened(url, size=size) as page:
+    async with opened(url, size=size, touch=touch) as page:
         yield page
     await server.stop()
     await task

@@ -1,7 +1,7 @@
 """Decals in a real browser, served by trame, as a program: ``python -m tests.frontends.in_browser NAME``.
 
-``page``, ``sandbox``, ``panels`` and ``lab`` take a path behind their name, where they save the picture of
-their page of docs.
+``page``, ``sandbox``, ``panels``, ``lab`` and ``touch`` take a path behind their name, where they save the
+picture of their page of docs.
 """
 
 import asyncio
@@ -9,6 +9,7 @@ import io
 import re
 import sys
 import tempfile
+from collections.abc import Sequence
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -232,7 +233,7 @@ async def sandbox(picture: str | None = None) -> None:
         await until(lambda: sandbox_page.sandbox.display.options.slice != cut)
         assert np.allclose(normal(), cut.normal if cut else 0.0)
         distance = plotter.camera.distance
-        await pinch(browser, 40, 50, 60, 80)
+        await fingers(browser, [(-40, 0), (40, 0)], [(-60, 0), (60, 0)], [(-80, 0), (80, 0)])
         await until(lambda: np.isclose(plotter.camera.distance, 0.5 * distance, rtol=0.02))
         await browser.get_by_text("Start", exact=True).click()
         await until(lambda: digest(window.document) == state)
@@ -298,17 +299,117 @@ async def until_count(found: Any, count: int) -> None:
             await asyncio.sleep(0.05)
 
 
-async def pinch(browser: Page, *reaches: float) -> None:
-    """Put two fingers on the view and part them; their distances are twice the reaches, in pixels."""
+async def fingers(browser: Page, *places: Sequence[tuple[float, float]]) -> None:
+    """Put fingers on the view one after the other, and move them; places count from its middle, in pixels."""
     box = await browser.locator(PICTURE).first.bounding_box()
     assert box is not None
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     touch = await browser.context.new_cdp_session(browser)
-    fingers = [[{"x": x + way * r, "y": y, "id": n} for n, way in enumerate((-1, 1))] for r in reaches]
-    steps = [("touchStart", fingers[0][:1]), ("touchStart", fingers[0])]
-    for kind, points in [*steps, *(("touchMove", pair) for pair in fingers[1:]), ("touchEnd", [])]:
+    steps = [[{"x": x + a, "y": y + b, "id": n} for n, (a, b) in enumerate(place)] for place in places]
+    begun = [("touchStart", steps[0][: n + 1]) for n in range(len(steps[0]))]
+    for kind, points in [*begun, *(("touchMove", step) for step in steps[1:]), ("touchEnd", [])]:
         await touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
         await asyncio.sleep(0.1)
+
+
+REACHED = """button => {
+  const box = button.getBoundingClientRect();
+  const at = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+  const inside = box.x >= 0 && box.y >= 0 && box.right <= innerWidth && box.bottom <= innerHeight;
+  return inside && button.contains(at) && Math.min(box.width, box.height) >= 24;
+}"""
+"""True for a button that a finger reaches: it lies in the window, and nothing above it."""
+
+
+async def touch(picture: str | None = None) -> None:
+    """On a phone and on a tablet, fingers reach everything, drag decals, and turn, zoom and move the view."""
+    await on_device("phone", (390, 844), picture)
+    await on_device("tablet", (820, 1180))
+
+
+async def on_device(name: str, size: tuple[int, int], picture: str | None = None) -> None:
+    """What a user does with fingers on a screen of a size."""
+    plotter = pv.Plotter(off_screen=True)
+    server = get_server(name, client_type="vue3")
+    folder = Path(tempfile.mkdtemp())
+    scene = decals.cover(BLOB, count=60, images=["tile"])
+    window = EditWindow(scene, path=folder / "a-scene-with-a-long-name.json", plotter=plotter)
+    window.show()
+    sandbox_page = SandboxPage(server, window, folder=folder)
+    async with served(server, size=size, guard=sandbox_page.guard, touch=True) as browser:
+        await shows(browser, plotter)
+        await reachable(browser)
+        await by_fingers(browser, window)
+        if picture is not None:
+            window.subplot.vtk_renderer.ResetCamera()
+            window.redraw(whole=True)
+            await shows(browser, plotter)
+            image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
+            image.save(picture, quality=80, optimize=True)
+        for side, row in (("left", "Point"), ("right", "Scattering")):
+            shown = browser.get_by_role("button", name=row, exact=True).first
+            if name == "phone":
+                await browser.get_by_label(f"{side} panel").first.tap()
+            await at_place(shown)
+            if side == "left":
+                await shown.tap()
+                await until(lambda: window.actions.state.primitive == (0, (0,)))
+            if name == "phone":
+                await browser.get_by_label(f"{side} panel").first.tap()
+        await browser.get_by_role("button", name=re.compile("^delete the selected")).tap()
+        await until(lambda: window.session.labels[-1:] == ("remove a primitive",))
+        await browser.get_by_role("button", name="undo").first.tap()
+        await until(lambda: window.session.undone_labels == ("remove a primitive",))
+        await browser.get_by_role("button", name=re.compile("^save")).first.tap()
+        await until((folder / "a-scene-with-a-long-name.json").exists)
+        await browser.get_by_role("button", name=re.compile("^show this help")).tap()
+        await browser.get_by_text("Page up", exact=True).wait_for()
+        await accessible(browser)
+    window.close()
+
+
+async def reachable(browser: Page) -> None:
+    """Make sure that fingers reach all buttons of the toolbar, that no name is cut, and nothing scrolls."""
+    buttons = await browser.locator(".toolbar button:visible").all()
+    missed = [await one.get_attribute("aria-label") for one in buttons if not await one.evaluate(REACHED)]
+    assert (len(buttons), missed) == (27, [])
+    assert await browser.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    cut = "name => name.scrollHeight > name.clientHeight + 1 || name.scrollWidth > name.clientWidth"
+    assert not await browser.locator(".toolbar h1").evaluate(cut)
+
+
+async def at_place(found: Any) -> None:
+    """Wait until a finger reaches an element: panels slide."""
+    async with asyncio.timeout(PATIENCE):
+        while not await found.evaluate(REACHED):
+            await asyncio.sleep(0.05)
+
+
+async def by_fingers(browser: Page, window: EditWindow) -> None:
+    """One finger selects and drags a decal; two turn and zoom the view, and three move it."""
+    plotter, driver = window.plotter, Driver(window)
+    camera, (width, height) = plotter.camera, plotter.window_size
+    number, at = min(
+        driver.visible(), key=lambda one: abs(one[1][0] - width / 2) + abs(one[1][1] - height / 2)
+    )
+    place = at[0] + 0.5 - width / 2, height / 2 - at[1] - 0.5
+    await fingers(browser, [place])
+    await until(lambda: window.actions.state.selection == (number,))
+    await fingers(browser, [place], [(place[0] + 6, place[1])], [(place[0] + 20, place[1])])
+    await until(lambda: window.session.labels == ("move",) and not window.tools.dragging)
+    before = digest(window.document)
+    target, direction, distance = camera.focal_point, np.array(camera.direction), camera.distance
+    await fingers(browser, *([(-40 + x, 0), (40 + x, 0)] for x in (0, 20, 40)))
+    turned = np.degrees(np.arccos(np.array(camera.direction) @ direction))
+    assert 0.5 * 200 * 40 / height < turned < 1.5 * 200 * 40 / height
+    np.testing.assert_allclose(camera.focal_point, target)
+    direction = np.array(camera.direction)
+    await fingers(browser, *([(-x, 0), (x, 0)] for x in (40, 60, 80)))
+    await until(lambda: np.isclose(camera.distance, 0.5 * distance, rtol=0.02))
+    await fingers(browser, *([(-40, y), (40, y), (0, y + 40)] for y in (0, 20, 40)))
+    assert not np.allclose(camera.focal_point, target)
+    np.testing.assert_allclose(camera.direction, direction, atol=1e-6)
+    assert digest(window.document) == before
 
 
 async def by_keys(browser: Page) -> None:
@@ -916,6 +1017,7 @@ def main() -> None:
         "fields": fields,
         "filled": filled,
         "shared": shared,
+        "touch": touch,
     }
     asyncio.run(checks[name](*arguments))
     print("done")

@@ -85,7 +85,7 @@ EVENTS: dict[str, list[list[Any]]] = {
         [True, False],
         [[], [], [0], [1], [9]],
     ],
-    "pinch": [[0.1, 0.0], [-0.2, 0.0], [0.5, 1.0, 3.0], ["begin", "move", "end"]],
+    "pinch": [[0.1, 0.0], [-0.2, 0.0], [0.5, 1.0, 3.0], ["begin", "move", "end"], [2, 3]],
     "move_camera": [["frame", "look", "keep", "go"], ["front", "top", 0, 3]],
     "set_control decals": [
         ["decals"],

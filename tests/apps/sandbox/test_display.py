@@ -26,7 +26,7 @@ from decals.scenes.camera import PRESETS
 from decals.scenes.meshes import as_polydata
 from decals.scenes.objects import MeshObject
 from decals.window import EditWindow
-from decals.window.host_plotter import pixels_of
+from decals.window.host_plotter import TURN_DEGREES, pixels_of
 from decals.window.view_modes import MODES, OVERLAYS, PREFIX, example_data
 from tests.apps.sandbox.test_sandbox import TREE, finish
 from tests.decals.editing.scenes import box, digest, tree_of
@@ -278,7 +278,7 @@ def test_the_model_keeps_its_size_when_the_projection_changes(sandbox: Sandbox, 
     np.testing.assert_allclose(places[2], places[0], atol=1e-3)
 
 
-def test_two_fingers_move_and_zoom_what_lies_at_the_target(sandbox: Sandbox, shared: EditWindow) -> None:
+def test_fingers_move_and_zoom_what_lies_at_the_target(sandbox: Sandbox, shared: EditWindow) -> None:
     camera, (_, height) = shared.subplot.vtk_renderer.camera, shared.plotter.window_size
     for parallel in (False, True):
         sandbox.perform("frame")
@@ -287,7 +287,7 @@ def test_two_fingers_move_and_zoom_what_lies_at_the_target(sandbox: Sandbox, sha
         sides = np.stack([point, point + 0.2 * np.array(camera.up)])
         before = pixels_of(shared.subplot, sides)
         sandbox.pinch(0.0, 0.0, 1.0, "begin")
-        sandbox.pinch(0.1, -0.2, 1.0, "move")
+        sandbox.pinch(0.1, -0.2, 1.0, "move", 3)
         moved = pixels_of(shared.subplot, sides)
         np.testing.assert_allclose(moved[0] - before[0], (0.1 * height, -0.2 * height), atol=1e-3)
         sandbox.pinch(0.0, 0.0, 2.0, "move")
@@ -299,6 +299,21 @@ def test_two_fingers_move_and_zoom_what_lies_at_the_target(sandbox: Sandbox, sha
         zoomed = pixels_of(shared.subplot, sides)
         np.testing.assert_allclose(zoomed[0], before[0], atol=1e-3)
         np.testing.assert_allclose(zoomed[1] - zoomed[0], 2.0 * (before[1] - before[0]), rtol=0.15)
+
+
+def test_two_fingers_turn_the_view_around_its_target(sandbox: Sandbox, shared: EditWindow) -> None:
+    camera = shared.subplot.vtk_renderer.camera
+    sandbox.perform("view_front")
+    target, eye, up = (np.array(one) for one in (camera.focal_point, camera.position, camera.up))
+    side = np.cross(up, eye - target)
+    for moved, across in (((0.1, 0.0), side), ((0.0, 0.1), up * camera.distance)):
+        sandbox.perform("view_front")
+        sandbox.pinch(*moved, 1.0, "move")
+        angle = np.radians(TURN_DEGREES * 0.1)
+        expected = target + np.cos(angle) * (eye - target) - np.sin(angle) * across
+        np.testing.assert_allclose(camera.position, expected, atol=1e-6)
+        np.testing.assert_allclose(camera.focal_point, target, atol=1e-9)
+        assert abs(np.dot(camera.up, camera.direction)) < 1e-6
 
 
 @pytest.mark.parametrize("parallel", [False, True])
