@@ -88,7 +88,7 @@ class Hover:
 def _box_of(document: Document, part: Part) -> Float32Array:
     """Return the edges of the box of a node or an object, shape (12, 2, 3)."""
     item = document.object(part.number)
-    if part.kind == "node" and isinstance(item, TreeObject):
+    if isinstance(item, TreeObject):
         return np.stack(box_edges(*node_in_world(item.tree, part.path).bounds))
     return np.stack(box_edges(*item.bounds))
 

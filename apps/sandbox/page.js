@@ -176,7 +176,10 @@
     (event) => {
       const view = document.querySelector("[role=application]");
       const taken = event.defaultPrevented || typedIn() || document.querySelector(OPEN);
-      if (event.key === "Escape" && !taken && !view.contains(event.target)) {
+      if (event.key === "Escape" && document.querySelector(OPEN) && view.contains(event.target)) {
+        event.stopPropagation(); // what is open closes, and the view keeps what it does
+        window.dispatchEvent(new KeyboardEvent("keydown", { key: "Escape" }));
+      } else if (event.key === "Escape" && !taken && !view.contains(event.target)) {
         view.dispatchEvent(new KeyboardEvent("keydown", { key: "Escape" }));
       }
     },

@@ -168,7 +168,7 @@ class Page:
         self._task: asyncio.Task[None] | None = None
         self._end: asyncio.Task[None] | None = None
         server.state.client_only(
-            "left_open", "right_open", "theme", "folded", "sought"
+            "left_open", "right_open", "file_open", "theme", "folded", "sought"
         )  # another browser has its own
         server.state.update({**self.values(), "catalog": self.sandbox.catalog(), "thumbnails": thumbnails()})
         server.state.update({"theme": "light", "dropped": None, "dropped_on": ""})
@@ -183,6 +183,8 @@ class Page:
         trigger("rename")(lambda key, name: change_row(key, "rename", name))
         trigger("drop_work")(self.sandbox.drop_work)
         trigger("hover")(self.sandbox.hover)
+        trigger("start")(lambda: self.sandbox.show_start(True))
+        trigger("write")(self.sandbox.write_file)
         trigger("read")(self.sandbox.read_file)
         trigger("place")(self.sandbox.place_image)
         trigger("move")(lambda key, target: change_row(key, "move", target))
@@ -461,13 +463,15 @@ class Page:
                 variant="tonal",
                 click=self.sandbox.unwrap,
             )
-        html.P(
-            "{{ outline.some(row => row.kind === 'object') ? 'Click on the model or on a row.' : "
-            "outline.some(row => row.kind === 'mesh') ? 'Scatter decals, or click on one.' : "
-            "'Add a primitive or drop a model.' }}",
-            v_if="!panel.kind",
-            classes="pa-3 text-caption",
-        )
+        with html.Div(v_if="!panel.kind && !decal.count && !image.name", classes="pa-3"):
+            html.H2("Scene", classes="text-subtitle-1")
+            html.P("{{ panel.doc }}", classes="text-caption")
+            html.P(
+                "{{ outline.some(row => row.kind === 'object') ? 'Click on the model or on a row.' : "
+                "outline.some(row => row.kind === 'mesh') ? 'Scatter decals, or click on one.' : "
+                "'Add a primitive or drop a model.' }}",
+                classes="text-caption",
+            )
 
     def _build_history(self) -> None:
         vuetify3.VDivider()

@@ -157,6 +157,7 @@ def build_controls(source: str, event: Any, identifiers: str, *, key: str = "c.n
             update_modelValue=(event, f"[{identifiers}, $event, true]"),
         )
         html.Div(CURVE, v_if="c.curve")
+        html.Div("{{ c.help }}", v_if="c.help", classes="text-caption help")
         vuetify3.VSwitch(
             v_if="c.kind === 'switch'",
             model_value=("c.value",),
@@ -245,17 +246,17 @@ def build_start(sandbox: Sandbox) -> None:
 def build_files(sandbox: Sandbox) -> None:
     """Build the menu that writes files: scene, script, mesh and picture by the suffix of the name."""
     with (
-        menu("File", "mdi-file-outline", close_on_content_click=False),
+        menu("File", "mdi-file-outline", close_on_content_click=False, v_model=("file_open", False)),
         vuetify3.VCard(width=340, classes="pa-3"),
     ):
-        vuetify3.VBtn("Open or new ...", variant="tonal", click=(sandbox.show_start, "[true]"))
+        vuetify3.VBtn("Open or new ...", variant="tonal", click="file_open = false; trigger('start')")
         html.P(
             "Save or export. The ending is the format: .json scene, .py script, "
             f"{' '.join(EXPORT_SUFFIXES)} with the decals, .png .jpg picture, .gif .mp4 video.",
             classes="text-caption mt-3 mb-1",
         )
         with html.Div(classes="d-flex ga-2 align-center"):
-            write = sandbox.write_file, "[file_name, replace_file, file_size, file_video]"
+            write = "file_open = false; trigger('write', [file_name, replace_file, file_size, file_video])"
             vuetify3.VTextField(
                 v_model=("file_name", ""),
                 placeholder="model.ply",

@@ -6,13 +6,12 @@ window's session and its actions.
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Sized
 from functools import partial, wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
 from blobtree import Node
-from blobtree.declare.registry import CUSTOM_KINDS
 from decals.apps.sandbox import decal_panel
 from decals.apps.sandbox.controls import KIND, controls_of, exchanged, kind_control, parsed, parsed_option
 from decals.apps.sandbox.display import PHASES, Display
@@ -216,14 +215,14 @@ class Sandbox:
             *dict.fromkeys((state.message, state.refusal)),
             self.display.message,
         )
-        return " · ".join(filter(None, parts))
+        last = self._window.session.labels[-1:]
+        return " · ".join(filter(None, parts)) or (f"last action: {last[0]}" if last else "")
 
     @staticmethod
     def catalog() -> dict[str, Any]:
         """Return the names of the kinds that can be added, by family, and what each is."""
         return {
             **new_nodes.families(),
-            "custom": [kind.__name__ for kind in CUSTOM_KINDS.values()],
             "docs": {name: first_line(kind) for name, kind in new_nodes.kinds().items()},
         }
 
@@ -239,7 +238,14 @@ class Sandbox:
     def _panel(self) -> dict[str, Any]:
         """Return title and controls of the selected node."""
         if self._state.primitive is None:
-            return {"kind": "", "name": "", "doc": "", "controls": [], "operands": 0}
+            document = self._window.document
+            parts: dict[str, Sized] = {
+                "object": document.objects,
+                "decal": document.decals,
+                "image": document.images,
+            }
+            facts = [f"{len(of)} {name}{'' if len(of) == 1 else 's'}" for name, of in parts.items()]
+            return {"kind": "", "name": "", "doc": ", ".join(facts), "controls": [], "operands": 0}
         (number, path), node = self._state.primitive, self._trees.selected_node
         item = self._window.document.object(number)
         assert isinstance(item, TreeObject)  # meshes have no nodes

@@ -102,9 +102,11 @@ class DecalActions(WindowActions):
         document = state.session.document
         decal = new_decal(document, pick.position, pick.normal, model).replace(**values)
         layer = int(decal.layers[0])
-        if layer in document.locked_layers:
+        hidden = layer in document.hidden.decals.layers and not len(document.decals_of_layer(layer))
+        if hidden or layer in document.locked_layers:
+            state_of, change = ("hidden", "show") if hidden else ("locked", "unlock")
             raise InvalidEdit(
-                f"layer {layer} is locked; unlock it in the outline, or select a decal of another layer"
+                f"layer {layer} is {state_of}; {change} it in the outline, or select a decal of another layer"
             )
         state.run(AddDecals(decal))
         state.selection = (state.session.document.decals.next_number - 1,)

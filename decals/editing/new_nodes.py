@@ -70,9 +70,21 @@ def built_in_kinds() -> dict[str, type[Node]]:
 
 
 def kinds() -> dict[str, type[Node]]:
-    """Return all classes of nodes that a scene can get, by name: built-in ones, then custom ones."""
-    custom: dict[str, Any] = {kind.__name__: kind for kind in CUSTOM_KINDS.values()}
-    return built_in_kinds() | custom
+    """Return all classes of nodes that a scene can get, by name: built-in ones, then custom ones.
+
+    A custom class whose name another class has is called "NAME (custom)", or "NAME (TAG)" with its tag.
+    """
+    found = built_in_kinds()
+    custom: Any = CUSTOM_KINDS
+    for tag, kind in custom.items():
+        names = kind.__name__, f"{kind.__name__} (custom)", f"{kind.__name__} ({tag})"
+        found[next((name for name in names if name not in found), names[-1])] = kind
+    return found
+
+
+def name_of(kind: type[Node]) -> str:
+    """Return the name of a class among `kinds`."""
+    return next((name for name, known in kinds().items() if known is kind), kind.__name__)
 
 
 def checked_kind(name: object) -> type[Node]:

@@ -364,7 +364,8 @@ class TreeActions(WindowActions):
         kind
             Name of its class; see `decals.editing.new_nodes.kinds`.
         """
-        kind, state, middle = checked_kind(kind).__name__, self._state, np.zeros(3, np.float32)
+        checked_kind(kind)
+        state, middle = self._state, np.zeros(3, np.float32)
         objects, view = state.session.document.objects, state.camera.eye_and_target()
         if state.primitive is None:
             self._add_tree(
@@ -381,7 +382,7 @@ class TreeActions(WindowActions):
 
     def wrap_node(self, kind: str) -> None:
         """Put the selected node under a new node of a kind with one operand, such as a warp."""
-        kind = checked_kind(kind).__name__
+        checked_kind(kind)
         self._replace_node(lambda node: node_above(kind, node), f"put {self._selected_label} under {kind}")
 
     def combine_operands(self, kind: str) -> None:

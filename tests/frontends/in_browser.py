@@ -445,6 +445,7 @@ async def creature(picture: str | None = None) -> None:
         await accessible(browser)
         await browser.get_by_label("New model").click()
         await until(lambda: not sandbox_page.sandbox.values()["start"]["open"])
+        await browser.get_by_text("The scene is empty").wait_for()
         empty = digest(window.document)
         await user.add("Point", "#4f8f6f", center=(0, 0, 0), radius=1.0)
         await user.add("Point", "#4f8f6f", center=(0, 0.5, 1.2), radius=0.7)
@@ -649,6 +650,9 @@ async def sandbox_start(picture: str | None = None) -> None:
         await browser.get_by_label("file name").fill("mine.py")
         await browser.get_by_role("button", name="Write", exact=True).click()
         await until((folder / "mine.py").exists)
+        await browser.get_by_label("file name").wait_for(state="hidden")
+        await escapes(browser, window)
+        await browser.get_by_role("button", name="File", exact=True).click()
         async with browser.expect_download() as download:
             await browser.get_by_label("download this file").click()
         downloaded = await (await download.value).path()
@@ -658,6 +662,23 @@ async def sandbox_start(picture: str | None = None) -> None:
         await browser.get_by_label("open from this computer").set_input_files(str(folder / "dot.png"))
         await until(lambda: len(window.document.images) == 2)
     window.close()
+
+
+async def escapes(browser: Page, window: EditWindow) -> None:
+    """Escape closes an open menu first, wherever the focus is, and then ends the brush."""
+    brush = window.actions.state.brush
+    await browser.get_by_label("erase brush").click()
+    await until(lambda: brush.brush == "erase")
+    for focus in ("[role=application]", ".toolbar button"):
+        await browser.get_by_role("button", name="View", exact=True).click()
+        menu = browser.get_by_text("Keep this view")
+        await menu.wait_for()
+        await browser.locator(focus).first.evaluate("one => one.focus()")
+        await browser.keyboard.press("Escape")
+        await menu.wait_for(state="hidden")
+        assert brush.brush == "erase"
+    await browser.keyboard.press("Escape")
+    await until(lambda: brush.brush == "select")
 
 
 DROP = """(label) => {

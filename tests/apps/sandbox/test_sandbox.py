@@ -1,11 +1,13 @@
 """The sandbox without a browser: its values follow the session, and its events edit the scene."""
 
 import json
+import re
 import threading
 import time
 from collections.abc import Iterator
 from functools import cache, partial
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,7 @@ import decals
 from blobtree import Point, Segment, Torus, Twist, Union
 from blobtree.nodes.paths import node_at
 from blobtree.nodes.surgery import dominant_primitive
+from decals.apps.sandbox.controls import WORDS
 from decals.apps.sandbox.outline import outline
 from decals.apps.sandbox.sandbox import REST_SECONDS, Sandbox
 from decals.editing import tree_actions
@@ -33,6 +36,7 @@ from decals.scenes.scene import Scene
 from decals.window import EditWindow
 from tests.decals.editing.scenes import box, digest, tree_of
 
+ROOT = Path(__file__).resolve().parents[3]
 TREE = Point((0, 0, 0), radius=1.0) + Point((1.2, 0.4, 0), radius=0.6)
 CAMERA = Camera((0, 0, 8))
 POINTS = np.random.default_rng(1).uniform(-2, 2, (500, 3))
@@ -195,6 +199,29 @@ def test_the_pointer_lights_up_rows_and_rows_light_up_the_view(window: EditWindo
         sandbox.hover(key)
         assert sandbox.values()["hovered"] == {"rows": [], "lines": [], "dots": []}
     assert (sandbox.status, window.session.labels) == (message, ())
+
+
+def test_a_page_says_what_the_scene_has_and_what_was_done_last(window: EditWindow) -> None:
+    sandbox = Sandbox(window)
+    sandbox.select("")
+    assert sandbox.values()["panel"]["doc"] == "1 object, 20 decals, 1 image"
+    sandbox.perform("select_all")
+    sandbox.perform("larger")
+    sandbox.perform("deselect")
+    assert sandbox.values()["status"].endswith("last action: larger")
+    sandbox.go_to(0)
+
+
+def test_words_of_the_theory_are_explained_and_their_pages_have_these_sections(window: EditWindow) -> None:
+    sandbox = Sandbox(window)
+    sandbox.perform("select_all")
+    values = sandbox.values()
+    controls = [*values["scattering"], *values["drawing"], *values["decal"]["controls"]]
+    explained = {control["name"]: control["help"] for control in controls if control["help"]}
+    assert explained.keys() == WORDS.keys()
+    for text in explained.values():
+        section, page = re.findall("“(.*)” in (docs/.*[.]md)", text)[0]
+        assert f"## {section}\n" in (ROOT / page).read_text(encoding="utf-8")
 
 
 def shapes(window: EditWindow) -> list[str]:

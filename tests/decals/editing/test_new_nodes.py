@@ -1,5 +1,6 @@
 """New nodes: every class gives one with a surface, or is left out for a stated reason."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -108,6 +109,30 @@ def test_custom_kinds_are_offered() -> None:
     assert Soft.__name__ in new_nodes.families()["combinations"]
     ring: Node = new_nodes.new_node("Ring")
     assert isinstance(ring, Ring)
+
+
+@pytest.fixture
+def points_by_name() -> Iterator[None]:
+    """Two custom kinds have the name of a class of the library."""
+    Ring.__name__ = Soft.__name__ = "Point"
+    yield
+    Ring.__name__, Soft.__name__ = "Ring", "Soft"
+
+
+def test_custom_kinds_named_like_others_take_the_place_of_none(points_by_name: None) -> None:
+    kinds = new_nodes.kinds()
+    names = {kind: [name for name, known in kinds.items() if known is kind] for kind in (Point, Ring, Soft)}
+    assert names[Point] == ["Point"]
+    assert sorted(names[Ring] + names[Soft]) in (
+        ["Point (custom)", f"Point ({Ring.kind})"],
+        ["Point (custom)", f"Point ({Soft.kind})"],
+    )
+    families = new_nodes.families()
+    assert new_nodes.name_of(Ring) in families["primitives"]
+    assert new_nodes.name_of(Soft) in families["combinations"]
+    assert type(new_nodes.new_node(new_nodes.name_of(Ring))) is Ring
+    assert type(new_nodes.exchanged_node(OPERANDS[0], new_nodes.name_of(Ring))) is Ring
+    assert type(new_nodes.new_node("Point")) is Point
 
 
 @pytest.mark.parametrize(

@@ -320,14 +320,20 @@ def test_the_add_tool_adds_a_decal_like_the_selected_one(user: UserInput) -> Non
     assert len(user.document.decals) == 62
 
 
-def test_the_add_tool_adds_no_decal_to_a_locked_layer(user: UserInput) -> None:
+@pytest.mark.parametrize(
+    ("change", "reason"), [("lock", "is locked; unlock it"), ("hide", "is hidden; show it")]
+)
+def test_the_add_tool_adds_no_decal_to_a_locked_or_hidden_layer(
+    user: UserInput, change: str, reason: str
+) -> None:
     (_, at), *_ = user.visible()
     user.key("s", shift=True)
-    user.actions.outline.change("layer 0", "lock")
+    user.actions.outline.change("layer 0", change)
+    count = len(user.document.decals)
     assert not user.click(at)
-    assert user.actions.state.message.startswith("layer 0 is locked; unlock it")
-    assert len(user.document.decals) == 60
-    user.actions.outline.change("layer 0", "lock")
+    assert user.actions.state.message.startswith(f"layer 0 {reason}")
+    assert len(user.document.decals) == count
+    user.actions.outline.change("layer 0", change)
     user.click(at)
     assert user.actions.state.selection == (60,)
 
