@@ -48,7 +48,7 @@ from decals.rendering.light_pass import NO_LIGHTS
 from decals.rendering.options import Drawing
 from decals.rendering.prefiltering import picture_texels, prefiltered
 from decals.rendering.viewpoint import TILE_MARGIN
-from decals.scenes.camera import REFERENCE_ASPECT
+from decals.scenes.camera import MAX_RATIO, REFERENCE_ASPECT, Camera, Vector
 from decals.scenes.files import to_json
 from decals.scenes.material import DecalMaterial
 from decals.scenes.objects import MeshObject
@@ -90,9 +90,8 @@ def page_contents(
     arrays = surfaces.arrays | mesh_objects(scene)
     for name, texture in textures.items():
         arrays |= texture.arrays(name)
-    camera = scene.camera.at(REFERENCE_ASPECT)
     return {
-        "camera": {name: getattr(camera, name) for name in ("position", "target", "up", "fov")},
+        "camera": camera_record(scene.camera),
         "aspect": REFERENCE_ASPECT,
         "bounds": surfaces.bounds,
         "surfaces": surfaces.records,
@@ -110,6 +109,35 @@ def page_contents(
         | {"index": index_rules(DecalIndex.of(scene.decals))},
         "scene": _scene_record(scene),
     }, arrays
+
+
+def camera_record(camera: Camera) -> dict[str, Any]:
+    """Return a camera as the viewer reads it, which finds its pose in each picture as `Camera.at` does.
+
+    It stays for those in the range ``kept``. Distances along the view count from the middle of the points.
+    """
+    record = {name: getattr(camera, name) for name in ("position", "target", "up", "fov")}
+    aspect, kept, margin = 0.0, (0.0, MAX_RATIO), 1.0
+    points: Sequence[Vector] = [camera.target]
+    if camera.fit is not None and camera.fit.points:
+        points, margin = camera.fit.points, camera.fit.margin
+        kept = camera.aspects_of(points)
+    elif camera.fit is not None:
+        aspect = REFERENCE_ASPECT
+    filling = camera.filling(points, margin)
+    right, up, back = filling.axes
+    return record | {
+        "aspect": aspect,
+        "fit": {
+            "kept": kept,
+            "points": np.stack([filling.across, filling.depths - filling.middle], axis=1).tolist(),
+            "slope": filling.slope,
+            "nearest": filling.nearest - filling.middle,
+            "middle": (filling.along * up + filling.middle * back).tolist(),
+            "right": right.tolist(),
+            "back": back.tolist(),
+        },
+    }
 
 
 def picture_uniforms(drawing: Drawing, bounds: Any, textures: Iterable[str]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 import base64
 import html
+import math
 import os
 import re
 from collections.abc import Mapping, Sequence
@@ -29,7 +30,7 @@ from decals.scenes.cover import as_scene
 from decals.scenes.objects import SceneObject
 from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model
-from decals.validation import checked_path, describe, one_of
+from decals.validation import MAX_STIFFNESS, checked_path, describe, one_of
 
 MODULES = (
     *("vectors", "packing", "texels", "index", "decals", "history", "camera", "link", "graphics", "painter"),
@@ -185,7 +186,8 @@ def page(
         )
     texts = {"TITLE": html.escape(title), "ALT": html.escape(alt)}
     modes = "".join(f"<option>{mode}</option>" for mode in header["shaders"]["modes"])
-    markup = _filled("controls.html", {**texts, "MODES": modes, "BACKGROUND": _gradient(sky)})
+    tools = {"MODES": modes, "BACKGROUND": _gradient(sky), "DOUBLINGS": f"{math.log2(MAX_STIFFNESS):g}"}
+    markup = _filled("controls.html", {**texts, **tools})
     markup = TOOLTIP.sub(r'\g<0> aria-label="\1"', markup)
     data = packed({**header, "markup": markup, "controls": controls}, arrays)
     style, start = (_read(name) for name in ("page.css", "start.js"))

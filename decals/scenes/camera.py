@@ -29,6 +29,8 @@ NEAREST, NEAREST_FITTED = 0.05, 0.005
 """Least distances of the eye from points, in half diagonals: of one picture, and of all aspect ratios."""
 FITTED_ASPECTS, SLOPES = (0.01, 100.0), 48
 """Range and number of aspect ratios whose outermost points a fitted camera remembers."""
+MAX_RATIO = 1e6
+"""Largest aspect ratio and margin; the least ones are its reciprocal."""
 DEFAULT_DIRECTION: Vector = (0.35, 0.25, 1.0)
 """Default direction from a model toward the camera."""
 THREE_QUARTER: Vector = (0.55, 0.35, 1.0)
@@ -171,12 +173,10 @@ class Camera:
         if self.fit is None:
             return self
         if self.fit.points:
-            points, margin = _points(self.fit.points), self.fit.margin
-            if self.shows(points, aspect):
+            if self.shows(self.fit.points, aspect):
                 return self
-            return Camera._fitting(
-                points, self._back.tolist(), self.up, self.fov, aspect, margin, NEAREST_FITTED
-            )
+            position, target = self.filling(self.fit.points, self.fit.margin).pose(_ratio("aspect", aspect))
+            return Camera(_triple(position), _triple(target), self.up, self.fov)
         if aspect >= REFERENCE_ASPECT:
             return self
         widened = math.tan(math.radians(self.fov) / 2) * REFERENCE_ASPECT / aspect
@@ -236,12 +236,26 @@ class Camera:
 
         The larger one of the shares of the width and of the height counts.
         """
+        lowest, highest = self.aspects_of(points, least=least)
+        return lowest <= aspect <= highest
+
+    def aspects_of(self, points: ArrayLike, *, least: float = FILLED[0]) -> tuple[float, float]:
+        """Return the range of aspect ratios for which `shows` is true; (1, 0) if there is none."""
         x, y, z = self.axes @ (_points(points) - self.position).T
         if z.max() >= 0.0:  # behind the eye
-            return False
+            return 1.0, 0.0
         half = math.tan(math.radians(self.fov) / 2)
-        places = np.stack([x / (half * aspect * z), y / (half * z)])
-        return bool(np.ptp(places, axis=1).max() >= 2.0 * least and np.abs(places).max() <= FILLED[1])
+        across, upward = x / (half * z), y / (half * z)
+        if np.abs(upward).max() > FILLED[1]:
+            return 1.0, 0.0
+        fills_height = np.ptp(upward) >= 2.0 * least
+        highest = MAX_RATIO if fills_height else float(np.ptp(across)) / (2.0 * least)
+        return float(np.abs(across).max()) / FILLED[1], highest
+
+    def filling(self, points: ArrayLike, margin: float) -> "Filling":
+        """Return the poses in this direction whose pictures points fill, but for a margin."""
+        toward, up = _orientation(self._back.tolist(), self.up)
+        return Filling.of(_points(points), _looking(toward, up, self.fov), margin, NEAREST_FITTED)
 
     def clip_range(self, bounds: Bounds) -> tuple[float, float]:
         """Return the distances, along the view, of a near and a far plane that enclose a box."""
@@ -356,27 +370,62 @@ class Camera:
         nearest: float,
     ) -> "Camera":
         """Return a camera whose picture points fill, at least ``nearest`` half diagonals in front of them."""
-        aspect = _ratio("aspect", aspect)
-        margin = _ratio("margin", margin)
         toward, upward = _orientation(direction, up)
-        axes_camera = cls(_triple(toward), (0.0, 0.0, 0.0), _triple(upward), fov)
-        half = math.tan(math.radians(axes_camera.fov) / 2) / margin
-        axes = axes_camera.axes
+        filling = Filling.of(positions, _looking(toward, upward, fov), _ratio("margin", margin), nearest)
+        position, centre = filling.pose(_ratio("aspect", aspect))
+        return cls(_triple(position), _triple(centre), _triple(upward), fov)
+
+
+@dataclass(frozen=True, eq=False)
+class Filling:
+    """Poses from one direction whose pictures some points fill.
+
+    Attributes
+    ----------
+    axes
+        Unit vectors to the right, up and toward the eye, as rows.
+    across, depths
+        Coordinates of the points along the first and the last axis, ``float64[n]``.
+    slope
+        Half the height of a picture at distance 1 that points may fill.
+    along, middle
+        Coordinates of the target along the other two axes.
+    nearest
+        Least coordinate of the eye along the last axis.
+    """
+
+    axes: Float64Array
+    across: Float64Array
+    depths: Float64Array
+    slope: float
+    along: float
+    middle: float
+    nearest: float
+
+    @classmethod
+    def of(cls, positions: Float64Array, camera: Camera, margin: float, nearest: float) -> "Filling":
+        """Return the poses in the direction of a camera; see `Camera.fitting` for the other arguments."""
+        slope, axes = math.tan(math.radians(camera.fov) / 2) / margin, camera.axes
         # Without BLAS, which rounds otherwise on other processors: content hashes would differ.
         x, y, z = ((positions * axis).sum(axis=1) for axis in axes)
-        across, depth_of_width = _fit_axis(x, z, half * aspect)
-        along, depth_of_height = _fit_axis(y, z, half)
-        middle = (z.max() + z.min()) / 2
-        eye = max(depth_of_width, depth_of_height, float(z.max()) + nearest * _half_diagonal(positions))
-        centre = across * axes[0] + along * axes[1] + middle * axes[2]
-        position = _triple(centre + (eye - middle) * axes[2])
-        return cls(position, _triple(centre), _triple(upward), fov)
+        along, depth_of_height = _fit_axis(y, z, slope)
+        middle = float(z.max() + z.min()) / 2
+        least = max(depth_of_height, float(z.max()) + nearest * _half_diagonal(positions))
+        return cls(axes, x, z, slope, along, middle, least)
+
+    def pose(self, aspect: float) -> tuple[Float64Array, Float64Array]:
+        """Return the eye and the target for pictures of an aspect ratio."""
+        right, up, back = self.axes
+        across, depth_of_width = _fit_axis(self.across, self.depths, self.slope * aspect)
+        target = across * right + self.along * up + self.middle * back
+        return target + (max(depth_of_width, self.nearest) - self.middle) * back, target
 
 
 def _ratio(name: str, value: float) -> float:
     """Return a ratio that float64 can divide by and multiply with."""
+    least, most = 1 / MAX_RATIO, MAX_RATIO
     return real_number(
-        name, value, "a number from 1e-6 to 1e6", lambda ratio: 1e-6 <= ratio <= 1e6, InvalidScene
+        name, value, "a number from 1e-6 to 1e6", lambda ratio: least <= ratio <= most, InvalidScene
     )
 
 
@@ -395,6 +444,11 @@ def _orientation(direction: Sequence[float], up: Sequence[float]) -> tuple[Float
     if not upward.any() or _parallel(upward, toward):
         upward = np.eye(3)[int(np.argmin(np.abs(toward)))]
     return toward, upward
+
+
+def _looking(toward: Float64Array, up: Float64Array, fov: float) -> Camera:
+    """Return a camera that looks at the origin from a unit direction."""
+    return Camera(_triple(toward), (0.0, 0.0, 0.0), _triple(up), fov)
 
 
 def _half_diagonal(points: Float64Array) -> float:

@@ -32,7 +32,6 @@ FIRST_FRAME = """() => performance.getEntriesByName("first frame")[0].startTime 
 DRAG = """(steps) => {
   const times = [], draws = [];
   viewer.set({ selected: 0 });
-  const { position, target } = viewer.camera;
   for (let i = 0; i < steps; i++) {
     const start = performance.now();
     const hit = viewer.pick(0.3 * Math.sin(i), 0.3 * Math.cos(i)).surface;

@@ -1,7 +1,8 @@
 """Pages of `save_html` in a real browser, as a program.
 
-    python -m tests.frontends.in_html_page picture|use|touch|mounts|losses|drags|refusals [chromium|firefox]
+    python -m tests.frontends.in_html_page CHECK [chromium|firefox]
 
+The checks are picture, sizes, use, touch, mounts, losses, drags and refusals.
 Firefox needs a display, such as that of ``xvfb-run -a``, and a version of playwright that knows it: Debian's
 Firefox 153 is driven by playwright 1.60, but not by 1.65. Touch is for Chromium alone.
 """
@@ -294,6 +295,29 @@ async def picture(browser: str) -> None:
         print(f"{name}: {share:.4f}", flush=True)
         found[name] = share
     assert min(found.values()) >= EQUAL, found
+
+
+SIZES = (400, 300), (320, 640), (700, 300)
+"""Sizes of windows; tools below the picture make it wider and lower."""
+
+
+async def sizes(browser: str) -> None:
+    """Pages of several sizes, with tools and without, show models as pictures of these sizes do."""
+    scene = meshed(tree_scene())
+    turned = scene.replace(camera=scene.camera.turned(50))
+    for case, controls in ((scene, True), (turned, False)):
+        async with shown(case, browser=browser, controls=controls) as page:
+            for width, height in SIZES:
+                await page.set_viewport_size({"width": width, "height": height})
+                await page.wait_for_function(RESIZED, arg=[width, height])
+                share = share_of_equal(await pixels(page), case)
+                print(f"{width} x {height}, controls {controls}: {share:.4f}", flush=True)
+                assert share >= EQUAL, (width, height, controls, share)
+
+
+RESIZED = """([width, height]) =>
+  innerWidth === width && innerHeight === height && viewer.canvas.width === viewer.canvas.clientWidth
+  && viewer.canvas.height === viewer.canvas.clientHeight"""
 
 
 async def use(browser: str) -> None:
@@ -695,6 +719,7 @@ async def accessible(page: Page) -> None:
 
 CHECKS = {
     "picture": picture,
+    "sizes": sizes,
     "use": use,
     "touch": touch,
     "mounts": mounts,

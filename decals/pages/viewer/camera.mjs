@@ -6,27 +6,37 @@ const STEEPEST = 0.98; // cosine between view and up, at most
 const CLOSEST = 1e-3; // least distance from the target, in sizes of the model
 
 export class Camera {
-  constructor({ position, target, up, fov }, bounds, referenceAspect) {
-    Object.assign(this, { position, target, up: unit(up), fov, bounds, referenceAspect });
+  // A pose has the eye, the target, and the aspect ratio below which pictures keep their width in place of their height.
+  constructor({ position, target, aspect = 0, up, fov, fit }, bounds, usualAspect) {
+    const pose = { position, target, aspect };
+    Object.assign(this, { pose, start: pose, home: pose, up: unit(up), fov, fit, bounds, usualAspect });
     this.size = length(subtract(bounds[1], bounds[0])) || 1;
   }
 
-  get pose() {
-    return { position: this.position, target: this.target };
-  }
-
   // Move to a pose, unless the eye is at the target, straight above or below it, or too far away.
-  place({ position, target }) {
+  place({ position, target, aspect }) {
     const across = length(cross(subtract(target, position), this.up));
-    if (across > 0 && across < this.size / CLOSEST) Object.assign(this, { position, target });
+    const kept = aspect >= 0 && aspect < 1 / CLOSEST ? aspect : this.usualAspect;
+    if (across > 0 && across < this.size / CLOSEST) this.pose = { position, target, aspect: kept };
   }
 
-  // From the middle of the picture to its right and its upper edge at distance 1, and along the view: narrow pictures
-  // show as much from left to right as wide ones.
+  // Find the home of pictures of an aspect ratio, as `Camera.at` of decals/scenes/camera.py does, and stay there.
+  fitTo(aspect) {
+    const isHome = this.pose.position === this.home.position;
+    const { kept, points, slope, nearest, middle, right, back } = this.fit;
+    const reach = (side) => Math.max(...points.map(([x, z]) => side * x + slope * aspect * z));
+    const target = add(middle, scaled(right, (reach(1) - reach(-1)) / 2));
+    const distance = Math.max(nearest, (reach(1) + reach(-1)) / (2 * slope * aspect));
+    const fitted = { position: add(target, scaled(back, distance)), target, aspect: 0 };
+    this.home = kept[0] <= aspect && aspect <= kept[1] ? this.start : fitted;
+    if (isHome) this.pose = this.home;
+  }
+
+  // From the middle of the picture to its right and its upper edge at distance 1, and along the view.
   frame(aspect) {
-    const ahead = unit(subtract(this.target, this.position));
+    const ahead = unit(subtract(this.pose.target, this.pose.position));
     const right = unit(cross(ahead, this.up));
-    const half = Math.tan((this.fov * Math.PI) / 360) * Math.max(1, this.referenceAspect / aspect);
+    const half = Math.tan((this.fov * Math.PI) / 360) * Math.max(1, this.pose.aspect / aspect);
     return [scaled(right, half * aspect), scaled(cross(right, ahead), half), ahead];
   }
 
@@ -38,7 +48,7 @@ export class Camera {
   // Distances of the near and the far plane, which enclose the model.
   range(ahead) {
     const [low, high] = this.bounds;
-    const middle = dot(ahead, subtract(scaled(add(low, high), 0.5), this.position));
+    const middle = dot(ahead, subtract(scaled(add(low, high), 0.5), this.pose.position));
     const reach = 0.5 * dot(ahead.map(Math.abs), subtract(high, low));
     const far = middle + reach > 0 ? 1.01 * (middle + reach) : this.size;
     return [Math.max(0.99 * (middle - reach), far * NEAREST), far];
@@ -46,7 +56,7 @@ export class Camera {
 
   // The uniform block of camera.glsl for a picture of some pixels that is shifted by parts of one.
   block(width, height, [x, y] = [0, 0]) {
-    const [right, up, ahead] = this.frame(width / height);
+    const [{ position }, [right, up, ahead]] = [this.pose, this.frame(width / height)];
     const [near, far] = this.range(ahead);
     const [shiftX, shiftY] = [(2 * x) / width, (2 * y) / height];
     const clip = (vector, w) => {
@@ -54,39 +64,36 @@ export class Camera {
       const z = ((far + near) * depth - 2 * w * far * near) / (far - near);
       return [across - shiftX * depth, upward - shiftY * depth, z, depth];
     };
-    const axes = [clip([1, 0, 0], 0), clip([0, 1, 0], 0), clip([0, 0, 1], 0)].flat();
-    const columns = [...axes, ...clip(scaled(this.position, -1), 1)];
+    const columns = [[1, 0, 0], [0, 1, 0], [0, 0, 1], scaled(position, -1)].flatMap((v, i) => clip(v, i > 2));
     const corner = subtract(ahead, add(scaled(right, 1 - shiftX), scaled(up, 1 - shiftY)));
     const steps = [...scaled(right, 2 / width), 0, ...scaled(up, 2 / height), 0];
-    return new Float32Array([...columns, ...this.position, 1, ...corner, 0, ...steps]);
+    return new Float32Array([...columns, ...position, 1, ...corner, 0, ...steps]);
   }
 
   // Where a point is seen, from −1 to 1 to the right and upward; null behind the eye.
   seen(point, aspect) {
-    const [x, y, depth] = this.within(subtract(point, this.position), aspect);
+    const [x, y, depth] = this.within(subtract(point, this.pose.position), aspect);
     return depth <= 0 ? null : [x / depth, y / depth];
   }
 
-  // Turn about the target, by angles to the right and upward.
-  orbit(right, up) {
-    const offset = turned(subtract(this.position, this.target), this.up, -right);
+  // A pose after a turn about its target, by angles to the right and upward.
+  orbit({ position, target }, right, up) {
+    const offset = turned(subtract(position, target), this.up, -right);
     const raised = turned(offset, unit(cross(this.up, offset)), -up);
-    const isSteep = Math.abs(dot(unit(raised), this.up)) > STEEPEST;
-    this.position = add(this.target, isSteep ? offset : raised);
+    return { position: add(target, Math.abs(dot(unit(raised), this.up)) > STEEPEST ? offset : raised) };
   }
 
-  // Move the picture by parts of half its sides.
-  pan(x, y, aspect) {
+  // A pose whose picture is moved by parts of half its sides.
+  pan({ position, target }, x, y, aspect) {
     const [right, up] = this.frame(aspect);
-    const move = scaled(add(scaled(right, x), scaled(up, y)), -length(subtract(this.position, this.target)));
-    this.position = add(this.position, move);
-    this.target = add(this.target, move);
+    const move = scaled(add(scaled(right, x), scaled(up, y)), -length(subtract(position, target)));
+    return { position: add(position, move), target: add(target, move) };
   }
 
-  zoom(factor) {
-    const offset = subtract(this.position, this.target);
+  zoom({ position, target }, factor) {
+    const offset = subtract(position, target);
     const distance = Math.min(Math.max(length(offset) * factor, CLOSEST * this.size), 100 * this.size);
-    this.position = add(this.target, scaled(unit(offset), distance));
+    return { position: add(target, scaled(unit(offset), distance)) };
   }
 
   // The direction that is upward in the picture, along a surface.

@@ -15,7 +15,7 @@ const COMMANDS = {
   right: (viewer) => viewer.editSelected((row) => ({ tangent: turned(row.tangent, row.normal, -TURN) })),
   smaller: (viewer) => viewer.editSelected(({ radius }) => ({ radius: radius / SCALE })),
   larger: (viewer) => viewer.editSelected(({ radius }) => ({ radius: radius * SCALE })),
-  home: (viewer) => viewer.set({ camera: viewer.home }),
+  home: (viewer) => viewer.set({ camera: viewer.camera.home }),
   link: copyLink,
   save,
   n: (viewer) => viewer.select(1),
@@ -30,7 +30,7 @@ const COMMANDS = {
 };
 
 export class Controls {
-  constructor(root, { markup, controls, rules }, viewer) {
+  constructor(root, { markup, controls }, viewer) {
     root.classList.add("decal-viewer");
     root.innerHTML = markup;
     const [canvas, bar, status] = root.children;
@@ -38,7 +38,6 @@ export class Controls {
     Object.assign(this, { root, canvas, status, mode, stiffness, buttons: bar.querySelectorAll("button") });
     bar.hidden = !controls;
     bar.addEventListener("click", ({ target }) => COMMANDS[target.name]?.(viewer));
-    stiffness.max = Math.log2(rules.maxStiffness); // equal steps double it
     const chosen = ({ name, value }) => ({ [name]: name === "stiffness" ? 2 ** value : value });
     bar.addEventListener("input", ({ target }) => viewer.set(chosen(target)));
     for (const part of [canvas, bar]) part.addEventListener("keydown", (event) => this.press(event, viewer));

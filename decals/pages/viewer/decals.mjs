@@ -30,7 +30,6 @@ export class DecalSet {
     this.limits = new Texels(Float32Array, 4, rows.length);
     this.rows.forEach((row, number) => row && this.pack(row, number));
     this.index = new DecalIndex(rules.index, this.records, this.numbers);
-    this.rank = this.numbers.length ? this.index.rank(this.numbers[0]) : null; // of all, without layers
   }
 
   get numbers() {
@@ -68,10 +67,10 @@ export class DecalSet {
   // True if the plain form of the shaders, which is right for the first decals, is wrong for a changed one.
   needsFull(number) {
     const { layered, limited, nested } = this.rules.plain;
-    this.rank ??= this.index.rank(number);
-    if (!layered && this.index.rank(number) !== this.rank) return true;
     if (!limited && this.limits.at(number).some((value) => value)) return true;
-    return !nested && this.numbers.some((other) => this.areNested(number, other));
+    const isLayered = (other) => this.index.rank(number) !== this.index.rank(other);
+    const isWrong = (other) => (!layered && isLayered(other)) || (!nested && this.areNested(number, other));
+    return this.numbers.some(isWrong);
   }
 
   // As `are_nested_contact` of decals/index/lookup.py.

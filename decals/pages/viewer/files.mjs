@@ -1,10 +1,9 @@
 // What leaves a page: a link to its state, and its scene as a file.
-import { written } from "./link.mjs";
 
 const READING = 60_000; // milliseconds in which a browser begins to read a file
 
-export function copyLink({ controls, ...state }) {
-  const link = written(state);
+export function copyLink(viewer) {
+  const [{ controls }, { link }] = [viewer, viewer.get()];
   if (link === null)
     return controls.say("So many decals have changed that no link can hold them: save a scene file.");
   try {
@@ -18,13 +17,13 @@ export function copyLink({ controls, ...state }) {
 }
 
 // The scene as a file that `decals.load_scene` takes.
-export function sceneText({ header: { scene }, arrays, mode, stiffness, camera, home, decals }) {
+export function sceneText({ header: { scene }, arrays, mode, stiffness, camera: { pose, home }, decals }) {
   const text = (name) =>
     btoa(Array.from(new Uint8Array(arrays[name].buffer), (byte) => String.fromCharCode(byte)).join(""));
   const data = (i) => ({ vertices: text(`vertices of ${i}`), faces: text(`faces of ${i}`) });
   const objects = scene.objects.map((item, i) => (item.type === "mesh" ? { ...item, data: data(i) } : item));
   const drawing = { ...scene.drawing, contact: mode, stiffness };
-  const moved = camera.position !== home.position && { ...camera.pose, fit: undefined };
+  const moved = pose.position !== home.position && { ...pose, aspect: undefined, fit: undefined };
   const rows = decals.rows.filter((row) => row);
   return JSON.stringify({ ...scene, objects, drawing, camera: { ...scene.camera, ...moved }, decals: rows });
 }

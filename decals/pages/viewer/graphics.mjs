@@ -79,15 +79,14 @@ export function uploaded(gl, { array, changes, width }, description, onCard) {
 }
 
 // Make a target of drawing with textures and a depth buffer; or give one another size.
-export function makeTarget(gl, size, descriptions, before) {
-  const framebuffer = before?.framebuffer ?? gl.createFramebuffer();
-  const depth = before?.depth ?? gl.createRenderbuffer();
+export function makeTarget(gl, size, descriptions, before = {}) {
+  const { framebuffer = gl.createFramebuffer(), depth = gl.createRenderbuffer() } = before;
   gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
   gl.bindRenderbuffer(gl.RENDERBUFFER, depth);
   gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT24, ...size);
   gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
   const textures = descriptions.map((description, i) => {
-    const made = makeTexture(gl, { ...description, size }, [null], before?.textures[i].texture);
+    const made = makeTexture(gl, { ...description, size }, [null], before.textures?.[i].texture);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + i, made.target, made.texture, 0);
     return made;
   });

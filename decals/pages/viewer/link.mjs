@@ -6,7 +6,7 @@ const short = (x) => String(Number(x.toPrecision(5)));
 const list = (values) => values.map(short).join(",");
 
 // Return the fragment, or null if it would be too long.
-export function written({ camera, mode, stiffness, decals, originals }) {
+export function written({ camera: { pose }, aspect, mode, stiffness, decals, originals }) {
   const changed = decals.rows.flatMap((row, place) => {
     const before = originals[place] ?? null;
     if (row === before) return [];
@@ -14,7 +14,8 @@ export function written({ camera, mode, stiffness, decals, originals }) {
     const parts = [...row.position, ...row.normal, ...row.tangent, row.radius];
     return [`${place}:${list(before ? parts : [...parts, row.image ?? 0])}`];
   });
-  const view = `eye=${list(camera.position)}&at=${list(camera.target)}&mode=${mode}&k=${short(stiffness)}`;
+  const camera = `eye=${list(pose.position)}&at=${list(pose.target)}&aspect=${short(pose.aspect || aspect)}`;
+  const view = `${camera}&mode=${mode}&k=${short(stiffness)}`;
   const text = changed.length ? `${view}&d=${changed.join(";")}` : view;
   return text.length <= LONGEST ? text : null;
 }
@@ -27,7 +28,7 @@ export function read(fragment, originals) {
     return values.length >= count && values.every(Number.isFinite) ? values : null;
   };
   const [eye, target] = ["eye", "at"].map((name) => numbers(fields.get(name), 3)?.slice(0, 3));
-  const camera = eye && target && { position: eye, target };
+  const camera = eye && target && { position: eye, target, aspect: Number(fields.get("aspect") ?? NaN) };
   const decals = {};
   for (const text of (fields.get("d") ?? "").split(";")) {
     const [, digits, parts] = /^(\d{1,7})(?:x|:(.*))$/.exec(text) ?? [];

@@ -128,8 +128,7 @@ export class Painter {
 
   // Wait until the picture that was drawn last is there, as a read of it does.
   finish() {
-    const { gl } = this;
-    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+    this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
   }
 
   // What a camera sees at a place of the picture, from −1 to 1 to the right and upward: the number of the decal, −1 for

@@ -10,9 +10,8 @@ export const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a 
 
 // A vector turned about a unit axis, counter-clockwise (Rodrigues).
 export function turned(v, axis, angle) {
-  const c = Math.cos(angle);
-  const along = scaled(axis, dot(axis, v) * (1 - c));
-  return add(add(scaled(v, c), scaled(cross(axis, v), Math.sin(angle))), along);
+  const [c, s] = [Math.cos(angle), Math.sin(angle)];
+  return add(add(scaled(v, c), scaled(cross(axis, v), s)), scaled(axis, dot(axis, v) * (1 - c)));
 }
 
 // A vector carried along by the smallest turn from one unit normal to another: two reflections.

@@ -27,7 +27,6 @@ class Viewer {
     this.decals = new DecalSet(scene.decals, rules);
     this.history = new History(this.decals, () => this.changed("decals"));
     this.camera = new Camera(header.camera, header.bounds, header.aspect);
-    this.home = this.camera.pose;
     this.pointer = new Pointer(this);
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.canvas);
@@ -72,6 +71,7 @@ class Viewer {
     canvas.width = Math.max(1, Math.round(canvas.clientWidth * devicePixelRatio));
     canvas.height = Math.max(1, Math.round(canvas.clientHeight * devicePixelRatio));
     this.aspect = canvas.width / canvas.height;
+    this.camera.fitTo(this.aspect);
     this.changed("view");
   }
 
@@ -92,21 +92,17 @@ class Viewer {
 
   request() {
     cancelAnimationFrame(this.frame);
-    this.frame = requestAnimationFrame(() => this.refine());
+    this.frame = requestAnimationFrame(() => this.draw());
   }
 
   // Draw the next sample of the picture; further ones follow, each after the one before it, until it changes.
-  refine() {
-    if (this.sample > 0 && this.painter.isBusy) this.request();
-    else if (!this.painter.gl.isContextLost()) this.draw();
-  }
-
   draw() {
+    if (this.painter.gl.isContextLost()) return;
+    if (this.sample > 0 && this.painter.isBusy) return this.request();
     if (!this.decals.rows[this.selected]) this.selected = -1;
     this.painter.draw(this, this.sample);
     this.controls.show(this);
-    this.sample += 1;
-    if (this.sample < this.header.samples.length) this.request();
+    if (++this.sample < this.header.samples.length) this.request();
   }
 
   // -- what lies at a place of the picture, from −1 to 1 ---------------------------------------------------
@@ -157,7 +153,7 @@ class Viewer {
     const step = add(scaled(cross(along, normal), right), scaled(along, up));
     const target = add(position, scaled(step, STEP * radius));
     const above = { position: add(target, scaled(normal, radius)), target, up: along, fov: NARROW };
-    const hit = this.pick(0, 0, new Camera(above, this.header.bounds, this.header.aspect)).surface;
+    const hit = this.pick(0, 0, new Camera(above, this.header.bounds)).surface;
     if (hit && length(subtract(hit.position, position)) < 3 * radius) this.moveTo(hit);
   }
 
@@ -179,9 +175,10 @@ class Viewer {
     if (this.selected >= 0) this.controls.say(`Decal ${this.selected} is selected.`);
   }
 
-  // Move the camera by a function of its own.
+  // Move the camera by a function of its own; pictures that are narrower from then on show as much from left to right.
   moveCamera(how, ...amounts) {
-    this.camera[how](...amounts);
+    const { pose } = this.camera;
+    this.camera.pose = { ...pose, aspect: pose.aspect || this.aspect, ...this.camera[how](pose, ...amounts) };
     this.changed("view");
   }
 }

@@ -20,7 +20,7 @@ from decals.errors import InvalidScene, TooMuchData
 from decals.index import DecalIndex
 from decals.index.index import has_nested, index_on
 from decals.pages import contents, page, viewer_script
-from decals.pages.contents import index_rules, record_rules
+from decals.pages.contents import camera_record, index_rules, record_rules
 from decals.pages.packing import packed
 from decals.pages.page import MODULES
 from decals.rendering import Environment
@@ -226,37 +226,105 @@ def test_equal_arrays_are_packed_once() -> None:
     assert len(packed({}, {"a": numbers, "b": numbers.view(np.float32)})) > 1.9 * len(once)
 
 
+BOUNDS = np.array([[-1.0, -1.0, -1.0], [1.0, 2.0, 1.0]])
+WIDTHS = 3, 60, 180, 300, 399, 400, 401, 420, 600, 900, 4000
+"""Widths of pictures of 300 lines."""
+
+
+def cameras() -> dict[str, decals.Camera]:
+    """Return cameras that stay, and cameras that fit points of several shapes, one of them moved a little."""
+    found = {"placed": decals.Camera((3, 2, 5), (0.5, 0, -0.5), (0.1, 1, 0), 40)}
+    random = np.random.default_rng(7)
+    for name, size in {
+        "long": (4, 1, 1),
+        "tall": (0.5, 4, 1),
+        "deep": (1, 1, 5),
+        "flat": (3, 0.01, 3),
+    }.items():
+        points = random.uniform(-1, 1, (50, 3)) * size + 0.3
+        direction = tuple(random.normal(size=3))
+        found[name] = decals.Camera.fitting(points, direction=direction, aspect=None, margin=1.1)
+        found[f"{name}, turned"] = found[name].turned(40)
+    closer = decals.Camera((0, 0, 6), fov=35).fitted_to(random.uniform(-1, 1, (30, 3)), margin=1.0)
+    return found | {"fitted by hand": closer}
+
+
 @needs_node
-@pytest.mark.parametrize("aspect", [4 / 3, 2.0, 0.6])
-def test_the_camera_is_that_of_the_picture(aspect: float) -> None:
-    camera = decals.Camera((3, 2, 5), (0.5, 0, -0.5), (0.1, 1, 0), 40)
-    bounds = [[-1.0, -1.0, -1.0], [1.0, 2.0, 1.0]]
+@pytest.mark.parametrize("name", cameras())
+def test_the_camera_of_each_size_is_that_of_the_picture(name: str) -> None:
     script = """
     const { Camera } = await import("./camera.mjs");
     const camera = new Camera(data.camera, data.bounds, data.reference);
-    const [width, height] = [data.width, 300];
-    const place = camera.seen([0.2, 0.3, 0.4], width / height);
-    const block = Array.from(camera.block(width, height));
-    const shifted = Array.from(camera.block(width, height, [0.25, -0.5]));
-    const { position } = camera;
-    camera.pan(0.3, -0.2, width / height);
-    const panned = camera.seen(data.camera.target, width / height);
-    const behind = camera.seen(position.map((x, i) => 2 * x - camera.target[i]), width / height);
-    console.log(JSON.stringify([block, shifted, place, panned, behind]));
+    const blocks = data.widths.map((width) => {
+      camera.fitTo(width / 300);
+      return Array.from(camera.block(width, 300));
+    });
+    console.log(JSON.stringify(blocks));
     """
-    given = {"position": camera.position, "target": camera.target, "up": camera.up, "fov": camera.fov}
-    width = round(300 * aspect)
-    data = {"camera": given, "bounds": bounds, "reference": REFERENCE_ASPECT, "width": width}
-    block, shifted, place, panned, behind = run_node(script, data)
+    camera = cameras()[name]
+    record = camera_record(camera)
+    data = {"camera": record, "bounds": BOUNDS.tolist(), "reference": REFERENCE_ASPECT, "widths": WIDTHS}
+    for width, block in zip(WIDTHS, run_node(script, data), strict=True):
+        size = width, 300
+        matrix = camera.clip_matrix(size, (BOUNDS[0], BOUNDS[1]))
+        scale = np.abs(matrix).max()
+        assert_allclose(np.reshape(block[:16], (4, 4)).T, matrix, atol=1e-6 * scale, err_msg=str(size))
+        known = camera.rays(*size)
+        rows = np.array([[*known.origin, 1], [*known.corner, 0], [*known.right, 0], [*known.up, 0]])
+        scale = np.abs(rows).max()
+        assert_allclose(np.reshape(block[16:], (4, 4)), rows, atol=1e-6 * scale, err_msg=str(size))
+
+
+@needs_node
+def test_a_moved_camera_keeps_its_width_in_narrower_pictures() -> None:
+    """Its home goes on to fit, and what it shows in the picture in which it was moved does not jump."""
+    camera = cameras()["long"]
+    script = """
+    const { Camera } = await import("./camera.mjs");
+    const camera = new Camera(data.camera, data.bounds, data.reference);
+    const found = [];
+    for (const aspect of [2, 0.5, 1]) { camera.fitTo(aspect); found.push(camera.pose); }
+    camera.place({ ...camera.pose, ...camera.zoom(camera.pose, 1), aspect: 1 });
+    const { pose } = camera;
+    const widths = [1, 0.5, 2].map((aspect) => {
+      camera.fitTo(aspect);
+      return camera.frame(aspect).slice(0, 2).map((axis) => Math.hypot(...axis));
+    });
+    const stays = camera.pose === pose;
+    camera.place(camera.home);
+    camera.fitTo(0.5);
+    found.push(camera.pose);
+    console.log(JSON.stringify({ found, widths, stays }));
+    """
+    data = {"camera": camera_record(camera), "bounds": BOUNDS.tolist(), "reference": REFERENCE_ASPECT}
+    ended = run_node(script, data)
+    for aspect, pose in zip((2, 0.5, 1, 0.5), ended["found"], strict=True):
+        assert_allclose(pose["position"], camera.at(aspect).position, atol=1e-9)
+        assert_allclose(pose["target"], camera.at(aspect).target, atol=1e-9)
     half = np.tan(np.radians(camera.fov) / 2)
-    if aspect < REFERENCE_ASPECT:
-        half *= REFERENCE_ASPECT / (width / 300)
-    wide = decals.Camera(camera.position, camera.target, camera.up, float(np.degrees(2 * np.arctan(half))))
-    expected = wide.clip_matrix((width, 300), (np.array(bounds[0]), np.array(bounds[1])))
-    assert_allclose(np.reshape(block[:16], (4, 4)).T, expected, rtol=1e-6, atol=1e-6)
-    known = wide.rays(width, 300)
-    rows = [[*known.origin, 1], [*known.corner, 0], [*known.right, 0], [*known.up, 0]]
-    assert_allclose(np.reshape(block[16:], (4, 4)), rows, atol=1e-6)
+    assert_allclose(ended["widths"], [[half, half], [half, 2 * half], [2 * half, half]])
+    assert ended["stays"]
+
+
+@needs_node
+def test_a_shifted_picture_is_seen_through_its_pixels() -> None:
+    camera = cameras()["placed"]
+    script = """
+    const { Camera } = await import("./camera.mjs");
+    const camera = new Camera(data.camera, data.bounds, data.reference);
+    const place = camera.seen([0.2, 0.3, 0.4], 2);
+    const shifted = Array.from(camera.block(600, 300, [0.25, -0.5]));
+    const { position, target } = camera.pose;
+    const behind = camera.seen(position.map((x, i) => 2 * x - target[i]), 2);
+    camera.place({ ...camera.pose, ...camera.pan(camera.pose, 0.3, -0.2, 2) });
+    const panned = camera.seen(target, 2);
+    console.log(JSON.stringify([shifted, place, panned, behind]));
+    """
+    data = {"camera": camera_record(camera), "bounds": BOUNDS.tolist(), "reference": REFERENCE_ASPECT}
+    shifted, place, panned, behind = run_node(script, data)
+    width = 600
+    expected = camera.clip_matrix((width, 300), (BOUNDS[0], BOUNDS[1]))
+    known = camera.rays(width, 300)
     corner = np.add(known.corner, 0.25 * np.array(known.right) - 0.5 * np.array(known.up))
     assert_allclose(shifted[20:23], corner, atol=1e-6)
     through = np.add(known.origin, 2.5 * (corner + 30 * np.array(known.right) + 40 * np.array(known.up)))
@@ -275,8 +343,8 @@ def test_links_hold_the_state_and_refuse_nonsense() -> None:
     const row = (x) => ({ position: [x, 0, 0], normal: [0, 0, 1], tangent: [1, 0, 0], radius: 1 });
     const originals = [row(0), row(1), row(2)];
     const rows = [originals[0], null, { ...row(5), radius: 0.25 }, { ...row(7), image: 2 }];
-    const camera = { position: [1, 2, 3], target: [0, 0, 0.125] };
-    const state = { camera, mode: "radial", stiffness: 2.5, decals: { rows }, originals };
+    const camera = { pose: { position: [1, 2, 3], target: [0, 0, 0.125], aspect: 0 } };
+    const state = { camera, aspect: 1.5, mode: "radial", stiffness: 2.5, decals: { rows }, originals };
     const link = written(state);
     const many = { ...state, decals: { rows: Array.from({ length: 200 }, (_, i) => row(i)) } };
     const wrong = ["", "#", "#d=99999999x", "#d=0:1,2,3", "#d=1:NaN", "#eye=1,2&at=3", "#d=7x"];
@@ -284,7 +352,7 @@ def test_links_hold_the_state_and_refuse_nonsense() -> None:
     console.log(JSON.stringify([read(link, originals), written(many), found]));
     """
     state, too_long, wrong = run_node(script, None)
-    assert state["camera"] == {"position": [1, 2, 3], "target": [0, 0, 0.125]}
+    assert state["camera"] == {"position": [1, 2, 3], "target": [0, 0, 0.125], "aspect": 1.5}
     assert (state["mode"], state["stiffness"]) == ("radial", "2.5")
     changes = state["decals"]
     assert set(changes) == {"1", "2", "3"}
@@ -363,7 +431,7 @@ def test_poses_without_a_picture_are_refused() -> None:
     const found = data.map(([position, target]) => {
       const camera = new Camera(start, [[-1, -1, -1], [1, 1, 1]], 1.5);
       camera.place({ position, target });
-      return camera.position === position && camera.target === target;
+      return camera.pose.position === position && camera.pose.target === target;
     });
     console.log(JSON.stringify(found));
     """
