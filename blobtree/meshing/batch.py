@@ -5,12 +5,13 @@ from itertools import pairwise
 
 import numpy as np
 
+from blobtree._typing import IndexArray
 from blobtree.cells.grid import BRANCHING, Grid
 from blobtree.cells.joint_cells import build_joint_cells, model_starts
 from blobtree.device import known_device
 from blobtree.joint_work import checked_trees, is_small, of_tree, work_together
 from blobtree.meshing.dual_kernels import sample_blocks
-from blobtree.meshing.mesh import Mesh, bridging_faces, download, extract_mesh
+from blobtree.meshing.mesh import DeviceMesh, Mesh, bridging_faces, download, extract_mesh
 from blobtree.meshing.polygonize import polygonize
 from blobtree.meshing.polygonizer import DEFAULT_RESOLUTION, cell_size_of, grid_around, load_kernels
 from blobtree.meshing.thin_parts import shows_thin_parts
@@ -95,9 +96,10 @@ def polygonize_batch(
 
         def joint(numbers: list[int]) -> list[Mesh]:
             chosen = [models[n] for n in numbers], [grids[n] for n in numbers]
-            meshes, bridging = _joint_meshes(*chosen, device, report)
-            for row in bridging if thin_matters else ():
-                meshes[row] = single(numbers[row])
+            meshes, faces, mesh = _joint_meshes(*chosen, device, report)
+            if thin_matters:
+                for row in np.unique(np.searchsorted(faces, bridging_faces(mesh), side="right") - 1).tolist():
+                    meshes[row] = single(numbers[row])
             return meshes
 
         kinds = list(map(kind, models, grids))
@@ -114,8 +116,8 @@ def _expected_blocks(tree: ImplicitModel, cell_size: float) -> float:
 
 def _joint_meshes(
     models: Sequence[ImplicitModel], grids: Sequence[Grid], device: str, report: Progress
-) -> tuple[list[Mesh], list[int]]:
-    """Return the meshes of models with one instruction set and one depth, and those that may bridge gaps."""
+) -> tuple[list[Mesh], IndexArray, DeviceMesh]:
+    """Return the meshes of models with one instruction set and one depth; their first faces in one mesh."""
     load_kernels(models[0], device, False, sample_blocks, place_vertices)
     cells = build_joint_cells(models, grids, device, report)
     mesh = extract_mesh(cells, report)
@@ -125,7 +127,7 @@ def _joint_meshes(
     whole = download(mesh)
     own = whole.faces - np.repeat(vertices[:-1], np.diff(faces))[:, None]
     ends = zip(pairwise(vertices.tolist()), pairwise(faces.tolist()), strict=True)
-    bridging = np.searchsorted(faces, bridging_faces(mesh), side="right") - 1
-    return [
+    meshes = [
         Mesh(whole.vertices[v:w], own[f:g], whole.normals[v:w], whole.colors[v:w]) for (v, w), (f, g) in ends
-    ], np.unique(bridging).tolist()
+    ]
+    return meshes, faces, mesh

@@ -270,6 +270,17 @@ def edge_rank(axis: wp.int32, du: wp.int32, dv: wp.int32) -> wp.int32:
     return du + 2 * dv
 
 
+@wp.func
+def may_bridge(
+    a: wp.int32, b: wp.int32, positions: wp.array(dtype=wp.vec3), normals: wp.array(dtype=wp.vec3)
+) -> wp.bool:
+    """Return True if an edge leaves the surface at both ends, where the normals differ much."""
+    if wp.dot(normals[a], normals[b]) >= FACING:
+        return False
+    step = positions[b] - positions[a]
+    return wp.dot(normals[a], step) > 0.0 and wp.dot(normals[b], step) < 0.0
+
+
 @wp.kernel
 def mark_bridging(
     first: wp.int32,
@@ -278,13 +289,9 @@ def mark_bridging(
     normals: wp.array(dtype=wp.vec3),
     bridging: wp.array(dtype=wp.bool),
 ) -> None:
-    """Mark triangles with an edge that leaves the surface at both ends, where the normals differ much."""
+    """Mark triangles with an edge that may bridge a gap."""
     i = first + wp.tid()
     face = faces[i]
     for side in range(3):
-        a = face[side]
-        b = face[(side + 1) % 3]
-        if wp.dot(normals[a], normals[b]) < FACING:
-            step = positions[b] - positions[a]
-            if wp.dot(normals[a], step) > 0.0 and wp.dot(normals[b], step) < 0.0:
-                bridging[i] = True
+        if may_bridge(face[side], face[(side + 1) % 3], positions, normals):
+            bridging[i] = True

@@ -6,7 +6,7 @@ from blobtree.cells.block_kernels import LevelBlocks, grid_point
 from blobtree.cells.grid import BRANCHING
 from blobtree.formulas.falloff import ISO, RIM
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.meshing.dual_kernels import SAMPLES, SAMPLES_PER_SIDE, sample_index
+from blobtree.meshing.dual_kernels import SAMPLES, SAMPLES_PER_SIDE, may_bridge, sample_index
 from blobtree.meshing.part_kernels import UNLIMITED
 from blobtree.tape.codes import FIELD, PREFIX, STRETCHED, UNWARP, WARP, WARP_REGISTERS
 from blobtree.tape.dispatch import closest, direct_stride, stride, warp_forward
@@ -30,6 +30,9 @@ UNKNOWN = wp.constant(-2)
 
 HALF_BLOCK = wp.constant(0.5 * BRANCHING)
 """Half the side of a block, in cells."""
+
+BELOW, DEEPEST = wp.constant(0.75), wp.constant(4.0)
+"""Cells from the bottom of a crease down to an edge that joins its sides, and most from an edge across it."""
 
 SIDE_HALVINGS = 12
 """Halvings until a side of a gap is known."""
@@ -93,11 +96,11 @@ def nearest_primitive(q: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.int32:
 
 
 @wp.func
-def gap_across(start: wp.vec3, step: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.vec2:
-    """Return the width of the gap that an edge crosses, and the share of the edge before a place in the gap.
+def gap_at(start: wp.vec3, step: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.float32:
+    """Return the share of an edge before a place in the gap that it crosses; −1 without one.
 
-    The width is 0 without a gap. The ends of the edge belong to different primitives. A gap between these is
-    where the nearest primitive changes, as its middle is as far from both.
+    The ends of the edge belong to different primitives. A gap between these is where the nearest primitive
+    changes, as its middle is as far from both.
     """
     owner = nearest_primitive(start, tape, span)
     low = float(0.0)
@@ -109,35 +112,40 @@ def gap_across(start: wp.vec3, step: wp.vec3, tape: Texels, span: wp.vec2i) -> w
             reach = 0.5 * (high - low) * wp.length(step)
             bound = field_bound(place, wp.vec3(0.0), reach, tape, span)
             if bound[0] - reach * bound[1] > ISO:
-                return wp.vec2(0.0)
+                return -1.0
         if nearest_primitive(place, tape, span) == owner:
             low = middle
         else:
             high = middle
     gap = 0.5 * (low + high)
+    if field_value(start + gap * step, tape, span) < ISO:
+        return gap
+    return -1.0
+
+
+@wp.func
+def gap_across(start: wp.vec3, step: wp.vec3, tape: Texels, span: wp.vec2i) -> wp.vec2:
+    """Return the width of the gap that an edge crosses, 0 without one, and `gap_at`."""
+    gap = gap_at(start, step, tape, span)
+    if gap < 0.0:
+        return wp.vec2(0.0, gap)
     within = float(0.0)
     beyond = gap
     first_side = float(0.0)
-    width = float(0.0)
-    for turn in range(2 * SIDE_HALVINGS + 1):  # at the middle first, then to both sides
-        t = gap
-        if turn > 0:
-            t = 0.5 * (within + beyond)
+    for halving in range(2 * SIDE_HALVINGS):  # to one side, then to the other
+        t = 0.5 * (within + beyond)
         if field_value(start + t * step, tape, span) < ISO:
             beyond = t
-        elif turn == 0:
-            return wp.vec2(0.0)
         else:
             within = t
-        if turn == SIDE_HALVINGS:
+        if halving == SIDE_HALVINGS - 1:
             first_side = beyond
             within = 1.0
             beyond = gap
-        elif turn == 2 * SIDE_HALVINGS:
-            width = (beyond - first_side) * wp.length(step)
+    width = (beyond - first_side) * wp.length(step)
     p = start + gap * step
     if width <= TOUCHING * wp.max(wp.max(wp.abs(p[0]), wp.abs(p[1])), wp.abs(p[2])):
-        return wp.vec2(0.0)
+        width = 0.0
     return wp.vec2(width, gap)
 
 
@@ -240,3 +248,36 @@ def find_crossing_edges(
                         join(i, other, labels)
                 elif stage == 3:
                     widths[3 * i + axis] = 0.0
+
+
+@wp.kernel
+def mark_open(
+    first: wp.int32,
+    faces: wp.array(dtype=wp.vec3i),
+    positions: wp.array(dtype=wp.vec3),
+    normals: wp.array(dtype=wp.vec3),
+    cell: wp.float32,
+    blocks: wp.array(dtype=wp.int32),
+    spans: wp.array(dtype=wp.vec2i),
+    tape: Texels,
+    opened: wp.array(dtype=wp.bool),
+) -> None:
+    """Mark triangles that may bridge a gap, but for those across creases, below which an edge is inside.
+
+    The bottom of a crease is where the planes at both ends meet. `blocks` have the tapes that hold there.
+    """
+    i = first + wp.tid()
+    for side in range(3):
+        a = faces[i][side]
+        b = faces[i][(side + 1) % 3]
+        if a < b and may_bridge(a, b, positions, normals):
+            step = positions[b] - positions[a]
+            outward = normals[a] + normals[b]
+            sine = 0.5 * wp.length(outward)
+            depth = 0.5 * wp.length(step) * wp.sqrt(wp.max(1.0 - sine * sine, 0.0)) + BELOW * cell * sine
+            if depth > DEEPEST * cell * sine:
+                opened[i] = True
+            else:
+                start = positions[a] - depth / sine * wp.normalize(outward)
+                if gap_at(start, step, tape, spans[blocks[i]]) >= 0.0:
+                    opened[i] = True

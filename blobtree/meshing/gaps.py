@@ -9,11 +9,11 @@ samples. So the samples and the edges that stay inside are a graph. An edge cros
 different components of the graph. Cells beside such edges are divided until no such edge is left.
 
 A mesh that bridges a gap has triangles with corners on both sides, whose normals face each other. Few meshes
-without gaps have any, and only these are searched.
+without gaps have any, at creases, and these prove that an edge below the crease is inside. All others are
+searched.
 """
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,13 +21,13 @@ import warp as wp
 
 from blobtree._typing import BoolArray, Float64Array, IndexArray, Int32Array, Int64Array
 from blobtree.cells.grid import BRANCHING, CHILDREN
-from blobtree.cells.scan import arange
 from blobtree.cells.sparse_cells import SparseCells
 from blobtree.device import launch
 from blobtree.formulas.falloff import ISO
 from blobtree.meshing.block_tree import BlockTree, on_device
-from blobtree.meshing.gap_kernels import find_crossing_edges
-from blobtree.meshing.mesh import DeviceMesh, bridging_faces, extract_mesh, sample_cells
+from blobtree.meshing.dual_kernels import SAMPLES
+from blobtree.meshing.gap_kernels import find_crossing_edges, mark_open
+from blobtree.meshing.mesh import DeviceMesh, bridging_faces, extract_mesh
 from blobtree.progress import Progress
 
 NEAR_BLOCKS = 3
@@ -108,8 +108,18 @@ class Gaps:
         return crossing.chosen(self._apart(crossing))
 
     def cross(self, blocks: IndexArray) -> bool:
-        """Return True if there are edges across gaps, if there are any in blocks of the base."""
-        return len(self._crossing_in(blocks, 0)) > 0 and len(self.edges()) > 0
+        """Return True if there are edges across gaps, if there are any beside blocks of the base."""
+        beside = np.flatnonzero(self._near(blocks, 1))
+        few = 2 * len(beside) < len(self._tree)
+        return (not few or len(self._crossing_in(beside, 0)) > 0) and len(self.edges()) > 0
+
+    def _near(self, blocks: IndexArray, distance: int) -> BoolArray:
+        """Return True for blocks of the base within a distance, in blocks, from some of them."""
+        from scipy.spatial import cKDTree  # most meshes need none
+
+        base = self._tree.coordinates[: len(self._tree.cells.leaves)]
+        search = cKDTree(base[blocks])
+        return np.asarray(search.query(base, p=np.inf, distance_upper_bound=distance + 0.5)[0] < np.inf)
 
     def _search(self) -> None:
         """Look for edges that cross the outside in new blocks."""
@@ -147,15 +157,11 @@ class Gaps:
 
     def _apart(self, crossing: CrossingEdges) -> BoolArray:
         """Return True for edges whose ends no edges join that stay inside."""
-        from scipy.sparse import coo_matrix  # most meshes have no such edges
+        from scipy.sparse import coo_matrix  # as above
         from scipy.sparse.csgraph import connected_components
-        from scipy.spatial import cKDTree
 
         tree = self._tree
-        base = tree.coordinates[: len(tree.cells.leaves)]
-        centers = base[np.unique(self._roots[crossing.blocks])]
-        near = cKDTree(centers).query(base, p=np.inf, distance_upper_bound=NEAR_BLOCKS + 0.5)[0] < np.inf
-        blocks = np.flatnonzero(near[self._roots])
+        blocks = np.flatnonzero(self._near(np.unique(self._roots[crossing.blocks]), NEAR_BLOCKS)[self._roots])
         row_of = np.full(len(tree), -1)
         row_of[blocks] = np.arange(len(blocks))
         inside = tree.values[blocks] >= ISO
@@ -195,16 +201,24 @@ class Gaps:
 
 def mesh_without_gaps(cells: SparseCells, report: Progress) -> DeviceMesh | None:
     """Return the mesh of cells of one size; None if it bridges a gap."""
-    every = arange(len(cells.leaves), cells.device)
-    samples = sample_cells(cells, every, partial(report, "sampling the field"))
+    samples: Any = wp.empty(len(cells.leaves) * SAMPLES, dtype=wp.float32, device=cells.device)
     mesh = extract_mesh(cells, report, samples=samples)
+    blocks = open_blocks(mesh)
+    return None if len(blocks) and Gaps(BlockTree(cells, samples)).cross(blocks) else mesh
+
+
+def open_blocks(mesh: DeviceMesh) -> IndexArray:
+    """Return the blocks of triangles that may bridge a gap, but for those across creases."""
     bridging = bridging_faces(mesh)
-    if len(bridging):
-        corners = np.unique(mesh.faces.numpy()[bridging])
-        blocks = np.unique(np.searchsorted(mesh.vertex_starts.numpy(), corners, side="right") - 1)
-        if Gaps(BlockTree(cells, samples)).cross(blocks):
-            return None
-    return mesh
+    if not len(bridging):
+        return bridging
+    cells, faces = mesh.cells, mesh.faces.numpy()[bridging]
+    blocks = np.searchsorted(mesh.vertex_starts.numpy(), faces[:, 0], side="right") - 1
+    inputs = [on_device(faces, wp.vec3i, cells.device), mesh.vertices, mesh.normals, cells.grid.cell_size]
+    inputs += [on_device(blocks, wp.int32, cells.device), cells.leaves.spans, cells.leaves.tape]
+    opened: Any = wp.zeros(len(faces), dtype=wp.bool, device=cells.device)
+    launch(cells.tape.instruction_set.kernel_for(mark_open), len(faces), inputs, [opened], cells.device)
+    return np.unique(blocks[opened.numpy()])
 
 
 def connected_blocks(coordinates: Int32Array) -> IndexArray:

@@ -170,17 +170,6 @@ def vertex_arrays(positions: DeviceArray, normals: DeviceArray, colors: DeviceAr
     return vertices
 
 
-def sample_cells(cells: SparseCells, listed: DeviceArray, step: Callable[[float], None]) -> DeviceArray:
-    """Return the field at the samples of listed blocks."""
-    count, arrays, grid = len(listed) * SAMPLES, cells.arrays, cells.grid
-    values: DeviceArray = wp.empty(count, dtype=wp.float32, device=cells.device)
-    inputs = [listed, arrays.blocks, arrays.keys, arrays.spans, arrays.tape]
-    inputs += [child_grid(grid, grid.depth), arrays.models]
-    kernel = cells.tape.instruction_set.kernel_for(sample_blocks)
-    launch(kernel, count, inputs, [values], cells.device, step=step)
-    return values
-
-
 def bridging_faces(mesh: DeviceMesh) -> IndexArray:
     """Return the triangles that may bridge a gap: an edge has outward normals that face each other."""
     count, device = len(mesh.faces), mesh.cells.device
@@ -197,7 +186,7 @@ def extract_mesh(
 ) -> DeviceMesh:
     """Return the dual mesh of the surface in `cells`.
 
-    `previous` is the mesh before an edit, which is reused. `samples` holds the field, if it is known.
+    `previous` is the mesh before an edit, which is reused. `samples` receives the field at the samples.
     """
     return _Extraction(cells, previous).mesh(report, samples)
 
@@ -240,7 +229,8 @@ class _Extraction:
         needed = len(changed) * SAMPLES * SAMPLE_BYTES + self._count * BLOCK_BYTES
         demand_memory(needed, self._device, f"the surface in {self._count:,} blocks of cells")
         if values is None:
-            values = sample_cells(self._cells, changed, partial(report, "sampling the field"))
+            values = self._empty(len(changed) * SAMPLES, wp.float32)
+        self._sample(changed, values, partial(report, "sampling the field"))
         codes, rows, offsets, vertex_counts, quad_counts = self._classify(changed, unchanged, values)
         vertex_starts, vertex_total = exclusive_scan(vertex_counts, "vertices")
         quad_starts, quad_total = exclusive_scan(quad_counts, "triangles")
@@ -296,6 +286,13 @@ class _Extraction:
         self._launch(mark, len(listed), [listed, self._arrays], [flags])
         self._launch(self._reuse.invert_flags, self._count, [flags], [others])
         return compact(flags), compact(others)
+
+    def _sample(self, changed: DeviceArray, values: DeviceArray, step: Callable[[float], None]) -> None:
+        """Write the field at the samples of changed blocks."""
+        cells, grid = self._arrays, self._cells.grid
+        inputs = [changed, cells.blocks, cells.keys, cells.spans, cells.tape]
+        inputs += [child_grid(grid, grid.depth), cells.models]
+        self._launch(self._kernel(sample_blocks), len(values), inputs, [values], step)
 
     def _classify(
         self, changed: DeviceArray, unchanged: DeviceArray, values: DeviceArray

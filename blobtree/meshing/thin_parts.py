@@ -54,8 +54,9 @@ def shows_thin_parts(tree: ImplicitModel, resolution: int, device: str | None) -
 def shows_small_parts(tree: ImplicitModel, resolution: int, size: float, device: str | None) -> bool:
     """Return True if a part is thinner than `size` cells of `resolution`; where there are warps, look."""
     cell = cell_size_of(tree, resolution, None)
-    if not has_small_parts(tree, size * cell) or not has_warps(tree):
-        return has_small_parts(tree, size * cell)
+    small = has_small_parts(tree, size * cell)
+    if not small or not has_warps(tree):
+        return small
     from blobtree.meshing.parts import PART_KERNELS, least_size  # imported here, as above
 
     load_kernels(tree, device, False, *PART_KERNELS)

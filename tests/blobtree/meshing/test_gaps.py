@@ -8,7 +8,7 @@ import pytest
 
 from blobtree import Box, Node, Point, Polygonizer, Segment, Sum, Union, polygonize
 from blobtree.meshing.block_tree import BlockTree
-from blobtree.meshing.gaps import Gaps
+from blobtree.meshing.gaps import Gaps, open_blocks
 from blobtree.meshing.mesh import DeviceMesh, bridging_faces
 from tests.gap_pairs import random_pair
 from tests.thin_trees import is_closed, pieces
@@ -103,6 +103,14 @@ def test_triangles_across_gaps_bridge(seed: int) -> None:
     across = side[mesh.faces.numpy()].any(axis=1) & ~side[mesh.faces.numpy()].all(axis=1)
     assert across.any()
     assert set(np.flatnonzero(across)) & set(bridging_faces(mesh))
+    assert len(open_blocks(mesh))
+
+
+@pytest.mark.parametrize("distance", [0.3, 0.9])
+@pytest.mark.parametrize("other", [BALL, CUBE, Segment((-2, 0, 0), (2, 0, 0), radius=0.5)])
+def test_triangles_across_creases_are_passed_over(other: Node, distance: float) -> None:
+    mesh = meshed(BALL | other.translate((distance, 0.2, 0.1)))
+    assert not len(open_blocks(mesh))
 
 
 @pytest.mark.parametrize("seed", [0, 2, 10, 43])
