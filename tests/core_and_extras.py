@@ -47,7 +47,7 @@ EXTRAS: dict[str, str] = {
         """,
     "decals.scattering": """
         bare_places center_normals covering covering_rule creases deform density gap_filling
-        image_projections owned_points polish relocation remesh trial_points turned_normals
+        image_projections owned_points part_shares polish relocation remesh trial_points turned_normals
         """,
     "decals.scenes": """
         animation area_gradient figure gaps measure outlines pose reproduction

@@ -3,11 +3,12 @@
 from decals.scattering.covering_rule import covering_decals
 from decals.scattering.deform import carried
 from decals.scattering.gap_filling import fill_gaps
+from decals.scattering.part_shares import PartShares
 from decals.scattering.polish import polish
 from decals.scattering.relocation import Relocation
 from decals.scattering.sizing import RULES, Sizing
 
-RELOCATIONS = (Relocation,)
+RELOCATIONS = (Relocation, PartShares)
 """Made of a domain and spacings; called at intervals, they move particles of a state and return which."""
 
 SEPARATIONS = (polish,)

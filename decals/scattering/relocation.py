@@ -122,7 +122,7 @@ def relocate(
     Repulsion acts only nearby: it carries no particle to another component, round a sharp tip, or past
     its neighbours. Counts of the parts stay the same. `candidate_sizes` are spacings at the candidates.
     """
-    gaps = _gap_sizes(state, candidates, candidate_sizes)
+    gaps = gap_sizes(state, candidates, candidate_sizes, enough=MIN_GAP)
     bare = np.flatnonzero(gaps > MIN_GAP)
     separations = MIN_SEPARATION * candidate_sizes[bare]
     maxima = local_maxima(candidates.positions[bare], gaps[bare], separations, device=state.device)
@@ -143,8 +143,13 @@ def relocate(
     return rows
 
 
-def _gap_sizes(state: ParticleState, candidates: OrientedPoints, sizes: Float32Array) -> Float32Array:
-    """Return the distance of each candidate to the nearest facing particle, in spacings, up to a limit."""
+def gap_sizes(
+    state: ParticleState, candidates: OrientedPoints, sizes: Float32Array, *, enough: float
+) -> Float32Array:
+    """Return the distance of each candidate to the nearest facing particle, in spacings, up to a limit.
+
+    Distances below `enough` need not be the least.
+    """
     device, count = state.device, len(candidates)
     points = particle_struct(
         vectors(candidates.positions, device),
@@ -155,5 +160,5 @@ def _gap_sizes(state: ParticleState, candidates: OrientedPoints, sizes: Float32A
     surface_ids = index_array(candidates.surface_ids, device)
     enabled = index_array(np.ones(count, np.int32), device)
     mirrors = state.mirror_planes(points, surface_ids, enabled)
-    gaps: Float32Array = NeighborQuery(state, GAP_REACH).nearest(points, own, mirrors, enough=MIN_GAP).numpy()
+    gaps: Float32Array = NeighborQuery(state, GAP_REACH).nearest(points, own, mirrors, enough=enough).numpy()
     return gaps
