@@ -6,7 +6,8 @@ values, so that they never block the page.
 
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,10 @@ from markdown_it import MarkdownIt
 from decals.apps.lab.bindings import AXES, MODES, binding
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Scope
-from decals.apps.lab.lesson import Lesson, Slider
+from decals.apps.lab.lesson import Lesson, Slider, shown
 from decals.apps.lab.plots import drawn
 from decals.apps.lab.relaxing import Recording
+from decals.apps.lab.symbols import marked, readings, table
 from decals.apps.sandbox.controls import STEPS, Control, exchanged
 from decals.apps.sandbox.decal_panel import set_drawing
 from decals.editing.commands import ReplaceScene, SetValues
@@ -42,9 +44,10 @@ class Results:
     """What was computed for one state."""
 
     key: object
-    values: list[dict[str, str]]
-    plots: list[dict[str, str]]
     verdict: tuple[bool, str]
+    values: list[dict[str, str]] = field(default_factory=list)
+    plots: list[dict[str, str]] = field(default_factory=list)
+    readings: str = ""
 
 
 class Lab:
@@ -134,11 +137,12 @@ class Lab:
             "lab_titles": self._titles,
             "lab_number": self._number,
             "lab_text": self._texts[self._number],
-            "lab_question": lesson.settings.question.text,
+            "lab_question": marked(escape(lesson.settings.question.text)),
             "lab_sliders": [self._slider(i, slider) for i, slider in enumerate(lesson.settings.sliders)],
             "lab_values": results.values if results is not None else [],
             "lab_plots": results.plots if results is not None else [],
-            "lab_verdict": {"right": right, "text": text},
+            "lab_readings": results.readings if results is not None else "",
+            "lab_verdict": {"right": right, "text": marked(escape(text))},
         }
 
     def _slider(self, number: int, slider: Slider) -> dict[str, Any]:
@@ -176,7 +180,7 @@ class Lab:
             try:
                 self._results = done.result()
             except ImplicitDecalsError as error:
-                self._results = Results(self._submitted, [], [], (False, str(error)))
+                self._results = Results(self._submitted, (False, str(error)))
         key = self._key()
         if self._asking and not self._editing:
             self._asked, self._asking = key, False
@@ -184,7 +188,7 @@ class Lab:
             try:
                 experiment = self.experiment()
             except InvalidLesson as error:
-                self._results = Results(key, [], [], (False, str(error)))
+                self._results = Results(key, (False, str(error)))
                 return
             self._submitted = key
             self._pending = self._worker.submit(measured, self.lesson, experiment, key)
@@ -256,15 +260,19 @@ class Lab:
             state.run_step(command, last=last)
 
     def move_probe(self, ray: Ray) -> None:
-        """Move the probe to the pointer, in the plane of the picture, along the axes of the sliders."""
+        """Move the probe to the pointer, along the axes of its sliders; without sliders, over the surface."""
         eye, target = self._window.camera.eye_and_target()
         point = on_plane(self.probe, np.subtract(eye, target), ray)
         if point is None:
             return
-        for number, slider in enumerate(self.lesson.settings.sliders):
-            if slider.path.startswith("probe."):
-                along = float(point[AXES.index(slider.path[-1])])
-                self.set_value(number, min(max(along, slider.low), slider.high))
+        sliders = [s for s in enumerate(self.lesson.settings.sliders) if s[1].path.startswith("probe.")]
+        for number, slider in sliders:
+            along = float(point[AXES.index(slider.path[-1])])
+            self.set_value(number, min(max(along, slider.low), slider.high))
+        if not sliders:
+            x, y, z = self.experiment().points_near(point).positions[0].tolist()
+            self.probe = x, y, z
+            self._mark_probe()
 
     def _relax(self, recording: Recording) -> None:
         """Show the step that was asked for, or the last one that is known in time."""
@@ -290,26 +298,30 @@ class Lab:
         self._asking = True
 
     def _mark_probe(self) -> None:
-        """Show the probe in the view, if the lesson moves it."""
-        plotter = self._window.plotter
-        if not self.lesson.moves_probe:
-            plotter.remove_actor("probe", render=False)
-            return
+        """Show the probe in the view."""
         ball = pv.Sphere(radius=PROBE_SIZE * self.lesson.size, center=self.probe)
-        plotter.add_mesh(ball, name="probe", color="white", pickable=False, reset_camera=False, render=False)
+        look: Any = {"color": "white", "pickable": False, "reset_camera": False, "render": False}
+        self._window.plotter.add_mesh(ball, name="probe", **look)
 
 
 def measured(lesson: Lesson, experiment: Experiment, key: object = None) -> Results:
     """Return values, plots and the verdict of a lesson for one state of its scene."""
     scope = Scope.at_probe(experiment)
     plots = [
-        {"title": plot.title, "note": plot.note, "svg": drawn(plot, lesson, scope)}
+        {
+            "title": plot.title,
+            "note": marked(escape(plot.note)),
+            "formula": marked(escape(lesson.formula_of(plot, scope))),
+            "svg": drawn(plot, lesson, scope),
+        }
         for plot in lesson.settings.plots
     ]
-    return Results(key, lesson.values(scope), plots, lesson.verdict(scope))
+    values = [{**value, "label": marked(escape(value["label"]))} for value in lesson.values(scope)]
+    rows = [(name, [shown(number) for number in numbers]) for name, numbers in readings(scope)]
+    return Results(key, lesson.verdict(scope), values, plots, table(rows))
 
 
 def _html(text: str) -> str:
-    """Return Markdown as HTML; HTML and pictures in it stay text, so that it asks no other server."""
+    """Return Markdown as HTML with marked symbols; HTML and pictures in it stay text: it asks no server."""
     html: str = MarkdownIt("commonmark", {"html": False}).disable("image").enable("table").render(text)
-    return html
+    return marked(html)

@@ -59,6 +59,13 @@ class Value(Struct, forbid_unknown_fields=True, frozen=True):
     formula: str
 
 
+class Case(Struct, forbid_unknown_fields=True, frozen=True):
+    """A formula with its live numbers, shown where a condition holds."""
+
+    text: str
+    when: str = "1"
+
+
 class Plot(Struct, forbid_unknown_fields=True, frozen=True):
     """Curves over a range or the lesson's line, or a map of colours over two ranges or the surface."""
 
@@ -71,6 +78,7 @@ class Plot(Struct, forbid_unknown_fields=True, frozen=True):
     y: Range | None = None
     values: Range | None = None
     marks: tuple[tuple[str, str], ...] = ()
+    formula: tuple[Case, ...] = ()
     note: str = ""
 
 
@@ -133,8 +141,10 @@ class Lesson:
         The scene at the beginning.
     formulas
         All formulas by their text, for the variables of their places.
-    wrong, right
-        Text of each check that fails, and of the right answer.
+    templates
+        All texts with formulas in braces.
+    folder
+        The folder of its files.
 
     Examples
     --------
@@ -148,8 +158,8 @@ class Lesson:
     text: str
     scene: Scene
     formulas: dict[str, Formula]
-    wrong: tuple[Template, ...]
-    right: Template
+    templates: dict[str, Template]
+    folder: Path
 
     @property
     def size(self) -> float:
@@ -158,10 +168,13 @@ class Lesson:
         visible = 2.0 * camera.distance * float(np.tan(np.radians(camera.fov) / 2))
         return visible if self.settings.size is None else self.settings.size
 
-    @property
-    def moves_probe(self) -> bool:
-        """True if a slider moves the probe, so that it is shown."""
-        return any(slider.path.startswith("probe.") for slider in self.settings.sliders)
+    def filled(self, text: str, scope: Scope) -> str:
+        """Return one of the lesson's texts with the values of its formulas."""
+        return self.templates[text].filled(scope)
+
+    def holds(self, formula: str, scope: Scope) -> bool:
+        """Return True if one of the lesson's conditions holds."""
+        return bool(np.all(self.formulas[formula].evaluate(scope)))
 
     def values(self, scope: Scope) -> list[dict[str, str]]:
         """Return the live values: label and text of each."""
@@ -173,10 +186,15 @@ class Lesson:
     def verdict(self, scope: Scope) -> tuple[bool, str]:
         """Return whether the scene answers the question, and the text to say so."""
         question = self.settings.question
-        for check, text in zip(question.checks, self.wrong, strict=True):
-            if not np.all(self.formulas[check.holds].evaluate(scope)):
-                return False, text.filled(scope)
-        return True, self.right.filled(scope)
+        for check in question.checks:
+            if not self.holds(check.holds, scope):
+                return False, self.filled(check.otherwise, scope)
+        return True, self.filled(question.right, scope)
+
+    def formula_of(self, plot: Plot, scope: Scope) -> str:
+        """Return the formula beside a plot, with the numbers at the probe."""
+        cases = (case.text for case in plot.formula if self.holds(case.when, scope))
+        return next((self.filled(text, scope) for text in cases), "")
 
 
 def shown(value: Any) -> str:
@@ -236,13 +254,11 @@ def _parsed(source: str, folder: Path) -> Lesson:
     for i, slider in enumerate(settings.sliders):
         with _place(f"sliders[{i}]"):
             _check_slider(slider, scene)
-    wrong = []
-    for i, check in enumerate(settings.question.checks):
-        with _place(f"question.checks[{i}].otherwise"):
-            wrong.append(_template(check.otherwise))
-    with _place("question.right"):
-        right = _template(settings.question.right)
-    return Lesson(settings, rest[1].strip(), scene, formulas, tuple(wrong), right)
+    templates: dict[str, Template] = {}
+    for place, text in _texts(settings):
+        with _place(place):
+            templates[text] = _template(text)
+    return Lesson(settings, rest[1].strip(), scene, formulas, templates, folder)
 
 
 def _without_files(scene: Scene) -> Scene:
@@ -301,8 +317,18 @@ def _formulas(settings: Settings) -> Iterator[tuple[str, str, set[str]]]:
         texts = [*(curve.formula for curve in plot.curves), *filter(None, (plot.map, plot.red))]
         yield from ((f"plots[{i}]", text, names) for text in texts)
         yield from ((f"plots[{i}].marks", text, set()) for mark in plot.marks for text in mark)
+        yield from ((f"plots[{i}].formula", case.when, set()) for case in plot.formula)
     for i, check in enumerate(settings.question.checks):
         yield f"question.checks[{i}]", check.holds, set()
+
+
+def _texts(settings: Settings) -> Iterator[tuple[str, str]]:
+    """Yield place and text of all texts that may have formulas in braces."""
+    for i, plot in enumerate(settings.plots):
+        yield from ((f"plots[{i}].formula", case.text) for case in plot.formula)
+    for i, check in enumerate(settings.question.checks):
+        yield f"question.checks[{i}].otherwise", check.otherwise
+    yield "question.right", settings.question.right
 
 
 def _template(text: str) -> Template:

@@ -231,7 +231,8 @@ def _jacobians(scope: Scope) -> Float64Array:
 # -- solids in contact ----------------------------------------------------------------------------------
 
 
-def _solids(scope: Scope) -> SolidContact:
+def solids_of(scope: Scope) -> SolidContact:
+    """Return the solids of the scene; raise `InvalidLesson` if it has none."""
     trees = (item.tree for item in scope.experiment.objects if isinstance(item, TreeObject))
     model = next((tree for tree in trees if isinstance(tree, SolidContact)), None)
     if model is None:
@@ -246,13 +247,13 @@ def _solid(scope: Scope, number: Any, solids: tuple[Node, ...]) -> Node:
 @measure("number")
 def body(scope: Scope, i: Any) -> Float64Array:
     """Return the field of solid i before it deforms."""
-    return _field(_solid(scope, i, _solids(scope).children), scope.points)
+    return _field(_solid(scope, i, solids_of(scope).children), scope.points)
 
 
 @measure("number")
 def solid(scope: Scope, i: Any) -> Float64Array:
     """Return the field of solid i after it deforms."""
-    return _field(_solid(scope, i, _solids(scope).solids()), scope.points)
+    return _field(_solid(scope, i, solids_of(scope).solids()), scope.points)
 
 
 def _field(node: Node, points: Points) -> Float64Array:
@@ -262,25 +263,25 @@ def _field(node: Node, points: Points) -> Float64Array:
 @measure("number", "number")
 def area(scope: Scope, i: Any, k: Any) -> float:
     """Return the area of the contact of solids i and k; 0 if they are apart."""
-    return float(sum(surface.area for surface in _contacts_of(_solids(scope), i, k)))
+    return float(sum(surface.area for surface in _contacts_of(solids_of(scope), i, k)))
 
 
 @measure("number")
 def volume(scope: Scope, i: Any) -> float:
     """Return the volume of solid i after it deforms."""
-    return _volume(_solid(scope, i, _solids(scope).solids()))
+    return _volume(_solid(scope, i, solids_of(scope).solids()))
 
 
 @measure("number")
 def free_volume(scope: Scope, i: Any) -> float:
     """Return the volume of solid i alone."""
-    return _volume(_solid(scope, i, _solids(scope).children))
+    return _volume(_solid(scope, i, solids_of(scope).children))
 
 
 @measure("number", "number")
 def penetration(scope: Scope, i: Any, k: Any) -> float:
     """Return how deep solids i and k would overlap without contact, on the line of their centres."""
-    pair = [_solid(scope, number, _solids(scope).children) for number in (i, k)]
+    pair = [_solid(scope, number, solids_of(scope).children) for number in (i, k)]
     ends = [np.mean(node.bounds, axis=0, dtype=np.float64) for node in pair]
     reach = max(float(np.ptp(node.bounds, axis=0).max()) for node in pair)
     apart = ends[1] - ends[0]
@@ -294,7 +295,7 @@ def penetration(scope: Scope, i: Any, k: Any) -> float:
 @measure("number", "number")
 def bulge(scope: Scope, i: Any, k: Any) -> float:
     """Return the width of the bulge of solid i around its contact with solid k."""
-    model = _solids(scope)
+    model = solids_of(scope)
     rings = [ring for surface in _contacts_of(model, i, k) for ring in surface.outlines]
     if not rings:
         return 0.0

@@ -8,13 +8,14 @@ from trame.widgets import client, html, vuetify3
 
 from decals.apps.lab.lab import Lab
 from decals.apps.lab.lesson import Lesson
+from decals.apps.lab.symbols import LIT
 from decals.apps.sandbox.page import PANEL_WIDTH, Page, drawer
 from decals.apps.sandbox.panels import build_controls, icon_button, named
 from decals.window import EditWindow
 
 LESSON_WIDTH, PLOTS_WIDTH = 330, 350
 
-STYLE = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
+STYLE = Path(__file__).with_name("page.css").read_text(encoding="utf-8") + f"{LIT} {{ stroke-width: 5 }}"
 
 
 class LabPage(Page):
@@ -52,8 +53,7 @@ class LabPage(Page):
     def values(self) -> dict[str, Any]:
         """Return all values that the page shows, by their names there."""
         in_lesson = self.sandbox.in_lesson
-        moves_probe = in_lesson and self.lab.lesson.moves_probe
-        points = {"probe": (self.lab.probe, self.lab.move_probe)} if moves_probe else {}
+        points = {"probe": (self.lab.probe, self.lab.move_probe)} if in_lesson else {}
         self.sandbox.display.points = points
         values = {**super().values(), "in_lesson": in_lesson}
         if in_lesson:
@@ -92,17 +92,17 @@ class LabPage(Page):
 
     def _build_question(self) -> None:
         with vuetify3.VSheet(border=True, rounded=True, classes="pa-2 my-2"):
-            html.Div("{{ lab_question }}", classes="lesson font-weight-medium mb-2")
+            html.Div(v_html=("lab_question",), classes="lesson font-weight-medium mb-2")
             vuetify3.VBtn("Check the answer", color="primary", click=self.lab.check)
-            vuetify3.VAlert(
-                "{{ lab_verdict.text }}",
+            with vuetify3.VAlert(
                 v_if="lab_verdict.text",
                 type=("lab_verdict.right ? 'success' : 'warning'",),
                 raw_attrs=['role="status"'],
                 variant="outlined",
                 density="compact",
                 classes="mt-3 lesson answer",
-            )
+            ):
+                html.Div(v_html=("lab_verdict.text",))
 
     def _build_right_side(self) -> None:
         with drawer("right", f"(in_lesson ? {PLOTS_WIDTH} : {PANEL_WIDTH})"):
@@ -119,12 +119,18 @@ class LabPage(Page):
             with html.Div(v_if="in_lesson && lab_side === 'plots'", classes="px-2 pb-2 plots"):
                 with html.Table(v_if="lab_values.length", classes="mb-2 text-caption", style="width: 100%"):  # noqa: SIM117  (one level of HTML a line)
                     with html.Tr(v_for="v in lab_values", key="v.label"):
-                        html.Td("{{ v.label }}")
+                        html.Td(v_html=("v.label",))
                         html.Td("{{ v.text }}", style="text-align: right; font-variant-numeric: tabular-nums")
-                with html.Div(v_for="p in lab_plots", key="p.title", classes="mb-2"):
+                html.Div(
+                    v_html=("lab_readings",),
+                    classes="readings text-caption mb-2",
+                    raw_attrs=['role="group"', *named("'at the probe'")],
+                )
+                with html.Div(v_for="p in lab_plots", key="p.title", classes="plot mb-2"):
                     html.Div("{{ p.title }}", classes="text-body-2 font-weight-medium")
+                    html.Div(v_html=("p.formula",), classes="formula text-caption")
                     html.Div(v_html=("p.svg",))
-                    html.Div("{{ p.note }}", classes="text-caption")
+                    html.Div(v_html=("p.note",), classes="text-caption")
             with html.Div(v_if="!in_lesson || lab_side === 'model'"):
                 with html.Div(v_if="in_lesson"):
                     self._build_outline()

@@ -11,6 +11,7 @@ from blobtree._typing import BoolArray, Float64Array
 from decals.apps.lab.experiment import MAP_PIXELS, Points, Scope
 from decals.apps.lab.lesson import Lesson, Plot
 from decals.apps.lab.measures import owner
+from decals.apps.lab.symbols import SYMBOL, marked
 from decals.apps.sandbox.outline import png_url
 
 WIDTH, HEIGHT, MAP_HEIGHT = 330, 150, 205
@@ -60,7 +61,7 @@ class _Axes:
     def add(self, tag: str, text: object = "", **attributes: Any) -> None:
         """Add an element."""
         pairs = " ".join(f'{name.replace("_", "-")}="{value}"' for name, value in attributes.items())
-        self.parts.append(f"<{tag} {pairs}>{escape(str(text))}</{tag}>")
+        self.parts.append(f"<{tag} {pairs}>{marked(escape(str(text)), svg=True)}</{tag}>")
 
     def svg(self, title: str) -> str:
         """Return the picture, with its axes."""
@@ -124,12 +125,13 @@ def _curves(plot: Plot, lesson: Lesson, scope: Scope) -> str:
     axes = _Axes(ends, plot.values or _range(np.concatenate(rows), 0.05), HEIGHT, rows=(len(rows) + 1) // 2)
     for number, (curve, row) in enumerate(zip(plot.curves, rows, strict=True)):
         look = {"stroke": COLORS[number % 6], "stroke_dasharray": DASHES[number % 6]}
-        path = _path(axes, x, row)
-        axes.add("path", d=path, fill="none", stroke_width=2, **look)
+        path, symbol = _path(axes, x, row), SYMBOL.match(curve.label)
+        of = {"data_symbol": symbol[0]} if symbol else {}
+        axes.add("path", d=path, fill="none", stroke_width=2, **look, **of)
         left, down = LEFT + number % 2 * LEGEND_COLUMN, TOP + 6 + number // 2 * LEGEND_ROW
         axes.add("line", x1=left, x2=left + 22, y1=down - 4, y2=down - 4, stroke_width=2, **look)
         axes.add("text", curve.label, x=left + 27, y=down)
-    if plot.x is None and lesson.moves_probe:
+    if plot.x is None:
         here, _ = axes.at(experiment.along_line(scope.points.positions[0]), 0.0)
         look = {"stroke": "currentColor", "stroke_dasharray": "3 3"}
         bottom = axes.top + axes.size[1]
@@ -195,7 +197,7 @@ def _map(plot: Plot, lesson: Lesson, scope: Scope) -> str:
     if plot.red:
         axes.add("rect", x=bar + 30, y=TOP, width=12, height=12, fill="#d50000")
         axes.add("text", plot.red_label, x=bar + 46, y=TOP + 10)
-    if plot.x is None and lesson.moves_probe:
+    if plot.x is None:
         axes.cross(*experiment.on_map(scope.points.positions[0]))
     _mark(plot, lesson, scope, axes)
     return axes.svg(plot.title)

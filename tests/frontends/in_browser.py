@@ -19,7 +19,7 @@ from unittest.mock import patch
 import numpy as np
 import pyvista as pv
 from PIL import Image
-from playwright.async_api import Page
+from playwright.async_api import Locator, Page
 from trame.app import get_server
 from trame.ui.vuetify3 import VAppLayout
 from trame_pyvista.widgets import PyVistaRCAView, PyVistaRemoteView
@@ -27,7 +27,7 @@ from trame_server.core import Server
 
 import decals
 from blobtree import Point
-from decals.apps.lab.lesson import LESSONS, load_lessons
+from decals.apps.lab.lesson import LESSONS, load_lessons, shown
 from decals.apps.lab.page import LabPage
 from decals.apps.models.scenes import empty_scene
 from decals.apps.sandbox.page import Page as SandboxPage
@@ -53,6 +53,7 @@ from tests.frontends.browsing import (
     shows,
     until,
 )
+from tests.oracles.contact import RIM, falloff
 
 BLOB = Point((0, 0, 0), radius=1.0) + Point((1.2, 0.4, 0), radius=0.6)
 
@@ -909,7 +910,16 @@ async def lab(picture: str | None = None) -> None:
         await browser.mouse.down()
         await browser.mouse.move(x + 40, y, steps=4)
         await browser.mouse.up()
-        await until(lambda: lab_page.lab.probe[0] > before[0] + 0.05)
+        await until(lambda: lab_page.lab.probe[0] > before[0] + 0.05 and not lab_page.lab.busy)
+        await until_readings(browser, lab_page)
+        symbol = browser.locator(".lesson-side abbr[data-symbol='g']").first
+        assert "falloff" in str(await symbol.get_attribute("title"))
+        curve = browser.locator("path[data-symbol='g']")
+        for place in (".lesson-side", ".readings", ".formula", ".plot svg"):
+            await browser.locator(f"{place} [data-symbol='g']").first.hover()
+            await until_width(curve, "5px")
+            await browser.get_by_role("button", name="Check the answer").hover()
+            await until_width(curve, "2px")
         await browser.set_viewport_size({"width": 820, "height": 1180})  # a tablet
         parts = [browser.locator(part) for part in (".lesson-side", "[role=application]", ".plots")]
         async with asyncio.timeout(PATIENCE):
@@ -923,6 +933,27 @@ async def lab(picture: str | None = None) -> None:
                 await asyncio.sleep(0.1)
         assert min(view["width"], plots["width"]) > 400
     window.close()
+
+
+async def until_readings(browser: Page, lab_page: LabPage) -> None:
+    """Wait until the page shows d and f of the probe as the formulas of float64 give them."""
+    x, radius = lab_page.lab.probe[0], lab_page.lab.experiment().decals.radii[0]
+    d = np.array(abs(x) / (radius / RIM))
+    expected = {"d": shown(d), "f = g(d)": shown(falloff(d))}
+    names, numbers = (browser.locator(f".readings {tag}") for tag in ("th", "td"))
+    async with asyncio.timeout(PATIENCE):
+        while True:
+            texts = dict(zip(await names.all_inner_texts(), await numbers.all_inner_texts(), strict=False))
+            if expected.items() <= texts.items():
+                return
+            await asyncio.sleep(0.1)
+
+
+async def until_width(line: Locator, width: str) -> None:
+    """Wait until a line has a width."""
+    async with asyncio.timeout(PATIENCE):
+        while await line.evaluate("path => getComputedStyle(path).strokeWidth") != width:
+            await asyncio.sleep(0.1)
 
 
 async def answer(browser: Page, lab_page: LabPage, *settings: tuple[str, float | str]) -> None:

@@ -1,0 +1,87 @@
+"""The symbols of the paper: their definitions, marked in texts, and their values at the probe."""
+
+import re
+from collections.abc import Iterable
+from html import escape
+
+import numpy as np
+
+from decals.apps.lab.experiment import Scope
+from decals.apps.lab.measures import MEASURES, F, h, owner, solids_of
+from decals.model import Interaction
+from decals.record import Contact
+
+DEFINITIONS = {
+    "r": "visible radius: at this distance from the centre is the rim of the image; r = 0.454 s",
+    "s": "influence radius: at this distance from the centre the field ends",
+    "d": "distance of the point from the centre, over the influence radius s",
+    "g": "falloff (1 − d²)³: 1 at the centre, ½ on the rim, 0 from the distance s on",
+    "f": "field g(d) before contact: the image is shown where it is ½ or more",
+    "h": "factor by which a neighbour lowers the owner's field: 1 without a push, 0 on the line of contact",
+    "F": "field after contact, ½ + (f − ½) h: it says how far from its middle the image is read",
+}
+"""What each symbol means, for decals and solids."""
+
+SYMBOL = re.compile(rf"(?<![\w'’])([{''.join(DEFINITIONS)}])([₀-₉]*)(?![^\W²³])")
+"""A symbol in a text, with the number of its decal."""
+
+TAG = re.compile(r"(<[^>]*>)")
+
+LIT = ",".join(
+    f'.v-application:has(:is(abbr, tspan)[data-symbol="{s}"]:hover) path[data-symbol="{s}"]'
+    for s in ("g", "h", "F", "f", "f₀", "f₁", "F₀", "F₁")
+)
+"""Selector of the curve whose symbol is under the pointer."""
+
+
+def marked(html: str, *, svg: bool = False) -> str:
+    """Return HTML, or the text of an SVG element, whose symbols show their definitions under the pointer."""
+
+    def definition(match: re.Match[str]) -> str:
+        title = escape(f"{match[0]}: {DEFINITIONS[match[1]]}")
+        if svg:
+            return f'<tspan data-symbol="{match[0]}"><title>{title}</title>{match[0]}</tspan>'
+        return f'<abbr data-symbol="{match[0]}" title="{title}">{match[0]}</abbr>'
+
+    parts = TAG.split(html)
+    return "".join(part if i % 2 else SYMBOL.sub(definition, part) for i, part in enumerate(parts))
+
+
+def readings(scope: Scope) -> list[tuple[str, list[float]]]:
+    """Return rows of symbols with their values at the probe, one for each of two decals or for the point.
+
+    The decals are the one that shows, else that of the highest field, and the strongest other one, by their
+    numbers. h is that of equation 5, and unknown in modes that do without it.
+    """
+    decals = scope.experiment.decals
+
+    def row(name: str, measure: str, numbers: Iterable[int]) -> tuple[str, list[float]]:
+        return name, [float(np.ravel(MEASURES[measure].function(scope, i))[0]) for i in numbers]
+
+    if scope.experiment.in_space:
+        solids = range(len(solids_of(scope).children))
+        return [("solid", [*map(float, solids)]), row("f", "body", solids), row("F", "solid", solids)]
+    if not len(decals):
+        return []
+    _, fields = row("f", "f", range(len(decals)))
+    own = int(owner(scope)[0])
+    own = int(np.argmax(fields)) if own < 0 else own
+    others = sorted({*range(len(fields))} - {own}, key=fields.__getitem__)[-1:]
+    pair, push = sorted([own, *others]), float("nan")
+    if others and scope.experiment.rules.contact in (Contact.PRODUCT, Contact.MIN):
+        alone = np.ptp(decals.layers[pair]) or (decals.interactions[pair] != Interaction.PUSH).any()
+        push = 1.0 if alone else float(h(scope, others[0], own)[0])
+    columns = {"r": "radius", "s": "influence", "d": "d", "f = g(d)": "f"}
+    rows = [row(name, measure, pair) for name, measure in columns.items()]
+    return [("decal", [*map(float, pair)]), *rows, ("h", [push]), ("F", [float(F(scope)[0])])]
+
+
+def table(rows: list[tuple[str, list[str]]]) -> str:
+    """Return the readings as an HTML table, with a column for each symbol."""
+    height = max((len(texts) for _, texts in rows), default=0)
+    head = "".join(f'<th scope="col">{marked(name)}</th>' for name, _ in rows)
+    lines = [
+        "".join(f'<td rowspan="{height // len(row)}">{row[i]}</td>' for _, row in rows if i < len(row))
+        for i in range(height)
+    ]
+    return f"<table><tr>{head}</tr><tr>{'</tr><tr>'.join(lines)}</tr></table>" if lines else ""
