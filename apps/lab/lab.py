@@ -20,6 +20,7 @@ from decals.apps.lab.experiment import Experiment, Scope
 from decals.apps.lab.lesson import Lesson, Slider, shown
 from decals.apps.lab.plots import drawn
 from decals.apps.lab.relaxing import Recording
+from decals.apps.lab.script import script
 from decals.apps.lab.symbols import marked, readings, table
 from decals.apps.sandbox.controls import STEPS, Control, exchanged
 from decals.apps.sandbox.decal_panel import set_drawing
@@ -287,6 +288,10 @@ class Lab:
         if self._step == self._target:
             self._window.actions.state.end_stroke()
         self._window.redraw(whole=self._step == self._target)
+
+    def script(self) -> str:
+        """Return lines of Python that make the present picture."""
+        return script(self.lesson, self.experiment(), self._recording)
 
     def leave(self) -> None:
         """Leave the lesson: its scene stays, its probe goes."""

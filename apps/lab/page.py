@@ -43,7 +43,7 @@ class LabPage(Page):
         **options: Any,
     ) -> None:
         self.lab = Lab(window, lessons)
-        server.state.update({"lab_side": "plots", **self.lab.values()})
+        server.state.update({"lab_side": "plots", "lab_script": "", **self.lab.values()})
         titles = [lesson.settings.title for lesson in lessons]
         super().__init__(server, window, lessons=titles, start_lesson=self.lab.start, **options)
         if in_lesson:
@@ -77,10 +77,29 @@ class LabPage(Page):
                         update_modelValue=(self._restart, "[$event]"),
                     )
                     icon_button("mdi-restart", "start the lesson again", (self._restart, "[lab_number]"))
+                    icon_button("mdi-language-python", "lines of Python for this picture", self._show_script)
+                    keep = self.sandbox.close_lesson, "[true]"
+                    icon_button("mdi-open-in-app", "open in the sandbox", keep)
                     icon_button("mdi-close", "leave the lesson", self.sandbox.close_lesson)
+                self._build_script()
                 html.Div(v_html=("lab_text",), classes="lesson", tabindex=0)
                 self._build_question()
                 build_controls("lab_sliders", self._set_value, "c.number", key="lab_number + c.name")
+
+    def _show_script(self) -> None:
+        """Show the lines of Python that make the present picture."""
+        self.sandbox.attempt(lambda: self._server.state.update({"lab_script": self.lab.script()}))
+
+    def _build_script(self) -> None:
+        with (
+            vuetify3.VDialog(
+                model_value=("!!lab_script",), update_modelValue="lab_script = ''", max_width=860
+            ),
+            vuetify3.VCard(title="Lines of Python for this picture"),
+            vuetify3.VCardText(),
+        ):
+            html.Pre("{{ lab_script }}", classes="script", tabindex=0)
+            vuetify3.VBtn("Copy", color="primary", click="utils.sandbox.copy(lab_script)")
 
     def _restart(self, number: int) -> None:
         """Start a lesson from its beginning."""

@@ -117,6 +117,9 @@
       if (sought) return `${row.label} ${row.type}`.toLowerCase().includes(sought.trim().toLowerCase());
       return !folded.some((key) => isBelow(row.key, key));
     },
+    copy(text) {
+      navigator.clipboard.writeText(text);
+    },
     // Fold a row, or unfold it.
     fold(row, folded) {
       return folded.includes(row.key) ? folded.filter((key) => key !== row.key) : [...folded, row.key];

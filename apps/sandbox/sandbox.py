@@ -434,10 +434,11 @@ class Sandbox:
         self._start_lesson(number)
         self.in_lesson, self._files.start_open = True, False
 
-    def close_lesson(self) -> None:
-        """Leave the lesson and go back to the scene before it; without one, that of the lesson stays."""
+    def close_lesson(self, keep: bool = False) -> None:
+        """Leave the lesson and go back to the scene before it; without one, or to keep it, its own stays."""
         self.in_lesson = False
-        if self._before_lesson is None:
+        if keep is True or self._before_lesson is None:
+            self._before_lesson = None
             return
         entry, camera = self._before_lesson
 

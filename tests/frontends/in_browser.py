@@ -914,9 +914,15 @@ async def lab(picture: str | None = None) -> None:
         await until_readings(browser, lab_page)
         symbol = browser.locator(".lesson-side abbr[data-symbol='g']").first
         assert "falloff" in str(await symbol.get_attribute("title"))
+        await browser.get_by_role("button", name="lines of Python for this picture").click()
+        lines = browser.locator("pre.script")
+        await lines.get_by_text("decals.load_scene").wait_for()
+        assert await lines.inner_text() == lab_page.lab.script().rstrip()
+        await browser.keyboard.press("Escape")
+        await lines.wait_for(state="hidden")
         curve = browser.locator("path[data-symbol='g']")
-        for place in (".lesson-side", ".readings", ".formula", ".plot svg"):
-            await browser.locator(f"{place} [data-symbol='g']").first.hover()
+        for place in (".lesson-side abbr", ".readings abbr", ".formula abbr", ".plot tspan"):
+            await browser.locator(f"{place}[data-symbol='g']").first.hover()
             await until_width(curve, "5px")
             await browser.get_by_role("button", name="Check the answer").hover()
             await until_width(curve, "2px")
@@ -932,6 +938,9 @@ async def lab(picture: str | None = None) -> None:
                     break
                 await asyncio.sleep(0.1)
         assert min(view["width"], plots["width"]) > 400
+        await browser.get_by_role("button", name="open in the sandbox").click()
+        await until(lambda: not lab_page.sandbox.in_lesson)
+        assert len(window.document.decals.numbers) == 1
     window.close()
 
 
