@@ -36,7 +36,11 @@ class MeshData(Value):
 
 
 def joined(parts: Sequence[MeshData]) -> MeshData:
-    """Return several meshes as one; those without colours become clay if others have some."""
+    """Return several meshes as one.
+
+    Those without colours become clay if others have some. Those without texture coordinates get (0, 0) if
+    others have some, with textures or without.
+    """
     starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     vertices: Float32Array = np.concatenate([part.vertices for part in parts])
     faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)])
@@ -55,8 +59,8 @@ def _joined_color(parts: Sequence[MeshData]) -> BaseColor | None:
         _texture_numbers(base, len(part.faces), textures) for part, base in zip(parts, bases, strict=True)
     ]
     return BaseColor(
-        np.concatenate([np.ones((len(base), 3)) if base.colors is None else base.colors for base in bases]),
-        np.concatenate([_coordinates(base) for base in bases]) if textures else None,
+        _joined_rows([base.colors for base in bases], 1.0, [(len(base), 3) for base in bases]),
+        _joined_rows([base.coordinates for base in bases], 0.0, [(len(base), 2) for base in bases]),
         textures,
         np.concatenate(numbers) if textures else None,
         None if all(base.corners is None for base in bases) else np.concatenate(rows),
@@ -68,8 +72,16 @@ def _clay(count: int) -> BaseColor:
     return BaseColor(np.tile(decode_srgb(np.array(CLAY)), (count, 1)))
 
 
-def _coordinates(base: BaseColor) -> Float32Array:
-    return np.zeros((len(base), 2), np.float32) if base.coordinates is None else base.coordinates
+def _joined_rows(
+    parts: Sequence[Float32Array | None], value: float, shapes: Sequence[tuple[int, int]]
+) -> Float32Array | None:
+    """Return rows of several parts, of which some have one value; None if no part has rows."""
+    if all(part is None for part in parts):
+        return None
+    pairs = zip(parts, shapes, strict=True)
+    return np.concatenate(
+        [np.full(shape, value, np.float32) if rows is None else rows for rows, shape in pairs]
+    )
 
 
 def _texture_numbers(base: BaseColor, count: int, textures: Sequence[BaseTexture]) -> Int32Array:
