@@ -171,6 +171,19 @@ def read_by_openusd(path: Path) -> ReadBack:
     return ReadBack(np.concatenate(triangles), np.concatenate(colors))
 
 
+def read_by_tinyusdz(path: Path) -> ReadBack:
+    """A USDZ file as tinyusdz reads it, which shares nothing with OpenUSD that writes it."""
+    usd = import_module("tinyusdz")
+    triangles, colors = [], []
+    for prim in usd.traverse(usd.load(str(path))):
+        if prim.type_name == "Mesh":
+            names = "points", "faceVertexIndices", "primvars:displayColor"
+            points, indices, shades = (np.array(prim.get_attribute(name).value) for name in names)
+            triangles.append(points.astype(float)[indices.reshape(-1, 3)])
+            colors.append(np.asarray(encode_srgb(shades.astype(float)))[indices.reshape(-1, 3)])
+    return ReadBack(np.concatenate(triangles), np.concatenate(colors))
+
+
 FORMATS = {
     ".glb": ("decals", "trimesh", "pyvista"),
     ".gltf": ("decals", "trimesh", "pyvista"),
@@ -179,7 +192,7 @@ FORMATS = {
     ".stl": ("decals", "trimesh", "pyvista"),
     ".vtp": ("decals", "pyvista"),
     ".3mf": ("decals", "lib3mf"),
-    ".usdz": ("pxr",),
+    ".usdz": ("pxr", "tinyusdz"),
 }
 """The readers of each format."""
 
@@ -204,5 +217,6 @@ READERS: dict[str, Callable[[Path], ReadBack]] = {
     "pyvista": read_by_pyvista,
     "lib3mf": read_by_lib3mf,
     "pxr": read_by_openusd,
+    "tinyusdz": read_by_tinyusdz,
 }
 """Readers of files by the packages that they need."""

@@ -376,3 +376,25 @@ def test_openusd_finds_materials_attributes_names_and_units(tmp_path: Path) -> N
     texture = next(prim for prim in stage.Traverse() if prim.GetName() == "color")
     asset = texture.GetAttribute("inputs:file").Get()
     assert asset.resolvedPath.endswith("ü.usdz[color.png]")
+
+
+def test_a_usdz_archive_is_as_its_specification_says(tmp_path: Path) -> None:
+    """Files are stored as they are, each from a multiple of 64 bytes on, the layer first."""
+    need("trimesh", "xatlas")
+    pytest.importorskip("pxr", reason="usd-core is not installed; it is in the extra `usd`")
+    path = tmp_path / "a.usdz"
+    decals.export(ball_and_cube(count=4), path, size=32, samples=1)
+    content = path.read_bytes()
+    with zipfile.ZipFile(path) as archive:
+        assert archive.testzip() is None
+        entries = archive.infolist()
+        assert entries[0].filename.endswith(".usdc")
+        assert {entry.filename for entry in entries[1:]} >= {"color.png"}
+        for entry in entries:
+            assert entry.compress_type == zipfile.ZIP_STORED
+            header = content[entry.header_offset : entry.header_offset + 30]
+            name, extra = (int.from_bytes(header[at : at + 2], "little") for at in (26, 28))
+            start = entry.header_offset + 30 + name + extra
+            assert start % 64 == 0
+            assert content[start : start + entry.file_size] == archive.read(entry)
+        assert archive.read(entries[0])[:8] == b"PXR-USDC"
