@@ -19,6 +19,9 @@ from decals.window.overlay import box_edges
 MAX_DOTS = 300
 """Most decals of a row that get a dot."""
 
+KIND = "kind "
+"""First part of the key of a row of the menu of kinds."""
+
 NOTHING: dict[str, Any] = {"rows": [], "lines": [], "dots": []}
 """Values of a page while the pointer is at nothing."""
 
@@ -50,7 +53,10 @@ class Hover:
                 self._rows.append(Part("layer", layer).key)
 
     def at_row(self, key: str) -> None:
-        """Light up a row, the box of its node or object, or its decals; "" lights up nothing."""
+        """Light up the box of a row's node or object, or its decals; "" lights up nothing.
+
+        "kind Torus" lights up the box in which the menu would add such a node.
+        """
         self._key, self._rows = str(key), []
 
     def values(self) -> dict[str, Any]:
@@ -63,11 +69,22 @@ class Hover:
             self._known = shown
             self._lines = self._dots = np.zeros((0, 2, 3), np.float32)
             with suppress(ImplicitDecalsError):  # the scene need not have what a page asks for
-                part = Part.named(self._key)
-                if part.kind in ("layer", "image"):
+                if self._key.startswith(KIND):
+                    self._lines = self._ghost_of(self._key.removeprefix(KIND))
+                elif (part := Part.named(self._key)).kind in ("layer", "image"):
                     self._dots = _decals_of(document, part)
                 else:
                     self._lines = _box_of(document, part)
+        return self._placed()
+
+    def _ghost_of(self, kind: str) -> Float32Array:
+        """Return the edges of the box of the node that the menu of a kind would add, shape (n, 2, 3)."""
+        make = self._window.actions.trees.node_in_view(kind)
+        node = self._window.actions.state.asked("place a node", lambda _document: make())
+        return self._lines if node is None else np.stack(box_edges(*node.bounds))
+
+    def _placed(self) -> dict[str, Any]:
+        """Return lines and dots where they lie in the view."""
         eye = np.asarray(self._window.camera.eye_and_target()[0])
         centers, normals = self._dots[:, 0], self._dots[:, 1]
         facing = ((eye - centers) * normals).sum(axis=1) > 0.0

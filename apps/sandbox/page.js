@@ -14,6 +14,14 @@
   const isBelow = (key, top) =>
     top.startsWith("object ") ? `${key}/`.startsWith(`${top.slice(7)}/`) : key.startsWith(`${top}/`);
 
+  // Return true for a layer that is dropped on another one, or an object near the edge of another one's row.
+  const sorts = ({ currentTarget, clientY }, dragged, key) => {
+    const [kind, other] = [dragged, key].map((one) => one.split(" ")[0]);
+    const { top, height } = currentTarget.getBoundingClientRect();
+    const edge = Math.abs((clientY - top) / height - 0.5) > 0.25;
+    return kind === other && (kind === "layer" || (kind === "object" && edge));
+  };
+
   const HOVER_MS = 60;
   const hovering = { key: "", told: null };
 
@@ -94,8 +102,11 @@
       if (source.files.length) {
         trame.state.set("dropped_on", key);
         trame.state.set("dropped", Array.from(source.files));
+        if (source === event.target) source.value = ""; // so that the same file can be chosen again
       } else if (key) {
-        trame.trigger(key.startsWith("view ") ? "place" : "move", [source.getData("text/plain"), key]);
+        const dragged = source.getData("text/plain");
+        const change = sorts(event, dragged, key) ? "reorder" : "move";
+        trame.trigger(key.startsWith("view ") ? "place" : change, [dragged, key]);
       }
     },
 
@@ -114,11 +125,15 @@
 
     // Return true for a row that is found, or that lies below no folded row while nothing is sought.
     shown(row, folded, sought) {
-      if (sought) return `${row.label} ${row.type}`.toLowerCase().includes(sought.trim().toLowerCase());
+      if (sought) return this.found(`${row.label} ${row.type}`, sought);
       return !folded.some((key) => isBelow(row.key, key));
     },
     copy(text) {
       navigator.clipboard.writeText(text);
+    },
+    // Return true for a text that has what is sought, in large or small letters.
+    found(text, sought) {
+      return text.toLowerCase().includes((sought ?? "").trim().toLowerCase());
     },
     // Fold a row, or unfold it.
     fold(row, folded) {

@@ -11,7 +11,7 @@ from trame.widgets import client, html, vuetify3
 from decals.apps.memory import keep_for_work
 from decals.apps.sandbox import panels
 from decals.apps.sandbox.connections import Connections
-from decals.apps.sandbox.folder import thumbnails
+from decals.apps.sandbox.folder import IMAGES, thumbnails
 from decals.apps.sandbox.guard import Guard
 from decals.apps.sandbox.panels import DEFAULTS, named
 from decals.apps.sandbox.sandbox import Sandbox
@@ -168,7 +168,7 @@ class Page:
         self._task: asyncio.Task[None] | None = None
         self._end: asyncio.Task[None] | None = None
         server.state.client_only(
-            "left_open", "right_open", "file_open", "theme", "folded", "sought"
+            "left_open", "right_open", "file_open", "theme", "folded", "sought", "kind_sought"
         )  # another browser has its own
         server.state.update({**self.values(), "catalog": self.sandbox.catalog(), "thumbnails": thumbnails()})
         server.state.update({"theme": "light", "dropped": None, "dropped_on": ""})
@@ -188,6 +188,7 @@ class Page:
         trigger("read")(self.sandbox.read_file)
         trigger("place")(self.sandbox.place_image)
         trigger("move")(lambda key, target: change_row(key, "move", target))
+        trigger("reorder")(lambda key, target: change_row(key, "reorder", target))
         self._build()
         server.controller.on_server_ready.add(self._start)
         server.controller.on_server_exited.add(self._stop)
@@ -321,7 +322,7 @@ class Page:
                     ("Combine", "mdi-set-center", "combinations", self.sandbox.combine),
                 ):
                     with panels.menu(title, icon, max_height=480, width=360):
-                        panels.build_list(f"catalog.{family}", "e", "catalog.docs[e]", event, "e")
+                        panels.build_kinds(family, event)
                 panels.build_actions(self.sandbox)
             panels.build_brushes(self.sandbox)
             with html.Div(classes="bar first"):
@@ -410,6 +411,8 @@ class Page:
                     raw_attrs=[f':aria-pressed="row.{flag}"', *named(f"'{change} ' + row.label")],
                 )
         self._build_row_menu()
+        with html.Div(classes="px-3 py-1"):
+            panels.build_file_input("add images", IMAGES, multiple=True)
         with html.Div(v_if="selected", classes="d-flex ga-1 px-2 row-changes"):
             for change, icon in ROW_CHANGES.items():
                 panels.icon_button(

@@ -1,6 +1,6 @@
 """Parts of the sandbox's page beside outline and history: start, files, view, brushes, decals, actions."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -8,6 +8,7 @@ from trame.widgets import html, vuetify3
 
 from decals.apps.sandbox.files import LIGHT
 from decals.apps.sandbox.folder import IMAGES, MODELS
+from decals.apps.sandbox.hover import KIND
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing.actions import KEYS
 from decals.editing.brush_settings import Brush
@@ -80,7 +81,23 @@ def menu(text: str, icon: str, **options: Any) -> Iterator[None]:
         yield
 
 
-def build_list(source: str, title: str, subtitle: str, click: Any, chosen: str) -> None:
+def build_kinds(family: str, event: Any) -> None:
+    """Build the list of a family of kinds, with a search; the pointer shows where a node would be."""
+    vuetify3.VTextField(
+        v_model=("kind_sought", ""),
+        prepend_inner_icon="mdi-magnify",
+        classes="ma-2 flex-grow-0",
+        raw_attrs=["@click.stop", *named(f"'search in {family}'")],
+    )
+    found = f"catalog.{family}.filter((e) => utils.sandbox.found(e + ' ' + catalog.docs[e], kind_sought))"
+    ghost = {
+        "pointerenter": f"utils.sandbox.hover('{KIND}' + e, $event)",
+        "pointerleave": "utils.sandbox.hover('')",
+    }
+    build_list(found, "e", "catalog.docs[e]", event, "e", __events=[*ghost], **ghost)
+
+
+def build_list(source: str, title: str, subtitle: str, click: Any, chosen: str, **options: Any) -> None:
     """Build a list with each ``e`` of a list of the page; a click sends the value of an expression."""
     with vuetify3.VList():
         vuetify3.VListItem(
@@ -89,6 +106,7 @@ def build_list(source: str, title: str, subtitle: str, click: Any, chosen: str) 
             title=(title,),
             subtitle=(subtitle,),
             click=(click, f"[{chosen}]"),
+            **options,
         )
 
 
@@ -212,6 +230,18 @@ def build_start(sandbox: Sandbox) -> None:
         vuetify3.VCard(title="Sandbox", subtitle="Model, and cover models with decals."),
         vuetify3.VCardText(),
     ):
+        with html.Div(v_if="start.lessons.length", classes="mb-4"):
+            html.H2("Lessons", classes="text-subtitle-2")
+            with html.Div(classes="d-flex flex-wrap ga-2"):
+                vuetify3.VBtn(
+                    "{{ title }}",
+                    v_for="(title, i) in start.lessons",
+                    key="i",
+                    variant="tonal",
+                    classes="text-none",
+                    click=(sandbox.open_lesson, "[i]"),
+                )
+        html.H2("New model, or a sample", classes="text-subtitle-2")
         with html.Div(classes="d-flex flex-wrap ga-3 mb-4"):
             shown = {"width": TILE_WIDTH, "variant": "outlined"}
             with vuetify3.VCard(click=sandbox.new_model, raw_attrs=named("'New model'"), **shown):
@@ -236,7 +266,6 @@ def build_start(sandbox: Sandbox) -> None:
         for family, heading, title, subtitle, event, chosen in (
             ("recovered", "Recovered sessions", "e.name", "e.when", sandbox.open_file, "e.name"),
             ("recent", "Files in this folder", "e.name", "e.when", sandbox.open_file, "e.name"),
-            ("lessons", "Lessons", "e", "''", sandbox.open_lesson, "i"),
         ):
             with html.Div(v_if=f"start.{family}.length", classes="mt-4"):
                 html.H2(heading, classes="text-subtitle-2")
@@ -280,6 +309,16 @@ def build_files(sandbox: Sandbox) -> None:
             classes="mt-2",
         )
         vuetify3.VCheckbox(v_model=("replace_file", False), label="replace a file that exists")
+
+
+def build_file_input(text: str, kinds: Sequence[str], key: str = "''", **options: Any) -> None:
+    """Build a field that takes files, also dropped ones, for a key, which is an expression of the page."""
+    take = f"utils.sandbox.take($event, {key})"
+    with html.Div(
+        dragover="$event.preventDefault()", drop=take, __events=["dragover", "drop"], classes="drop"
+    ):
+        html.Label(f"{text}: choose, or drop here", classes="text-caption")
+        html.Input(type="file", accept=",".join(kinds), change=take, raw_attrs=named(f"'{text}'"), **options)
 
 
 def build_driver() -> None:
@@ -364,6 +403,7 @@ def build_decal_panel(sandbox: Sandbox) -> None:
             html.H2(title, classes="text-subtitle-1")
             if panel == "image":
                 html.Img(src=("image.picture",), alt="", style="width: 50%; border-radius: 50%")
+                build_file_input("replace this image", IMAGES, "selected")
             build_controls(f"{values}.controls", sandbox.set_control, f"'{panel}', c.name")
 
 
@@ -379,12 +419,9 @@ def build_options(sandbox: Sandbox) -> None:
 
 def _build_light(sandbox: Sandbox) -> None:
     """Build the inputs that load and remove the panorama that lights the scene."""
-    take = f"utils.sandbox.take($event, '{LIGHT}')"
-    with html.Div(dragover="$event.preventDefault()", drop=take, __events=["dragover", "drop"]):
-        html.Label("light from a panorama: choose or drop a file", classes="text-caption")
-        html.Input(type="file", accept=",".join(IMAGES), raw_attrs=named("'picture of light'"), change=take)
-        present = "drawing.some(c => c.name.startsWith('environment.'))"
-        vuetify3.VBtn("Remove this light", v_if=present, variant="tonal", click=sandbox.remove_light)
+    build_file_input("light from a panorama", IMAGES, f"'{LIGHT}'")
+    present = "drawing.some(c => c.name.startsWith('environment.'))"
+    vuetify3.VBtn("Remove this light", v_if=present, variant="tonal", click=sandbox.remove_light)
 
 
 def build_scatter(sandbox: Sandbox) -> None:

@@ -4,13 +4,15 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple, Self
 
+import numpy as np
+
 from blobtree.nodes.paths import Path
 from decals.editing.action_state import ActionState, WindowActions
 from decals.editing.commands import DeleteDecals, RemoveImage, SetValues
 from decals.editing.document import Document
-from decals.editing.scatter_commands import RemoveObject
+from decals.editing.scatter_commands import MoveObject, RemoveObject
 from decals.editing.tree_actions import TreeActions
-from decals.editing.visibility import RenameLayer, RenameNode, RenameObject
+from decals.editing.visibility import RenameLayer, RenameNode, RenameObject, RenumberLayers
 from decals.editing.visibility_actions import VisibilityActions
 from decals.errors import InvalidEdit
 from decals.validation import describe
@@ -91,11 +93,11 @@ class OutlineActions(WindowActions):
         key
             Key of the part; see `Part.key`.
         change
-            "rename", "remove", "duplicate", "group", "move", "hide", "lock" or "isolate". "hide" shows a
-            hidden part, and "lock" unlocks a locked one.
+            "rename", "remove", "duplicate", "group", "move", "reorder", "hide", "lock" or "isolate". "hide"
+            shows a hidden part, and "lock" unlocks a locked one.
         value
             New name; or the key of the part to which a part is moved: a node of any object, or the layer of
-            an image.
+            an image. A layer or an object that is reordered takes the place of another one.
         marked
             Keys of the marked nodes, or layers.
 
@@ -142,6 +144,11 @@ class OutlineActions(WindowActions):
             case "object" | "node", "move":
                 target = Part.node(value)
                 self._trees.move_node(number, path, target.number, target.path)
+            case "object" | "layer", "reorder":
+                target = Part.named(value)
+                if target.kind != kind:
+                    raise InvalidEdit(f"reorder: expected the row of another {kind}, got {describe(value)}")
+                self._reorder(kind, number, target.number)
             case "object", "rename":
                 run(RenameObject(number, value))
             case "object", "remove":
@@ -152,3 +159,17 @@ class OutlineActions(WindowActions):
                 raise InvalidEdit(f"move: expected a node, or an image onto a layer, got {describe(key)}")
             case _:
                 raise InvalidEdit(f"change: expected one that {describe(key)} has, got {describe(change)}")
+
+    def _reorder(self, kind: str, number: int, place: int) -> None:
+        """Let an object or a layer take the place of another one; those between move by one place."""
+        document, state = self._state.session.document, self._state
+        if kind == "object":
+            state.run(MoveObject(number, place), lambda: setattr(state, "primitive", None))
+            return
+        present = np.concatenate([document.decals.column("layers"), document.hidden.decals.layers])
+        layers = np.unique(present).tolist()
+        if not {number, place} <= {*layers}:
+            raise InvalidEdit(f"layers: expected two of {layers} to reorder, got {number} and {place}")
+        order = [layer for layer in layers if layer != number]
+        order.insert(layers.index(place), number)
+        state.run(RenumberLayers(dict(zip(order, layers, strict=True))))

@@ -309,6 +309,43 @@ class AddObject:
 
 
 @dataclass(frozen=True, eq=False)
+class MoveObject:
+    """Give an object another place in the order of the objects.
+
+    Parameters
+    ----------
+    number
+        Index of the object.
+    place
+        Its index afterwards.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession
+    >>> from decals.editing.scatter_commands import MoveObject
+    >>> balls = [Point((x, 0, 0), radius=1.0) for x in (0, 3, 6)]
+    >>> session = EditSession(decals.cover(balls, count=3, images=["eye"]))
+    >>> edit = session.do(MoveObject(0, 2))
+    >>> [item.name for item in session.document.objects]
+    ['model 2', 'model 3', 'model 1']
+    """
+
+    number: int
+    place: int
+    label: ClassVar[str] = "reorder objects"
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        for number in (self.number, self.place):
+            document.object(number)
+        objects = list(document.objects)
+        objects.insert(self.place, objects.pop(self.number))
+        return document.compute_parts(objects=tuple(objects))
+
+
+@dataclass(frozen=True, eq=False)
 class RemoveObject:
     """Remove an object and the decals on it; the index of later objects decreases by one.
 

@@ -364,21 +364,24 @@ class TreeActions(WindowActions):
         kind
             Name of its class; see `decals.editing.new_nodes.kinds`.
         """
-        checked_kind(kind)
-        state, middle = self._state, np.zeros(3, np.float32)
-        objects, view = state.session.document.objects, state.camera.eye_and_target()
-        if state.primitive is None:
-            self._add_tree(
-                kind.lower(), lambda: new_node(kind, (), *_place_in_view(objects, *view, kind)), middle
-            )
+        make, middle = self.node_in_view(kind), np.zeros(3, np.float32)
+        if self._state.primitive is None:
+            self._add_tree(kind.lower(), make, middle)
             return
-        number, path = state.primitive
+        number, path = self._state.primitive
 
         def command(tree: Node) -> tuple[StructureCommand, ...]:
-            node = new_node(kind, (), *_place_in_view(objects[number : number + 1], *view, kind))
-            return (AddPrimitive(number, world_space_path(tree, path), node),)
+            return (AddPrimitive(number, world_space_path(tree, path), make()),)
 
         self._restructure_later(f"add {kind}", number, command, middle)
+
+    def node_in_view(self, kind: str) -> Callable[[], Node]:
+        """Return a function that makes the node that `add_node` adds now."""
+        checked_kind(kind)
+        objects, view = self._state.session.document.objects, self._state.camera.eye_and_target()
+        if self._state.primitive is not None:
+            objects = objects[self._state.primitive[0] :][:1]
+        return lambda: new_node(kind, (), *_place_in_view(objects, *view, kind))
 
     def wrap_node(self, kind: str) -> None:
         """Put the selected node under a new node of a kind with one operand, such as a warp."""

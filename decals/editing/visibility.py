@@ -1,6 +1,6 @@
 """Commands that hide, lock and name parts of a scene."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -186,6 +186,61 @@ class LockLayers:
     def compute(self, document: Document) -> Edit:
         """Return the edit."""
         return document.compute_parts(locked_layers=as_layers("layers", self.layers, InvalidEdit))
+
+
+@dataclass(frozen=True, eq=False)
+class RenumberLayers:
+    """Give layers other numbers, which changes the order in which they are drawn; flags and names go along.
+
+    Parameters
+    ----------
+    numbers
+        The new number of each layer that gets one; different layers get different ones.
+
+    Raises
+    ------
+    InvalidEdit
+        Two layers would have one number.
+
+    Examples
+    --------
+    >>> import decals
+    >>> from blobtree import Point
+    >>> from decals.editing import EditSession
+    >>> from decals.editing.visibility import RenumberLayers
+    >>> session = EditSession(decals.cover(Point((0, 0, 0), radius=1.0), count=3, images=["eye"]))
+    >>> edit = session.do(RenumberLayers({0: 2}))
+    >>> session.document.decals.column("layers")
+    array([2, 2, 2], dtype=int32)
+    """
+
+    numbers: Mapping[int, int]
+    label: ClassVar[str] = "reorder layers"
+    ignores_locks: ClassVar[bool] = True
+
+    def compute(self, document: Document) -> Edit:
+        """Return the edit."""
+        shown: Any = document.decals.column("layers")
+        layers = {*shown.tolist(), *document.hidden.decals.layers.tolist()}
+        layers |= {*document.locked_layers, *document.layer_names}
+        after = {layer: self.numbers.get(layer, layer) for layer in layers}
+        if len({*after.values()}) < len(after):
+            raise InvalidEdit(f"layers: expected a number for each alone, got {describe(self.numbers)}")
+        as_layers("layers", after.values(), InvalidEdit)
+
+        def renumbered(decals: Any) -> Any:
+            return decals.replace(layers=np.array([after[one] for one in decals.layers.tolist()], np.int32))
+
+        changed = [layer for layer, number in after.items() if layer != number]
+        numbers, hidden = document.decals_of_layer(*changed), document.hidden
+        names = {after[layer]: name for layer, name in document.layer_names.items()}
+        return document.compute_replacement(
+            numbers,
+            renumbered(document.decals.take(numbers)),
+            hidden=DecalStates.existing(hidden.numbers, renumbered(hidden.decals)),
+            locked_layers=tuple(sorted(after[layer] for layer in document.locked_layers)),
+            layer_names=as_layer_names(names),
+        )
 
 
 class Renaming:

@@ -191,8 +191,17 @@ async def sandbox(picture: str | None = None) -> None:
         await clicks(browser, window)
         await hovers(browser, window)
         await browser.get_by_role("button", name="Add", exact=True).click()
-        await browser.get_by_text("Torus", exact=True).click()
+        await browser.get_by_label("search in primitives").fill("TORUS:")
+        kinds = browser.locator(".v-overlay--active .v-list-item-title")
+        await until_count(kinds, 1)
+        await kinds.get_by_text("Torus", exact=True).hover()
+        await until_count(browser.locator(".hovered line"), 12)
+        ghost = np.array(sandbox_page.sandbox.values()["hovered"]["lines"])
+        await kinds.get_by_text("Torus", exact=True).click()
         await until(lambda: window.session.labels[-1:] == ("add Torus",))
+        sandbox_page.sandbox.hover("0/2")
+        np.testing.assert_allclose(sandbox_page.sandbox.values()["hovered"]["lines"], ghost, atol=1e-3)
+        sandbox_page.sandbox.hover("")
         field = browser.get_by_role("textbox", name="ring radius")
         await field.fill("0.6")
         await field.press("Enter")
@@ -430,7 +439,7 @@ async def by_keys(browser: Page) -> None:
     steps = 0
     while await focused() != "center 1":
         await browser.keyboard.press("Tab")
-        assert (steps := steps + 1) < 10
+        assert (steps := steps + 1) < 12
 
 
 async def creature(picture: str | None = None) -> None:
@@ -617,13 +626,18 @@ async def sandbox_start(picture: str | None = None) -> None:
     server = get_server("start", client_type="vue3")
     window = EditWindow(empty_scene(["scale"], UPRIGHT["y"]), path=folder / "scene.json", plotter=plotter)
     window.show()
-    sandbox_page = SandboxPage(server, window, folder=folder, start=True)
+    decals.save_scene(empty_scene(["scale"], UPRIGHT["y"]), folder / "older.json")
+    titles = ["First lesson", "Second lesson"]
+    sandbox_page = SandboxPage(server, window, folder=folder, start=True, lessons=titles)
     async with served(server, size=(1280, 800), guard=sandbox_page.guard) as browser:
+        headings = await browser.locator(".v-dialog h2").all_inner_texts()
+        assert headings == ["Lessons", "New model, or a sample", "Files in this folder"]
+        await browser.get_by_role("button", name="Second lesson").wait_for()
         await browser.get_by_label("sample creature").click()
         await until(lambda: len(window.document.decals) == 500)
         await shows(browser, plotter)
         await asyncio.sleep(AUTOSAVE_SECONDS + 1.0)
-        assert [*folder.iterdir()] == []  # the sample has no edits to recover
+        assert [*folder.iterdir()] == [folder / "older.json"]  # the sample has no edits to recover
         assert await browser.title() == f"{window.actions.files.title} \N{EN DASH} sandbox"
         middle = plotter.window_size[0] // 2, plotter.window_size[1] // 2
         path = [(middle[0] + x, middle[1]) for x in (0, 10, 30)]
@@ -682,6 +696,24 @@ async def escapes(browser: Page, window: EditWindow) -> None:
     await until(lambda: brush.brush == "select")
 
 
+async def images(browser: Page, window: EditWindow) -> None:
+    """Images are added with a button beside the list, and replaced in their panel; undo takes both back."""
+    document = window.document
+    folder = Path(tempfile.mkdtemp())
+    for name, color in (("first", "red"), ("second", "blue")):
+        Image.new("RGB", (8, 8), color).save(folder / f"{name}.png")
+    before, names = digest(document), [image.source for image in document.images]
+    chooser = browser.get_by_label("add images")
+    await chooser.set_input_files([folder / "first.png", folder / "second.png"])
+    await until(lambda: [image.source for image in document.images] == [*names, "first", "second"])
+    await browser.get_by_role("button", name="first", exact=True).click()
+    await browser.get_by_label("replace this image").set_input_files(folder / "second.png")
+    await until(lambda: [image.source for image in document.images] == [*names, "second", "second"])
+    for _ in range(3):
+        await browser.keyboard.press("Control+z")
+    await until(lambda: digest(document) == before)
+
+
 DROP = """(label) => {
   const files = new DataTransfer(), canvas = document.createElement('canvas');
   const row = [...document.querySelectorAll('[role=button]')].find(one => one.innerText.trim() === label);
@@ -728,6 +760,7 @@ async def panels(picture: str | None = None) -> None:
         assert set(document.decals.decals.images.tolist()) == {1}
         await browser.evaluate(DROP, "armour")
         await done("add an image")
+        await images(browser, window)
         assert set(document.decals.decals.images.tolist()) == {2}
         await row("tile").drag_to(browser.get_by_label("view of the scene"))
         await done("add")
@@ -770,6 +803,12 @@ async def panels(picture: str | None = None) -> None:
         await browser.get_by_text("Duplicate", exact=True).click()
         await done("duplicate snail")
         await row("snail 2").wait_for()
+        upper = {"x": 20.0, "y": 3.0}
+        await row("snail 2").drag_to(row("snail"), target_position=upper)
+        await done("reorder objects")
+        assert [item.name for item in document.objects] == ["snail 2", "snail"]
+        await browser.keyboard.press("Control+z")
+        await done("duplicate snail")
         await row("snail 2").drag_to(row("snail"))
         await done("move snail 2 into snail")
         assert len(document.objects) == 1

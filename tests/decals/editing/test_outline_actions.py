@@ -10,6 +10,7 @@ from decals.editing import Actions, EditSession
 from decals.editing.commands import SetValues
 from decals.editing.outline_actions import Part
 from decals.editing.tree_actions import _surface_check
+from decals.editing.visibility import RenumberLayers
 from decals.errors import InvalidEdit, InvalidInput
 from decals.scenes.objects import TreeObject
 from tests.decals.editing.scenes import digest, goes_back_and_forth, scene, tree_of
@@ -41,6 +42,59 @@ def test_a_node_is_that_of_its_row_or_the_root_of_an_object() -> None:
     assert (Part.node("object 1"), Part.node("0/1")) == (Part("node", 1), Part("node", 0, (1,)))
     with pytest.raises(InvalidEdit, match="row: expected that of an object or a node, got 'layer 0'"):
         Part.node("layer 0")
+
+
+@pytest.mark.parametrize(("number", "place"), [(0, 2), (2, 0), (1, 0), (1, 1), (0, 1)])
+def test_objects_and_layers_take_the_place_of_others(number: int, place: int) -> None:
+    actions = Actions(EditSession(scene()))
+    change, document = actions.outline.change, actions.state.session.document
+    change("object 1", "duplicate")
+    levels, numbers = (-3, 0, 7), document.decals.numbers
+    actions.state.run(SetValues.each(numbers[:20], "layers", layers=levels[0]))
+    actions.state.run(SetValues.each(numbers[20:30], "layers", layers=levels[2]))
+    change("layer 7", "rename", "top")
+    change("layer 7", "hide")
+    change("layer -3", "lock")
+    layers = np.zeros(len(numbers), np.int64)
+    layers[:20], layers[20:30] = levels[0], levels[2]
+    expected = [*levels]
+    expected.insert(place, expected.pop(number))
+    objects = [item.name for item in document.objects]
+    objects.insert(place, objects.pop(number))
+    change(f"object {number}", "reorder", f"object {place}")
+    change(f"layer {levels[number]}", "reorder", f"layer {levels[place]}")
+    assert [item.name for item in document.objects] == objects
+    after = dict(zip(expected, levels, strict=True))
+    shown = document.decals.take(document.decals.numbers).layers
+    np.testing.assert_array_equal(
+        shown, [after[layer] for layer in np.delete(layers, slice(20, 30)).tolist()]
+    )
+    assert set(document.hidden.decals.layers.tolist()) == {after[7]}
+    assert (document.locked_layers, document.layer_names) == ((after[-3],), {after[7]: "top"})
+    goes_back_and_forth(actions.state.session)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("layer 0", "layer 5"),
+        ("layer 5", "layer 0"),
+        ("layer 0", "object 0"),
+        ("object 0", "object 9"),
+        ("object 0", "0"),
+    ],
+)
+def test_what_takes_no_place_is_refused(key: str, value: str) -> None:
+    actions = Actions(EditSession(scene()))
+    actions.outline.change("layer 3", "rename", "empty")
+    before = digest(actions.state.session.document)
+    with pytest.raises((InvalidEdit, InvalidInput)):
+        actions.outline.change(key, "reorder", value)
+    with pytest.raises(InvalidEdit, match="expected one that"):
+        actions.outline.change("image 0", "reorder", "image 1")
+    with pytest.raises(InvalidEdit, match="a number for each alone"):
+        RenumberLayers({0: 3, 3: 3}).compute(actions.state.session.document)
+    assert digest(actions.state.session.document) == before
 
 
 def test_changes_are_undone_exactly() -> None:
