@@ -25,6 +25,9 @@ PROOFS = wp.constant(4)
 ROUNDING = wp.constant(1e-5)
 """Relative error of the field in float32, which a proof allows for."""
 
+DIRECTIONS = 9
+"""Edges of a sample: along each axis, and the diagonals of the three faces that begin there."""
+
 UNKNOWN = wp.constant(-2)
 """Mark of a sample whose nearest primitive is not known."""
 
@@ -162,6 +165,7 @@ def root_of(i: wp.int32, labels: wp.array(dtype=wp.int32)) -> wp.int32:
     root = i
     while labels[root] != root:
         root = labels[root]
+    labels[i] = root
     return root
 
 
@@ -174,16 +178,30 @@ def join(i: wp.int32, other: wp.int32, labels: wp.array(dtype=wp.int32)) -> None
 
 
 @wp.func
-def is_unjoined(
-    i: wp.int32, axis: wp.int32, values: wp.array(dtype=wp.float32), labels: wp.array(dtype=wp.int32)
-) -> wp.bool:
-    """Return True if both ends of a sample's edge along an axis are inside, and not joined."""
-    if sample_place(i % SAMPLES)[axis] == BRANCHING or values[i] < ISO:
-        return False
-    other = i + STRIDES[axis]
-    if values[other] < ISO:
-        return False
-    return root_of(i, labels) != root_of(other, labels)
+def ends_of(i: wp.int32, direction: wp.int32, values: wp.array(dtype=wp.float32)) -> wp.vec2i:
+    """Return the samples inside at the ends of an edge of a sample, see DIRECTIONS; −1 if one is outside.
+
+    Diagonals count where the other corners of their face are outside.
+    """
+    place = sample_place(i % SAMPLES)
+    ends = wp.vec2i(i, i + STRIDES[direction % 3])
+    if direction < 3:
+        if place[direction] == BRANCHING:
+            return wp.vec2i(-1)
+    else:
+        u = (direction + 1) % 3
+        v = (direction + 2) % 3
+        if place[u] == BRANCHING or place[v] == BRANCHING:
+            return wp.vec2i(-1)
+        ends = wp.vec2i(i, i + STRIDES[u] + STRIDES[v])
+        others = wp.vec2i(i + STRIDES[v], i + STRIDES[u])
+        if direction >= 6:
+            ends, others = others, ends
+        if values[others[0]] >= ISO or values[others[1]] >= ISO:
+            return wp.vec2i(-1)
+    if values[ends[0]] < ISO or values[ends[1]] < ISO:
+        return wp.vec2i(-1)
+    return ends
 
 
 @wp.func
@@ -204,13 +222,14 @@ def find_crossing_edges(
     base: wp.vec3i,
     corner: wp.vec3,
     cell: wp.float32,
+    directions: wp.int32,
     values: wp.array(dtype=wp.float32),
     owners: wp.array(dtype=wp.int32),
     labels: wp.array(dtype=wp.int32),
     widths: wp.array(dtype=wp.float32),
     shares: wp.array(dtype=wp.float32),
 ) -> None:
-    """Write the gaps that edges in listed blocks of a level cross, 3 for each sample, see `gap_across`.
+    """Write the gaps that edges in listed blocks of a level cross, DIRECTIONS for each sample.
 
     They are 0 for edges whose ends are joined by edges of the block that stay inside: between samples whose
     values exceed what the slope of the field can take away, between samples of one primitive, or else by
@@ -226,28 +245,36 @@ def find_crossing_edges(
     for i in range(row * SAMPLES, (row + 1) * SAMPLES):
         owners[i] = UNKNOWN
         labels[i] = i
+    left = int(1)
     for stage in range(4):
+        if left == 0:
+            return
+        left = int(0)
         for i in range(row * SAMPLES, (row + 1) * SAMPLES):
-            for axis in range(3):
-                if is_unjoined(i, axis, values, labels):
-                    other = i + STRIDES[axis]
-                    place = sample_place(i % SAMPLES)
+            for direction in range(directions):
+                ends = ends_of(i, direction, values)
+                if ends[0] >= 0 and root_of(wp.max(ends[0], i), labels) != root_of(
+                    wp.max(ends[1], i), labels
+                ):
+                    place = sample_place(ends[0] % SAMPLES)
                     start = grid_point(sample_index(low, place[0], place[1], place[2]), corner, cell)
-                    step = wp.vec3(0.0)
-                    step[axis] = cell
-                    inside = values[i] + values[other] > least
+                    place = sample_place(ends[1] % SAMPLES) - place
+                    step = cell * wp.vec3(float(place[0]), float(place[1]), float(place[2]))
+                    inside = direction < 3 and values[ends[0]] + values[ends[1]] > least
                     if stage == 1:
-                        owner = owner_of(i, start, level.tape, span, owners)
-                        inside = owner == owner_of(other, start + step, level.tape, span, owners)
+                        owner = owner_of(ends[0], start, level.tape, span, owners)
+                        inside = owner == owner_of(ends[1], start + step, level.tape, span, owners)
                     elif stage == 2:
                         gap = gap_across(start, step, level.tape, span)
                         inside = gap[0] == 0.0
-                        widths[3 * i + axis] = gap[0]
-                        shares[3 * i + axis] = gap[1]
+                        widths[directions * i + direction] = gap[0]
+                        shares[directions * i + direction] = gap[1]
                     if inside:
-                        join(i, other, labels)
+                        join(ends[0], ends[1], labels)
+                    else:
+                        left += 1
                 elif stage == 3:
-                    widths[3 * i + axis] = 0.0
+                    widths[directions * i + direction] = 0.0
 
 
 @wp.kernel

@@ -26,12 +26,18 @@ from blobtree.device import launch
 from blobtree.formulas.falloff import ISO
 from blobtree.meshing.block_tree import BlockTree, on_device
 from blobtree.meshing.dual_kernels import SAMPLES
-from blobtree.meshing.gap_kernels import find_crossing_edges, mark_open
+from blobtree.meshing.gap_kernels import DIRECTIONS, find_crossing_edges, mark_open
 from blobtree.meshing.mesh import DeviceMesh, bridging_faces, extract_mesh
 from blobtree.progress import Progress
 
 NEAR_BLOCKS = 3
 """Distance, in blocks of the base, within which edges inside join two samples."""
+
+_AXES = np.eye(3, dtype=np.intp)
+_SECOND, _THIRD = np.roll(_AXES, -1, axis=0), np.roll(_AXES, -2, axis=0)
+STARTS = np.concatenate([0 * _AXES, 0 * _AXES, _THIRD])
+STEPS = np.concatenate([_AXES, _SECOND + _THIRD, _SECOND - _THIRD])
+"""Where the edges of a sample begin, and where they lead (DIRECTIONS, 3)."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +48,8 @@ class CrossingEdges:
     """The block of each (n,); an edge between blocks is in both of them."""
     lowest: IndexArray
     """Its lower end (n, 3), in cells from the lowest corner of the block."""
-    axes: IndexArray
-    """Its axis (n,)."""
+    steps: IndexArray
+    """From there to the other end (n, 3): along an axis, or a diagonal of a face."""
     widths: Float64Array
     """Length of the part that is outside (n,)."""
     places: Float64Array
@@ -53,7 +59,8 @@ class CrossingEdges:
     def none() -> "CrossingEdges":
         """Return no edges."""
         numbers, points = np.empty(0, np.intp), np.empty((0, 3))
-        return CrossingEdges(numbers, np.empty((0, 3), np.intp), numbers, points[:, 0], points)
+        places = np.empty((0, 3), np.intp)
+        return CrossingEdges(numbers, places, places, points[:, 0], points)
 
     def __len__(self) -> int:
         return len(self.blocks)
@@ -69,14 +76,11 @@ class CrossingEdges:
 
     @property
     def cells(self) -> IndexArray:
-        """The cells of each edge's block beside it (n, 4), −1 where the block has none."""
-        offsets = np.zeros((len(self), 4, 3), np.intp)
-        rows = np.arange(len(self))
-        for number, (first, second) in enumerate(np.ndindex(2, 2)):
-            offsets[rows, number, (self.axes + 1) % 3] = first
-            offsets[rows, number, (self.axes + 2) % 3] = second
-        at = self.lowest[:, None] - offsets
-        there = ((at >= 0) & (at < BRANCHING)).all(axis=2)
+        """The cells of each edge's block beside it (n, 8), −1 for those that are none."""
+        offsets = np.array(list(np.ndindex(2, 2, 2)))
+        at = np.minimum(self.lowest, self.lowest + self.steps)[:, None] - offsets
+        beside = (offsets == 0) | (self.steps[:, None] == 0)
+        there = (beside & (at >= 0) & (at < BRANCHING)).all(axis=2)
         cells = self.blocks[:, None] * CHILDREN + at @ [BRANCHING**2, BRANCHING, 1]
         return np.where(there, cells, -1)
 
@@ -142,18 +146,21 @@ class Gaps:
         grid, values = tree.grid(level), tree.values[listed]
         inputs: list[Any] = [on_device(listed, wp.int32, device), tree.level_arrays()]
         inputs += [wp.vec3i(*grid.base_of(grid.depth)), wp.vec3(*grid.corner), grid.cell_size]
-        inputs += [on_device(values.ravel(), wp.float32, device)]
+        directions = DIRECTIONS if level else 3
+        inputs += [directions, on_device(values.ravel(), wp.float32, device)]
         inputs += [wp.empty(values.size, dtype=wp.int32, device=device) for _ in range(2)]
-        widths, shares = (wp.zeros(3 * values.size, dtype=wp.float32, device=device) for _ in range(2))
+        widths, shares = (
+            wp.zeros(directions * values.size, dtype=wp.float32, device=device) for _ in range(2)
+        )
         kernel = tree.cells.tape.instruction_set.kernel_for(find_crossing_edges)
         launch(kernel, len(listed), inputs, [widths, shares], device)
         lengths = widths.numpy()
         found = np.flatnonzero(lengths)
-        row, *lowest, axes = np.unravel_index(found, (*values.shape, 3))
-        blocks, places = listed[row], np.stack(lowest, axis=1)
+        row, *lowest, along = np.unravel_index(found, (*values.shape, directions))
+        blocks, places, steps = listed[row], np.stack(lowest, axis=1) + STARTS[along], STEPS[along]
         starts = grid.origin + (tree.coordinates[blocks] * BRANCHING + places) * grid.cell_size
-        between = shares.numpy()[found, None] * np.eye(3)[axes] * grid.cell_size
-        return CrossingEdges(blocks, places, axes, lengths[found].astype(np.float64), starts + between)
+        between = shares.numpy()[found, None] * steps * grid.cell_size
+        return CrossingEdges(blocks, places, steps, lengths[found].astype(np.float64), starts + between)
 
     def _apart(self, crossing: CrossingEdges) -> BoolArray:
         """Return True for edges whose ends no edges join that stay inside."""
@@ -176,13 +183,13 @@ class Gaps:
                 for ends in ((0, 4), (1, 5))
             )
             joined = inside[:, *low] & inside[:, *high]
-            of_axis = known.chosen(known.axes == axis)
+            of_axis = known.chosen((known.steps == np.eye(3)[axis]).all(axis=1))
             joined[row_of[of_axis.blocks], *of_axis.lowest.T] = False
             pairs.append(np.stack([numbers[:, *low][joined], numbers[:, *high][joined]]))
         start, end = np.concatenate(pairs, axis=1)
         graph = coo_matrix((np.ones(len(start), np.int8), (start, end)), (len(nodes),) * 2)
         labels = connected_components(graph, directed=False)[1]
-        rows, ends = row_of[crossing.blocks], crossing.lowest + np.eye(3, dtype=np.intp)[crossing.axes]
+        rows, ends = row_of[crossing.blocks], crossing.lowest + crossing.steps
         first, second = (labels[numbers[rows, *at.T]] for at in (crossing.lowest, ends))
         return np.asarray(first != second)
 
