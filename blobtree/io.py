@@ -29,10 +29,8 @@ from blobtree.errors import ImplicitDecalsError, InvalidFile, UnusableFile
 from blobtree.files import write_atomically
 from blobtree.json_errors import json_reason
 from blobtree.nodes.attributes import Attributes, AttributeValue
-from blobtree.nodes.fields import BoxedField, FieldPrimitive
-from blobtree.nodes.kinds import NODE_KINDS
+from blobtree.nodes.kinds import BASES, NODE_KINDS
 from blobtree.nodes.node import Node
-from blobtree.nodes.operator import Operator
 from blobtree.nodes.values import left_out, operand_names
 from blobtree.tape.model import checked_tree
 from blobtree.tape.program import postorder
@@ -110,15 +108,24 @@ def _record_type(kind: type[Node], tag: str, base: type[NodeRecord] = NodeRecord
 RECORD_OF_KIND = {kind: _record_type(kind, tag) for tag, kind in NODE_KINDS.items()}
 """Records of the built-in classes of nodes."""
 
+_RECORDS: dict[str, type[NodeRecord]] = {
+    "custom_skeleton": CustomSkeletonRecord,
+    "own skeleton": CustomSkeletonRecord,
+    "custom_free_field": CustomLeafRecord,
+}
+"""Records of users' kinds that hold more than `CustomRecord`, by tags."""
+
+_BASES = BASES | {
+    "custom_skeleton": CustomPrimitive,
+    "own skeleton": CustomPrimitive,
+    "custom_warp": CustomWarp,
+}
+
 CUSTOM_RECORDS: dict[Any, list[type[NodeRecord]]] = {
-    CustomPrimitive: [
-        _record_type(CustomPrimitive, tag, CustomSkeletonRecord)
-        for tag in ("custom_skeleton", "own skeleton")
-    ],
-    BoxedField: [_record_type(BoxedField, "custom_field", CustomRecord)],
-    FieldPrimitive: [_record_type(FieldPrimitive, "custom_free_field", CustomLeafRecord)],
-    Operator: [_record_type(Operator, tag, CustomRecord) for tag in ("custom_operator", "own operator")],
-    CustomWarp: [_record_type(CustomWarp, "custom_warp", CustomRecord)],
+    base: [
+        _record_type(base, tag, _RECORDS.get(tag, CustomRecord)) for tag, own in _BASES.items() if own is base
+    ]
+    for base in _BASES.values()
 }
 """Records of custom nodes by the bases of their classes: those of today, then those of older files."""
 

@@ -2,7 +2,8 @@
 
 import atexit
 import gc
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, Generic, Self, TypeVar, overload
 
 import lazy_loader
@@ -39,6 +40,16 @@ def attach_stub(package: str, file: str) -> tuple[Callable[[str], Any], Callable
             gc.enable()
 
     return attribute, listed, names
+
+
+@contextmanager
+def if_present() -> Iterator[None]:
+    """Go on behind a ``with`` block that imports extras of this project which were left out."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] not in ("blobtree", "decals"):
+            raise
 
 
 class Lazy(Generic[Value]):

@@ -9,8 +9,7 @@ from tests.import_graph import module_graph
 EXTRAS: dict[str, str] = {
     "blobtree": "field_slice fitting slicing",
     "blobtree.conformance": "*",
-    "blobtree.custom": "bounds_kernels field skeleton_checks warp_checks",
-    "blobtree.declare": "checks field_checks operator_checks",
+    "blobtree.custom": "field",
     "blobtree.derivatives": "*",
     "blobtree.formulas": """
         contact curve_skeletons deformations falloffs flat_skeletons noise solid_skeletons
@@ -29,13 +28,13 @@ EXTRAS: dict[str, str] = {
     "blobtree.tape": "attributes directed directed_along grown operands part_sizes poses rest_kernels",
     "decals.baking": "*",
     "decals.editing": """
-        bare_watch brush_actions brushes filling formats outline_actions overlays recovery slicing visibility
+        bare_watch brush_actions brushes filling outline_actions overlays slicing visibility
         visibility_actions
         """,
     "decals.experiments": "*",
     "decals.field": """
-        batch batch_kernels batch_neighbor_kernels jacobian law neighbor_kernels pixel_filter walk_kernels
-        walks
+        batch batch_kernels batch_neighbor_kernels jacobian law neighbor_kernels neighbor_lists pixel_filter
+        walk_kernels walks
         """,
     "decals.hosts": "*",
     "decals.images": "radiance",
@@ -54,7 +53,7 @@ EXTRAS: dict[str, str] = {
         script tables
         """,
     "decals.surfaces": """
-        dataset_colors mesh_check mesh_file triangulate trimesh_colors vtk_child vtk_process
+        dataset_colors mesh_check mesh_file tree_parts trimesh_colors vtk_child vtk_process
         """,
     "decals.surfaces.files": "*",
     "decals.vtk": "exports injection mapper",
@@ -66,12 +65,17 @@ LISTS = (
     "blobtree.meshing.polygonize",
     "blobtree.nodes.extras",
     "blobtree.nodes.kinds",
+    "blobtree.tape.extras",
     "decals.editing.actions",
+    "decals.editing.formats",
+    "decals.field.extras",
     "decals.images.extras",
     "decals.rendering.extras",
     "decals.scattering.extras",
+    "decals.surfaces.extras",
+    "decals.vtk.extras",
 )
-"""Modules that list kinds of nodes, ways of meshing, actions, refinements, and what extends the renderer."""
+"""Modules that list kinds of nodes, ways of meshing, actions, formats, refinements, and other extras."""
 
 
 def is_extra(module: str) -> bool:

@@ -13,7 +13,8 @@ from decals.errors import InvalidInput
 from decals.scenes.camera import UPRIGHT, Axes
 from decals.scenes.objects import SceneObject
 from decals.scenes.records import SAMPLE
-from decals.surfaces.mesh_file import MeshArrays, dataset_triangles
+from decals.surfaces.mesh_file import dataset_triangles
+from decals.surfaces.triangulate import MeshArrays
 
 _DATA = "https://github.com/pyvista/vtk-data"
 

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike
 
 from blobtree import Node, Point, Ricci, Segment, Sum
 from blobtree._typing import Float64Array, FloatArray, Int32Array
-from decals.surfaces.mesh_file import MeshArrays
+from decals.surfaces.triangulate import MeshArrays
 
 _COLD, _WARM = (0.36, 0.52, 0.72), (0.85, 0.55, 0.32)
 _BALLS = (

@@ -4,17 +4,31 @@ Cells of one size are those of `Polygonizer`. They are smaller where parts are t
 from a chord error (`chord_error`).
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from blobtree.errors import InvalidResolution
-from blobtree.meshing import creases as _creases  # noqa: F401  (adds what moves vertices onto creases)
-from blobtree.meshing.chord_error import adaptive_within_chord_error, within_chord_error
+from blobtree.lazy import if_present
 from blobtree.meshing.mesh import Mesh
 from blobtree.meshing.polygonizer import Polygonizer, above_zero
-from blobtree.meshing.thin_parts import polygonize_parts
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import ImplicitModel, checked_tree
 from blobtree.validation import positive_count, truth
+
+WAYS: dict[str, Callable[..., Mesh]] = {}
+"""Ways of meshing beside cells of one size."""
+
+with if_present():
+    from blobtree.meshing import creases as _creases  # noqa: F401  (adds what moves vertices onto creases)
+    from blobtree.meshing.chord_error import adaptive_within_chord_error, within_chord_error
+    from blobtree.meshing.thin_parts import polygonize_parts
+
+    WAYS |= {
+        "parts": polygonize_parts,
+        "adaptive": adaptive_within_chord_error,
+        "uniform": within_chord_error,
+    }
 
 MIN_RELATIVE_ERROR = 2.0**-20
 """Smallest error that float32 can resolve, over the largest coordinate."""
@@ -104,8 +118,8 @@ def polygonize(
     True
     """
     checked_tree(tree)
-    if resolution is None and cell_size is None and chord_error is None:
-        return polygonize_parts(tree, creases=creases, device=device, progress=progress, cancel=cancel)
+    if resolution is None and cell_size is None and chord_error is None and "parts" in WAYS:
+        return WAYS["parts"](tree, creases=creases, device=device, progress=progress, cancel=cancel)
     if chord_error is None:
         return Polygonizer(
             tree,
@@ -124,7 +138,7 @@ def polygonize(
     most = positive_count("max_triangles", max_triangles, InvalidResolution)
     truth("creases", creases, InvalidResolution)
     adaptive = truth("adaptive", adaptive, InvalidResolution)
-    within = adaptive_within_chord_error if adaptive else within_chord_error
+    within = WAYS["adaptive" if adaptive else "uniform"]
     with reporting(progress, cancel) as report:
         return within(tree, chord_error, most, creases, device, report)
 

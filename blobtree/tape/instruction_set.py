@@ -29,6 +29,7 @@ from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.kinds.falloff import FALLOFFS
 from blobtree.lazy import Lazy
 from blobtree.tape.dispatch import CORE_TABLES
+from blobtree.tape.extras import gradient_evaluations
 from blobtree.transpile.derivative import derivative_along, differentiated
 from blobtree.transpile.specialize import rebind, referenced_values, row_choice, warp_function
 
@@ -154,9 +155,7 @@ class InstructionSet:
         """Return the evaluation that knows gradients for one that does not, if an operator reads them."""
         if not self.reads_gradients:
             return function
-        from blobtree.tape.directed import DIRECTED_EVALUATIONS  # its derivatives are made at the first use
-
-        exchanged: wp.Function = DIRECTED_EVALUATIONS.get(function, function)
+        exchanged: wp.Function = gradient_evaluations().get(function, function)
         return exchanged
 
     def _module_of(self, function: FunctionType) -> str:

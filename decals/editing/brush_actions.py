@@ -1,7 +1,11 @@
 """Actions that choose the brush of a window."""
 
+from collections.abc import Callable
+
+from blobtree._typing import Int64Array
 from decals.editing.action_state import WindowActions
 from decals.editing.brush_settings import Brush
+from decals.editing.brushes import BrushStroke
 from decals.editing.key_bindings import Group
 
 BRUSHES = {
@@ -26,6 +30,11 @@ class BrushActions(WindowActions):
     def choose(self, brush: Brush) -> None:
         """Drag with a brush from now on."""
         self._state.brush.brush, self._state.message = brush, BRUSHES[brush][1]
+
+    def stroke(self, select: Callable[[Int64Array], None]) -> BrushStroke:
+        """Return a stroke of the chosen brush; `select` takes the decals that the paint brush touches."""
+        state = self._state
+        return BrushStroke(lambda: state.session.document, state.brush, state.run_latest, select)
 
 
 for _brush, (_key, _summary) in BRUSHES.items():

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Any, Protocol
 
 from decals.options import Values
 
@@ -57,3 +57,16 @@ class BrushSettings:
     density: Annotated[float, Values(LEAST_DENSITY, 1.0)] = 1.0
     images: tuple[int, ...] = ()
     seed: int = 0
+
+
+class Stroke(Protocol):
+    """A drag of a brush over surfaces."""
+
+    @property
+    def label(self) -> str:
+        """Text of the undo entry."""
+        ...
+
+    def touch(self, point: Any, normal: Any) -> None:
+        """Change the decals around a surface point."""
+        ...

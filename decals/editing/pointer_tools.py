@@ -7,8 +7,7 @@ import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array, Int64Array
 from decals.editing.actions import KEYS, Actions
-from decals.editing.brush_settings import Brush
-from decals.editing.brushes import BrushStroke
+from decals.editing.brush_settings import Brush, Stroke
 from decals.editing.commands import MoveDecals
 from decals.editing.gizmo import Ray, on_plane
 from decals.editing.queries import (
@@ -88,7 +87,7 @@ class PointerTools:
         self.selection_line: list[tuple[float, float]] = []
         self._press, self._press_position, self._last_click = Press.UP, (0.0, 0.0), (-np.inf, -np.inf)
         self._drag: DecalDrag | SurfaceDrag | None = None
-        self._brush: BrushStroke | None = None
+        self._brush: Stroke | None = None
         self._brush_start: object = None
         self.actions.forget_press = self.forget_press
 
@@ -167,15 +166,13 @@ class PointerTools:
             return False
         if state.brush.brush is Brush.PAINT:
             state.primitive, state.selection = None, ()
-        self._brush = BrushStroke(
-            lambda: state.session.document, state.brush, state.run_latest, self._also_select
-        )
+        self._brush = self.actions.brush.stroke(self._also_select)
         state.begin_stroke(self._brush.label)
         self._brush_start = state.session.position
         self._brush.touch(surface_pick.position, surface_pick.normal)
         return True
 
-    def _end_brush(self, brush: BrushStroke) -> None:
+    def _end_brush(self, brush: Stroke) -> None:
         """End a stroke of the brush; a message says if it changed nothing."""
         state, start = self.actions.state, self._brush_start
         state.end_stroke()

@@ -13,8 +13,8 @@ from decals.editing.document import Document
 from decals.errors import InvalidEdit, InvalidPoints, InvalidScene
 from decals.field.contact_mode import AnyContact, contact_mode
 from decals.field.evaluate import Samples, evaluate
+from decals.field.extras import WALKS
 from decals.field.mapping import ImageMapping
-from decals.field.walks import Walks, walks_for
 from decals.model import Decals
 from decals.record import DEFAULT_CONTACT
 from decals.scattering.mean_normals import mean_normals
@@ -415,7 +415,7 @@ def outlines(
     decals = document.decals.take(numbers)
     if not len(decals):
         return np.zeros((0, angles + 1, 3), np.float32)
-    walks = walks_for(mapping, document.decals, document.objects, only=numbers)
+    walks = WALKS["for"](mapping, document.decals, document.objects, only=numbers) if WALKS else None
     own_walks = None if walks is None else walks.take(numbers)
     alone = {"mapping": mapping, "walks": own_walks}
     rims = _rim_points(document, decals, angles, alone)
@@ -436,12 +436,12 @@ def _along_spokes(
     decals: Decals,
     rims: Float64Array,
     spokes: Float64Array,
-    walks: Walks | None,
+    walks: Any,
     fractions: Float64Array,
 ) -> Float64Array:
     """Return points at fractions (n, angles, k) of the ways from centres to rims (n, angles, 3).
 
-    They lie on the surface where walks lead along spokes (n, angles, 2), otherwise on straight lines.
+    They lie on the surface where `Walks` lead along spokes (n, angles, 2), otherwise on straight lines.
     """
     centers = decals.positions[:, None, None].astype(np.float64)
     points: Float64Array = centers + fractions[..., None] * (rims[:, :, None] - centers)

@@ -12,6 +12,7 @@ from blobtree.device import array_on, known_device, launch
 from blobtree.validation import truth
 from decals.errors import InvalidDecals, InvalidScene
 from decals.field.contact_mode import AnyContact, with_law
+from decals.field.extras import ANSWERS
 from decals.field.image_texels import MaterialSamples, UploadedImages
 from decals.field.mapping import ImageMapping
 from decals.field.points import checked_rows, checked_turns, device_of, placed, rows_on
@@ -197,8 +198,8 @@ def samples_of(
         query.owners,
         query.uv,
         query.fields,
-        jacobian=query.jacobians(normal_derivatives) if jacobian else None,
-        neighbors=query.neighbors() if neighbors else None,
+        jacobian=ANSWERS["jacobian"](query, normal_derivatives) if jacobian else None,
+        neighbors=ANSWERS["neighbors"](query) if neighbors else None,
         **({} if images is None else images.samples(query.sums)),
     )
 

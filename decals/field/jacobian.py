@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
+from decals.field.query import Query
+from decals.record import RECORD, RIM_RADIUS
 from decals.surfaces.surface import tangent_axes
 
 STEP = 1e-3
@@ -117,3 +119,19 @@ def normal_derivatives_of_triangles(corners: Points, normals: Points) -> Float64
     ways = np.stack([wide[:, 1] - wide[:, 0], wide[:, 2] - wide[:, 0]])
     turns = np.stack([normals[:, 1] - normals[:, 0], normals[:, 2] - normals[:, 0]]).astype(np.float64)
     return _solved(ways, turns)
+
+
+def jacobians(query: Query, normal_derivatives: Float64Array | None) -> Float64Array:
+    """Return derivatives of the image coordinates of a query."""
+    spheres: Float32Array = query.target.records.numpy()[::RECORD, 3]
+    radii = np.ones(query.count)
+    places = query.target.places(query.host_owners)
+    owned = places >= 0
+    radii[owned] = RIM_RADIUS * spheres[places[owned]]
+
+    def sampled(points: Float32Array, normals: Float32Array) -> tuple[Int32Array, Float32Array]:
+        owner, uv, *_ = query.sampled(query.on_device(points), query.on_device(normals))
+        return owner.numpy(), uv.numpy()
+
+    center = query.host_owners, query.uv.numpy()
+    return image_jacobians(sampled, *query.host_rows, radii, center, normal_derivatives)

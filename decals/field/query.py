@@ -7,16 +7,15 @@ from typing import Any, Protocol
 import numpy as np
 import warp as wp
 
-from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
+from blobtree._typing import BoolArray, Float32Array, Int32Array, Int64Array
 from blobtree.device import launch
 from decals.field.contact_mode import AnyContact, with_law
 from decals.field.image_texels import UploadedImages
-from decals.field.jacobian import image_jacobians
 from decals.field.sampling_kernels import sample_images, sample_points
 from decals.index.editor import DecalEditor
 from decals.index.index import index_on
 from decals.model import NO_IMAGE, Decals
-from decals.record import NEIGHBOR_REACH, RECORD, RIM_RADIUS
+from decals.record import NEIGHBOR_REACH
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,90 +136,47 @@ class Query:
     def __init__(
         self, target: Target, points: Any, normals: Any, contact: AnyContact, images: UploadedImages | None
     ) -> None:
-        self._target, self._contact, self._device = target, contact, target.device
-        self._points, self._normals = points, normals
-        self._count = target.count(points)
+        self.target, self.contact, self.device = target, contact, target.device
+        self.points, self.normals = points, normals
+        self.count = target.count(points)
         if images is not None:
             images.check(target.image_count)
-        self.owners, self.uv, self.fields, self.sums = self._sampled(points, normals, images)
+        self.owners, self.uv, self.fields, self.sums = self.sampled(points, normals, images)
 
     def _inputs(self, points: Any, normals: Any) -> list[Any]:
-        return [points, normals, int(self._contact), *self._target.arguments()]
+        return [points, normals, int(self.contact), *self.target.arguments()]
 
-    def _launch(self, kernel: Any, inputs: list[Any], outputs: list[Any]) -> None:
-        launch(
-            with_law(self._target.kernel(kernel), self._contact), self._count, inputs, outputs, self._device
-        )
+    def launch(self, kernel: Any, inputs: list[Any], outputs: list[Any]) -> None:
+        """Run a kernel, that of these decals and this contact, once for each result."""
+        launch(with_law(self.target.kernel(kernel), self.contact), self.count, inputs, outputs, self.device)
 
-    def _sampled(self, points: Any, normals: Any, images: UploadedImages | None = None) -> list[Any]:
-        outputs = zeros(self._device, self._count, wp.int32, wp.vec2, wp.float32)
+    def sampled(self, points: Any, normals: Any, images: UploadedImages | None = None) -> list[Any]:
+        """Return owners, image coordinates, fields and sums of images at points on the device."""
+        outputs = zeros(self.device, self.count, wp.int32, wp.vec2, wp.float32)
         inputs = self._inputs(points, normals)
         if images is None:
-            self._launch(sample_points, inputs, outputs)
+            self.launch(sample_points, inputs, outputs)
             return [*outputs, None]
-        sums = images.sums(self._count, self._device)
-        self._launch(sample_images, [*inputs, *outputs, images.texels], [sums])
+        sums = images.sums(self.count, self.device)
+        self.launch(sample_images, [*inputs, *outputs, images.texels], [sums])
         return [*outputs, sums]
 
-    def _on_device(self, rows: Float32Array) -> Any:
-        return wp.array(rows, dtype=wp.vec3, device=self._device)
+    def on_device(self, rows: Float32Array) -> Any:
+        """Return rows as an array of vectors on the device."""
+        return wp.array(rows, dtype=wp.vec3, device=self.device)
 
     @cached_property
-    def _host_owners(self) -> Int32Array:
+    def host_owners(self) -> Int32Array:
+        """Owners in the memory of the host."""
         owners: Int32Array = self.owners.numpy()
         return owners
 
     @cached_property
-    def _host_rows(self) -> tuple[Float32Array, Float32Array]:
+    def host_rows(self) -> tuple[Float32Array, Float32Array]:
         """Points and normals of all results."""
-        rows = [array.numpy() for array in (self._points, self._normals)]
-        repeats = 1 if len(rows[0]) == self._count else self._count // max(len(rows[0]), 1)
+        rows = [array.numpy() for array in (self.points, self.normals)]
+        repeats = 1 if len(rows[0]) == self.count else self.count // max(len(rows[0]), 1)
         return np.tile(rows[0], (repeats, 1)), np.tile(rows[1], (repeats, 1))
-
-    def jacobians(self, normal_derivatives: Float64Array | None) -> Float64Array:
-        """Return derivatives of image coordinates."""
-        spheres: Float32Array = self._target.records.numpy()[::RECORD, 3]
-        radii = np.ones(self._count)
-        places = self._target.places(self._host_owners)
-        owned = places >= 0
-        radii[owned] = RIM_RADIUS * spheres[places[owned]]
-
-        def sampled(points: Float32Array, normals: Float32Array) -> tuple[Int32Array, Float32Array]:
-            owner, uv, *_ = self._sampled(self._on_device(points), self._on_device(normals))
-            return owner.numpy(), uv.numpy()
-
-        center = self._host_owners, self.uv.numpy()
-        return image_jacobians(sampled, *self._host_rows, radii, center, normal_derivatives)
-
-    def neighbors(self) -> Neighbors:
-        """Return all decals with a field at points; the index lists whole influences, not only reaches."""
-        from decals.field.neighbor_kernels import (  # compiled at the first use
-            SHOWS_ALONE,
-            SHOWS_IN_LAYER,
-            list_neighbors,
-        )
-
-        device, count = self._device, self._count
-        target, known = self._target.wide()
-        empty = zeros(device, 0, wp.int32, wp.float32)
-        (counts,) = zeros(device, count, wp.int32)
-        owners = self._host_owners
-        if known is not None:
-            owners = np.where(owners >= 0, np.searchsorted(known, owners), owners).astype(np.int32)
-        placed: Any = wp.array(owners, dtype=wp.int32, device=device)
-        given = [self._points, self._normals, int(self._contact), *target.arguments(), placed]
-        self._launch(list_neighbors, [*given, empty[0]], [counts, empty[0], empty[1], empty[1], empty[0]])
-        offsets = np.concatenate([[0], np.cumsum(counts.numpy(), dtype=np.int64)])
-        starts: Any = wp.array(offsets[:-1], dtype=wp.int32, device=device)
-        total = int(offsets[-1])
-        lists = zeros(device, total, wp.int32, wp.float32, wp.float32, wp.int32)
-        if total:
-            self._launch(list_neighbors, [*given, starts], [counts, *lists])
-        order = np.lexsort((lists[0].numpy(), np.repeat(np.arange(count), np.diff(offsets))))
-        found, fields, pushes, shows = (values.numpy()[order] for values in lists)
-        numbers = found if known is None else known[found].astype(np.int32)
-        alone, in_layer = ((shows & bit) > 0 for bit in (SHOWS_ALONE, SHOWS_IN_LAYER))
-        return Neighbors(offsets, numbers, fields, pushes, alone, in_layer)
 
 
 def zeros(device: Any, count: int, *kinds: Any) -> list[Any]:

@@ -46,6 +46,7 @@ from blobtree.tape.evaluators import (
     way_end,
     way_outside,
 )
+from blobtree.tape.extras import gradient_evaluators, gradient_steps
 from blobtree.tape.instruction_set import BUILT_IN, InstructionSet
 from blobtree.tape.interpreter import field_bound, field_gradient
 from blobtree.tape.tape import Tape
@@ -149,9 +150,8 @@ def _evaluators(kinds: Kinds) -> dict[str, tuple[Evaluator, str]]:
     """Return the evaluators; where operators read gradients, ``directed.glsl`` adds the gradient to them."""
     if not kinds.directed:
         return _EVALUATORS
-    from blobtree.tape.directed import DIRECTED_BOUND, DIRECTED_COLOR  # imported here: it takes long
-
-    return {"directed_bound": (DIRECTED_BOUND, "mat2x4"), "directed_color": (DIRECTED_COLOR, "mat2x4")}
+    bound, color = gradient_evaluators()
+    return {"directed_bound": (bound, "mat2x4"), "directed_color": (color, "mat2x4")}
 
 
 def _library(kinds: Kinds, others: Iterable[Any]) -> str:
@@ -190,8 +190,7 @@ def _library(kinds: Kinds, others: Iterable[Any]) -> str:
 
 def _functions_along(kinds: Kinds, skeletons: list[Skeleton]) -> Iterable[Any]:
     """Yield the functions of `_interpreter_along`."""
-    from blobtree.tape import directed_along as along  # imported here: it takes long
-
+    along = gradient_steps()
     yield from (directional_derivative(skeleton.closest, ["q"]) for skeleton in skeletons)
     yield from (along.leaf_along, along.pullback_affine_along, along.combine_along)
     if kinds.falloffs:
@@ -351,8 +350,7 @@ def _run_cases(kinds: Kinds, *, bounds: bool) -> Iterable[str]:
 
 def _interpreter_along(kinds: Kinds) -> Source:
     """Return the loop of ``interpreter.glsl`` for the derivative of (value, direction) along `direction`."""
-    from blobtree.tape import directed_along as along
-
+    along = gradient_steps()
     defines = {
         "INTERPRET": "interpret_along",
         "FIELD": "mat2x4",
@@ -371,8 +369,7 @@ def _key(function: Any) -> str:
 
 def _run_cases_along(kinds: Kinds) -> Iterable[str]:
     """Return the cases of `_run_cases` for derivatives; `local_direction` is the velocity of the point."""
-    from blobtree.tape import directed_along as along
-
+    along = gradient_steps()
     for code in kinds.skeletons:
         skeleton = kinds.instruction_set.skeletons[code]
         closest = directional_derivative(skeleton.closest, ["q"]).key

@@ -20,9 +20,10 @@ from decals.scenes.camera import Vector
 from decals.scenes.objects import MeshObject, Paths, SceneObject, TreeObject, shape_color, spare_coordinates
 from decals.scenes.origin import WORLD
 from decals.surfaces.base_color import COLOR_ARRAYS, BaseColor, BaseTexture, Color
+from decals.surfaces.extras import READERS
 from decals.surfaces.mesh_data import MeshData
-from decals.surfaces.mesh_file import MeshArrays, read_mesh_data
 from decals.surfaces.normals import CREASE_ANGLE
+from decals.surfaces.triangulate import MeshArrays
 
 SAMPLE = "sample:"
 """How the source of a mesh begins that is a sample and no file."""
@@ -213,7 +214,8 @@ def _textures(name: str, records: Iterable[_TextureRecord]) -> list[BaseTexture]
 
 def _mesh(source: str, folder: Path, samples: SampleLoader | None) -> MeshData:
     if not source.startswith(SAMPLE):
-        return read_mesh_data(folder / source)
+        data: MeshData = READERS["file"](folder / source)
+        return data
     if samples is None:
         raise InvalidScene(f"the mesh {source!r} is a sample; pass samples=, or use the command line")
     return MeshData(*samples(source.removeprefix(SAMPLE)))

@@ -17,12 +17,12 @@ from blobtree.validation import point_array
 from decals.errors import ImplicitDecalsError, InvalidMesh
 from decals.model import MAX_COORDINATE
 from decals.surfaces.base_color import BaseColor, checked_color, linear_colors
+from decals.surfaces.extras import READERS
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.mesh_data import MeshData, joined
-from decals.surfaces.mesh_file import dataset_mesh, polygon_triangles, read_mesh_data
 from decals.surfaces.surface import Surface
-from decals.surfaces.trimesh_colors import trimesh_color
+from decals.surfaces.triangulate import polygon_triangles
 from decals.validation import describe
 
 if TYPE_CHECKING:
@@ -98,7 +98,8 @@ def as_shape(
             raise error(f"{name}: expected a model, found no file {os.fspath(model)!r}; check the path")
         return read_shape(model)
     if _is_dataset(model):
-        return dataset_mesh(model, name=name)
+        data: MeshData = READERS["dataset"](model, name=name)
+        return data
     if _is_trimesh_scene(model):
         parts = [part for part in model.dump() if hasattr(part, "faces") and len(part.faces)]
         if parts:
@@ -176,7 +177,8 @@ def read_shape(path: str | os.PathLike[str]) -> Node | MeshData:
     """
     path = Path(path)
     if path.suffix.lower() != ".json":
-        return read_mesh_data(path)
+        data: MeshData = READERS["file"](path)
+        return data
     try:
         return blobtree.load(path)
     except OSError as error:
@@ -201,7 +203,7 @@ def _color(mesh: MeshLike) -> BaseColor | None:
     """Return the colours of a mesh of trimesh or of `blobtree.polygonize`."""
     if isinstance(mesh, Mesh):
         return BaseColor(linear_colors(mesh.colors))
-    return trimesh_color(mesh) if _is_trimesh(mesh) else None
+    return READERS["trimesh"](mesh) if _is_trimesh(mesh) else None
 
 
 def _array_mesh(vertices: ArrayLike, faces: ArrayLike | Sequence[Any], name: str) -> MeshData:

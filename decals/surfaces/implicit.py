@@ -14,15 +14,12 @@ from blobtree.device import known_device, launch
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, UNION
 from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
-from blobtree.meshing.thin_parts import polygonize_parts, shows_small_parts
-from blobtree.tape.grown import runs_of_leaves
 from blobtree.tape.model import values_at
-from blobtree.tape.operands import leaves_of
-from blobtree.tape.part_sizes import has_small_bodies
 from blobtree.tracing.trace import trace
 from blobtree.validation import point_array
 from decals.errors import InvalidMesh, InvalidScattering
 from decals.surfaces.curved import CurvedMesh
+from decals.surfaces.extras import SMALL_PARTS
 from decals.surfaces.mesh import DeviceMeshSurface, MeshSurface
 from decals.surfaces.surface import (
     Scalars,
@@ -45,12 +42,6 @@ RESOLUTION = 64
 
 MAX_RESOLUTION = 128
 """Largest number of cells along the longest side of the tree's support in `ImplicitSurface.triangulated`."""
-
-SMALL_PART = 2.5
-"""Radius in cells below which the area of a part's triangles is not that of its surface."""
-
-MAX_PARTS = 64
-"""Leaves of a tree up to which parts are told apart."""
 
 MAX_STEP = 0.5
 """Longest step of Newton's method, in cells."""
@@ -119,11 +110,9 @@ class ImplicitSurface(Immutable):
                 f"expected a tree with a surface, got none in {cells} cells; "
                 "its parts may be too small, or cut each other away"
             )
-        self._finds_parts = resolution is None
-        self.has_small_parts = (
-            self._finds_parts
-            and has_small_bodies(tree, SMALL_PART * _cell_size(tree, cells))
-            and shows_small_parts(tree, cells, SMALL_PART, device)
+        self._finds_parts = resolution is None and bool(SMALL_PARTS)
+        self.has_small_parts = self._finds_parts and SMALL_PARTS["find"](
+            tree, cells, _cell_size(tree, cells), device
         )
         """True if parts of the tree are small beside it, not only what is cut out of it."""
         self._coarse = (
@@ -150,7 +139,7 @@ class ImplicitSurface(Immutable):
         resolution = RESOLUTION if cells <= RESOLUTION else MAX_RESOLUTION
         mesh = self._meshes.get(resolution)
         if mesh is None:
-            refine = polygonize_parts if self._finds_parts else polygonize
+            refine = SMALL_PARTS["mesh"] if self._finds_parts else polygonize
             fine = refine(self.tree, resolution=resolution, creases=True, device=self.device)
             mesh = MeshSurface(
                 fine.vertices, fine.faces, device=self.device, orientation=MeshOrientation.KEEP
@@ -201,10 +190,8 @@ class ImplicitSurface(Immutable):
 
     def parts(self, points: Float32Array) -> Int64Array:
         """Return the leaf whose surface is nearest to each of the points (n,); 0 for trees of many leaves."""
-        tree, gaps = self.tree, []
-        if sum(1 for _ in runs_of_leaves(tree._program)) <= MAX_PARTS:
-            gaps = [np.abs(values_at(tape, points) - ISO) for tape in leaves_of(tree._program, tree.tape)]
-        return np.argmin(gaps, axis=0) if gaps else np.zeros(len(points), np.int64)
+        leaves: Int64Array = SMALL_PARTS["nearest"](self.tree, points)
+        return leaves
 
     def project(
         self, points: ArrayLike, *, within: Float32Array | None = None

@@ -3,7 +3,6 @@
 VTK's readers crash or hang on some damaged files, so they run in a process of their own.
 """
 
-import logging
 import math
 import re
 from collections.abc import Callable, Sequence
@@ -12,9 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
+from blobtree._typing import Float64Array, Int64Array
 from blobtree.files import is_file
 from decals.child_process import can_isolate
 from decals.errors import InvalidMesh
@@ -29,18 +27,18 @@ from decals.surfaces.files.ply import read_ply, strip_triangles
 from decals.surfaces.files.stl import read_stl
 from decals.surfaces.files.threemf import read_3mf, threemf_objects
 from decals.surfaces.mesh_data import MeshData, joined
-from decals.surfaces.triangulate import Polygons, Triangulation, triangulate
+from decals.surfaces.triangulate import (
+    MeshArrays,
+    Polygons,
+    check_indices,
+    polygon_triangles,
+    traced_triangles,
+)
 from decals.surfaces.vtk_process import read_isolated
 from decals.validation import as_path, describe
 
 if TYPE_CHECKING:  # its import takes longer than ours, and meshes of arrays do without
     import pyvista as pv
-
-MeshArrays = tuple[Float32Array, Int32Array]
-"""Vertices ``float32[n, 3]`` and triangles ``int32[m, 3]``."""
-
-MIN_PRECISE_RATIO = 500.0
-"""Least ratio of coordinates to the extent of a mesh at which float64 is kept."""
 
 _POLYGON_READERS: dict[str, Callable[[Path], tuple[Float64Array, Polygons, Paint]]] = {
     ".obj": read_obj,
@@ -59,8 +57,6 @@ _OBJECT_READERS: dict[str, Callable[[Path], dict[str, MeshData]]] = {
     ".gltf": gltf_objects,
 }
 """Those of the objects in such files, by their names."""
-
-_logger = logging.getLogger(__name__)
 
 
 def read_mesh(path: str | PathLike[str]) -> MeshArrays:
@@ -192,50 +188,6 @@ def _cells(cells: Any) -> Polygons:
     return Polygons(corners, np.diff(offsets))
 
 
-def precise_points(points: ArrayLike) -> Any:
-    """Return points as float32; keep float64 of points so far from zero that float32 would round them."""
-    given = np.asarray(points)
-    with np.errstate(over="ignore", invalid="ignore"):  # surfaces refuse infinity and NaN
-        finite = given.dtype == np.float64 and len(given) and np.isfinite(given).all()
-        if finite and np.abs(given).max() > MIN_PRECISE_RATIO * np.ptp(given, axis=0).max():
-            return given
-        return given.astype(np.float32)
-
-
-def polygon_triangles(
-    points: ArrayLike, polygons: Polygons | NDArray[Any] | Sequence[NDArray[Any]], *, name: str
-) -> MeshArrays:
-    """Divide polygons into triangles, concave ones too, after a check of their indices."""
-    return traced_triangles(points, polygons, name=name)[:2]
-
-
-def traced_triangles(
-    points: ArrayLike, polygons: Polygons | NDArray[Any] | Sequence[NDArray[Any]], *, name: str
-) -> tuple[Float32Array, Int32Array, Triangulation]:
-    """Return vertices and triangles as `polygon_triangles` does, and which corners the triangles have."""
-    vertices: Any = precise_points(points)
-    polygons = Polygons.of(polygons)
-    if len(polygons) == 0:
-        raise InvalidMesh(f"{name!r} has {len(vertices)} points but no faces; give a surface mesh")
-    _check_indices(polygons.corners, len(vertices), name)
-    if (polygons.sizes < 3).all():
-        raise InvalidMesh(f"{name!r} has no face of three or more corners; give a surface mesh")
-    if short := int((polygons.sizes < 3).sum()):
-        _logger.warning("%s: left out %d faces of fewer than three corners", name, short)
-    wrong = ~np.isfinite(vertices[polygons.corners]).all(axis=1)
-    if wrong.any():
-        bad = int(polygons.corners[np.argmax(wrong)])
-        raise InvalidMesh(
-            f"{name!r} has a face at point {bad}, whose coordinates are not finite; correct them"
-        )
-    triangles = triangulate(vertices, polygons)
-    if triangles.crossing:
-        _logger.warning(
-            "%s: %d faces cross themselves; some of their triangles lie on others", name, triangles.crossing
-        )
-    return vertices, polygons.corners[triangles.places].astype(np.int32), triangles
-
-
 def _is_empty(dataset: Any) -> bool:
     """Return True if neither a dataset nor any of its blocks has cells."""
     import pyvista as pv
@@ -267,14 +219,7 @@ def _check_cells(dataset: Any, name: str) -> None:
                 offsets[0] != 0 or offsets[-1] != len(corners) or (np.diff(offsets) < 0).any()
             ):
                 raise InvalidMesh(f"{name!r} has faces that do not follow each other; export it again")
-            _check_indices(corners, dataset.n_points, name)
-
-
-def _check_indices(corners: Any, count: int, name: str) -> None:
-    """Refuse corner indices out of range: VTK's filters trust them and crash."""
-    if len(corners) and (corners.min() < 0 or corners.max() >= count):
-        bad = corners.min() if corners.min() < 0 else corners.max()
-        raise InvalidMesh(f"{name!r} has {count} points but a face asks for number {bad}; export it again")
+            check_indices(corners, dataset.n_points, name)
 
 
 def read_dataset(path: Path) -> "pv.DataSet | pv.MultiBlock":

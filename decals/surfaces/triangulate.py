@@ -6,15 +6,25 @@ a neighbour that has them would no longer meet the polygon.
 """
 
 import heapq
+import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from blobtree._typing import BoolArray, Float64Array, Int64Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
+from decals.errors import InvalidMesh
+
+MeshArrays = tuple[Float32Array, Int32Array]
+"""Vertices ``float32[n, 3]`` and triangles ``int32[m, 3]``."""
+
+MIN_PRECISE_RATIO = 500.0
+"""Least ratio of coordinates to the extent of a mesh at which float64 is kept."""
+
+_logger = logging.getLogger(__name__)
 
 FLAT = 1e-12
 """Area of a triangle, relative to the square around its polygon, below which it counts as none."""
@@ -291,3 +301,54 @@ TREE_CORNERS = 100
 def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
     """Return twice the area of a triangle, positive if counter-clockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def precise_points(points: ArrayLike) -> Any:
+    """Return points as float32; keep float64 of points so far from zero that float32 would round them."""
+    given = np.asarray(points)
+    with np.errstate(over="ignore", invalid="ignore"):  # surfaces refuse infinity and NaN
+        finite = given.dtype == np.float64 and len(given) and np.isfinite(given).all()
+        if finite and np.abs(given).max() > MIN_PRECISE_RATIO * np.ptp(given, axis=0).max():
+            return given
+        return given.astype(np.float32)
+
+
+def polygon_triangles(
+    points: ArrayLike, polygons: Polygons | NDArray[Any] | Sequence[NDArray[Any]], *, name: str
+) -> MeshArrays:
+    """Divide polygons into triangles, concave ones too, after a check of their indices."""
+    return traced_triangles(points, polygons, name=name)[:2]
+
+
+def traced_triangles(
+    points: ArrayLike, polygons: Polygons | NDArray[Any] | Sequence[NDArray[Any]], *, name: str
+) -> tuple[Float32Array, Int32Array, Triangulation]:
+    """Return vertices and triangles as `polygon_triangles` does, and which corners the triangles have."""
+    vertices: Any = precise_points(points)
+    polygons = Polygons.of(polygons)
+    if len(polygons) == 0:
+        raise InvalidMesh(f"{name!r} has {len(vertices)} points but no faces; give a surface mesh")
+    check_indices(polygons.corners, len(vertices), name)
+    if (polygons.sizes < 3).all():
+        raise InvalidMesh(f"{name!r} has no face of three or more corners; give a surface mesh")
+    if short := int((polygons.sizes < 3).sum()):
+        _logger.warning("%s: left out %d faces of fewer than three corners", name, short)
+    wrong = ~np.isfinite(vertices[polygons.corners]).all(axis=1)
+    if wrong.any():
+        bad = int(polygons.corners[np.argmax(wrong)])
+        raise InvalidMesh(
+            f"{name!r} has a face at point {bad}, whose coordinates are not finite; correct them"
+        )
+    triangles = triangulate(vertices, polygons)
+    if triangles.crossing:
+        _logger.warning(
+            "%s: %d faces cross themselves; some of their triangles lie on others", name, triangles.crossing
+        )
+    return vertices, polygons.corners[triangles.places].astype(np.int32), triangles
+
+
+def check_indices(corners: Any, count: int, name: str) -> None:
+    """Refuse corner indices out of range: VTK's filters trust them and crash."""
+    if len(corners) and (corners.min() < 0 or corners.max() >= count):
+        bad = corners.min() if corners.min() < 0 else corners.max()
+        raise InvalidMesh(f"{name!r} has {count} points but a face asks for number {bad}; export it again")

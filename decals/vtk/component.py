@@ -31,7 +31,7 @@ from decals.surfaces.windings import MeshOrientation
 from decals.validation import describe, instance
 from decals.vtk.adapters import Lights
 from decals.vtk.attributes import KnownAttributes
-from decals.vtk.exports import restore_exports, watch_exports
+from decals.vtk.extras import ACTORS
 from decals.vtk.frame import WindowContext
 from decals.vtk.subplot import PickResult, SubplotRenderer
 
@@ -354,7 +354,7 @@ class DecalsComponent(KnownAttributes):
         renderer = self._plotter.renderer
         if id(renderer) not in self._subplots:
             if not self._subplots:
-                watch_exports(self._plotter)
+                ACTORS["watch"](self._plotter)
             self._subplots[id(renderer)] = SubplotRenderer(self._plotter, renderer, self._window_context)
         return self._subplots[id(renderer)]
 
@@ -436,7 +436,7 @@ class DecalsComponent(KnownAttributes):
         for subplot in self._subplots.values():
             subplot.release()
         self._subplots.clear()
-        restore_exports(self._plotter)
+        ACTORS["restore"](self._plotter)
         if self._context is not None and not self._context.stale:
             self._context.release()
         self._context = None

@@ -263,7 +263,11 @@ class InjectedDecals:
     ----------
     in_frame
         True while VTK draws a frame of the subplot.
+    refusal
+        Message about a mapping that cannot be drawn.
     """
+
+    refusal = NOT_WALKED
 
     def __init__(self, subplot: InjectionTarget) -> None:
         self._subplot = subplot

@@ -36,8 +36,8 @@ from decals.surfaces.windings import MeshOrientation
 from decals.validation import count_number, finite_number, member
 from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
 from decals.vtk.attributes import KnownAttributes
+from decals.vtk.extras import ACTORS
 from decals.vtk.frame import FrameKey, FrameOptions, FrameRenderer, WindowContext
-from decals.vtk.injection import NOT_WALKED, InjectedDecals
 from decals.vtk.proxy_actor import ProxyActor, box_around
 from decals.vtk.window_title import WindowTitle
 
@@ -184,7 +184,7 @@ class SubplotRenderer(KnownAttributes):
     keep_previous_frame: bool
     walks_in_thread: bool
     status: FrameStatus
-    applied: InjectedDecals
+    applied: Any
 
     def __init__(
         self, plotter: pv.BasePlotter, renderer: pv.Renderer, context: Callable[[], WindowContext]
@@ -204,7 +204,7 @@ class SubplotRenderer(KnownAttributes):
         self._drawn_size: Size | None = None
         self._proxy_actor = ProxyActor(renderer, weak_callback(self.draw))
         self._enclosed: tuple[object, ...] = ()
-        self.applied = InjectedDecals(self)
+        self.applied = ACTORS["decals"](self)
         self._warned: set[str] = set()
         self._title = WindowTitle(plotter)
         self._tags = [
@@ -596,7 +596,7 @@ class SubplotRenderer(KnownAttributes):
         if picking and self._enclosed:
             messages = [*messages, PICKERS]
         if self.applied.refuse(self.mapping):  # an edited document has changed its own
-            messages = [*messages, NOT_WALKED]
+            messages = [*messages, self.applied.refusal]
         for message in messages:
             if message not in self._warned:
                 self._warned.add(message)

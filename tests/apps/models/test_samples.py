@@ -17,7 +17,7 @@ from decals.apps.models.samples import SAMPLES, axes_of, sample, sample_mesh
 from decals.apps.models.shapes import egg, rounded_box, torus_knot
 from decals.errors import InvalidInput
 from decals.scenes.objects import MeshObject, TreeObject
-from decals.surfaces.mesh_file import MeshArrays
+from decals.surfaces.triangulate import MeshArrays
 
 
 def _volume(vertices: NDArray[np.float32], faces: NDArray[np.int32]) -> float:
