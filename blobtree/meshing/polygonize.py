@@ -20,7 +20,7 @@ WAYS: dict[str, Callable[..., Mesh]] = {}
 """Ways of meshing beside cells of one size."""
 
 with if_present():
-    from blobtree.meshing import creases as _creases  # noqa: F401  (adds what moves vertices onto creases)
+    import blobtree.meshing.creases  # noqa: F401  (adds what moves vertices onto creases)
     from blobtree.meshing.chord_error import adaptive_within_chord_error, within_chord_error
     from blobtree.meshing.thin_parts import polygonize_parts
 

@@ -1,5 +1,13 @@
 """Further formats of images: for each, a test of the first bytes and a function of bytes and name."""
 
-from decals.images.radiance import decode_radiance, is_radiance
+from collections.abc import Callable
 
-DECODERS = ((is_radiance, decode_radiance),)
+from blobtree.lazy import if_present
+from decals.images.texels import Pixels
+
+DECODERS: list[tuple[Callable[[bytes], bool], Callable[[bytes, str], Pixels]]] = []
+
+with if_present():
+    from decals.images.radiance import decode_radiance, is_radiance
+
+    DECODERS.append((is_radiance, decode_radiance))

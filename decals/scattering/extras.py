@@ -1,23 +1,39 @@
-"""Refinements of particles, in the order in which `Relaxation` applies them; each tuple may be empty."""
+"""Rules of radii, and refinements of particles in the order in which `Relaxation` applies them.
 
-from decals.scattering.covering_rule import covering_decals
-from decals.scattering.deform import carried
-from decals.scattering.gap_filling import fill_gaps
-from decals.scattering.part_shares import PartShares
-from decals.scattering.polish import polish
-from decals.scattering.relocation import Relocation
-from decals.scattering.sizing import RULES, Sizing
+Each list may be empty.
+"""
 
-RELOCATIONS = (Relocation, PartShares)
+from collections.abc import Callable
+from typing import Any
+
+from blobtree.lazy import if_present
+from decals.scattering.sizing import Rule, Sizing
+
+RULES: dict[Sizing, Rule] = {}
+"""Rules by their names, besides those of `decals.scattering.sizing`."""
+
+RELOCATIONS: list[Callable[..., Any]] = []
 """Made of a domain and spacings; called at intervals, they move particles of a state and return which."""
 
-SEPARATIONS = (polish,)
+SEPARATIONS: list[Callable[..., Any]] = []
 """Functions that part close pairs of a state after the last step."""
 
-FILLINGS = (fill_gaps,)
+FILLINGS: list[Callable[..., Any]] = []
 """Functions particles → particles after the last step."""
 
-CARRIERS = (carried,)
+CARRIERS: list[Callable[..., Any]] = []
 """Functions particles → particles when surfaces deform."""
 
-RULES[Sizing.COVERING] = covering_decals
+with if_present():
+    from decals.scattering.covering_rule import covering_decals
+    from decals.scattering.deform import carried
+    from decals.scattering.gap_filling import fill_gaps
+    from decals.scattering.part_shares import PartShares
+    from decals.scattering.polish import polish
+    from decals.scattering.relocation import Relocation
+
+    RULES[Sizing.COVERING] = covering_decals
+    RELOCATIONS += [Relocation, PartShares]
+    SEPARATIONS.append(polish)
+    FILLINGS.append(fill_gaps)
+    CARRIERS.append(carried)

@@ -47,9 +47,6 @@ Rule: TypeAlias = Callable[
 """A function of a domain, of centres, with their spacings and True for those that may move, of samples of the
 surfaces, of the normals of decals, and of a seed, to the decals and their radii."""
 
-RULES: dict[Sizing, Rule] = {}
-"""Rules by their names, besides those of this file."""
-
 
 def touching_radii(decals: OrientedPoints) -> Float64Array:
     """Return half the distance to the nearest facing decal; the median radius without such a decal."""
