@@ -77,6 +77,7 @@ from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
 from .nodes.tree import Difference, Intersection, Offset, Ricci, Sum, Transform, Twist, Union
 from .nodes.tree_volumes import sample
 from .nodes.volumes import Volume, from_mesh, from_sdf
+from .nodes.warp import Warp
 from .progress import Cancel, Progress
 from .sampling.field_grid import FieldGrid, field_grid
 from .sampling.tree_distances import SignedDistances, to_sdf
@@ -187,6 +188,7 @@ __all__ = [
     "UnusableCache",
     "UnusableFile",
     "Volume",
+    "Warp",
     "__version__",
     "check_kind",
     "content_hash",

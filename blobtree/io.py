@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Union, cast, get_type_
 import msgspec
 
 from blobtree.custom.skeleton import CustomPrimitive
-from blobtree.custom.warp import CustomWarp
 from blobtree.declare.falloff import Falloff
 from blobtree.declare.parameters import OPTIONAL, fields_of
 from blobtree.declare.registry import CUSTOM_KINDS
@@ -32,6 +31,7 @@ from blobtree.nodes.attributes import Attributes, AttributeValue
 from blobtree.nodes.kinds import BASES, NODE_KINDS
 from blobtree.nodes.node import Node
 from blobtree.nodes.values import left_out, operand_names
+from blobtree.nodes.warp import Warp
 from blobtree.tape.model import checked_tree
 from blobtree.tape.program import postorder
 from blobtree.validation import Vector, shown
@@ -118,7 +118,7 @@ _RECORDS: dict[str, type[NodeRecord]] = {
 _BASES = BASES | {
     "custom_skeleton": CustomPrimitive,
     "own skeleton": CustomPrimitive,
-    "custom_warp": CustomWarp,
+    "custom_warp": Warp,
 }
 
 CUSTOM_RECORDS: dict[Any, list[type[NodeRecord]]] = {

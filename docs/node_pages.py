@@ -54,7 +54,9 @@ def bounds_of(kind: type[Node]) -> str:
         row = kind.operator
         return f"{BOXES[row.support]} Range: {sentence(row.range)} Slope: {sentence(row.slope)}"
     if warp := getattr(kind, "warp", None):
-        return f"Box: {sentence(warp.box)} {TEXTS['warp_bounds'].strip()} {sentence(warp.stretch)}"
+        bound = kind._formulas["lipschitz"].function if kind._formulas else warp.lipschitz
+        box = sentence(kind.outer_box or warp.box)
+        return f"Box: {box} {TEXTS['warp_bounds'].strip()} {sentence(bound)}"
     assert issubclass(kind, Macro), kind
     return f"They are those of the tree for which `{kind.__name__}` stands."
 

@@ -12,7 +12,7 @@ EXTRAS: dict[str, str] = {
     "blobtree.custom": "field",
     "blobtree.derivatives": "*",
     "blobtree.formulas": """
-        contact curve_skeletons deformations falloffs flat_skeletons noise solid_skeletons
+        contact curve_skeletons falloffs flat_skeletons noise solid_skeletons
         """,
     "blobtree.meshing": """
         adaptive adaptive_cell_kernels adaptive_cells adaptive_kernels adaptive_mesh batch

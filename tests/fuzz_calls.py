@@ -41,7 +41,7 @@ UNCALLED = {
     "Actions", "Cancel", "ContactLaw", "ContactSurface", "Curvatures", "CustomCombination",
     "CustomField", "CustomPrimitive", "CustomWarp", "Document", "EditSession", "Falloff", "FieldGrid",
     "FieldPrimitive", "Fit", "Hits", "Node", "NumericParameter", "Operator", "ParameterGradient",
-    "PointerTools", "Progress", "SignedDistances", "Tape", "UndoEntry", "edit", "show",
+    "PointerTools", "Progress", "SignedDistances", "Tape", "UndoEntry", "Warp", "edit", "show",
 }  # fmt: skip
 """Types that users only get from functions, extend, or start for a whole session; and windows."""
 

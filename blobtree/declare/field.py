@@ -23,7 +23,7 @@ import numpy as np
 import warp as wp
 
 from blobtree.declare.formula import Formula
-from blobtree.declare.readers import PLACE, Reader, number_types
+from blobtree.declare.readers import PLACE, Reader, number_types, require_numbers
 from blobtree.transpile.derivative import partial_derivatives
 
 wp.set_module_options({"enable_backward": False})
@@ -103,23 +103,7 @@ class FieldFormulas:
         `declared` are the names of the parameters that formulas take, None for other numbers.
         """
         source = self.source
-        first, *names = source.parameters or {"": None}
-        if source.parameters.get(first) is not wp.vec3:
-            raise source.refusal("expected the point `q: wp.vec3` as its first parameter")
-        if declared is not None and names != [*declared]:
-            raise source.refusal(
-                f"expected the parameters of the class, {', '.join(declared) or 'none'}, behind the point; "
-                f"got {', '.join(names) or 'none'}"
-            )
-        own = [wp.float32 if kind is float else kind for kind in self.numbers.values()]
-        for name, part in self.given.items():
-            types = [wp.float32 if kind is float else kind for kind in part.parameters.values()]
-            alone = name == "lipschitz" and types == own
-            if part is not source and not alone and types != [*_BALL.values(), *own]:
-                wanted = ", ".join([*(f"{key}: {kind.__name__}" for key, kind in _BALL.items()), *names])
-                raise source.refusal(
-                    f"{name}: expected a function of ({wanted}), got one of ({', '.join(part.parameters)})"
-                )
+        require_numbers(source, self.given, dict.fromkeys(RESULTS, _BALL), declared)
         if len(self.given.keys() & {"value", "value_gradient"}) == 2:
             raise source.refusal("expected one of the formulas `value` and `value_gradient`, got both")
         bound = self.lipschitz

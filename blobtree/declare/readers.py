@@ -1,5 +1,6 @@
 """Readers: functions of rows that read the numbers of a formula from the tape and call it."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -26,6 +27,46 @@ PLACE = {"tape": Texels, "at": wp.int32}
 def number_types(formula: Formula, leading: int) -> dict[str, Any]:
     """Return the types of what a formula takes behind its leading parameters, by name."""
     return dict(list(formula.parameters.items())[leading:])
+
+
+def require_numbers(
+    source: Formula,
+    given: Mapping[str, Formula],
+    leading: Mapping[str, Mapping[str, Any]],
+    declared: Sequence[str] | None,
+) -> None:
+    """Raise `InvalidDefinition` unless all formulas of a kind take a point, and then the same numbers.
+
+    `leading` has what formulas take in front of the numbers; the bound `lipschitz` may take the numbers
+    alone. `declared` are the names of the parameters that formulas take, None for other numbers.
+    """
+    first, *names = source.parameters or {"": None}
+    if source.parameters.get(first) is not wp.vec3:
+        raise source.refusal("expected the point `q: wp.vec3` as its first parameter")
+    if declared is not None and names != [*declared]:
+        raise source.refusal(
+            f"expected the parameters of the class, {', '.join(declared) or 'none'}, behind the point; "
+            f"got {', '.join(names) or 'none'}"
+        )
+    own = [wp.float32 if kind is float else kind for kind in number_types(source, 1).values()]
+    for name, part in given.items():
+        types = [wp.float32 if kind is float else kind for kind in part.parameters.values()]
+        alone = name == "lipschitz" and types == own
+        if part is not source and not alone and types != [*leading[name].values(), *own]:
+            wanted = ", ".join([*(f"{key}: {spelled(kind)}" for key, kind in leading[name].items()), *names])
+            raise source.refusal(
+                f"{name}: expected a function of ({wanted}), got one of ({', '.join(part.parameters)})"
+            )
+
+
+def named_values(types: Mapping[str, Any], numbers: Sequence[float]) -> dict[str, Any]:
+    """Return numbers that lie one after the other as values of their types, by name."""
+    found: dict[str, Any] = {}
+    for name, kind in types.items():
+        taken, numbers = tuple(numbers[: SIZES[kind]]), numbers[SIZES[kind] :]
+        if taken:
+            found[name] = taken if SIZES[kind] > 1 else int(taken[0]) if kind in (wp.int32, int) else taken[0]
+    return found
 
 
 @dataclass(frozen=True)

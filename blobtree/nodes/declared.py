@@ -77,7 +77,8 @@ class DeclaredNode(Node, metaclass=CustomKind):
     def _define(cls, declaration: Any) -> None:
         """Check a user's kind, unless it is known, and register it."""
         declared = parameters_of(cls)
-        unknown = [item.name for item in fields_of(cls) if item.name not in ("operands", *declared)]
+        known_fields = {*_fields_of_base(cls), *declared}
+        unknown = [item.name for item in fields_of(cls) if item.name not in known_fields]
         if unknown:
             raise InvalidDefinition(
                 f"{cls.__qualname__}: field {unknown[0]!r}: expected a specifier of blobtree.par, such as "
@@ -89,9 +90,8 @@ class DeclaredNode(Node, metaclass=CustomKind):
         cls.parameters = tuple(p for name, p in declared.items() if name not in shared)
         numbers = getattr(cls, "numbers", cls)
         declaration.require([p.name for p in cls.parameters] if is_own(numbers) or numbers is cls else None)
-        sources = [
-            inspect.getsource(getattr(cls, name)) for name in cls.methods if not is_own(getattr(cls, name))
-        ]
+        methods = [getattr(cls, name) for name in cls.methods]
+        sources = [_source_text(method) for method in methods if method is not None and not is_own(method)]
         cls.digest = declaration.digest((*cls.parameters, *sources))
         known: Any = CUSTOM_KINDS.get(cls.kind)
         if (
@@ -115,6 +115,14 @@ class DeclaredNode(Node, metaclass=CustomKind):
         """The parameters by name; of a user's kind those that its base does not have."""
         names = [p.name for p in self.parameters] if self.digest else parameters_of(type(self))
         return {name: getattr(self, name) for name in names}
+
+
+def _source_text(method: Any) -> str:
+    """Return the source of a method, or else a text that differs between methods."""
+    try:
+        return inspect.getsource(method)
+    except (OSError, TypeError):
+        return repr(method)
 
 
 def _fields_of_base(kind: type) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from blobtree.declare.field import RESULTS, FieldFormulas, FieldKind
 from blobtree.declare.field_checks import check_box, check_field
 from blobtree.declare.formula import formula, is_own
 from blobtree.declare.parameters import Color, Quantity, columns_of, parameters_of
-from blobtree.declare.readers import SIZES
+from blobtree.declare.readers import named_values
 from blobtree.errors import InvalidDefinition, InvalidNode
 from blobtree.formulas.falloff import RIM
 from blobtree.formulas.noise import LARGEST_NOISE, MEAN_NOISE_SLOPE, STEEPEST_NOISE, gradient_noise
@@ -135,12 +135,7 @@ class FieldPrimitive(DeclaredLeaf, ProgramField):
     @classmethod
     def _formula_values(cls, values: dict[str, Any], declaration: FieldFormulas) -> dict[str, Any]:
         """Return the numbers of the formulas for values of the parameters."""
-        numbers = cls.numbers(_rows(values))[0].tolist()
-        found: dict[str, Any] = {}
-        for name, kind in declaration.numbers.items():
-            taken, numbers = numbers[: SIZES[kind]], numbers[SIZES[kind] :]
-            found[name] = tuple(taken) if SIZES[kind] > 1 else taken[0]
-        return found
+        return named_values(declaration.numbers, cls.numbers(_rows(values))[0].tolist())
 
     @property
     def mean_radius(self) -> float:

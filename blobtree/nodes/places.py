@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float64Array
+from blobtree.declare.warp import SpaceWarp
 from blobtree.errors import InvalidNode
-from blobtree.formulas.warps import SpaceWarp
 from blobtree.nodes.node import Node
 from blobtree.nodes.paths import Path, nodes_along, square_matrix
 from blobtree.nodes.tree import Transform

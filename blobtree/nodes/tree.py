@@ -6,16 +6,17 @@
 import math
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 
 from blobtree import par
 from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, RICCI, SUM, UNION
-from blobtree.formulas.warps import TWIST, SpaceWarp
+from blobtree.formulas.warps import TWIST
 from blobtree.nodes.node import Node
 from blobtree.nodes.operator import Combination, Operator
+from blobtree.nodes.warp import Placed, Warp
 from blobtree.tape.program import Placement
 from blobtree.validation import Matrix
 
@@ -140,13 +141,6 @@ class Difference(Combination):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Placed(Node):
-    """A node with one `child`, which it moves, grows or deforms."""
-
-    child: Node
-
-
-@dataclass(frozen=True, eq=False, repr=False)
 class Transform(Placed):
     """`child` under an affine map.
 
@@ -198,7 +192,7 @@ class Offset(Placed):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Twist(Placed):
+class Twist(Warp):
     """`child` turned about the z axis by an angle that grows with the height (Barr 1984).
 
     Examples
@@ -209,13 +203,11 @@ class Twist(Placed):
     """
 
     file_tag = "twist"
-    warp: ClassVar[SpaceWarp] = TWIST
+    warp = TWIST
 
-    degrees: Annotated[
-        float, Parameter(Quantity.ANGLE, "degrees per model unit of height, counter-clockwise from above")
-    ]
+    degrees: float = par.angle("degrees per model unit of height, counter-clockwise from above")
 
-    @property
-    def warp_parameters(self) -> tuple[float, ...]:
-        """The angle per unit of height in radians."""
-        return (math.radians(self.degrees),)
+    @classmethod
+    def numbers(cls, degrees: float) -> tuple[float, ...]:
+        """Return the angle per unit of height in radians."""
+        return (math.radians(degrees),)

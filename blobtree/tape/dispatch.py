@@ -187,12 +187,12 @@ def warp_pullback(kind: wp.int32, q: wp.vec3, g: wp.vec3, tape: Texels, at: wp.i
     """Return Jᵀ g of a warp."""
 
 
-@of_row("warps", "stretch")
+@of_row("warps", "lipschitz")
 def warp_stretch(kind: wp.int32, q: wp.vec3, reach: wp.float32, tape: Texels, at: wp.int32) -> wp.float32:
     """Return a bound on ‖J‖ of a warp over a ball."""
 
 
-@of_row("warps", "extent")
+@of_row("warps", "image_box")
 def warp_extent(kind: wp.int32, q: wp.vec3, half: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
     """Return half the size of a box about T(q) that holds the image of the box q ± half."""
 

@@ -23,7 +23,7 @@ from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.nodes.primitives import Columns
 from blobtree.validation import Vector
 from tests.blobtree.custom.field_kernels import lump, lump_slope, waves, waves_interval, waves_slope
-from tests.blobtree.custom.warp_kernels import sway, sway_pullback, sway_stretch, swirl, swirl_stretch
+from tests.blobtree.custom.warp_kernels import Swirl, sway, sway_pullback, sway_stretch
 from tests.blobtree.kernels import (
     bar,
     brick,
@@ -71,18 +71,10 @@ Staircase = define_falloff(staircase, staircase_slope)
 Tent = define_falloff(tent, tent_slope)
 
 
-def swirl_box(lower: Float64Array, upper: Float64Array, **_parameters: Any) -> tuple[Any, Any]:
-    radius = np.hypot(*np.maximum(np.abs(lower[:2]), np.abs(upper[:2])))
-    return (-radius, -radius, lower[2]), (radius, radius, upper[2])
-
-
 SWAY_LIMITS = {"width": (-0.5, 0.5), "rate": (0.0, 3.0)}
 Sway = define_warp(sway, stretch=sway_stretch, box=0.5, limits=SWAY_LIMITS)
 GivenSway = define_warp(
     sway, stretch=sway_stretch, box=0.5, pullback=sway_pullback, limits=SWAY_LIMITS, name="given_sway"
-)
-Swirl = define_warp(
-    swirl, stretch=swirl_stretch, box=swirl_box, limits={"axis": (0.0, 2.0), "turns": (-5, 5)}
 )
 
 

@@ -13,6 +13,7 @@ from blobtree import (
     Point,
     Segment,
     define_warp,
+    formula,
     from_json,
     polygonize,
     to_json,
@@ -20,17 +21,19 @@ from blobtree import (
 from blobtree._typing import Float64Array
 from blobtree.tracing.trace import trace
 from tests.blobtree.custom.warp_kernels import (
+    Swirl,
     broken,
     flat,
     folded,
+    same_size,
     sway,
     sway_stretch,
-    swirl_stretch,
     torn,
     wrong_pullback,
+    wrong_stretch,
 )
 from tests.blobtree.custom_kinds import SWAY_LIMITS as LIMITS
-from tests.blobtree.custom_kinds import GivenSway, Sway, Swirl
+from tests.blobtree.custom_kinds import GivenSway, Sway
 from tests.blobtree.tape.evaluations import bounds_along
 from tests.oracles import blobtree as oracle
 
@@ -90,18 +93,27 @@ def test_parameters_are_checked() -> None:
     with pytest.raises(InvalidNode, match=r"width: expected a number from -0\.5 to 0\.5"):
         Sway(ROD, 0.6, 1.0)
     with pytest.raises(InvalidNode, match="expected BlobTree nodes"):
-        Sway(3, 0.1, 1.0)  # type: ignore[arg-type]
+        Sway(3, 0.1, 1.0)
+
+
+def refused(**changed: Any) -> Any:
+    """Define a class like `Swirl` with one change."""
+    kind: Any = type(Swirl)
+    return kind("Refused", (Swirl,), {"__module__": __name__, **changed})
 
 
 REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "flat": (lambda: define_warp(flat, stretch=1.0, box=9.0), "its Jacobian is singular"),
     "folded": (lambda: define_warp(folded, stretch=9.0, box=99.0), "its Jacobian is singular"),
-    "torn": (lambda: define_warp(torn, stretch=1.0, box=1.0), "stretch: .* it may jump between them"),
+    "torn": (lambda: define_warp(torn, stretch=1.0, box=1.0), "lipschitz: .* it may jump between them"),
     "broken": (lambda: define_warp(broken, stretch=1.0, box=1.0), "broken: for "),
-    "steep": (lambda: define_warp(sway, stretch=1.01, box=0.5, limits=LIMITS, name="s"), "stretch: the norm"),
+    "steep": (
+        lambda: define_warp(sway, stretch=1.01, box=0.5, limits=LIMITS, name="s"),
+        "lipschitz: the norm",
+    ),
     "small box": (
         lambda: define_warp(sway, stretch=sway_stretch, box=0.1, limits=LIMITS, name="s"),
-        "box: .* does not hold it",
+        "motion: .* does not hold it",
     ),
     "wrong pullback": (
         lambda: define_warp(
@@ -109,11 +121,20 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
         ),
         "pullback: for q",
     ),
-    "no stretch": (lambda: define_warp(sway, stretch=0.0, box=0.5), "stretch: expected a number above 0"),
-    "no box": (lambda: define_warp(sway, stretch=9.0, box="big"), "box: expected a distance or a function"),
+    "no stretch": (lambda: define_warp(sway, stretch=0.0, box=0.5), "lipschitz: expected a number above 0"),
+    "no box": (lambda: define_warp(sway, stretch=9.0, box="big"), "motion: expected a distance from 0"),
     "other parameters": (
-        lambda: define_warp(sway, stretch=swirl_stretch, box=0.5),
-        "stretch: expected a function of",
+        lambda: define_warp(sway, stretch=wrong_stretch, box=0.5),
+        "lipschitz: expected a function of",
+    ),
+    "own small box": (
+        lambda: refused(outer_box=classmethod(lambda _cls, lower, upper, **_: (lower, upper))),
+        "outer_box: .* does not hold it",
+    ),
+    "small image": (lambda: refused(image_box=formula(same_size)), "image_box: the images of"),
+    "too few numbers": (
+        lambda: refused(numbers=classmethod(lambda _cls, axis, turns: axis)),
+        "numbers: expected 4 in all, got 3",
     ),
     "no point": (lambda: define_warp(sway_stretch, stretch=1.0, box=0.5), "expected it to return wp.vec3"),
 }

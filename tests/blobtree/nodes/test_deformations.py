@@ -26,14 +26,13 @@ from blobtree import (
     to_json,
 )
 from blobtree._typing import Float64Array
-from blobtree.formulas.deformations import CURVE, curve_forward
+from blobtree.nodes.places import _forward
 from blobtree.tape.codes import WARP_REGISTERS
 from blobtree.tape.model import gradients_at
 from blobtree.tape.program import postorder
 from blobtree.tracing.trace import trace
 from blobtree.tracing.tree_cells import trace_tolerance
 from tests.blobtree.tape.evaluations import bounds_along
-from tests.blobtree.transpile.warp_functions import call
 from tests.blobtree.trees import points_around, random_deformation, random_leaf
 from tests.oracles import blobtree as oracle
 
@@ -213,12 +212,9 @@ def test_a_twist_with_wide_limits_is_a_twist() -> None:
 def test_a_curve_warp_takes_each_point_to_its_target() -> None:
     node = KNOBBED.curve_warp(SOURCE, TARGET, 2.0)
     assert isinstance(node, CurveWarp)
-    texels = np.array((0.0, *node.warp_parameters), np.float32).reshape(-1, 4)
-    moved = call(
-        curve_forward, q=np.array(TARGET, np.float32), tape=texels, at=np.zeros(len(TARGET), np.int32)
-    )
-    np.testing.assert_allclose(moved, SOURCE, atol=1e-5)
-    lower, upper = CURVE.box(np.full(3, 50.0), np.full(3, 51.0), node.warp_parameters)
+    to_child = _forward(CurveWarp.warp, node.warp_parameters)
+    np.testing.assert_allclose([to_child(np.array(point)) for point in TARGET], SOURCE, atol=1e-9)
+    lower, upper = CurveWarp.warp.box(np.full(3, 50.0), np.full(3, 51.0), node.warp_parameters)
     assert lower.tolist() == [50.0] * 3
     assert upper.tolist() == [51.0] * 3
 

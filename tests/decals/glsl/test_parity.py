@@ -117,7 +117,7 @@ def test_a_function_is_the_same_in_both_languages(context: Context, name: str) -
     arguments = arguments_of(typed)
     library = _dispatch(ALL_KINDS)
     rows_of_operators = [f for operator in OPERATORS for f in (operator.partials, operator.slope)]
-    rows_of_warps = [f for warp in WARPS for f in (warp.forward, warp.pullback, warp.stretch)]
+    rows_of_warps = [f for warp in WARPS for f in (warp.forward, warp.pullback, warp.lipschitz)]
     rows_of_falloffs = [f for row in FALLOFFS for f in (row.value, row.slope)]
     chosen = [*rows_of_operators, *rows_of_warps, *rows_of_falloffs]
     if typed.function in CHOOSERS:

@@ -1,14 +1,16 @@
-"""Checks of custom warps: samples in double precision that may contradict a definition."""
+"""Checks of users' warps: samples in double precision that may contradict a definition."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from blobtree._typing import Box, Float64Array
+from blobtree._typing import Float64Array
 from blobtree.declare.checks import SEED, SLOPE_TOLERANCE, Trial, trials
 from blobtree.declare.formula import Formula, shown
 from blobtree.declare.parameters import Parameter
+from blobtree.declare.readers import SIZES
+from blobtree.declare.warp import WarpFormulas
 
 POINTS = 30
 """Points per set of parameters."""
@@ -23,37 +25,35 @@ SINGLE_TOLERANCE = 1e-4
 """Relative error in single precision that is accepted."""
 
 
-@dataclass(frozen=True)
-class WarpClaims:
-    """The claims of a definition about its warp."""
+def check_warp(
+    formulas: WarpFormulas, parameters: tuple[Parameter, ...], numbers_of: Callable[..., tuple[float, ...]]
+) -> None:
+    """Raise `InvalidDefinition` if samples contradict a claim, or the Jacobian is singular at one.
 
-    stretch: float | Formula
-    box: Callable[[Float64Array, Float64Array, tuple[float, ...]], Box]
-    pullback: Formula | None
-    extent: float
+    `numbers_of` returns the numbers of the formulas for values of the parameters.
+    """
+    size = sum(SIZES[kind] for kind in formulas.numbers.values())
 
-    @property
-    def digest(self) -> tuple[object, ...]:
-        """What of the claims enters the kernels."""
-        stretch = self.stretch if isinstance(self.stretch, float) else self.stretch.digest
-        return stretch, self.pullback and self.pullback.digest
+    def packed(values: dict[str, Any]) -> dict[str, Any]:
+        numbers = numbers_of(values)
+        if len(numbers) != size:
+            raise formulas.source.refusal(f"numbers: expected {size} in all, got {len(numbers)}")
+        return formulas.values(numbers)
 
-
-def check_warp(source: Formula, parameters: tuple[Parameter, ...], claims: WarpClaims) -> None:
-    """Raise `InvalidDefinition` if samples contradict a claim, or the Jacobian is singular at one."""
     rng = np.random.default_rng(SEED)
-    for trial, points in trials(source, parameters, 3, claims.extent, POINTS, rng):
+    step = STEP * formulas.extent
+    for trial, points in trials(formulas.source, parameters, 3, formulas.extent, POINTS, rng, packed):
         images = np.array([trial.at(q) for q in points])
         _try_single_precision(trial, points, images)
-        step = STEP * claims.extent
         jacobians = [_jacobian(trial, q, image, step) for q, image in zip(points, images, strict=True)]
         smooth = [(q, j) for q, j in zip(points, jacobians, strict=True) if j is not None]
         _try_determinants(trial, smooth)
-        if claims.pullback is not None:
-            _try_pullback(trial, smooth, claims.pullback, rng)
-        _try_stretch(trial, points, images, smooth, claims, rng)
-        numbers = tuple(float(x) for item in parameters for x in item.components(trial.values[item.name]))
-        _try_box(trial, claims, numbers, rng)
+        if "pullback" in formulas.given:
+            _try_pullback(trial, smooth, formulas.given["pullback"], rng)
+        _try_lipschitz(trial, points, images, smooth, formulas, rng)
+        _try_box(trial, formulas, rng)
+        if "image_box" in formulas.given:
+            _try_image_box(trial, formulas, rng)
 
 
 def _try_single_precision(trial: Trial, points: Float64Array, images: Float64Array) -> None:
@@ -95,20 +95,21 @@ def _try_pullback(
             )
 
 
-def _try_stretch(
+def _try_lipschitz(
     trial: Trial,
     points: Float64Array,
     images: Float64Array,
     smooth: list[tuple[Float64Array, Float64Array]],
-    claims: WarpClaims,
+    formulas: WarpFormulas,
     rng: np.random.Generator,
 ) -> None:
     """Check the claimed bound at points, and between the centres of balls and points in them."""
+    claim = formulas.given.get("lipschitz") or float(formulas.lipschitz)
     for q, jacobian in smooth:
-        norm, bound = float(np.linalg.norm(jacobian, 2)), trial.bound(claims.stretch, q, 0.0)
+        norm, bound = float(np.linalg.norm(jacobian, 2)), trial.bound(claim, q, 0.0)
         if norm > bound * (1.0 + SLOPE_TOLERANCE):
             raise trial.source.refusal(
-                f"stretch: the norm of its Jacobian at q = {shown(q)} is {norm:.6g}, more than "
+                f"lipschitz: the norm of its Jacobian at q = {shown(q)} is {norm:.6g}, more than "
                 f"{bound:.6g}{trial.with_values}"
             )
     others = rng.permutation(len(points))
@@ -116,25 +117,41 @@ def _try_stretch(
         apart = float(np.linalg.norm(other - q))
         moved, bound = float(np.linalg.norm(other_image - image)), 0.0
         if apart > 0.0:
-            bound = trial.bound(claims.stretch, q, apart)
+            bound = trial.bound(claim, q, apart)
         if moved > bound * apart * (1.0 + SLOPE_TOLERANCE) + SLOPE_TOLERANCE:
             raise trial.source.refusal(
-                f"stretch: {shown(q)} and {shown(other)} are {apart:.6g} apart, their images {moved:.6g}, "
+                f"lipschitz: {shown(q)} and {shown(other)} are {apart:.6g} apart, their images {moved:.6g}, "
                 f"more than {bound:.6g} times as much{trial.with_values}; it may jump between them"
             )
 
 
-def _try_box(trial: Trial, claims: WarpClaims, numbers: tuple[float, ...], rng: np.random.Generator) -> None:
+def _try_box(trial: Trial, formulas: WarpFormulas, rng: np.random.Generator) -> None:
     """Check that no point outside the claimed box comes from the inner box."""
-    for q in rng.uniform(-1.0, 1.0, (POINTS, 3)) * claims.extent:
+    slack = 1e-6 * formulas.extent
+    for q in rng.uniform(-1.0, 1.0, (POINTS, 3)) * formulas.extent:
         image = trial.at(q)
-        half = claims.extent * rng.uniform(0.01, 0.5)
-        lower, upper = claims.box(image - half, image + half, numbers)
-        slack = 1e-6 * claims.extent
+        half = formulas.extent * rng.uniform(0.01, 0.5)
+        lower, upper = formulas.box(image - half, image + half, trial.values)
         if (q < lower - slack).any() or (q > upper + slack).any():
             raise trial.source.refusal(
-                f"box: {shown(image)} of the child moves to {shown(q)}, but the claimed box "
-                f"{shown(lower)} to {shown(upper)} does not hold it{trial.with_values}"
+                f"{'motion' if formulas.outer_box is None else 'outer_box'}: {shown(image)} of the child "
+                f"moves to {shown(q)}, but the claimed box {shown(lower)} to {shown(upper)} does not hold "
+                f"it{trial.with_values}"
+            )
+
+
+def _try_image_box(trial: Trial, formulas: WarpFormulas, rng: np.random.Generator) -> None:
+    """Check that images of points in boxes lie in the claimed boxes around the images of their middles."""
+    slack = 1e-6 * formulas.extent
+    for q in rng.uniform(-1.0, 1.0, (POINTS, 3)) * formulas.extent:
+        half = formulas.extent * 10.0 ** rng.uniform(-3.0, 0.0, 3)
+        claimed = trial.call(formulas.given["image_box"], (tuple(q), tuple(half)), 3)
+        other = q + half * rng.uniform(-1.0, 1.0, 3)
+        moved = np.abs(trial.at(other) - trial.at(q))
+        if (moved > claimed * (1.0 + SLOPE_TOLERANCE) + slack).any():
+            raise trial.source.refusal(
+                f"image_box: the images of {shown(q)} and {shown(other)} are {shown(moved)} apart along the "
+                f"axes, more than {shown(claimed)}{trial.with_values}"
             )
 
 
