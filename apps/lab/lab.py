@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from html import escape
 from typing import Any
 
+import msgspec
 import numpy as np
 import pyvista as pv
 from markdown_it import MarkdownIt
@@ -48,6 +49,8 @@ class Results:
     verdict: tuple[bool, str]
     values: list[dict[str, str]] = field(default_factory=list)
     plots: list[dict[str, str]] = field(default_factory=list)
+    tasks: list[dict[str, Any]] = field(default_factory=list)
+    guess: dict[str, Any] = field(default_factory=dict)
     readings: str = ""
 
 
@@ -84,6 +87,7 @@ class Lab:
         self._submitted: object = None
         self._number = self._first = self._step = self._target = 0
         self.probe = self.lesson.settings.probe
+        self._guess: float | None = None
         self._recording: Recording | None = None
 
     # -- state ------------------------------------------------------------------------------------------
@@ -131,18 +135,19 @@ class Lab:
 
     def values(self) -> dict[str, Any]:
         """Return all values of the page, by their names there."""
-        lesson, results = self.lesson, self._results
-        asked = results is not None and self._asked == results.key == self._key()
-        right, text = results.verdict if results is not None and asked else (False, "")
+        lesson, results = self.lesson, self._results or Results(None, (False, ""))
+        right, text = results.verdict
+        if results.key != self._key() or not (right or self._asked == results.key):
+            right, text = False, ""
+        guess = msgspec.to_builtins(lesson.settings.guess) or {}
         return {
             "lab_titles": self._titles,
             "lab_number": self._number,
             "lab_text": self._texts[self._number],
             "lab_question": marked(escape(lesson.settings.question.text)),
             "lab_sliders": [self._slider(i, slider) for i, slider in enumerate(lesson.settings.sliders)],
-            "lab_values": results.values if results is not None else [],
-            "lab_plots": results.plots if results is not None else [],
-            "lab_readings": results.readings if results is not None else "",
+            "lab_guess": {**guess, "waits": self.waits, **results.guess},
+            **{f"lab_{name}": getattr(results, name) for name in ("values", "plots", "readings", "tasks")},
             "lab_verdict": {"right": right, "text": marked(escape(text))},
         }
 
@@ -185,19 +190,25 @@ class Lab:
         key = self._key()
         if self._asking and not self._editing:
             self._asked, self._asking = key, False
-        if self._pending is None and (self._results is None or self._results.key != key):
+        if self._pending is None and not self.waits and (self._results is None or self._results.key != key):
             try:
                 experiment = self.experiment()
             except InvalidLesson as error:
                 self._results = Results(key, (False, str(error)))
                 return
             self._submitted = key
-            self._pending = self._worker.submit(measured, self.lesson, experiment, key)
+            self._pending = self._worker.submit(measured, self.lesson, experiment, key, self._guess)
 
     @property
     def busy(self) -> bool:
         """True until the values are those of the present state."""
-        return self._editing or self._asking or self._results is None or self._results.key != self._key()
+        known = self.waits or (self._results is not None and self._results.key == self._key())
+        return self._editing or self._asking or not known
+
+    @property
+    def waits(self) -> bool:
+        """True while contact is off, until the student's guess."""
+        return self.lesson.settings.guess is not None and self._guess is None
 
     @property
     def _editing(self) -> bool:
@@ -210,8 +221,12 @@ class Lab:
 
     # -- events -----------------------------------------------------------------------------------------
 
-    def start(self, number: int) -> None:
-        """Start a lesson, from its beginning: its scene replaces the present one."""
+    def guess(self, value: Any) -> None:
+        """Take the student's guess, and switch contact on."""
+        self.start(self._number, number_of("guess", value, InvalidEdit))
+
+    def start(self, number: int, guess: float | None = None) -> None:
+        """Start a lesson, from its beginning: its scene replaces the present one, without contact first."""
         number = whole_number("lesson", number, 0, len(self._lessons) - 1, InvalidEdit)
         window, lesson = self._window, self._lessons[number]
         settings = lesson.settings
@@ -221,7 +236,7 @@ class Lab:
             if not window.actions.files.is_aside:
                 window.session.mark_saved()  # a lesson without edits needs no recovery
             self._number, self._asked, self._asking, self.probe = number, None, False, settings.probe
-            self._results = self._pending = None
+            self._results, self._pending, self._guess = None, None, guess
             self._first = window.document.decals.next_number - len(lesson.scene.decals)
             self._step = self._target = 0
             self._recording = self._recorded(0) if settings.steps else None
@@ -233,7 +248,8 @@ class Lab:
             window.redraw(whole=True)
 
         modes = {name: getattr(settings, name) for name in MODES}
-        scene = lesson.scene.replace(drawing=window.document.drawing.overridden(**modes))
+        begin = lesson.apart if guess is None and settings.guess is not None else lesson.scene
+        scene = begin.replace(drawing=window.document.drawing.overridden(**modes))
         window.actions.state.run(ReplaceScene(scene, f"lesson: {settings.title}"), started)
 
     def _recorded(self, seed: int) -> Recording:
@@ -309,7 +325,9 @@ class Lab:
         self._window.plotter.add_mesh(ball, name="probe", **look)
 
 
-def measured(lesson: Lesson, experiment: Experiment, key: object = None) -> Results:
+def measured(
+    lesson: Lesson, experiment: Experiment, key: object = None, guess: float | None = None
+) -> Results:
     """Return values, plots and the verdict of a lesson for one state of its scene."""
     scope = Scope.at_probe(experiment)
     plots = [
@@ -323,7 +341,14 @@ def measured(lesson: Lesson, experiment: Experiment, key: object = None) -> Resu
     ]
     values = [{**value, "label": marked(escape(value["label"]))} for value in lesson.values(scope)]
     rows = [(name, [shown(number) for number in numbers]) for name, numbers in readings(scope)]
-    return Results(key, lesson.verdict(scope), values, plots, table(rows))
+    checks, asked = lesson.settings.question.checks, lesson.settings.guess
+    done = [{"text": c.task, "done": lesson.holds(c.holds, scope)} for c in checks if c.task]
+    compared: dict[str, Any] = {}
+    if asked is not None and guess is not None:
+        truth = float(np.ravel(lesson.formulas[asked.truth].evaluate(scope))[0])
+        compared = {"ends": [guess, truth if np.isfinite(truth) else None]}
+        compared |= {"texts": [shown(guess), shown(truth)], "why": lesson.filled(asked.why, scope)}
+    return Results(key, lesson.verdict(scope), values, plots, done, compared, table(rows))
 
 
 def _html(text: str) -> str:

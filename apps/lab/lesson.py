@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 from msgspec import Struct, field
 
+from blobtree import SolidContact, Union
 from decals.apps.lab.bindings import OWN, binding
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Scope
@@ -19,9 +20,10 @@ from decals.apps.lab.formulas import Formula, parse
 from decals.apps.lab.measures import MEASURES
 from decals.errors import ImplicitDecalsError
 from decals.field.mapping import ImageMapping
+from decals.model import Interaction
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 from decals.scenes.files import load_scene
-from decals.scenes.objects import MeshObject
+from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.scene import Scene
 from decals.validation import member, stiffness_number
 
@@ -87,6 +89,7 @@ class Check(Struct, forbid_unknown_fields=True, frozen=True):
 
     holds: str
     otherwise: str
+    task: str = ""
 
 
 class Question(Struct, forbid_unknown_fields=True, frozen=True):
@@ -97,12 +100,25 @@ class Question(Struct, forbid_unknown_fields=True, frozen=True):
     checks: tuple[Check, ...]
 
 
+class Guess(Struct, forbid_unknown_fields=True, frozen=True):
+    """A number to guess before contact is switched on, the formula of its true value, and an explanation."""
+
+    text: str
+    label: str
+    truth: str
+    why: str
+    low: float = 0.0
+    high: float = 1.0
+    step: float = 0.01
+
+
 class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     """What stands between the fences of a lesson."""
 
     title: str
     scene: str
     question: Question
+    guess: Guess | None = None
     contact: str = DEFAULT_CONTACT.name.lower()
     stiffness: float = DEFAULT_STIFFNESS
     mapping: str = "corrected"
@@ -167,6 +183,18 @@ class Lesson:
         camera = self.scene.camera
         visible = 2.0 * camera.distance * float(np.tan(np.radians(camera.fov) / 2))
         return visible if self.settings.size is None else self.settings.size
+
+    @property
+    def apart(self) -> Scene:
+        """The scene without contact: decals lie on each other, and solids in each other."""
+        objects = [
+            replace(item, tree=Union(item.tree.children))
+            if isinstance(item, TreeObject) and isinstance(item.tree, SolidContact)
+            else item
+            for item in self.scene.objects
+        ]
+        alone = self.scene.decals.replace(interactions=Interaction.OVERLAP)
+        return self.scene.replace(objects=objects, decals=alone)
 
     def filled(self, text: str, scope: Scope) -> str:
         """Return one of the lesson's texts with the values of its formulas."""
@@ -282,8 +310,9 @@ def _check_ranges(settings: Settings) -> None:
         raise InvalidLesson(f"size: expected a width above 0, got {settings.size!r}")
     if not 0 <= settings.steps <= 1000:
         raise InvalidLesson(f"steps: expected 0 to 1000, got {settings.steps!r}")
-    for i, slider in enumerate(settings.sliders):
-        if not slider.choices and not -np.inf < slider.low < slider.high < np.inf:
+    sliders: list[Any] = [*settings.sliders, *filter(None, [settings.guess])]
+    for i, slider in enumerate(sliders):
+        if not getattr(slider, "choices", ()) and not -np.inf < slider.low < slider.high < np.inf:
             raise InvalidLesson(f"sliders[{i}]: expected low < high, got {slider.low!r} and {slider.high!r}")
     for i, plot in enumerate(settings.plots):
         if bool(plot.curves) == bool(plot.map):
@@ -320,6 +349,8 @@ def _formulas(settings: Settings) -> Iterator[tuple[str, str, set[str]]]:
         yield from ((f"plots[{i}].formula", case.when, set()) for case in plot.formula)
     for i, check in enumerate(settings.question.checks):
         yield f"question.checks[{i}]", check.holds, set()
+    if settings.guess is not None:
+        yield "guess.truth", settings.guess.truth, set()
 
 
 def _texts(settings: Settings) -> Iterator[tuple[str, str]]:
@@ -329,6 +360,8 @@ def _texts(settings: Settings) -> Iterator[tuple[str, str]]:
     for i, check in enumerate(settings.question.checks):
         yield f"question.checks[{i}].otherwise", check.otherwise
     yield "question.right", settings.question.right
+    if settings.guess is not None:
+        yield "guess.why", settings.guess.why
 
 
 def _template(text: str) -> Template:

@@ -55,6 +55,14 @@ from tests.frontends.browsing import (
 )
 from tests.oracles.contact import RIM, falloff
 
+SCROLLED_TWICE = """() => {
+  const scrolls = (e) =>
+    e.scrollHeight > e.clientHeight + 1 && /auto|scroll/.test(getComputedStyle(e).overflowY);
+  const areas = [...document.querySelectorAll("*")].filter(scrolls);
+  return areas.filter((e) => areas.some((other) => other !== e && other.contains(e))).map((e) => e.className);
+}"""
+"""Classes of areas that scroll inside others."""
+
 BLOB = Point((0, 0, 0), radius=1.0) + Point((1.2, 0.4, 0), radius=0.6)
 
 
@@ -925,16 +933,20 @@ async def lab(picture: str | None = None) -> None:
         for number, attempts in enumerate(ANSWERS):
             await choose(browser, "lesson", lab_page.lab.values()["lab_titles"][number]["title"])
             await until(partial(shows_lesson, lab_page, number))
+            await guess(browser, lab_page)
             for attempt in attempts:
                 await answer(browser, lab_page, *attempt.settings)
                 kind = "success" if attempt.right else "warning"
                 await browser.locator(f".v-alert.text-{kind}").get_by_text(attempt.words).wait_for()
+            tasks = browser.locator("[data-task]")
+            assert await tasks.count() == len(lab_page.lab.lesson.settings.question.checks)
             if not attempts[-1].right:
                 await find_step(browser, lab_page)
             lowest = browser.get_by_label(lab_page.lab.values()["lab_sliders"][-1]["label"], exact=True).last
             box = await lowest.bounding_box()
             assert box is not None
             assert box["y"] + box["height"] <= 800  # in sight below text, question and verdict
+            assert await browser.evaluate(SCROLLED_TWICE) == []
             if number == 0:
                 await accessible(browser)
             if picture is not None and number == 1:
@@ -944,6 +956,7 @@ async def lab(picture: str | None = None) -> None:
         assert all("127.0.0.1" in url or url.startswith("data:") for url in requests)
         await choose(browser, "lesson", lab_page.lab.values()["lab_titles"][0]["title"])
         await until(partial(shows_lesson, lab_page, 0))
+        await guess(browser, lab_page)
         before, (x, y) = lab_page.lab.probe, await at_rest(browser, lab_page, "probe")
         await browser.mouse.move(x, y)
         await browser.mouse.down()
@@ -960,6 +973,7 @@ async def lab(picture: str | None = None) -> None:
         await browser.keyboard.press("Escape")
         await lines.wait_for(state="hidden")
         curve = browser.locator("path[data-symbol='g']")
+        await browser.get_by_text("Text of the lesson").click()
         for place in (".lesson-side abbr", ".readings abbr", ".formula abbr", ".plot tspan"):
             await browser.locator(f"{place}[data-symbol='g']").first.hover()
             await until_width(curve, "5px")
@@ -981,6 +995,20 @@ async def lab(picture: str | None = None) -> None:
         await until(lambda: not lab_page.sandbox.in_lesson)
         assert len(window.document.decals.numbers) == 1
     window.close()
+
+
+async def guess(browser: Page, lab_page: LabPage) -> None:
+    """Guess before contact is switched on, and see the truth; nothing shows it before."""
+    question = lab_page.lab.lesson.settings.guess
+    assert question is not None
+    await browser.get_by_text("follow after your guess").wait_for()
+    assert await browser.locator(".plot, [data-task]").count() == 0
+    value = (question.low + question.high) / 2
+    await browser.get_by_label(question.label).fill(f"{value:g}")
+    await browser.get_by_role("button", name="See", exact=True).click()
+    await browser.get_by_text(f"you guessed {shown(np.array(value))}, it is ").wait_for()
+    await browser.locator(".plot").first.wait_for()
+    assert await browser.locator(".scale path").count() in (1, 2)
 
 
 async def until_readings(browser: Page, lab_page: LabPage) -> None:

@@ -26,10 +26,10 @@ ANSWERS = [
         attempt("On the rim the field is ½", ("Probe, along the line", 0.908), right=True),
     ],
     [
-        attempt("The images are apart"),
+        attempt("The images are apart", (BLUE, 1.1)),
         attempt("the probe is inside one of them", (BLUE, 0.0)),
         attempt("the probe is outside of both", (PROBE, 1.5)),
-        attempt("F = 0.5", (PROBE, -0.4), right=True),
+        attempt("F = 0.5", (PROBE, -0.32), right=True),
     ],
     [
         attempt("of the images are folded"),

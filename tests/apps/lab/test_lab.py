@@ -54,6 +54,12 @@ def wait(lab: Lab) -> dict[str, Any]:
     return lab.values()
 
 
+def begin(lab: Lab, number: int) -> None:
+    """Start a lesson, and take a guess."""
+    lab.start(number)
+    lab.guess(0.5)
+
+
 def plain(html: str) -> str:
     """Return what a reader sees of HTML."""
     return unescape(re.sub("<[^>]+>", "", html))
@@ -66,20 +72,25 @@ def number_of(lab: Lab, label: str) -> int:
 @pytest.mark.slow_cases("5")
 @pytest.mark.parametrize("number", range(6))
 def test_wrong_and_right_answers_are_told_apart(lab: Lab, number: int) -> None:
-    lab.start(number)
+    begin(lab, number)
     for attempt in ANSWERS[number]:
         for label, value in attempt.settings:
             lab.set_value(number_of(lab, label), value)
-        assert wait(lab)["lab_verdict"]["text"] == ""  # not before the student asks
+        first = wait(lab)["lab_verdict"]
+        assert bool(first["text"]) is attempt.right  # what is wrong is not said before the student asks
         lab.check()
         verdict = wait(lab)["lab_verdict"]
+        assert not attempt.right or verdict == first
+        done = [task["done"] for task in lab.values()["lab_tasks"]]
+        assert len(done) == len(lab.lesson.settings.question.checks)
+        assert all(done) is attempt.right
         assert verdict["right"] is attempt.right, verdict
         assert attempt.words in plain(verdict["text"])
         assert "{" not in verdict["text"]
 
 
 def test_the_first_even_step_is_the_answer(lab: Lab) -> None:
-    lab.start(4)
+    begin(lab, 4)
     assert lab.values()["lab_plots"] == []  # not those of another lesson
     lab.set_value(number_of(lab, STEP), 60)
     wait(lab)
@@ -98,7 +109,7 @@ def test_the_first_even_step_is_the_answer(lab: Lab) -> None:
 
 
 def test_the_probe_follows_the_pointer_where_its_slider_leads(lab: Lab, window: EditWindow) -> None:
-    lab.start(0)
+    begin(lab, 0)
     wait(lab)
     x, y, z = lab.probe
     lab.move_probe(([0.7, 0.4, 5.0], [0.0, 0.0, -1.0]))
@@ -110,7 +121,7 @@ def test_the_probe_follows_the_pointer_where_its_slider_leads(lab: Lab, window: 
     assert lab.probe == pytest.approx((0.7, y, z))
     lab.move_probe(([90.0, 0.0, 5.0], [0.0, 0.0, -1.0]))
     assert lab.probe == (2.0, y, z)  # the end of the slider
-    lab.start(0)
+    begin(lab, 0)
     assert wait(lab)["lab_sliders"][number_of(lab, "Probe")]["value"] == x
 
 
@@ -118,7 +129,7 @@ def test_the_probe_follows_the_pointer_where_its_slider_leads(lab: Lab, window: 
 def test_every_slider_moves_the_scene_and_undo_brings_it_back(
     lab: Lab, window: EditWindow, number: int
 ) -> None:
-    lab.start(number)
+    begin(lab, number)
     for slider in wait(lab)["lab_sliders"]:
         before, state = digest(window.document), lab._key()
         done = len(window.session.labels)
@@ -141,14 +152,14 @@ def test_every_slider_moves_the_scene_and_undo_brings_it_back(
 
 
 def test_a_moved_decal_lies_on_the_surface(lab: Lab, window: EditWindow) -> None:
-    lab.start(1)
+    begin(lab, 1)
     lab.set_value(number_of(lab, "Blue decal"), 0.25)
     position = lab.experiment().decals.positions[1]
     np.testing.assert_allclose(position, (0.25, 0.0, 0.0), atol=1e-6)
 
 
 def test_a_verdict_vanishes_when_the_scene_changes(lab: Lab) -> None:
-    lab.start(1)
+    begin(lab, 1)
     lab.check()
     assert wait(lab)["lab_verdict"]["text"]
     lab.set_value(number_of(lab, "Probe"), 0.77)
@@ -156,8 +167,52 @@ def test_a_verdict_vanishes_when_the_scene_changes(lab: Lab) -> None:
     assert wait(lab)["lab_verdict"]["text"] == ""
 
 
+def test_a_right_answer_says_so_by_itself_and_vanishes_again(lab: Lab) -> None:
+    begin(lab, 1)
+    assert not wait(lab)["lab_verdict"]["text"]
+    lab.set_value(number_of(lab, "Probe"), -0.32)
+    assert wait(lab)["lab_verdict"]["right"]
+    assert [task["done"] for task in lab.values()["lab_tasks"]] == [True] * 4
+    lab.set_value(number_of(lab, "Probe"), -0.6)
+    assert lab.values()["lab_verdict"] == {"right": False, "text": ""}
+    assert [task["done"] for task in wait(lab)["lab_tasks"]] == [True, True, True, False]
+
+
+TRUTHS = [0.6 / 0.27252, 0.48, None, None, None, None]
+"""Known answers to the guesses, from the oracle: s = r / 0.4542, and x = D r₀ / (r₀ + r₁)."""
+
+
+@pytest.mark.slow_cases("2", "3", "4")
+@pytest.mark.parametrize("number", range(6))
+def test_a_guess_comes_before_contact_and_is_compared(lab: Lab, window: EditWindow, number: int) -> None:
+    lab.start(number)
+    values = wait(lab)
+    assert values["lab_guess"]["waits"]
+    assert not any(values[f"lab_{name}"] for name in ("plots", "values", "tasks", "readings"))
+    document = window.document
+    assert (document.decals.decals.interactions == decals.Interaction.OVERLAP).all()
+    assert not any("SolidContact" in repr(item) for item in document.objects)
+    for wrong in ("much", None, float("nan")):
+        with pytest.raises(InvalidEdit, match="guess: expected"):
+            lab.guess(wrong)
+    assert lab.values()["lab_guess"]["waits"]
+    lab.guess(1.5)
+    known = wait(lab)["lab_guess"]
+    assert not known["waits"]
+    assert known["ends"][0] == 1.5
+    assert known["texts"][0] == "1.5"
+    assert window.document.scene.replace(camera=lab.lesson.scene.camera).decals == lab.lesson.scene.decals
+    if (truth := TRUTHS[number]) is not None:
+        assert known["ends"][1] == pytest.approx(truth, rel=1e-3)
+    elif number == 4:
+        assert known["ends"][1] is None
+    else:
+        assert lab.lesson.settings.guess is not None
+        assert lab.lesson.settings.guess.low <= known["ends"][1] <= lab.lesson.settings.guess.high
+
+
 def test_a_lesson_whose_decal_was_deleted_says_so(lab: Lab, window: EditWindow) -> None:
-    lab.start(1)
+    begin(lab, 1)
     wait(lab)
     window.session.do(decals.editing.DeleteDecals([lab.numbers[0]]))
     lab.check()
@@ -167,7 +222,7 @@ def test_a_lesson_whose_decal_was_deleted_says_so(lab: Lab, window: EditWindow) 
         lab.set_value(number_of(lab, "Blue decal"), 0.25)
     window.session.undo()
     lab.check()
-    assert "apart" in wait(lab)["lab_verdict"]["text"]
+    assert "inside one of them" in wait(lab)["lab_verdict"]["text"]
 
 
 @pytest.mark.parametrize(
@@ -175,7 +230,7 @@ def test_a_lesson_whose_decal_was_deleted_says_so(lab: Lab, window: EditWindow) 
     [(99, 1.0), (-9, 1.0), ("0", 1.0), (None, 1.0), (0, "much"), (0, None), (0, float("nan")), (0, 1e99)],
 )
 def test_wrong_events_change_nothing(lab: Lab, window: EditWindow, number: Any, value: Any) -> None:
-    lab.start(1)
+    begin(lab, 1)
     wait(lab)
     before = digest(window.document)
     with pytest.raises(ImplicitDecalsError, match="expected"):
@@ -192,7 +247,7 @@ def test_a_lesson_without_edits_leaves_no_recovery_file(vtk_display: None, tmp_p
     with EditWindow(EMPTY, off_screen=True, size=(60, 40), path=tmp_path / "scene.json") as window:
         window.show()
         lab = Lab(window, load_lessons(LESSONS))
-        lab.start(0)
+        begin(lab, 0)
         while window.background.busy:
             window.tick()
         assert not window.session.modified
@@ -208,7 +263,7 @@ def test_a_lesson_without_edits_leaves_no_recovery_file(vtk_display: None, tmp_p
 @pytest.mark.slow_cases("5")
 @pytest.mark.parametrize("number", range(6))
 def test_plots_are_pictures_without_addresses(lab: Lab, number: int) -> None:
-    lab.start(number)
+    begin(lab, number)
     values = wait(lab)
     plots = lab.lesson.settings.plots
     assert [plot["title"] for plot in values["lab_plots"]] == [plot.title for plot in plots]
@@ -221,7 +276,7 @@ def test_plots_are_pictures_without_addresses(lab: Lab, number: int) -> None:
 
 
 def test_the_plot_of_the_falloff_has_its_values(lab: Lab) -> None:
-    lab.start(0)
+    begin(lab, 0)
     (path, *_) = re.findall(r'<path d="([^"]+)"', wait(lab)["lab_plots"][0]["svg"])
     right, down = np.array([pair.split() for pair in re.split("[ML]", path)[1:]], float).T
     x = (right - LEFT) / (right[-1] - LEFT) * 1.2

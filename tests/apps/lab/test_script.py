@@ -14,11 +14,11 @@ from decals.apps.lab.lab import Lab
 from decals.apps.lab.lesson import LESSONS, load_lessons
 from decals.window import EditWindow
 from tests.apps.lab.answers import BLUE, GREEN, MODE, STEP
-from tests.apps.lab.test_lab import EMPTY, number_of, wait
+from tests.apps.lab.test_lab import EMPTY, begin, number_of, wait
 
 CHANGES: list[list[tuple[str, Any]]] = [
     [("Visible radius", 0.9)],
-    [(BLUE, 0.1), ("Radius of the blue decal", 0.4)],
+    [(BLUE, 0.1), ("Radius of the blue decal", 0.5)],
     [(MODE, "elastic"), ("Stiffness", 7.5)],
     [("Interaction of the eye", "overlap"), ("Layer of the rock", -1)],
     [(STEP, 7)],
@@ -42,7 +42,7 @@ def test_the_lines_make_the_picture(
     lab: Lab, number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    lab.start(number)
+    begin(lab, number)
     wait(lab)
     first = made(lab.script(), tmp_path)
     for label, value in CHANGES[number]:
@@ -70,7 +70,7 @@ def test_lines_for_lessons_of_ones_own_name_no_folder(lab: Lab, tmp_path: Path) 
     for part in (*LESSONS.glob("2-*"), LESSONS / "target.png"):
         copy(part, tmp_path)
     own = Lab(lab._window, load_lessons(tmp_path))
-    own.start(0)
+    begin(own, 0)
     assert "decals.load_scene('2-two-decals.json')" in own.script()
     assert str(tmp_path) not in own.script()
     number = lab._window.document.decals.numbers[-1]
