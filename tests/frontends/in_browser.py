@@ -969,7 +969,7 @@ async def lab(picture: str | None = None) -> None:
         await browser.get_by_role("button", name="lines of Python for this picture").click()
         lines = browser.locator("pre.script")
         await lines.get_by_text("decals.load_scene").wait_for()
-        assert await lines.inner_text() == lab_page.lab.script().rstrip()
+        assert (await lines.inner_text()).rstrip() == lab_page.lab.script().rstrip()
         await browser.keyboard.press("Escape")
         await lines.wait_for(state="hidden")
         curve = browser.locator("path[data-symbol='g']")

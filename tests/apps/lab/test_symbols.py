@@ -106,7 +106,7 @@ def test_every_lesson_defines_its_symbols_and_shows_numbers_beside_its_plots(les
 @pytest.mark.parametrize("x", [-0.8, -0.5, 0.1, 0.18, 0.3, 0.62, 1.9])
 def test_numbers_in_the_formula_of_contact_fit_together(lessons: list[Lesson], x: float) -> None:
     lesson = lessons[1]
-    decals = lesson.scene.decals.replace(positions=[[-0.4, 0, 0], [0.6, 0, 0]])
+    decals = lesson.scene.decals.replace(positions=[[-0.4, 0, 0], [0.6, 0, 0]], radii=0.6)
     state = experiment(decals=decals, camera=lesson.scene.camera, probe=(x, 0.0, 0.0))
     results = measured(lesson, state)
     line, factor = (plain(plot["formula"]) for plot in results.plots[:2])
