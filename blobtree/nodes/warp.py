@@ -83,8 +83,8 @@ class Warp(Placed, DeclaredNode):
     ...     @formula
     ...     def forward(q: wp.vec3, height: wp.float32) -> wp.vec3:
     ...         return wp.vec3(q[0] - 0.2 * wp.sin(q[2] - height), q[1], q[2])
-    >>> Lean(Point((0, 0, 0), radius=1.0), height=0.5)([[0, 0, 1]]).round(3).tolist()
-    [0.464]
+    >>> round(float(Lean(Point((0, 0, 0), radius=1.0), height=0.5)([0, 0, 1])), 3)
+    0.496
     """
 
     sort = "a warp"
