@@ -504,7 +504,7 @@ def check_kind(
 
 
 def _tried(name: str, law: LawFunction, cases: Iterator[Case]) -> Law:
-    """Return what comes of a law; it is not checked if no case can be."""
+    """Return the outcome of a law, which is "not checked" if the law can be tried on no sample."""
     worst: Contradiction | None = None
     checked, reason = False, ""
     for case in cases:

@@ -5,26 +5,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import make_dataclass
 from typing import Annotated, Any, ClassVar
 
-import numpy as np
 import warp as wp
 
-from blobtree.declare.formula import Formula, class_name, formula, formula_of, spelled
+from blobtree.declare.formula import Formula, class_name, formula, formula_of
 from blobtree.declare.parameters import Parameter, Quantity
+from blobtree.declare.readers import SIZES
 from blobtree.declare.registry import CUSTOM_KINDS as CUSTOM_KINDS
 from blobtree.declare.registry import CustomKind
 from blobtree.declare.registry import unpickled_kind as _unpickled  # noqa: F401  (old pickles name it here)
 from blobtree.nodes.declared import DeclaredNode
 from blobtree.nodes.node import Node
-
-_SIZES: dict[Any, int] = {
-    wp.float32: 1,
-    float: 1,
-    wp.int32: 1,
-    int: 1,
-    wp.vec2: 2,
-    wp.vec3: 3,
-    wp.vec4: 4,
-}
 
 Limits = tuple[float | None, float | None]
 """Smallest and largest value of a parameter, None for no limit; of the length of a vector."""
@@ -50,7 +40,7 @@ def custom_parameters(
     parameters = []
     for name in names:
         hint = source.parameters[name]
-        if hint not in _SIZES:
+        if hint not in SIZES:
             raise source.refusal(
                 f"parameter {name!r}: expected wp.float32, wp.int32, wp.vec2, wp.vec3 or wp.vec4, "
                 f"got {hint!r}"
@@ -64,7 +54,7 @@ def custom_parameters(
             Parameter(
                 Quantity.NUMBERS,
                 name=name,
-                size=_SIZES[hint],
+                size=SIZES[hint],
                 whole=hint in (wp.int32, int),
                 low=low,
                 high=high,
@@ -101,62 +91,6 @@ def point_function(function: Any, returns: Any) -> tuple[Formula, list[str]]:
     if source.parameters.get(first) is not wp.vec3:
         raise source.refusal("expected the point `q: wp.vec3` as its first parameter")
     return source, names
-
-
-def claimed_function(
-    source: Formula,
-    parameters: tuple[Parameter, ...],
-    claim: Any,
-    name: str,
-    leading: Mapping[str, Any],
-    returns: Any,
-    *,
-    needs_leading: bool = True,
-) -> Formula:
-    """Return the function of a claim: of the `leading` parameters, by type, and then those of the kind.
-
-    Without `needs_leading` it may be a function of the kind's parameters alone.
-    """
-    bound = formula_of(claim, returns=returns)
-    own = [source.parameters[parameter.name] for parameter in parameters]
-    types = [wp.float32 if kind is float else kind for kind in bound.parameters.values()]
-    own = [wp.float32 if kind is float else kind for kind in own]
-    if types == [*leading.values(), *own] or (types == own and not needs_leading):
-        return bound
-    typed = [f"{key}: {spelled(kind)}" for key, kind in leading.items()]
-    wanted = ", ".join([*typed, *(parameter.name for parameter in parameters)])
-    got = ", ".join(bound.parameters)
-    raise source.refusal(f"{name}: expected a function of ({wanted}), got one of ({got})")
-
-
-def claimed_bound(
-    source: Formula,
-    parameters: tuple[Parameter, ...],
-    claim: Any,
-    name: str,
-    ball: tuple[str, str],
-    *,
-    positive: bool,
-) -> float | Formula:
-    """Return a claimed bound: a number, or a function of the kind's parameters, and maybe of a ball."""
-    if isinstance(claim, int | float | np.number) and not isinstance(claim, bool):
-        if not (claim > 0.0 if positive else claim >= 0.0) or not claim < np.inf:
-            least = "above 0" if positive else "from 0"
-            raise source.refusal(f"{name}: expected a number {least} or a typed function, got {claim!r}")
-        return float(claim)
-    leading = dict(zip(ball, (wp.vec3, wp.float32), strict=True))
-    return claimed_function(source, parameters, claim, name, leading, wp.float32, needs_leading=False)
-
-
-def bound_call(
-    claim: float | Formula, ball: Sequence[str], readings: Sequence[str]
-) -> tuple[str, dict[str, Any]]:
-    """Return the expression of a claimed bound in a generated function, and the functions that it calls."""
-    if isinstance(claim, float):
-        return repr(claim), {}
-    leading = ball if len(claim.parameters) > len(readings) else ()
-    function = claim.function
-    return f"{function.key}({', '.join([*leading, *readings])})", {function.key: function}
 
 
 def tape_readings(

@@ -240,7 +240,7 @@ class Camera:
         return lowest <= aspect <= highest
 
     def aspects_of(self, points: ArrayLike, *, least: float = FILLED[0]) -> tuple[float, float]:
-        """Return the range of aspect ratios for which `shows` is true; (1, 0) if there is none."""
+        """Return the least and the greatest aspect ratio whose pictures show the points; (1, 0) for none."""
         x, y, z = self.axes @ (_points(points) - self.position).T
         if z.max() >= 0.0:  # behind the eye
             return 1.0, 0.0
