@@ -72,7 +72,7 @@ from .nodes.numeric_parameters import (
 )
 from .nodes.operator import Operator
 from .nodes.parameter_gradient import ParameterGradient
-from .nodes.primitives import Box, Cone, Disc, Point, Segment, Torus
+from .nodes.primitives import Box, Cone, Disc, Point, Primitive, Segment, Torus
 from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
 from .nodes.tree import Difference, Intersection, Offset, Ricci, Sum, Transform, Twist, Union
 from .nodes.tree_volumes import sample
@@ -154,6 +154,7 @@ __all__ = [
     "Polygonizer",
     "Polyline",
     "Press",
+    "Primitive",
     "Progress",
     "QuadraticBezier",
     "RDifference",

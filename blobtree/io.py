@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Union, cast, get_type_
 
 import msgspec
 
-from blobtree.custom.skeleton import CustomPrimitive
 from blobtree.declare.falloff import Falloff
 from blobtree.declare.parameters import OPTIONAL, fields_of
 from blobtree.declare.registry import CUSTOM_KINDS
@@ -30,6 +29,7 @@ from blobtree.json_errors import json_reason
 from blobtree.nodes.attributes import Attributes, AttributeValue
 from blobtree.nodes.kinds import BASES, NODE_KINDS
 from blobtree.nodes.node import Node
+from blobtree.nodes.primitives import Primitive
 from blobtree.nodes.values import left_out, operand_names
 from blobtree.nodes.warp import Warp
 from blobtree.tape.model import checked_tree
@@ -116,8 +116,8 @@ _RECORDS: dict[str, type[NodeRecord]] = {
 """Records of users' kinds that hold more than `CustomRecord`, by tags."""
 
 _BASES = BASES | {
-    "custom_skeleton": CustomPrimitive,
-    "own skeleton": CustomPrimitive,
+    "custom_skeleton": Primitive,
+    "own skeleton": Primitive,
     "custom_warp": Warp,
 }
 

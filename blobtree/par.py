@@ -76,6 +76,12 @@ radius = partial(_field, Quantity.RADIUS)
 point = partial(_field, Quantity.POINT)
 """A point (3,); it moves with the node."""
 
+points = partial(_field, Quantity.POINTS)
+"""Points (n, 3); they move with the node."""
+
+radii = partial(_field, Quantity.RADII)
+"""Visible radii (n,), one for each point, above 0, in model units."""
+
 direction = partial(_field, Quantity.DIRECTION)
 """A vector (3,) of any length above 0; rotations turn it. Formulas get it at length 1."""
 

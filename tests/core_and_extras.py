@@ -12,7 +12,7 @@ EXTRAS: dict[str, str] = {
     "blobtree.custom": "field",
     "blobtree.derivatives": "*",
     "blobtree.formulas": """
-        contact curve_skeletons falloffs flat_skeletons noise solid_skeletons
+        contact falloffs noise
         """,
     "blobtree.meshing": """
         adaptive adaptive_cell_kernels adaptive_cells adaptive_kernels adaptive_mesh batch
@@ -21,8 +21,8 @@ EXTRAS: dict[str, str] = {
         part_kernels parts thickening thickening_kernels thin_parts wall_kernels walls
         """,
     "blobtree.nodes": """
-        blends contact convolution curves deformations fields flats parameter_gradient pieces questions
-        samples solids tree_volumes volumes
+        blends contact convolution curves deformations fields flats parameter_gradient pieces
+        questions samples solids tree_volumes volumes
         """,
     "blobtree.sampling": "*",
     "blobtree.tape": "attributes directed directed_along grown operands part_sizes poses rest_kernels",

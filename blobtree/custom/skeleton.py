@@ -8,80 +8,21 @@
     Ring = define_skeleton(ring, limits={"size": (0.0, None)})
     model = Ring((0, 0, 0), (0, 0, 1), 1.0, radius=0.2) + Point((1, 0, 0), radius=0.5)
 
-The engine derives the rest from the function. The distance to a closest point changes by at most 1 per unit,
-so balls bound the field over a cell and along a ray. Closest points seen from far away bound the skeleton
-itself (`bounds_kernels`). Maps do not fold into the parameters, whose meaning is unknown: a primitive under
-a map carries that map on the tape. Offsets change its radius.
+Maps do not fold into the parameters, whose meaning is unknown: a primitive under a map carries that map on
+the tape. `blobtree.nodes.primitives.Primitive` is the base of the class that it makes.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, field
-from itertools import product
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Mapping
+from typing import Any
 
-import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
-from blobtree.custom.bounds_kernels import skeleton_boxes
-from blobtree.custom.definition import (
-    CustomNode,
-    Limits,
-    custom_parameters,
-    defined_kind,
-    point_function,
-    tape_readings,
-    texel_lines,
-)
-from blobtree.custom.skeleton_checks import check_skeleton
-from blobtree.declare.formula import Formula, generated, kind_name
-from blobtree.declare.parameters import Color, Parameter, Radius
-from blobtree.errors import InvalidNode
-from blobtree.formulas.skeletons import Skeleton, min_influence_of_one
-from blobtree.nodes.primitives import DEFAULT_COLOR, INFLUENCE_SLOT, Primitive
-from blobtree.tape.program import ProgramPrimitive
-from blobtree.validation import Vector
+from blobtree.custom.definition import Limits, custom_parameters, point_function, short_form
+from blobtree.declare.formula import kind_name
+from blobtree.nodes.primitives import Primitive
 
-Floats = NDArray[np.float64]
-
-
-class CustomPrimitive(CustomNode, Primitive):
-    """A primitive around a custom skeleton: the base of the classes that `define_skeleton` returns.
-
-    Examples
-    --------
-    >>> import warp as wp
-    >>> from blobtree import CustomPrimitive, define_skeleton
-    >>> @wp.func
-    ... def bar(q: wp.vec3, half: wp.float32) -> wp.vec3:
-    ...     return wp.vec3(wp.clamp(q[0], -half, half), 0.0, 0.0)
-    >>> Bar = define_skeleton(bar, convex=True, limits={"half": (0.0, None)})
-    >>> issubclass(Bar, CustomPrimitive)
-    True
-    >>> Bar(1.0, radius=0.2).values
-    {'half': 1.0}
-    """
-
-    if TYPE_CHECKING:
-
-        def __init__(self, *parameters: Any, radius: float, color: Vector = ..., **named: Any) -> None: ...
-
-    @classmethod
-    def hulls(cls, primitives: Sequence[ProgramPrimitive]) -> Floats:
-        """Return the corners (n, 8, 3) of boxes that hold the skeletons."""
-        texels = cls.packed(primitives, np.ones((len(primitives), 1)), None)
-        numbers = np.delete(texels.reshape(len(texels), -1), INFLUENCE_SLOT, axis=1)
-        sizes = np.abs(numbers).max(axis=1, initial=0.0)
-        lower, upper = skeleton_boxes(cls.skeleton, texels, sizes)
-        unbounded = ~np.isfinite(lower).all(axis=1) | ~np.isfinite(upper).all(axis=1)
-        if unbounded.any():
-            raise InvalidNode(
-                f"{primitives[int(np.argmax(unbounded))]!r}: its skeleton is unbounded or too large for "
-                "float32, or a closest point is not finite; a skeleton must be bounded"
-            )
-        boxes = np.stack([lower, upper])
-        corners = [boxes[list(sides), :, range(3)].T for sides in product((0, 1), repeat=3)]
-        return np.stack(corners, axis=1)
+CustomPrimitive = Primitive
+"""The former name of the base of the classes that `define_skeleton` returns."""
 
 
 def define_skeleton(
@@ -90,8 +31,8 @@ def define_skeleton(
     convex: bool = False,
     name: str | None = None,
     limits: Mapping[str, Limits] | None = None,
-) -> type[CustomPrimitive]:
-    """Return a class of primitives whose skeleton is defined by a closest-point function.
+) -> type[Primitive]:
+    """Return a class of primitives from a closest-point function: a short form of `Primitive`.
 
     Parameters
     ----------
@@ -108,7 +49,7 @@ def define_skeleton(
 
     Returns
     -------
-    type[CustomPrimitive]
+    type[Primitive]
         A node class: the function's parameters in order, then the keywords `radius` and `color`.
 
     Raises
@@ -131,52 +72,9 @@ def define_skeleton(
     array([0.5], dtype=float32)
     """
     source, names = point_function(function, wp.vec3)
-    parameters = custom_parameters(source, names, limits, CustomPrimitive)
+    parameters = custom_parameters(source, names, limits, Primitive)
     kind = kind_name(source, name)
-    digest = source.digest_with(kind, parameters, convex)
-    node: type[CustomPrimitive] = defined_kind(
-        CustomPrimitive,
-        source,
-        kind,
-        digest,
-        parameters,
-        check=lambda: check_skeleton(source, parameters, convex=convex),
-        row=lambda: {"skeleton": _row(kind, digest, source, parameters, convex=convex)},
-        fields=[("_", KW_ONLY), ("radius", Radius), ("color", Color, field(default=DEFAULT_COLOR))],
+    node: type[Primitive] = short_form(
+        Primitive, kind, source, parameters, {"closest": source}, convex=convex
     )
     return node
-
-
-def _row(
-    kind: str, digest: str, source: Formula, parameters: tuple[Parameter, ...], *, convex: bool
-) -> Skeleton:
-    """Return the row of the table, with functions generated around the user's."""
-    readings, texels = tape_readings(parameters, skipped=INFLUENCE_SLOT)
-    texels = max(texels, 1)
-    texts = {"texels": texel_lines(texels), "influence": str(INFLUENCE_SLOT)}
-    texts["call"] = f"{source.function.key}({', '.join(['q', *readings])})"
-    scope = {source.function.key: source.function}
-    closest = generated(kind, digest, "closest", _CLOSEST, scope, **texts)
-    apart = (
-        generated(kind, digest, "apart", _APART, {closest.key: closest}, call=closest.key) if convex else 1.0
-    )
-    smallest = cast(wp.Function, min_influence_of_one)
-    return Skeleton(
-        kind, closest, smallest, texels, folds_maps=False, convex=convex, apart=apart, digest=digest
-    )
-
-
-_CLOSEST = '''\
-def {name}(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.vec4:
-    """The user's closest point, and the influence."""
-{texels}    c = {call}
-    return wp.vec4(c[0], c[1], c[2], t0[{influence}])
-'''
-
-_APART = '''\
-def {name}(q: wp.vec3, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> wp.float32:
-    """The squared distance from the skeleton, over the squared influence."""
-    c = {call}(q, tape, at)
-    w = q - wp.vec3(c[0], c[1], c[2])
-    return wp.dot(w, w) / (c[3] * c[3])
-'''

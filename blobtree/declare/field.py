@@ -98,10 +98,7 @@ class FieldFormulas:
         return number_types(self.source, 1)
 
     def require(self, declared: Sequence[str] | None) -> None:
-        """Raise `InvalidDefinition` for formulas or claims that do not fit each other.
-
-        `declared` are the names of the parameters that formulas take, None for other numbers.
-        """
+        """Raise `InvalidDefinition` for formulas or claims that do not fit, see `require_numbers`."""
         source = self.source
         require_numbers(source, self.given, dict.fromkeys(RESULTS, _BALL), declared)
         if len(self.given.keys() & {"value", "value_gradient"}) == 2:

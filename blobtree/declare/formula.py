@@ -90,9 +90,9 @@ def formula(function: Callable[..., Any] | Formula) -> Any:
     return Declared(function)
 
 
-def is_own(kind: type) -> bool:
+def is_own(kind: Any) -> bool:
     """Return True for a kind of this package."""
-    return kind.__module__.partition(".")[0] == __name__.partition(".")[0]
+    return str(kind.__module__).partition(".")[0] == __name__.partition(".")[0]
 
 
 def tag_of(kind: type) -> str:

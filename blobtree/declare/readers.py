@@ -48,15 +48,20 @@ def require_numbers(
             f"expected the parameters of the class, {', '.join(declared) or 'none'}, behind the point; "
             f"got {', '.join(names) or 'none'}"
         )
-    own = [wp.float32 if kind is float else kind for kind in number_types(source, 1).values()]
+    own = [_plain(kind) for kind in number_types(source, 1).values()]
     for name, part in given.items():
-        types = [wp.float32 if kind is float else kind for kind in part.parameters.values()]
+        front, types = leading.get(name, {}), [_plain(kind) for kind in part.parameters.values()]
         alone = name == "lipschitz" and types == own
-        if part is not source and not alone and types != [*leading[name].values(), *own]:
-            wanted = ", ".join([*(f"{key}: {spelled(kind)}" for key, kind in leading[name].items()), *names])
+        if part is not source and not alone and types != [*front.values(), *own]:
+            wanted = ", ".join([*(f"{key}: {spelled(kind)}" for key, kind in front.items()), *names])
             raise source.refusal(
                 f"{name}: expected a function of ({wanted}), got one of ({', '.join(part.parameters)})"
             )
+
+
+def _plain(kind: Any) -> Any:
+    """Return the type that Warp takes for a Python number."""
+    return {float: wp.float32, int: wp.int32}.get(kind, kind)
 
 
 def named_values(types: Mapping[str, Any], numbers: Sequence[float]) -> dict[str, Any]:
@@ -104,8 +109,10 @@ class Reader:
     @property
     def texels(self) -> int:
         """The number of texels up to the last number."""
-        taken = (self.first - 1, self.taken, *(place for places in self.places.values() for place in places))
-        return max(taken) // 4 + 1
+        last = max(
+            [self.first - 1, self.taken, *(place for found in self.places.values() for place in found)]
+        )
+        return last // 4 + 1
 
     @property
     def readings(self) -> list[str]:
@@ -128,8 +135,8 @@ class Reader:
         self, part: str, leading: dict[str, Any], returns: Any, lines: str, *called: wp.Function
     ) -> wp.Function:
         """Return the typed function of some lines, which read texels t0, t1 and so on."""
-        typed = ", ".join(f"{name}: {spelled(kind)}" for name, kind in leading.items())
-        text = f"def {{name}}({typed}, tape: wp.array(dtype=wp.vec4), at: wp.int32) -> {spelled(returns)}:\n"
+        typed = "".join(f"{name}: {spelled(kind)}, " for name, kind in leading.items())
+        text = f"def {{name}}({typed}tape: wp.array(dtype=wp.vec4), at: wp.int32) -> {spelled(returns)}:\n"
         reads = "".join(f"    t{i} = tape[at + {i}]\n" for i in range(self.texels) if f"t{i}[" in lines)
         scope: dict[str, Any] = {function.key: function for function in called}
         if self.module:

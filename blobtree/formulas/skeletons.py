@@ -9,10 +9,10 @@ skeleton.
 """
 
 import math
-from dataclasses import dataclass
 
 import warp as wp
 
+from blobtree.declare.skeleton import PLATE_CELLS, TUBE_CELLS, Skeleton
 from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
@@ -215,45 +215,6 @@ def box_to_point(center: wp.vec3, half: wp.float32, tape: Texels, at: wp.int32) 
         nearest += near * near
         farthest += (gap + half) * (gap + half)
     return wp.vec2(nearest, farthest) / (point[3] * point[3])
-
-
-BALL_CELLS, TUBE_CELLS, PLATE_CELLS = 1.5, 1.0, 0.9
-"""Cells along the radius with which a mesh shows a thin ball, tube or plate: the less it bends the fewer."""
-
-
-@dataclass(frozen=True, eq=False)
-class Skeleton:
-    """One row of the table: a kind's name, functions and size on the tape."""
-
-    name: str
-    closest: wp.Function
-    min_influence: wp.Function
-    parameters: int
-    """Number of texels (vec4) of its parameters on the tape."""
-    folds_maps: bool = True
-    """True if similarity maps fold into its parameters; otherwise each primitive carries its map."""
-    convex: bool = False
-    """True for a convex set with one influence radius: distances along a ray are then convex."""
-    cells: float = BALL_CELLS
-    """Cells along the radius with which a mesh shows a thin primitive of this kind."""
-    own_influence_near: wp.Function | None = None
-    """Of a set whose influence varies: a function of (tape, at, q, c) that returns its `influence_near`."""
-    depth: wp.Function | float = 0.0
-    """Of a solid set: a lower bound on the distance of a point inside from its rim, at most 0 outside."""
-    apart: wp.Function | float = 1.0
-    """Of a convex set of unknown depth: (|q − closest| / influence)² of a point q; 1 is unknown."""
-    digest: str = ""
-    """Digest of the sources of a custom kind."""
-
-    @property
-    def influence_near(self) -> wp.Function:
-        """Function of (tape, at, q, c) that returns `influence_near`, or the smallest influence."""
-        return self.own_influence_near or self.min_influence
-
-    @property
-    def stride(self) -> int:
-        """Number of texels of a primitive on the tape: its parameters and its colour."""
-        return self.parameters + 1
 
 
 POINT = Skeleton("point", closest_on_point, min_influence_of_one, parameters=1, convex=True)

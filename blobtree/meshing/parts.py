@@ -21,9 +21,9 @@ import warp as wp
 from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray
 from blobtree.cells.grid import BRANCHING, CHILDREN, Grid
 from blobtree.cells.sparse_cells import SparseCells, build_cells
+from blobtree.declare.skeleton import BALL_CELLS
 from blobtree.device import launch
 from blobtree.errors import InvalidResolution
-from blobtree.formulas.skeletons import BALL_CELLS
 from blobtree.meshing.adaptive_cell_kernels import write_polygons
 from blobtree.meshing.adaptive_cells import OCTANT_OF_CELL, AdaptiveCells
 from blobtree.meshing.adaptive_kernels import place_on_surface

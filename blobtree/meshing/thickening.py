@@ -23,10 +23,10 @@ import warp as wp
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray, Int32Array
 from blobtree.cells.grid import Grid
+from blobtree.declare.skeleton import BALL_CELLS, PLATE_CELLS, Skeleton
 from blobtree.device import known_device, launch
 from blobtree.errors import InvalidNode
 from blobtree.formulas.falloff import ISO, RIM
-from blobtree.formulas.skeletons import BALL_CELLS, PLATE_CELLS, Skeleton
 from blobtree.kernels import load_together
 from blobtree.lazy import Lazy
 from blobtree.meshing.block_tree import on_device

@@ -2,8 +2,8 @@
 
 from blobtree.cells.grid import Grid
 from blobtree.cells.sparse_cells import build_cells
+from blobtree.declare.skeleton import BALL_CELLS
 from blobtree.errors import InvalidResolution
-from blobtree.formulas.skeletons import BALL_CELLS
 from blobtree.meshing.dual_kernels import sample_blocks
 from blobtree.meshing.mesh import Mesh, download
 from blobtree.meshing.polygonizer import (

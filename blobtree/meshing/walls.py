@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray
 from blobtree.cells.grid import BRANCHING, Grid
 from blobtree.cells.sparse_cells import SparseCells, build_cells
+from blobtree.declare.skeleton import BALL_CELLS, PLATE_CELLS
 from blobtree.device import launch
 from blobtree.formulas.falloff import ISO
-from blobtree.formulas.skeletons import BALL_CELLS, PLATE_CELLS
 from blobtree.meshing.adaptive_cells import CELL_OFFSETS, CORNERS, cell_codes
 from blobtree.meshing.block_tree import BlockTree, on_device
 from blobtree.meshing.part_kernels import UNLIMITED

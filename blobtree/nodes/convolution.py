@@ -25,9 +25,9 @@ factor of 3; beyond, it is added.
 """
 
 import math
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import KW_ONLY, replace
 from itertools import pairwise
-from typing import Annotated, Any, Self
+from typing import Any, Self
 
 import numpy as np
 import warp as wp
@@ -35,18 +35,15 @@ import warp as wp
 from blobtree import par
 from blobtree._typing import Box, Float64Array
 from blobtree.declare.formula import formula
-from blobtree.declare.parameters import Color, Parameter, Quantity, parameters_of
+from blobtree.declare.parameters import Quantity, parameters_of
 from blobtree.errors import InvalidNode
 from blobtree.lazy import Lazy
 from blobtree.nodes.curves import Arc, checked_radii
 from blobtree.nodes.fields import FieldPrimitive
 from blobtree.nodes.flats import check_corners, triangle_texels
 from blobtree.nodes.node import Node
-from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, Leaf, beside
-from blobtree.nodes.tree import (
-    Macro,
-    Sum,
-)
+from blobtree.nodes.primitives import Columns, Leaf, beside
+from blobtree.nodes.tree import Macro, Sum
 from blobtree.texels import Texels
 from blobtree.validation import Vector
 
@@ -663,7 +660,6 @@ class ConvolutionTriangle(ConvolutionPrimitive):
         return triangle_texels(columns, 1.0 / cls.kernel_radii(columns)[:, 0])
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class ConvolutionStroke(Macro, Leaf):
     """A limb along a polyline without bulges at its corners: the sum of convolution segments.
 
@@ -684,12 +680,8 @@ class ConvolutionStroke(Macro, Leaf):
 
     file_tag = "convolution_stroke"
 
-    points: Annotated[tuple[Vector, ...], Parameter(Quantity.POINTS, "two or more points in order")]
-    radii: Annotated[
-        tuple[float, ...], Parameter(Quantity.RADII, "visible radius at each point, or one for all points")
-    ]
-    _: KW_ONLY
-    color: Color = DEFAULT_COLOR
+    points: tuple[Vector, ...] = par.points("two or more points in order")
+    radii: tuple[float, ...] = par.radii("visible radius at each point, or one for all points")
 
     def __post_init__(self) -> None:
         super().__post_init__()

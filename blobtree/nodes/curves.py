@@ -1,23 +1,32 @@
-"""Primitives along curves: circles, arcs, Bézier curves, polylines and strokes, each with visible radii."""
+"""Primitives along curves: circles, arcs, Bézier curves, polylines and strokes, each with visible radii.
+
+`formulas.skeletons` states what a skeleton is. For a curve c(t) with the influence s(t), 0 ≤ t ≤ 1, the
+closest point minimises |q − c(t)| / s(t). Its derivative has the sign of a polynomial N of degree 5 at most,
+so every local minimum is found: the roots of N''' bracket those of N'', these bracket those of N', and these
+bracket the minima. No start value can lead to the wrong one of two minima.
+"""
 
 from collections import Counter
 from collections.abc import Hashable, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, field
 from itertools import chain, pairwise
 from typing import Annotated
 
 import numpy as np
+import warp as wp
 
+from blobtree import par
 from blobtree._typing import Float64Array
-from blobtree.declare.parameters import Color, Parameter, Quantity, Radius
+from blobtree.declare.formula import formula
+from blobtree.declare.parameters import Parameter, Quantity
+from blobtree.declare.registry import library_rows
+from blobtree.declare.skeleton import TUBE_CELLS, Skeleton
 from blobtree.errors import InvalidNode
-from blobtree.formulas.curve_skeletons import ARC, CURVE, JOINED_SEGMENT
-from blobtree.formulas.skeletons import CIRCLE
+from blobtree.formulas.skeletons import CIRCLE, JOINT_YIELD, distance_to_segment, influence_near
 from blobtree.lazy import Lazy
 from blobtree.nodes.node import Node
 from blobtree.nodes.pieces import Pieces
 from blobtree.nodes.primitives import (
-    DEFAULT_COLOR,
     OPTIONAL_FIELD,
     Columns,
     JoinedPrimitive,
@@ -26,7 +35,24 @@ from blobtree.nodes.primitives import (
     Segment,
     beside,
 )
+from blobtree.texels import Texels
 from blobtree.validation import Vector
+
+wp.set_module_options({"enable_backward": False})
+
+CHORDS = 6
+"""Chords that bound the distance from a curve."""
+
+ROOT_STEPS = 20
+"""Most steps of a bracketed root: bisection alone then leaves an interval of 1e-6."""
+
+ROOT_TOLERANCE = 1e-7
+"""Change of a root, for parameters from 0 to 1, that ends its iteration."""
+
+POLISH_STEPS = 3
+
+POLISH_LIMIT = 4e-3
+"""Longest step of `polished`: beside a centre of curvature, a root in float32 is that far off."""
 
 STRAIGHTEST_ARC = 1e3
 """Radius of an arc, over the longest distance of its points, beyond which it counts as a line."""
@@ -41,7 +67,6 @@ STEEPEST_RADIUS = 0.5
 """Part of a stroke's radius at a point by which the radius of the next control point may differ from it."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Circle(RoundPrimitive):
     """A tube around a circle, the same shape as a `Torus`.
 
@@ -55,15 +80,11 @@ class Circle(RoundPrimitive):
     file_tag = "circle"
     skeleton = CIRCLE
 
-    center: Annotated[Vector, Parameter(Quantity.POINT, "centre of the circle")]
-    axis: Annotated[Vector, Parameter(Quantity.DIRECTION, "normal of the circle's plane, of any length")]
-    circle_radius: Annotated[float, Parameter(Quantity.LENGTH, "radius of the circle")]
-    _: KW_ONLY
-    radius: Radius
-    color: Color = DEFAULT_COLOR
+    center: Vector = par.point("centre of the circle")
+    axis: Vector = par.direction("normal of the circle's plane, of any length")
+    circle_radius: float = par.length("radius of the circle")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Arc(Primitive):
     """A tube around the part of a circle from `start` to `end` that leads through a third point.
 
@@ -80,15 +101,11 @@ class Arc(Primitive):
     [0.5, 0.5, 0.0]
     """
 
-    file_tag = "arc"
-    skeleton = ARC
+    cells = TUBE_CELLS
 
-    start: Annotated[Vector, Parameter(Quantity.POINT, "start of the arc")]
-    through: Annotated[Vector, Parameter(Quantity.POINT, "a point of the arc between its ends")]
-    end: Annotated[Vector, Parameter(Quantity.POINT, "end of the arc")]
-    _: KW_ONLY
-    radius: Radius
-    color: Color = DEFAULT_COLOR
+    start: Vector = par.point("start of the arc")
+    through: Vector = par.point("a point of the arc between its ends")
+    end: Vector = par.point("end of the arc")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -114,11 +131,34 @@ class Arc(Primitive):
         return np.concatenate([columns["start"][:, None], corners, columns["end"][:, None]], axis=1)
 
     @classmethod
-    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
-        """Return centre and influence radius; two vectors that span the arc, cosine and sine of its half."""
+    def numbers(cls, columns: Columns, influences: Float64Array) -> Float64Array:
+        """Return centres; two vectors that span the arc, with cosine and sine of its half."""
         centers, u, v, halves = _arc_frames(columns["start"], columns["through"], columns["end"])
-        spans = [beside(u, np.cos(halves)), beside(v, np.sin(halves))]
-        return np.stack([beside(centers, influences[:, 0]), *spans], axis=1)
+        return np.concatenate([centers, beside(u, np.cos(halves)), beside(v, np.sin(halves))], axis=1)
+
+    @formula
+    def closest(
+        q: wp.vec3, center: wp.vec3, u: wp.vec3, least: wp.float32, v: wp.vec3, most: wp.float32
+    ) -> wp.vec3:
+        """Return the closest point of an arc of radius |u| from −h to h about u; v is u turned by 90°.
+
+        The numbers are cos h and sin h.
+        """
+        w = q - center
+        radius = wp.length(u)
+        x = wp.dot(w, u) / radius
+        y = wp.dot(w, v) / radius
+        across = wp.sqrt(x * x + y * y)
+        cosine = float(1.0)
+        sine = float(0.0)
+        if across > 1.0e-6 * wp.length(w):
+            cosine = x / across
+            sine = y / across
+        if cosine < least:
+            cosine = least
+            sine = most * wp.sign(sine)
+        c = u * cosine + v * sine
+        return center + c
 
 
 def _arc_frames(
@@ -142,6 +182,283 @@ def _arc_frames(
     return starts + sizes * from_start, sizes * u, sizes * v, 0.5 * angles
 
 
+@wp.func
+def joined_influence(
+    influence: wp.float32, joints: wp.float32, at_start: wp.bool, at_end: wp.bool
+) -> wp.float32:
+    """Return the influence at a closest point, which yields at joints: 1 start, 2 end, 3 both, 0 none."""
+    if (at_start and (joints == 1.0 or joints == 3.0)) or (at_end and joints >= 2.0):
+        return influence * (1.0 - JOINT_YIELD)
+    return influence
+
+
+@wp.func
+def closest_on_joined_segment(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
+    """tape[at] = (start, influence); tape[at + 1] = (end − start, joints), as in `joined_influence`."""
+    start = tape[at]
+    axis = tape[at + 1]
+    a = wp.vec3(start[0], start[1], start[2])
+    ab = wp.vec3(axis[0], axis[1], axis[2])
+    t = wp.clamp(wp.dot(q - a, ab) / wp.max(wp.dot(ab, ab), 1.0e-37), 0.0, 1.0)
+    c = a + ab * t
+    return wp.vec4(c[0], c[1], c[2], joined_influence(start[3], axis[3], t == 0.0, t == 1.0))
+
+
+@wp.func
+def min_influence_of_joined_segment(tape: Texels, at: wp.int32) -> wp.float32:
+    """Return the influence radius at joints."""
+    return tape[at][3] * (1.0 - JOINT_YIELD)
+
+
+@wp.func
+def polynomial(t: wp.float32, c: wp.vec4, c4: wp.float32, c5: wp.float32) -> wp.float32:
+    """Return Σ cₖ tᵏ for k from 0 to 5."""
+    return c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * (c4 + t * c5))))
+
+
+@wp.func
+def polynomial_slope(t: wp.float32, c: wp.vec4, c4: wp.float32, c5: wp.float32) -> wp.float32:
+    """Return Σ k cₖ tᵏ⁻¹."""
+    return c[1] + t * (2.0 * c[2] + t * (3.0 * c[3] + t * (4.0 * c4 + t * 5.0 * c5)))
+
+
+@wp.func
+def root_between(low: wp.float32, high: wp.float32, c: wp.vec4, c4: wp.float32, c5: wp.float32) -> wp.float32:
+    """Return the root of a polynomial that is monotone from `low` to `high`; `high` if it has none there.
+
+    Newton's method, and a bisection where a step of it would leave the bracket.
+    """
+    left = float(low)
+    right = float(high)
+    rises = polynomial(low, c, c4, c5) < 0.0
+    if rises == (polynomial(high, c, c4, c5) < 0.0):
+        return high
+    t = 0.5 * (left + right)
+    for _step in range(ROOT_STEPS):
+        value = polynomial(t, c, c4, c5)
+        if (value < 0.0) == rises:
+            left = t
+        else:
+            right = t
+        slope = polynomial_slope(t, c, c4, c5)
+        following = 0.5 * (left + right)
+        if (t - left) * wp.abs(slope) > wp.abs(value) or (right - t) * wp.abs(slope) > wp.abs(value):
+            newton = t - value / slope
+            if newton > left and newton < right:
+                following = newton
+        change = wp.abs(following - t)
+        t = following
+        if change <= ROOT_TOLERANCE:
+            break
+    return t
+
+
+@wp.func
+def unit_quotient(a: wp.float32, b: wp.float32) -> wp.float32:
+    """Return a / b clamped to [0, 1]; 0 for 0 / 0."""
+    numerator = a * wp.sign(b)
+    denominator = wp.abs(b)
+    if numerator <= 0.0:
+        return 0.0
+    if numerator >= denominator:
+        return 1.0
+    return numerator / denominator
+
+
+@wp.func
+def quadratic_roots(c: wp.float32, b: wp.float32, a: wp.float32) -> wp.vec2:
+    """Return the roots of a t² + b t + c in ascending order, clamped to [0, 1]; its extremum if it has none.
+
+    The form −2c / (b ± …) of the smaller root does not cancel (Press et al., Numerical Recipes, 5.6).
+    """
+    discriminant = b * b - 4.0 * a * c
+    if discriminant <= 0.0:
+        extremum = unit_quotient(-b, 2.0 * a)
+        return wp.vec2(extremum, extremum)
+    k = -0.5 * (b + wp.sign(b) * wp.sqrt(discriminant))
+    first = unit_quotient(k, a)
+    second = unit_quotient(c, k)
+    return wp.vec2(wp.min(first, second), wp.max(first, second))
+
+
+@wp.func
+def roots_between(ends: wp.vec4, c: wp.vec4, c4: wp.float32, c5: wp.float32) -> wp.vec4:
+    """Return `root_between` of the four intervals from 0 through the ascending `ends`."""
+    roots = wp.vec4()
+    low = float(0.0)
+    for k in range(4):
+        roots[k] = root_between(low, ends[k], c, c4, c5)
+        low = ends[k]
+    return roots
+
+
+@wp.func
+def extrema(c: wp.vec4, c4: wp.float32, c5: wp.float32) -> wp.vec4:
+    """Return numbers in [0, 1], ascending, between which a polynomial of degree 5 is monotone."""
+    inflections = quadratic_roots(6.0 * c[3], 24.0 * c4, 60.0 * c5)
+    ends = wp.vec4(inflections[0], inflections[1], 1.0, 1.0)
+    turns = roots_between(ends, wp.vec4(2.0 * c[2], 6.0 * c[3], 12.0 * c4, 20.0 * c5), 0.0, 0.0)
+    slope = wp.vec4(c[1], 2.0 * c[2], 3.0 * c[3], 4.0 * c4)
+    return roots_between(turns, slope, 5.0 * c5, 0.0)
+
+
+@wp.func
+def curve_point(t: wp.float32, tape: Texels, at: wp.int32) -> wp.vec4:
+    """Return the point of a curve, and the influence there."""
+    last = tape[at + 3]
+    cubic = wp.vec4(last[0], last[1], last[2], 0.0)
+    return tape[at] + (tape[at + 1] + (tape[at + 2] + cubic * t) * t) * t
+
+
+@wp.func
+def curve_ratio(t: wp.float32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
+    """Return (|q − c(t)| / s(t))²."""
+    c = curve_point(t, tape, at)
+    w = q - wp.vec3(c[0], c[1], c[2])
+    return wp.dot(w, w) / (c[3] * c[3])
+
+
+@wp.func
+def polished(t: wp.float32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
+    """Return t after Newton steps for N(t) = ½ (|c − q|²)' s − |c − q|² s'.
+
+    Its vectors cancel less than the coefficients of N. Lengths are in units of s(0), for squares overflow.
+    """
+    unit = 1.0 / tape[at][3]
+    last = tape[at + 3]
+    cubic = wp.vec4(last[0], last[1], last[2], 0.0)
+    root = float(t)
+    for _step in range(POLISH_STEPS):
+        c = curve_point(root, tape, at)
+        slope = (tape[at + 1] + (tape[at + 2] * 2.0 + cubic * (3.0 * root)) * root) * unit
+        bend = (tape[at + 2] * 2.0 + cubic * (6.0 * root)) * unit
+        w = (wp.vec3(c[0], c[1], c[2]) - q) * unit
+        s = c[3] * unit
+        d = wp.vec3(slope[0], slope[1], slope[2])
+        n = wp.dot(w, d) * s - wp.dot(w, w) * slope[3]
+        rate = (wp.dot(d, d) + wp.dot(w, wp.vec3(bend[0], bend[1], bend[2]))) * s
+        rate -= wp.dot(w, d) * slope[3] + wp.dot(w, w) * bend[3]
+        if rate <= 0.0:
+            break
+        following = wp.clamp(root - wp.clamp(n / rate, -POLISH_LIMIT, POLISH_LIMIT), 0.0, 1.0)
+        change = wp.abs(following - root)
+        root = following
+        if change <= ROOT_TOLERANCE:
+            break
+    return root
+
+
+@wp.func
+def closest_on_curve(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
+    """tape[at + k] = coefficient of tᵏ in (c(t), s(t)), k from 0 to 3; s is constant if that of t³ is not 0.
+
+    s has no term in t³. In its place stand the joints, as in `joined_influence`.
+    With c − q = w + b t + a t² + g t³ and s = 1 + s₁ t + s₂ t² in units of s(0), to which N is proportional,
+    N = ½ (|c − q|²)' s − |c − q|² s'.
+    """
+    start = tape[at]
+    unit = 1.0 / start[3]
+    k1 = tape[at + 1] * unit
+    k2 = tape[at + 2] * unit
+    k3 = tape[at + 3] * unit
+    w = (wp.vec3(start[0], start[1], start[2]) - q) * unit
+    b = wp.vec3(k1[0], k1[1], k1[2])
+    a = wp.vec3(k2[0], k2[1], k2[2])
+    g = wp.vec3(k3[0], k3[1], k3[2])
+    h0 = wp.dot(w, b)
+    h1 = wp.dot(b, b) + 2.0 * wp.dot(w, a)
+    h2 = 3.0 * wp.dot(a, b)
+    h3 = 2.0 * wp.dot(a, a)
+    e0 = wp.dot(w, w)
+    n0 = h0 - e0 * k1[3]
+    n1 = h1 - h0 * k1[3] - 2.0 * e0 * k2[3]
+    n2 = h2 + 3.0 * wp.dot(w, g) - 3.0 * h0 * k2[3]
+    n3 = h3 + 4.0 * wp.dot(b, g) + h2 * k1[3] / 3.0 - h1 * k2[3]
+    n4 = 5.0 * wp.dot(a, g) + 0.5 * h3 * k1[3] - h2 * k2[3] / 3.0
+    n5 = 3.0 * wp.dot(g, g)
+    largest = wp.max(wp.max(wp.abs(n0), wp.abs(n1)), wp.max(wp.abs(n2), wp.abs(n3)))
+    largest = wp.max(largest, wp.max(wp.abs(n4), wp.abs(n5)))
+    scale = 1.0 / wp.max(largest, 1.0e-30)
+    n = wp.vec4(n0, n1, n2, n3) * scale
+    n4 *= scale
+    n5 *= scale
+    ends = extrema(n, n4, n5)
+    best = float(0.0)
+    least = curve_ratio(0.0, q, tape, at)
+    low = float(0.0)
+    for k in range(6):
+        high = float(1.0)
+        t = float(1.0)
+        if k < 4:
+            high = ends[k]
+        if k < 5 and polynomial(low, n, n4, n5) < 0.0:
+            t = root_between(low, high, n, n4, n5)
+        ratio = curve_ratio(t, q, tape, at)
+        if ratio < least:
+            least = ratio
+            best = t
+        low = high
+    best = polished(best, q, tape, at)
+    c = curve_point(best, tape, at)
+    c[3] = joined_influence(c[3], tape[at + 3][3], best == 0.0, best == 1.0)
+    return c
+
+
+@wp.func
+def min_influence_of_curve(tape: Texels, at: wp.int32) -> wp.float32:
+    """Return the smallest of the influences s₀, s₀ + s₁ / 2, s₀ + s₁ + s₂, whose hull holds all of s(t)."""
+    start = tape[at][3]
+    first = tape[at + 1][3]
+    return wp.min(start, wp.min(start + 0.5 * first, start + first + tape[at + 2][3]))
+
+
+@wp.func
+def clearance_of_curve(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
+    """Return a lower bound on the distance from a parabola, by chords of its pieces.
+
+    Over a piece of Δt it is at most |a| Δt² / 4 away from the chord, a being the coefficient of t². Nothing
+    is known of a cubic, whose influence is constant.
+    """
+    bend = tape[at + 2]
+    if tape[at + 1][3] == 0.0 and bend[3] == 0.0:
+        return 0.0
+    before = curve_point(0.0, tape, at)
+    least = float(1.0e30)
+    for k in range(CHORDS):
+        after = curve_point(float(k + 1) / float(CHORDS), tape, at)
+        a = wp.vec3(before[0], before[1], before[2])
+        least = wp.min(least, distance_to_segment(q, a, wp.vec3(after[0], after[1], after[2])))
+        before = after
+    sag = wp.length(wp.vec3(bend[0], bend[1], bend[2])) / float(4 * CHORDS * CHORDS)
+    return wp.max(least - sag, 0.0)
+
+
+@wp.func
+def influence_near_curve(tape: Texels, at: wp.int32, q: wp.vec3, c: wp.vec4) -> wp.float32:
+    """Return `influence_near` of a curve."""
+    return influence_near(q, c, min_influence_of_curve(tape, at), clearance_of_curve(q, tape, at))
+
+
+JOINED_SEGMENT = Skeleton(
+    "joined_segment",
+    closest_on_joined_segment,
+    min_influence_of_joined_segment,
+    parameters=2,
+    convex=True,
+    cells=TUBE_CELLS,
+)
+CURVE = Skeleton(
+    "curve",
+    closest_on_curve,
+    min_influence_of_curve,
+    parameters=4,
+    own_influence_near=influence_near_curve,
+    cells=TUBE_CELLS,
+)
+
+library_rows(JOINED_SEGMENT, CURVE)
+
+
 class BezierCurve(Primitive):
     """A tube around a Bézier curve, whose control points are the parameters in order."""
 
@@ -163,7 +480,6 @@ class BezierCurve(Primitive):
         return powers
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class QuadraticBezier(BezierCurve):
     """A tube around a parabola: a quadratic Bézier curve.
 
@@ -177,15 +493,11 @@ class QuadraticBezier(BezierCurve):
 
     file_tag = "quadratic_bezier"
 
-    start: Annotated[Vector, Parameter(Quantity.POINT, "start of the curve")]
-    control: Annotated[Vector, Parameter(Quantity.POINT, "where the tangents of the ends meet")]
-    end: Annotated[Vector, Parameter(Quantity.POINT, "end of the curve")]
-    _: KW_ONLY
-    radius: Radius
-    color: Color = DEFAULT_COLOR
+    start: Vector = par.point("start of the curve")
+    control: Vector = par.point("where the tangents of the ends meet")
+    end: Vector = par.point("end of the curve")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class CubicBezier(BezierCurve):
     """A tube around a cubic Bézier curve.
 
@@ -199,16 +511,12 @@ class CubicBezier(BezierCurve):
 
     file_tag = "cubic_bezier"
 
-    start: Annotated[Vector, Parameter(Quantity.POINT, "start of the curve")]
-    start_control: Annotated[Vector, Parameter(Quantity.POINT, "control point on the tangent of the start")]
-    end_control: Annotated[Vector, Parameter(Quantity.POINT, "control point on the tangent of the end")]
-    end: Annotated[Vector, Parameter(Quantity.POINT, "end of the curve")]
-    _: KW_ONLY
-    radius: Radius
-    color: Color = DEFAULT_COLOR
+    start: Vector = par.point("start of the curve")
+    start_control: Vector = par.point("control point on the tangent of the start")
+    end_control: Vector = par.point("control point on the tangent of the end")
+    end: Vector = par.point("end of the curve")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class TaperedBezier(JoinedPrimitive):
     """A tube around a parabola, whose radius varies as the fourth coordinate of a quadratic Bézier curve.
 
@@ -228,14 +536,13 @@ class TaperedBezier(JoinedPrimitive):
     skeleton = CURVE
     joint_texels = (3,)
 
-    start: Annotated[Vector, Parameter(Quantity.POINT, "start of the curve")]
-    control: Annotated[Vector, Parameter(Quantity.POINT, "where the tangents of the ends meet")]
-    end: Annotated[Vector, Parameter(Quantity.POINT, "end of the curve")]
+    start: Vector = par.point("start of the curve")
+    control: Vector = par.point("where the tangents of the ends meet")
+    end: Vector = par.point("end of the curve")
     _: KW_ONLY
-    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius at the start")]
-    control_radius: Annotated[float, Parameter(Quantity.RADIUS, "second Bernstein coefficient of the radius")]
-    end_radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius at the end")]
-    color: Color = DEFAULT_COLOR
+    radius: float = par.radius("visible radius at the start")
+    control_radius: float = par.radius("second Bernstein coefficient of the radius")
+    end_radius: float = par.radius("visible radius at the end")
 
     @classmethod
     def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
@@ -261,7 +568,6 @@ class JoinedSegment(JoinedPrimitive, Segment):
         )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Polyline(Pieces):
     """A tube around straight lines from point to point: the union of segments.
 
@@ -280,10 +586,9 @@ class Polyline(Pieces):
 
     file_tag = "polyline"
 
-    points: Annotated[tuple[Vector, ...], Parameter(Quantity.POINTS, "two or more points in order")]
+    points: tuple[Vector, ...] = par.points("two or more points in order")
     _: KW_ONLY
-    radius: Radius
-    color: Color = DEFAULT_COLOR
+    radius: float = par.radius("visible radius around the skeleton")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -302,7 +607,6 @@ class Polyline(Pieces):
         )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Stroke(Pieces):
     """A limb along points, with given radii there: a spline of any length, whose pieces are parabolas.
 
@@ -333,10 +637,8 @@ class Stroke(Pieces):
 
     file_tag = "stroke"
 
-    points: Annotated[tuple[Vector, ...], Parameter(Quantity.POINTS, "two or more points in order")]
-    radii: Annotated[
-        tuple[float, ...], Parameter(Quantity.RADII, "visible radius at each point, or one for all points")
-    ]
+    points: tuple[Vector, ...] = par.points("two or more points in order")
+    radii: tuple[float, ...] = par.radii("visible radius at each point, or one for all points")
     _: KW_ONLY
     spline: Annotated[
         str,
@@ -346,7 +648,6 @@ class Stroke(Pieces):
             choices=("catmull_rom", "b_spline"),
         ),
     ] = field(default="catmull_rom", metadata=OPTIONAL_FIELD)
-    color: Color = DEFAULT_COLOR
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -364,7 +665,7 @@ class Stroke(Pieces):
         start, control, end = controls
         a, b, c = (tuple(ball[:3]) for ball in controls)
         radii = {"radius": start[3], "control_radius": control[3], "end_radius": end[3]}
-        piece = TaperedBezier(a, b, c, **radii, **self.shared)  # type: ignore[arg-type]  # lists of four
+        piece = TaperedBezier(a, b, c, **radii, **self.shared)
         object.__setattr__(piece, "to_width_radius", self.radii[0] - start[3])
         return piece.joined(joints)
 

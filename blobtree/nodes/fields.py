@@ -5,9 +5,9 @@ A kind is a class with parameters, formulas, claims, and a box outside which the
 
 import math
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, field, replace
+from dataclasses import KW_ONLY, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import warp as wp
@@ -24,7 +24,8 @@ from blobtree.formulas.falloff import RIM
 from blobtree.formulas.noise import LARGEST_NOISE, MEAN_NOISE_SLOPE, STEEPEST_NOISE, gradient_noise
 from blobtree.formulas.operators import ricci_partials
 from blobtree.formulas.windows import smooth_step, smooth_step_slope, steepest_smooth_step
-from blobtree.nodes.primitives import DEFAULT_COLOR, PROFILE, Columns, DeclaredLeaf, Falling, Profile
+from blobtree.nodes.declared import DeclaredNode
+from blobtree.nodes.primitives import DEFAULT_COLOR, PROFILE, Columns, Falling, Leaf, Profile, rows_of
 from blobtree.tape.program import ProgramField, profile_extent, profile_factor
 from blobtree.validation import Vector
 
@@ -46,7 +47,7 @@ LARGEST_GYROID = 1.5
 """Largest |G|."""
 
 
-class FieldPrimitive(DeclaredLeaf, ProgramField):
+class FieldPrimitive(Leaf, ProgramField, DeclaredNode):
     """A direct field and a colour: a leaf of the tree.
 
     Its field is a function of the point itself, not of the distance from a skeleton. Every one has a
@@ -95,15 +96,13 @@ class FieldPrimitive(DeclaredLeaf, ProgramField):
     row_name = "field_kind"
     formula_results = RESULTS
     needed = ("value", "value_gradient")
+    common = ("color",)
     methods = ("numbers", "box")
     field_kind: ClassVar[FieldKind]
     lipschitz: ClassVar[float | None] = None
     trial_extent: ClassVar[float] = 4.0
     texels_read: ClassVar[int] = 0
     """Number of texels that formulas take which read the tape themselves."""
-
-    if TYPE_CHECKING:
-        color: Color = field(default=DEFAULT_COLOR, kw_only=True)
 
     def __new__(cls, *_: Any, **named: Any) -> Self:
         """Refuse a falloff or a width that has no meaning."""
@@ -130,12 +129,12 @@ class FieldPrimitive(DeclaredLeaf, ProgramField):
                 f"{cls.__qualname__}: expected the class method `box`, or the base BoxedField"
             )
         if not declaration.windowed:
-            check_box(declaration, cls.parameters, packed, lambda values: cls.box(_rows(values)))
+            check_box(declaration, cls.parameters, packed, lambda values: cls.box(rows_of(values)))
 
     @classmethod
     def _formula_values(cls, values: dict[str, Any], declaration: FieldFormulas) -> dict[str, Any]:
         """Return the numbers of the formulas for values of the parameters."""
-        return named_values(declaration.numbers, cls.numbers(_rows(values))[0].tolist())
+        return named_values(declaration.numbers, cls.numbers(rows_of(values))[0].tolist())
 
     @property
     def mean_radius(self) -> float:
@@ -208,11 +207,6 @@ class FieldPrimitive(DeclaredLeaf, ProgramField):
             for name, parameter in parameters_of(cls).items()
             if parameter.quantity not in (Quantity.COLOR, Quantity.ATTRIBUTES) and name not in PROFILE
         }
-
-
-def _rows(values: dict[str, Any]) -> Columns:
-    """Return values of one leaf as columns."""
-    return {name: np.atleast_2d(np.asarray(value, np.float64)) for name, value in values.items()}
 
 
 class BoxedField(FieldPrimitive):

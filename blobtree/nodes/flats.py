@@ -1,21 +1,27 @@
 """Primitives around flat skeletons: rectangles, triangles and polygons, with rounded edges."""
 
 from collections import Counter
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY
 from itertools import combinations, product
-from typing import Annotated
 
 import numpy as np
+import warp as wp
 
+from blobtree import par
 from blobtree._typing import Float64Array
-from blobtree.declare.parameters import Color, Parameter, Quantity, unit_vectors
+from blobtree.declare.formula import formula
+from blobtree.declare.parameters import unit_vectors
+from blobtree.declare.skeleton import PLATE_CELLS
 from blobtree.errors import InvalidNode
-from blobtree.formulas.flat_skeletons import RECTANGLE, TRIANGLE
+from blobtree.formulas.skeletons import JOINT_YIELD
 from blobtree.lazy import Lazy
 from blobtree.nodes.node import Node
 from blobtree.nodes.pieces import Pieces
-from blobtree.nodes.primitives import DEFAULT_COLOR, Columns, JoinedPrimitive, Primitive, beside
+from blobtree.nodes.primitives import Columns, JoinedPrimitive, Primitive, beside
+from blobtree.texels import Texels
 from blobtree.validation import Vector
+
+wp.set_module_options({"enable_backward": False})
 
 SMALLEST_SINE = 1e-6
 """Sine of an angle below which two directions count as parallel."""
@@ -24,7 +30,6 @@ FLATNESS = 1e-5
 """Distance of a polygon's corners from a plane, over its size, up to which it counts as planar."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Rectangle(Primitive):
     """A flat rectangle with a rounded edge: everything within `radius` of the rectangle.
 
@@ -41,19 +46,16 @@ class Rectangle(Primitive):
     [0.5, 0.5, 0.5]
     """
 
-    file_tag = "rectangle"
-    skeleton = RECTANGLE
+    convex = True
+    cells = PLATE_CELLS
 
-    center: Annotated[Vector, Parameter(Quantity.POINT, "centre of the rectangle")]
-    axis: Annotated[Vector, Parameter(Quantity.DIRECTION, "normal of the rectangle's plane, of any length")]
-    side: Annotated[
-        Vector, Parameter(Quantity.DIRECTION, "direction of the length; its part along the axis is left out")
-    ]
-    length: Annotated[float, Parameter(Quantity.LENGTH, "length along `side`, without the radius")]
-    height: Annotated[float, Parameter(Quantity.LENGTH, "length across `side`, without the radius")]
+    center: Vector = par.point("centre of the rectangle")
+    axis: Vector = par.direction("normal of the rectangle's plane, of any length")
+    side: Vector = par.direction("direction of the length; its part along the axis is left out")
+    length: float = par.length("length along `side`, without the radius")
+    height: float = par.length("length across `side`, without the radius")
     _: KW_ONLY
-    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the edge, half the thickness")]
-    color: Color = DEFAULT_COLOR
+    radius: float = par.radius("visible radius of the edge, half the thickness")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -74,11 +76,20 @@ class Rectangle(Primitive):
         return corners
 
     @classmethod
-    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
-        """Return centre and influence radius; unit vectors along the sides with half their lengths."""
+    def numbers(cls, columns: Columns, influences: Float64Array) -> Float64Array:
+        """Return centres; unit vectors along the sides with half their lengths."""
         u, v = _sides(columns)
-        sides = [beside(u, 0.5 * columns["length"]), beside(v, 0.5 * columns["height"])]
-        return np.stack([beside(columns["center"], influences[:, 0]), *sides], axis=1)
+        sides = [u, 0.5 * columns["length"], v, 0.5 * columns["height"]]
+        return np.concatenate([columns["center"], *sides], axis=1)
+
+    @formula
+    def closest(
+        q: wp.vec3, center: wp.vec3, u: wp.vec3, along: wp.float32, v: wp.vec3, across: wp.float32
+    ) -> wp.vec3:
+        """`u` and `v` are unit vectors along the sides, and the numbers half their lengths."""
+        w = q - center
+        c = u * wp.clamp(wp.dot(w, u), -along, along) + v * wp.clamp(wp.dot(w, v), -across, across)
+        return center + c
 
 
 def _sides(columns: Columns) -> tuple[Float64Array, Float64Array]:
@@ -88,7 +99,79 @@ def _sides(columns: Columns) -> tuple[Float64Array, Float64Array]:
     return np.cross(v, normals), v
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@wp.func
+def foot_on_edge(w: wp.vec3, edge: wp.vec3) -> wp.vec3:
+    """Return the point of the line segment from 0 to `edge` that is closest to w."""
+    return edge * wp.clamp(wp.dot(w, edge) / wp.max(wp.dot(edge, edge), 1.0e-37), 0.0, 1.0)
+
+
+@wp.func
+def closer(w: wp.vec3, a: wp.vec3, b: wp.vec3) -> wp.vec3:
+    """Return a, or b if it is closer to w.
+
+    |w − a|² − |w − b|² is written as a product with b − a: feet near a corner differ little, and float32 does
+    not show in the squares which one is closer.
+    """
+    if wp.dot(b - a, (w - a) + (w - b)) > 0.0:
+        return b
+    return a
+
+
+@wp.func
+def is_beside(w: wp.vec3, edge: wp.vec3, outward: wp.vec3) -> wp.bool:
+    """Return True if w lies outside the line segment from 0 to `edge`, between the normals at its ends."""
+    t = wp.dot(w, edge)
+    return wp.dot(w, outward) > 0.0 and t > 0.0 and t < wp.dot(edge, edge)
+
+
+@wp.func
+def closest_on_triangle(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
+    """tape[at] = (corner a, influence); tape[at + 1] = (b − a, joint ab); tape[at + 2] = (c − a, joint ac).
+
+    tape[at + 3] = (unit normal, joint bc); float32 could not compute the normal of slivers. A joint is 1 if
+    another triangle goes on behind the edge, else 0. A point outside has the closest one inside an edge if it
+    is beside this edge, which signs tell: distances to that point and to a corner near it differ by less than
+    float32 shows.
+    """
+    corner = tape[at]
+    to_b = tape[at + 1]
+    to_c = tape[at + 2]
+    upright = tape[at + 3]
+    w = q - wp.vec3(corner[0], corner[1], corner[2])
+    ab = wp.vec3(to_b[0], to_b[1], to_b[2])
+    ac = wp.vec3(to_c[0], to_c[1], to_c[2])
+    bc = ac - ab
+    n = wp.vec3(upright[0], upright[1], upright[2])
+    beyond_ab = wp.cross(ab, n)
+    beyond_ac = wp.cross(n, ac)
+    beyond_bc = wp.cross(bc, n)
+    outside = wp.dot(w, beyond_ab) > 0.0 or wp.dot(w, beyond_ac) > 0.0 or wp.dot(w - ab, beyond_bc) > 0.0
+    c = w - n * wp.dot(w, n)
+    joint = float(0.0)
+    if outside:
+        if is_beside(w, ab, beyond_ab):
+            c = foot_on_edge(w, ab)
+            joint = to_b[3]
+        elif is_beside(w, ac, beyond_ac):
+            c = foot_on_edge(w, ac)
+            joint = to_c[3]
+        elif is_beside(w - ab, bc, beyond_bc):
+            c = ab + foot_on_edge(w - ab, bc)
+            joint = upright[3]
+        else:
+            c = closer(w, foot_on_edge(w, ab), foot_on_edge(w, ac))
+            c = closer(w, c, ab + foot_on_edge(w - ab, bc))
+            joint = wp.max(wp.max(to_b[3], to_c[3]), upright[3])
+    influence = corner[3] * (1.0 - JOINT_YIELD * joint)
+    return wp.vec4(corner[0] + c[0], corner[1] + c[1], corner[2] + c[2], influence)
+
+
+@wp.func
+def least_influence_at_joints(tape: Texels, at: wp.int32) -> wp.float32:
+    """Return the influence radius at joints."""
+    return tape[at][3] * (1.0 - JOINT_YIELD)
+
+
 class Triangle(JoinedPrimitive):
     """A flat triangle with a rounded edge: everything within `radius` of the triangle.
 
@@ -105,16 +188,18 @@ class Triangle(JoinedPrimitive):
     [0.5, 0.5, 0.5]
     """
 
-    file_tag = "triangle"
-    skeleton = TRIANGLE
+    convex = True
+    cells = PLATE_CELLS
     joint_texels = (1, 2, 3)
+    texels_read = 4
+    closest_with_influence = formula(closest_on_triangle)
+    least_influence = formula(least_influence_at_joints)
 
-    a: Annotated[Vector, Parameter(Quantity.POINT, "first corner")]
-    b: Annotated[Vector, Parameter(Quantity.POINT, "second corner")]
-    c: Annotated[Vector, Parameter(Quantity.POINT, "third corner")]
+    a: Vector = par.point("first corner")
+    b: Vector = par.point("second corner")
+    c: Vector = par.point("third corner")
     _: KW_ONLY
-    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the edge, half the thickness")]
-    color: Color = DEFAULT_COLOR
+    radius: float = par.radius("visible radius of the edge, half the thickness")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -147,7 +232,6 @@ def triangle_texels(columns: Columns, numbers: Float64Array) -> Float64Array:
     return np.stack([beside(a, numbers), *rows], axis=1)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Polygon(Pieces):
     """A flat polygon with a rounded edge, also a concave one: the union of triangles that fill it.
 
@@ -168,10 +252,9 @@ class Polygon(Pieces):
 
     file_tag = "polygon"
 
-    points: Annotated[tuple[Vector, ...], Parameter(Quantity.POINTS, "corners in order, at least three")]
+    points: tuple[Vector, ...] = par.points("corners in order, at least three")
     _: KW_ONLY
-    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the edge, half the thickness")]
-    color: Color = DEFAULT_COLOR
+    radius: float = par.radius("visible radius of the edge, half the thickness")
 
     def __post_init__(self) -> None:
         super().__post_init__()

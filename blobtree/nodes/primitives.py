@@ -1,25 +1,25 @@
 """Primitives: the leaves of a tree, each a skeleton with a visible radius and a colour.
 
-A new primitive is a row of `formulas.skeletons` and a class here. The class names that row, declares its
-parameters, and returns points whose convex hull holds the skeleton. If the formula reads its parameters in
-the order of declaration, `texels` need not be written. Falloff, width and weight are those of every primitive
-(`Profile`).
+A kind is a class with its parameters, formulas and claims. Those of the core have their formulas in
+`formulas.skeletons`, because the kernels of all trees read them. Falloff, width and weight are those of every
+primitive (`Profile`).
 """
 
 import inspect
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, Field, dataclass, field
+from dataclasses import KW_ONLY, MISSING, Field, dataclass, field
 from itertools import product
-from typing import Annotated, Any, ClassVar, Self, cast, dataclass_transform
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, dataclass_transform
 
 import numpy as np
 
 from blobtree import par
 from blobtree._typing import Float64Array
 from blobtree.declare.falloff import Falloff
-from blobtree.declare.formula import Declared
+from blobtree.declare.formula import Declared, is_own
 from blobtree.declare.parameters import (
     OPTIONAL,
+    SPECIFIED,
     Color,
     Parameter,
     Quantity,
@@ -29,7 +29,10 @@ from blobtree.declare.parameters import (
     parameters_of,
     unit_vectors,
 )
-from blobtree.formulas.skeletons import BOX, CIRCLE, CONE, DISC, POINT, SEGMENT, Skeleton
+from blobtree.declare.readers import named_values
+from blobtree.declare.skeleton import BALL_CELLS, INFLUENCE_SLOT, RESULTS, Skeleton, SkeletonFormulas
+from blobtree.errors import InvalidDefinition
+from blobtree.formulas.skeletons import BOX, CIRCLE, CONE, DISC, POINT, SEGMENT
 from blobtree.kinds.falloff import WYVILL
 from blobtree.nodes.attributes import NO_ATTRIBUTES, AttributeMapping
 from blobtree.nodes.declared import DeclaredNode
@@ -42,11 +45,11 @@ DEFAULT_COLOR: Any = (0.8, 0.8, 0.8)
 SHORTEST_AXIS = 1e-12
 """Squared length of an axis, over squared influence radius, below which a segment is a point."""
 
-INFLUENCE_SLOT = 3
-"""Place of the influence radius among the parameters on the tape, in floats: beside a first point."""
-
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
 """Corners (8, 3) of a cube around the origin."""
+
+FOLDING = (Quantity.POINT, Quantity.DIRECTION, Quantity.LENGTH)
+"""Quantities whose values maps change."""
 
 OCTAGON_ANGLES = np.arange(8) * (np.pi / 4.0)
 
@@ -60,10 +63,41 @@ OPTIONAL_FIELD = {OPTIONAL: True}
 """Metadata of fields that texts and files leave out at their defaults."""
 
 
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class LeafKeywords:
+@dataclass_transform(
+    frozen_default=True,
+    eq_default=False,
+    field_specifiers=(field, par.factor, par.angle, par.length, par.distance, par.radius, par.radii,
+                      par.point, par.points, par.direction, par.extents, par.semi_axes, par.whole),
+)  # fmt: skip
+class LeafBase(Node):
+    """A node whose parameters make it a dataclass; a kind ends with the keyword `color`."""
+
+    def __init_subclass__(cls) -> None:
+        values = list(vars(cls).items())
+        declares = any(isinstance(value, Declared) for _, value in values)
+        if declares or "file_tag" in vars(cls):
+            cls._add_keywords({"color": (Color, DEFAULT_COLOR)})
+        super().__init_subclass__()
+        declared = any(isinstance(value, Field) and SPECIFIED in value.metadata for _, value in values)
+        if declared and not declares:
+            dataclass(frozen=True, eq=False, repr=False)(cls)
+
+    @classmethod
+    def _add_keywords(cls, keywords: dict[str, tuple[Any, Any]]) -> None:
+        """Add fields, each a type and a default, unless the class has them."""
+        hints = inspect.get_annotations(cls)
+        for name, (hint, default) in keywords.items():
+            if name not in hints and name not in getattr(cls, "__dataclass_fields__", ()):
+                hints = {**hints, name: hint}
+                setattr(cls, name, field(default=default, kw_only=True))
+        cls.__annotations__ = hints
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LeafKeywords(LeafBase):
     """The keywords that every leaf has."""
 
+    _: KW_ONLY
     attributes: Annotated[
         AttributeMapping,
         Parameter(Quantity.ATTRIBUTES, "numbers, vectors and labels by name"),
@@ -85,10 +119,11 @@ class LeafKeywords:
         return WYVILL, None, self.weight
 
 
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Falling(LeafKeywords):
     """The keyword of leaves whose field is a function of a distance."""
 
+    _: KW_ONLY
     falloff: Annotated[
         Falloff | type[Falloff] | str,
         Parameter(Quantity.FALLOFF, "how the field falls off with the distance, or its name"),
@@ -100,10 +135,11 @@ class Falling(LeafKeywords):
         return cast(Falloff, self.falloff), None, self.weight
 
 
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Profile(Falling):
     """The keywords of leaves that show a radius, whatever falloff and width they have."""
 
+    _: KW_ONLY
     width: Annotated[
         float | None,
         Parameter(
@@ -123,10 +159,13 @@ PROFILE = ("falloff", "width", "weight")
 PLAIN = (WYVILL, None, 1.0)
 
 
-class Leaf(LeafKeywords, Node):
+class Leaf(LeafKeywords):
     """A node without operands: a shape of one colour."""
 
-    color: Color
+    if TYPE_CHECKING:
+        color: Color = field(default=DEFAULT_COLOR, kw_only=True)
+    else:
+        color: Color
 
     @property
     def children(self) -> tuple[Node, ...]:
@@ -140,49 +179,112 @@ class Leaf(LeafKeywords, Node):
             object.__setattr__(self, "signed", self.weight < 0.0)
 
 
-@dataclass_transform(
-    frozen_default=True,
-    eq_default=False,
-    field_specifiers=(
-        field,
-        par.factor,
-        par.angle,
-        par.length,
-        par.distance,
-        par.radius,
-        par.point,
-        par.direction,
-        par.extents,
-        par.semi_axes,
-        par.whole,
-    ),
-)
-class DeclaredLeaf(Leaf, DeclaredNode):
-    """A leaf of a class with formulas, which ends with the keyword `color`."""
+class Primitive(Profile, Leaf, ProgramPrimitive, DeclaredNode):
+    """A skeleton with a visible radius, a colour and a `Profile`: a leaf of the tree.
 
-    common = ("color",)
+    A kind is a subclass with typed formulas, claims and parameters, which specifiers of `blobtree.par`
+    declare. It always has `radius`, and may declare more radii behind it. Formulas are static functions after
+    `@formula`. They take the parameters as they are declared, without `radius`, or else the numbers that the
+    class method `numbers` returns:
 
-    def __init_subclass__(cls) -> None:
-        declares = any(isinstance(value, Declared) for value in vars(cls).values())
-        if declares and "color" not in getattr(cls, "__dataclass_fields__", ()):
-            cls.__annotations__ = {**inspect.get_annotations(cls), "color": Color}
-            cls.color = field(default=DEFAULT_COLOR, kw_only=True)
-        super().__init_subclass__()
-        if not declares and any(isinstance(value, Field) for value in vars(cls).values()):
-            dataclass(frozen=True, eq=False, repr=False)(cls)
+    * ``closest(q)`` returns the point of the skeleton that is closest to a point q: wp.vec3, as wp.vec3.
+    * ``closest_with_influence(q)``, in place of it, returns the point c with the least ``|q − c| / s``, and
+      the influence radius s there, as wp.vec4. Behind the other parameters it takes `radius` and all further
+      radii, as influence radii. The class then has the class method `hull`.
+    * ``least_influence()``, optional, returns the least s; by default the least of the radii.
 
+    Attributes
+    ----------
+    tag
+        Name of the kind in files; by default that of the class, in lower case with underscores.
+    convex
+        Straight lines between points of the skeleton stay in it; rays then take longer steps.
+    folds_maps
+        Maps of points, directions and lengths move the skeleton along, and all parameters are such. By
+        default each primitive under a map carries that map. `check_kind` tries the claim, and `hull`.
 
-class Primitive(Profile, Leaf, ProgramPrimitive):
-    """A skeleton with a visible radius, a colour and a `Profile`: a leaf of the tree."""
+    Raises
+    ------
+    InvalidDefinition
+        At the definition of a subclass: a formula has no types or no source, or samples contradict a claim,
+        or show that the formula does not return the closest point of any set. Nothing has been compiled by
+        then.
+    UntranslatableFunction
+        A formula leaves the shared subset; the message names file and line.
 
+    Examples
+    --------
+    >>> import warp as wp
+    >>> from blobtree import Primitive, formula, par
+    >>> class Rod(Primitive):
+    ...     middle: tuple = par.point("middle of the rod")
+    ...     half: float = par.length("half its length")
+    ...     convex = True
+    ...     @formula
+    ...     def closest(q: wp.vec3, middle: wp.vec3, half: wp.float32) -> wp.vec3:
+    ...         return middle + wp.vec3(wp.clamp(q[0] - middle[0], -half, half), 0.0, 0.0)
+    >>> Rod((0, 0, 0), 1.0, radius=0.2)([[0.9, 0.0, 0.0]])
+    array([1.], dtype=float32)
+    """
+
+    sort = "a primitive"
+    hash_name = "CustomPrimitive"
+    row_name = "skeleton"
+    formula_results = RESULTS
+    needed = ("closest", "closest_with_influence")
+    common = ("radius", "color")
+    methods = ("numbers", "hull")
     skeleton: ClassVar[Skeleton]
-    radius: float
+    convex: ClassVar[bool] = False
+    folds_maps: ClassVar[bool] = False
+    cells: ClassVar[float] = BALL_CELLS
+    texels_read: ClassVar[int] = 0
+    """Number of texels that formulas take which read the tape themselves."""
+    if TYPE_CHECKING:
+        radius: float = field(kw_only=True)
+
+        def __init__(self, *parameters: Any, radius: float, **named: Any) -> None: ...
+    else:
+        radius: float
 
     def __init_subclass__(cls) -> None:
         declared = [name for name in PROFILE if name in inspect.get_annotations(cls)]
         if declared:
             raise TypeError(f"{cls.__name__}: every primitive has a parameter {declared[0]!r} already")
+        if "file_tag" in vars(cls) or any(isinstance(value, Declared) for value in vars(cls).values()):
+            cls._add_keywords({"radius": (Radius, MISSING)})
         super().__init_subclass__()
+
+    @classmethod
+    def _declaration(cls, tag: str) -> SkeletonFormulas:
+        own = cls._skeleton_parameters()
+        radii = [p.name for p in parameters_of(cls).values() if p.quantity is Quantity.RADIUS]
+        folds = (cls.folds_maps or is_own(cls)) and all(p.quantity in FOLDING for p in own)
+        return SkeletonFormulas(
+            tag, cls._formulas, tuple(radii), folds, cls.convex, cls.cells, cls.texels_read
+        )
+
+    @classmethod
+    def _check(cls, declaration: SkeletonFormulas) -> None:
+        from blobtree.declare.skeleton_checks import check_skeleton
+
+        plain = declaration.size == 3 and is_own(cls.numbers)
+        packed = dict if plain else lambda values: cls._formula_values(values, declaration)
+        if is_own(cls.hull) and declaration.size == 4:
+            raise InvalidDefinition(
+                f"{cls.__qualname__}: expected the class method `hull`, because its influence varies"
+            )
+        check_skeleton(declaration, cls.parameters, packed)
+
+    @classmethod
+    def _formula_values(cls, values: dict[str, Any], declaration: SkeletonFormulas) -> dict[str, Any]:
+        """Return the numbers of the formulas for values of the parameters."""
+        columns = rows_of({"radius": 1.0, **values})
+        influences = np.concatenate([columns.pop(name) for name in declaration.radii], axis=1)
+        types = {name: kind for name, kind in declaration.numbers.items() if name != declaration.radii[0]}
+        found = named_values(types, cls.numbers(columns, influences)[0].tolist())
+        found[declaration.radii[0]] = float(influences[0, 0])
+        return {name: found[name] for name in declaration.numbers}
 
     @classmethod
     def radii(cls, primitives: Sequence[ProgramPrimitive]) -> Float64Array:
@@ -200,6 +302,10 @@ class Primitive(Profile, Leaf, ProgramPrimitive):
     @classmethod
     def hulls(cls, primitives: Sequence[ProgramPrimitive]) -> Float64Array:
         """Return points (n, k, 3) whose convex hulls hold the skeletons of n primitives of this kind."""
+        if cls.digest and is_own(cls.hull):
+            from blobtree.nodes.bounds_kernels import far_hulls
+
+            return far_hulls(cls, primitives)
         return cls.hull({item.name: columns_of(primitives, item) for item in cls._skeleton_parameters()})
 
     @classmethod
@@ -236,16 +342,17 @@ class Primitive(Profile, Leaf, ProgramPrimitive):
 
     @classmethod
     def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
-        """Return parameters as texels (n, ·, 4), as `formulas.skeletons` reads them.
-
-        By default the numbers follow each other as declared, with the influence radius in INFLUENCE_SLOT.
-        """
-        count = len(influences)
-        numbers = np.concatenate([np.empty((count, 0)), *columns.values()], axis=1)
+        """Return the numbers as texels (n, ·, 4), with the influence radius in INFLUENCE_SLOT."""
+        numbers = cls.numbers(columns, influences)
         head, tail = numbers[:, :INFLUENCE_SLOT], numbers[:, INFLUENCE_SLOT:]
         head = np.pad(head, ((0, 0), (0, INFLUENCE_SLOT - head.shape[1])))
         tail = np.pad(tail, ((0, 0), (0, -tail.shape[1] % 4)))
-        return np.concatenate([head, influences[:, :1], tail], axis=1).reshape(count, -1, 4)
+        return np.concatenate([head, influences[:, :1], tail], axis=1).reshape(len(numbers), -1, 4)
+
+    @classmethod
+    def numbers(cls, columns: Columns, influences: Float64Array) -> Float64Array:
+        """Return the numbers (n, ·) of the formulas but the influence radius; by default as declared."""
+        return np.concatenate([*columns.values(), influences[:, 1:]], axis=1)
 
 
 class RoundPrimitive(Primitive):
@@ -262,7 +369,7 @@ class JoinedPrimitive(Primitive):
 
     joint_texels: ClassVar[tuple[int, ...]]
     """Texels of the parameters whose last number marks a joint."""
-    joints: tuple[float, ...] = ()
+    joints: ClassVar[tuple[float, ...]] = ()
     """These numbers; none if no other piece goes on. They are no parameters of the node."""
 
     @classmethod
@@ -284,7 +391,6 @@ class JoinedPrimitive(Primitive):
         return self
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Point(Primitive):
     """A ball.
 
@@ -298,13 +404,9 @@ class Point(Primitive):
     file_tag = "point"
     skeleton = POINT
 
-    center: Annotated[Vector, Parameter(Quantity.POINT, "centre of the ball")]
-    _: KW_ONLY
-    radius: Radius
-    color: Color = DEFAULT_COLOR
+    center: Vector = par.point("centre of the ball")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Segment(Primitive):
     """A capsule around a straight line; equal ends make a ball.
 
@@ -318,11 +420,8 @@ class Segment(Primitive):
     file_tag = "segment"
     skeleton = SEGMENT
 
-    start: Annotated[Vector, Parameter(Quantity.POINT, "start of the line")]
-    end: Annotated[Vector, Parameter(Quantity.POINT, "end of the line")]
-    _: KW_ONLY
-    radius: Radius
-    color: Color = DEFAULT_COLOR
+    start: Vector = par.point("start of the line")
+    end: Vector = par.point("end of the line")
 
     @classmethod
     def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
@@ -334,7 +433,6 @@ class Segment(Primitive):
         return np.stack([beside(columns["start"], influences[:, 0]), beside(axes, inverses)], axis=1)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Cone(Primitive):
     """A round cone: the convex hull of two balls; if one ball holds the other, the larger ball alone.
 
@@ -348,12 +446,11 @@ class Cone(Primitive):
     file_tag = "cone"
     skeleton = CONE
 
-    start: Annotated[Vector, Parameter(Quantity.POINT, "start of the axis")]
-    end: Annotated[Vector, Parameter(Quantity.POINT, "end of the axis")]
+    start: Vector = par.point("start of the axis")
+    end: Vector = par.point("end of the axis")
     _: KW_ONLY
-    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius at the start")]
-    end_radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius at the end")]
-    color: Color = DEFAULT_COLOR
+    radius: float = par.radius("visible radius at the start")
+    end_radius: float = par.radius("visible radius at the end")
 
     @classmethod
     def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
@@ -362,7 +459,6 @@ class Cone(Primitive):
         return np.stack([beside(columns["start"], influences[:, 0]), beside(axes, influences[:, 1])], axis=1)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Torus(RoundPrimitive):
     """A torus: a tube around a circle.
 
@@ -377,15 +473,13 @@ class Torus(RoundPrimitive):
     file_tag = "torus"
     skeleton = CIRCLE
 
-    center: Annotated[Vector, Parameter(Quantity.POINT, "centre of the circle")]
-    axis: Annotated[Vector, Parameter(Quantity.DIRECTION, "normal of the circle's plane, of any length")]
-    ring_radius: Annotated[float, Parameter(Quantity.LENGTH, "radius of the circle")]
+    center: Vector = par.point("centre of the circle")
+    axis: Vector = par.direction("normal of the circle's plane, of any length")
+    ring_radius: float = par.length("radius of the circle")
     _: KW_ONLY
-    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the tube")]
-    color: Color = DEFAULT_COLOR
+    radius: float = par.radius("visible radius of the tube")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Disc(RoundPrimitive):
     """A flat disc with a rounded edge: everything within `radius` of the disc.
 
@@ -400,15 +494,13 @@ class Disc(RoundPrimitive):
     file_tag = "disc"
     skeleton = DISC
 
-    center: Annotated[Vector, Parameter(Quantity.POINT, "centre of the disc")]
-    axis: Annotated[Vector, Parameter(Quantity.DIRECTION, "normal of the disc's plane, of any length")]
-    disc_radius: Annotated[float, Parameter(Quantity.LENGTH, "radius of the disc, without its edge")]
+    center: Vector = par.point("centre of the disc")
+    axis: Vector = par.direction("normal of the disc's plane, of any length")
+    disc_radius: float = par.length("radius of the disc, without its edge")
     _: KW_ONLY
-    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the edge, half the thickness")]
-    color: Color = DEFAULT_COLOR
+    radius: float = par.radius("visible radius of the edge, half the thickness")
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Box(Primitive):
     """A solid box with rounded edges, parallel to the axes: everything within `radius` of the box.
 
@@ -423,11 +515,10 @@ class Box(Primitive):
     file_tag = "box"
     skeleton = BOX
 
-    center: Annotated[Vector, Parameter(Quantity.POINT, "centre of the box")]
-    size: Annotated[Vector, Parameter(Quantity.EXTENTS, "lengths along x, y and z, without the radius")]
+    center: Vector = par.point("centre of the box")
+    size: Vector = par.extents("lengths along x, y and z, without the radius")
     _: KW_ONLY
-    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the edges")]
-    color: Color = DEFAULT_COLOR
+    radius: float = par.radius("visible radius of the edges")
 
     @classmethod
     def hull(cls, columns: Columns) -> Float64Array:
@@ -440,6 +531,11 @@ class Box(Primitive):
         """Return half the shortest lengths."""
         inradii: Float64Array = 0.5 * np.array([leaf.size for leaf in leaves]).min(axis=1)
         return inradii
+
+
+def rows_of(values: dict[str, Any]) -> Columns:
+    """Return values of one leaf as columns."""
+    return {name: np.atleast_2d(np.asarray(value, np.float64)) for name, value in values.items()}
 
 
 def beside(vectors: Float64Array, numbers: Float64Array) -> Float64Array:

@@ -1,33 +1,34 @@
 """Solid shapes: the cylinder, the half-space, and the ellipsoid as a ball under a map."""
 
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass
-from typing import Annotated, Any
+from dataclasses import KW_ONLY
+from typing import Any
 
 import numpy as np
+import warp as wp
 
+from blobtree import par
 from blobtree._typing import Float64Array
-from blobtree.declare.parameters import Color, Parameter, Quantity, unit_vectors
+from blobtree.declare.formula import formula
+from blobtree.declare.parameters import unit_vectors
 from blobtree.errors import InvalidNode
-from blobtree.formulas.solid_skeletons import CYLINDER
 from blobtree.lazy import Lazy
 from blobtree.nodes.node import Node
 from blobtree.nodes.pieces import Pieces
 from blobtree.nodes.primitives import (
-    DEFAULT_COLOR,
     Columns,
     Point,
     Primitive,
-    beside,
     octagons,
 )
 from blobtree.validation import Vector
+
+wp.set_module_options({"enable_backward": False})
 
 LARGEST_RATIO = 1e5
 """Largest ratio of two semi-axes; a flatter map cannot be inverted in float32."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Ellipsoid(Pieces):
     """An ellipsoid, its axes parallel to those of its space: a ball of radius 1 under a scale.
 
@@ -44,12 +45,8 @@ class Ellipsoid(Pieces):
 
     file_tag = "ellipsoid"
 
-    center: Annotated[Vector, Parameter(Quantity.POINT, "centre of the ellipsoid")]
-    semi_axes: Annotated[
-        Vector, Parameter(Quantity.SEMI_AXES, "visible radii along the x, y and z axes, above 0")
-    ]
-    _: KW_ONLY
-    color: Color = DEFAULT_COLOR
+    center: Vector = par.point("centre of the ellipsoid")
+    semi_axes: Vector = par.semi_axes("visible radii along the x, y and z axes, above 0")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -66,7 +63,16 @@ class Ellipsoid(Pieces):
         return ball.transform(np.column_stack([np.diag(self.semi_axes), self.center]))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@wp.func
+def beside_axis(q: wp.vec3, start: wp.vec3, way: wp.vec3) -> wp.vec4:
+    """Return the way across from the axis to q, and the distance of q along the axis from its start."""
+    axis = wp.normalize(way)
+    w = q - start
+    x = wp.dot(w, axis)
+    c = w - axis * x
+    return wp.vec4(c[0], c[1], c[2], x)
+
+
 class Cylinder(Primitive):
     """A solid cylinder with rounded edges: everything within `radius` of the cylinder.
 
@@ -83,17 +89,13 @@ class Cylinder(Primitive):
     [0.5, 0.5, 1.0]
     """
 
-    file_tag = "cylinder"
-    skeleton = CYLINDER
+    convex = True
 
-    start: Annotated[Vector, Parameter(Quantity.POINT, "start of the axis")]
-    end: Annotated[Vector, Parameter(Quantity.POINT, "end of the axis")]
-    cylinder_radius: Annotated[
-        float, Parameter(Quantity.LENGTH, "radius of the cylinder, without its rounded edge")
-    ]
+    start: Vector = par.point("start of the axis")
+    end: Vector = par.point("end of the axis")
+    cylinder_radius: float = par.length("radius of the cylinder, without its rounded edge")
     _: KW_ONLY
-    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the edges")]
-    color: Color = DEFAULT_COLOR
+    radius: float = par.radius("visible radius of the edges")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -108,12 +110,10 @@ class Cylinder(Primitive):
         return np.concatenate(ends, axis=1)
 
     @classmethod
-    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
-        """Return start and influence radius; axis and radius of the cylinder."""
+    def numbers(cls, columns: Columns, influences: Float64Array) -> Float64Array:
+        """Return start; axis and radius of the cylinder."""
         axes = columns["end"] - columns["start"]
-        return np.stack(
-            [beside(columns["start"], influences[:, 0]), beside(axes, columns["cylinder_radius"])], axis=1
-        )
+        return np.concatenate([columns["start"], axes, columns["cylinder_radius"]], axis=1)
 
     @classmethod
     def inradii(cls, leaves: Sequence[Any]) -> Float64Array:
@@ -123,8 +123,28 @@ class Cylinder(Primitive):
         inradii: Float64Array = np.minimum(radii, 0.5 * np.linalg.norm(axes, axis=1))
         return inradii
 
+    @formula
+    def closest(q: wp.vec3, start: wp.vec3, axis: wp.vec3, size: wp.float32) -> wp.vec3:
+        """`axis` leads from the start to the end; `size` is the radius of the cylinder."""
+        length = wp.length(axis)
+        place = beside_axis(q, start, axis)
+        c = wp.vec3(place[0], place[1], place[2])
+        across = wp.length(c)
+        if across > size:
+            c *= size / across
+        elif place[3] >= 0.0 and place[3] <= length:
+            return q
+        c += wp.normalize(axis) * wp.clamp(place[3], 0.0, length)
+        return start + c
 
-@dataclass(frozen=True, eq=False, repr=False)
+    @formula
+    def depth(q: wp.vec3, start: wp.vec3, axis: wp.vec3, size: wp.float32) -> wp.float32:
+        """Return the distance from side and ends, below 0 outside."""
+        place = beside_axis(q, start, axis)
+        across = wp.length(wp.vec3(place[0], place[1], place[2]))
+        return wp.min(wp.min(place[3], wp.length(axis) - place[3]), size - across)
+
+
 class HalfSpace(Pieces):
     """All that lies below a plane, clipped by bounds: its field is exact within `extent` of a point.
 
@@ -141,12 +161,11 @@ class HalfSpace(Pieces):
 
     file_tag = "half_space"
 
-    point: Annotated[Vector, Parameter(Quantity.POINT, "a point of the plane, the middle of the bounds")]
-    normal: Annotated[Vector, Parameter(Quantity.DIRECTION, "outward normal of the plane, of any length")]
-    extent: Annotated[float, Parameter(Quantity.LENGTH, "distance from the point up to which it is exact")]
+    point: Vector = par.point("a point of the plane, the middle of the bounds")
+    normal: Vector = par.direction("outward normal of the plane, of any length")
+    extent: float = par.length("distance from the point up to which it is exact")
     _: KW_ONLY
-    radius: Annotated[float, Parameter(Quantity.RADIUS, "visible radius of the edges: how far it blends")]
-    color: Color = DEFAULT_COLOR
+    radius: float = par.radius("visible radius of the edges: how far it blends")
 
     @Lazy
     def expanded(self) -> Node:

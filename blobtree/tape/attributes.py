@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array, Float64Array
+from blobtree.declare.skeleton import Skeleton
 from blobtree.errors import InvalidNode
-from blobtree.formulas.skeletons import Skeleton
 from blobtree.tape.data_region import DataRegion
 from blobtree.tape.model import colors_at, evaluate
 from blobtree.tape.program import Instruction, Run, distinct_placements

@@ -22,9 +22,10 @@ from blobtree.declare.claims import OperatorRow
 from blobtree.declare.falloff import Falloff
 from blobtree.declare.field import FieldKind
 from blobtree.declare.registry import LIBRARY_ROWS, load_libraries
+from blobtree.declare.skeleton import Skeleton
 from blobtree.declare.warp import SpaceWarp
 from blobtree.formulas.operators import OPERATORS
-from blobtree.formulas.skeletons import SKELETONS, Skeleton
+from blobtree.formulas.skeletons import SKELETONS
 from blobtree.formulas.warps import WARPS
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.kinds.falloff import FALLOFFS

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from blobtree._typing import Box, Float32Array, Float64Array
+from blobtree.declare.skeleton import BALL_CELLS, PLATE_CELLS, TUBE_CELLS, Skeleton
 from blobtree.formulas.falloff import RIM
-from blobtree.formulas.skeletons import BALL_CELLS, PLATE_CELLS, TUBE_CELLS, Skeleton
 from blobtree.tape.bounds import field_boxes, primitive_boxes
 from blobtree.tape.model import ImplicitModel
 from blobtree.tape.operands import operands_of

@@ -23,11 +23,11 @@ from blobtree._typing import Box, Float64Array, IndexArray
 from blobtree.declare.claims import OperatorRow, Support
 from blobtree.declare.falloff import Falloff
 from blobtree.declare.field import FieldKind
+from blobtree.declare.skeleton import Skeleton
 from blobtree.declare.warp import SpaceWarp
 from blobtree.errors import InvalidNode
 from blobtree.formulas.falloff import RIM
 from blobtree.formulas.operators import RICCI, SUM, UNION
-from blobtree.formulas.skeletons import Skeleton
 from blobtree.lazy import Lazy
 from blobtree.validation import Vector
 

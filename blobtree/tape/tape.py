@@ -45,10 +45,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array
 from blobtree.declare.field import FieldKind
+from blobtree.declare.skeleton import Skeleton
 from blobtree.device import known_device
 from blobtree.errors import InvalidNode
 from blobtree.formulas.operators import SUM
-from blobtree.formulas.skeletons import Skeleton
 from blobtree.kinds.falloff import WYVILL
 from blobtree.tape.bounds import warp_parameters
 from blobtree.tape.codes import (

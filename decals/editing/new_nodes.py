@@ -42,9 +42,6 @@ NATURAL = {
     "factor": 1.5,
     "slope_x": 0.5,
     "height": 0.05,
-    "level": 0.0,
-    "softness": 0.2,
-    "fade": 0.25,
 }
 """Numbers without unit by the name of their parameter; others are as near to 1 as their range allows."""
 

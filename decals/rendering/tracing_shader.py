@@ -12,7 +12,7 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.formulas.skeletons import Skeleton
+from blobtree.declare.skeleton import Skeleton
 from blobtree.tape.codes import FIELD, POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP
 from blobtree.tape.dispatch import (
     directed_partials,

@@ -63,7 +63,7 @@ def with_row(kind: Any, label: str, **changed: Any) -> Any:
 def formula_in(kind: Any, part: str) -> wp.Function:
     """Return a formula of a leaf as its class has it, or that of a row."""
     name, row = row_of(kind)
-    given = kind._formulas if name in ("field_kind", "warp") else {}
+    given = kind._formulas if name != "operator" else {}
     found: wp.Function = given[part].function if part in given else getattr(row, part)
     return found
 

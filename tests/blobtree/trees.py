@@ -203,7 +203,7 @@ def random_profile(rng: np.random.Generator, leaf: Any, weights: Sequence[float]
     size = float(getattr(leaf, "radius", 0.5))
     width = None if rng.random() < 0.4 else float(size * rng.uniform(0.4, 2.0))
     falloff, weight = str(rng.choice(BUILT_IN_FALLOFFS)), float(rng.choice(weights))
-    profiled: Any = replace(leaf, falloff=falloff, width=width, weight=weight)
+    profiled: Any = replace(cast(Any, leaf), falloff=falloff, width=width, weight=weight)
     return cast(Node, profiled)
 
 

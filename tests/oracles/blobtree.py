@@ -25,7 +25,6 @@ from blobtree import (
     ConvolutionStroke,
     ConvolutionTriangle,
     CurveWarp,
-    CustomPrimitive,
     Difference,
     Disc,
     Ellipsoid,
@@ -167,7 +166,7 @@ def signed(node: Node, points: ArrayLike) -> Field:
         case Volume():
             ratio = 1.0 + volumes.distance(node, q) * (1.0 / RIM - 1.0) / node.width
             return _falling(ratio, 1.0, 1.0 / RIM - 1.0, node, volumes.clearance(node, q))
-        case CustomPrimitive(radius=radius, color=color):
+        case Primitive(radius=radius, color=color) if node.digest:
             closest, clearance = custom_kinds.CLOSEST[node.kind](q, **node.values)
             return replace(_leaf(q - closest, radius, color), margin=clearance)
         case Operator() if node.digest:

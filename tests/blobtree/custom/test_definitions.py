@@ -41,14 +41,15 @@ RING_DOC = "A circle of radius `size` around `axis`."
 def names_are_ours() -> None:
     """Another test's definitions may have taken the names of these kinds."""
     for kind in vars(custom_kinds).values():
-        if isinstance(kind, CustomKind):
+        if isinstance(kind, CustomKind) and "kind" in vars(kind):
             CUSTOM_KINDS[kind.kind] = kind
 
 
 def test_a_definition_gives_a_node_class() -> None:
     assert issubclass(Ring, CustomPrimitive)
     assert issubclass(Soft, CustomCombination)
-    assert (Ring.__name__, Ring.kind, Ring.__doc__) == ("Ring", "ring", RING_DOC)
+    assert (Ring.__name__, Ring.kind) == ("Ring", "ring")
+    assert (Ring.__doc__ or "").startswith(RING_DOC)
     ring = Ring((0, 0, 0), axis=(0, 0, 2), size=1, radius=0.5)
     assert repr(ring) == (
         "Ring(center=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0), size=1.0, radius=0.5, color=(0.8, 0.8, 0.8))"
@@ -162,7 +163,7 @@ def test_a_file_of_an_unknown_kind_says_which_and_what_to_do() -> None:
         (b'"size": 1.0', b'"size": -1.0', "size: expected a number from 0"),
         (b'"size": 1.0', b'"size": "wide"', "not a BlobTree"),
         (b'"size": 1.0', b'"size": [1, 2, 3]', "size: expected a finite number"),
-        (b'"kind": "ring"', b'"kind": "soft"', "is defined as Operator, not CustomPrimitive"),
+        (b'"kind": "ring"', b'"kind": "soft"', "is defined as Operator, not Primitive"),
     ],
 )
 def test_a_file_that_does_not_fit_the_definition_is_refused(

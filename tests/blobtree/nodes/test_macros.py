@@ -112,6 +112,6 @@ def test_paths_and_surgery_treat_an_ellipsoid_as_a_primitive() -> None:
 
 
 def test_colors_and_bounds_are_those_of_the_ball() -> None:
-    np.testing.assert_allclose(EGG.colors([[0.5, 0, 0]])[0], EGG.color, atol=1e-6)
+    np.testing.assert_allclose(EGG.colors([[0.5, 0, 0]])[0], np.array(EGG.color), atol=1e-6)
     lower, upper = EGG.bounds
     np.testing.assert_allclose(upper - lower, (0.8, 1.6, 1.2), rtol=0.01)

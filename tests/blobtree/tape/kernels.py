@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from blobtree.formulas.skeletons import Skeleton
+from blobtree.declare.skeleton import Skeleton
 
 wp.set_module_options({"enable_backward": False})
 

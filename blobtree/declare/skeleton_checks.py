@@ -1,4 +1,4 @@
-"""Checks of custom skeletons: samples of points that may contradict a definition."""
+"""Checks of users' skeletons: samples of points that may contradict a definition."""
 
 from itertools import product
 from typing import Any
@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from blobtree._typing import Float64Array
-from blobtree.custom.bounds_kernels import FARTHEST
-from blobtree.declare.checks import SEED, TRIALS, Trial, trial_value
-from blobtree.declare.formula import Formula, shown
+from blobtree.declare.checks import SEED, TRIALS, Packed, Trial, trial_value
+from blobtree.declare.formula import shown
 from blobtree.declare.parameters import Parameter
+from blobtree.declare.skeleton import FARTHEST, SkeletonFormulas
 
 POINTS = 80
 """Query points per set, besides the vectors among the parameters and the points between them."""
@@ -24,33 +24,37 @@ FAR_SHARE = 0.1
 """Distance of a closest point, relative to that of its far query, at which a skeleton counts as unbounded."""
 
 
-def check_skeleton(source: Formula, parameters: tuple[Parameter, ...], *, convex: bool) -> None:
+def check_skeleton(formulas: SkeletonFormulas, parameters: tuple[Parameter, ...], packed: Packed) -> None:
     """Raise `InvalidDefinition` unless a function seems to return the closest point of a set.
 
     Let c be the point returned for q. Then c is returned for c itself, and no point returned for another
-    query is nearer to q. Both hold for every set and, over all queries, for no other function.
+    query is nearer to q. Both hold for every set and, over all queries, for no other function. Where the
+    influence varies, distances are in influences.
     """
-    rng = np.random.default_rng(SEED)
+    rng, source = np.random.default_rng(SEED), formulas.source
     for number in range(TRIALS):
         values = {parameter.name: trial_value(parameter, rng, number) for parameter in parameters}
-        trial = Trial(source, values, 3)
-        queries = _queries(rng, values)
-        closest_points = np.array([trial.at(q) for q in queries])
-        _try_single_precision(trial, queries, closest_points)
-        repeated = np.array([trial.at(c) for c in closest_points])
+        trial = Trial(source, packed(values), formulas.size)
+        queries = _queries(rng, trial.values)
+        found = np.array([trial.at(q) for q in queries])
+        closest_points, influences = found[:, :3], found[:, 3] if formulas.size == 4 else np.ones(len(found))
+        _try_single_precision(trial, queries, found)
+        repeated = np.array([trial.at(c)[:3] for c in closest_points])
         scale = 1.0 + max(np.abs(queries).max(), np.abs(closest_points).max())
         moved = np.linalg.norm(repeated - closest_points, axis=1)
         hint = f"{trial.with_values}{_hint(parameters)}"
+        if influences.min() <= 0.0:
+            raise source.refusal(f"expected influences above 0, got {influences.min():.6g}{hint}")
         if moved.max() > TOLERANCE * scale:
             worst = int(moved.argmax())
             raise source.refusal(
                 f"{shown(closest_points[worst])} is returned as a point of the skeleton, but for that very "
                 f"point it returns {shown(repeated[worst])}; return the closest point of a fixed set{hint}"
             )
-        if convex:
+        if formulas.convex:
             _try_convexity(trial, closest_points)
-        distances = np.linalg.norm(queries[:, None] - closest_points[None], axis=2)
-        excess = np.diagonal(distances)[:, None] - distances
+        distances = np.linalg.norm(queries[:, None] - closest_points[None], axis=2) / influences
+        excess = (np.diagonal(distances)[:, None] - distances) * influences[:, None]
         if excess.max() > TOLERANCE * scale:
             i, j = np.unravel_index(int(excess.argmax()), excess.shape)
             raise source.refusal(
@@ -65,7 +69,7 @@ def _try_single_precision(trial: Trial, queries: Float64Array, closest_points: F
     """Check that distances survive float32, in which devices compute."""
     for q, c in zip(queries, closest_points, strict=True):
         other = trial.at(q, np.float32)
-        one, two = np.linalg.norm(q - c), np.linalg.norm(q - other)
+        one, two = np.linalg.norm(q - c[:3]), np.linalg.norm(q - other[:3])
         if abs(one - two) > SINGLE_TOLERANCE * (1.0 + np.abs(q).max() + np.abs(c).max()):
             raise trial.source.refusal(
                 f"for {trial.where((q,))} it returns {shown(other)} in single precision, {shown(c)} in "
@@ -77,7 +81,7 @@ def _try_convexity(trial: Trial, closest_points: Float64Array) -> None:
     """Check that the middle between two points of a convex skeleton belongs to it."""
     for one, other in zip(closest_points, np.roll(closest_points, 1, axis=0), strict=True):
         middle = 0.5 * (one + other)
-        apart = float(np.linalg.norm(trial.at(middle) - middle))
+        apart = float(np.linalg.norm(trial.at(middle)[:3] - middle))
         if apart > TOLERANCE * (1.0 + np.abs(closest_points).max()):
             raise trial.source.refusal(
                 f"convex: {shown(one)} and {shown(other)} belong to the skeleton, but the middle between "
@@ -91,7 +95,7 @@ def _try_bounds(trial: Trial) -> None:
     for signs in product((-1.0, 0.0, 1.0), repeat=3):
         if any(signs):
             q = distance * np.array(signs) / np.linalg.norm(signs)
-            c = trial.at(q)
+            c = trial.at(q)[:3]
             if np.linalg.norm(c) > FAR_SHARE * distance:
                 raise trial.source.refusal(
                     f"for q = {shown(q)} it returns {shown(c)}, so its skeleton seems to be unbounded; "

@@ -6,14 +6,17 @@ such balls around m leave a small ball and what lies beyond them all; the search
 FARTHEST times as large as the parameters and shrinks it. A skeleton that still reaches that far is refused.
 """
 
+from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from blobtree.declare.skeleton import FARTHEST, INFLUENCE_SLOT, Skeleton
 from blobtree.device import known_device, launch
-from blobtree.formulas.skeletons import Skeleton
+from blobtree.errors import InvalidNode
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.dispatch import closest, stride
 from blobtree.tape.instruction_set import single_skeleton_set
@@ -21,7 +24,6 @@ from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
-FARTHEST = 1e4
 LARGEST_REACH = 1e18
 """Beyond it float32 squares overflow."""
 
@@ -101,6 +103,23 @@ def _measure_boxes(
             low[number // 2] = middle[number // 2] - support
     lower[i] = low
     upper[i] = high
+
+
+def far_hulls(kind: Any, primitives: Sequence[Any]) -> Floats:
+    """Return the corners (n, 8, 3) of boxes that hold the skeletons of primitives of a user's kind."""
+    texels = kind.packed(primitives, np.ones_like(kind.radii(primitives)), None)
+    numbers = np.delete(texels.reshape(len(texels), -1), INFLUENCE_SLOT, axis=1)
+    sizes = np.abs(numbers).max(axis=1, initial=0.0)
+    lower, upper = skeleton_boxes(kind.skeleton, texels, sizes)
+    unbounded = ~np.isfinite(lower).all(axis=1) | ~np.isfinite(upper).all(axis=1)
+    if unbounded.any():
+        raise InvalidNode(
+            f"{primitives[int(np.argmax(unbounded))]!r}: its skeleton is unbounded or too large for "
+            "float32, or a closest point is not finite; a skeleton must be bounded"
+        )
+    boxes = np.stack([lower, upper])
+    corners = [boxes[list(sides), :, range(3)].T for sides in product((0, 1), repeat=3)]
+    return np.stack(corners, axis=1)
 
 
 def skeleton_boxes(skeleton: Skeleton, texels: Floats, sizes: Floats) -> tuple[Floats, Floats]:
