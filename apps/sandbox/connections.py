@@ -62,6 +62,9 @@ OF_SERVER = "driving", "trame__template"
 MAX_MESSAGE_BYTES = 250_000_000
 """Longest messages whose parts may be under way: the server reserves as much as a first part announces."""
 
+MAX_HELLO_BYTES = 512
+"""Likewise before a browser has shown that it may connect."""
+
 MAX_WATCHER_BYTES = 20_000
 """Likewise for a browser that only watches."""
 
@@ -170,16 +173,15 @@ def _closing(
     """Return a receiver of messages that ends connections whose bytes are no message, or too many."""
 
     async def received(binary: bool, message: Any, client: str) -> None:
-        chunks, limit = handler.unchunkers[client], limit_of(client)
-        chunks.max_message_size = min(chunks.max_message_size, MAX_MESSAGE_BYTES)
-        if client in handler.authentified_client_ids:
-            chunks.max_message_size = limit
+        chunks = handler.unchunkers[client]
+        known = client in handler.authentified_client_ids
+        reserved = sum(len(part["content"]) for part in chunks.pending_messages.values())
+        chunks.max_message_size = (limit_of(client) if known else MAX_HELLO_BYTES) - reserved
         try:
             assert binary
             await receive(binary, message, client)
-            waiting = chunks.pending_messages.values()
-            assert sum(len(part["content"]) for part in waiting) <= limit
         except Exception:  # unpacking raises anything; errors of calls have been answered
+            chunks.release_pending_messages()
             await handler.connections[client].close(code=WSCloseCode.INVALID_TEXT)
 
     return received

@@ -583,7 +583,7 @@ async def parts(server: Server) -> str:
             except TimeoutError:
                 return f"announced {len(sizes)} messages of {sizes[0]} bytes"
     grown = _megabytes(server) - before
-    return f"grew by {grown:.0f} MB" if grown > 600 else ""
+    return f"grew by {grown:.0f} MB" if grown > 400 else ""
 
 
 def _megabytes(server: Server) -> float:

@@ -63,6 +63,7 @@ def test_a_browser_that_leaves_in_a_drag_ends_it_as_one_entry(
         before = digest(window.document)
         for times in (1, 2):  # a button that was never released would swallow the next press
             browser, other = await connect(), await connect()
+            await until(lambda: any(Driver(window).visible()))  # the kernels of rays may still compile
             number, (x, y) = next(Driver(window).visible())
             window.actions.state.selection = (number,)
             await browser.mouse((x, y), action="down")

@@ -80,7 +80,7 @@ def test_an_edit_of_a_watcher_is_noticed(vtk_display: None, monkeypatch: pytest.
 
     monkeypatch.setattr(messages, "SHARED_PART", 0.9)
     monkeypatch.setattr(Connections, "_allows", lambda _self, _client, name, _arguments: name in DRIVES)
-    figures = messages.measure(60, seed=1)
+    figures = messages.measure(200, seed=2)
     assert any(line.startswith("a watcher's") for line in figures["first_intrusions"])
 
 
