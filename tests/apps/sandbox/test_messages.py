@@ -74,13 +74,14 @@ def test_random_messages_raise_nothing(vtk_display: None) -> None:
 
 @pytest.mark.slow
 def test_an_edit_of_a_watcher_is_noticed(vtk_display: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With a page on which watchers may do all."""
+    """With a page on which watchers may do all, and events that open and close the help."""
     from decals.apps.sandbox.connections import DRIVES, Connections
     from tests.apps.sandbox import messages
 
     monkeypatch.setattr(messages, "SHARED_PART", 0.9)
+    monkeypatch.setattr(messages, "EVENTS", {"show_help": [[True, False]]})
     monkeypatch.setattr(Connections, "_allows", lambda _self, _client, name, _arguments: name in DRIVES)
-    figures = messages.measure(200, seed=2)
+    figures = messages.measure(60, seed=1)
     assert any(line.startswith("a watcher's") for line in figures["first_intrusions"])
 
 
