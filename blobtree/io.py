@@ -14,7 +14,6 @@ to equal trees.
 """
 
 import os
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Union, cast, get_type_hints
 
@@ -22,19 +21,17 @@ import msgspec
 
 from blobtree.declare.falloff import Falloff
 from blobtree.declare.parameters import OPTIONAL, fields_of
-from blobtree.declare.registry import CUSTOM_KINDS
+from blobtree.declare.registry import CUSTOM_KINDS, CUSTOM_TAGS
 from blobtree.errors import ImplicitDecalsError, InvalidFile, UnusableFile
 from blobtree.files import write_atomically
 from blobtree.json_errors import json_reason
 from blobtree.nodes.attributes import Attributes, AttributeValue
-from blobtree.nodes.kinds import BASES, NODE_KINDS
+from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.node import Node
-from blobtree.nodes.primitives import Primitive
 from blobtree.nodes.values import left_out, operand_names
-from blobtree.nodes.warp import Warp
 from blobtree.tape.model import checked_tree
 from blobtree.tape.program import postorder
-from blobtree.validation import Vector, shown
+from blobtree.validation import shown
 
 VERSION: Literal[1] = 1
 
@@ -65,26 +62,13 @@ class CustomRecord(NodeRecord, frozen=True):
         return _custom_node(self.node_kind, values)
 
 
-class CustomLeafRecord(CustomRecord, frozen=True):
-    """A leaf of a custom kind, whose class declares this in each definition."""
-
-    color: Vector
-
-
-class CustomSkeletonRecord(CustomRecord, frozen=True):
-    """A primitive around a custom skeleton, whose class declares these in each definition."""
-
-    radius: float
-    color: Vector
-
-
 def _record_type(kind: type[Node], tag: str, base: type[NodeRecord] = NodeRecord) -> type[NodeRecord]:
     """Return the record of a class of nodes, or of the custom kinds that derive from one."""
     hints = get_type_hints(kind)
-    references = operand_names(kind)
+    references, declared = operand_names(kind), [field.name for field in fields_of(kind)]
     types: list[Any] = [
         (name, (int if hints[name] is Node else tuple[int, ...]) if name in references else hints[name])
-        for name in (field.name for field in fields_of(kind))
+        for name in declared
     ]
     for place, field in enumerate(fields_of(kind)):
         if isinstance(field.default, Attributes):
@@ -93,9 +77,10 @@ def _record_type(kind: type[Node], tag: str, base: type[NodeRecord] = NodeRecord
             types[place] = (field.name, str, field.default.name)
         elif OPTIONAL in field.metadata:
             types[place] = (*types[place], field.default)
+    common = [(name, hints[name]) for name in getattr(kind, "common", ()) if name not in declared]
     record: Any = msgspec.defstruct(
         f"{kind.__name__}Record",
-        types,
+        common + types,
         bases=(base,),
         namespace={"node_kind": kind, "references": references},
         tag=tag,
@@ -108,31 +93,13 @@ def _record_type(kind: type[Node], tag: str, base: type[NodeRecord] = NodeRecord
 RECORD_OF_KIND = {kind: _record_type(kind, tag) for tag, kind in NODE_KINDS.items()}
 """Records of the built-in classes of nodes."""
 
-_RECORDS: dict[str, type[NodeRecord]] = {
-    "custom_skeleton": CustomSkeletonRecord,
-    "own skeleton": CustomSkeletonRecord,
-    "custom_free_field": CustomLeafRecord,
-}
-"""Records of users' kinds that hold more than `CustomRecord`, by tags."""
-
-_BASES = BASES | {
-    "custom_skeleton": Primitive,
-    "own skeleton": Primitive,
-    "custom_warp": Warp,
-}
-
-CUSTOM_RECORDS: dict[Any, list[type[NodeRecord]]] = {
-    base: [
-        _record_type(base, tag, _RECORDS.get(tag, CustomRecord)) for tag, own in _BASES.items() if own is base
-    ]
-    for base in _BASES.values()
-}
-"""Records of custom nodes by the bases of their classes: those of today, then those of older files."""
+CUSTOM_RECORDS = {tag: _record_type(base, tag, CustomRecord) for tag, base in CUSTOM_TAGS.items()}
+"""Records of custom nodes, by their tags."""
 
 if TYPE_CHECKING:
     AnyRecord = NodeRecord
 else:
-    AnyRecord = Union[(*RECORD_OF_KIND.values(), *chain.from_iterable(CUSTOM_RECORDS.values()))]
+    AnyRecord = Union[(*RECORD_OF_KIND.values(), *CUSTOM_RECORDS.values())]
 
 
 class TreeFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -313,8 +280,8 @@ def _checked_path(path: str | os.PathLike[str]) -> str | os.PathLike[str]:
 
 def _record_of(node: Node, index: dict[int, int]) -> NodeRecord:
     """Return the record of `node`, whose operands are replaced by their indices."""
-    bases = (base for base in CUSTOM_RECORDS if isinstance(node, base))
-    record_type = RECORD_OF_KIND.get(type(node)) or CUSTOM_RECORDS[next(bases)][0]
+    kind: Any = type(node)
+    record_type = RECORD_OF_KIND.get(kind) or CUSTOM_RECORDS[kind.custom_tags[0]]
     defaults = {field.name for field in fields_of(type(node)) if left_out(field, getattr(node, field.name))}
     values = {name: getattr(node, name) for name in record_type.__struct_fields__ if name not in defaults}
     values |= {name: dict(value) for name, value in values.items() if isinstance(value, Attributes)}

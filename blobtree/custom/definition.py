@@ -1,9 +1,8 @@
 """Definitions of custom kinds: parameters and claims read from typed functions, and a registry by name."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import make_dataclass
-from typing import Annotated, Any, ClassVar
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
 
 import warp as wp
 
@@ -93,32 +92,6 @@ def point_function(function: Any, returns: Any) -> tuple[Formula, list[str]]:
     return source, names
 
 
-def tape_readings(
-    parameters: tuple[Parameter, ...], first: int = 0, skipped: int = -1
-) -> tuple[list[str], int]:
-    """Return the expressions that read each parameter from texels t0, t1 and so on, and the number of texels.
-
-    The numbers begin at the place `first`, in floats, and leave out the place `skipped`.
-    """
-    readings, place = [], first
-    for parameter in parameters:
-        components = []
-        for _ in range(parameter.size):
-            place += place == skipped
-            components.append(f"t{place // 4}[{place % 4}]")
-            place += 1
-        if parameter.size > 1:
-            readings.append(f"wp.vec{parameter.size}({', '.join(components)})")
-        else:
-            readings.append(f"int({components[0]})" if parameter.whole else components[0])
-    return readings, -(-place // 4)
-
-
-def texel_lines(count: int) -> str:
-    """Return the lines of a generated function that read its texels."""
-    return "".join(f"    t{i} = tape[at + {i}]\n" for i in range(count))
-
-
 def short_form(
     base: type[DeclaredNode],
     kind: str,
@@ -145,58 +118,3 @@ def short_form(
     same = issubclass(known or object, base) and known.digest == made.digest
     CUSTOM_KINDS[kind] = known if same else made
     return CUSTOM_KINDS[kind]
-
-
-def node_class(
-    kind: str, source: Formula, fields: list[Any], base: type[Node], namespace: dict[str, Any]
-) -> Any:
-    """Return a node class with these fields, in the module of the function."""
-    options: dict[str, Any] = {"frozen": True, "eq": False, "repr": False}
-    node_type = make_dataclass(class_name(kind), fields, bases=(base,), namespace=namespace, **options)
-    node_type.__module__ = source.python.__module__
-    return node_type
-
-
-class CustomNode(metaclass=CustomKind):
-    """A node of a user's function: what the classes of all definitions share."""
-
-    kind: ClassVar[str]
-    digest: ClassVar[str]
-    parameters: ClassVar[tuple[Parameter, ...]]
-
-    @classmethod
-    def content_key(cls) -> tuple[str, ...]:
-        """Return what names the kind in content hashes: its name, and the digest of its functions."""
-        return cls.__mro__[1].__name__, cls.kind, cls.digest
-
-    @property
-    def values(self) -> dict[str, Any]:
-        """The function's parameters by name."""
-        return {parameter.name: getattr(self, parameter.name) for parameter in self.parameters}
-
-
-def defined_kind(
-    base: type[Any],
-    source: Formula,
-    kind: str,
-    digest: str,
-    parameters: tuple[Parameter, ...],
-    *,
-    check: Callable[[], None],
-    row: Callable[[], Mapping[str, Any]],
-    fields: Sequence[Any] = (),
-) -> Any:
-    """Return the node class of a definition: the registered one, or a new one after `check`.
-
-    `row` returns attributes of the class, such as the row of its table. `fields` follow the parameters.
-    """
-    known = CUSTOM_KINDS.get(kind)
-    if known is not None and issubclass(known, base) and known.digest == digest:
-        return known
-    check()
-    declared = [(parameter.name, Annotated[Any, parameter]) for parameter in parameters]
-    described = source.python.__doc__ or f"A node of the custom kind {kind!r}."
-    namespace = {"__doc__": described, "kind": kind, "digest": digest, "parameters": parameters, **row()}
-    node: Any = node_class(kind, source, [*declared, *fields], base, namespace)
-    CUSTOM_KINDS[kind] = node
-    return node

@@ -17,6 +17,9 @@ Definition = TypeVar("Definition")
 NODE_KINDS: dict[str, type[Any]] = {}
 """The classes of nodes that are loaded, by their tags; `blobtree.nodes.kinds` loads all."""
 
+CUSTOM_TAGS: dict[str, type[Any]] = {}
+"""The base classes of users' kinds, by their tags in files."""
+
 LIBRARY_ROWS: list[Any] = []
 """What the loaded kinds of this package put on tapes beyond the core, in any order."""
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from blobtree.declare.formula import Declared, Formula, declared_formulas, is_own, tag_of
 from blobtree.declare.parameters import Parameter, documented, fields_of, parameters_of
-from blobtree.declare.registry import CUSTOM_KINDS, CustomKind, library_rows
+from blobtree.declare.registry import CUSTOM_KINDS, CUSTOM_TAGS, CustomKind, library_rows
 from blobtree.errors import InvalidDefinition
 from blobtree.nodes.node import Node
 
@@ -34,12 +34,15 @@ class DeclaredNode(Node, metaclass=CustomKind):
     """Names of the parameters that all kinds of this sort declare."""
     methods: ClassVar[tuple[str, ...]] = ()
     """Methods of a class that belong to the meaning of its formulas."""
+    custom_tags: ClassVar[tuple[str, ...]] = ()
+    """Tags of users' kinds in files: that of today, then those of older files."""
     has_init: ClassVar[bool] = False
     """True if the base has the constructor."""
     _formulas: ClassVar[dict[str, Formula]] = {}
 
     def __init_subclass__(cls) -> None:
         own, declares = is_own(cls), any(isinstance(value, Declared) for value in vars(cls).values())
+        CUSTOM_TAGS.update(dict.fromkeys(vars(cls).get("custom_tags", ()), cls))
         if not declares and (own or cls.row_name in vars(cls)):
             super().__init_subclass__()
             return

@@ -93,6 +93,7 @@ class FieldPrimitive(Leaf, ProgramField, DeclaredNode):
 
     sort = "a field"
     hash_name = "CustomField"
+    custom_tags = ("custom_free_field",)
     row_name = "field_kind"
     formula_results = RESULTS
     needed = ("value", "value_gradient")
@@ -228,6 +229,8 @@ class BoxedField(FieldPrimitive):
     >>> Layers((0, 0, 0), (2, 2, 2), period=1.0)([[0, 0, 0], [0, 0, 0.25], [0, 0, 2]]).round(3).tolist()
     [1.0, 0.5, 0.0]
     """
+
+    custom_tags = ("custom_field",)
 
     center: Vector = par.point("middle of the box, and origin of the function")
     size: Vector = par.extents("lengths of the box along x, y and z, above 0")

@@ -129,6 +129,8 @@ class Operator(ManyOperands, Combination):
     [0.75]
     """
 
+    custom_tags = ("custom_operator", "own operator")
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if type(self) is Operator:

@@ -229,6 +229,7 @@ class Primitive(Profile, Leaf, ProgramPrimitive, DeclaredNode):
 
     sort = "a primitive"
     hash_name = "CustomPrimitive"
+    custom_tags = ("custom_skeleton", "own skeleton")
     row_name = "skeleton"
     formula_results = RESULTS
     needed = ("closest", "closest_with_influence")

@@ -89,6 +89,7 @@ class Warp(Placed, DeclaredNode):
 
     sort = "a warp"
     hash_name = "CustomWarp"
+    custom_tags = ("custom_warp",)
     row_name = "warp"
     formula_results = RESULTS
     needed = ("forward",)
