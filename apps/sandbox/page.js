@@ -69,7 +69,7 @@
       const box = event.target.ownerSVGElement.getBoundingClientRect();
       const x = (event.clientX - box.left) / box.width;
       const y = (event.clientY - box.top) / box.height;
-      trame.trigger("handle", [name, phase, x, y, event.ctrlKey || event.metaKey]);
+      trame.trigger("drag_handle", [name, phase, x, y, event.ctrlKey || event.metaKey]);
     },
 
     // Send the row or the place of the view at which the pointer is, the newest one only.
@@ -106,7 +106,8 @@
       } else if (key) {
         const dragged = source.getData("text/plain");
         const change = sorts(event, dragged, key) ? "reorder" : "move";
-        trame.trigger(key.startsWith("view ") ? "place" : change, [dragged, key]);
+        if (key.startsWith("view ")) trame.trigger("place_image", [dragged, key]);
+        else trame.trigger("change_row", [dragged, change, key]);
       }
     },
 
@@ -115,7 +116,7 @@
       const parts = [];
       let size = 0;
       for (;;) {
-        const part = await trame.trigger("read", [name, size]);
+        const part = await trame.trigger("read_file", [name, size]);
         if (!part?.byteLength) break;
         parts.push(part);
         size += part.byteLength;
@@ -142,7 +143,9 @@
 
     // Send the name in the field of a row, unless it is as before, and return the hidden field.
     rename(field, row) {
-      if (field.key && field.name !== row.label) trame.trigger("rename", [field.key, field.name]);
+      if (field.key && field.name !== row.label) {
+        trame.trigger("change_row", [field.key, "rename", field.name]);
+      }
       return { key: "", name: "" };
     },
   };

@@ -1,6 +1,7 @@
 """The page of the sandbox: a trame user interface around the view of an edit window."""
 
 import asyncio
+import re
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -11,12 +12,13 @@ from trame.widgets import client, html, vuetify3
 from decals.apps.memory import keep_for_work
 from decals.apps.sandbox import panels
 from decals.apps.sandbox.connections import Connections
-from decals.apps.sandbox.folder import IMAGES, thumbnails
+from decals.apps.sandbox.folder import IMAGES, MODELS, thumbnails
 from decals.apps.sandbox.guard import Guard
 from decals.apps.sandbox.panels import DEFAULTS, named
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.apps.sandbox.view import StreamedView
 from decals.editing.actions import KEYS
+from decals.editing.formats import EXPORT_SUFFIXES, Video
 from decals.window import EditWindow, browser_keys
 
 REFRESH_SECONDS = 0.1
@@ -46,10 +48,18 @@ TOOLBAR_HEIGHT = (
 )
 """Height of the toolbar, of which its density takes 16."""
 
-STYLE, SCRIPT, ABOVE_VIEW = (
-    Path(__file__).with_name(name).read_text(encoding="utf-8")
-    for name in ("page.css", "page.js", "view.html")
+STYLE, SCRIPT = (
+    Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("page.css", "page.js")
 )
+TEMPLATES = {
+    path.stem: path.read_text(encoding="utf-8") for path in sorted(Path(__file__).parent.glob("*.html"))
+}
+"""Parts of the page in HTML, by their names."""
+
+EVENTS = {*re.findall(r"trigger\(['\"](\w+)", "".join([SCRIPT, *TEMPLATES.values()]))}
+EVENTS -= {"ask_to_drive", "pass_control"}
+"""Events of the `Sandbox` that script and templates send; those of the driver are of `Connections`."""
+
 TOUCH_EVENTS = "touchstart", "touchmove", "touchend", "pointerdown", "pointermove", "pointerup"
 """Events of the view that the script takes first."""
 
@@ -64,12 +74,6 @@ TOOLBAR = {
 }
 """Icons of the actions in the toolbar."""
 
-FOLDS = "['object', 'combination', 'modifier'].includes(row.kind)"
-"""True for a row that others lie below."""
-
-LONG_OUTLINE = 12
-"""Number of rows from which on the outline has a field to search in it."""
-
 ROW_CHANGES = {
     "duplicate": "mdi-content-duplicate",
     "group": "mdi-group",
@@ -77,18 +81,12 @@ ROW_CHANGES = {
 }
 """Icons of what can be done with the selected rows."""
 
-ROW_FLAGS = (
-    ("hide", "hidden", ("mdi-eye-off-outline", "mdi-eye-outline")),
-    ("lock", "locked", ("mdi-lock-outline", "mdi-lock-open-variant-outline")),
-)
-"""Buttons of a row: its change, the row's value, and icons for true and false."""
-
-NODE = "combination modifier primitive"
-SHAPES = f"object mesh {NODE}"
-"""Kinds of rows of nodes, and of all that has a shape."""
-
-SHOW_MENU = "menu = {...row, open: row.kind !== 'more', x: $event.clientX, y: $event.clientY}"
-"""Show the menu of a row at the pointer."""
+FORMATS = {
+    "opened": ",".join(MODELS + IMAGES),
+    "exported": " ".join(EXPORT_SUFFIXES),
+    "videos": list(map(str, Video)),
+}
+"""Endings of files, and kinds of videos, that the page offers."""
 
 CTRL_KEYS = "".join(
     gesture[-1]
@@ -98,9 +96,10 @@ CTRL_KEYS = "".join(
 )
 """Letters that have an action together with Ctrl."""
 
-RENAME_ROW = "!['image', 'more'].includes(row.kind) && (renamed = {key: row.key, name: row.label})"
-SEND_NAME = "renamed = utils.sandbox.rename(renamed, row)"
-"""Show the field of a row's name; send what stands there, and hide the field."""
+
+def template(name: str) -> None:
+    """Build a part of the page whose elements are those of what it stands in."""
+    html.Div(TEMPLATES[name], style="display: contents")
 
 
 def drawer(side: str, width: str = str(PANEL_WIDTH)) -> Any:
@@ -171,24 +170,14 @@ class Page:
             "left_open", "right_open", "file_open", "theme", "folded", "sought", "kind_sought"
         )  # another browser has its own
         server.state.update({**self.values(), "catalog": self.sandbox.catalog(), "thumbnails": thumbnails()})
-        server.state.update({"theme": "light", "dropped": None, "dropped_on": ""})
-        server.state.folded, server.state.sought = [], ""
+        server.state.update({"theme": "light", "dropped": None, "dropped_on": "", "folded": [], "sought": ""})
+        server.state.update({"file_open": False, "file_name": "", "file_size": "", "replace_file": False})
+        server.state.update({"file_video": str(Video.TURNTABLE), "formats": FORMATS})
         server.state.renamed = {"key": "", "name": ""}
         server.state.menu = {"open": False, "x": 0, "y": 0}
         server.state.change("dropped")(self._take_dropped)
-        trigger, change_row = server.controller.trigger, self.sandbox.change_row
-        trigger("handle")(self.sandbox.drag_handle)
-        trigger("pinch")(self.sandbox.pinch)
-        trigger("look")(lambda side: self.sandbox.move_camera("look", side))
-        trigger("rename")(lambda key, name: change_row(key, "rename", name))
-        trigger("drop_work")(self.sandbox.drop_work)
-        trigger("hover")(self.sandbox.hover)
-        trigger("start")(lambda: self.sandbox.show_start(True))
-        trigger("write")(self.sandbox.write_file)
-        trigger("read")(self.sandbox.read_file)
-        trigger("place")(self.sandbox.place_image)
-        trigger("move")(lambda key, target: change_row(key, "move", target))
-        trigger("reorder")(lambda key, target: change_row(key, "reorder", target))
+        for name in EVENTS:
+            server.controller.trigger(name)(getattr(self.sandbox, name))
         self._build()
         server.controller.on_server_ready.add(self._start)
         server.controller.on_server_exited.add(self._stop)
@@ -277,11 +266,10 @@ class Page:
                         style="height: 100%",
                     )
                     self.sandbox.schedule = self.view.update
-                    html.Div(ABOVE_VIEW)
-                panels.build_start(self.sandbox)
+                    html.Div(TEMPLATES["view"])
+                template("start")
                 with vuetify3.VFooter(app=True, order="2", height=28, classes="text-caption"):
-                    html.Span("{{ status }}", raw_attrs=['role="status" :class="{status: true, refused}"'])
-                    panels.build_queue(self.sandbox)
+                    template("status")
 
     def _build_left_side(self) -> None:
         """Build what stands left of the view."""
@@ -299,8 +287,7 @@ class Page:
         panels.build_options(self.sandbox)
         panels.build_decal_panel(self.sandbox)
         self._build_panel()
-        panels.build_pick()
-        self._build_history()
+        html.Div(TEMPLATES["history"])
 
     def _build_toolbar(self) -> None:
         with (
@@ -313,8 +300,7 @@ class Page:
             with html.Div(classes="bar"):
                 if self._ends:
                     vuetify3.VBtn("Done", color="primary", variant="flat", click=self._finish)
-                panels.build_driver()
-                panels.build_files(self.sandbox)
+                template("files")
                 panels.build_view_menu(self.sandbox)
                 for title, icon, family, event in (
                     ("Add", "mdi-plus", "primitives", self.sandbox.add),
@@ -338,79 +324,7 @@ class Page:
                 panels.icon_button("mdi-theme-light-dark", "light or dark", theme)
 
     def _build_outline(self) -> None:
-        vuetify3.VListSubheader("Outline", raw_attrs=['role="heading" aria-level="2"'])
-        vuetify3.VTextField(
-            v_model="sought",
-            v_if=f"outline.length > {LONG_OUTLINE}",
-            prepend_inner_icon="mdi-magnify",
-            clearable=True,
-            classes="mx-2",
-            raw_attrs=named("'search in the outline'"),
-        )
-        with (
-            vuetify3.VList(nav=True, raw_attrs=["data-roving"]),
-            html.Div(
-                v_for="row in outline",
-                key="row.key",
-                classes=("utils.sandbox.shown(row, folded, sought) ? 'd-flex align-center' : 'd-none'",),
-                raw_attrs=['role="listitem"'],
-            ),
-        ):
-            vuetify3.VTextField(
-                v_if="renamed.key === row.key",
-                v_model="renamed.name",
-                autofocus=True,
-                raw_attrs=named("'new name of ' + row.label"),
-                enter=SEND_NAME,
-                blur=SEND_NAME,
-                escape="renamed = {key: '', name: ''}",
-                focus="$event.target.select()",
-                __events=[("enter", "keyup.enter"), ("escape", "keyup.esc"), "blur", "focus"],
-            )
-            vuetify3.VListItem(
-                v_if="renamed.key !== row.key",
-                title=("row.label",),
-                raw_attrs=['role="button"', 'draggable="true"'],
-                prepend_icon=("row.icon",),
-                prepend_avatar=("row.picture",),
-                active=("row.key === selected || marked.includes(row.key)",),
-                style=("`padding-left: ${8 + 14 * row.depth}px; opacity: ${row.hidden ? 0.6 : 1}`",),
-                classes=("'flex-grow-1' + (utils.sandbox.lit(row, hovered.rows, folded) ? ' lit' : '')",),
-                pointerenter="utils.sandbox.hover(row.key, $event)",
-                pointerleave="utils.sandbox.hover('')",
-                click=(self._click, "[row.key, $event.ctrlKey || $event.metaKey || $event.shiftKey]"),
-                contextmenu=f"$event.preventDefault(); {SHOW_MENU}",
-                dragstart="$event.dataTransfer.setData('text/plain', row.key)",
-                dragover="$event.preventDefault()",
-                drop="utils.sandbox.take($event, row.key)",
-                dblclick=RENAME_ROW,
-                __events=[
-                    "pointerenter",
-                    "pointerleave",
-                    "dragstart",
-                    "dragover",
-                    "drop",
-                    "dblclick",
-                    "contextmenu",
-                ],
-            )
-            html.Button(
-                v_if=f"{FOLDS} && renamed.key !== row.key",
-                classes=("'mdi row-flag mdi-chevron-' + (folded.includes(row.key) ? 'right' : 'down')",),
-                click="folded = utils.sandbox.fold(row, folded)",
-                raw_attrs=[
-                    ':aria-expanded="!folded.includes(row.key)"',
-                    *named("'nodes below ' + row.label"),
-                ],
-            )
-            for change, flag, icons in ROW_FLAGS:
-                html.Button(
-                    v_if="!['image', 'more'].includes(row.kind)",
-                    classes=(f"'mdi row-flag ' + (row.{flag} ? '{icons[0]}' : '{icons[1]}')",),
-                    click=(self.sandbox.change_row, f"[row.key, '{change}']"),
-                    raw_attrs=[f':aria-pressed="row.{flag}"', *named(f"'{change} ' + row.label")],
-                )
-        self._build_row_menu()
+        html.Div(TEMPLATES["outline"])
         with html.Div(classes="px-3 py-1"):
             panels.build_file_input("add images", IMAGES, multiple=True)
         with html.Div(v_if="selected", classes="d-flex ga-1 px-2 row-changes"):
@@ -421,38 +335,6 @@ class Page:
                     (self.sandbox.change_row, f"[selected, '{change}']"),
                     variant="text",
                 )
-
-    def _build_row_menu(self) -> None:
-        """Build the menu of a row, where the pointer was."""
-        change = self.sandbox.change_row
-        with (
-            vuetify3.VMenu(
-                model_value=("menu.open",),
-                update_modelValue="menu = {...menu, open: $event}",
-                target=("[menu.x, menu.y]",),
-            ),
-            vuetify3.VList(),
-        ):
-            for title, kinds, event in (
-                ("Rename", f"{SHAPES} layer", "renamed = {key: menu.key, name: menu.label}"),
-                ("Duplicate", SHAPES, (change, "[menu.key, 'duplicate']")),
-                ("Group", NODE, (change, "[menu.key, 'group']")),
-                ("Remove", f"{SHAPES} layer image", (change, "[menu.key, 'remove']")),
-                ("Hide or show", f"{SHAPES} layer", (change, "[menu.key, 'hide']")),
-                ("Lock or unlock", f"{SHAPES} layer", (change, "[menu.key, 'lock']")),
-                ("Isolate, or show all", f"{SHAPES} layer", (change, "[menu.key, 'isolate']")),
-                ("Frame", SHAPES, (self._frame, "[menu.key]")),
-            ):
-                vuetify3.VListItem(title=title, v_if=f"'{kinds}'.includes(menu.kind)", click=event)
-
-    def _frame(self, key: str) -> None:
-        """Select a row, and show it as large as it fits."""
-        self.sandbox.select(key)
-        self.sandbox.move_camera("frame")
-
-    def _click(self, key: str, several: bool) -> None:
-        """Select a row, or mark several."""
-        (self.sandbox.mark if several else self.sandbox.select)(key)
 
     def _build_panel(self) -> None:
         with html.Div(v_if="panel.kind", classes="pa-3"):
@@ -474,22 +356,4 @@ class Page:
                 "outline.some(row => row.kind === 'mesh') ? 'Scatter decals, or click on one.' : "
                 "'Add a primitive or drop a model.' }}",
                 classes="text-caption",
-            )
-
-    def _build_history(self) -> None:
-        vuetify3.VDivider()
-        vuetify3.VListSubheader("History", raw_attrs=['role="heading" aria-level="2"'])
-        with vuetify3.VList():
-            vuetify3.VListItem(
-                title=("forgotten ? `Oldest step (${forgotten} before it are forgotten)` : 'Start'",),
-                active=("done.length === 0",),
-                click=(self.sandbox.go_to, "[0]"),
-            )
-            vuetify3.VListItem(
-                v_for="(entry, i) in done.concat(undone)",
-                key="i",
-                title=("entry",),
-                active=("i === done.length - 1",),
-                classes=("i < done.length ? '' : 'text-disabled'",),
-                click=(self.sandbox.go_to, "[earlier + i + 1]"),
             )

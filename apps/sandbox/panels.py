@@ -7,12 +7,11 @@ from typing import Any
 from trame.widgets import html, vuetify3
 
 from decals.apps.sandbox.files import LIGHT
-from decals.apps.sandbox.folder import IMAGES, MODELS
+from decals.apps.sandbox.folder import IMAGES
 from decals.apps.sandbox.hover import KIND
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing.actions import KEYS
 from decals.editing.brush_settings import Brush
-from decals.editing.formats import EXPORT_SUFFIXES, Video
 from decals.editing.key_bindings import CAMERA, Binding, Group, format_gestures
 from decals.editing.view_actions import SIDE_KEYS
 
@@ -32,9 +31,6 @@ DEFAULTS = {
 
 Menus do not grow when they open: the list of a `VSelect` in one would change its width while it measures it.
 """
-
-TILE_WIDTH = 120
-"""Width of a sample on the start page, in pixels: six fit beside each other."""
 
 BRUSH_ICONS = {
     Brush.SELECT: "mdi-cursor-default-outline",
@@ -94,19 +90,15 @@ def build_kinds(family: str, event: Any) -> None:
         "pointerenter": f"utils.sandbox.hover('{KIND}' + e, $event)",
         "pointerleave": "utils.sandbox.hover('')",
     }
-    build_list(found, "e", "catalog.docs[e]", event, "e", __events=[*ghost], **ghost)
-
-
-def build_list(source: str, title: str, subtitle: str, click: Any, chosen: str, **options: Any) -> None:
-    """Build a list with each ``e`` of a list of the page; a click sends the value of an expression."""
     with vuetify3.VList():
         vuetify3.VListItem(
-            v_for=f"(e, i) in {source}",
+            v_for=f"(e, i) in {found}",
             key="i",
-            title=(title,),
-            subtitle=(subtitle,),
-            click=(click, f"[{chosen}]"),
-            **options,
+            title=("e",),
+            subtitle=("catalog.docs[e]",),
+            click=(event, "[e]"),
+            __events=[*ghost],
+            **ghost,
         )
 
 
@@ -215,102 +207,6 @@ def _number_field(
     )
 
 
-# -- start page and files -------------------------------------------------------------------------------
-
-
-def build_start(sandbox: Sandbox) -> None:
-    """Build the start page: new model, samples, recent files, recovered sessions and lessons."""
-    with (
-        vuetify3.VDialog(
-            model_value=("start.open && driving.drives",),
-            update_modelValue=(sandbox.show_start, "[$event]"),
-            max_width=860,
-            raw_attrs=['aria-label="start"'],
-        ),
-        vuetify3.VCard(title="Sandbox", subtitle="Model, and cover models with decals."),
-        vuetify3.VCardText(),
-    ):
-        with html.Div(v_if="start.lessons.length", classes="mb-4"):
-            html.H2("Lessons", classes="text-subtitle-2")
-            with html.Div(classes="d-flex flex-wrap ga-2"):
-                vuetify3.VBtn(
-                    "{{ title }}",
-                    v_for="(title, i) in start.lessons",
-                    key="i",
-                    variant="tonal",
-                    classes="text-none",
-                    click=(sandbox.open_lesson, "[i]"),
-                )
-        html.H2("New model, or a sample", classes="text-subtitle-2")
-        with html.Div(classes="d-flex flex-wrap ga-3 mb-4"):
-            shown = {"width": TILE_WIDTH, "variant": "outlined"}
-            with vuetify3.VCard(click=sandbox.new_model, raw_attrs=named("'New model'"), **shown):
-                vuetify3.VIcon("mdi-plus", size=40, style="height: 88px; width: 100%")
-                html.Div("New model", classes="text-caption text-center pa-1")
-            with (
-                html.Div(v_for="name in start.samples", key="name"),
-                vuetify3.VCard(
-                    click=(sandbox.open_sample, "[name]"), raw_attrs=named("'sample ' + name"), **shown
-                ),
-            ):
-                vuetify3.VImg(src=("thumbnails[name]",), height=88, cover=True, alt="")
-                html.Div("{{ name }}", classes="text-caption text-center pa-1")
-        html.Label("Open from this computer (or drop files on the view): ", classes="text-caption")
-        html.Input(
-            type="file",
-            multiple=True,
-            accept=",".join(MODELS + IMAGES),
-            raw_attrs=named("'open from this computer'"),
-            change="utils.sandbox.take($event)",
-        )
-        for family, heading, title, subtitle, event, chosen in (
-            ("recovered", "Recovered sessions", "e.name", "e.when", sandbox.open_file, "e.name"),
-            ("recent", "Files in this folder", "e.name", "e.when", sandbox.open_file, "e.name"),
-        ):
-            with html.Div(v_if=f"start.{family}.length", classes="mt-4"):
-                html.H2(heading, classes="text-subtitle-2")
-                build_list(f"start.{family}", title, subtitle, event, chosen)
-
-
-def build_files(sandbox: Sandbox) -> None:
-    """Build the menu that writes files: scene, script, mesh and picture by the suffix of the name."""
-    with (
-        menu("File", "mdi-file-outline", close_on_content_click=False, v_model=("file_open", False)),
-        vuetify3.VCard(width=340, classes="pa-3"),
-    ):
-        vuetify3.VBtn("Open or new ...", variant="tonal", click="file_open = false; trigger('start')")
-        html.P(
-            "Save or export. The ending is the format: .json scene, .py script, "
-            f"{' '.join(EXPORT_SUFFIXES)} with the decals, .png .jpg picture, .gif .mp4 video.",
-            classes="text-caption mt-3 mb-1",
-        )
-        with html.Div(classes="d-flex ga-2 align-center"):
-            write = "file_open = false; trigger('write', [file_name, replace_file, file_size, file_video])"
-            vuetify3.VTextField(
-                v_model=("file_name", ""),
-                placeholder="model.ply",
-                raw_attrs=named("'file name'"),
-                enter=write,
-                __events=[("enter", "keyup.enter")],
-            )
-            vuetify3.VBtn("Write", click=write)
-            icon_button("mdi-download", "download this file", "utils.sandbox.download(file_name)")
-        vuetify3.VTextField(
-            v_if="/(png|jpg|gif|mp4)$/i.test(file_name)",
-            v_model=("file_size", ""),
-            label="size, such as 1920 x 1080",
-            classes="mt-2",
-        )
-        vuetify3.VSelect(
-            v_if="/(gif|mp4)$/i.test(file_name)",
-            v_model=("file_video", "turntable"),
-            items=("videos", list(map(str, Video))),
-            label="video",
-            classes="mt-2",
-        )
-        vuetify3.VCheckbox(v_model=("replace_file", False), label="replace a file that exists")
-
-
 def build_file_input(text: str, kinds: Sequence[str], key: str = "''", **options: Any) -> None:
     """Build a field that takes files, also dropped ones, for a key, which is an expression of the page."""
     take = f"utils.sandbox.take($event, {key})"
@@ -319,30 +215,6 @@ def build_file_input(text: str, kinds: Sequence[str], key: str = "''", **options
     ):
         html.Label(f"{text}: choose, or drop here", classes="text-caption")
         html.Input(type="file", accept=",".join(kinds), change=take, raw_attrs=named(f"'{text}'"), **options)
-
-
-def build_driver() -> None:
-    """Build the name of the driver of a shared page, and the button that asks for control or passes it."""
-    with html.Div(v_if="driving.shared", classes="d-flex align-center ga-2 mr-2"):
-        html.Span(
-            "{{ driving.drives ? 'You drive' : 'Browser ' + driving.driver + ' drives' }}, "
-            "{{ driving.browsers - 1 }} watching",
-            classes="text-caption",
-            raw_attrs=['role="status"'],
-        )
-        vuetify3.VBtn(
-            "Pass control to browser {{ driving.next }}",
-            v_if="driving.drives && driving.next",
-            variant="tonal",
-            click="trigger('pass_control')",
-        )
-        vuetify3.VBtn(
-            "{{ driving.asks ? 'Asked for control' : 'Ask for control' }}",
-            v_if="!driving.drives",
-            disabled=("driving.asks",),
-            variant="tonal",
-            click="trigger('ask_to_drive')",
-        )
 
 
 # -- view -----------------------------------------------------------------------------------------------
@@ -439,28 +311,6 @@ def build_scatter(sandbox: Sandbox) -> None:
             variant="tonal",
             title=SUMMARIES["fill"],
             click=(sandbox.perform, "['fill']"),
-        )
-
-
-def build_pick() -> None:
-    """Build the report of the last click."""
-    with html.Div(v_if="Object.keys(pick).length", classes="pa-3 text-caption"):
-        html.H2("Last click", classes="text-subtitle-1")
-        html.Div("{{ name }}: {{ text }}", v_for="(text, name) in pick", key="name")
-
-
-def build_queue(sandbox: Sandbox) -> None:
-    """Build the list of the work that runs and waits, each with a button that cancels or removes it."""
-    with html.Div(classes="queue", raw_attrs=['role="list" aria-label="work that runs and waits"']):
-        vuetify3.VChip(
-            "{{ w.label }}",
-            v_for="w in queue",
-            key="w.number",
-            size="x-small",
-            variant=("w.running ? 'flat' : 'outlined'",),
-            closable=True,
-            close_label=("`${w.running ? 'cancel' : 'remove'}: ${w.label}`",),
-            raw_attrs=['role="listitem"', "@click:close.prevent=\"trigger('drop_work', [w.number])\""],
         )
 
 
