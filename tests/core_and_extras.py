@@ -12,7 +12,7 @@ EXTRAS: dict[str, str] = {
     "blobtree.custom": "field",
     "blobtree.derivatives": "*",
     "blobtree.formulas": """
-        contact falloffs noise
+        falloffs noise
         """,
     "blobtree.meshing": """
         adaptive adaptive_cell_kernels adaptive_cells adaptive_kernels adaptive_mesh batch

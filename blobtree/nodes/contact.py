@@ -2,31 +2,54 @@
 
 `Press` deforms one solid at an obstacle. `SolidContact` lets any number of solids deform each other: each one
 is pressed by all others, and their union is the model.
+
+Two solids in contact share one surface, and the material bulges around it. In the papers the field of a solid
+becomes F = f + h, where h < 0 inside the other solid (compression) and h > 0 in a region around the contact
+(propagation). Their surface lies where f is 1; here it lies where f is ½, and fields are larger inside.
+
+A solid a of stiffness s meets an obstacle b of stiffness s′ where s(a − ½) = s′(b − ½). `rated_field` brings
+the obstacle to the scale of the solid, m = r(b) with slope s′/s at ½. Then
+
+    F = a − (m − ½)          where m ≥ ½,
+    F = a + B(½ − m) φ(a)    outside of the obstacle,
+
+with a bulge B(t) of the given height and width. B rises with slope 1 at t = 0, so F is C¹ where contact
+begins, and B(t) < t, so two bulges never overlap. φ confines the bulge to the support of a; it is 1 where F
+can reach ½.
 """
 
 from collections.abc import Iterable
 from dataclasses import KW_ONLY, dataclass, replace
+from functools import partial
 from typing import Annotated, Any, Self, cast
 
 import numpy as np
+import warp as wp
 
+from blobtree import par
 from blobtree._typing import Float32Array, Float64Array
+from blobtree.declare.claims import KEEP_BOTH, KEEP_LEFT, KEEP_NONE
+from blobtree.declare.formula import formula
 from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.errors import InvalidNode
-from blobtree.formulas.contact import (
-    BULGE,
-    HEIGHT_OVER_WIDTH,
-    LARGEST_HEIGHT,
-    PRESS,
-    RATED_UNION,
-)
 from blobtree.lazy import Lazy
 from blobtree.meshing.clip import clipped, enclosed_volume, outlines_of
 from blobtree.meshing.mesh import Mesh
 from blobtree.meshing.polygonize import polygonize
 from blobtree.nodes.node import Node
-from blobtree.nodes.operator import Combination, ManyOperands
+from blobtree.nodes.operator import ManyOperands, Pair
 from blobtree.nodes.tree import Macro, Union
+
+wp.set_module_options({"enable_backward": False})
+
+LARGEST_HEIGHT = 0.125
+"""Largest height of a bulge, in field values."""
+
+HEIGHT_OVER_WIDTH = 0.25
+"""Largest height of a bulge over its width: the top lies at twice the height, in the nearer half."""
+
+FADE = 0.25
+"""Field value of the solid below which its bulge fades, at most ½ − LARGEST_HEIGHT."""
 
 LARGEST_RATIO = 100.0
 """Largest ratio of two stiffnesses; beyond it the stiffer solid is rigid for any purpose."""
@@ -40,30 +63,94 @@ STEPS = 12
 LARGEST_STEP, LARGEST_GROWTH = 0.1, 0.5
 """Largest step and offset in `SolidContact.compensated`, over the side of a cube of the solid's volume."""
 
-Width = Annotated[
-    float,
-    Parameter(
-        Quantity.FACTOR,
-        "width of the bulge, as the fall of the obstacle's field from 0.5 to its end",
-        low=0.01,
-        high=0.5,
-        hint="0.5 reaches to the end of the obstacle's field",
-    ),
-]
-Height = Annotated[
-    float,
-    Parameter(
-        Quantity.FACTOR,
-        "height of the bulge, as a value of the solid's field; 0 for none",
-        low=0.0,
-        high=LARGEST_HEIGHT,
-        hint="a larger bulge would not stay in the support of its solid",
-    ),
-]
+width_field = partial(
+    par.factor,
+    "width of the bulge, as the fall of the obstacle's field from 0.5 to its end",
+    low=0.01,
+    high=0.5,
+    hint="0.5 reaches to the end of the obstacle's field",
+    default=0.4,
+)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Press(Combination):
+@wp.func
+def rated_field(b: wp.float32, ratio: wp.float32) -> wp.vec2:
+    """Return r(b) and r′(b): 0 at b = 0, ½ at b = ½ with slope `ratio`, linear above.
+
+    The maps of all ratios are a group: first k, then k′ is k · k′. So a point has one order of solids.
+    """
+    t = 0.5 - b
+    if t <= 0.0:
+        return wp.vec2(0.5 - ratio * t, ratio)
+    if b <= 0.0:
+        return wp.vec2(0.0, 0.0)
+    divisor = 1.0 + 2.0 * (ratio - 1.0) * t
+    return wp.vec2(wp.max(0.5 - ratio * t / divisor, 0.0), ratio / (divisor * divisor))
+
+
+@wp.func
+def hump(t: wp.float32, width: wp.float32, height: wp.float32) -> wp.vec2:
+    """Return B(t) and B′(t): up to `height` at t = 2 · height, then down to 0 at t = `width`."""
+    top = 2.0 * height
+    if t <= 0.0 or t >= width or height <= 0.0:
+        return wp.vec2(0.0, 0.0)
+    if t < top:
+        return wp.vec2(t * (1.0 - 0.5 * t / top), 1.0 - t / top)
+    v = (t - top) / (width - top)
+    return wp.vec2(
+        height * (1.0 - v) * (1.0 - v) * (1.0 + 2.0 * v), -6.0 * height * v * (1.0 - v) / (width - top)
+    )
+
+
+@wp.func
+def pressed_value(a: wp.float32, m: wp.float32, width: wp.float32, height: wp.float32) -> wp.float32:
+    """Return F(a, m) for a rated obstacle."""
+    if m >= 0.5:
+        return wp.max(a - (m - 0.5), 0.0)
+    x = wp.clamp(a / FADE, 0.0, 1.0)
+    return a + hump(0.5 - m, width, height)[0] * x * x * (3.0 - 2.0 * x)
+
+
+@wp.func
+def pressed_partials(
+    a: wp.float32, b: wp.float32, ratio: wp.float32, width: wp.float32, height: wp.float32
+) -> wp.vec3:
+    """Return F, ∂F/∂a and ∂F/∂b."""
+    m = rated_field(b, ratio)
+    if b <= 0.0:
+        return wp.vec3(a, 1.0, 0.0)
+    if m[0] >= 0.5:
+        value = a - (m[0] - 0.5)
+        if value <= 0.0:
+            return wp.vec3(0.0, 0.0, 0.0)
+        return wp.vec3(value, 1.0, -m[1])
+    h = hump(0.5 - m[0], width, height)
+    x = wp.clamp(a / FADE, 0.0, 1.0)
+    fade = x * x * (3.0 - 2.0 * x)
+    return wp.vec3(a + h[0] * fade, 1.0 + h[0] * 6.0 * x * (1.0 - x) / FADE, -h[1] * fade * m[1])
+
+
+@wp.func
+def steepest_rating(max_b: wp.float32, ratio: wp.float32, width: wp.float32) -> wp.float32:
+    """Bound r′ where r(b) > ½ − width and b ≤ max_b."""
+    b = wp.min(max_b, 0.5)
+    if ratio < 1.0:
+        b = rated_field(0.5 - width, 1.0 / ratio)[0]
+    divisor = 1.0 + 2.0 * (ratio - 1.0) * (0.5 - b)
+    return ratio / (divisor * divisor)
+
+
+@wp.func
+def pressed_range(
+    a: wp.vec2, low: wp.float32, high: wp.float32, width: wp.float32, height: wp.float32
+) -> wp.vec2:
+    """F rises with a; over m from `low` to `high` it rises up to the top of the bulge and falls behind."""
+    top = wp.clamp(0.5 - 2.0 * height, low, high)
+    smallest = wp.min(pressed_value(a[0], low, width, height), pressed_value(a[0], high, width, height))
+    return wp.vec2(smallest, pressed_value(a[1], top, width, height))
+
+
+class Press(Pair):
     """`solid` as it deforms at `obstacle`; the obstacle itself is not part of the result.
 
     Inside the obstacle the solid yields until s(f − ½) = s′(g − ½), where f and g are their fields and s′/s
@@ -78,31 +165,58 @@ class Press(Combination):
     [1.0, 0.5, 0.0]
     """
 
-    file_tag = "press"
-    operator = PRESS
+    like = "difference"
+    paints = False
 
     solid: Node
     obstacle: Node
     _: KW_ONLY
-    stiffness_ratio: Annotated[
-        float,
-        Parameter(
-            Quantity.FACTOR,
-            "stiffness of the obstacle over that of the solid",
-            low=1.0 / LARGEST_RATIO,
-            high=LARGEST_RATIO,
-            hint="leave a rigid solid as it is, and press the others",
-        ),
-    ] = 1.0
-    width: Width = 0.4
-    height: Height = 0.05
+    stiffness_ratio: float = par.factor(
+        "stiffness of the obstacle over that of the solid",
+        low=1.0 / LARGEST_RATIO,
+        high=LARGEST_RATIO,
+        hint="leave a rigid solid as it is, and press the others",
+        default=1.0,
+    )
+    width: float = width_field()
+    height: float = par.factor(
+        "height of the bulge, as a value of the solid's field; 0 for none",
+        low=0.0,
+        high=LARGEST_HEIGHT,
+        hint="a larger bulge would not stay in the support of its solid",
+        default=0.05,
+    )
+
+    partials = formula(pressed_partials)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         _check_shape(self.width, self.height)
 
+    @formula
+    def slope(
+        rise: wp.vec2, most: wp.vec2, ratio: wp.float32, width: wp.float32, height: wp.float32
+    ) -> wp.float32:
+        """Bound |∇F|: ∂F/∂a ≤ 1 + 1.5 · height / FADE, |∂F/∂b| ≤ r′."""
+        if rated_field(most[1], ratio)[0] <= 0.5 - width:
+            return rise[0]
+        return rise[0] * (1.0 + 1.5 * height / FADE) + rise[1] * steepest_rating(most[1], ratio, width)
 
-@dataclass(frozen=True, eq=False, repr=False)
+    @formula
+    def interval(a: wp.vec2, b: wp.vec2, ratio: wp.float32, width: wp.float32, height: wp.float32) -> wp.vec2:
+        """F rises with a; over b it rises up to the top of the bulge and falls behind."""
+        return pressed_range(a, rated_field(b[0], ratio)[0], rated_field(b[1], ratio)[0], width, height)
+
+    @formula
+    def keeps(a: wp.vec2, b: wp.vec2, ratio: wp.float32, width: wp.float32, height: wp.float32) -> wp.int32:
+        """Keep the solid alone where the obstacle's region ends."""
+        if a[1] <= 0.0 or a[1] <= rated_field(b[0], ratio)[0] - 0.5:
+            return KEEP_NONE
+        if b[1] <= 0.0 or rated_field(b[1], ratio)[0] <= 0.5 - width:
+            return KEEP_LEFT
+        return KEEP_BOTH
+
+
 class Bulge(Press):
     """`solid` with the bulge that it gets at `obstacle`, but not compressed by it.
 
@@ -117,12 +231,32 @@ class Bulge(Press):
     True
     """
 
-    file_tag = "bulge"
-    operator = BULGE
+    @formula
+    def partials(
+        a: wp.float32, b: wp.float32, ratio: wp.float32, width: wp.float32, height: wp.float32
+    ) -> wp.vec3:
+        """Return F, ∂F/∂a and ∂F/∂b of a solid that bulges, but is not compressed."""
+        if rated_field(b, ratio)[0] >= 0.5:
+            return wp.vec3(a, 1.0, 0.0)
+        return pressed_partials(a, b, ratio, width, height)
+
+    @formula
+    def interval(a: wp.vec2, b: wp.vec2, ratio: wp.float32, width: wp.float32, height: wp.float32) -> wp.vec2:
+        """F rises with a; over b it rises up to the top of the bulge and falls behind, up to b = ½."""
+        low = wp.min(rated_field(b[0], ratio)[0], 0.5)
+        return pressed_range(a, low, wp.min(rated_field(b[1], ratio)[0], 0.5), width, height)
+
+    @formula
+    def keeps(a: wp.vec2, b: wp.vec2, ratio: wp.float32, width: wp.float32, height: wp.float32) -> wp.int32:
+        """Keep the solid alone inside the obstacle and beyond its region."""
+        if a[1] <= 0.0:
+            return KEEP_NONE
+        if b[1] <= 0.0 or rated_field(b[1], ratio)[0] <= 0.5 - width or rated_field(b[0], ratio)[0] >= 0.5:
+            return KEEP_LEFT
+        return KEEP_BOTH
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class RatedUnion(Combination):
+class RatedUnion(Pair):
     """Union of two obstacles of different stiffness, F = max(f, r(g)); for `Press`.
 
     r keeps the surface of g, and changes its slope there by `stiffness_ratio`.
@@ -135,22 +269,45 @@ class RatedUnion(Combination):
     [0.5, 0.5, 1.5]
     """
 
-    file_tag = "rated_union"
-    operator = RATED_UNION
+    monotone = True
 
     first: Node
     second: Node
     _: KW_ONLY
-    stiffness_ratio: Annotated[
-        float,
-        Parameter(
-            Quantity.FACTOR,
-            "stiffness of the second over that of the first",
-            low=LARGEST_RATIO**-2,
-            high=LARGEST_RATIO**2,
-            hint="take a union, or leave one out",
-        ),
-    ]
+    stiffness_ratio: float = par.factor(
+        "stiffness of the second over that of the first",
+        low=LARGEST_RATIO**-2,
+        high=LARGEST_RATIO**2,
+        hint="take a union, or leave one out",
+    )
+
+    @formula
+    def partials(a: wp.float32, b: wp.float32, ratio: wp.float32) -> wp.vec3:
+        """F = max(a, r(b))."""
+        m = rated_field(b, ratio)
+        if a >= m[0]:
+            return wp.vec3(a, 1.0, 0.0)
+        return wp.vec3(m[0], 0.0, m[1])
+
+    @formula
+    def slope(rise: wp.vec2, most: wp.vec2, ratio: wp.float32) -> wp.float32:
+        """Bound the rise: r′ lies between the ratio and its inverse."""
+        steepest = wp.max(ratio, 1.0 / ratio)
+        if rise[1] < 0.0:
+            steepest = 1.0 / steepest
+        return wp.max(rise[0], rise[1] * steepest)
+
+    @formula
+    def interval(a: wp.vec2, b: wp.vec2, ratio: wp.float32) -> wp.vec2:
+        """F is monotone in both operands."""
+        return wp.max(a, wp.vec2(rated_field(b[0], ratio)[0], rated_field(b[1], ratio)[0]))
+
+    @formula
+    def keeps(a: wp.vec2, b: wp.vec2, ratio: wp.float32) -> wp.int32:
+        """Keep the first operand where that is always the larger."""
+        if b[1] <= 0.0 or rated_field(b[1], ratio)[0] <= a[0]:
+            return KEEP_LEFT
+        return KEEP_BOTH
 
 
 @dataclass(frozen=True)
@@ -225,7 +382,7 @@ class SolidContact(ManyOperands, Macro):
             "stiffness of each solid, or of each (row) against each other (n × n numbers); equal if empty",
         ),
     ] = ()
-    width: Width = 0.4
+    width: float = width_field()
     height: Annotated[
         float | tuple[float, ...],
         Parameter(

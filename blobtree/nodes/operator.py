@@ -2,8 +2,9 @@
 
 from collections.abc import Iterable
 from dataclasses import MISSING, dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, dataclass_transform
 
+from blobtree import par
 from blobtree.declare.claims import Like, OperatorRow
 from blobtree.declare.operator import RESULTS, Claims, OperatorFormulas
 from blobtree.declare.operator_checks import check_operator
@@ -46,6 +47,11 @@ class Combination(DeclaredNode):
         """The numbers that the operator takes besides its operands."""
         values = ((p, getattr(self, name)) for name, p in parameters_of(type(self)).items())
         return tuple(number for p, value in values for number in p.components(value))
+
+
+@dataclass_transform(frozen_default=True, eq_default=False, field_specifiers=(par.factor,))
+class Pair(Combination):
+    """A combination of two operands, which have names."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)

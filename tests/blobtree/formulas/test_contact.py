@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blobtree.formulas.contact import rated_field
+from blobtree.nodes.contact import rated_field
 from tests.blobtree.formulas.test_operators import CONTACTS, Setting, pressed, scale
 from tests.blobtree.transpile.warp_functions import call
 from tests.oracles.blobtree import rated
