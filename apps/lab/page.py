@@ -11,6 +11,7 @@ from decals.apps.lab.lesson import Lesson
 from decals.apps.lab.symbols import LIT
 from decals.apps.sandbox.page import PANEL_WIDTH, Page, drawer
 from decals.apps.sandbox.panels import build_controls, icon_button, named
+from decals.errors import InvalidEdit
 from decals.window import EditWindow
 
 LESSON_WIDTH, PLOTS_WIDTH = 370, 350
@@ -52,7 +53,7 @@ class LabPage(Page):
         super().__init__(server, window, lessons=titles, start_lesson=self.lab.start, **options)
         trigger = server.controller.trigger
         trigger("check")(self.lab.check)
-        trigger("guess")(lambda value: self.sandbox.attempt(lambda: self.lab.guess(value)))
+        trigger("guess")(lambda value: self.sandbox.attempt(lambda: self._guess(value)))
         if in_lesson:
             self.sandbox.open_lesson(0)
         server.controller.on_server_exited.add(lambda **_: self.lab.close())
@@ -95,6 +96,12 @@ class LabPage(Page):
     def _show_script(self) -> None:
         """Show the lines of Python that make the present picture."""
         self.sandbox.attempt(lambda: self._server.state.update({"lab_script": self.lab.script()}))
+
+    def _guess(self, value: Any) -> None:
+        """Take a guess, if a lesson asks for one."""
+        if not (self.sandbox.in_lesson and self.lab.lesson.settings.guess):
+            raise InvalidEdit("no lesson asks for a guess now; start one that does")
+        self.lab.guess(value)
 
     def _restart(self, number: int) -> None:
         """Start a lesson from its beginning."""

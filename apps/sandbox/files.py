@@ -8,6 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from blobtree.files import exists, is_file
 from blobtree.progress import Cancel, Progress
 from decals import cover
@@ -19,6 +22,7 @@ from decals.apps.views import THREE_QUARTER
 from decals.editing.commands import AddImage, ReplaceImage
 from decals.editing.file_names import open_plain
 from decals.editing.formats import WRITTEN_SUFFIXES
+from decals.editing.gizmo import on_plane
 from decals.editing.outline_actions import Part, image_on_layer
 from decals.editing.queries import SurfacePick
 from decals.editing.recovery import recovery_path
@@ -32,6 +36,7 @@ from decals.scenes.objects import MeshObject, SceneObject, unused_name
 from decals.scenes.scene import DecalImage, Scene
 from decals.validation import describe, one_of, whole_number
 from decals.window import EditWindow
+from decals.window.host_plotter import ray_through
 
 FIRST_IMAGES = ("scale",)
 """Images of a scene at the beginning."""
@@ -188,13 +193,27 @@ class SandboxFiles:
 
         "view 5000/0" is the middle of the lower edge, "view 10000/10000" the upper right corner.
         """
+        pixel = self._pixel_at(place)
+        return None if pixel is None else self._window.tools.at(*pixel)
+
+    def point_at(self, place: object) -> ArrayLike | None:
+        """Return the surface point at a place of the view, else the point there as far away as the target."""
+        pixel = self._pixel_at(place)
+        if pixel is None:
+            return None
+        if (pick := self._window.tools.at(*pixel)) is not None:
+            return pick.position
+        eye, target = self._window.camera.eye_and_target()
+        ray = ray_through(self._window.subplot, *pixel)
+        return None if ray is None else on_plane(target, np.subtract(eye, target), ray)
+
+    def _pixel_at(self, place: object) -> tuple[float, float] | None:
+        """Return the pixel at a place of the view, from the lower left; None for other texts."""
         found = PLACE.fullmatch(str(place))
+        sizes = self._window.plotter.window_size
         if found is None:
             return None
-        width, height = self._window.plotter.window_size
-        return self._window.tools.at(
-            int(found[1]) * width / PLACE_STEPS, int(found[2]) * height / PLACE_STEPS
-        )
+        return int(found[1]) * sizes[0] / PLACE_STEPS, int(found[2]) * sizes[1] / PLACE_STEPS
 
     def _take_light(self, picture: Any, file: object) -> None:
         """Light the scene with a panorama, which is kept in the folder."""

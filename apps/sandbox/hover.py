@@ -1,10 +1,13 @@
 """What the pointer is at: its rows in the outline, and the shape of a row in the view."""
 
 from contextlib import suppress
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from blobtree import Node, polygonize
 from blobtree._typing import Float32Array
 from blobtree.nodes.paths import node_in_world
 from decals.editing.document import Document
@@ -21,6 +24,12 @@ MAX_DOTS = 300
 
 KIND = "kind "
 """First part of the key of a row of the menu of kinds."""
+
+VIEW = " view "
+"""What parts a kind from the place of the view at which it is shown."""
+
+GHOST_RESOLUTION = 10
+"""Cells along the longest side of the shape that would be added."""
 
 NOTHING: dict[str, Any] = {"rows": [], "lines": [], "dots": []}
 """Values of a page while the pointer is at nothing."""
@@ -39,6 +48,7 @@ class Hover:
         self._window = window
         self._rows: list[str] = []
         self._key = ""
+        self._at: ArrayLike | None = None
         self._known: tuple[object, ...] = ()
         self._lines = self._dots = np.zeros((0, 2, 3), np.float32)
 
@@ -52,12 +62,12 @@ class Hover:
                 layer = int(self._window.document.decals[pick.owner].layers[0])
                 self._rows.append(Part("layer", layer).key)
 
-    def at_row(self, key: str) -> None:
+    def at_row(self, key: str, at: ArrayLike | None = None) -> None:
         """Light up the box of a row's node or object, or its decals; "" lights up nothing.
 
-        "kind Torus" lights up the box in which the menu would add such a node.
+        "kind Torus" lights up the box of the node that the menu would add; at a point of the scene its shape.
         """
-        self._key, self._rows = str(key), []
+        self._key, self._rows, self._at = str(key), [], at
 
     def values(self) -> dict[str, Any]:
         """Return the keys of the lit rows; and lines and dots in parts of the view, which cost no frame."""
@@ -78,10 +88,12 @@ class Hover:
         return self._placed()
 
     def _ghost_of(self, kind: str) -> Float32Array:
-        """Return the edges of the box of the node that the menu of a kind would add, shape (n, 2, 3)."""
-        make = self._window.actions.trees.node_in_view(kind)
+        """Return lines of the node that the menu of a kind would add, shape (n, 2, 3)."""
+        make = self._window.actions.trees.node_in_view(kind.partition(VIEW)[0], self._at)
         node = self._window.actions.state.asked("place a node", lambda _document: make())
-        return self._lines if node is None else np.stack(box_edges(*node.bounds))
+        if node is None:
+            return self._lines
+        return np.stack(box_edges(*node.bounds)) if self._at is None else outlines(node)
 
     def _placed(self) -> dict[str, Any]:
         """Return lines and dots where they lie in the view."""
@@ -100,6 +112,16 @@ class Hover:
         rows = (places / self._window.plotter.window_size * (1, -1) + (0, 1)).reshape(-1, width)
         listed: list[list[float]] = rows[np.isfinite(rows).all(axis=1)].round(4).tolist()
         return listed
+
+
+@lru_cache(maxsize=64)
+def outlines(node: Node) -> Float32Array:
+    """Return the edges of a coarse mesh of a node, shape (n, 2, 3); those of its box if it has no mesh."""
+    mesh = polygonize(node, resolution=GHOST_RESOLUTION)
+    if not len(mesh.faces):
+        return np.stack(box_edges(*node.bounds))
+    pairs = np.sort(mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    return np.asarray(mesh.vertices, np.float32)[np.unique(pairs, axis=0)]
 
 
 def _box_of(document: Document, part: Part) -> Float32Array:

@@ -48,7 +48,11 @@
       else if (event.currentTarget.fingers) trame.trigger("pinch", [0, 0, 1, "end"]);
     },
     pointerdown(event) {
-      if (event.isPrimary) event.currentTarget.fingers = null;
+      const kind = trame.state.get("placing");
+      if (kind && event.isPrimary) {
+        this.leave(event);
+        trame.trigger("add_at", [kind, this.place(event)]);
+      } else if (event.isPrimary) event.currentTarget.fingers = event.currentTarget.placed = null;
       else event.stopPropagation();
     },
     // The circle of the brush follows the pointer.
@@ -56,12 +60,23 @@
       const view = event.currentTarget;
       const box = view.getBoundingClientRect();
       if (view.fingers) event.stopPropagation();
-      this.hover(event.buttons ? "" : this.place(event), event);
+      const kind = trame.state.get("placing");
+      const place = event.buttons ? "" : this.place(event);
+      this.hover(kind && place ? `kind ${kind} ${place}` : place, event);
       view.style.setProperty("--x", `${event.clientX - box.left}px`);
       view.style.setProperty("--y", `${event.clientY - box.top}px`);
     },
     pointerup(event) {
-      if (!event.isPrimary) event.stopPropagation();
+      if (!event.isPrimary || event.currentTarget.placed) event.stopPropagation();
+    },
+
+    // Leave the placing of a new part; the press that places it does nothing else.
+    leave(event) {
+      event.stopPropagation();
+      event.preventDefault();
+      event.currentTarget.placed = true;
+      trame.state.set("placing", "");
+      this.hover("");
     },
 
     // Send a phase of a drag of a handle, and the pointer's place.
@@ -197,7 +212,9 @@
     (event) => {
       const view = document.querySelector("[role=application]");
       const taken = event.defaultPrevented || typedIn() || document.querySelector(OPEN);
-      if (event.key === "Escape" && document.querySelector(OPEN) && view.contains(event.target)) {
+      if (event.key === "Escape" && !taken && trame.state.get("placing")) {
+        trame.utils.sandbox.leave(event);
+      } else if (event.key === "Escape" && document.querySelector(OPEN) && view.contains(event.target)) {
         event.stopPropagation(); // what is open closes, and the view keeps what it does
         window.dispatchEvent(new KeyboardEvent("keydown", { key: "Escape" }));
       } else if (event.key === "Escape" && !taken && !view.contains(event.target)) {

@@ -57,7 +57,7 @@ TEMPLATES = {
 """Parts of the page in HTML, by their names."""
 
 EVENTS = {*re.findall(r"trigger\(['\"](\w+)", "".join([SCRIPT, *TEMPLATES.values()]))}
-EVENTS -= {"ask_to_drive", "pass_control"}
+EVENTS = EVENTS - {"ask_to_drive", "pass_control", "EVENT"} | {"add", "wrap", "combine"}
 """Events of the `Sandbox` that script and templates send; those of the driver are of `Connections`."""
 
 TOUCH_EVENTS = "touchstart", "touchmove", "touchend", "pointerdown", "pointermove", "pointerup"
@@ -97,9 +97,10 @@ CTRL_KEYS = "".join(
 """Letters that have an action together with Ctrl."""
 
 
-def template(name: str) -> None:
-    """Build a part of the page whose elements are those of what it stands in."""
-    html.Div(TEMPLATES[name], style="display: contents")
+def template(name: str, **words: str) -> None:
+    """Build a part of the page, with words in the place of others, whose elements are those of its parent."""
+    text = re.sub("|".join(words) or "$^", lambda found: words[found[0]], TEMPLATES[name])
+    html.Div(text, style="display: contents")
 
 
 def drawer(side: str, width: str = str(PANEL_WIDTH)) -> Any:
@@ -167,10 +168,11 @@ class Page:
         self._task: asyncio.Task[None] | None = None
         self._end: asyncio.Task[None] | None = None
         server.state.client_only(
-            "left_open", "right_open", "file_open", "theme", "folded", "sought", "kind_sought"
+            "left_open", "right_open", "file_open", "theme", "folded", "sought", "kind_sought", "placing"
         )  # another browser has its own
         server.state.update({**self.values(), "catalog": self.sandbox.catalog(), "thumbnails": thumbnails()})
         server.state.update({"theme": "light", "dropped": None, "dropped_on": "", "folded": [], "sought": ""})
+        server.state.update({"kind_sought": "", "placing": ""})
         server.state.update({"file_open": False, "file_name": "", "file_size": "", "replace_file": False})
         server.state.update({"file_video": str(Video.TURNTABLE), "formats": FORMATS})
         server.state.renamed = {"key": "", "name": ""}
@@ -303,12 +305,12 @@ class Page:
                 template("files")
                 panels.build_view_menu(self.sandbox)
                 for title, icon, family, event in (
-                    ("Add", "mdi-plus", "primitives", self.sandbox.add),
-                    ("Modify", "mdi-tune-variant", "modifiers", self.sandbox.wrap),
-                    ("Combine", "mdi-set-center", "combinations", self.sandbox.combine),
+                    ("Add", "mdi-plus", "primitives", "add"),
+                    ("Modify", "mdi-tune-variant", "modifiers", "wrap"),
+                    ("Combine", "mdi-set-center", "combinations", "combine"),
                 ):
-                    with panels.menu(title, icon, max_height=480, width=360):
-                        panels.build_kinds(family, event)
+                    with panels.menu(title, icon, max_height=480, width=360), vuetify3.VSheet():
+                        template("kinds", FAMILY=family, EVENT=event)
                 panels.build_actions(self.sandbox)
             panels.build_brushes(self.sandbox)
             with html.Div(classes="bar first"):

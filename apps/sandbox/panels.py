@@ -8,7 +8,6 @@ from trame.widgets import html, vuetify3
 
 from decals.apps.sandbox.files import LIGHT
 from decals.apps.sandbox.folder import IMAGES
-from decals.apps.sandbox.hover import KIND
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing.actions import KEYS
 from decals.editing.brush_settings import Brush
@@ -75,31 +74,6 @@ def menu(text: str, icon: str, **options: Any) -> Iterator[None]:
         with vuetify3.Template(v_slot_activator="{ props }"):
             vuetify3.VBtn(text, v_bind="props", prepend_icon=icon)
         yield
-
-
-def build_kinds(family: str, event: Any) -> None:
-    """Build the list of a family of kinds, with a search; the pointer shows where a node would be."""
-    vuetify3.VTextField(
-        v_model=("kind_sought", ""),
-        prepend_inner_icon="mdi-magnify",
-        classes="ma-2 flex-grow-0",
-        raw_attrs=["@click.stop", *named(f"'search in {family}'")],
-    )
-    found = f"catalog.{family}.filter((e) => utils.sandbox.found(e + ' ' + catalog.docs[e], kind_sought))"
-    ghost = {
-        "pointerenter": f"utils.sandbox.hover('{KIND}' + e, $event)",
-        "pointerleave": "utils.sandbox.hover('')",
-    }
-    with vuetify3.VList():
-        vuetify3.VListItem(
-            v_for=f"(e, i) in {found}",
-            key="i",
-            title=("e",),
-            subtitle=("catalog.docs[e]",),
-            click=(event, "[e]"),
-            __events=[*ghost],
-            **ghost,
-        )
 
 
 def build_controls(source: str, event: Any, identifiers: str, *, key: str = "c.name") -> None:

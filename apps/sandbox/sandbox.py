@@ -18,7 +18,7 @@ from decals.apps.sandbox.display import PHASES, Display
 from decals.apps.sandbox.fields import Fields
 from decals.apps.sandbox.files import SandboxFiles
 from decals.apps.sandbox.folder import MAX_UPLOADS
-from decals.apps.sandbox.hover import Hover
+from decals.apps.sandbox.hover import VIEW, Hover
 from decals.apps.sandbox.outline import outline
 from decals.editing import new_nodes
 from decals.editing.action_state import joined
@@ -473,12 +473,21 @@ class Sandbox:
     def hover(self, key: str) -> None:
         """Light up what the pointer is at: the row of a key in the view, or the part at a place of the view.
 
-        A place that has no part, and a key that the scene does not have, light up nothing.
+        A place that has no part, and a key that the scene does not have, light up nothing. "kind Torus view
+        5000/5000" shows what `add_at` would add.
         """
-        if not str(key).startswith("view "):
+        kind, _, place = str(key).partition(VIEW)
+        if place and not self._window.background.busy_editing:
+            self._hover.at_row(key, self._files.point_at(f"view {place}"))
+        elif not place and not kind.startswith("view "):
             self._hover.at_row(key)
         elif not self._window.background.busy_editing:
             self._hover.at_place(self._files.surface_at(key))
+
+    @event
+    def add_at(self, kind: str, place: str) -> None:
+        """Add a primitive of a kind at a place of the view, see `SandboxFiles.surface_at`."""
+        self._trees.add_node(kind, self._files.point_at(place))
 
     @event
     def move_camera(self, name: str, value: Any = None) -> None:

@@ -356,15 +356,17 @@ class TreeActions(WindowActions):
         if last:
             self.end_drag()
 
-    def add_node(self, kind: str) -> None:
-        """Add a primitive in the middle of the view, blended into the selected node, else as an object.
+    def add_node(self, kind: str, at: ArrayLike | None = None) -> None:
+        """Add a primitive to a scene, blended into the selected node, else as an object.
 
         Parameters
         ----------
         kind
             Name of its class; see `decals.editing.new_nodes.kinds`.
+        at
+            Its place, shape (3,). Default: the middle of the view.
         """
-        make, middle = self.node_in_view(kind), np.zeros(3, np.float32)
+        make, middle = self.node_in_view(kind, at), np.zeros(3, np.float32)
         if self._state.primitive is None:
             self._add_tree(kind.lower(), make, middle)
             return
@@ -375,13 +377,13 @@ class TreeActions(WindowActions):
 
         self._restructure_later(f"add {kind}", number, command, middle)
 
-    def node_in_view(self, kind: str) -> Callable[[], Node]:
+    def node_in_view(self, kind: str, at: ArrayLike | None = None) -> Callable[[], Node]:
         """Return a function that makes the node that `add_node` adds now."""
         checked_kind(kind)
         objects, view = self._state.session.document.objects, self._state.camera.eye_and_target()
         if self._state.primitive is not None:
             objects = objects[self._state.primitive[0] :][:1]
-        return lambda: new_node(kind, (), *_place_in_view(objects, *view, kind))
+        return lambda: new_node(kind, (), *_place_in_view(objects, *view, kind, at))
 
     def wrap_node(self, kind: str) -> None:
         """Put the selected node under a new node of a kind with one operand, such as a warp."""
@@ -691,21 +693,23 @@ def _surface_check(number: int) -> Step:
 
 
 def _place_in_view(
-    objects: Sequence[SceneObject], eye: ArrayLike, target: ArrayLike, kind: str
+    objects: Sequence[SceneObject], eye: ArrayLike, target: ArrayLike, kind: str, at: ArrayLike | None
 ) -> tuple[Float64Array, float]:
     """Return centre (3,) and size for a new node of a kind.
 
-    It is centred at the point of the surfaces in the middle of the view, else the one closest to the target;
-    without objects, at the target.
+    Without a place, it is centred at the point of the surfaces in the middle of the view, else the one
+    closest to the target; without objects, at the target.
     """
-    position, middle = np.asarray(eye, np.float64), np.asarray(target, np.float64)
+    position, middle = np.asarray(eye, np.float64), np.asarray(target if at is None else at, np.float64)
     if not objects:
         return _rounded(middle, FIRST_OBJECT_RADIUS * float(np.linalg.norm(position - middle)))
-    hit = first_hit(objects, position, middle - position)
-    points = hit if len(hit.objects) else nearest_points(objects, middle[None])
+    if at is None:
+        hit = first_hit(objects, position, middle - position)
+        points = hit if len(hit.objects) else nearest_points(objects, middle[None])
+        middle = points.positions[0].astype(np.float64)
     (low, high), (kind_low, kind_high) = bounds_of(objects), new_node(kind).bounds
     size = NEW_NODE_EXTENT * float((high - low).max() / (kind_high - kind_low).max())
-    return _rounded(points.positions[0].astype(np.float64), size)
+    return _rounded(middle, size)
 
 
 def _rounded(center: Float64Array, size: float) -> tuple[Float64Array, float]:

@@ -210,6 +210,7 @@ async def sandbox(picture: str | None = None) -> None:
         sandbox_page.sandbox.hover("0/2")
         np.testing.assert_allclose(sandbox_page.sandbox.values()["hovered"]["lines"], ghost, atol=1e-3)
         sandbox_page.sandbox.hover("")
+        await placed(browser, window)
         field = browser.get_by_role("textbox", name="ring radius")
         await field.fill("0.6")
         await field.press("Enter")
@@ -308,6 +309,36 @@ async def hovers(browser: Page, window: EditWindow) -> None:
     await drag(browser, window.plotter, at)
     await browser.keyboard.up("Control")
     await until(lambda: state.nodes == ((0, (1,)),))
+
+
+async def placed(browser: Page, window: EditWindow) -> None:
+    """A kind is placed under the mouse, which shows its shape before; Escape leaves it; one undo takes it."""
+    labels, (_, at) = window.session.labels, next(Driver(window).visible())
+    lines = browser.locator(".hovered line")
+    for leave in (True, False):
+        await browser.get_by_role("button", name="Add", exact=True).click()
+        await browser.get_by_label("search in primitives").fill("cone")
+        await browser.get_by_title("place a Cone by the mouse").click()
+        await browser.get_by_text("Click where the Cone goes").wait_for()
+        await point(browser, window.plotter, at)
+        await until_more(lines, 12)
+        if leave:
+            await browser.keyboard.press("Escape")
+            await browser.get_by_text("Click where the Cone goes").wait_for(state="detached")
+        else:
+            await drag(browser, window.plotter, at)
+    await until(lambda: window.session.labels == (*labels, "add Cone"))
+    await until(lambda: not window.background.busy)
+    await browser.keyboard.press("Control+z")
+    await until(lambda: window.session.labels == labels)
+    await browser.get_by_text("Torus", exact=True).first.click()
+
+
+async def until_more(found: Any, count: int) -> None:
+    """Wait until more elements than so many are found."""
+    async with asyncio.timeout(PATIENCE):
+        while await found.count() <= count:
+            await asyncio.sleep(0.05)
 
 
 async def until_count(found: Any, count: int) -> None:
@@ -714,6 +745,7 @@ async def images(browser: Page, window: EditWindow) -> None:
     chooser = browser.get_by_label("add images")
     await chooser.set_input_files([folder / "first.png", folder / "second.png"])
     await until(lambda: [image.source for image in document.images] == [*names, "first", "second"])
+    await browser.get_by_role("heading", name="Images", exact=True).wait_for()
     await browser.get_by_role("button", name="first", exact=True).click()
     await browser.get_by_label("replace this image").set_input_files(folder / "second.png")
     await until(lambda: [image.source for image in document.images] == [*names, "second", "second"])

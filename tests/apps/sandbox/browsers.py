@@ -104,17 +104,24 @@ Connect = Callable[..., Awaitable[Browser]]
 Check = Callable[[EditWindow, Any, Connect], Awaitable[None]]
 
 
-def serve(check: Check, **options: Any) -> None:
-    """Serve a page with options to a check."""
+def serve(check: Check, *, lessons: bool = False, **options: Any) -> None:
+    """Serve a page with options to a check, with the lessons of the lab if they are wanted."""
     from trame.app import get_server
 
+    from decals.apps.lab.lesson import LESSONS, load_lessons
+    from decals.apps.lab.page import LabPage
     from decals.apps.sandbox.guard import Guard
     from decals.apps.sandbox.page import Page
 
+    def new_page(server: Any, window: EditWindow) -> Page:
+        if not lessons:
+            return Page(server, window, **options)
+        return LabPage(server, window, load_lessons(LESSONS), **{"in_lesson": False, **options})
+
     async def run(window: EditWindow) -> None:
         server = get_server(f"connections {id(window)}", client_type="vue3")
-        guard = Guard(framed=True)
-        page = Page(server, window, guard=guard, **options)
+        guard = options["guard"] = Guard(framed=True)
+        page = new_page(server, window)
         network: dict[str, Any] = {"exec_mode": "task", "port": 0, "timeout": 0, "open_browser": False}
         task = server.start(host="127.0.0.1", show_connection_info=False, **network)
         await server.ready

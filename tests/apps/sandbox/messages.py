@@ -62,7 +62,7 @@ HANDLES = ["move", "move x", "turn y", "scale", "start 0", "slice", "tilt slice"
 EVENTS: dict[str, list[list[Any]]] = {
     "select": [KEYS_OF_ROWS],
     "mark": [KEYS_OF_ROWS],
-    "open_lesson": [[0, 1]],
+    "open_lesson": [[0, 1, 9, -1, "x"]],
     "set_control node": [
         ["node"],
         NAMES,
@@ -72,6 +72,7 @@ EVENTS: dict[str, list[list[Any]]] = {
     ],
     "scatter": [],
     "add": [KINDS],
+    "add_at": [KINDS, ["view 5000/5000", "view 0/10000", "view 99999/1", "0/1"]],
     "wrap": [KINDS],
     "combine": [KINDS],
     "unwrap": [],
@@ -115,7 +116,12 @@ EVENTS: dict[str, list[list[Any]]] = {
     "read_file": [["../x.json", "scene.json", "mine.py"], [0, 5, -1]],
     "write_file": [["../x.py", "x.exe", "no/x.json"]],
     "place_image": [KEYS_OF_ROWS, ["view 5000/5000", "view 0/0", "view 1", "0"]],
-    "hover": [[*KEYS_OF_ROWS, "layer 0", "view 5000/5000", "view x"]],
+    "hover": [
+        [*KEYS_OF_ROWS, "layer 0", "view 5000/5000", "view x", "kind Box view 4000/6000", "kind x view 1/1"]
+    ],
+    "close_lesson": [[True, False]],
+    "check": [],
+    "guess": [[0.4, -3, 1e300, "x", [0.2]]],
     "upload": [[[{}], [{"name": "a.ply", "content": b"x"}], 3], [*KEYS_OF_ROWS, "light", "view 5000/5000"]],
 }
 """Arguments of the page's events, by their names; a second word tells two kinds of one event apart."""
@@ -469,7 +475,8 @@ class Messages:
             await self._answer(f"{name} {arguments[:1]}"[:40], self._trigger(number, name, *arguments))
 
     def _trigger(self, number: int, name: str, *arguments: Any) -> Awaitable[Any]:
-        return self._browsers[number].trigger(getattr(self._page.sandbox, name.split()[0]), *arguments)
+        name = name.split()[0]  # the lab's events have names alone
+        return self._browsers[number].trigger(getattr(self._page.sandbox, name, name), *arguments)
 
     def _mouse(self, number: int, action: str = "") -> Awaitable[Any]:
         at = self._rng.uniform(0, SIZE[0]), self._rng.uniform(0, SIZE[1])
@@ -555,7 +562,7 @@ def measure(
                 await Messages(window, page, connect, folder, seed, shared=shared).run(part, report)
             )
 
-        serve(check, folder=folder, shared=shared)
+        serve(check, lessons=True, folder=folder, shared=shared)
         return figures
 
     noted = Noted(logging.ERROR)

@@ -20,6 +20,7 @@ from blobtree import Point, Segment, Torus, Twist, Union
 from blobtree.nodes.paths import node_at
 from blobtree.nodes.surgery import dominant_primitive
 from decals.apps.sandbox.controls import WORDS
+from decals.apps.sandbox.hover import outlines
 from decals.apps.sandbox.outline import outline
 from decals.apps.sandbox.sandbox import REST_SECONDS, Sandbox
 from decals.editing import tree_actions
@@ -27,6 +28,7 @@ from decals.editing.action_state import SLOW_STEP
 from decals.editing.actions import KEYS
 from decals.editing.commands import ReplaceScene
 from decals.editing.document import Document
+from decals.editing.gizmo import on_plane
 from decals.editing.queries import first_hit, nearest_points
 from decals.editing.tree_commands import SetParameter
 from decals.errors import InvalidEdit
@@ -34,6 +36,7 @@ from decals.scenes.camera import Camera
 from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.scene import Scene
 from decals.window import EditWindow
+from decals.window.host_plotter import pixels_of, ray_through
 from tests.decals.editing.scenes import box, digest, tree_of
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -641,6 +644,33 @@ def test_added_primitives_lie_where_the_view_looks(vtk_display: None, toward: tu
             assert (high - low).max() == pytest.approx(0.1 * size, rel=0.02)
             assert (low - 0.01 * size <= seen.positions[0]).all()
             assert (seen.positions[0] <= high + 0.01 * size).all()
+
+
+@pytest.mark.parametrize("kind", ["Point", "Box", "Torus", "Cylinder", "Polyline"])
+def test_the_ghost_under_the_mouse_is_what_a_click_adds_there(window: EditWindow, kind: str) -> None:
+    sandbox, state = Sandbox(window), window.actions.state
+    size = float(np.ptp(tree_of(window.document).bounds, axis=0).max())
+    for x, y in np.random.default_rng(len(kind)).integers(0, 10_000, (3, 2)).tolist():
+        pixel = x / 10_000 * 80, y / 10_000 * 60
+        pick, ray = window.tools.at(*pixel), ray_through(window.subplot, *pixel)
+        assert ray is not None
+        eye, target = window.camera.eye_and_target()
+        seen: Any = on_plane(target, np.subtract(eye, target), ray) if pick is None else pick.position
+        sandbox.select("0/0")
+        sandbox.hover(f"kind {kind} view {x}/{y}")
+        ghost = sandbox.values()["hovered"]["lines"]
+        sandbox.add_at(kind, f"view {x}/{y}")
+        finish(window)
+        assert state.primitive is not None
+        node = node_at(tree_of(window.document), state.primitive[1])
+        low, high = node.bounds
+        assert (high - low).max() == pytest.approx(0.1 * size, rel=0.02)
+        assert (low - 0.01 * size <= seen).all()
+        assert (seen <= high + 0.01 * size).all()
+        lines = (pixels_of(window.subplot, outlines(node).reshape(-1, 3)) + 0.5) / (80, 60) * (1, -1) + (0, 1)
+        np.testing.assert_allclose(ghost, lines.reshape(-1, 4), atol=1e-3)
+        sandbox.go_to(0)
+        finish(window)
 
 
 def test_the_queue_lists_work_and_each_entry_can_be_removed(window: EditWindow) -> None:
