@@ -14,6 +14,7 @@ from blobtree.declare.formula import (
     formula,
     is_own,
     python_function,
+    require_claims,
     tag_of,
 )
 from blobtree.declare.registry import Definitions, library_rows, load_libraries
@@ -82,13 +83,16 @@ class Falloff:
     _instance: ClassVar["Falloff"]
 
     def __init_subclass__(cls) -> None:
-        cls.name = tag_of(cls)
-        cls._formulas = declared_formulas(cls, cls.name, {"value": wp.float32, "slope": wp.float32})
+        tag = tag_of(cls)
+        cls._formulas = declared_formulas(cls, tag, {"value": wp.float32, "slope": wp.float32})
         fields = [name for name, value in vars(cls).items() if isinstance(value, Field)]
         if fields:
             raise InvalidDefinition(f"{cls.__qualname__}: {fields[0]!r}: a falloff has no parameters")
         if "value" not in cls._formulas:
             raise InvalidDefinition(f"{cls.__qualname__}: expected a falloff with the formula `value`")
+        if not is_own(cls):
+            require_claims(cls, "a falloff")
+        cls.name = tag
         for name, declared in cls._formulas.items():
             setattr(cls, name, declared.function)
         falloff = object.__new__(cls)

@@ -8,12 +8,13 @@ formulas of this package are named after their kind instead; tests check them, a
 """
 
 import ast
+import difflib
 import hashlib
 import inspect
 import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import Field, dataclass, field, replace
 from types import FunctionType
 from typing import Any
 
@@ -109,6 +110,27 @@ def tag_of(kind: type) -> str:
             f"{kind.__qualname__}: tag: expected letters, digits and single underscores, got {tag!r}"
         )
     return tag
+
+
+def require_claims(kind: type, sort: str) -> None:
+    """Raise `InvalidDefinition` for a misspelt claim in the body of a kind.
+
+    That is a value in lower case, or a class method with nearly the name of another, which no base has.
+    """
+    known = [name for name in dir(kind.__mro__[1]) if not name.startswith("_")]
+    for name, value in vars(kind).items():
+        if name.startswith("_") or name in ("tag", *known, *inspect.get_annotations(kind)):
+            continue
+        alike = difflib.get_close_matches(name, known, 1)
+        plain = name.islower() and not (
+            hasattr(value, "__get__") or isinstance(value, type | Declared | Field)
+        )
+        if plain or (isinstance(value, classmethod) and alike):
+            meant = f"; did you mean {alike[0]!r}?" if alike else ""
+            raise InvalidDefinition(
+                f"{kind.__qualname__}: {name!r} is no claim of {sort}{meant}; begin a name of your own with "
+                "an underscore"
+            )
 
 
 def declared_formulas(kind: type, tag: str, results: Mapping[str, Any]) -> dict[str, Formula]:

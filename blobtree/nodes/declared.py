@@ -3,12 +3,12 @@
 import inspect
 from collections.abc import Mapping
 from dataclasses import Field, dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
-from blobtree.declare.formula import Declared, Formula, declared_formulas, is_own, tag_of
+from blobtree.declare.formula import Declared, Formula, declared_formulas, is_own, require_claims, tag_of
 from blobtree.declare.parameters import Parameter, documented, fields_of, parameters_of
 from blobtree.declare.registry import CUSTOM_KINDS, CUSTOM_TAGS, CustomKind, library_rows
-from blobtree.errors import InvalidDefinition
+from blobtree.errors import InvalidDefinition, InvalidNode
 from blobtree.nodes.node import Node
 
 
@@ -46,6 +46,8 @@ class DeclaredNode(Node, metaclass=CustomKind):
         if not declares and (own or cls.row_name in vars(cls)):
             super().__init_subclass__()
             return
+        if not own:
+            require_claims(cls, cls.sort)
         tag = tag_of(cls)
         cls._formulas = {**cls._formulas, **declared_formulas(cls, tag, cls.formula_results)}
         if own:
@@ -65,6 +67,12 @@ class DeclaredNode(Node, metaclass=CustomKind):
             )
         else:
             cls._define(cls._declaration(tag))
+
+    def __new__(cls, *_: Any, **__: Any) -> Self:
+        """Refuse a node of a base class, which has no formulas."""
+        if getattr(cls, cls.row_name, None) is None:
+            raise InvalidNode(f"{cls.__name__}: expected a subclass of it with the formula `{cls.needed[0]}`")
+        return super().__new__(cls)
 
     @classmethod
     def _declaration(cls, tag: str) -> Any:

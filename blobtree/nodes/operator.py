@@ -139,8 +139,6 @@ class Operator(ManyOperands, Combination):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if type(self) is Operator:
-            raise InvalidNode("Operator: expected a subclass of it with the formula `value`")
         if not self.operator.commutes and len(self.operands) != 2:
             raise InvalidNode(
                 f"operands: expected two, got {len(self.operands)}; {type(self).__name__} does not "

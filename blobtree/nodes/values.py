@@ -11,6 +11,7 @@ from operator import attrgetter
 from typing import Annotated, Any, TypeVar, get_origin, get_type_hints
 
 from blobtree.declare.parameters import OPTIONAL, fields_of
+from blobtree.errors import UnknownKind
 from blobtree.identity import content_hash
 from blobtree.tape.program import ProgramNode, postorder
 
@@ -160,14 +161,26 @@ def to_records(root: ProgramNode) -> list[Record]:
 
 
 def from_records(records: list[Record]) -> ProgramNode:
-    """Return the tree of records from `to_records`."""
+    """Return the tree of records from `to_records`.
+
+    Raises
+    ------
+    UnknownKind
+        A kind has other parameters than when the records were made.
+    """
     nodes: list[ProgramNode] = []
     for kind, values, references in records:
         operands = {
             name: nodes[indices] if isinstance(indices, int) else tuple(nodes[place] for place in indices)
             for name, indices in references.items()
         }
-        nodes.append(kind(**values, **operands))
+        try:
+            nodes.append(kind(**values, **operands))
+        except TypeError as error:
+            raise UnknownKind(
+                f"{kind.__name__}: expected the parameters {', '.join(f.name for f in fields_of(kind))}, got "
+                f"{', '.join(values | operands)}; the pickle was written with another definition of it"
+            ) from error
     return nodes[-1]
 
 
