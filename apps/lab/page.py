@@ -8,7 +8,7 @@ from trame.widgets import client, html, vuetify3
 
 from decals.apps.lab.lab import Lab
 from decals.apps.lab.lesson import Lesson
-from decals.apps.lab.symbols import LIT
+from decals.apps.lab.symbols import ACTS, LIT
 from decals.apps.sandbox.page import PANEL_WIDTH, Page, drawer
 from decals.apps.sandbox.panels import build_controls, icon_button, named
 from decals.errors import InvalidEdit
@@ -20,7 +20,7 @@ STYLE, LESSON, PLOTS = (
     Path(__file__).with_name(name).read_text(encoding="utf-8")
     for name in ("page.css", "lesson.html", "plots.html")
 )
-STYLE += f"{LIT} {{ stroke-width: 5 }}"
+STYLE += f"{LIT} {{ stroke-width: 5 }} {ACTS} {{ opacity: 0.5 }}"
 
 
 class LabPage(Page):

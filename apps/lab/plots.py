@@ -11,7 +11,7 @@ from blobtree._typing import BoolArray, Float64Array
 from decals.apps.lab.experiment import MAP_PIXELS, Points, Scope
 from decals.apps.lab.lesson import Lesson, Plot
 from decals.apps.lab.measures import owner
-from decals.apps.lab.symbols import SYMBOL, marked
+from decals.apps.lab.symbols import SYMBOL, marked, regions
 from decals.apps.sandbox.outline import png_url
 
 WIDTH, HEIGHT, MAP_HEIGHT = 330, 150, 205
@@ -32,6 +32,9 @@ SCALE = np.array(
     [[253, 231, 37], [122, 209, 81], [34, 168, 132], [42, 120, 142], [65, 68, 135], [68, 1, 84]], np.float64
 )[::-1]
 """Colours of a map from its lowest to its highest value: viridis, whose lightness rises evenly."""
+
+ACTING = "#56b4e9"
+"""Colour of the part of a line at which a symbol acts."""
 
 RED, LINE = (213, 0, 0), (255, 255, 255)
 
@@ -132,12 +135,29 @@ def _curves(plot: Plot, lesson: Lesson, scope: Scope) -> str:
         axes.add("line", x1=left, x2=left + 22, y1=down - 4, y2=down - 4, stroke_width=2, **look)
         axes.add("text", curve.label, x=left + 27, y=down)
     if plot.x is None:
+        _shade(axes, x, regions(at))
         here, _ = axes.at(experiment.along_line(scope.points.positions[0]), 0.0)
         look = {"stroke": "currentColor", "stroke_dasharray": "3 3"}
         bottom = axes.top + axes.size[1]
         axes.add("line", x1=f"{here:.1f}", x2=f"{here:.1f}", y1=axes.top, y2=bottom, **look)
     _mark(plot, lesson, scope, axes)
     return axes.svg(plot.title)
+
+
+def _shade(axes: _Axes, x: Float64Array, found: dict[str, BoolArray]) -> None:
+    """Add where symbols act along a line; the page shows it while the pointer is at one of them."""
+    half = (x[1] - x[0]) / 2
+    for name, acts in found.items():
+        ends = np.flatnonzero(np.diff(np.concatenate([[False], acts, [False]])))
+        for first, last in ends.reshape(-1, 2):
+            (left, right), _ = axes.at([max(x[first] - half, x[0]), min(x[last - 1] + half, x[-1])], 0.0)
+            places = {
+                "x": f"{left:.1f}",
+                "width": f"{right - left:.1f}",
+                "y": axes.top,
+                "height": axes.size[1],
+            }
+            axes.add("rect", data_region=name, fill=ACTING, **places)
 
 
 def _range(values: Float64Array, padding: float = 0.0) -> tuple[float, float]:
@@ -189,6 +209,10 @@ def _map(plot: Plot, lesson: Lesson, scope: Scope) -> str:
     source = png_url(_colored(values, low, high, red, lines), compress_level=1)
     width, height = axes.size
     axes.add("image", x=LEFT, y=TOP, width=width, height=height, href=source, preserveAspectRatio="none")
+    for name, acts in regions(at).items() if plot.x is None else ():
+        shade = png_url(_colored(np.where(acts, 1.0, np.nan).reshape(values.shape), 0, 1, red & False, None))
+        places = {"x": LEFT, "y": TOP, "width": width, "height": height}
+        axes.add("image", data_region=name, href=shade, preserveAspectRatio="none", **places)
     bar = LEFT + width + 14
     scale = png_url(_colored(np.linspace(1, 0, 64)[:, None], 0, 1, np.zeros((64, 1), np.bool_), None))
     axes.add("image", x=bar, y=TOP, width=12, height=height, href=scale, preserveAspectRatio="none")

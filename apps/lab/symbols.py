@@ -6,8 +6,9 @@ from html import escape
 
 import numpy as np
 
+from blobtree._typing import BoolArray
 from decals.apps.lab.experiment import Scope
-from decals.apps.lab.measures import MEASURES, F, h, owner, solids_of
+from decals.apps.lab.measures import MEASURES, F, h, owner, solids_of, top
 from decals.model import Interaction
 from decals.record import Contact
 
@@ -27,11 +28,15 @@ SYMBOL = re.compile(rf"(?<![\w'’])([{''.join(DEFINITIONS)}])([₀-₉]*)(?![^\
 
 TAG = re.compile(r"(<[^>]*>)")
 
-LIT = ",".join(
-    f'.v-application:has(:is(abbr, tspan)[data-symbol="{s}"]:hover) path[data-symbol="{s}"]'
-    for s in ("g", "h", "F", "f", "f₀", "f₁", "F₀", "F₁")
+NAMES = *DEFINITIONS, "f₀", "f₁", "F₀", "F₁"
+LIT, ACTS = (
+    ",".join(f'.v-application:has(:is(abbr, tspan)[data-symbol="{s}"]:hover) {part}="{s}"]' for s in NAMES)
+    for part in ("path[data-symbol", "[data-region")
 )
-"""Selector of the curve whose symbol is under the pointer."""
+"""Selectors of the curve whose symbol is under the pointer, and of the region in which that symbol acts."""
+
+PUSHED = 1e-3
+"""Least change of the field by which a push counts."""
 
 
 def marked(html: str, *, svg: bool = False) -> str:
@@ -45,6 +50,26 @@ def marked(html: str, *, svg: bool = False) -> str:
 
     parts = TAG.split(html)
     return "".join(part if i % 2 else SYMBOL.sub(definition, part) for i, part in enumerate(parts))
+
+
+def regions(scope: Scope) -> dict[str, BoolArray]:
+    """Return the points at which each symbol acts, bool[n] each.
+
+    A field acts where its image or solid is, ½ or more, h where it lowers the highest field, and g, d and s
+    where the influence of a decal reaches.
+    """
+
+    def of(measure: str, number: int) -> BoolArray:
+        return np.asarray(MEASURES[measure].function(scope, number) >= 0.5)
+
+    pairs = range(2)
+    if scope.experiment.in_space:
+        return {f"{s}{'₀₁'[i]}": of(name, i) for s, name in (("f", "body"), ("F", "solid")) for i in pairs}
+    highest, seen = top(scope), owner(scope) >= 0
+    pushed = seen & (highest - F(scope) > PUSHED)
+    found = dict.fromkeys("gds", highest > 0.0) | dict.fromkeys("fr", highest >= 0.5)
+    found |= {f"f{'₀₁'[i]}": of("f", i) for i in pairs if i < len(scope.experiment.decals)}
+    return {name: acts & scope.points.exists for name, acts in {**found, "F": seen, "h": pushed}.items()}
 
 
 def readings(scope: Scope) -> list[tuple[str, list[float]]]:

@@ -1008,6 +1008,7 @@ async def lab(picture: str | None = None) -> None:
         await browser.get_by_text("Text of the lesson").click()
         for place in (".lesson-side abbr", ".readings abbr", ".formula abbr", ".plot tspan"):
             await browser.locator(f"{place}[data-symbol='g']").first.hover()
+            await until_width(browser.locator("[data-region='g']").first, "0.5", "opacity")
             await until_width(curve, "5px")
             await browser.get_by_role("button", name="Check the answer").hover()
             await until_width(curve, "2px")
@@ -1057,10 +1058,10 @@ async def until_readings(browser: Page, lab_page: LabPage) -> None:
             await asyncio.sleep(0.1)
 
 
-async def until_width(line: Locator, width: str) -> None:
+async def until_width(line: Locator, width: str, of: str = "strokeWidth") -> None:
     """Wait until a line has a width."""
     async with asyncio.timeout(PATIENCE):
-        while await line.evaluate("path => getComputedStyle(path).strokeWidth") != width:
+        while await line.evaluate(f"path => getComputedStyle(path).{of}") != width:
             await asyncio.sleep(0.1)
 
 

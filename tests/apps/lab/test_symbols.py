@@ -9,7 +9,8 @@ import pytest
 from decals.apps.lab.experiment import Scope
 from decals.apps.lab.lab import _html, measured
 from decals.apps.lab.lesson import LESSONS, Lesson, load_lessons, shown
-from decals.apps.lab.symbols import DEFINITIONS, marked, readings, table
+from decals.apps.lab.plots import LEFT, RIGHT, SAMPLES, WIDTH, drawn
+from decals.apps.lab.symbols import DEFINITIONS, PUSHED, marked, readings, regions, table
 from decals.field.rules import PictureRules
 from decals.model import Decals, Interaction
 from decals.record import Contact
@@ -125,3 +126,39 @@ def test_numbers_in_the_formula_of_contact_fit_together(lessons: list[Lesson], x
     assert 0.5 + (high - 0.5) * h == pytest.approx(result, abs=0.006)
     assert factor.endswith(f"= {shown(h)}") or (h == 1 and factor.startswith("h = 1, as"))
     assert 'data-symbol="h"' in results.plots[0]["svg"]
+
+
+@pytest.mark.parametrize("gap", [0.5, 0.9, 1.1, 1.3])
+def test_regions_lie_where_the_symbols_act(lessons: list[Lesson], gap: float) -> None:
+    lesson, centers = lessons[1], np.array([-gap / 2, gap / 2])
+    positions = [[x, 0, 0] for x in centers]
+    decals = lesson.scene.decals.replace(positions=positions, radii=0.6)
+    state = experiment(decals=decals, camera=lesson.scene.camera)
+    along = state.line_points(SAMPLES)
+    x = along.variables["x"] - gap / 2  # it begins at the first centre
+    f = falloff(np.abs(x[:, None] - centers) / (0.6 / RIM))
+    high, low = f.max(axis=1), f.min(axis=1)
+    expected = {"g": high > 0, "f": high > 0.5, "f₀": f[:, 0] > 0.5, "f₁": f[:, 1] > 0.5}
+    expected |= {"F": high > 0.5, "h": (high > 0.5) & (high - contact_field(f) > PUSHED)}
+    found = regions(Scope.at_probe(state).at(along))
+    svg = measured(lesson, state).plots[0]["svg"]
+    for name, acts in expected.items():
+        differs = np.flatnonzero(found[name] != acts)
+        edges = np.flatnonzero(np.diff(acts)) + 0.5
+        assert all(np.abs(edges - i).min(initial=np.inf) <= 1.5 for i in differs), name
+        rects = re.findall(rf'<rect data-region="{name}"[^>]* x="([\d.]+)" width="([\d.]+)"', svg)
+        width = sum(float(part) for _, part in rects)
+        assert width / (WIDTH - LEFT - RIGHT) == pytest.approx(acts.mean(), abs=0.01), name
+    assert found["h"].any() == bool((low + high > 1.01)[high > 0.51].any())
+
+
+def test_maps_have_a_layer_for_each_region_and_solids_have_theirs(lessons: list[Lesson]) -> None:
+    for lesson, names in ((lessons[2], "gdsfrFh"), (lessons[5], ["f₀", "f₁", "F₀", "F₁"])):
+        settings = lesson.settings
+        known = {"objects": lesson.scene.objects, "camera": lesson.scene.camera, "size": lesson.size}
+        known |= {"line": settings.line, "in_space": settings.space, "decals": lesson.scene.decals}
+        scope = Scope.at_probe(experiment(probe=settings.probe, **known))
+        plots = [drawn(plot, lesson, scope) for plot in lesson.settings.plots if plot.x is None]
+        assert plots
+        for name in names:
+            assert all(f'data-region="{name}"' in svg for svg in plots), (lesson.settings.title, name)
