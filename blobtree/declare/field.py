@@ -15,16 +15,14 @@ no end of its own: it is multiplied by the window of a box (`formulas.windows`).
 functions, and so is the factor `weight` (`tape.evaluators.direct_value_gradient`).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import warp as wp
 
-from blobtree.declare.formula import Formula
-from blobtree.declare.readers import PLACE, Reader, number_types, require_numbers
-from blobtree.transpile.derivative import partial_derivatives
+from blobtree.declare.readers import PLACE, PointFormulas, Reader, require_numbers
 
 wp.set_module_options({"enable_backward": False})
 
@@ -70,11 +68,10 @@ class FieldKind:
 
 
 @dataclass(frozen=True)
-class FieldFormulas:
+class FieldFormulas(PointFormulas):
     """The formulas and claims of a direct field, whose row they make."""
 
-    kind: str
-    given: Mapping[str, Formula]
+    sources = ("value_gradient", "value")
     lipschitz: Any
     extent: float
     distance: bool
@@ -83,19 +80,9 @@ class FieldFormulas:
     """Number of texels of a kind whose formulas read the tape."""
 
     @property
-    def source(self) -> Formula:
-        """The formula of the field: `value_gradient`, or `value`."""
-        return self.given.get("value_gradient") or self.given["value"]
-
-    @property
     def size(self) -> int:
         """Number of numbers that it returns."""
         return 1 if "value" in self.given else 4
-
-    @property
-    def numbers(self) -> dict[str, Any]:
-        """The types of the numbers that the formulas take, by name."""
-        return number_types(self.source, 1)
 
     def require(self, declared: Sequence[str] | None) -> None:
         """Raise `InvalidDefinition` for formulas or claims that do not fit, see `require_numbers`."""
@@ -121,8 +108,7 @@ class FieldFormulas:
         if self.numbers == PLACE:
             value, bounds = (self.given[name].function for name in ("value_gradient", "bounds"))
             return FieldKind(self.kind, value, bounds, self.texels, **flags)
-        first, module = BEHIND_BOX if self.windowed else 0, "" if digest else self.source.python.__module__
-        reader = Reader(self.kind, digest, self.numbers, first, module=module)
+        reader = self.reader(digest, BEHIND_BOX if self.windowed else 0)
         x = "{} - wp.vec3(t0[0], t0[1], t0[2])" if self.windowed else "{}"
         value = self._value(reader, x.format("q"))
         bounds = self._bounds(reader, x.format("center"))
@@ -132,10 +118,8 @@ class FieldFormulas:
         """Return the function of the field and its gradient, which is derived from `value`."""
         at_point, source = {"q": wp.vec3}, self.source
         if "value" not in self.given:
-            lines = f"    return {reader.call(source, x)}\n"
-            return reader.written("value_gradient", at_point, wp.vec4, lines, source.function)
-        partials = partial_derivatives(source.function, [next(iter(source.parameters))])
-        call = f"{partials.key}({', '.join([x, *reader.readings])})"
+            return reader.around("value_gradient", source, at_point, wp.vec4, x)
+        call, partials = reader.derivative(source, x)
         lines = (
             f"    f, along_x, along_y, along_z = {call}\n    return wp.vec4(f, along_x, along_y, along_z)\n"
         )
@@ -144,9 +128,7 @@ class FieldFormulas:
     def _bounds(self, reader: Reader, x: str) -> wp.Function:
         """Return the function of the smallest and the largest value and slope in a ball."""
         if "bounds" in self.given:
-            bounds = self.given["bounds"]
-            lines = f"    return {reader.call(bounds, x, 'radius')}\n"
-            return reader.written("bounds", _BALL, wp.vec3, lines, bounds.function)
+            return reader.around("bounds", self.given["bounds"], _BALL, wp.vec3, x, "radius")
         called, slope = [], repr(float(self.lipschitz or 0.0))
         if "lipschitz" in self.given:
             claim = self.given["lipschitz"]

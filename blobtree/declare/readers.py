@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import warp as wp
 
 from blobtree.declare.formula import Formula, generated, spelled
 from blobtree.texels import Texels
+from blobtree.transpile.derivative import partial_derivatives
 
 SIZES: dict[Any, int] = {
     wp.float32: 1,
@@ -131,6 +132,18 @@ class Reader:
         rest = self.readings if len(formula.parameters) > len(leading) else []
         return f"{formula.function.key}({', '.join([*leading, *rest])})"
 
+    def around(
+        self, part: str, formula: Formula, leading: dict[str, Any], returns: Any, *arguments: str
+    ) -> wp.Function:
+        """Return the typed function that calls a formula with arguments in front of the numbers."""
+        lines = f"    return {self.call(formula, *arguments)}\n"
+        return self.written(part, leading, returns, lines, formula.function)
+
+    def derivative(self, formula: Formula, point: str) -> tuple[str, wp.Function]:
+        """Return the call of the value and the derivatives of a formula along the axes, and its function."""
+        partials = partial_derivatives(formula.function, [next(iter(formula.parameters))])
+        return f"{partials.key}({', '.join([point, *self.readings])})", partials
+
     def written(
         self, part: str, leading: dict[str, Any], returns: Any, lines: str, *called: wp.Function
     ) -> wp.Function:
@@ -142,3 +155,28 @@ class Reader:
         if self.module:
             scope["__name__"] = self.module
         return generated(self.kind, self.digest, part, text + reads + lines, scope)
+
+
+@dataclass(frozen=True)
+class PointFormulas:
+    """The formulas of a kind that take a point and then the same numbers; one of them is its `source`."""
+
+    kind: str
+    given: Mapping[str, Formula]
+    sources: ClassVar[tuple[str, ...]]
+    """Names of formulas of which a kind has one."""
+
+    @property
+    def source(self) -> Formula:
+        """The formula that all others belong to."""
+        return next(self.given[name] for name in self.sources if name in self.given)
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """The types of the numbers that the formulas take, by name."""
+        return number_types(self.source, 1)
+
+    def reader(self, digest: str, first: int = 0, **places: Any) -> Reader:
+        """Return the reader of the numbers; what it writes for a kind of this package is in its module."""
+        module = "" if digest else self.source.python.__module__
+        return Reader(self.kind, digest, self.numbers, first, module=module, **places)

@@ -1,13 +1,12 @@
 """Rows of primitives: what kernels know of a skeleton, and the functions that its formulas make."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import warp as wp
 
-from blobtree.declare.formula import Formula
-from blobtree.declare.readers import PLACE, Reader, number_types, require_numbers
+from blobtree.declare.readers import PLACE, PointFormulas, Reader, require_numbers
 
 INFLUENCE_SLOT = 3
 """Place of the influence radius among the parameters on the tape, in floats: beside a first point."""
@@ -71,11 +70,10 @@ class Skeleton:
 
 
 @dataclass(frozen=True)
-class SkeletonFormulas:
+class SkeletonFormulas(PointFormulas):
     """The formulas and claims of a primitive, whose row they make."""
 
-    kind: str
-    given: Mapping[str, Formula]
+    sources = ("closest", "closest_with_influence")
     radii: tuple[str, ...]
     """Names of the visible radii, of which a formula with an influence takes the influence radii."""
     folds_maps: bool
@@ -85,19 +83,9 @@ class SkeletonFormulas:
     """Number of texels of a kind whose formulas read the tape."""
 
     @property
-    def source(self) -> Formula:
-        """The formula of the closest point."""
-        return self.given.get("closest") or self.given["closest_with_influence"]
-
-    @property
     def size(self) -> int:
         """Number of numbers that it returns."""
         return 3 if "closest" in self.given else 4
-
-    @property
-    def numbers(self) -> dict[str, Any]:
-        """The types of the numbers that the formulas take, by name."""
-        return number_types(self.source, 1)
 
     def require(self, declared: Sequence[str] | None) -> None:
         """Raise `InvalidDefinition` for formulas that do not fit, see `require_numbers`."""
@@ -119,18 +107,16 @@ class SkeletonFormulas:
         if self.numbers == PLACE:
             least = given["least_influence"].function
             return Skeleton(self.kind, source.function, least, self.texels, **claims)
-        module = "" if digest else source.python.__module__
         named = {self.radii[0]: INFLUENCE_SLOT} if self.size == 4 else {}
-        reader = Reader(self.kind, digest, self.numbers, 0, named, INFLUENCE_SLOT, module)
-        lines = f"    return {reader.call(source, 'q')}\n"
-        if self.size == 3:
+        reader = self.reader(digest, named=named, taken=INFLUENCE_SLOT)
+        if self.size == 4:
+            closest = reader.around("closest", source, _POINT, wp.vec4, "q")
+        else:
             lines = f"    c = {reader.call(source, 'q')}\n    return wp.vec4(c[0], c[1], c[2], t0[3])\n"
-        closest = reader.written("closest", _POINT, wp.vec4, lines, source.function)
+            closest = reader.written("closest", _POINT, wp.vec4, lines, source.function)
         smallest = self._least(reader)
         if "depth" in given:
-            depth = given["depth"]
-            lines = f"    return {reader.call(depth, 'q')}\n"
-            claims["depth"] = reader.written("depth", _POINT, wp.float32, lines, depth.function)
+            claims["depth"] = reader.around("depth", given["depth"], _POINT, wp.float32, "q")
         if self.convex and digest:
             squared = _SQUARED.format(closest.key)
             claims["apart"] = reader.written("apart", _POINT, wp.float32, squared, closest)
@@ -139,9 +125,7 @@ class SkeletonFormulas:
     def _least(self, reader: Reader) -> wp.Function:
         """Return the function of the least influence radius: by default the least of those of the ends."""
         if "least_influence" in self.given:
-            formula = self.given["least_influence"]
-            lines = f"    return {reader.call(formula)}\n"
-            return reader.written("least_influence", {}, wp.float32, lines, formula.function)
+            return reader.around("least_influence", self.given["least_influence"], {}, wp.float32)
         readings = dict(zip(reader.numbers, reader.readings, strict=True))
         least = f"t0[{INFLUENCE_SLOT}]"
         for name in self.radii[1:] if self.size == 4 else ():

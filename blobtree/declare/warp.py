@@ -19,11 +19,9 @@ import numpy as np
 import warp as wp
 
 from blobtree._typing import Box, Float64Array
-from blobtree.declare.formula import Formula
-from blobtree.declare.readers import PLACE, Reader, named_values, number_types, require_numbers
+from blobtree.declare.readers import PLACE, PointFormulas, Reader, named_values, require_numbers
 from blobtree.errors import InvalidNode
 from blobtree.texels import Texels
-from blobtree.transpile.derivative import partial_derivatives
 
 wp.set_module_options({"enable_backward": False})
 
@@ -79,27 +77,16 @@ class SpaceWarp:
 
 
 @dataclass(frozen=True)
-class WarpFormulas:
+class WarpFormulas(PointFormulas):
     """The formulas and claims of a warp, whose row they make."""
 
-    kind: str
-    given: Mapping[str, Formula]
+    sources = ("forward",)
     lipschitz: Any
     motion: Any
     """The largest distance by which points move, where there is no `outer_box`."""
     outer_box: Claim | None
     room: Claim | None
     extent: float
-
-    @property
-    def source(self) -> Formula:
-        """The formula of the map."""
-        return self.given["forward"]
-
-    @property
-    def numbers(self) -> dict[str, Any]:
-        """The types of the numbers that the formulas take, by name."""
-        return number_types(self.source, 1)
 
     def require(self, declared: Sequence[str] | None) -> None:
         """Raise `InvalidDefinition` for formulas or claims that do not fit each other.
@@ -127,8 +114,7 @@ class WarpFormulas:
         if self.numbers == PLACE:
             made = {name: part.function for name, part in self.given.items()}
         else:
-            module = "" if digest else self.source.python.__module__
-            made = self._functions(Reader(self.kind, digest, self.numbers, FIRST_NUMBER, module=module))
+            made = self._functions(self.reader(digest, FIRST_NUMBER))
         room = self._room if self.room else None
         return SpaceWarp(self.kind, **made, box=self._box, room=room, digest=digest)
 
@@ -174,8 +160,7 @@ class WarpFormulas:
         lines = {"lipschitz": f"    return {self.lipschitz!r}\n"}
         called = {}
         if "pullback" not in self.given:
-            partials = partial_derivatives(self.source.function, [next(iter(self.source.parameters))])
-            call = f"{partials.key}({', '.join(['q', *reader.readings])})"
+            call, partials = reader.derivative(self.source, "q")
             lines["pullback"], called["pullback"] = _DERIVED.format(call=call), [partials]
         for name, part in self.given.items():
             leading = LEADING[name] if len(part.parameters) > len(self.numbers) else ()
