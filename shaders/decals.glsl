@@ -116,7 +116,7 @@ vec4 decal_paint(DecalHit hit, vec3 q, vec3 n, vec3 right, vec3 up) {
     }
     vec4 u = decal_texel(4 * hit.owner + 2);
     vec4 tint = decal_texel(4 * hit.owner + 3);
-    float shown = tint.w * fade_at(q, n, hit.owner);
+    float shown = opacity_at(q, n, hit.owner);
     vec4 color = vec4(1.0);
     if (u.w >= 0.0) {
         float s = decal_texel(4 * hit.owner).w;

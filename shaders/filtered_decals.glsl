@@ -117,7 +117,7 @@ Maps material_sums() {
 // Premultiplied linear colour of a decal around a place, of which a part of the pixel is seen. Where the image has more than one texel a pixel, several
 // look-ups along each side, more along the longer one, form a box.
 vec4 image_average(int decal, Place place, vec3 q, vec3 n, float part) {
-    float fade = fade_at(q, n, decal);
+    float shown = opacity_at(q, n, decal);
     vec4 u = decal_texel(4 * decal + 2);
     vec4 tint = decal_texel(4 * decal + 3);
     vec4 color = vec4(1.0);
@@ -158,12 +158,12 @@ vec4 image_average(int decal, Place place, vec3 q, vec3 n, float part) {
             float variance = max(squares / (color.a * taps.x * taps.y) - dot(tilt, tilt), 0.0);
             float rough = maps.z / color.a;
             maps.z = color.a * min(pow(rough * rough * rough * rough + variance, 0.25), 1.0);
-            add_maps(maps, glow / (taps.x * taps.y), color.a, material_left * part * fade * tint.w, n,
+            add_maps(maps, glow / (taps.x * taps.y), color.a, material_left * part * shown, n,
                 decal_texel(4 * decal + 1).xyz, u.xyz);
         }
 #endif
     }
-    return fade * tint.w * color * vec4(tint.rgb, 1.0);
+    return shown * color * vec4(tint.rgb, 1.0);
 }
 
 // `pushes` of a decal across a contact line; of the nearest two neighbours, for others are farther.

@@ -55,7 +55,7 @@ float relief_height(vec3 q, vec3 n) {
     }
     while (hit.owner >= 0 && left > 1.0 - OPAQUE) {
         float image = decal_texel(4 * hit.owner + 2).w;
-        float shown = decal_texel(4 * hit.owner + 3).w * fade_at(q, n, hit.owner);
+        float shown = opacity_at(q, n, hit.owner);
         float radius = RIM * decal_texel(4 * hit.owner).w;
         vec4 slopes = slopes_beyond(RELIEF_STEPPED ? 0.0 : radius * max(1.0 - 2.0 * length(hit.uv - 0.5), 0.0));
         vec2 texel = vec2(0.0, 1.0);
