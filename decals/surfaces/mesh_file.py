@@ -26,6 +26,8 @@ from decals.surfaces.files.paint import Paint
 from decals.surfaces.files.ply import read_ply, strip_triangles
 from decals.surfaces.files.stl import read_stl
 from decals.surfaces.files.threemf import read_3mf, threemf_objects
+from decals.surfaces.files.usd import SUFFIXES as USD_SUFFIXES
+from decals.surfaces.files.usd import usd_objects
 from decals.surfaces.mesh_data import MeshData, joined
 from decals.surfaces.triangulate import (
     MeshArrays,
@@ -34,7 +36,7 @@ from decals.surfaces.triangulate import (
     polygon_triangles,
     traced_triangles,
 )
-from decals.surfaces.vtk_process import read_isolated
+from decals.surfaces.vtk_process import read_isolated, read_isolated_usd
 from decals.validation import as_path, describe
 
 if TYPE_CHECKING:  # its import takes longer than ours, and meshes of arrays do without
@@ -48,13 +50,25 @@ _POLYGON_READERS: dict[str, Callable[[Path], tuple[Float64Array, Polygons, Paint
 }
 """Our own readers of polygons, by suffix: they return points, polygons and their colours."""
 
-_SCENE_READERS = {".3mf": read_3mf, ".glb": read_gltf, ".gltf": read_gltf}
+
+def _read_usd(path: Path) -> dict[str, MeshData]:
+    """Read the meshes of a USD file by their names."""
+    return read_isolated_usd(path) if can_isolate() else usd_objects(path)
+
+
+_SCENE_READERS: dict[str, Callable[[Path], MeshData]] = {
+    ".3mf": read_3mf,
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
+    **dict.fromkeys(USD_SUFFIXES, lambda path: joined(list(_read_usd(path).values()))),
+}
 """Those of files that place meshes in space: they return one mesh with its colours."""
 
 _OBJECT_READERS: dict[str, Callable[[Path], dict[str, MeshData]]] = {
     ".3mf": threemf_objects,
     ".glb": gltf_objects,
     ".gltf": gltf_objects,
+    **dict.fromkeys(USD_SUFFIXES, _read_usd),
 }
 """Those of the objects in such files, by their names."""
 
@@ -63,12 +77,14 @@ def read_mesh(path: str | PathLike[str]) -> MeshArrays:
     """Read a mesh file as triangles.
 
     Polygons and triangle strips are triangulated. Of volume meshes the boundary is taken. Vertices keep their
-    order. Cells without area, such as lines, are left out. The parts of glTF and 3MF files become one mesh.
+    order. Cells without area, such as lines, are left out. The parts of glTF, 3MF and USD files become one
+    mesh.
 
     Parameters
     ----------
     path : str or path
-        OBJ, OFF, PLY, STL, glTF, GLB or 3MF file, or one of another format that pyvista knows by its suffix.
+        OBJ, OFF, PLY, STL, glTF, GLB or 3MF file, a USD file (needs the extra ``usd``), or one of another
+        format that pyvista knows by its suffix.
 
     Returns
     -------
@@ -81,6 +97,8 @@ def read_mesh(path: str | PathLike[str]) -> MeshArrays:
     ------
     InvalidMesh
         If the file is missing, of an unknown kind, unreadable, or has no faces or wrong indices.
+    MissingPackage
+        If a USD file is read, and usd-core is not installed.
 
     Examples
     --------
@@ -96,7 +114,10 @@ def read_mesh(path: str | PathLike[str]) -> MeshArrays:
 
 
 def read_objects(path: str | PathLike[str]) -> list[tuple[str, MeshArrays]]:
-    """Read the objects of a mesh file: nodes of glTF, objects of 3MF and OBJ files, else the whole file.
+    """Read the objects of a mesh file: nodes of glTF, meshes of USD, objects of 3MF and OBJ.
+
+    Other files are one object.
+
 
     Parameters and errors are those of `read_mesh`.
     """

@@ -26,7 +26,8 @@ from vtkmodules.vtkCommonCore import vtkSMPTools
 import blobtree.vtk_errors  # noqa: F401
 from decals.errors import ImplicitDecalsError
 from decals.surfaces.base_color import COLOR_ARRAYS
-from decals.surfaces.mesh_data import MeshData
+from decals.surfaces.files.usd import SUFFIXES, usd_objects
+from decals.surfaces.mesh_data import MeshData, joined
 from decals.surfaces.mesh_file import dataset_mesh, read_dataset
 
 if sys.platform != "win32":
@@ -100,7 +101,7 @@ def _answer_in_fork(request: dict[str, Any], answers: BinaryIO) -> None:
     _, status = os.waitpid(child, 0)
     if status != 0:
         limited = os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGXCPU
-        _send(answers, request, {"limit": "time"} if limited else {"error": "VTK's reader crashed"})
+        _send(answers, request, {"limit": "time"} if limited else {"error": "its reader crashed"})
 
 
 def _limit(request: dict[str, Any]) -> None:
@@ -122,7 +123,8 @@ def _limit_step(seconds: float) -> None:
 def _answer(request: dict[str, Any]) -> tuple[Any, ...]:
     """Return the header of an answer, and the contents of its arrays."""
     try:
-        mesh = _read(Path(os.fsdecode(bytes.fromhex(request["path"]))), request["seconds"])
+        parts = _read(Path(os.fsdecode(bytes.fromhex(request["path"]))), request["seconds"])
+        mesh = joined(list(parts.values()))
     except ImplicitDecalsError as error:
         return ({"error": str(error), "whole": True},)
     except MemoryError:
@@ -137,15 +139,20 @@ def _answer(request: dict[str, Any]) -> tuple[Any, ...]:
         if (array := getattr(mesh.color, name)) is not None:
             arrays[name] = np.ascontiguousarray(array)
     shapes = {name: [array.dtype.str, *array.shape] for name, array in arrays.items()}
-    return {"arrays": shapes}, *(array.data.cast("B") for array in arrays.values() if array.size)
+    counts = [(name, len(part.vertices), len(part.faces)) for name, part in parts.items()]
+    return {"arrays": shapes, "parts": counts}, *(
+        array.data.cast("B") for array in arrays.values() if array.size
+    )
 
 
-def _read(path: Path, seconds: float) -> MeshData:
-    """Read a mesh file by pyvista, as triangles with colours; each step has its limit of processor time."""
+def _read(path: Path, seconds: float) -> dict[str, MeshData]:
+    """Read a mesh file by pyvista or OpenUSD, as triangles; each step has its limit of processor time."""
     _limit_step(seconds)
+    if path.suffix.lower() in SUFFIXES:
+        return usd_objects(path)
     dataset = read_dataset(path)
     _limit_step(seconds)
-    return dataset_mesh(dataset, name=str(path))
+    return {path.name: dataset_mesh(dataset, name=str(path))}
 
 
 def _send(answers: BinaryIO, request: dict[str, Any], header: dict[str, Any], *contents: memoryview) -> None:

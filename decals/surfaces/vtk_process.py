@@ -23,6 +23,7 @@ from decals.child_process import Child, kill, start_child, time_limit
 from decals.errors import InvalidMesh
 from decals.surfaces.base_color import BaseColor
 from decals.surfaces.mesh_data import MeshData
+from decals.validation import optional_package
 
 START_SECONDS = 120.0
 """Seconds until the process must be ready; imports from a slow disk take long."""
@@ -52,7 +53,20 @@ def read_isolated(path: Path) -> MeshData:
     Cancelled
         The caller cancelled the work that reads the file; the process has ended.
     """
-    return _process.read(path)
+    return _process.read(path)[0]
+
+
+def read_isolated_usd(path: Path) -> dict[str, MeshData]:
+    """Return the meshes of a USD file by their names, read in that process; see `read_isolated`."""
+    optional_package("pxr", "usd")
+    whole, counts = _process.read(path)
+    names, vertices, faces = zip(*counts, strict=True)
+    starts = np.cumsum([0, *vertices[:-1]])
+    parts = (
+        np.split(of, np.cumsum(sizes)[:-1]) for of, sizes in zip(whole.arrays, (vertices, faces), strict=True)
+    )
+    rows = zip(names, *parts, starts, strict=True)
+    return {name: MeshData(points, corners - start) for name, points, corners, start in rows}
 
 
 class _ReaderProcess:
@@ -63,8 +77,8 @@ class _ReaderProcess:
         self._child: Child | None = None
         self._requests = count()
 
-    def read(self, path: Path) -> MeshData:
-        """Read a file; see `read_isolated`."""
+    def read(self, path: Path) -> tuple[MeshData, list[tuple[str, int, int]]]:
+        """Return the mesh of a file, and names, vertices and faces of its parts; see `read_isolated`."""
         size = path.stat().st_size
         seconds = math.ceil(SECONDS + SECONDS_PER_BYTE * size)
         memory = MEMORY + MEMORY_PER_BYTE * size
@@ -85,7 +99,7 @@ class _ReaderProcess:
             if answer is None:
                 self.stop()
                 raise InvalidMesh(
-                    _failure(path, f"VTK's reader crashed, or was stuck for {PATIENCE * seconds:.0f} s")
+                    _failure(path, f"its reader crashed, or was stuck for {PATIENCE * seconds:.0f} s")
                 )
         header, arrays = answer
         if "limit" in header:
@@ -96,7 +110,7 @@ class _ReaderProcess:
         if "error" in header:
             raise InvalidMesh(header["error"] if "whole" in header else _failure(path, header["error"]))
         mesh = arrays.pop("vertices"), arrays.pop("faces")
-        return MeshData(*mesh, BaseColor(**arrays) if arrays else None)
+        return MeshData(*mesh, BaseColor(**arrays) if arrays else None), header["parts"]
 
     def _answer(
         self, request: dict[str, Any], seconds: float
