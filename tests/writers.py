@@ -26,7 +26,6 @@ from blobtree.pyvista_views import write_polydata
 from decals.apps import cli
 from decals.errors import ImplicitDecalsError, InvalidInput
 from decals.rendering import Picture
-from decals.scenes.meshes import write_mesh
 from decals.scenes.script import write_script
 
 Writer = Callable[[Path], object]
@@ -100,7 +99,6 @@ WRITERS: dict[str, Writer] = {
     "mesh.ply": lambda path: blobtree.polygonize(blobtree.Point((0, 0, 0), radius=1.0), resolution=8).save(
         path
     ),
-    "objects.ply": lambda path: write_mesh(scene().objects, path),
     "scene.json": lambda path: decals.save_scene(scene(), path),
     "script.py": lambda path: write_script(scene(), path),
     "baked.glb": lambda path: decals.bake(scene(), path, size=64),

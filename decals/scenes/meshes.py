@@ -1,6 +1,5 @@
 """Objects of a scene as one mesh, for files of other programs."""
 
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -11,7 +10,7 @@ from blobtree._typing import Float32Array, Int32Array
 from blobtree.meshing.mesh import Mesh
 from blobtree.meshing.polygonize import MAX_TRIANGLES
 from blobtree.progress import Progress
-from blobtree.pyvista_views import to_polydata, write_polydata
+from blobtree.pyvista_views import to_polydata
 from decals.errors import InvalidMesh, InvalidScene
 from decals.images.texels import encode_srgb
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject, shown_objects
@@ -147,22 +146,3 @@ def meshed(objects: Iterable[SceneObject], meshes: Iterable["pv.PolyData"]) -> l
     """Return objects of a scene with meshes in place of trees; `as_polydata` makes those of each object."""
     pairs = zip(objects, meshes, strict=True)
     return [MeshedTree.of(item, mesh) if isinstance(item, TreeObject) else item for item, mesh in pairs]
-
-
-def write_mesh(
-    objects: Iterable[SceneObject], path: str | os.PathLike[str], *, progress: Progress | None = None
-) -> None:
-    """Write all objects to a file as one mesh, whole or not at all; the suffix is the format.
-
-    Raises
-    ------
-    InvalidScene
-        There is no object, or the file cannot be written.
-    InvalidMesh
-        A tree has no surface.
-    """
-    mesh = as_polydata(objects, progress=progress)
-    try:
-        write_polydata(path, mesh)
-    except OSError as error:
-        raise InvalidScene(f"could not write the mesh {os.fspath(path)!r} ({error.strerror})") from error

@@ -24,7 +24,6 @@ from decals.editing.commands import ScaleDecals
 from decals.errors import ImplicitDecalsError
 from decals.scenes.camera import UPRIGHT
 from decals.scenes.files import load_scene, save_scene
-from decals.scenes.meshes import write_mesh
 from decals.scenes.objects import MeshObject
 from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of
@@ -197,7 +196,7 @@ def test_a_recovered_session_is_opened(sandbox: Sandbox, window: EditWindow, tmp
 
 
 def test_dropped_files_are_added(sandbox: Sandbox, window: EditWindow, tmp_path: Path) -> None:
-    write_mesh([decals.TreeObject("x", BALL)], tmp_path / "x.ply")
+    blobtree.polygonize(BALL).save(tmp_path / "x.ply")
     blobtree.save(BALL, tmp_path / "ball.json")
     save_scene(decals.cover(BALL, count=3, images=["eye"]), tmp_path / "all.json")
     files = [

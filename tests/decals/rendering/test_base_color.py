@@ -11,9 +11,10 @@ import trimesh
 from numpy.typing import NDArray
 
 import decals
+from blobtree.pyvista_views import write_polydata
 from decals.baking.displace import displace
 from decals.rendering import Lighting
-from decals.scenes.meshes import as_polydata, write_mesh
+from decals.scenes.meshes import as_polydata
 from decals.scenes.objects import MeshObject, as_object
 from decals.surfaces import BaseColor, BaseTexture, Wrap
 from tests.oracles.base_color import base_light, linear
@@ -194,7 +195,7 @@ def test_a_baked_file_has_the_base_colours(vertex_colors: bool, tmp_path: Path) 
 def test_exports_have_the_colours_at_vertices(tmp_path: Path) -> None:
     item = ball()
     mesh = as_polydata([item])
-    write_mesh([item], tmp_path / "ball.ply")
+    write_polydata(tmp_path / "ball.ply", mesh)
     read: Any = pv.read(tmp_path / "ball.ply")
     assert isinstance(item.color, BaseColor)
     faces, _ = item.surface.locate(mesh.points[mesh.regular_faces].mean(axis=1))
