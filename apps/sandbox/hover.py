@@ -89,11 +89,15 @@ class Hover:
 
     def _ghost_of(self, kind: str) -> Float32Array:
         """Return lines of the node that the menu of a kind would add, shape (n, 2, 3)."""
-        make = self._window.actions.trees.node_in_view(kind.partition(VIEW)[0], self._at)
-        node = self._window.actions.state.asked("place a node", lambda _document: make())
-        if node is None:
+        make, box = (
+            self._window.actions.trees.node_in_view(kind.partition(VIEW)[0], self._at),
+            self._at is None,
+        )
+        found = self._window.actions.state.asked("place a node", lambda _document: _drawn(make(), box=box))
+        if found is None:  # a thread compiles kernels for it; then it is asked again
+            self._known = ()
             return self._lines
-        return np.stack(box_edges(*node.bounds)) if self._at is None else outlines(node)
+        return found
 
     def _placed(self) -> dict[str, Any]:
         """Return lines and dots where they lie in the view."""
@@ -112,6 +116,10 @@ class Hover:
         rows = (places / self._window.plotter.window_size * (1, -1) + (0, 1)).reshape(-1, width)
         listed: list[list[float]] = rows[np.isfinite(rows).all(axis=1)].round(4).tolist()
         return listed
+
+
+def _drawn(node: Node, *, box: bool) -> Float32Array:
+    return np.stack(box_edges(*node.bounds)) if box else outlines(node)
 
 
 @lru_cache(maxsize=64)
