@@ -369,6 +369,7 @@ class Sandbox:
         """Carry out a step of a slider; while it moves, only the newest one, before the next frame."""
 
         def stepped() -> None:
+            self._window.overlay.moving = not last
             step()
             self._last_step = math.inf if last else time.monotonic()
 
@@ -387,7 +388,7 @@ class Sandbox:
     def end_input(self) -> None:
         """End the moves of a slider whose browser has left, as one entry of the history."""
         self.take_step()
-        self._last_step = math.inf
+        self._last_step, self._window.overlay.moving = math.inf, False
         self.attempt(self._trees.end_drag)
 
     def settle(self) -> None:

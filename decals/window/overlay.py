@@ -65,12 +65,18 @@ class Overlay:
         The plotter; its active subplot shows the overlay.
     draw_scale
         Returns the size of the surface's frame over that of the window.
+
+    Attributes
+    ----------
+    moving
+        True while a slider of a page moves: outlines, which take longer than a frame, follow at its end.
     """
 
     def __init__(self, plotter: pv.BasePlotter, draw_scale: Callable[[], float] = lambda: 1.0) -> None:
         self._plotter: Any = plotter
         self._draw_scale = draw_scale
         self._renderer: Any = plotter.renderer
+        self.moving = False
         self._lines = pv.PolyData()
         self._outlined: tuple[object, ...] = ()
         self._actor = plotter.add_mesh(

@@ -274,6 +274,7 @@ class EditWindow:
     def update_overlay(self) -> None:
         """Update outlines, handle, help and status."""
         dragging = self.tools.dragging or self.handle.dragging or self.background.following
+        dragging |= self.overlay.moving
         if not dragging:
             self.handle.update()
         state = self.actions.state
