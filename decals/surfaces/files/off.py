@@ -61,9 +61,9 @@ def _read(content: bytes) -> tuple[Float64Array, Polygons, Paint]:
         if (text := line.partition(b"#")[0].strip())
     ]
     keyword, lines = _keyword(lines)
-    points, faces, lines = _counts(lines)
+    points, faces, lines, edges = _counts(lines)
     if len(lines) != points + faces:
-        for rows in _of_words(keyword, points, faces, lines):
+        for rows in _of_words(keyword, points, faces, lines, edges=edges):
             try:
                 return _of_lines(keyword, points, faces, rows)
             except ValueError:
@@ -115,11 +115,14 @@ def _of_lines(
 
 
 def _of_words(
-    keyword: _Keyword, points: int, faces: int, lines: list[Line], *, edges: bool = True
+    keyword: _Keyword, points: int, faces: int, lines: list[Line], *, edges: bool
 ) -> Iterator[list[Line]]:
-    """Yield lines of one vertex or face each, made of words that the lines of a file divide otherwise."""
+    """Yield lines of one vertex or face each, made of words that the lines of a file divide otherwise.
+
+    The first word may be the number of edges if it did not stand beside the others.
+    """
     first, _, rest = lines[0].text.strip().partition(b" ") if lines else (b"", b"", b"")
-    if edges and first.isdigit():  # the number of edges, which some programs leave out
+    if edges and first.isdigit():
         behind = [Line(lines[0].number, rest), *lines[1:]] if rest else lines[1:]
         yield behind
         yield from _of_words(keyword, points, faces, behind, edges=False)
@@ -131,7 +134,8 @@ def _of_words(
         vertices = [_line(words[k : k + width]) for k in range(0, end, width)]
         counts = np.cumsum([len(line.text.split()) for line in lines])
         row = int(np.searchsorted(counts, end, side="right")) if end else 0
-        if len(lines) - row == faces and end == (counts[row - 1] if row else 0):  # they may have colours
+        whole = len(lines) - row == faces and end == (counts[row - 1] if row else 0)
+        if whole and any(_size(line.text.split()[0]) >= 3 for line in lines[row:]):  # they may have colours
             yield [*vertices, *lines[row:]]
         yield [*vertices, *_face_rows(words[end:])]
 
@@ -140,12 +144,16 @@ def _face_rows(words: list[Line]) -> Iterator[Line]:
     """Yield the words of each face: a number of corners and as many vertices."""
     place = 0
     while place < len(words):
-        count = words[place].text
-        size = int(count) if count.isdigit() and len(count) < MAX_DIGITS else 0
+        size = _size(words[place].text)
         if size < 3:  # so that a file with a missing line is not read as another mesh
             return
         yield _line(words[place : place + 1 + size])
         place += 1 + size
+
+
+def _size(word: bytes) -> int:
+    """Return the number of corners that a word states, or 0."""
+    return int(word) if word.isdigit() and len(word) < MAX_DIGITS else 0
 
 
 def _line(words: list[Line]) -> Line:
@@ -153,8 +161,8 @@ def _line(words: list[Line]) -> Line:
     return Line(words[0].number, b" ".join(word.text for word in words)) if words else Line(0, b"")
 
 
-def _counts(lines: list[Line]) -> tuple[int, int, list[Line]]:
-    """Return the numbers of vertices and of faces, and the lines behind them."""
+def _counts(lines: list[Line]) -> tuple[int, int, list[Line], bool]:
+    """Return the numbers of vertices and of faces, the lines behind them, and if that of edges may follow."""
     if not lines:
         raise ValueError("it ends before its numbers of vertices and faces")
     words = lines[0].text.split()
@@ -162,8 +170,8 @@ def _counts(lines: list[Line]) -> tuple[int, int, list[Line]]:
         return _counts([Line(lines[0].number, words[0] + b" " + lines[1].text), *lines[2:]])
     points, faces = parsed(lines[:1], _two_counts, "'OFF', and the numbers of vertices and faces")
     if len(words) < 4 or len(lines) - 1 == points + faces:
-        return points, faces, lines[1:]
-    return points, faces, [Line(lines[0].number, b" ".join(words[2:])), *lines[1:]]
+        return points, faces, lines[1:], len(words) == 2  # some programs leave edges out
+    return points, faces, [Line(lines[0].number, b" ".join(words[2:])), *lines[1:]], True
 
 
 def _two_counts(lines: list[Line]) -> tuple[int, int]:

@@ -1,5 +1,6 @@
 """Files of other programs: all forms of OBJ, STL, OFF and PLY, and what is wrong in some of them."""
 
+import itertools
 import logging
 import struct
 from pathlib import Path
@@ -242,11 +243,44 @@ OFF_SQUARES = {
     + "4 0 1 2 3\n",
     "three colours on one line": "COFF\n4 1 0\n" + OFF_ROWS.replace("\n", " 255 0 0 ") + "4 0 1 2 3\n",
     "normals on one line": "NOFF\n4 1 0\n" + OFF_ROWS.replace("\n", " 0 0 1 ") + "\n4 0 1\n2 3\n",
+    "three colours, a corner a line": "COFF\n4 1 0\n"
+    + OFF_ROWS.replace("\n", " 255 0 0\n")
+    + "4\n3\n2\n1\n0\n",
     "small letters": OFF.replace("OFF", "noff")
     .replace("0\n", "0 0 0 1\n", 5)
     .replace("4 1 0 0 0 1", "4 1 0"),
     "all": "STCNOFF\n4 1 0\n" + OFF_ROWS.replace("\n", " 0 0 1 1 1 1 1 0 0\n") + "4 0 1 2 3\n",
 }
+
+
+def off_prism(corners: int, faces: int, components: int, layout: str) -> str:
+    """Return polygons of an area of 1/6 of n(n² - 1) each, whose words lines divide in one of four ways."""
+    ends = ["0 255 0"] * bool(components) + ["7"] * (components == 4)
+    vertices = [
+        " ".join([f"{x} {x * (corners - 1 - x)} {3 * k}", *ends])
+        for k in range(faces)
+        for x in range(corners)
+    ]
+    rows = [
+        " ".join(map(str, [corners, *range(k * corners + corners - 1, k * corners - 1, -1)]))
+        for k in range(faces)
+    ]
+    if layout != "lines":
+        rows = [row.replace(" ", "\n") for row in rows]
+    if layout == "words":
+        vertices = [row.replace(" ", "\n") for row in vertices]
+    if layout == "one line":
+        vertices, rows = [" ".join(vertices)], [" ".join(rows).replace("\n", " ")]
+    keyword = "COFF" if components else "OFF"
+    return "\n".join([keyword, f"{corners * faces} {faces} 0", *vertices, *rows])
+
+
+@pytest.mark.parametrize("layout", ["lines", "faces", "words", "one line"])
+def test_words_of_off_may_stand_on_any_lines(tmp_path: Path, layout: str) -> None:
+    for corners, faces, components in itertools.product(range(3, 8), (1, 2, 3), (0, 3, 4)):
+        text = off_prism(corners, faces, components, layout)
+        n = corners - 1
+        assert area(written(tmp_path, "a.off", text)) == pytest.approx(faces * n * (n * n - 1) / 6), text
 
 
 @pytest.mark.parametrize("name", OFF_SQUARES)
