@@ -28,8 +28,11 @@ CLIENTS = {
 """Views that draw in the browser."""
 BAKING_EXPORTS = ("export_html", "export_gltf", "export_obj")
 """Methods of a plotter that write VTK's actors to a file with their textures; decals are baked for them."""
-OTHER_EXPORTS = ("export_vtksz", "export_vrml")
+OTHER_EXPORTS = ("export_vtksz", "export_vrml", "export_wazex", "export_wasm_html")
 """Methods that write VTK's actors alone."""
+
+TRAME = "trame"
+"""Component of a plotter, of the package trame-pyvista, that has the exports for browsers too."""
 
 BAKED = "plotter.decals, baked"
 """Name in pyvista of the actor with baked decals, while an export writes it."""
@@ -43,28 +46,31 @@ _exporting = ContextVar("exporting", default=False)
 
 def watch_exports(plotter: pv.BasePlotter) -> None:
     """Make exports of a plotter write baked decals or warn, and views that draw in a browser warn."""
-    wrappers: dict[str, Callable[[str, Any], Any]] = {
+    wrappers: dict[str, Callable[..., Any]] = {
         **dict.fromkeys(BAKING_EXPORTS, _baking_exporter),
         **dict.fromkeys(OTHER_EXPORTS, _exporter),
         WATCHED: _watcher,
     }
-    for name, wrapper in wrappers.items():
-        method = getattr(plotter, name, None)
-        if method is not None:
-            # Around pyvista's guard against new attributes, as pyvista itself does for components.
-            plotter.__dict__[name] = wrapper(name, method)
+    for owner in (plotter, getattr(plotter, TRAME, None)):
+        for name, wrapper in wrappers.items():
+            method = getattr(owner, name, None)
+            if method is not None:
+                # Around pyvista's guard against new attributes, as pyvista itself does for components.
+                vars(owner)[name] = wrapper(name, method, plotter)
 
 
-def _exporter(name: str, method: Any) -> Any:
+def _exporter(name: str, method: Any, plotter: Any) -> Any:
     @wraps(method)
     def export(*arguments: Any, **options: Any) -> Any:
+        if _exporting.get():  # by another export
+            return method(*arguments, **options)
         _warn(
             f"{name} writes VTK's own actors; objects of plotter.decals are drawn by OpenGL and are not "
             f"in the file. Call decals.bake(plotter.decals.scene, 'scene.glb'), or one of "
             f"{', '.join(BAKING_EXPORTS)}, which write baked decals"
         )
         with ExitStack() as stack:
-            for subplot in method.__self__.decals.subplots:
+            for subplot in plotter.decals.subplots:
                 stack.enter_context(_hidden(subplot.actor))
             stack.enter_context(_silent_views())
             return method(*arguments, **options)
@@ -72,11 +78,13 @@ def _exporter(name: str, method: Any) -> Any:
     return export
 
 
-def _baking_exporter(name: str, method: Any) -> Any:
+def _baking_exporter(name: str, method: Any, plotter: Any) -> Any:
     @wraps(method)
     def export(*arguments: Any, **options: Any) -> Any:
+        if _exporting.get():
+            return method(*arguments, **options)
         with ExitStack() as stack:
-            for subplot in method.__self__.decals.subplots:
+            for subplot in plotter.decals.subplots:
                 if len(subplot.applied):
                     _warn(
                         f"{name} writes actors of VTK without the decals that plotter.decals.apply shows on "
@@ -151,7 +159,7 @@ def _warn(text: str, stacklevel: int = 3) -> None:
 
 @contextmanager
 def _silent_views() -> Iterator[None]:
-    """Let views in a browser not warn, which exports make."""
+    """Let views in a browser not warn, which exports make, nor exports that others call."""
     token = _exporting.set(True)
     try:
         yield
@@ -159,7 +167,7 @@ def _silent_views() -> Iterator[None]:
         _exporting.reset(token)
 
 
-def _watcher(_name: str, method: Any) -> Any:
+def _watcher(_name: str, method: Any, _plotter: Any) -> Any:
     @wraps(method)
     def add(callback: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
         for name in () if _exporting.get() else _class_names(callback) & CLIENTS.keys():
@@ -185,5 +193,6 @@ def _class_names(callback: Callable[..., Any]) -> set[str]:
 
 def restore_exports(plotter: pv.BasePlotter) -> None:
     """Undo `watch_exports`."""
-    for name in (*BAKING_EXPORTS, *OTHER_EXPORTS, WATCHED):
-        plotter.__dict__.pop(name, None)
+    for owner in (plotter, vars(plotter).get(TRAME)):
+        for name in (*BAKING_EXPORTS, *OTHER_EXPORTS, WATCHED) if owner is not None else ():
+            vars(owner).pop(name, None)

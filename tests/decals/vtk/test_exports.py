@@ -200,3 +200,32 @@ def test_an_export_that_fails_leaves_the_plotter_as_it_was(plotter: Factory, tmp
         pl.export_obj(tmp_path / "a.txt")
     assert set(pl.renderer.actors) == actors
     assert pl.decals.subplot.actor.GetVisibility()
+
+
+class Trame:
+    """Stands in for pyvista's component of trame, whose exports call each other."""
+
+    def __init__(self, plotter: Plotter) -> None:
+        self._plotter = plotter
+        self.written: list[set[str]] = []
+
+    def export_html(self) -> None:
+        self.export_vtksz()
+
+    def export_vtksz(self) -> None:
+        actors = self._plotter.renderer.actors.items()
+        self.written.append({name for name, actor in actors if actor.GetVisibility()})
+
+
+def test_exports_of_the_component_of_trame_are_watched(plotter: Factory) -> None:
+    pl = plotter()
+    component = pl.__dict__["trame"] = Trame(pl)
+    pl.decals.add_scene(both(), camera=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        component.export_html()
+    with pytest.warns(UserWarning, match="export_vtksz writes VTK's own actors"):
+        component.export_vtksz()
+    assert component.written == [{exports.BAKED}, set()]
+    pl.close()
+    assert "export_html" not in vars(component)
