@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from cyclopts import Parameter
@@ -14,15 +14,18 @@ from blobtree import field_grid
 from blobtree.sampling.field_grid import GRID_FORMATS
 from decals import Scene, TreeObject, save_html
 from decals import export as export_scene
-from decals.apps.commands.options import CreaseAngle, Inputs, Rules, Surfaces, Texture, given
+from decals.apps.commands.options import CreaseAngle, Inputs, Rules, Shown, Surfaces, Texture, given
 from decals.apps.commands.progress_bars import preparing
 from decals.apps.models.loading import load_model
 from decals.apps.output import check_output, print_path
 from decals.baking.formats import FORMATS
 from decals.errors import InvalidInput
-from decals.pages.page import SUFFIXES
+from decals.pages.page import SUFFIXES as PAGES
 from decals.surfaces import MeshCheck, check_mesh
 from decals.surfaces.mesh_file import read_objects
+
+MESHES, GRIDS = tuple(FORMATS), tuple(GRID_FORMATS)
+"""Ends of the names of files with meshes, and of files with values on a grid."""
 
 LABELS = {
     "vertices": "vertices",
@@ -61,7 +64,7 @@ def export(
     up: Annotated[Literal["y", "z"] | None, Parameter(show_default=False)] = None,
     texture: Texture = Texture(),
     rules: Rules = Rules(),
-    surface: Annotated[Literal["mesh", "traced"] | None, Parameter(show_default=False)] = None,
+    shown: Shown = Shown(),
     surfaces: Surfaces = Surfaces(),
     crease_angle: CreaseAngle = None,
     inputs: Inputs = Inputs(),
@@ -91,58 +94,59 @@ def export(
         Unit of the scene's lengths, for formats that have one.
     up
         The axis of the scene that points upward, for formats that have one.
-    surface
-        How a page shows implicit objects: as a mesh (default) or traced, which is exact and slower.
     """
     if output is None:
         if not check:
             raise InvalidInput("export: missing -o FILE; or --check, to check a mesh file")
         _print_checks([check_mesh(*arrays, name) for name, arrays in read_objects(scene)])
         return
-    check_output(output, (*FORMATS, *GRID_FORMATS, *SUFFIXES))
-    if output.suffix.lower() in GRID_FORMATS:
-        with preparing(inputs.define) as progress:
-            tree = _only_tree(load_model(scene, trust=inputs.trust), scene)
+    check_output(output, (*MESHES, *GRIDS, *PAGES))
+    of_page, of_drawing = given(**vars(shown)), rules.given()
+    of_file = given(colors=colors, unit=unit, up=up, attributes=attributes, instances=instances or None)
+    flags = {"check": check or None, "creases": surfaces.creases or None}
+    _refuse_others(output, GRIDS, distance=distance or None)
+    _refuse_others(output, PAGES, **of_page)
+    _refuse_others(output, MESHES, **of_file, **flags, **texture.changed())
+    _refuse_others(output, (*MESHES, *PAGES), **of_drawing, crease_angle=crease_angle, table=inputs.table)
+    baked = texture.checked()
+    checks: Sequence[MeshCheck] = ()
+    error: float | None = None
+    with preparing(inputs.define) as progress:
+        loaded = load_model(scene, trust=inputs.trust, crease_angle=crease_angle, table=inputs.table)
+        if output.suffix.lower() in GRIDS:
+            tree = _only_tree(loaded, scene)
             grid = field_grid(tree.tree, resolution=surfaces.resolution, distance=distance, progress=progress)
             x, y, z = (np.array(grid.origin) + tree.origin).tolist()
             replace(grid, origin=(x, y, z)).save(output)
-        print_path(output)
-        if grid.error is not None:
-            Console().print(f"distances are exact to {grid.error:.2g}", highlight=False)
-        return
-    if distance:
-        raise InvalidInput(
-            f"--distance: expected an output that ends in {' or '.join(GRID_FORMATS)}, got {str(output)!r}"
-        )
-    baked, modes = texture.checked(), rules.given()
-    in_file = given(colors=colors, unit=unit, up=up)
-    checks: Sequence[MeshCheck] = ()
-    with preparing(inputs.define) as progress:
-        loaded = load_model(scene, trust=inputs.trust, crease_angle=crease_angle, table=inputs.table)
-        if output.suffix.lower() in SUFFIXES:
-            if in_file or attributes or instances or check:
-                raise InvalidInput("export: a page takes no options of mesh files; leave them out")
-            shown = given(surface=surface)
-            save_html(loaded, output, resolution=surfaces.resolution, progress=progress, **shown, **modes)
-        elif surface is not None:
-            raise InvalidInput(
-                f"--surface: expected an output that ends in {' or '.join(SUFFIXES)}, got {str(output)!r}"
-            )
+            error = grid.error
+        elif output.suffix.lower() in PAGES:
+            cells = surfaces.resolution
+            save_html(loaded, output, resolution=cells, progress=progress, **of_page, **of_drawing)
         else:
             checks = export_scene(
                 loaded,
                 output,
-                attributes=attributes or (),
-                instances=instances,
                 progress=progress,
                 **baked,
                 **vars(surfaces),
-                **in_file,
-                **modes,
+                **of_file,
+                **of_drawing,
             )
     print_path(output)
+    if error is not None:
+        Console().print(f"distances are exact to {error:.2g}", highlight=False)
     if check:
         _print_checks(checks)
+
+
+def _refuse_others(output: Path, suffixes: Sequence[str], **options: Any) -> None:
+    """Raise `InvalidInput` if an option is given that is for outputs with other suffixes."""
+    for name, value in options.items():
+        if value is not None and output.suffix.lower() not in suffixes:
+            raise InvalidInput(
+                f"--{name.replace('_', '-')}: expected an output that ends in {' or '.join(suffixes)}, "
+                f"got {str(output)!r}; leave it out, or rename the output"
+            )
 
 
 def _only_tree(loaded: object, name: str) -> TreeObject:

@@ -152,6 +152,36 @@ class Texture:
         check_count("--samples", self.samples, 1, MAX_SAMPLES)
         return vars(self)
 
+    def changed(self) -> dict[str, Any]:
+        """Return the options that are not the usual ones."""
+        return {name: value for name, value in vars(self).items() if value != getattr(Texture, name)}
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Shown:
+    """Options of a page in the browser.
+
+    Parameters
+    ----------
+    surface
+        How a page shows implicit objects: as a mesh (default) or traced, which is exact and slower.
+    title
+        Title of a page. Default: the names of the objects.
+    alt
+        What a page shows, for people who do not see it. Default: the objects and the number of decals.
+    background
+        Colour behind a page's model, such as white. Default: that of the scene.
+    controls
+        Buttons of a page; mouse, touch and keys work without them.
+    """
+
+    surface: Annotated[Literal["mesh", "traced"] | None, Parameter(show_default=False)] = None
+    title: Annotated[str | None, Parameter(show_default=False)] = None
+    alt: Annotated[str | None, Parameter(show_default=False)] = None
+    background: Annotated[str | None, Parameter(show_default=False)] = None
+    controls: Annotated[bool | None, Parameter(show_default=False)] = None
+
 
 @Parameter(name="*")
 @dataclass(frozen=True)

@@ -373,6 +373,13 @@ async def used(scene: Scene, browser: str, **options: Any) -> None:
         await page.evaluate("(link) => viewer.set({ link })", link)
         again = (await state(page))["decals"]
         assert np.allclose(again[number]["position"], nudged["position"], rtol=1e-4, atol=1e-5)
+        await page.evaluate("viewer.set({ link: 'mode=min' })")
+        first = await state(page)
+        assert first["decals"][: len(scene.decals)] == before["decals"]
+        assert first["decals"][len(scene.decals) :] == [None]
+        assert "d=" not in first["link"]
+        await page.evaluate("(link) => viewer.set({ link })", link)
+        assert (await state(page))["link"] == link
         await accessible(page)
 
 

@@ -21,7 +21,8 @@ export function written({ camera: { pose }, aspect, mode, stiffness, decals, ori
 }
 
 // Return the state of a fragment for `set`, which refuses other modes, stiffnesses and decals than valid ones.
-export function read(fragment, originals) {
+// Of the rows of all decals, those that the fragment leaves out become as they were at first.
+export function read(fragment, originals, rows = originals) {
   const fields = new URLSearchParams(fragment.replace(/^#/, ""));
   const numbers = (text, count) => {
     const values = (text ?? "").split(",").map(Number);
@@ -30,6 +31,8 @@ export function read(fragment, originals) {
   const [eye, target] = ["eye", "at"].map((name) => numbers(fields.get(name), 3)?.slice(0, 3));
   const camera = eye && target && { position: eye, target, aspect: Number(fields.get("aspect") ?? NaN) };
   const decals = {};
+  for (const [place, row] of rows.entries())
+    if (row !== (originals[place] ?? null)) decals[place] = originals[place] ?? null;
   for (const text of (fields.get("d") ?? "").split(";")) {
     const [, digits, parts] = /^(\d{1,7})(?:x|:(.*))$/.exec(text) ?? [];
     const [place, values] = [Number(digits), numbers(parts, 10)];

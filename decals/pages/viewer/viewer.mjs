@@ -44,7 +44,7 @@ class Viewer {
 
   // Change the camera, the contact mode, the stiffness, decals ({number: row or null}), or the state of a link.
   set({ link, camera, mode, stiffness, decals, selected } = {}) {
-    if (link) this.set(read(link, this.originals));
+    if (link) this.set(read(link, this.originals, this.decals.rows));
     if (camera) this.camera.place(camera);
     if (Object.hasOwn(this.header.shaders.modes, mode ?? "")) this.mode = mode;
     if (stiffness >= 1 && stiffness <= this.header.rules.maxStiffness) this.stiffness = Number(stiffness);
@@ -124,9 +124,10 @@ class Viewer {
   // -- edits ----------------------------------------------------------------------------------------------
 
   // Change decals, with normals and tangents made perpendicular and of length 1; decals with a value that a scene cannot
-  // have stay, and a line says so. What is returned continues the step.
+  // have stay, and a line says so. Rows of the scene stay the same objects. What is returned continues the step.
   edit(pairs, step) {
-    const given = pairs.map(([number, row]) => [number, row && framed(row)]);
+    const ready = (number, row) => (row && row !== this.originals[number] ? framed(row) : row);
+    const given = pairs.map(([number, row]) => [number, ready(number, row)]);
     const wrong = ([number, row]) => row && wrongValue({ ...row, number }, this.header.rules);
     const refused = given.find(wrong);
     this.refused = refused && `Decal ${refused[0]} stays: no scene can have its ${wrong(refused)}.`;

@@ -10,6 +10,7 @@ from blobtree import Point, save
 from decals import save_scene
 from decals.apps.cli import run
 from tests.decals.baking.glb import ball_and_cube, need, read_json
+from tests.decals.pages.test_page import header_of
 
 Capture = pytest.CaptureFixture[str]
 
@@ -40,15 +41,43 @@ def test_unit_and_axis_reach_the_file(saved: Path) -> None:
     assert matrix[:8] == pytest.approx([1e-3, 0, 0, 0, 0, 0, -1e-3, 0])
 
 
-def test_a_page_takes_no_options_of_meshes(saved: Path, capsys: Capture) -> None:
-    assert run(["export", "scene.json", "-o", "a.html", "--contact", "min"]) == 0
+def test_a_page_has_a_title_a_description_and_a_background(saved: Path, capsys: Capture) -> None:
+    words = ["--title", "A <duck>", "--alt", "green", "--background", "#ff0000", "--no-controls"]
+    assert run(["export", "scene.json", "-o", "a.html", "--contact", "min", *words]) == 0
     assert capsys.readouterr().out == "a.html\n"
-    assert (saved / "a.html").read_text(encoding="utf-8").startswith("<!doctype html>")
-    assert run(["export", "scene.json", "-o", "b.html", "--unit", "inch"]) == 2
-    assert "a page takes no options of mesh files" in capsys.readouterr().err
-    assert not (saved / "b.html").exists()
-    assert run(["export", "scene.json", "-o", "b.ply", "--surface", "traced"]) == 2
-    assert not (saved / "b.ply").exists()
+    text = (saved / "a.html").read_text(encoding="utf-8")
+    assert "<title>A &lt;duck&gt;</title>" in text
+    assert 'alt="green"' in text
+    header = header_of(text)
+    assert header["mode"] == "min"
+    assert header["controls"] is False
+    assert "rgb(100% 0% 0% / 1)" in header["markup"]
+
+
+@pytest.mark.parametrize(
+    ("output", "words", "ends"),
+    [
+        ("a.html", ["--unit", "inch"], ".glb"),
+        ("a.html", ["--size", "4096"], ".glb"),
+        ("a.html", ["--creases"], ".glb"),
+        ("a.html", ["--check"], ".glb"),
+        ("a.ply", ["--surface", "traced"], ".html"),
+        ("a.ply", ["--controls"], ".html"),
+        ("a.ply", ["--distance"], ".vti"),
+        ("a.vti", ["--attributes", "owner"], ".glb"),
+        ("a.vti", ["--instances"], ".glb"),
+        ("a.vti", ["--contact", "min"], ".glb"),
+        ("a.vti", ["--crease-angle", "20"], ".glb"),
+    ],
+)
+def test_an_option_of_other_files_is_named(
+    saved: Path, capsys: Capture, output: str, words: list[str], ends: str
+) -> None:
+    assert run(["export", "scene.json", "-o", output, *words]) == 2
+    says = capsys.readouterr().err
+    assert f"{words[0]}: expected an output that ends in {ends}" in says
+    assert f"got '{output}'" in says
+    assert [path.name for path in saved.iterdir()] == ["scene.json"]
 
 
 def test_check_prints_a_table_for_written_objects_and_for_files(saved: Path, capsys: Capture) -> None:
@@ -109,7 +138,6 @@ def test_the_field_of_a_tree_becomes_a_volume(folder: Path, capsys: Capture) -> 
     [
         (["scene.json", "-o", "a.vti"], "got MeshObject, MeshObject in 'scene.json'"),
         (["knot", "-o", "a.nrrd"], "got MeshObject in 'knot'"),
-        (["scene.json", "-o", "a.ply", "--distance"], "--distance: expected an output that ends in .vti"),
         (["spheres", "-o", "a.npy", "--cells", "99999"], "expected at most 67,108,864 grid points"),
     ],
 )
