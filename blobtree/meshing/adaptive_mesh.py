@@ -19,7 +19,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from blobtree._typing import BoolArray, Float32Array, IndexArray, Int32Array, Int64Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray, Int32Array, Int64Array
 from blobtree.cells.block_kernels import CellBlocks
 from blobtree.cells.grid import CHILDREN, KEY_DIGITS
 from blobtree.cells.scan import exclusive_scan
@@ -46,6 +46,18 @@ WIDEST_REPAIR = 8.0
 
 MAX_REPAIRS = 100
 """Most rounds in which leaves are divided until the mesh is a manifold; each makes some leaves smaller."""
+
+
+NO_PLACES: Float64Array = np.empty((0, 3))
+
+
+class OpenMesh(InvalidResolution):
+    """The mesh does not close."""
+
+    def __init__(self, message: str, places: Float64Array = NO_PLACES) -> None:
+        super().__init__(message)
+        self.places = places
+        """Middles of the cells at which it is open (n, 3)."""
 
 
 @dataclass
@@ -138,11 +150,11 @@ class AdaptiveMesher:
 
         Raises
         ------
-        InvalidResolution
+        OpenMesh
             Cells cannot be divided any further, or their blocks have grown by more than a factor, or all
             rounds together have had too many leaves.
         """
-        most, stuck, seen = max_growth * len(self._tree), 0, 0
+        most, stuck, seen, places = max_growth * len(self._tree), 0, 0, NO_PLACES
         for repair in range(max_repairs):
             if len(self._tree) > most or seen > max_leaves:
                 break
@@ -153,6 +165,7 @@ class AdaptiveMesher:
             rows, polygons, irregular, pierced = self._polygons(leaves)
             if polygons is None:
                 wrong = np.flatnonzero(irregular & ~SIMPLE[leaves.codes])
+                places = self._middles(leaves, wrong)
                 self._divide(leaves, _widened(leaves, wrong, stuck - SINGLE_REPAIRS), pierced)
                 stuck += 1
                 continue
@@ -168,9 +181,17 @@ class AdaptiveMesher:
                 mesh = AdaptiveMesh(leaves, vertices, owners, faces, quads)
                 return self._with_turned_diagonals(mesh) if self._creases else mesh
             wrong = np.unique(owners[torn])
+            places = self._middles(leaves, wrong)
             self._divide(leaves, wrong[irregular[wrong]] if irregular[wrong].any() else wrong, pierced)
             stuck = 0
-        raise InvalidResolution("cells could not be divided to a closed mesh; allow a smaller error")
+        raise OpenMesh("cells could not be divided to a closed mesh; allow a smaller error", places)
+
+    def _middles(self, leaves: Leaves, chosen: IndexArray) -> Float64Array:
+        """Return the middles of some leaves (n, 3), in world units."""
+        grid = self._tree.grid(self._tree.depth)
+        middles = leaves.lowest[chosen] + 0.5 * leaves.sizes[chosen, None]
+        result: Float64Array = grid.origin + middles * grid.cell_size
+        return result
 
     def _divide(self, leaves: Leaves, wrong: IndexArray, pierced: IndexArray) -> None:
         """Divide leaves at which the mesh is no manifold, and empty leaves at which it has a hole."""
@@ -178,8 +199,9 @@ class AdaptiveMesher:
         changed = self._cells.divide(leaves.blocks[wrong], leaves.slots[wrong], once)
         changed |= self._cells.divide_pierced(pierced)
         if not changed:
-            raise InvalidResolution(
-                "the field differs between two evaluations at one point; allow another error"
+            raise OpenMesh(
+                "the field differs between two evaluations at one point; allow another error",
+                self._middles(leaves, wrong),
             )
 
     # -- polygons -----------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ import logging
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import warp as wp
@@ -27,7 +27,7 @@ from blobtree.errors import InvalidResolution
 from blobtree.meshing.adaptive_cell_kernels import write_polygons
 from blobtree.meshing.adaptive_cells import OCTANT_OF_CELL, AdaptiveCells
 from blobtree.meshing.adaptive_kernels import place_on_surface
-from blobtree.meshing.adaptive_mesh import AdaptiveMesher
+from blobtree.meshing.adaptive_mesh import NO_PLACES, AdaptiveMesher, OpenMesh
 from blobtree.meshing.block_tree import BlockTree
 from blobtree.meshing.crumbs import without_specks
 from blobtree.meshing.dual_kernels import sample_blocks
@@ -95,6 +95,9 @@ MAX_REPAIRED_LEAVES = 20_000_000
 
 MAX_SECOND_BLOCKS = 40_000
 """Most blocks of a mesh that did not close, for a second mesh to be tried."""
+
+MAX_MESHES = 4
+"""Most meshes that are tried: one of other cells, and two with fewer walls."""
 
 OTHER_CELLS = 0.87
 """Size of the cells of the second mesh over that of the first; rims then lie elsewhere in cells."""
@@ -356,12 +359,13 @@ def mesh_of_parts(
     creases: bool,
     report: Progress,
     first: FirstCells | None = None,
-    without_walls: bool = True,
+    expendable: Literal["none", "some", "all"] = "all",
 ) -> tuple[Mesh | None, list[ThinPart]]:
     """Return a mesh of cells that are smaller where parts are thin, and the parts that it does not show.
 
-    There is no mesh if the cells of `grid_of(1.0)` show all parts, or if none closes, not even
-    `without_walls`. `grid_of` returns a grid whose cells are smaller by a factor. `first` are the
+    There is no mesh if the cells of `grid_of(1.0)` show all parts, or if none closes, not even without
+    the walls that are `expendable`: some, at which repairs stopped, or all. Rims of these may be too sharp
+    for any cells. `grid_of` returns a grid whose cells are smaller by a factor. `first` are the
     `first_cells` if these are known.
     """
     smallest, size = _least_cell(tree), grid_of(1.0).cell_size
@@ -381,21 +385,24 @@ def mesh_of_parts(
     ):
         return None, unresolved
     scale = first.blocks.cells.grid.cell_size / size
-    for attempt in range(3):
+    stops, left_out = NO_PLACES, list[ThinPart]()
+    for attempt in range(MAX_MESHES):
         try:
             mesh, others = _closed_mesh(first, smallest, creases, report)
-        except InvalidResolution:
+        except InvalidResolution as error:
             if attempt == 0 and len(first.blocks) <= MAX_SECOND_BLOCKS:
                 first = _sampled(tree, grid_of(OTHER_CELLS * scale), device, report)
-            elif first.walls is not None and without_walls:  # their rims may be too sharp for any cells
-                named = _sampled(tree, grid_of(scale), device, report)
-                unresolved += [ThinPart(*wall) for wall in named.walls.thinnest] if named.walls else []
-                first = FirstCells(named.blocks, None)
-            else:
+                continue
+            at = error.places if isinstance(error, OpenMesh) and attempt < 2 else NO_PLACES
+            if first.walls is None or expendable == "none" or (expendable == "some" and not len(at)):
                 break
+            first = _sampled(tree, grid_of(scale), device, report)
+            assert first.walls is not None
+            stops = np.concatenate([stops, at])
+            left_out = [ThinPart(*wall) for wall in first.walls.leave_out_near(stops if len(at) else None)]
         else:
-            return mesh, others + unresolved
-    return None, unresolved + _all_parts(first, smallest)
+            return mesh, others + unresolved + left_out
+    return None, unresolved + left_out + _all_parts(first, smallest)
 
 
 def _closed_mesh(

@@ -17,6 +17,7 @@ fails is meshed again with less growth, and at last with cells as small as its p
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Literal
 
 import numpy as np
 import warp as wp
@@ -291,22 +292,23 @@ def mesh_of_thin_parts(
     """
 
     def with_small_cells(
-        model: ImplicitModel, first: FirstCells | None = None
+        model: ImplicitModel, first: FirstCells | None, expendable: Literal["none", "some", "all"]
     ) -> tuple[Mesh, list[ThinPart]]:
         grids = partial(grid_of, model)
-        mesh, unresolved = mesh_of_parts(model, grids, device, creases, report, first, model is tree)
+        mesh, unresolved = mesh_of_parts(model, grids, device, creases, report, first, expendable)
         return mesh or uniform(model), unresolved
 
     size = grid_of(tree, 1.0).cell_size
     limits, first = np.full(len(part_sizes(tree)[0]), np.inf), None
-    for _attempt in range(MAX_ATTEMPTS):
+    for attempt in range(MAX_ATTEMPTS):
         plates = _grown_plates(tree, size, limits)
         first = first_cells(plates.grown, partial(grid_of, plates.grown), device, report)
         growth = plates.then(_grown_walls(plates.grown, first, size, limits))
         if growth.grown is tree:
             break
         walls_grow = not np.array_equal(growth.amounts, plates.amounts)
-        mesh, unresolved = with_small_cells(growth.grown, None if walls_grow else first)
+        expendable: Literal["none", "some"] = "some" if attempt else "none"
+        mesh, unresolved = with_small_cells(growth.grown, None if walls_grow else first, expendable)
         first = None
         kernels = (return_to_surface, find_feet, improve_feet, find_other_sides)
         load_together(map(tree.tape.instruction_set.kernel_for, kernels), known_device(device))
@@ -319,7 +321,7 @@ def mesh_of_thin_parts(
         if len(mesh.faces) > MAX_GROWN_TRIANGLES:
             break
         limits[wrong] = LESS * np.abs(growth.lengths[wrong])
-    mesh, unresolved = with_small_cells(tree, first)
+    mesh, unresolved = with_small_cells(tree, first, "all")
     warn_of_thin_parts(tree, unresolved)
     return mesh
 

@@ -26,6 +26,7 @@ from blobtree.device import launch
 from blobtree.formulas.falloff import ISO
 from blobtree.meshing.adaptive_cells import CELL_OFFSETS, CORNERS, cell_codes
 from blobtree.meshing.block_tree import BlockTree, on_device
+from blobtree.meshing.gaps import connected_blocks
 from blobtree.meshing.part_kernels import UNLIMITED
 from blobtree.meshing.patches import EDGES
 from blobtree.meshing.wall_kernels import climb, measure_walls, place_samples
@@ -349,6 +350,29 @@ class Walls:
             if cells > (most_fine if self._thick[number] < THICK_SHARE * finest else most):
                 left_out.append(self._thinnest_of(samples))
                 self._samples[number] = samples.chosen(np.empty(0, np.intp))
+        return left_out
+
+    def leave_out_near(self, places: Float64Array | None) -> list[tuple[float, Float64Array, ProgramLeaf]]:
+        """Forget the walls nearest to places (n, 3), each in all blocks of the base that it connects.
+
+        Without places, forget all walls. Return size of cells, place and leaf of each. To be called before
+        blocks are refined.
+        """
+        from scipy.spatial import cKDTree  # most meshes have no thin walls
+
+        samples, grid = np.concatenate([one.places for one in self._samples]), self._blocks.grid(0)
+        places = samples if places is None else places
+        if not len(samples):
+            return []
+        at = np.floor((samples - grid.origin) / (4 * grid.cell_size)).astype(np.int32)
+        blocks, of_samples = np.unique(at, axis=0, return_inverse=True)
+        groups = connected_blocks(blocks)[of_samples.ravel()]
+        near = np.isin(groups, groups[cKDTree(samples).query(places)[1]])
+        ends, left_out = np.cumsum([len(one.places) for one in self._samples])[:-1], []
+        for number, (one, out) in enumerate(zip(self._samples, np.split(near, ends), strict=True)):
+            if out.any():
+                left_out.append(self._thinnest_of(one.chosen(out)))
+                self._samples[number] = one.chosen(~out)
         return left_out
 
     def leaf_at(self, place: Float64Array, size: float) -> ProgramLeaf | None:

@@ -7,7 +7,7 @@ import pytest
 
 from blobtree import Box, Mesh, Node, Point, Segment, Shell, SmoothDifference, polygonize
 from blobtree.errors import InvalidResolution
-from blobtree.meshing.adaptive_mesh import AdaptiveMesh, AdaptiveMesher
+from blobtree.meshing.adaptive_mesh import AdaptiveMesh, AdaptiveMesher, OpenMesh
 from blobtree.meshing.thin_parts import polygonize_parts
 from blobtree.progress import Progress
 from tests.thin_trees import is_closed, mesh_areas, pieces
@@ -196,7 +196,7 @@ def test_parts_that_cells_cannot_close_leave_the_rest(
 ) -> None:
     tree = BALL.translate((4, 0, 0)) | (CUBE & CUBE.translate((0, 0, 1.1)))
 
-    def failing(self: AdaptiveMesher, report: Progress, *limits: float) -> AdaptiveMesh:
+    def failing(self: AdaptiveMesher, report: Progress, *limits: int) -> AdaptiveMesh:
         raise InvalidResolution("cells could not be divided")
 
     monkeypatch.setattr(AdaptiveMesher, "mesh", failing)
@@ -206,3 +206,31 @@ def test_parts_that_cells_cannot_close_leave_the_rest(
     assert is_closed(mesh.faces)
     assert mesh_areas(mesh)[1].sum() > 4.0 * np.pi * 0.95
     assert "a wall of the Intersection at path (1,)" in record.getMessage()
+
+
+@pytest.mark.parametrize("thickness", [0.08, 0.01])
+def test_a_wall_that_cells_cannot_close_leaves_the_other_walls(
+    thickness: float, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    inner = 1.0 - thickness
+    case = CUBE - Box((0, 0, 0), (inner, inner, inner), radius=0.1)
+    tree = case | (BALL & BALL.translate((1.95, 0, 0))).translate((4, 0, 0))
+    mesh_of_cells = AdaptiveMesher.mesh
+
+    def failing(self: AdaptiveMesher, report: Progress, *limits: int) -> AdaptiveMesh:
+        mesh = mesh_of_cells(self, report, *limits)
+        at_lens = mesh.vertices.positions[:, 0] > 3.0
+        if (mesh.leaves.sizes[mesh.owners[at_lens]] < mesh.leaves.sizes.max()).any():
+            raise OpenMesh("cells could not be divided", mesh.vertices.positions[at_lens][:1].astype(float))
+        return mesh
+
+    monkeypatch.setattr(AdaptiveMesher, "mesh", failing)
+    with caplog.at_level(logging.WARNING):
+        mesh = polygonize_parts(tree, resolution=24)
+    (record,) = caplog.records
+    assert is_closed(mesh.faces)
+    centers, areas = mesh_areas(mesh)
+    expected = box_area(1.0, 0.1) + box_area(inner, 0.1)
+    assert areas[centers[:, 0] < 2.0].sum() == pytest.approx(expected, rel=0.06)
+    assert "a wall of the Intersection at path (1, 0)" in record.getMessage()
+    assert "Difference" not in record.getMessage()
