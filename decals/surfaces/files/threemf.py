@@ -12,7 +12,7 @@ from decals.surfaces.files.faults import Notes, Unreadable, reading
 from decals.surfaces.files.pieces import Budget, Piece, mesh_of, placed
 from decals.surfaces.files.threemf_colors import Colors
 from decals.surfaces.files.threemf_model import Model, Object, Use, parse_model
-from decals.surfaces.files.threemf_package import Package
+from decals.surfaces.files.threemf_package import Package, open_package
 from decals.surfaces.mesh_data import MeshData
 
 _logger = logging.getLogger(__name__)
@@ -44,7 +44,7 @@ def threemf_objects(path: Path) -> dict[str, MeshData]:
 
 def _objects(path: Path) -> dict[str, Piece]:
     """Return the objects that a file builds, each with all its copies."""
-    with reading(path, "3MF") as notes, Package(path) as package:
+    with reading(path, "3MF") as notes, open_package(path) as package:
         build = _Build(package, notes)
         _logger.info("%s: the unit is 1 %s", path, build.unit)
         budget, pieces = Budget(), {}

@@ -4,8 +4,9 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Self
+from typing import BinaryIO
 from urllib.parse import unquote
 
 from decals.surfaces.files.faults import Unreadable
@@ -29,27 +30,24 @@ _FAULTS = (zipfile.BadZipFile, zlib.error, struct.error, NotImplementedError, Ru
 """What `zipfile` raises for damaged archives."""
 
 
+@contextmanager
+def open_package(path: Path) -> Iterator["Package"]:
+    """Give the package of a file, which is open until the block ends, also when a part is half read."""
+    with path.open("rb") as file:
+        yield Package(file, path.stat().st_size)
+
+
 class Package:
     """A 3MF file that is open for reading."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, file: BinaryIO, size: int) -> None:
         try:
-            self._zip = zipfile.ZipFile(path)
+            self._zip = zipfile.ZipFile(file)
         except _FAULTS as error:
             raise Unreadable(f"it is no ZIP archive: {error}") from error
-        self._unpacked, self._limit = 0, MAX_UNPACKED + UNPACKED_PER_BYTE * path.stat().st_size
+        self._unpacked, self._limit = 0, MAX_UNPACKED + UNPACKED_PER_BYTE * size
         self._parts = {_normal(entry.filename): entry for entry in self._zip.infolist()}
-        try:
-            self.model_part = self._start()
-        except Unreadable:
-            self._zip.close()
-            raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._zip.close()
+        self.model_part = self._start()
 
     def chunks(self, part: str) -> Iterator[bytes]:
         """Yield the bytes of a part, in order."""

@@ -2,6 +2,7 @@
 
 import io
 import logging
+import os
 import random
 import zipfile
 from pathlib import Path
@@ -185,6 +186,18 @@ PALETTES = f"""<m:colorgroup xmlns:m="{MATERIALS}" id="10">
 <m:texture2dgroup xmlns:m="{MATERIALS}" id="13" texid="12"><m:tex2coord u="0.25" v="0.75"/>
 <m:tex2coord u="9" v="0.25"/><m:tex2coord u="-9" v="0.25"/></m:texture2dgroup>
 <m:multiproperties xmlns:m="{MATERIALS}" id="14" pids="10 11"/>"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="only Linux lists the open files of a process")
+@pytest.mark.parametrize("text", [model("<object"), model('<object id="1"/>', "<!DOCTYPE a>")])
+def test_a_file_is_closed_after_a_fault_in_the_middle_of_a_part(tmp_path: Path, text: str) -> None:
+    """The error keeps the frames that read the part alive."""
+    path = saved(tmp_path, text)
+    with pytest.raises(InvalidMesh) as info:
+        threemf.read_3mf(path)
+    opened = [os.path.realpath(link) for link in Path("/proc/self/fd").iterdir()]
+    assert info.value.__cause__ is not None
+    assert str(path.resolve()) not in opened
 
 
 def test_colours_of_corners_objects_and_textures(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
