@@ -36,10 +36,11 @@ def _report(progress: Any, cancel: Any) -> None:
 
 
 UNCALLED = {
-    "Actions", "BoxedField", "Cancel", "ContactLaw", "ContactSurface", "Curvatures", "CustomCombination",
-    "CustomField", "CustomPrimitive", "CustomWarp", "Document", "EditSession", "Falloff", "FieldGrid",
-    "FieldPrimitive", "Fit", "Hits", "Node", "NumericParameter", "Operator", "ParameterGradient",
-    "PointerTools", "Primitive", "Progress", "SignedDistances", "Tape", "UndoEntry", "Warp", "edit", "show",
+    "Actions", "AreaGradient", "BatchHits", "BoxedField", "Cancel", "ContactLaw", "ContactSurface",
+    "Curvatures", "CustomCombination", "CustomField", "CustomPrimitive", "CustomWarp", "Document",
+    "EditSession", "Falloff", "FieldGrid", "FieldPrimitive", "Fit", "Hits", "Node", "NumericParameter",
+    "Operator", "ParameterGradient", "PointerTools", "Primitive", "Progress", "SignedDistances",
+    "SurfaceLine", "Tape", "UndoEntry", "Warp", "edit", "show",
 }  # fmt: skip
 """Types that users only get from functions, extend, or start for a whole session; and windows."""
 
@@ -310,6 +311,58 @@ def call_table() -> Calls:
             blobtree.field_grid,
             {"tree": tree, "resolution": 6, "spacing": None, "distance": True},
         ),
+        "area_gradient": (
+            decals.area_gradient,
+            {"scene": whole, "weights": None, "contact": "elastic", "step": 0.2},
+        ),
+        "outlines": (
+            lambda **arguments: list(decals.outlines(**arguments)),
+            {"scene": whole, "contact": "elastic", "stiffness": 4.0, "mapping": "chord", "step": 0.2},
+        ),
+        "save_figure": (
+            decals.save_figure,
+            {
+                "scene": whole,
+                "path": "a.svg",
+                "size": (90.0, 60.0),
+                "widths": None,
+                "picture": False,
+                "camera": camera,
+                "contact": "elastic",
+                "stiffness": 4.0,
+                "mapping": "chord",
+                "step": 0.2,
+            },
+        ),
+        "render_batch": (
+            lambda **arguments: list(decals.render_batch(**arguments)),
+            {
+                "scenes": [whole],
+                "viewpoints": None,
+                "size": (8, 6),
+                "samples": 1,
+                "contact": "elastic",
+                "stiffness": 4.0,
+                "mapping": "chord",
+                "background": "white",
+                "lights": None,
+                "filtered": None,
+                "environment": None,
+            },
+        ),
+        "save_table": (
+            decals.save_table,
+            {"decals": spots, "path": "a.csv", "images": whole.images, "origin": origin},
+        ),
+        "load_table": (decals.load_table, {"path": "a.csv", "origin": origin, "trust": False}),
+        "from_table": (decals.from_table, {"table": decals.to_pandas(spots)}),
+        "to_arrow": (decals.to_arrow, {"decals": spots}),
+        "to_pandas": (decals.to_pandas, {"decals": spots}),
+        "check_kind": (
+            blobtree.check_kind,
+            {"kind": Point, "oracle": None, "samples": 1, "seed": 0, "compiled": False, "show": None},
+        ),
+        "formula": (blobtree.formula, {"function": None}),
         "displace": (
             decals.displace,
             {

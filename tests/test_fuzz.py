@@ -22,6 +22,7 @@ def test_the_fuzzer_finds_nothing() -> None:
         },
         "torn": [],
     }
+    assert figures["not_called"] == []
 
 
 def test_a_stage_reports_crashes_hangs_and_foreign_exceptions(

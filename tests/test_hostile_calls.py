@@ -151,6 +151,10 @@ CALLS: dict[str, Callable[[], object]] = {
     "surrogate in a tree": lambda: blobtree.load("\ud800.json"),
     "surrogate in a mesh": lambda: read_mesh("\ud800.ply"),
     "surrogate in a saved scene": lambda: decals.save_scene(SCENE, "\ud800.json"),
+    "surrogate as title": lambda: decals.save_html(SCENE, "a.html", title="\ud800"),
+    "surrogate as alternative text": lambda: decals.save_html(SCENE, "a.html", alt="a\udfff"),
+    "origin of a saved table": lambda: decals.save_table(SPOTS, "a.csv", origin=[[0, 0, 0]]),  # type: ignore[arg-type]
+    "origin of a table": lambda: decals.load_table("a.csv", origin=np.array("x")),  # type: ignore[arg-type]
     "no image to cover with": lambda: decals.cover(BALL, count=1, images=[]),
     "no direction": lambda: decals.cover(BALL, count=1, direction=(0, 0, 0)),
     "upward": lambda: decals.cover(BALL, count=1, up=(0, 0, 1)),  # type: ignore[arg-type]

@@ -30,7 +30,7 @@ from decals.scenes.cover import as_scene
 from decals.scenes.objects import SceneObject
 from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model
-from decals.validation import MAX_STIFFNESS, checked_path, describe, one_of
+from decals.validation import MAX_STIFFNESS, checked_path, describe, is_unicode, one_of
 
 MODULES = (
     *("vectors", "packing", "texels", "index", "decals", "history", "camera", "link", "graphics", "painter"),
@@ -250,8 +250,8 @@ def _gradient(background: Background) -> str:
 
 
 def _text(name: str, value: Any, default: str) -> str:
-    if value is not None and not isinstance(value, str):
-        raise InvalidScene(f"{name}: expected a text, got {describe(value)}")
+    if value is not None and not (isinstance(value, str) and is_unicode(value)):
+        raise InvalidScene(f"{name}: expected a text of Unicode characters, got {describe(value)}")
     return value or default
 
 

@@ -32,7 +32,7 @@ from decals.scenes.origin import WORLD, Origin
 from decals.scenes.parquet import read_parquet
 from decals.scenes.records import check_inside, decimals
 from decals.scenes.scene import DecalImage
-from decals.validation import as_path, checked_path, describe, instance, optional_package
+from decals.validation import as_path, checked_path, describe, finite_vector, instance, optional_package
 
 if TYPE_CHECKING:
     import pandas
@@ -235,7 +235,7 @@ def save_table(
     Raises
     ------
     InvalidDecals
-        No decals.
+        No decals, or an origin of other than three finite numbers.
     InvalidScene
         Another suffix, or a folder that cannot be written.
     MissingPackage
@@ -250,7 +250,7 @@ def save_table(
     ['x,y,z,nx,ny,nz,tx,ty,tz,radius,image', '0.0,0.0,0.0,0.0,0.0,1.0,1.0,0.0,0.0,0.1,0']
     """
     instance("decals", decals, Decals, InvalidDecals, "a scene has .decals")
-    target = checked_path(path, SUFFIXES)
+    target, shift = checked_path(path, SUFFIXES), finite_vector("origin", origin, InvalidDecals)
     columns = _columns_of(decals)
     names = [
         name
@@ -266,7 +266,7 @@ def save_table(
         with replacing(target) as temporary:
             parquet.write_table(table, temporary)
         return
-    texts = [_texts(name, columns[name], origin) for name in names]
+    texts = [_texts(name, columns[name], shift) for name in names]
     if sources:
         names, texts = [*names, IMAGE_SOURCE], [*texts, sources]
     lines = io.StringIO()
@@ -296,7 +296,7 @@ def load_table(path: str | os.PathLike[str], *, origin: Origin = WORLD, trust: b
     Raises
     ------
     InvalidDecals
-        No such file, or no table of decals; the message names file, line and column.
+        No such file, no table of decals, or a wrong origin; the message names file, line and column.
     InvalidScene, InvalidImage
         A picture outside the folder, or a missing one.
 
@@ -308,13 +308,13 @@ def load_table(path: str | os.PathLike[str], *, origin: Origin = WORLD, trust: b
     >>> decals.load_table("disk.csv").decals == disk
     True
     """
-    source = as_path(path, InvalidDecals)
+    source, shifts = as_path(path, InvalidDecals), finite_vector("origin", origin, InvalidDecals)
     if not is_file(source):
         raise InvalidDecals(f"{str(path)!r}: expected a table of decals, found no such file")
     if source.suffix.lower() == ".parquet":
         return _loaded(source, _arrays_of(read_parquet(source)), lambda row: f"row {row + 1}", trust)
     columns, lines = _csv_columns(source)
-    for name, shift in zip("xyz", origin, strict=True):
+    for name, shift in zip("xyz", shifts, strict=True):
         if shift and name in columns:
             columns[name] = _shifted(columns[name], shift)
     return _loaded(source, columns, lambda row: f"line {lines[row]}", trust)
@@ -454,7 +454,7 @@ def _is_empty(value: Any) -> bool:
 # -- CSV and Parquet -------------------------------------------------------------------------------------
 
 
-def _texts(name: str, values: NDArray[Any], origin: Origin) -> list[Any]:
+def _texts(name: str, values: NDArray[Any], origin: Float64Array) -> list[Any]:
     """Return the cells of a column as text: the shortest decimals that are read as the same float32."""
     if values.dtype == np.float32:
         shift = origin["xyz".index(name)] if name in ("x", "y", "z") else 0.0
