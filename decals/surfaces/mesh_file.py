@@ -116,13 +116,9 @@ def read_mesh(path: str | PathLike[str]) -> MeshArrays:
 def read_objects(path: str | PathLike[str]) -> list[tuple[str, MeshArrays]]:
     """Read the objects of a mesh file: nodes of glTF, meshes of USD, objects of 3MF and OBJ.
 
-    Other files are one object.
-
-
-    Parameters and errors are those of `read_mesh`.
+    Other files are one object. Parameters and errors are those of `read_mesh`.
     """
-    path = as_path(path, InvalidMesh)
-    whole = read_mesh_data(path)
+    path = _existing(path)
     suffix = path.suffix.lower()
     if suffix in _OBJECT_READERS:
         parts = _OBJECT_READERS[suffix](path)
@@ -134,14 +130,12 @@ def read_objects(path: str | PathLike[str]) -> list[tuple[str, MeshArrays]]:
             (name, polygon_triangles(points, [faces[row] for row in rows], name=name))
             for name, rows in obj_objects(path)
         ]
-    return [(path.name, whole.arrays)]
+    return [(path.name, read_mesh_data(path).arrays)]
 
 
 def read_mesh_data(path: str | PathLike[str]) -> MeshData:
     """Read a mesh file with its colours; see `read_mesh`."""
-    path = as_path(path, InvalidMesh)
-    if not is_file(path):
-        raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
+    path = _existing(path)
     suffix = path.suffix.lower()
     if suffix in _SCENE_READERS:
         data = _SCENE_READERS[suffix](path)
@@ -154,6 +148,14 @@ def read_mesh_data(path: str | PathLike[str]) -> MeshData:
     if can_isolate():
         return read_isolated(path)
     return dataset_mesh(read_dataset(path), name=str(path))
+
+
+def _existing(path: str | PathLike[str]) -> Path:
+    """Return the path of a file; raise `InvalidMesh` if there is none."""
+    path = as_path(path, InvalidMesh)
+    if not is_file(path):
+        raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
+    return path
 
 
 def dataset_triangles(dataset: "pv.DataSet | pv.MultiBlock", *, name: str) -> MeshArrays:

@@ -8,6 +8,7 @@ again after a crash.
 import contextlib
 import gc
 import json
+import logging
 import math
 import os
 import select
@@ -15,6 +16,7 @@ import signal
 import sys
 import tempfile
 import time
+from logging.handlers import BufferingHandler
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -121,7 +123,20 @@ def _limit_step(seconds: float) -> None:
 
 
 def _answer(request: dict[str, Any]) -> tuple[Any, ...]:
-    """Return the header of an answer, and the contents of its arrays."""
+    """Return the header of an answer, with what was logged, and the contents of its arrays."""
+    logger, kept = logging.getLogger(), BufferingHandler(sys.maxsize)
+    logger.addHandler(kept)
+    try:
+        header, *contents = _mesh_answer(request)
+    finally:
+        logger.removeHandler(kept)
+    return {
+        **header,
+        "log": [(line.name, line.levelno, line.getMessage()) for line in kept.buffer],
+    }, *contents
+
+
+def _mesh_answer(request: dict[str, Any]) -> tuple[Any, ...]:
     try:
         parts = _read(Path(os.fsdecode(bytes.fromhex(request["path"]))), request["seconds"])
         mesh = joined(list(parts.values()))

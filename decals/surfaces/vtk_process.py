@@ -5,6 +5,7 @@
 
 import atexit
 import json
+import logging
 import math
 import os
 import subprocess
@@ -102,6 +103,8 @@ class _ReaderProcess:
                     _failure(path, f"its reader crashed, or was stuck for {PATIENCE * seconds:.0f} s")
                 )
         header, arrays = answer
+        for name, level, line in header.get("log", ()):
+            logging.getLogger(name).log(level, "%s", line)
         if "limit" in header:
             raise InvalidMesh(
                 f"could not read {str(path)!r} within the limits for {size:,} bytes, {seconds} s of "

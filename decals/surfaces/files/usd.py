@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from decals.surfaces.files.faults import Unreadable, reading
+from decals.surfaces.files.faults import Notes, Unreadable, reading
 from decals.surfaces.files.pieces import Budget, Piece, placed
 from decals.surfaces.mesh_data import MeshData
 from decals.surfaces.triangulate import Polygons, polygon_triangles
@@ -20,7 +20,7 @@ def usd_objects(path: Path) -> dict[str, MeshData]:
     """Return the visible meshes of a USD file by their paths, without colours.
 
     Each lies where the file places it at its first time. Meshes of subdivision surfaces are read as they are.
-    Spheres, curves and copies of point instancers are left out.
+    Spheres, curves and copies of point instancers are left out, and the log names them.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def usd_objects(path: Path) -> dict[str, MeshData]:
     """
     usd, geometry, tf = (optional_package(f"pxr.{name}", "usd") for name in ("Usd", "UsdGeom", "Tf"))
     found: dict[str, MeshData] = {}
-    with reading(path, "USD"):
+    with reading(path, "USD") as notes:
         try:
             stage = usd.Stage.Open(str(path))
         except tf.ErrorException as error:
@@ -41,7 +41,7 @@ def usd_objects(path: Path) -> dict[str, MeshData]:
         budget.grow(path.stat().st_size)
         first = usd.TimeCode.EarliestTime()
         places = geometry.XformCache(first)
-        for prim in _meshes(usd, geometry, stage, first):
+        for prim in _meshes(usd, geometry, stage, first, notes):
             name = str(prim.GetPath())
             points, polygons = _polygons(geometry.Mesh(prim), first)
             if not len(polygons):
@@ -66,14 +66,22 @@ def _check_layers(stage: Any, path: Path) -> None:
             raise Unreadable(f"it refers to {place!r}, outside of its folder", "move that file beside it")
 
 
-def _meshes(usd: Any, geometry: Any, stage: Any, time: Any) -> Iterator[Any]:
-    """Yield the meshes of a stage that are seen."""
-    for prim in usd.PrimRange.Stage(stage, usd.TraverseInstanceProxies()):
+def _meshes(usd: Any, geometry: Any, stage: Any, time: Any, notes: Notes) -> Iterator[Any]:
+    """Yield the meshes of a stage that are seen; note other shapes that are."""
+    prims = iter(usd.PrimRange.Stage(stage, usd.TraverseInstanceProxies()))
+    for prim in prims:
+        if prim.IsA(geometry.PointInstancer):
+            prims.PruneChildren()  # what is copied is not seen itself
+        elif not prim.IsA(geometry.Gprim):
+            continue
+        shape = geometry.Imageable(prim)
+        hidden = shape.ComputeVisibility(time) == geometry.Tokens.invisible
+        if hidden or shape.ComputePurpose() not in (geometry.Tokens.default_, geometry.Tokens.render):
+            continue
         if prim.IsA(geometry.Mesh):
-            shape = geometry.Imageable(prim)
-            hidden = shape.ComputeVisibility(time) == geometry.Tokens.invisible
-            if not hidden and shape.ComputePurpose() in (geometry.Tokens.default_, geometry.Tokens.render):
-                yield prim
+            yield prim
+        else:
+            notes.add(f"left out, as {prim.GetTypeName()} is no mesh", str(prim.GetPath()))
 
 
 def _polygons(mesh: Any, time: Any) -> tuple[Any, Polygons]:

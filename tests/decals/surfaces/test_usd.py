@@ -39,7 +39,9 @@ def written(path: Path, *parts: str) -> Path:
     return path
 
 
-def test_meshes_lie_where_the_file_places_them_with_their_outside_outside(tmp_path: Path) -> None:
+def test_meshes_lie_where_the_file_places_them_with_their_outside_outside(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     left = 'uniform token orientation = "leftHanded"'
     turned = [side[::-1] for side in SIDES]
     parts = {
@@ -51,10 +53,16 @@ def test_meshes_lie_where_the_file_places_them_with_their_outside_outside(tmp_pa
         "hidden": cube("hidden", 'token visibility = "invisible"'),
         "guide": cube("guide", 'uniform token purpose = "guide"'),
         "ball": 'def Sphere "ball" {}\n',
+        "hidden ball": 'def Sphere "b" {\ntoken visibility = "invisible"\n}\n',
+        "copies": f'def PointInstancer "copies" {{\n{cube("copied")}}}\n',
     }
     volumes = {"/plain": 1, "/mirrored": 3, "/left": 1, "/both": 2}
     found = dict(read_objects(written(tmp_path / "a.usda", *parts.values())))
     assert list(found) == [*volumes, "/open"]
+    assert [message.partition("a.usda: ")[2] for message in caplog.messages] == [
+        "left out, as Sphere is no mesh: /ball",
+        "left out, as PointInstancer is no mesh: /copies",
+    ]
     assert len(found["/open"][1]) == 10
     for name, volume in volumes.items():
         vertices, faces = found[name]
