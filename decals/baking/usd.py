@@ -11,7 +11,8 @@ from decals.baking.parts import METRES, Baked, Part
 from decals.baking.pictures import png_bytes
 from decals.validation import optional_package
 
-MODULES = ("Gf", "Sdf", "Tf", "Usd", "UsdGeom", "UsdShade", "Vt")
+MODULES = tuple(f"pxr.{name}" for name in ("Gf", "Sdf", "Tf", "Usd", "UsdGeom", "UsdShade", "Vt"))
+"""Modules of OpenUSD that write a file."""
 
 STAGE = "scene.usdc"
 """First file of the package, as the format demands."""
@@ -25,7 +26,7 @@ def usdz_bytes(baked: Baked) -> bytes:
     MissingPackage
         If usd-core is not installed.
     """
-    pxr = SimpleNamespace(**{name: optional_package(f"pxr.{name}", "usd") for name in MODULES})
+    pxr = SimpleNamespace(**{name.rpartition(".")[2]: optional_package(name, "usd") for name in MODULES})
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         pictures = {} if baked.maps is None else _pictures(baked.maps)

@@ -1,6 +1,8 @@
 """Exported files, read back by this package, trimesh and VTK: surfaces and colours are those of the scene."""
 
 import json
+import subprocess
+import sys
 import zipfile
 from functools import cache
 from pathlib import Path
@@ -398,3 +400,29 @@ def test_a_usdz_archive_is_as_its_specification_says(tmp_path: Path) -> None:
             assert start % 64 == 0
             assert content[start : start + entry.file_size] == archive.read(entry)
         assert archive.read(entries[0])[:8] == b"PXR-USDC"
+
+
+LATE = """
+import sys
+import decals
+from blobtree import Point
+from decals.baking import export
+
+class Pool(export.ThreadPoolExecutor):
+    def __init__(self, *arguments):
+        known.update(sys.modules)
+        super().__init__(*arguments)
+
+known, export.ThreadPoolExecutor = set(), Pool
+decals.export(Point((0, 0, 0), radius=1), sys.argv[1], colors="none", resolution=8)
+print([name for name in sys.modules if name.startswith("pxr") and name not in known], "pxr.Usd" in known)
+"""
+
+
+@pytest.mark.slow
+def test_openusd_is_imported_before_other_threads_start(tmp_path: Path) -> None:
+    """Its loading can wait for a thread that waits for it, so that neither ends."""
+    pytest.importorskip("pxr", reason="usd-core is not installed; it is in the extra `usd`")
+    command = [sys.executable, "-c", LATE, str(tmp_path / "a.usdz")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    assert done.stdout == "[] True\n", done.stderr
