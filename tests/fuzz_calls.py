@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from enum import Enum
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -359,8 +360,8 @@ def call_table() -> Calls:
         "to_arrow": (decals.to_arrow, {"decals": spots}),
         "to_pandas": (decals.to_pandas, {"decals": spots}),
         "check_kind": (
-            blobtree.check_kind,
-            {"kind": Point, "oracle": None, "samples": 1, "seed": 0, "compiled": False, "show": None},
+            partial(blobtree.check_kind, show=None),
+            {"kind": Point, "oracle": None, "samples": 1, "seed": 0, "compiled": False},
         ),
         "formula": (blobtree.formula, {"function": None}),
         "displace": (

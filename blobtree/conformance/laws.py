@@ -57,6 +57,9 @@ NO_KINK = 1e-3
 STEP = 1e-6
 """Step of differences, over the size of the node."""
 
+MAX_SAMPLES = 100_000
+"""Most nodes that are tried."""
+
 MAX_TEXT = 300
 """Letters of a node in a report."""
 
@@ -443,7 +446,7 @@ def check_kind(
         A function of a random generator that returns a node to try. By default parameters are drawn from
         their declarations, and operands are balls.
     samples
-        Number of nodes.
+        Number of nodes, at most 100,000.
     seed
         Seed of all random numbers.
     compiled
@@ -478,6 +481,8 @@ def check_kind(
         if function is not None and not callable(function):
             raise InvalidNode(f"{name}: expected a function or None, got {function!r:.200}")
     samples = positive_count("samples", samples, InvalidNode)
+    if samples > MAX_SAMPLES:
+        raise InvalidNode(f"samples: expected at most {MAX_SAMPLES:,}, got more; give fewer")
     if not is_whole(seed) or seed < 0:
         raise InvalidNode(f"seed: expected a whole number from 0, got {seed!r:.200}")
     draw = sample

@@ -14,7 +14,7 @@ from PIL import Image
 from blobtree._typing import BoolArray, Float64Array
 from blobtree.files import replacing, write_atomically
 from blobtree.progress import Progress, reporting
-from blobtree.validation import items
+from blobtree.validation import items, truth
 from decals.errors import InvalidScene
 from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
@@ -126,7 +126,7 @@ def save_figure(
     require_scene("scene", scene, "draw the scene that was posed, where its decals lie")
     target = checked_path(path, SUFFIXES)
     page = _page(size)
-    thickness = _widths(widths)
+    thickness, pictured = _widths(widths), truth("picture", picture, InvalidScene)
     if not scene.objects:
         raise InvalidScene("expected a scene with an object to draw, got none; add one")
     modes = scene.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping).modes
@@ -148,7 +148,7 @@ def save_figure(
             lines += [line for item in scene.objects for line in _edges(item, view)]
         strokes = list(view.strokes([line for line in lines if line.kind in shown]))
         image = None
-        if picture:
+        if pictured:
             pixels = tuple(max(1, round(PIXELS_PER_POINT * side)) for side in page)
             image = render(scene, size=(pixels[0], pixels[1]), **modes)
         write = _write_svg if target.suffix.lower() == ".svg" else _write_pdf

@@ -24,6 +24,7 @@ from blobtree._typing import Float64Array
 from blobtree.files import is_file, replacing, write_atomically
 from blobtree.validation import items
 from decals.errors import InvalidDecals, InvalidInput
+from decals.images.load import AnyImage
 from decals.model import Decals, Interaction
 from decals.receivers import TEXT
 from decals.scenes.files import image_record, images_of
@@ -31,7 +32,7 @@ from decals.scenes.material_record import MaterialRecord, sources_of
 from decals.scenes.origin import WORLD, Origin
 from decals.scenes.parquet import read_parquet
 from decals.scenes.records import check_inside, decimals
-from decals.scenes.scene import DecalImage
+from decals.scenes.scene import DecalImage, as_images
 from decals.validation import as_path, checked_path, describe, finite_vector, instance, optional_package
 
 if TYPE_CHECKING:
@@ -216,7 +217,7 @@ def save_table(
     decals: Decals,
     path: str | os.PathLike[str],
     *,
-    images: Iterable[DecalImage] = (),
+    images: AnyImage | Iterable[AnyImage] = (),
     origin: Origin = WORLD,
 ) -> None:
     """Write decals as a table, whole or not at all; `load_table` reads the same bits.
@@ -227,8 +228,9 @@ def save_table(
         The decals.
     path : str or path
         The file, named ``.csv`` or ``.parquet``. Parquet needs the extra ``experiments``.
-    images : sequence of DecalImage, optional
-        Images of the decals. The file names them, or has them in full if they have neither name nor path.
+    images : sequence of images, optional
+        Images of the decals, as a scene takes them. The file names them, or has them in full if they have
+        neither name nor path.
     origin : (x, y, z), optional
         Added to the positions in CSV: the origin of the objects, as coordinates in their files have it.
 
@@ -238,6 +240,8 @@ def save_table(
         No decals, or an origin of other than three finite numbers.
     InvalidScene
         Another suffix, or a folder that cannot be written.
+    InvalidImage
+        Images that are none.
     MissingPackage
         pyarrow is not installed.
 
@@ -531,9 +535,9 @@ def _long_cells() -> Any:
 # -- images ----------------------------------------------------------------------------------------------
 
 
-def _image_sources(decals: Decals, images: Iterable[DecalImage], folder: Path) -> list[str]:
+def _image_sources(decals: Decals, images: AnyImage | Iterable[AnyImage], folder: Path) -> list[str]:
     """Return a cell for each decal: the record of its image where the image comes first, else empty."""
-    records = [image_record(image, folder) for image in images]
+    records = [image_record(image, folder) for image in as_images(images)]
     if not records:
         return []
     if decals.images.max(initial=-1) >= len(records):
