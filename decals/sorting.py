@@ -1,4 +1,4 @@
-"""Orders and groups of whole numbers, in a fraction of the time of NumPy's stable sort."""
+"""Orders, groups and ranges of whole numbers, in a fraction of the time of NumPy's stable sort."""
 
 import numpy as np
 
@@ -42,3 +42,16 @@ def distinct_numbers(numbers: Int64Array, count: int) -> Int64Array:
     marked = np.zeros(count, np.bool_)
     marked[numbers.reshape(-1)] = True
     return np.flatnonzero(marked)
+
+
+def ranges(starts: Int64Array, counts: Int64Array) -> Int64Array:
+    """Return whole numbers from each start on, so many of each, one range after another.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> ranges(np.array([5, 0]), np.array([2, 3])).tolist()
+    [5, 6, 0, 1, 2]
+    """
+    ends = np.cumsum(counts)
+    return np.arange(int(counts.sum())) + np.repeat(starts - (ends - counts), counts)

@@ -1,5 +1,6 @@
 """Warp kernels of seams: how far both sides differ, what lies around, and changes point by point."""
 
+# ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
 # mypy: ignore-errors
 # (kernel code is Python only in form: its names have Warp types)
 
@@ -31,10 +32,10 @@ def level_of(light: wp.float32, srgb: wp.bool) -> wp.float32:
 
 
 @wp.func
-def slope(level: wp.float32, srgb: wp.bool) -> wp.float32:
+def slope(level: wp.float32, light: wp.float32, srgb: wp.bool) -> wp.float32:
     """Return the derivative of light by the level."""
     if srgb:
-        return decoded_slope(level)
+        return decoded_slope(level, light)
     return wp.float32(1.0)
 
 
@@ -56,88 +57,67 @@ def decode_listed(
 @wp.kernel
 def linearize(
     first: wp.int32,
+    strips: wp.array(dtype=wp.int32),
     rows: wp.array(dtype=wp.int32),
-    run_of: wp.array(dtype=wp.int32),
     index: wp.array2d(dtype=wp.int32),
+    starts: wp.array(dtype=wp.int32),
     weights: wp.array2d(dtype=wp.float64),
+    smooth: wp.array2d(dtype=wp.uint8),
     srgb: wp.array(dtype=wp.uint8),
     levels: wp.array(dtype=wp.float64),
     light: wp.array(dtype=wp.float64),
     gaps: wp.array(dtype=wp.float64),
     slopes: wp.array2d(dtype=wp.float64),
 ):
-    """Write how far both sides differ at rows, and the derivatives by the eight levels if there is room."""
+    """Write how far both sides differ at the points of strips, from a row on, and 0 where they may.
+
+    The derivatives by the eight levels are written too if there is room.
+    """
     i = first + wp.tid()
     channels = srgb.shape[0]
-    point = rows[i] / channels
-    run = run_of[point]
-    channel = rows[i] % channels
-    mixed = wp.vec2d()
-    for k in range(8):
-        mixed[k / 4] += weights[point, k] * light[index[run, k] * channels + channel]
+    run = strips[i] / channels
+    channel = strips[i] % channels
     gamma = srgb[channel] != wp.uint8(0)
-    if gamma:
-        for side in range(2):
-            mixed[side] = encoded64(wp.clamp(mixed[side], wp.float64(0.0), wp.float64(1.0)))
-    gaps[i] = mixed[0] - mixed[1]
-    if slopes.shape[0] > 0:
-        for k in range(8):
-            value = weights[point, k]
+    for row in range(rows[i], rows[i + 1]):
+        point = starts[run] + row - rows[i]
+        gaps[row] = wp.float64(0.0)
+        if smooth[point, channel] != wp.uint8(0):
+            mixed = wp.vec2d()
+            for k in range(8):
+                mixed[k / 4] += weights[point, k] * light[index[run, k] * channels + channel]
+            seen = mixed
             if gamma:
-                level = levels[index[run, k] * channels + channel]
-                value = value * decoded_slope64(level) / decoded_slope64(mixed[k / 4])
-            if k >= 4:
-                value = -value
-            slopes[i, k] = value
-
-
-@wp.kernel
-def mark_levels(
-    first: wp.int32,
-    runs: wp.array(dtype=wp.uint8),
-    index: wp.array2d(dtype=wp.int32),
-    channels: wp.int32,
-    marks: wp.array(dtype=wp.uint8),
-):
-    """Mark the levels that are mixed at marked runs."""
-    i = first + wp.tid()
-    if runs[i] != wp.uint8(0):
-        for k in range(8):
-            marks[index[i / channels, k] * channels + i % channels] = wp.uint8(1)
-
-
-@wp.kernel
-def mark_runs(
-    first: wp.int32,
-    marks: wp.array(dtype=wp.uint8),
-    valid: wp.array(dtype=wp.uint8),
-    index: wp.array2d(dtype=wp.int32),
-    channels: wp.int32,
-    runs: wp.array(dtype=wp.uint8),
-):
-    """Mark the valid runs at which a marked level is mixed."""
-    i = first + wp.tid()
-    if valid[i] != wp.uint8(0):
-        for k in range(8):
-            if marks[index[i / channels, k] * channels + i % channels] != wp.uint8(0):
-                runs[i] = wp.uint8(1)
+                for side in range(2):
+                    mixed[side] = wp.clamp(mixed[side], wp.float64(0.0), wp.float64(1.0))
+                    seen[side] = encoded64(mixed[side])
+            gaps[row] = seen[0] - seen[1]
+            if slopes.shape[0] > 0:
+                for k in range(8):
+                    value = weights[point, k]
+                    if gamma:
+                        at = index[run, k] * channels + channel
+                        value = value * decoded_slope64(levels[at], light[at])
+                        value = value / decoded_slope64(seen[k / 4], mixed[k / 4])
+                    if k >= 4:
+                        value = -value
+                    slopes[row, k] = value
 
 
 @wp.kernel
 def find_lowest(
     first: wp.int32,
-    rows: wp.array(dtype=wp.int32),
+    strips: wp.array(dtype=wp.int32),
     columns: wp.array2d(dtype=wp.int32),
     lowest: wp.array(dtype=wp.int32),
 ):
-    """Lower ``lowest`` of each level to the lowest one that is mixed with it, for parts of rows."""
+    """Lower ``lowest`` of each level to the lowest one that is mixed with it, for parts of strips."""
     part = first + wp.tid()
-    for row in range(rows[part], rows[part + 1]):
-        least = columns[row, 0]
+    for strip in range(strips[part], strips[part + 1]):
+        least = columns[strip, 0]
         for k in range(8):
-            least = wp.min(least, columns[row, k])
+            least = wp.min(least, columns[strip, k])
         for k in range(8):
-            lowest[columns[row, k]] = wp.min(lowest[columns[row, k]], least)
+            lowest[columns[strip, k]] = wp.min(lowest[columns[strip, k]], least)
 
 
 @wp.kernel
@@ -145,6 +125,7 @@ def solve_parts(
     first: wp.int32,
     parts: wp.array(dtype=wp.int32),
     rows: wp.array(dtype=wp.int32),
+    strips: wp.array(dtype=wp.int32),
     bounds: wp.array(dtype=wp.int32),
     columns: wp.array2d(dtype=wp.int32),
     chosen: wp.array(dtype=wp.uint8),
@@ -172,20 +153,21 @@ def solve_parts(
             factors[base + wp.int64(j)] = wp.float64(0.0)
         factors[diagonal[i]] = held[i]
         solution[i] = held[i] * aims[i]
-    for row in range(rows[part], rows[part + 1]):
-        if chosen[row] != wp.uint8(0):
-            target = -gaps[row]
-            for k in range(8):
-                target += slopes[row, k] * levels[columns[row, k]]
-            for a in range(8):
-                i = columns[row, a]
-                base = diagonal[i] - wp.int64(i)
-                weighted = force[row] * force[row] * slopes[row, a]
-                solution[i] += weighted * target
-                for b in range(8):
-                    j = columns[row, b]
-                    if j <= i:
-                        factors[base + wp.int64(j)] += weighted * slopes[row, b]
+    for strip in range(strips[part], strips[part + 1]):
+        for row in range(rows[strip], rows[strip + 1]):
+            if chosen[row] != wp.uint8(0):
+                target = -gaps[row]
+                for k in range(8):
+                    target += slopes[row, k] * levels[columns[strip, k]]
+                for a in range(8):
+                    i = columns[strip, a]
+                    base = diagonal[i] - wp.int64(i)
+                    weighted = force[row] * force[row] * slopes[row, a]
+                    solution[i] += weighted * target
+                    for b in range(8):
+                        j = columns[strip, b]
+                        if j <= i:
+                            factors[base + wp.int64(j)] += weighted * slopes[row, b]
     for i in range(begin, end):
         base = diagonal[i] - wp.int64(i)
         low = lowest[i]
@@ -211,13 +193,61 @@ def solve_parts(
             solution[j] -= factors[base + wp.int64(j)] * value
 
 
+@wp.func
+def settle_point(
+    weights: wp.array(dtype=wp.float64),
+    columns: wp.array(dtype=wp.int32),
+    srgb: wp.bool,
+    aim: wp.float32,
+    limit: wp.float32,
+    sweep: wp.int32,
+    levels: wp.array(dtype=wp.float32),
+    light: wp.array(dtype=wp.float32),
+    changed: wp.array(dtype=wp.int32),
+) -> wp.bool:
+    """Change the eight levels at a point, see `settle`; return False if nothing can or need change."""
+    lights = wp.vec2(0.0, 0.0)
+    for k in range(8):
+        lights[k / 4] += float(weights[k]) * light[columns[k]]
+    sides = wp.vec2(level_of(lights[0], srgb), level_of(lights[1], srgb))
+    gap = sides[0] - sides[1]
+    if wp.abs(gap) <= limit:
+        return False
+    slopes = wp.vector(length=8, dtype=wp.float32)
+    power = wp.float32(0.0)
+    for k in range(8):
+        level = levels[columns[k]]
+        side = k / 4
+        slopes[k] = float(weights[k]) * slope(level, light[columns[k]], srgb)
+        slopes[k] = slopes[k] / slope(sides[side], lights[side], srgb)
+        if side == 1:
+            slopes[k] = -slopes[k]
+        down = slopes[k] * gap > 0.0
+        if (down and level > 0.0) or (not down and level < 1.0):
+            power += slopes[k] * slopes[k]
+    if power <= MIN_POWER:
+        return False
+    step = (gap - wp.clamp(gap, -aim, aim)) / power
+    for k in range(8):
+        texel = columns[k]
+        level = wp.clamp(levels[texel] - step * slopes[k], 0.0, 1.0)
+        if level != levels[texel]:
+            levels[texel] = level
+            light[texel] = light_of(level, srgb)
+            changed[texel] = sweep
+    return True
+
+
 @wp.kernel
 def settle(
     first: wp.int32,
     bounds: wp.array(dtype=wp.int32),
+    strips: wp.array(dtype=wp.int32),
     columns: wp.array2d(dtype=wp.int32),
-    weights: wp.array2d(dtype=wp.float32),
-    srgb_rows: wp.array(dtype=wp.uint8),
+    starts: wp.array(dtype=wp.int32),
+    weights: wp.array2d(dtype=wp.float64),
+    smooth: wp.array2d(dtype=wp.uint8),
+    srgb: wp.array(dtype=wp.uint8),
     sweeps: wp.int32,
     aim: wp.float32,
     limit: wp.float32,
@@ -226,17 +256,19 @@ def settle(
     changed: wp.array(dtype=wp.int32),
     seen: wp.array(dtype=wp.int32),
 ):
-    """Change levels at each row in turn, forth and back, where both sides differ by more than ``limit``.
+    """Change levels at each point of strips, forth and back, where both sides differ by more than ``limit``.
 
-    The change is about the smallest after which both sides differ by ``aim`` (the method of Kaczmarz). Rows
+    The change is about the smallest after which both sides differ by ``aim`` (the method of Kaczmarz). Strips
     whose levels have not changed since the sweep ``seen`` are left out; ``changed`` has the sweep of each
-    level. One thread has the rows from one of ``bounds`` to the next, since each step needs the steps before;
-    rows of different threads have no level in common.
+    level. One thread has the strips from one of ``bounds`` to the next, since each step needs the steps
+    before; strips of different threads have no level in common.
     """
     part = first + wp.tid()
     begin = bounds[part]
     count = bounds[part + 1] - begin
-    srgb = srgb_rows[begin] != wp.uint8(0)
+    channels = srgb.shape[0]
+    channel = strips[begin] % channels
+    gamma = srgb[channel] != wp.uint8(0)
     for sweep in range(sweeps):
         updates = wp.int32(0)
         for at in range(count):
@@ -248,36 +280,15 @@ def settle(
                 newest = wp.max(newest, changed[columns[i, k]])
             if newest >= seen[i]:
                 seen[i] = sweep
-                mixed = wp.float32(0.0)
-                other = wp.float32(0.0)
-                for k in range(4):
-                    mixed += weights[i, k] * light[columns[i, k]]
-                    other += weights[i, k + 4] * light[columns[i, k + 4]]
-                mixed = level_of(mixed, srgb)
-                other = level_of(other, srgb)
-                gap = mixed - other
-                if wp.abs(gap) > limit:
-                    slopes = wp.vector(length=8, dtype=wp.float32)
-                    power = wp.float32(0.0)
-                    for k in range(8):
-                        level = levels[columns[i, k]]
-                        slopes[k] = weights[i, k] * slope(level, srgb)
-                        if k < 4:
-                            slopes[k] = slopes[k] / slope(mixed, srgb)
-                        else:
-                            slopes[k] = -slopes[k] / slope(other, srgb)
-                        down = slopes[k] * gap > 0.0
-                        if (down and level > 0.0) or (not down and level < 1.0):
-                            power += slopes[k] * slopes[k]
-                    if power > MIN_POWER:
-                        updates += 1
-                        step = (gap - wp.clamp(gap, -aim, aim)) / power
-                        for k in range(8):
-                            texel = columns[i, k]
-                            level = wp.clamp(levels[texel] - step * slopes[k], 0.0, 1.0)
-                            if level != levels[texel]:
-                                levels[texel] = level
-                                light[texel] = light_of(level, srgb)
-                                changed[texel] = sweep
+                run = strips[i] / channels
+                for number in range(starts[run + 1] - starts[run]):
+                    point = starts[run] + number
+                    if sweep % 2 == 1:
+                        point = starts[run + 1] - 1 - number
+                    if smooth[point, channel] != wp.uint8(0):
+                        if settle_point(
+                            weights[point], columns[i], gamma, aim, limit, sweep, levels, light, changed
+                        ):
+                            updates += 1
         if updates == 0:
             break

@@ -34,19 +34,21 @@ REPORT_SECONDS = 0.1
 class SeamSystem:
     """Changes of levels, and weighted differences at rows that mix eight of them.
 
-    Rows and levels form parts: no row mixes levels of two. The levels of a part come in an order in which
-    those of a row are close to each other.
+    Strips of rows mix the same levels. Strips and levels form parts: no strip mixes levels of two. The levels
+    of a part come in an order in which those of a strip are close to each other.
 
     Parameters
     ----------
     first : float64[n]
         The levels at first.
-    columns : int32[k, 8]
-        The levels that are mixed at each row.
+    columns : int32[s, 8]
+        The levels that are mixed at each strip.
     chosen : bool[k]
         True for the rows that take part from the first.
-    rows, levels : int64[c + 1]
-        The first row and the first level of each part, and the ends.
+    rows : int64[s + 1]
+        The first row of each strip, and the end.
+    parts, levels : int64[c + 1]
+        The first strip and the first level of each part, and the ends.
 
     Attributes
     ----------
@@ -60,16 +62,17 @@ class SeamSystem:
         columns: Int32Array,
         chosen: BoolArray,
         rows: Int64Array,
+        parts: Int64Array,
         levels: Int64Array,
     ) -> None:
         self._first, self._columns, self._chosen = first, columns, chosen
-        self._rows, self._levels, self._sizes = rows, levels, np.diff(levels)
+        self._rows, self._parts, self._levels, self._sizes = rows, parts, levels, np.diff(levels)
         self._held, self._aims = np.ones(len(first)), first.copy()
-        self._force = np.full(len(columns), FIRST_WEIGHT)
-        self.slopes: Float64Array = np.empty(columns.shape)
-        self._bounds = [array_on(CPU, of, wp.int32) for of in (rows, levels)]
+        self._force = np.full(len(chosen), FIRST_WEIGHT)
+        self.slopes: Float64Array = np.empty((len(chosen), 8))
+        self._bounds = [array_on(CPU, of, wp.int32) for of in (rows, parts, levels)]
         lowest: Int32Array = np.arange(len(first), dtype=np.int32)
-        inputs = [self._bounds[0], array_on(CPU, columns, wp.int32)]
+        inputs = [self._bounds[1], array_on(CPU, columns, wp.int32)]
         launch(find_lowest, len(self._sizes), inputs, [array_on(CPU, lowest, wp.int32)], CPU)
         widths = np.arange(1, len(first) + 1) - lowest
         self._wide = np.add.reduceat(widths**2.0, levels[:-1]) > MAX_WIDTH**2 * self._sizes
@@ -137,8 +140,10 @@ class SeamSystem:
 
         def solve(part: int) -> None:
             own = slice(*self._levels[part : part + 2])
-            of = np.flatnonzero(self._chosen[slice(*self._rows[part : part + 2])]) + self._rows[part]
-            ends, columns = np.arange(0, 8 * len(of) + 1, 8), (self._columns[of] - own.start).reshape(-1)
+            begin, end = self._rows[self._parts[part : part + 2]]
+            of = np.flatnonzero(self._chosen[begin:end]) + begin
+            strips = np.searchsorted(self._rows, of, side="right") - 1
+            ends, columns = np.arange(0, 8 * len(of) + 1, 8), (self._columns[strips] - own.start).reshape(-1)
             slopes, held = self.slopes[of], self._held[own]
             weights = slopes * self._force[of, None] ** 2
             change = csr_array((slopes.reshape(-1), columns, ends), (len(of), len(held)))

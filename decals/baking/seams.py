@@ -18,10 +18,10 @@ from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 from blobtree._typing import BoolArray, Float64Array, Int32Array, Int64Array, UInt8Array
 from blobtree.device import array_on, launch
 from decals.baking.meshes import BakeMesh
-from decals.baking.seam_kernels import decode_listed, linearize, mark_levels, mark_runs, settle
+from decals.baking.seam_kernels import decode_listed, linearize, settle
 from decals.baking.seam_system import CPU, SeamSystem
 from decals.baking.unwrapped import Unwrapped
-from decals.sorting import distinct_numbers, groups, stable_order
+from decals.sorting import distinct_numbers, groups, ranges, stable_order
 from decals.surfaces.topology import welded
 
 STEP = 0.1
@@ -92,7 +92,7 @@ class Seams:
         texels = np.linalg.norm(self.ends[:, :, 1] - self.ends[:, :, 0], axis=2).max(axis=1, initial=0.0)
         counts = np.ceil(texels / STEP).astype(np.int64) + 1
         seams = np.repeat(np.arange(len(counts)), counts)
-        number = np.arange(len(seams)) - np.repeat(np.cumsum(counts) - counts, counts)
+        number = ranges(np.zeros_like(counts), counts)
         share = (number / np.maximum(counts - 1, 1)[seams])[:, None, None]
         begin, end = np.moveaxis(self.ends[seams], 2, 0)
         return seams, begin * (1.0 - share) + end * share
@@ -203,7 +203,7 @@ def match_seams(
 class _Match:
     """Levels of texels, from 0 to 1, that become alike on both sides of seams, each channel by itself.
 
-    A row is a point and a channel, ``point * channels + channel``; a level is a texel and a channel.
+    A strip is a run of points in a channel, ``run * channels + channel``; a level is a texel and a channel.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ class _Match:
     mixed : Mixed
         Points of the seams.
     smooth : bool[m, channels]
-        True for the rows that are matched.
+        True where both sides are matched.
     srgb : sequence of bool
         True for channels that are decoded before they are mixed.
     report : callable
@@ -229,117 +229,117 @@ class _Match:
     ) -> None:
         self._shape, self._channels, self._report = texels.shape, len(srgb), report
         self._first = (texels / 255.0).reshape(-1)
-        self._smooth, self._index = smooth, mixed.mixed
-        self._starts = starts = mixed.starts
-        self._ends = np.append(starts[1:], len(smooth))
-        self._run_of = np.repeat(np.arange(len(starts)), self._ends - starts)
-        self._valid = np.logical_or.reduceat(smooth, starts, axis=0).reshape(-1).view(np.uint8)
+        self._smooth, self._starts, self._index = smooth, mixed.starts, mixed.mixed
+        self._counts = np.diff(mixed.starts, append=len(smooth))
+        self._valid = np.logical_or.reduceat(smooth, mixed.starts, axis=0).reshape(-1)
+        ends, shape = np.arange(0, self._index.size + 1, 8), (len(self._index), len(texels))
+        each = np.ones(self._index.size, np.bool_), self._index.reshape(-1), ends
+        self._runs_at = csr_array(each, shape).tocsc()
         self._srgb = array_on(CPU, np.asarray(srgb), wp.uint8)
-        self._runs = [array_on(CPU, each, wp.int32) for each in (self._run_of, self._index)]
-        self._weights = mixed.weights
+        self._points = [
+            array_on(CPU, np.append(mixed.starts, len(smooth)), wp.int32),
+            array_on(CPU, mixed.weights, wp.float64),
+            array_on(CPU, smooth, wp.uint8),
+            self._srgb,
+        ]
         self._levels, self._light = self._first.copy(), np.empty_like(self._first)
         self._decode(np.arange(len(self._first)))
 
     def solved(self) -> Float64Array:
         """Return levels ``float64[n, channels]`` that differ as little from the texels as the seams need."""
-        rows = np.flatnonzero(self._smooth)
-        chosen, _ = self._around(rows[np.abs(self._gaps(rows)) > SQUARES_FROM / 255.0])
+        strips = np.flatnonzero(self._valid)
+        chosen, _ = self._around(self._wrong(strips, SQUARES_FROM))
         if len(chosen):
             self._least_squares(chosen)
-        self._settle(rows)
+        self._settle(strips)
         return self._levels.reshape(self._shape)
 
-    def _gaps(self, rows: Int64Array, slopes: Float64Array | None = None) -> Float64Array:
+    def _rows_of(self, strips: Int64Array) -> Int64Array:
+        """Return the first row of each strip, and the end; a row is a point of a strip."""
+        return np.append(0, np.cumsum(self._counts[strips // self._channels]))
+
+    def _gaps(
+        self, strips: Int64Array, rows: Int64Array, slopes: Float64Array | None = None
+    ) -> Float64Array:
         """Return the differences of both sides at rows, and write their derivatives, ``float64[k, 8]``."""
-        gaps = np.empty(len(rows))
+        gaps = np.empty(rows[-1])
         known = np.empty((0, 8)) if slopes is None else slopes
-        inputs = [
-            array_on(CPU, rows, wp.int32),
-            *self._runs,
-            array_on(CPU, self._weights, wp.float64),
-            self._srgb,
-        ]
+        inputs = [array_on(CPU, each, wp.int32) for each in (strips, rows, self._index)]
         states = [array_on(CPU, state, wp.float64) for state in (self._levels, self._light)]
         outputs = [array_on(CPU, values, wp.float64) for values in (gaps, known)]
-        launch(linearize, len(rows), [*inputs, *states], outputs, CPU)
+        launch(linearize, len(strips), [*inputs, *self._points, *states], outputs, CPU)
         return gaps
+
+    def _wrong(self, strips: Int64Array, most: float) -> Int64Array:
+        """Return the strips where both sides differ by more than so much of 255."""
+        rows = self._rows_of(strips)
+        gaps = np.abs(self._gaps(strips, rows))
+        return strips[np.maximum.reduceat(gaps, rows[:-1]) > most / 255.0] if len(gaps) else strips
 
     def _decode(self, numbers: Int64Array) -> None:
         """Make the light of some levels that of these."""
         inputs = [array_on(CPU, numbers, wp.int32), self._srgb, array_on(CPU, self._levels, wp.float64)]
         launch(decode_listed, len(numbers), inputs, [array_on(CPU, self._light, wp.float64)], CPU)
 
-    def _around(self, wrong: Int64Array) -> tuple[Int64Array, Int64Array]:
-        """Return some rows with those in `RINGS` rings around them, and with one ring more."""
-        chosen = np.zeros(len(self._valid), np.uint8)
-        chosen[self._run_of[wrong // self._channels] * self._channels + wrong % self._channels] = 1
-        index, valid = self._runs[1], array_on(CPU, self._valid, wp.uint8)
-        marks = array_on(CPU, np.zeros(len(self._first), np.uint8), wp.uint8)
-        runs = array_on(CPU, chosen, wp.uint8)
-        found = []
-        for ring in range(RINGS + 1):
-            launch(mark_levels, len(chosen), [runs, index, self._channels], [marks], CPU)
-            launch(mark_runs, len(chosen), [marks, valid, index, self._channels], [runs], CPU)
-            if ring >= RINGS - 1:
-                found.append(self._rows_of(np.flatnonzero(runs.numpy())))
-        inner, outer = found
-        return inner, outer
+    def _around(self, strips: Int64Array) -> tuple[Int64Array, Int64Array]:
+        """Return some strips with those in `RINGS` rings around them, and with one ring more."""
+        inner = strips
+        for _ in range(RINGS + 1):
+            inner, strips = strips, self._beside(strips)
+        return inner, strips
 
-    def _rows_of(self, runs: Int64Array) -> Int64Array:
-        """Return the rows of runs, in order; a run and a channel are numbered as a row is."""
-        run, channel = np.divmod(runs, self._channels)
-        counts = self._ends[run] - self._starts[run]
-        within = np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
-        points = np.repeat(self._starts[run], counts) + within
-        rows = points * self._channels + np.repeat(channel, counts)
-        return np.sort(rows[self._smooth.reshape(-1)[rows]])
+    def _beside(self, strips: Int64Array) -> Int64Array:
+        """Return the strips that have a level in common with some strips, and these, in order."""
+        levels = distinct_numbers(self._levels_of(strips), len(self._first))
+        texel, channel = np.divmod(levels, self._channels)
+        starts = self._runs_at.indptr
+        counts = starts[texel + 1] - starts[texel]
+        runs = self._runs_at.indices[ranges(starts[texel], counts)]
+        beside = distinct_numbers(runs * self._channels + np.repeat(channel, counts), len(self._valid))
+        return beside[self._valid[beside]]
 
-    def _levels_of(self, rows: Int64Array) -> Int64Array:
-        """Return the levels that are mixed at rows, ``int64[k, 8]``."""
-        point, channel = np.divmod(rows, self._channels)
-        return self._index[self._run_of[point]] * np.int64(self._channels) + channel[:, None]
+    def _levels_of(self, strips: Int64Array) -> Int64Array:
+        """Return the levels that are mixed at strips, ``int64[k, 8]``."""
+        run, channel = np.divmod(strips, self._channels)
+        return self._index[run] * np.int64(self._channels) + channel[:, None]
 
-    def _linked(self, rows: Int64Array) -> tuple[Int64Array, Int32Array, csr_array, Int64Array]:
-        """Return the levels of rows, their columns there, links of levels, and the component of each level.
+    def _linked(self, strips: Int64Array) -> tuple[Int64Array, Int32Array, csr_array, Int64Array]:
+        """Return the levels of strips, their columns there, links of levels, and the component of each level.
 
-        Levels of one row are in one component. Its number is larger in a later channel.
+        Levels of one strip are in one component. Its number is larger in a later channel.
         """
-        listed = self._levels_of(rows)
+        listed = self._levels_of(strips)
         used = distinct_numbers(listed, len(self._first))
         number = np.empty(len(self._first), np.int32)
         number[used] = np.arange(len(used))
         columns = number[listed]
-        run = self._run_of[rows // self._channels] * self._channels + rows % self._channels
-        first = np.full(len(self._valid), -1)
-        first[run[::-1]] = np.arange(len(run) - 1, -1, -1)
-        first = first[first >= 0]  # one row of each run
-        links = np.repeat(columns[first, 0], 7), columns[first, 1:].reshape(-1)
+        links = np.repeat(columns[:, 0], 7), columns[:, 1:].reshape(-1)
         both = np.concatenate(links), np.concatenate(links[::-1])
         graph = coo_array((np.ones(len(both[0]), np.int8), both), (len(used), len(used))).tocsr()
         count, label = connected_components(graph, connection="weak")
         return used, columns, graph, label + count * (used % self._channels)
 
-    def _least_squares(self, rows: Int64Array) -> None:
+    def _least_squares(self, strips: Int64Array) -> None:
         """Minimise the change of texels and the weighted differences, with more weight where these stay."""
-        number = (np.cumsum(self._smooth, axis=0) - 1).reshape(-1)
-        used, columns, graph, label = self._linked(rows)
+        used, columns, graph, label = self._linked(strips)
         order = stable_order(label[columns[:, 0]])
         near = reverse_cuthill_mckee(graph, symmetric_mode=True)
         ranked = near[stable_order(label[near])]
         place = np.empty(len(used), np.int32)
         place[ranked] = np.arange(len(used))
-        rows, used, columns = rows[order], used[ranked], place[columns[order]]
-        begins = np.flatnonzero(np.diff(label[ranked], prepend=-1, append=-1))
-        starts = np.flatnonzero(np.diff(label[ranked][columns[:, 0]], prepend=-1, append=-1))
-        channel = used[begins[:-1]] % self._channels
-        system = SeamSystem(self._first[used], columns, number[rows] % COARSE == 0, starts, begins)
+        strips, used, columns = strips[order], used[ranked], place[columns[order]]
+        levels = np.flatnonzero(np.diff(label[ranked], prepend=-1, append=-1))
+        parts = np.flatnonzero(np.diff(label[ranked][columns[:, 0]], prepend=-1, append=-1))
+        channel = used[levels[:-1]] % self._channels
+        rows = self._rows_of(strips)
+        system = SeamSystem(self._first[used], columns, self._coarse(strips), rows, parts, levels)
         for step in range(ROUNDS):
             tick = partial(self._report, 0.9 * step / ROUNDS)
             tick()
-            gaps = self._gaps(rows, system.slopes)
+            gaps = self._gaps(strips, rows, system.slopes)
             off = np.abs(gaps) * 255.0 / TOLERANCE
             worst = np.zeros(self._channels)
-            np.maximum.at(worst, channel, np.maximum.reduceat(off, starts[:-1]))
+            np.maximum.at(worst, channel, np.maximum.reduceat(off, rows[parts[:-1]]))
             active = (worst > LARGEST / TOLERANCE)[channel]
             if not active.any():
                 return
@@ -348,27 +348,33 @@ class _Match:
             self._levels[used] = system.stepped(self._levels[used], gaps, active, tick)
             self._decode(used)
 
-    def _settle(self, rows: Int64Array) -> None:
+    def _coarse(self, strips: Int64Array) -> BoolArray:
+        """Return True for one of `COARSE` smooth points, for the rows of strips."""
+        run, channel = np.divmod(strips, self._channels)
+        counts = self._counts[run]
+        at = ranges(self._starts[run], counts), np.repeat(channel, counts)
+        number = np.cumsum(self._smooth, axis=0) - 1
+        coarse: BoolArray = self._smooth[at] & (number[at] % COARSE == 0)
+        return coarse
+
+    def _settle(self, strips: Int64Array) -> None:
         """Move points that still differ one by one, see `settle`."""
         for attempt in range(ATTEMPTS):
             self._report(0.9 + 0.1 * attempt / ATTEMPTS)
-            wrong = rows[np.abs(self._gaps(rows)) > LARGEST / 255.0]
+            wrong = self._wrong(strips, LARGEST)
             if not len(wrong):
                 return
-            chosen, rows = self._around(wrong)
+            chosen, strips = self._around(wrong)
             touched, columns, _, label = self._linked(chosen)
             component = label[columns[:, 0]]
             order = stable_order(component)
             bounds = np.flatnonzero(np.diff(component[order], prepend=-1, append=-1))
-            points, channel = np.divmod(chosen[order], self._channels)
-            kinds = wp.int32, wp.int32, wp.float32, wp.uint8
-            listed = bounds, columns[order], self._weights[points], self._srgb.numpy()[channel]
-            inputs = [array_on(CPU, *each) for each in zip(listed, kinds, strict=True)]
+            inputs = [array_on(CPU, each, wp.int32) for each in (bounds, chosen[order], columns[order])]
             states = self._levels[touched], self._light[touched]
             levels, light = (array_on(CPU, state, wp.float32) for state in states)
             counts = len(touched), len(chosen)
             changed, seen = (wp.zeros(count, dtype=wp.int32, device=CPU) for count in counts)
-            inputs += [SWEEPS, SETTLED / 255.0, LARGEST / 255.0]
+            inputs += [*self._points, SWEEPS, SETTLED / 255.0, LARGEST / 255.0]
             launch(settle, len(bounds) - 1, inputs, [levels, light, changed, seen], CPU)
             self._levels[touched] = levels.numpy()
             self._decode(touched)

@@ -27,10 +27,10 @@ def encoded(light: wp.float32) -> wp.float32:
 
 
 @wp.func
-def decoded_slope(level: wp.float32) -> wp.float32:
-    """Return the derivative of linear light by the sRGB level."""
+def decoded_slope(level: wp.float32, light: wp.float32) -> wp.float32:
+    """Return the derivative of linear light by the sRGB level; `light` is that of the level."""
     if level > 0.04045:
-        return 2.4 / 1.055 * wp.pow((level + 0.055) / 1.055, 1.4)
+        return 2.4 * light / (level + 0.055)
     return wp.float32(1.0 / 12.92)
 
 
@@ -56,8 +56,8 @@ def encoded64(light: wp.float64) -> wp.float64:
 
 
 @wp.func
-def decoded_slope64(level: wp.float64) -> wp.float64:
+def decoded_slope64(level: wp.float64, light: wp.float64) -> wp.float64:
     """Return what `decoded_slope` returns, in double precision."""
     if level > LINEAR_LEVEL:
-        return POWER / SCALE * wp.pow((level + OFFSET) / SCALE, POWER - wp.float64(1.0))
+        return POWER * light / (level + OFFSET)
     return wp.float64(1.0) / SLOPE
