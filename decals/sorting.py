@@ -53,5 +53,6 @@ def ranges(starts: Int64Array, counts: Int64Array) -> Int64Array:
     >>> ranges(np.array([5, 0]), np.array([2, 3])).tolist()
     [5, 6, 0, 1, 2]
     """
-    ends = np.cumsum(counts)
-    return np.arange(int(counts.sum())) + np.repeat(starts - (ends - counts), counts)
+    before = np.cumsum(counts) - counts
+    rows: Int64Array = np.arange(int(counts.sum())) + np.repeat(starts - before, counts)
+    return rows

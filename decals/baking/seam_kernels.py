@@ -11,6 +11,15 @@ from decals.baking.srgb import decoded, decoded64, decoded_slope, decoded_slope6
 
 wp.set_module_options(KERNEL_OPTIONS)
 
+FINENESS = 1024.0
+"""Steps into which the square of a texel's width is divided."""
+
+MAX_SQUARE = 4095
+"""Most such steps between a point and the middle of a texel; those of the four around it lie within half."""
+
+POINT_BITS = 40
+"""Bits of a number in which the number of a point lies."""
+
 MIN_POWER = 1.0e-6
 """Sum of squared slopes of a point from which on its texels can move it."""
 
@@ -54,6 +63,50 @@ def decode_listed(
         light[at] = decoded64(levels[at])
 
 
+@wp.func
+def mixed_weights(places: wp.array(dtype=wp.vec2d)):
+    """Return the weights of the four texels that are mixed on each side of a point."""
+    weights = wp.vector(length=8, dtype=wp.float64)
+    half = wp.float64(0.5)
+    one = wp.float64(1.0)
+    for side in range(2):
+        x = places[side][0] - half - wp.floor(places[side][0] - half)
+        y = places[side][1] - half - wp.floor(places[side][1] - half)
+        weights[4 * side] = (one - x) * (one - y)
+        weights[4 * side + 1] = x * (one - y)
+        weights[4 * side + 2] = (one - x) * y
+        weights[4 * side + 3] = x * y
+    return weights
+
+
+@wp.kernel
+def find_closest(
+    first: wp.int32,
+    starts: wp.array(dtype=wp.int32),
+    index: wp.array2d(dtype=wp.int32),
+    texels: wp.array(dtype=wp.int64),
+    places: wp.array2d(dtype=wp.vec2d),
+    size: wp.int64,
+    keys: wp.array2d(dtype=wp.int64),
+):
+    """Write which point of a run is closest to each of its texels, after its distance and side."""
+    run = first + wp.tid()
+    for k in range(8):
+        texel = texels[index[run, k]]
+        column = wp.float64(texel % size) + wp.float64(0.5)
+        row = wp.float64(texel / size % size) + wp.float64(0.5)
+        best = wp.int64(-1)
+        for point in range(starts[run], starts[run + 1]):
+            at = places[point, k / 4]
+            x = column - at[0]
+            y = row - at[1]
+            away = wp.min(int((x * x + y * y) * wp.float64(FINENESS)), MAX_SQUARE)
+            key = (wp.int64(2 * away + k / 4) << wp.int64(POINT_BITS)) + wp.int64(point)
+            if best < wp.int64(0) or key < best:
+                best = key
+        keys[run, k] = best
+
+
 @wp.kernel
 def linearize(
     first: wp.int32,
@@ -61,7 +114,7 @@ def linearize(
     rows: wp.array(dtype=wp.int32),
     index: wp.array2d(dtype=wp.int32),
     starts: wp.array(dtype=wp.int32),
-    weights: wp.array2d(dtype=wp.float64),
+    places: wp.array2d(dtype=wp.vec2d),
     smooth: wp.array2d(dtype=wp.uint8),
     srgb: wp.array(dtype=wp.uint8),
     levels: wp.array(dtype=wp.float64),
@@ -82,9 +135,10 @@ def linearize(
         point = starts[run] + row - rows[i]
         gaps[row] = wp.float64(0.0)
         if smooth[point, channel] != wp.uint8(0):
+            weights = mixed_weights(places[point])
             mixed = wp.vec2d()
             for k in range(8):
-                mixed[k / 4] += weights[point, k] * light[index[run, k] * channels + channel]
+                mixed[k / 4] += weights[k] * light[index[run, k] * channels + channel]
             seen = mixed
             if gamma:
                 for side in range(2):
@@ -93,7 +147,7 @@ def linearize(
             gaps[row] = seen[0] - seen[1]
             if slopes.shape[0] > 0:
                 for k in range(8):
-                    value = weights[point, k]
+                    value = weights[k]
                     if gamma:
                         at = index[run, k] * channels + channel
                         value = value * decoded_slope64(levels[at], light[at])
@@ -195,7 +249,7 @@ def solve_parts(
 
 @wp.func
 def settle_point(
-    weights: wp.array(dtype=wp.float64),
+    places: wp.array(dtype=wp.vec2d),
     columns: wp.array(dtype=wp.int32),
     srgb: wp.bool,
     aim: wp.float32,
@@ -206,6 +260,7 @@ def settle_point(
     changed: wp.array(dtype=wp.int32),
 ) -> wp.bool:
     """Change the eight levels at a point, see `settle`; return False if nothing can or need change."""
+    weights = mixed_weights(places)
     lights = wp.vec2(0.0, 0.0)
     for k in range(8):
         lights[k / 4] += float(weights[k]) * light[columns[k]]
@@ -245,7 +300,7 @@ def settle(
     strips: wp.array(dtype=wp.int32),
     columns: wp.array2d(dtype=wp.int32),
     starts: wp.array(dtype=wp.int32),
-    weights: wp.array2d(dtype=wp.float64),
+    places: wp.array2d(dtype=wp.vec2d),
     smooth: wp.array2d(dtype=wp.uint8),
     srgb: wp.array(dtype=wp.uint8),
     sweeps: wp.int32,
@@ -287,7 +342,7 @@ def settle(
                         point = starts[run + 1] - 1 - number
                     if smooth[point, channel] != wp.uint8(0):
                         if settle_point(
-                            weights[point], columns[i], gamma, aim, limit, sweep, levels, light, changed
+                            places[point], columns[i], gamma, aim, limit, sweep, levels, light, changed
                         ):
                             updates += 1
         if updates == 0:

@@ -18,7 +18,13 @@ from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 from blobtree._typing import BoolArray, Float64Array, Int32Array, Int64Array, UInt8Array
 from blobtree.device import array_on, launch
 from decals.baking.meshes import BakeMesh
-from decals.baking.seam_kernels import decode_listed, linearize, settle
+from decals.baking.seam_kernels import (
+    POINT_BITS,
+    decode_listed,
+    find_closest,
+    linearize,
+    settle,
+)
 from decals.baking.seam_system import CPU, SeamSystem
 from decals.baking.unwrapped import Unwrapped
 from decals.sorting import distinct_numbers, groups, ranges, stable_order
@@ -134,12 +140,6 @@ def bilinear_texels(places: Float64Array, tiles: Int64Array, size: int) -> Int64
     return texels
 
 
-def _bilinear_weights(places: Float64Array) -> Float64Array:
-    """Return the weights of these texels, ``float64[n, 4]``."""
-    x, y = (places - 0.5 - np.floor(places - 0.5)).T
-    return np.stack([(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y], axis=1)
-
-
 class Mixed(NamedTuple):
     """The texels that programs mix at points of seams. Points in turn whose texels are the same are a run.
 
@@ -151,25 +151,41 @@ class Mixed(NamedTuple):
         The first point of each run.
     mixed : int32[r, 8]
         Rows of ``texels`` at each run: four on each side.
-    weights : float64[n, 8]
-        Their weights at each point.
+    places : float64[n, 2, 2]
+        The places of each point on both sides.
     """
 
     texels: Int64Array
     starts: Int64Array
     mixed: Int32Array
-    weights: Float64Array
+    places: Float64Array
 
     @classmethod
     def of(cls, places: Float64Array, tiles: Int64Array, size: int) -> "Mixed":
         """Return the texels of points at places ``float64[n, 2, 2]`` on textures ``int64[n, 2]``."""
-        keys = np.concatenate([np.floor(places - 0.5).reshape(-1, 4), tiles], axis=1)
-        starts = np.flatnonzero(np.append(True, (keys[1:] != keys[:-1]).any(axis=1)))
+        x, y = np.moveaxis(np.floor(places - 0.5).astype(np.int64) + 1, 2, 0)
+        one, other = ((tiles * (size + 2) + y) * (size + 2) + x).T
+        starts = np.flatnonzero(np.append(True, (np.diff(one) != 0) | (np.diff(other) != 0))[: len(places)])
         at, on = places[starts], tiles[starts]
         index = np.hstack([bilinear_texels(at[:, side], on[:, side], size) for side in (0, 1)])
         rows, number, _ = groups(index.reshape(-1))
-        weights = np.hstack([_bilinear_weights(places[:, side]) for side in (0, 1)])
-        return cls(index.reshape(-1)[rows], starts, number.reshape(index.shape).astype(np.int32), weights)
+        return cls(index.reshape(-1)[rows], starts, number.reshape(index.shape).astype(np.int32), places)
+
+    def closest(self, size: int) -> tuple[Int64Array, Int64Array]:
+        """Return for each texel the closest of the points that mix it, and on which side of its seam."""
+        keys = np.empty(self.mixed.shape, np.int64)
+        points = np.append(self.starts, len(self.places))
+        inputs = [
+            array_on(CPU, points, wp.int32),
+            array_on(CPU, self.mixed, wp.int32),
+            array_on(CPU, self.texels, wp.int64),
+            array_on(CPU, self.places, wp.vec2d),
+            size,
+        ]
+        launch(find_closest, len(self.mixed), inputs, [array_on(CPU, keys, wp.int64)], CPU)
+        best = np.full(len(self.texels), np.iinfo(np.int64).max)
+        np.minimum.at(best, self.mixed, keys)
+        return best & ((1 << POINT_BITS) - 1), (best >> POINT_BITS) & 1
 
 
 def match_seams(
@@ -238,7 +254,7 @@ class _Match:
         self._srgb = array_on(CPU, np.asarray(srgb), wp.uint8)
         self._points = [
             array_on(CPU, np.append(mixed.starts, len(smooth)), wp.int32),
-            array_on(CPU, mixed.weights, wp.float64),
+            array_on(CPU, mixed.places, wp.vec2d),
             array_on(CPU, smooth, wp.uint8),
             self._srgb,
         ]
@@ -258,9 +274,7 @@ class _Match:
         """Return the first row of each strip, and the end; a row is a point of a strip."""
         return np.append(0, np.cumsum(self._counts[strips // self._channels]))
 
-    def _gaps(
-        self, strips: Int64Array, rows: Int64Array, slopes: Float64Array | None = None
-    ) -> Float64Array:
+    def _gaps(self, strips: Int64Array, rows: Int64Array, slopes: Float64Array | None = None) -> Float64Array:
         """Return the differences of both sides at rows, and write their derivatives, ``float64[k, 8]``."""
         gaps = np.empty(rows[-1])
         known = np.empty((0, 8)) if slopes is None else slopes

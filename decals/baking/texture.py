@@ -47,6 +47,7 @@ from decals.baking.texel_kernels import (
 )
 from decals.baking.unwrapped import Unwrapped
 from decals.images.texels import decode_srgb
+from decals.sorting import ranges
 
 BLOCK_SAMPLES, CARD_BLOCK_SAMPLES = 1 << 20, 1 << 23
 """Samples that a processor or a card looks up at once; they bound the memory besides that of the texture."""
@@ -174,15 +175,16 @@ def bake_texture(
     }
     seams = Seams.of(meshes, unwrapped)
     rows, places = seams.points()
+    mixed = Mixed.of(places, seams.tiles[rows], size)
+    points, sides = mixed.closest(size)
     for done, ((tile, number), sheet) in enumerate(sheets.items()):
-        beyond = Beyond.of(seams, rows, places, number, tile, size)
+        beyond = Beyond.of(seams, mixed.texels, rows[points], sides, number, tile, size)
         pages[tile].color(sheet, beyond, samples, partial(_report_part, report, done, len(sheets)))
     for page in pages:
         page.finish(gutter)
     if len(seams.faces):
         report("matching seams", 0.0)
         smooth = _smooth_points(seams, rows, places, sheets, channels)
-        mixed = Mixed.of(places, seams.tiles[rows], size)
         bounds = np.searchsorted(mixed.texels, np.arange(tiles + 1) * size**2)
         own = [slice(*bounds[tile : tile + 2]) for tile in range(tiles)]
         before = [page.texels(mixed.texels[of] % size**2) for page, of in zip(pages, own, strict=True)]
@@ -319,9 +321,7 @@ class Sheet:
                 for of in (heights.min, heights.max)
             )
             counts = last - first + 1
-            ends = np.cumsum(counts)
-            within = np.arange(int(counts.sum())) - np.repeat(ends - counts, counts)
-            row = (np.repeat(first, counts) + within).astype(np.uint16)  # sorted by their digits
+            row = ranges(first, counts).astype(np.uint16)  # sorted by their digits
             order = np.argsort(row, kind="stable")
             starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=size))])
             listed = np.repeat(self._chosen, counts)[order]
@@ -412,7 +412,7 @@ class Sheet:
         begin, end = places[sides[rows, 0]], places[sides[rows, 1]]
         steps = np.ceil(np.linalg.norm(end - begin, axis=1) / BORDER_STEP).astype(np.int64) + 1
         edges = np.repeat(np.arange(len(rows)), steps)
-        number = np.arange(len(edges)) - np.repeat(np.cumsum(steps) - steps, steps)
+        number = ranges(np.zeros_like(steps), steps)
         share = (number / np.maximum(steps - 1, 1)[edges])[:, None].astype(np.float32)
         return self._chosen[rows[edges] // 3], begin[edges] * (1 - share) + end[edges] * share
 

@@ -17,6 +17,7 @@ from decals.model import FACING_LIMIT
 from decals.scattering.boundary_kernels import PLANES_PER_POINT, BoundarySegments, find_mirror_planes
 from decals.scattering.repulsion import mirror_planes, no_mirror_planes
 from decals.scattering.search_kernels import MirrorPlanes, Particles
+from decals.sorting import ranges
 from decals.surfaces.mesh import MeshSurface, edges_of
 from decals.surfaces.surface import Scalars, Surface
 
@@ -130,7 +131,7 @@ def _open_edges(index: int, surface: Surface, spacing: float) -> _Pieces:
     max_length = max(spacing, float(lengths.sum()) / MAX_PIECES)
     counts = np.maximum(np.ceil(lengths / max_length), 1).astype(np.int64)
     rows = np.repeat(np.arange(len(counts)), counts)
-    fractions = (np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[rows]
+    fractions = ranges(np.zeros_like(counts), counts) / counts[rows]
     starts = ends[rows, 0] + fractions[:, None] * offsets[rows]
     stops = starts + offsets[rows] / counts[rows, None]
     return _Pieces(starts, stops, inward[rows], normals[rows], np.full(len(rows), index, np.int32))

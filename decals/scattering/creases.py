@@ -13,6 +13,7 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.validation import point_array, truth
 from decals.errors import InvalidScattering
 from decals.scattering.domain import MAX_PARTICLES
+from decals.sorting import ranges
 from decals.surfaces.mesh import MeshSurface, edges_of
 from decals.validation import instance, real_number
 
@@ -145,7 +146,7 @@ class Creases:
         lengths = np.linalg.norm(offsets, axis=1)
         counts = 1 + np.ceil(lengths * (MIN_LINE_SAMPLES / self.length)).astype(np.int64)
         owners = np.repeat(np.arange(len(counts)), counts)
-        inner = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
+        inner = ranges(np.zeros_like(counts), counts)
         along = inner / np.maximum(counts[owners] - 1, 1)
         return _Samples(cKDTree(self.segments[owners, 0] + along[:, None] * offsets[owners]), owners)
 
