@@ -9,7 +9,7 @@ from blobtree._typing import Float64Array, Int64Array
 from decals.baking.meshes import BakeMesh
 from decals.baking.packing import pack
 from decals.baking.unwrapped import Unwrapped
-from decals.sorting import groups, stable_order
+from decals.sorting import distinct_numbers, groups
 from decals.surfaces.topology import components, edge_twins, welded
 
 AXES = np.array([sign * row for sign in (1.0, -1.0) for row in np.eye(3)])
@@ -151,16 +151,21 @@ def _charts(mesh: BakeMesh, group: Int64Array, tick: Callable[[], None]) -> _Cha
 
 def _smoothed(cosines: Float64Array, neighbors: Int64Array, tick: Callable[[], None]) -> Int64Array:
     """Return the axis of each face: close to its normal, and alike among neighbours."""
-    allowed = (cosines >= MIN_COSINE) | (cosines >= cosines.max(axis=1, keepdims=True))
     axis: Int64Array = cosines.argmax(axis=1)
+    votes = np.vstack([SMOOTHING * np.eye(len(AXES)), np.zeros(len(AXES))])  # the last one is at open edges
+    with_none = np.append(axis, len(AXES))
+    faces = np.flatnonzero((with_none[neighbors] != axis[:, None]).any(axis=1))
     for _ in range(SMOOTHING_ROUNDS):
         tick()
-        votes = np.where(neighbors >= 0, axis[neighbors], -1)
-        counts = (votes[:, :, None] == np.arange(len(AXES))).sum(axis=1)
-        before, axis = axis, np.where(allowed, cosines + SMOOTHING * counts, -np.inf).argmax(axis=1)
-        if np.array_equal(before, axis):
-            break
-    return axis
+        own = cosines[faces]
+        allowed = (own >= MIN_COSINE) | (own >= own.max(axis=1, keepdims=True))
+        total = own + votes[with_none[neighbors[faces]]].sum(axis=1)
+        chosen = np.where(allowed, total, -np.inf).argmax(axis=1)
+        moved = faces[chosen != with_none[faces]]
+        with_none[faces] = chosen
+        beside = neighbors[moved]
+        faces = distinct_numbers(beside[beside >= 0], len(axis))  # no others can change now
+    return with_none[:-1]
 
 
 def _projected(points: Float64Array, axis: Int64Array) -> Float64Array:
@@ -172,19 +177,24 @@ def _projected(points: Float64Array, axis: Int64Array) -> Float64Array:
 
 
 def _turned(places: Float64Array, chart: Int64Array) -> tuple[Float64Array, Float64Array]:
-    """Return places from the corners of the smallest rectangles around charts, and these rectangles."""
-    order = stable_order(chart)
-    starts = np.flatnonzero(np.diff(chart[order], prepend=-1))
+    """Return places from the corners of the smallest rectangles around charts, and these rectangles.
+
+    The places come chart after chart.
+    """
+    starts = np.flatnonzero(np.diff(chart, prepend=-1))
     best = np.full(len(starts), np.inf)
-    turned, low, sides = places.copy(), np.zeros((len(starts), 2)), np.zeros((len(starts), 2))
+    angles, low, sides = np.zeros(len(starts)), np.zeros((2, len(starts))), np.zeros((2, len(starts)))
     for angle in np.radians(ANGLES):
-        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-        now = places @ turn.T
-        lower, upper = (fold.reduceat(now[order], starts) for fold in (np.minimum, np.maximum))
-        area = (upper - lower).prod(axis=1)
+        now = _rotated(places.T, angle)
+        lower, upper = (fold.reduceat(now, starts, axis=1) for fold in (np.minimum, np.maximum))
+        area = (upper - lower).prod(axis=0)
         better = area < best * (1.0 - 1e-6)
-        best[better], low[better] = area[better], lower[better]
-        sides[better] = (upper - lower)[better]
-        mine = better[chart]
-        turned[mine] = now[mine]
-    return turned - low[chart], sides
+        best[better], angles[better] = area[better], angle
+        low[:, better], sides[:, better] = lower[:, better], (upper - lower)[:, better]
+    return (_rotated(places.T, angles[chart]) - low[:, chart]).T, sides.T
+
+
+def _rotated(places: Float64Array, angle: float | Float64Array) -> Float64Array:
+    """Return places ``float64[2, n]`` turned by an angle."""
+    (x, y), cosine, sine = places, np.cos(angle), np.sin(angle)
+    return np.stack([cosine * x + sine * y, cosine * y - sine * x])

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -79,18 +80,21 @@ def _halvings(mesh: BakeMesh, texel: float) -> int:
 def _finer(mesh: BakeMesh, surface: Surface, texel: float, report: Progress) -> BakeMesh:
     """Return a mesh whose edges have their middles near the surface, unless they are shorter than a texel."""
     rounds = iter(range(_halvings(mesh, texel)))
+    middles: list[Any] = []  # of the edges that were found to be long, and the normals there
 
     def are_long(starts: Float64Array, ends: Float64Array) -> BoolArray:
         report("dividing triangles", 0.0)
         long: BoolArray = np.linalg.norm(ends - starts, axis=1) > texel
         if len(long) > MAX_EDGES or next(rounds, None) is None:
             return np.zeros(len(long), np.bool_)
-        long[long] = middles_on(surface, starts[long], ends[long], SMOOTH)[2] > MAX_GAP * texel
+        places, normals, moves = middles_on(surface, starts[long], ends[long], SMOOTH)
+        far = moves > MAX_GAP * texel
+        long[long] = far
+        middles[:] = places[far], normals[far]
         return long
 
     def midpoints(rows: Float64Array, ends: Int64Array) -> Float64Array:
-        begins, stops = rows[ends.T, :3]
-        places, normals, _ = middles_on(surface, begins, stops, SMOOTH)
+        places, normals = middles
         own = unit_rows(means(rows[:, 3:], ends))
         alike = np.einsum("na,na->n", own, normals) > ALIKE
         return np.hstack([places, np.where(alike[:, None], normals, own)])

@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from blobtree._typing import Float32Array, Int64Array
+from blobtree._typing import Float32Array, Int32Array, Int64Array
 from blobtree.progress import Progress
 from decals.baking.atlas import UNWRAPPING, unwrap
 from decals.baking.box_atlas import MAX_CHARTS, box_atlas
@@ -135,17 +135,20 @@ def _report_try(report: Progress, number: int, share: float = 0.0) -> None:
 
 def _faces_over_others(mesh: BakeMesh, part: Unwrapped, size: int) -> Int64Array:
     """Return the faces of a mesh that cover others on a texture: the later ones."""
-    over: list[Int64Array] = []
+    over: list[Int64Array] = [np.empty(0, np.int64)]
     last = len(part.faces) - 1
     look = min(size, LOOK_SIZE)
     places = part.places * np.float32(look / size)
+
+    def cover(order: slice, tile: int) -> tuple[Int32Array, int]:
+        turned = Unwrapped(part.rows, part.faces[order], places, part.tile_of_face[order])
+        return Sheet(0, mesh, turned, tile).cover(look, INSET)
+
     for tile in np.unique(part.tile_of_face).tolist():
-        first, later = (
-            Sheet(0, mesh, Unwrapped(part.rows, part.faces[order], places, part.tile_of_face[order]), tile)
-            for order in (slice(None), slice(None, None, -1))
-        )
-        below, _ = first.cover(look, INSET)
-        above, _ = later.cover(look, INSET)
+        below, twice = cover(slice(None), tile)
+        if not twice:
+            continue
+        above, _ = cover(slice(None, None, -1), tile)
         covered = above >= 0
         faces = last - above[covered]
         over.append(np.unique(faces[faces != below[covered]]).astype(np.int64))

@@ -119,7 +119,10 @@ def _cut_edges(
     order = stable_order(keys)
     ordered = keys[order]
     first = np.flatnonzero((ordered[1:] == ordered[:-1]) & (one != other)[order[1:]])
-    pairs = np.stack([order[first], order[first + 1]], axis=1)
+    pairs = np.stack([order[first], order[first + 1]])
+    tile = part.tile_of_face[pairs // 3]
+    apart = (sides[pairs[0]] != sides[pairs[1]]).any(axis=1) | (tile[0] != tile[1])
+    pairs = pairs[:, apart].T  # edges whose sides have the same vertices lie at one place
     faces = pairs // 3
     tiles = part.tile_of_face[faces].astype(np.int64)
     ends = part.places[sides[pairs]].astype(np.float64)

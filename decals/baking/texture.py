@@ -47,7 +47,7 @@ from decals.baking.texel_kernels import (
 )
 from decals.baking.unwrapped import Unwrapped
 from decals.images.texels import decode_srgb
-from decals.sorting import ranges
+from decals.sorting import groups, ranges
 
 BLOCK_SAMPLES, CARD_BLOCK_SAMPLES = 1 << 20, 1 << 23
 """Samples that a processor or a card looks up at once; they bound the memory besides that of the texture."""
@@ -166,7 +166,6 @@ def bake_texture(
     """
     device = known_device()
     tiles = 1 + max(int(part.tile_of_face.max(initial=0)) for part in unwrapped)
-    gutter = gutter_width(size)
     pages = [_Page(size, channels, device) for _ in range(tiles)]
     sheets = {
         (tile, number): Sheet(number, mesh, part, tile, channels, device)
@@ -180,8 +179,6 @@ def bake_texture(
     for done, ((tile, number), sheet) in enumerate(sheets.items()):
         beyond = Beyond.of(seams, mixed.texels, rows[points], sides, number, tile, size)
         pages[tile].color(sheet, beyond, samples, partial(_report_part, report, done, len(sheets)))
-    for page in pages:
-        page.finish(gutter)
     if len(seams.faces):
         report("matching seams", 0.0)
         smooth = _smooth_points(seams, rows, places, sheets, channels)
@@ -193,7 +190,8 @@ def bake_texture(
         )
         for page, of in zip(pages, own, strict=True):
             page.replace(mixed.texels[of] % size**2, matched[of])
-            page.finish(gutter)
+    for page in pages:
+        page.finish(gutter_width(size))
     return np.stack([page.image() for page in pages])
 
 
@@ -315,9 +313,9 @@ class Sheet:
     def _faces_of_rows(self, size: int) -> list[Any]:
         """Return the faces at each row of texels, in their order."""
         if self._lists[0] != size:
-            heights = self._part.places[:, 1][self._part.faces[self._chosen]]
+            heights = self._part.places[:, 1][self._part.faces[self._chosen].T]
             first, last = (
-                np.clip(np.floor(of(axis=1)), 0, size - 1).astype(np.int64)
+                np.clip(np.floor(of(axis=0)), 0, size - 1).astype(np.int64)
                 for of in (heights.min, heights.max)
             )
             counts = last - first + 1
@@ -406,8 +404,8 @@ class Sheet:
         """Return faces and places ``float32[n, 2]`` of points along the borders of charts."""
         faces, places = self._part.faces[self._chosen], self._part.places
         sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-        keys = np.sort(sides, axis=1).astype(np.int64) @ [len(places), 1]
-        _, first, counts = np.unique(keys, return_index=True, return_counts=True)
+        keys = sides.min(axis=1) * np.int64(len(places)) + sides.max(axis=1)
+        first, _, counts = groups(keys)
         rows = first[counts == 1]
         begin, end = places[sides[rows, 0]], places[sides[rows, 1]]
         steps = np.ceil(np.linalg.norm(end - begin, axis=1) / BORDER_STEP).astype(np.int64) + 1
