@@ -331,6 +331,7 @@ async def used(scene: Scene, browser: str, **options: Any) -> None:
     async with shown(scene, (700, 600), browser=browser, **options) as page:
         await page.evaluate("viewer.set({ link: 'mode=toString&k=0.5&d=0:1e300,0,0,0,0,0,0,0,0,1e300' })")
         await page.evaluate("viewer.set({ link: 'k=1e999&eye=1,2&at=3' })")
+        await page.evaluate("viewer.set({ link: 5, camera: {} })")
         before = await state(page)
         assert before["stiffness"] == scene.drawing.stiffness
         assert before["mode"] == scene.drawing.contact.name.lower()

@@ -14,7 +14,7 @@ export class Camera {
   }
 
   // Move to a pose, unless the eye is at the target, straight above or below it, or too far away.
-  place({ position, target, aspect }) {
+  place({ position = this.pose.position, target = this.pose.target, aspect }) {
     const across = length(cross(subtract(target, position), this.up));
     const kept = aspect >= 0 && aspect < 1 / CLOSEST ? aspect : this.usualAspect;
     if (across > 0 && across < this.size / CLOSEST) this.pose = { position, target, aspect: kept };

@@ -21,26 +21,23 @@ export function written({ camera: { pose }, aspect, mode, stiffness, decals, ori
 }
 
 // Return the state of a fragment for `set`, which refuses other modes, stiffnesses and decals than valid ones.
-// Of the rows of all decals, those that the fragment leaves out become as they were at first.
-export function read(fragment, originals, rows = originals) {
-  const fields = new URLSearchParams(fragment.replace(/^#/, ""));
+// Decals with rows that the fragment leaves out become as they were at first.
+export function read(fragment, originals, rows = []) {
+  const fields = new URLSearchParams(String(fragment).replace(/^#/, ""));
   const numbers = (text, count) => {
     const values = (text ?? "").split(",").map(Number);
     return values.length >= count && values.every(Number.isFinite) ? values : null;
   };
   const [eye, target] = ["eye", "at"].map((name) => numbers(fields.get(name), 3)?.slice(0, 3));
   const camera = eye && target && { position: eye, target, aspect: Number(fields.get("aspect") ?? NaN) };
-  const decals = {};
-  for (const [place, row] of rows.entries())
-    if (row !== (originals[place] ?? null)) decals[place] = originals[place] ?? null;
+  const decals = Object.fromEntries(rows.map((_, place) => [place, originals[place] ?? null]));
   for (const text of (fields.get("d") ?? "").split(";")) {
     const [, digits, parts] = /^(\d{1,7})(?:x|:(.*))$/.exec(text) ?? [];
     const [place, values] = [Number(digits), numbers(parts, 10)];
-    const before = originals[place];
-    if (before && parts === undefined) decals[place] = null;
+    if (originals[place] && parts === undefined) decals[place] = null;
     if (values?.[9] > 0 && place <= originals.length + LONGEST) {
       const [position, normal, tangent] = [0, 3, 6].map((first) => values.slice(first, first + 3));
-      const base = before ?? { image: values[10] ?? 0 };
+      const base = originals[place] ?? { image: values[10] ?? 0 };
       decals[place] = { ...base, position, normal, tangent, radius: values[9] };
     }
   }

@@ -126,12 +126,12 @@ class Viewer {
   // Change decals, with normals and tangents made perpendicular and of length 1; decals with a value that a scene cannot
   // have stay, and a line says so. Rows of the scene stay the same objects. What is returned continues the step.
   edit(pairs, step) {
-    const ready = (number, row) => (row && row !== this.originals[number] ? framed(row) : row);
-    const given = pairs.map(([number, row]) => [number, ready(number, row)]);
+    const isOwn = ([number, row]) => !row || row === this.originals[number];
+    const given = pairs.map((pair) => (isOwn(pair) ? pair : [pair[0], framed(pair[1])]));
     const wrong = ([number, row]) => row && wrongValue({ ...row, number }, this.header.rules);
     const refused = given.find(wrong);
     this.refused = refused && `Decal ${refused[0]} stays: no scene can have its ${wrong(refused)}.`;
-    const changes = given.filter((pair) => !wrong(pair));
+    const changes = given.filter((pair) => pair[1] !== this.decals.rows[pair[0]] && !wrong(pair));
     return changes.length ? this.history.change(changes, step) : step;
   }
 

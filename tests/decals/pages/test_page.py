@@ -347,14 +347,17 @@ def test_links_hold_the_state_and_refuse_nonsense() -> None:
     const state = { camera, aspect: 1.5, mode: "radial", stiffness: 2.5, decals: { rows }, originals };
     const link = written(state);
     const many = { ...state, decals: { rows: Array.from({ length: 200 }, (_, i) => row(i)) } };
-    const wrong = ["", "#", "#d=99999999x", "#d=0:1,2,3", "#d=1:NaN", "#eye=1,2&at=3", "#d=7x"];
+    const wrong = ["", "#", 5, "#d=99999999x", "#d=0:1,2,3", "#d=1:NaN", "#eye=1,2&at=3", "#d=7x"];
     const found = wrong.map((text) => read(text, originals));
     const edited = [row(8), originals[1], null, row(9), null];
     const again = read("mode=min&d=3:0,0,0,0,0,1,1,0,0,2", originals, edited).decals;
     console.log(JSON.stringify([read(link, originals), written(many), found, again]));
     """
     state, too_long, wrong, again = run_node(script, None)
-    assert {number: row["position"][0] for number, row in again.items()} == {"0": 0, "2": 2, "3": 0}
+    assert {number: row and row["position"][0] for number, row in again.items()} == {
+        **{"0": 0, "1": 1, "2": 2, "3": 0},
+        "4": None,
+    }
     assert state["camera"] == {"position": [1, 2, 3], "target": [0, 0, 0.125], "aspect": 1.5}
     assert (state["mode"], state["stiffness"]) == ("radial", "2.5")
     changes = state["decals"]
