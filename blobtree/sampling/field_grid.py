@@ -94,7 +94,7 @@ class FieldGrid:
         Raises
         ------
         InvalidFile
-            The suffix is another.
+            No path, or one with another suffix.
         UnusableFile
             The file cannot be written.
 
@@ -106,6 +106,8 @@ class FieldGrid:
         >>> numpy.load("ball.npy").shape
         (9, 9, 9)
         """
+        if not isinstance(path, str | os.PathLike):
+            raise InvalidFile(f"path: expected the path of a file, got {shown(path)}")
         suffix = Path(path).suffix.lower()
         if suffix not in GRID_FORMATS:
             known = " or ".join(GRID_FORMATS)

@@ -196,6 +196,8 @@ def test_other_suffixes_and_cancelled_work(tmp_path: Path) -> None:
     tree = Point((0, 0, 0), radius=1.0)
     with pytest.raises(ImplicitDecalsError, match=r"ends in .vti or .nrrd or .npz or .npy, got '.*a.raw'"):
         field_grid(tree, resolution=4).save(tmp_path / "a.raw")
+    with pytest.raises(ImplicitDecalsError, match="path: expected the path of a file, got 5"):
+        field_grid(tree, resolution=4).save(5)  # type: ignore[arg-type]
     with pytest.raises(ImplicitDecalsError, match=r"[Cc]ancel"):
         field_grid(tree, resolution=4, cancel=lambda: True)
     assert list(tmp_path.iterdir()) == []

@@ -355,7 +355,10 @@ def test_links_hold_the_state_and_refuse_nonsense() -> None:
     """
     state, too_long, wrong, again = run_node(script, None)
     assert {number: row and row["position"][0] for number, row in again.items()} == {
-        **{"0": 0, "1": 1, "2": 2, "3": 0},
+        "0": 0,
+        "1": 1,
+        "2": 2,
+        "3": 0,
         "4": None,
     }
     assert state["camera"] == {"position": [1, 2, 3], "target": [0, 0, 0.125], "aspect": 1.5}
