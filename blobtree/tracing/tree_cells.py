@@ -108,12 +108,14 @@ class DeviceCells:
     instruction_set: InstructionSet
 
 
-def tracing_cells(tree: ImplicitModel, *, device: str | None = None) -> TracingCells:
-    """Return the cells for rays through `tree`, with BLOCKS_ALONG finest blocks along its longest side.
+def tracing_cells(
+    tree: ImplicitModel, *, device: str | None = None, blocks: int = BLOCKS_ALONG
+) -> TracingCells:
+    """Return the cells for rays through `tree`, with a number of finest blocks along its longest side.
 
     `device` is the Warp device that builds them, by default the current one.
     """
-    return _tracing_cells(tree.tape, *_corners(tree), known_device(device))
+    return _tracing_cells(tree.tape, *_corners(tree), known_device(device), blocks)
 
 
 def device_cells(tree: ImplicitModel, *, device: str | None = None) -> DeviceCells:
@@ -121,9 +123,9 @@ def device_cells(tree: ImplicitModel, *, device: str | None = None) -> DeviceCel
     return tracing_cells(tree, device=device).on(known_device(device))
 
 
-def cells_grid(lower: Float32Array, upper: Float32Array) -> Grid:
+def cells_grid(lower: Float32Array, upper: Float32Array, blocks: int = BLOCKS_ALONG) -> Grid:
     """Return the cells for rays through a model in a box."""
-    return grid_from(lower, upper, float((upper - lower).max()) / (BLOCKS_ALONG * BRANCHING) * (1.0 + 1e-6))
+    return grid_from(lower, upper, float((upper - lower).max()) / (blocks * BRANCHING) * (1.0 + 1e-6))
 
 
 def block_counts(lower: Float32Array, upper: Float32Array, block_size: float) -> IndexArray:
@@ -143,20 +145,20 @@ def _corners(tree: ImplicitModel) -> tuple[Corner, Corner]:
 
 
 @sized_cache(MAX_CELLS_BYTES)
-def _tracing_cells(tape: Tape, lower: Corner, upper: Corner, device: str) -> TracingCells:
+def _tracing_cells(tape: Tape, lower: Corner, upper: Corner, device: str, blocks: int) -> TracingCells:
     bounds = np.array(lower, np.float32), np.array(upper, np.float32)
-    cells = build_cells(tape, cells_grid(*bounds), device=device)
+    cells = build_cells(tape, cells_grid(*bounds, blocks), device=device)
     region, whole = np.split(tape.data, [tape.start])
     length = np.array([[len(whole), 0.0, 0.0, 0.0]], np.float32)
     block_size = cells.grid.cell_size * BRANCHING
-    blocks = block_table(cells, len(whole) + 1, block_counts(*bounds, block_size))
+    table = block_table(cells, len(whole) + 1, block_counts(*bounds, block_size))
     return TracingCells(
         tape=np.concatenate([region, length, whole, cells.leaves.tape.numpy()[tape.start :]]),
         start=tape.start,
-        blocks=blocks.ravel(),
+        blocks=table.ravel(),
         lower=cells.grid.origin.astype(np.float32),
         block_size=block_size,
-        counts=blocks.shape,
+        counts=table.shape,
         tolerance=trace_tolerance(bounds),
         instruction_set=tape.instruction_set,
     )

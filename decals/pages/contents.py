@@ -66,9 +66,9 @@ SAMPLES = (0.0, 0.0), (0.125, 0.375), (0.375, -0.125), (-0.125, -0.375), (-0.375
 
 
 def page_contents(
-    scene: Scene, *, traced: bool, resolution: int | None, report: Progress
+    scene: Scene, *, traced: int, resolution: int | None, report: Progress
 ) -> tuple[dict[str, Any], Arrays]:
-    """Return the header and the arrays of a page, in which trees are traced or meshes.
+    """Return the header and the arrays of a page, in which trees are meshes, or traced with some blocks.
 
     Raises
     ------

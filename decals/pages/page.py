@@ -18,6 +18,7 @@ from blobtree.colors import ColorLike
 from blobtree.files import write_atomically
 from blobtree.immutable import Immutable
 from blobtree.progress import Progress, reporting
+from blobtree.tracing.tree_cells import BLOCKS_ALONG
 from blobtree.validation import truth
 from decals.errors import InvalidScene, NoGraphics
 from decals.field.mapping import ImageMapping
@@ -52,6 +53,9 @@ SURFACES = "mesh", "traced"
 
 SUFFIXES = ".html", ".htm"
 """Ends of the names of pages."""
+
+LINKS = re.compile(r"^(import [^;]*;\n|export )", re.MULTILINE)
+"""What joins modules, and what one script of all of them does without."""
 
 SLOT = re.compile(r"<!--([A-Z]+)-->")
 """Places of the page's template that are filled."""
@@ -181,19 +185,47 @@ def page(
     one_of("surface", surface, SURFACES, InvalidScene)
     sky = drawing.background if background is None else as_background(background)
     with reporting(progress) as report:
-        header, arrays = page_contents(
-            given, traced=surface == "traced", resolution=resolution, report=report
+        slots = viewer_slots(
+            given,
+            title,
+            alt,
+            controls=controls,
+            background=sky,
+            traced=BLOCKS_ALONG if surface == "traced" else 0,
+            resolution=resolution,
+            report=report,
         )
+    script = as_script(viewer_script(), "mount") + _read("start.js")
+    return Page(filled(_read("page.html"), {**slots, "SCRIPT": script}), slots["DATA"], title)
+
+
+def viewer_slots(
+    scene: Scene,
+    title: str,
+    alt: str,
+    *,
+    controls: bool,
+    background: Background,
+    traced: int,
+    resolution: int | None,
+    report: Progress,
+    picture: Scene | None = None,
+) -> dict[str, str]:
+    """Return what a template of a page shows of a scene: its slots but for the script.
+
+    The picture without WebGL 2 is that of the scene, or of another one.
+    """
+    header, arrays = page_contents(scene, traced=traced, resolution=resolution, report=report)
     texts = {"TITLE": html.escape(title), "ALT": html.escape(alt)}
     modes = "".join(f"<option>{mode}</option>" for mode in header["shaders"]["modes"])
-    tools = {"MODES": modes, "BACKGROUND": _gradient(sky), "DOUBLINGS": f"{math.log2(MAX_STIFFNESS):g}"}
-    markup = _filled("controls.html", {**texts, **tools})
-    markup = TOOLTIP.sub(r'\g<0> aria-label="\1"', markup)
+    tools = {
+        "MODES": modes,
+        "BACKGROUND": _gradient(background),
+        "DOUBLINGS": f"{math.log2(MAX_STIFFNESS):g}",
+    }
+    markup = TOOLTIP.sub(r'\g<0> aria-label="\1"', filled(_read("controls.html"), {**texts, **tools}))
     data = packed({**header, "markup": markup, "controls": controls}, arrays)
-    style, start = (_read(name) for name in ("page.css", "start.js"))
-    script = _inline(viewer_script()) + start
-    slots = {**texts, "PICTURE": _picture(given), "STYLE": style, "SCRIPT": script, "DATA": data}
-    return Page(_filled("page.html", slots), data, title)
+    return {**texts, "PICTURE": _picture(picture or scene), "STYLE": _read("page.css"), "DATA": data}
 
 
 def save_html(
@@ -214,19 +246,16 @@ def save_html(
 
 
 @cache
-def viewer_script() -> str:
-    """Return the viewer as one ES module that exports `mount`."""
-    texts = [_read(f"{name}.mjs") for name in MODULES]
-    lines = "".join(texts).splitlines()
-    kept = [line.removeprefix("export ") for line in lines if not line.startswith("import ")]
-    return "\n".join([*kept, "export { mount };", ""])
+def viewer_script(*more: str, name: str = "mount") -> str:
+    """Return the viewer, with the texts of more modules, as one ES module that exports a function."""
+    texts = "".join([*(_read(f"{module}.mjs") for module in MODULES), *more])
+    return f"{LINKS.sub('', texts)}export {{ {name} }};\n"
 
 
-def _inline(module: str) -> str:
-    """Return a module as a classic script: browsers load no modules from files."""
-    return (
-        f"const {{ mount }} = (() => {{\n{module.replace('export { mount };', 'return { mount };')}}})();\n"
-    )
+def as_script(module: str, name: str) -> str:
+    """Return a module that exports a function as a classic script: browsers load no modules from files."""
+    body = module.replace(f"export {{ {name} }};", f"return {{ {name} }};")
+    return f"const {{ {name} }} = (() => {{\n{body}}})();\n"
 
 
 def _read(name: str) -> str:
@@ -234,9 +263,9 @@ def _read(name: str) -> str:
     return (VIEWER / name).read_text(encoding="utf-8")
 
 
-def _filled(name: str, slots: Mapping[str, str]) -> str:
-    """Return a file of the viewer with its slots filled."""
-    parts = SLOT.split(_read(name))
+def filled(template: str, slots: Mapping[str, str]) -> str:
+    """Return the text of a template with its slots filled."""
+    parts = SLOT.split(template)
     parts[1::2] = [slots[slot] for slot in parts[1::2]]
     return "".join(parts)
 

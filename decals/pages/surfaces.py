@@ -60,11 +60,11 @@ class Surfaces:
         scene: Scene,
         receivers: Sequence[str],
         *,
-        traced: bool,
+        traced: int,
         resolution: int | None,
         report: Progress,
     ) -> "Surfaces":
-        """Return the surfaces of the objects that a scene shows.
+        """Return the surfaces of the objects that a scene shows: trees as meshes, or traced with some blocks.
 
         Raises
         ------
@@ -77,7 +77,7 @@ class Surfaces:
                 continue
             masks.append(object_mask(item, receivers))
             if traced and isinstance(part, TreeObject):
-                surfaces._add_tree(part)
+                surfaces._add_tree(part, traced)
             else:
                 surfaces._add_mesh(part, bake_mesh(part, resolution=resolution, creases=True, report=report))
         if not masks:
@@ -91,9 +91,9 @@ class Surfaces:
         low, high = np.moveaxis(np.array(self.corners, np.float64), 1, 0)
         return [low.min(axis=0).tolist(), high.max(axis=0).tolist()]
 
-    def _add_tree(self, item: TreeObject) -> None:
+    def _add_tree(self, item: TreeObject, blocks: int) -> None:
         number, tree = len(self.records), item.tree
-        cells = tracing_cells(tree)
+        cells = tracing_cells(tree, blocks=blocks)
         lower, upper = np.asarray(tree.support)
         self.corners.append(np.array([lower, upper]))
         box = {"box_lower": tuple(lower.tolist()), "box_upper": tuple(upper.tolist())}

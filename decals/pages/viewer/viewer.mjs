@@ -16,7 +16,7 @@ const STEP = 0.25; // of a decal, in radii, at a press
 const ORBIT = Math.PI / 24; // of the model, at a press
 const LOST = "The graphics card has let this picture go. It returns as soon as the browser allows it.";
 
-class Viewer {
+export class Viewer {
   constructor(root, { header, arrays }, options) {
     const { mode, stiffness, scene, rules } = header;
     Object.assign(this, { header, arrays, mode, stiffness, originals: scene.decals });
