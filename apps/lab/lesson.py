@@ -159,15 +159,15 @@ class Lesson:
         All formulas by their text, for the variables of their places.
     templates
         All texts with formulas in braces.
-    folder
-        The folder of its files.
+    folder, name
+        The folder of its files, and the name of its own without an ending.
 
     Examples
     --------
     >>> from decals.apps.lab.lesson import LESSONS, load_lessons
     >>> lessons = load_lessons(LESSONS)
     >>> len(lessons), lessons[0].settings.title
-    (6, 'One decal')
+    (8, 'One decal')
     """
 
     settings: Settings
@@ -176,6 +176,7 @@ class Lesson:
     formulas: dict[str, Formula]
     templates: dict[str, Template]
     folder: Path
+    name: str
 
     @property
     def size(self) -> float:
@@ -256,14 +257,14 @@ def load_lessons(folder: Path) -> list[Lesson]:
 def load_lesson(path: Path) -> Lesson:
     """Return the lesson of a file; see `load_lessons`."""
     try:
-        return _parsed(path.read_text(encoding="utf-8"), path.parent)
+        return _parsed(path.read_text(encoding="utf-8"), path)
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidLesson(f"could not read the lesson {str(path)!r} ({error})") from error
     except ImplicitDecalsError as error:
         raise InvalidLesson(f"{str(path)!r}: {error}") from error
 
 
-def _parsed(source: str, folder: Path) -> Lesson:
+def _parsed(source: str, path: Path) -> Lesson:
     fence, *rest = source.split(f"{FENCE}\n", 2)
     if fence or len(rest) != 2:
         raise InvalidLesson(f"expected settings between two lines {FENCE!r} at the top; write them in TOML")
@@ -278,7 +279,7 @@ def _parsed(source: str, folder: Path) -> Lesson:
     for place, text, variables in _formulas(settings):
         with _place(place):
             formulas[text] = parse(text, MEASURES, variables)
-    scene = _without_files(load_scene(folder / settings.scene))
+    scene = _without_files(load_scene(path.parent / settings.scene))
     for i, slider in enumerate(settings.sliders):
         with _place(f"sliders[{i}]"):
             _check_slider(slider, scene)
@@ -286,7 +287,7 @@ def _parsed(source: str, folder: Path) -> Lesson:
     for place, text in _texts(settings):
         with _place(place):
             templates[text] = _template(text)
-    return Lesson(settings, rest[1].strip(), scene, formulas, templates, folder)
+    return Lesson(settings, rest[1].strip(), scene, formulas, templates, path.parent, path.stem)
 
 
 def _without_files(scene: Scene) -> Scene:

@@ -18,6 +18,7 @@ def attempt(words: str, *settings: tuple[str, float | str], right: bool = False)
 
 PROBE, BLUE, MODE, STEP = "Probe, left and right", "Blue decal, left and right", "Contact mode", "Step"
 YELLOW, GREEN = "Yellow ball, up and down", "Stiffness of the green ball"
+DECAL, MAPPING = "Decal, left and right", "Mapping"
 
 ANSWERS = [
     [
@@ -52,6 +53,17 @@ ANSWERS = [
         attempt("Make green softer", (YELLOW, 1.5)),
         attempt("not pressed together", ("Green ball", 1.9)),
         attempt("the soft one is dented", ("Green ball", 0.9), (GREEN, 0.1), right=True),
+    ],
+    [
+        attempt("The area of the contact is only"),
+        attempt("The balls are apart", ("Green ball", 1.4)),
+        attempt("Make green softer", ("Green ball", 0.5)),
+        attempt("The area depends on how deep", (GREEN, 0.25), right=True),
+    ],
+    [
+        attempt("onto the bump"),
+        attempt("Choose the other mapping", (DECAL, 0.9)),
+        attempt("the corrected mapping lengthens it", (MAPPING, "corrected"), right=True),
     ],
 ]
 """For each lesson, attempts one after the other; the first changes nothing."""

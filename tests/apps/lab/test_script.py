@@ -13,7 +13,7 @@ import decals
 from decals.apps.lab.lab import Lab
 from decals.apps.lab.lesson import LESSONS, load_lessons
 from decals.window import EditWindow
-from tests.apps.lab.answers import BLUE, GREEN, MODE, STEP
+from tests.apps.lab.answers import BLUE, DECAL, GREEN, MAPPING, MODE, STEP
 from tests.apps.lab.test_lab import EMPTY, begin, number_of, wait
 
 CHANGES: list[list[tuple[str, Any]]] = [
@@ -23,6 +23,8 @@ CHANGES: list[list[tuple[str, Any]]] = [
     [("Interaction of the eye", "overlap"), ("Layer of the rock", -1)],
     [(STEP, 7)],
     [("Green ball", 1.1), (GREEN, 0.2)],
+    [("Green ball", 0.5), (GREEN, 0.25)],
+    [(DECAL, 0.9), (MAPPING, "corrected")],
 ]
 """For each lesson, what a student sets."""
 
@@ -37,7 +39,7 @@ def lab(vtk_display: None) -> Iterator[Lab]:
 
 
 @pytest.mark.ordinary_cases("1")
-@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("number", range(8))
 def test_the_lines_make_the_picture(
     lab: Lab, number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
