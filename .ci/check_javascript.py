@@ -15,7 +15,7 @@ TOOLS = ROOT / ".ci" / "javascript"
 INSTALLED = TOOLS / "node_modules" / ".package-lock.json"
 SCRIPTS = "*.js", "*.mjs"
 PAGES = ("*.html",)
-TEMPLATES = ("decals/pages/viewer/*.html",)
+TEMPLATES = ("decals/pages/viewer/*.html", "apps/lesson_pages/*.html")
 """Pages whose scripts are files of their own."""
 
 

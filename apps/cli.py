@@ -79,6 +79,16 @@ implicit-decals sandbox knot.json
 
 implicit-decals sandbox --lab
 """,
+    "lessons": """Write lessons of the contact lab as HTML pages, which need no server and no network.
+
+For example:
+
+implicit-decals lessons -o pages
+
+implicit-decals lessons -o pages --language en --language de
+
+implicit-decals lessons my-lessons -o pages
+""",
     "scatter": """Scatter decals over models and write a scene, or a table of decals.
 
 All models share one coordinate system. Decals of different models push each other where the models touch.

@@ -46,7 +46,9 @@ EXTRAS = {
     "decals/scenes/tables.py": "experiments",
     "apps/commands/sandbox.py": "browser",
     "apps/commands/sweep.py": "experiments",
+    "apps/commands/lessons.py": "browser",
     "apps/lab": "browser",
+    "apps/lesson_pages": "browser",
     "apps/sandbox": "browser",
     "decals/experiments": "experiments",
 }

@@ -13,7 +13,6 @@ from typing import Any
 import msgspec
 import numpy as np
 import pyvista as pv
-from markdown_it import MarkdownIt
 
 from decals.apps.lab.bindings import AXES, MODES, binding
 from decals.apps.lab.errors import InvalidLesson
@@ -22,7 +21,7 @@ from decals.apps.lab.lesson import Lesson, Slider, shown
 from decals.apps.lab.plots import drawn
 from decals.apps.lab.relaxing import Recording
 from decals.apps.lab.script import script
-from decals.apps.lab.symbols import marked, readings, table
+from decals.apps.lab.symbols import document, marked, readings, table
 from decals.apps.sandbox.controls import STEPS, Control, exchanged
 from decals.apps.sandbox.decal_panel import set_drawing
 from decals.editing.commands import ReplaceScene, SetValues
@@ -78,7 +77,7 @@ class Lab:
         self._window, self._lessons = window, lessons
         titles = [lesson.settings.title for lesson in lessons]
         self._titles = [{"title": f"{i + 1}. {title}", "value": i} for i, title in enumerate(titles)]
-        self._texts = [_html(lesson.text) for lesson in lessons]
+        self._texts = [document(lesson.text) for lesson in lessons]
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="lab")
         self._pending: Future[Results] | None = None
         self._results: Results | None = None
@@ -349,9 +348,3 @@ def measured(
         compared = {"ends": [guess, truth if np.isfinite(truth) else None]}
         compared |= {"texts": [shown(guess), shown(truth)], "why": lesson.filled(asked.why, scope)}
     return Results(key, lesson.verdict(scope), values, plots, done, compared, table(rows))
-
-
-def _html(text: str) -> str:
-    """Return Markdown as HTML with marked symbols; HTML and pictures in it stay text: it asks no server."""
-    html: str = MarkdownIt("commonmark", {"html": False}).disable("image").enable("table").render(text)
-    return marked(html)

@@ -1,10 +1,11 @@
 """The symbols of the paper: their definitions, marked in texts, and their values at the probe."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from html import escape
 
 import numpy as np
+from markdown_it import MarkdownIt
 
 from blobtree._typing import BoolArray
 from decals.apps.lab.experiment import Scope
@@ -39,11 +40,11 @@ PUSHED = 1e-3
 """Least change of the field by which a push counts."""
 
 
-def marked(html: str, *, svg: bool = False) -> str:
+def marked(html: str, *, svg: bool = False, definitions: Mapping[str, str] = DEFINITIONS) -> str:
     """Return HTML, or the text of an SVG element, whose symbols show their definitions under the pointer."""
 
     def definition(match: re.Match[str]) -> str:
-        title = escape(f"{match[0]}: {DEFINITIONS[match[1]]}")
+        title = escape(f"{match[0]}: {definitions[match[1]]}")
         if svg:
             return f'<tspan data-symbol="{match[0]}"><title>{title}</title>{match[0]}</tspan>'
         return f'<abbr data-symbol="{match[0]}" title="{title}">{match[0]}</abbr>'
@@ -70,6 +71,12 @@ def regions(scope: Scope) -> dict[str, BoolArray]:
     found = dict.fromkeys("gds", highest > 0.0) | dict.fromkeys("fr", highest >= 0.5)
     found |= {f"f{'₀₁'[i]}": of("f", i) for i in pairs if i < len(scope.experiment.decals)}
     return {name: acts & scope.points.exists for name, acts in {**found, "F": seen, "h": pushed}.items()}
+
+
+def document(text: str, definitions: Mapping[str, str] = DEFINITIONS) -> str:
+    """Return Markdown as HTML with marked symbols; HTML and pictures in it stay text: it asks no server."""
+    html: str = MarkdownIt("commonmark", {"html": False}).disable("image").enable("table").render(text)
+    return marked(html, definitions=definitions)
 
 
 def readings(scope: Scope) -> list[tuple[str, list[float]]]:

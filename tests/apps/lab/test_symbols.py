@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from decals.apps.lab.experiment import Scope
-from decals.apps.lab.lab import _html, measured
+from decals.apps.lab.lab import measured
 from decals.apps.lab.lesson import LESSONS, Lesson, load_lessons, shown
 from decals.apps.lab.plots import LEFT, RIGHT, SAMPLES, WIDTH, drawn
-from decals.apps.lab.symbols import DEFINITIONS, PUSHED, marked, readings, regions, table
+from decals.apps.lab.symbols import DEFINITIONS, PUSHED, document, marked, readings, regions, table
 from decals.field.rules import PictureRules
 from decals.model import Decals, Interaction
 from decals.record import Contact
@@ -95,7 +95,7 @@ def test_symbols_are_marked_where_they_stand_alone() -> None:
 
 
 def test_every_lesson_defines_its_symbols_and_shows_numbers_beside_its_plots(lessons: list[Lesson]) -> None:
-    text = "".join(_html(lesson.text) for lesson in lessons) + table([(name, ["1"]) for name in "rsdgfhF"])
+    text = "".join(document(lesson.text) for lesson in lessons) + table([(name, ["1"]) for name in "rsdgfhF"])
     for symbol in DEFINITIONS:
         assert f'<abbr data-symbol="{symbol}"' in text
     for lesson in lessons:
