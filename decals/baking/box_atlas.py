@@ -12,7 +12,8 @@ from decals.baking.unwrapped import Unwrapped
 from decals.sorting import distinct_numbers, groups
 from decals.surfaces.topology import components, edge_twins, welded
 
-AXES = np.array([sign * row for sign in (1.0, -1.0) for row in np.eye(3)])
+SIDES = 6
+"""Sides of a box; axes 0 to 2 are +x, +y and +z, and 3 to 5 are −x, −y and −z."""
 
 MIN_COSINE = 0.35
 """Least cosine between a face and the axis along which it is projected, unless no axis is closer."""
@@ -41,7 +42,7 @@ class BoxSides:
     neighbors : int64[m, 3]
         Index of the face on the other side of each edge; −1 at open edges.
     axis : int64[m]
-        Row of `AXES`.
+        One of `SIDES`.
     """
 
     normals: Float64Array
@@ -64,7 +65,7 @@ class BoxSides:
         tick()
         neighbors = np.where(twins >= 0, twins // 3, -1)
         normals = crosses / np.maximum(doubled, 1e-300)[:, None]
-        return cls(normals, doubled, neighbors, _smoothed(normals @ AXES.T, neighbors, tick))
+        return cls(normals, doubled, neighbors, _smoothed(np.hstack([normals, -normals]), neighbors, tick))
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,8 +129,7 @@ def _charts(mesh: BakeMesh, group: Int64Array, tick: Callable[[], None]) -> _Cha
     faces = mesh.faces.astype(np.int64)
     sides = BoxSides.of(mesh, tick)
     axis, neighbors, doubled = sides.axis, sides.neighbors, sides.doubled
-    cosines = sides.normals @ AXES.T
-    label = group * len(AXES) + axis
+    label = group * SIDES + axis
     face, side = np.nonzero((neighbors >= 0) & (label[neighbors] == label[:, None]))
     links = np.stack([face, neighbors[face, side]], axis=1)
     chart = components(links, len(faces))
@@ -140,7 +140,7 @@ def _charts(mesh: BakeMesh, group: Int64Array, tick: Callable[[], None]) -> _Cha
     tick()
     axis_of_chart = np.zeros(int(chart.max()) + 1, np.int64)
     axis_of_chart[chart] = axis
-    flat = np.bincount(chart, doubled * np.abs(cosines[np.arange(len(faces)), axis]))
+    flat = np.bincount(chart, doubled * np.abs(sides.normals[np.arange(len(faces)), axis % 3]))
     stretch = np.sqrt(np.bincount(chart, doubled) / np.maximum(flat, 1e-300))
     places = _projected(mesh.vertices[rows].astype(np.float64), axis_of_chart[chart_of_row])
     places *= np.minimum(stretch, 1.0 / MIN_COSINE)[chart_of_row, None]
@@ -152,8 +152,8 @@ def _charts(mesh: BakeMesh, group: Int64Array, tick: Callable[[], None]) -> _Cha
 def _smoothed(cosines: Float64Array, neighbors: Int64Array, tick: Callable[[], None]) -> Int64Array:
     """Return the axis of each face: close to its normal, and alike among neighbours."""
     axis: Int64Array = cosines.argmax(axis=1)
-    votes = np.vstack([SMOOTHING * np.eye(len(AXES)), np.zeros(len(AXES))])  # the last one is at open edges
-    with_none = np.append(axis, len(AXES))
+    votes = np.vstack([SMOOTHING * np.eye(SIDES), np.zeros(SIDES)])  # the last one is at open edges
+    with_none = np.append(axis, SIDES)
     faces = np.flatnonzero((with_none[neighbors] != axis[:, None]).any(axis=1))
     for _ in range(SMOOTHING_ROUNDS):
         tick()

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from blobtree._typing import (
     BoolArray,
@@ -47,7 +48,7 @@ from decals.baking.texel_kernels import (
 )
 from decals.baking.unwrapped import Unwrapped
 from decals.images.texels import decode_srgb
-from decals.sorting import groups, ranges
+from decals.sorting import ranges
 
 BLOCK_SAMPLES, CARD_BLOCK_SAMPLES = 1 << 20, 1 << 23
 """Samples that a processor or a card looks up at once; they bound the memory besides that of the texture."""
@@ -156,8 +157,8 @@ def bake_texture(
     samples: int,
     channels: Channels,
     report: Progress,
-) -> UInt8Array:
-    """Return textures ``uint8[tiles, size, size, channels]``, by default sRGB, first row at the top.
+) -> list[UInt8Array]:
+    """Return textures ``uint8[size, size, channels]``, by default sRGB, first row at the top.
 
     A texel is the colour at its centre; where neighbours differ, the mean of those of its ``samples`` ×
     ``samples`` points that lie in charts. Beyond a seam, texels show the surface on its other side, see
@@ -192,7 +193,7 @@ def bake_texture(
             page.replace(mixed.texels[of] % size**2, matched[of])
     for page in pages:
         page.finish(gutter_width(size))
-    return np.stack([page.image() for page in pages])
+    return [page.image() for page in pages]
 
 
 def _report_part(report: Progress, done: int, count: int, share: float) -> None:
@@ -319,11 +320,11 @@ class Sheet:
                 for of in (heights.min, heights.max)
             )
             counts = last - first + 1
-            row = ranges(first, counts).astype(np.uint16)  # sorted by their digits
-            order = np.argsort(row, kind="stable")
-            starts = np.concatenate([[0], np.cumsum(np.bincount(row, minlength=size))])
-            listed = np.repeat(self._chosen, counts)[order]
-            self._lists = size, [array_on(self.device, each, wp.int32) for each in (starts, listed)]
+            ends, rows = np.append(0, np.cumsum(counts)), ranges(first, counts)
+            each = np.ones(len(rows), np.bool_), rows, ends
+            lists = csr_array(each, (len(counts), size)).tocsc()
+            listed = self._chosen[lists.indices]
+            self._lists = size, [array_on(self.device, of, wp.int32) for of in (lists.indptr, listed)]
         return self._lists[1]
 
     def surface(self, faces: FloatArray | Int64Array, places: FloatArray) -> Located:
@@ -403,11 +404,11 @@ class Sheet:
     def border_points(self) -> tuple[Int64Array, Float32Array]:
         """Return faces and places ``float32[n, 2]`` of points along the borders of charts."""
         faces, places = self._part.faces[self._chosen], self._part.places
-        sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-        keys = sides.min(axis=1) * np.int64(len(places)) + sides.max(axis=1)
-        first, _, counts = groups(keys)
+        starts, stops = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
+        keys = np.minimum(starts, stops) * np.int64(len(places)) + np.maximum(starts, stops)
+        _, first, counts = np.unique(keys, return_index=True, return_counts=True)
         rows = first[counts == 1]
-        begin, end = places[sides[rows, 0]], places[sides[rows, 1]]
+        begin, end = places[starts[rows]], places[stops[rows]]
         steps = np.ceil(np.linalg.norm(end - begin, axis=1) / BORDER_STEP).astype(np.int64) + 1
         edges = np.repeat(np.arange(len(rows)), steps)
         number = ranges(np.zeros_like(steps), steps)

@@ -73,10 +73,10 @@ def subdivided(
         More than MAX_FACES triangles would be needed.
     """
     while True:
-        ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-        ends.sort(axis=1)
-        first, edge_of, _ = groups(ends @ [len(rows), 1])
-        edges = ends[first]
+        next_corners = np.roll(faces, -1, axis=1)
+        low, high = (of(faces, next_corners).reshape(-1) for of in (np.minimum, np.maximum))
+        first, edge_of, _ = groups(low * len(rows) + high)
+        edges = np.stack([low[first], high[first]], axis=1)
         halved = is_long(rows[edges[:, 0], :3], rows[edges[:, 1], :3])
         if not halved.any():
             return rows, faces

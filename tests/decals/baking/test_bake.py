@@ -344,8 +344,8 @@ def square_texture(size: int, samples: int = 2) -> Callable[[], Array]:
     )
 
     def texture() -> Array:
-        made: Array = bake_texture([mesh], [part], size, samples, Channels(colors.at), lambda *_: None)
-        return np.asarray(made[0])
+        (made,) = bake_texture([mesh], [part], size, samples, Channels(colors.at), lambda *_: None)
+        return made
 
     return texture
 

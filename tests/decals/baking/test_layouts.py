@@ -363,8 +363,8 @@ def test_seams_between_tiles_agree_too() -> None:
     meshes = [bake_mesh(item, resolution=None, creases=False, report=silent) for item in scene.objects[:1]]
     colors = SurfaceColors(meshes, scene.objects[:1], scene.decals, scene.images, scene.drawing)
     parts = lay_out(meshes, 128, "box", 2, silent)
-    image = bake_texture(meshes, parts, 128, 2, Channels(colors.at), silent)
-    assert image.shape == (2, 128, 128, 3)
+    images = bake_texture(meshes, parts, 128, 2, Channels(colors.at), silent)
+    assert [image.shape for image in images] == 2 * [(128, 128, 3)]
     seams = Seams.of(meshes, parts)
     between = seams.tiles[:, 0] != seams.tiles[:, 1]
     assert between.any()
@@ -374,6 +374,6 @@ def test_seams_between_tiles_agree_too() -> None:
         uv = places[:, side] / 128
         uv[:, 1] = 1 - uv[:, 1]
         own = seams.tiles[rows, side]
-        light = [bilinear(linear(tile / 255.0), uv) for tile in image]
+        light = [bilinear(linear(tile / 255.0), uv) for tile in images]
         levels.append(255 * srgb(np.where(own[:, None] == 0, *light)))
     assert np.abs(levels[0] - levels[1])[between[rows]].max() <= 4.0
