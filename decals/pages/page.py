@@ -22,6 +22,7 @@ from blobtree.tracing.tree_cells import BLOCKS_ALONG
 from blobtree.validation import truth
 from decals.errors import InvalidScene, NoGraphics
 from decals.field.mapping import ImageMapping
+from decals.hosts.unsupported import refuse_unsupported
 from decals.pages.contents import page_contents
 from decals.pages.packing import packed
 from decals.record import Contact
@@ -29,6 +30,7 @@ from decals.rendering.options import Background, as_background
 from decals.rendering.picture import on_white
 from decals.scenes.cover import as_scene
 from decals.scenes.objects import SceneObject
+from decals.scenes.pose import PosedScene
 from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model
 from decals.validation import MAX_STIFFNESS, checked_path, describe, is_unicode, one_of
@@ -111,7 +113,7 @@ class Page(Immutable):
 
 
 def page(
-    scene: Scene | SceneObject | Model | Sequence[SceneObject | Model],
+    scene: Scene | PosedScene | SceneObject | Model | Sequence[SceneObject | Model],
     *,
     title: str | None = None,
     alt: str | None = None,
@@ -132,9 +134,9 @@ def page(
 
     Parameters
     ----------
-    scene : Scene, SceneObject or Model
-        A scene; or a model as `decals.cover` takes it, a list of such models, or the path of a model or a
-        scene.
+    scene : Scene, PosedScene, SceneObject or Model
+        A scene, also one with rigid poses; or a model as `decals.cover` takes it, a list of such models, or
+        the path of a model or a scene.
     title : str, optional
         Title of the page. Default: names of the objects.
     alt : str, optional
@@ -175,7 +177,7 @@ def page(
     >>> "http://" in shown.text or "https://" in shown.text
     False
     """
-    given = as_scene(scene)
+    given = as_scene(_unposed(scene))
     drawing = given.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping)
     given = given.replace(drawing=drawing)
     names = ", ".join(item.name for item in given.objects)
@@ -228,8 +230,17 @@ def viewer_slots(
     return {**texts, "PICTURE": _picture(picture or scene), "STYLE": _read("page.css"), "DATA": data}
 
 
+def _unposed(scene: Any) -> Any:
+    """Return a scene with rigid poses as a plain one; raise `InvalidScene` for other poses."""
+    if not getattr(scene, "posed", False):
+        return scene
+    refuse_unsupported(scene, scene.drawing)
+    fields = ("objects", "camera", "decals", "images", "drawing")
+    return Scene(**{name: getattr(scene, name) for name in fields})
+
+
 def save_html(
-    scene: Scene | SceneObject | Model | Sequence[SceneObject | Model],
+    scene: Scene | PosedScene | SceneObject | Model | Sequence[SceneObject | Model],
     path: str | os.PathLike[str],
     **options: Any,
 ) -> None:

@@ -584,3 +584,16 @@ def test_an_edit_takes_the_full_shaders_where_it_must() -> None:
     """
     found = run_node(script, {"rows": rows, "rules": rules, "edits": edits})
     assert found == {"moved": False, "nested": True, "over": True, "upper": True, "fading": True}
+
+
+def test_a_page_shows_rigid_poses_and_names_others() -> None:
+    rest = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    scene = decals.cover(decals.MeshObject("sheet", rest, [[0, 1, 2]]), count=3)
+    stretched = decals.pose(scene, {"sheet": 2 * rest})
+    with pytest.raises(InvalidScene, match="expected one without poses"):
+        page(stretched)
+    lifted = rest + np.array([0, 0, 5], np.float32)
+    rigid = decals.pose(scene, {"sheet": lifted}, rigid=True)
+    rows = header_of(page(rigid).text)["scene"]["decals"]
+    assert_allclose([row["position"] for row in rows], rigid.decals.positions, atol=1e-6)
+    assert rows[0]["position"][2] == pytest.approx(5)
