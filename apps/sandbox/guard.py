@@ -12,6 +12,7 @@ import logging
 import re
 import secrets
 import socket
+import sys
 from collections.abc import Awaitable, Callable, Collection
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -24,6 +25,9 @@ from urllib.parse import urlencode, urlsplit
 from aiohttp import web
 from aiohttp.http_exceptions import HttpProcessingError
 
+if sys.platform != "win32":
+    import resource
+
 LOOPBACK = "127.0.0.1"
 """By default, the page is served to this machine only."""
 
@@ -34,7 +38,13 @@ COOKIE_SECONDS = 30 * 24 * 3600
 """Time for which a browser that was closed finds its session again."""
 
 MAX_SOCKETS = 64
-"""Most connections for messages of one server."""
+"""Most connections for messages of one server, of browsers with a cookie."""
+
+MAX_STRANGERS = 16
+"""Most connections for messages that still have to bring the token."""
+
+MAX_FILES = 10_240
+"""Open files of the server, connections among them, where the system allows so many."""
 
 MAX_NAME_BYTES = 255
 """Longest name in an address; file systems refuse longer ones."""
@@ -144,7 +154,7 @@ class Guard:
             self._hosts.add(socket.gethostname().lower())
         self._secret = secrets.token_bytes(32)
         self._frames: set[str] = set()
-        self._sockets = 0
+        self._sockets = {True: 0, False: 0}
 
     def url(self, port: int) -> str:
         """Return the URL that opens the page."""
@@ -159,6 +169,7 @@ class Guard:
     def protect(self, app: web.Application) -> None:
         """Check the requests of an application, before all its other parts and before its start."""
         logging.getLogger(SERVER_LOG).addFilter(_is_no_wrong_request)
+        allow_connections()
         app.middlewares.insert(0, self._check)
         app.on_response_prepare.append(self._add_headers)
 
@@ -212,13 +223,14 @@ class Guard:
         """Answer a request, unless too many connections for messages are open."""
         if not _is_socket(request):
             return await handler(request)
-        if self._sockets >= MAX_SOCKETS:
+        trusted = ASKING.get().trusted
+        if self._sockets[trusted] >= (MAX_SOCKETS if trusted else MAX_STRANGERS):
             raise web.HTTPServiceUnavailable(text="expected fewer open pages; close some of them")
-        self._sockets += 1
+        self._sockets[trusted] += 1
         try:
             return await handler(request)
         finally:
-            self._sockets -= 1
+            self._sockets[trusted] -= 1
 
     def _check_names(self, request: web.Request) -> None:
         """Refuse requests by a foreign name of this machine, and those of pages of other servers."""
@@ -315,6 +327,15 @@ class Guard:
             )
         )
         response.headers.update(HEADERS)
+
+
+def allow_connections() -> None:
+    """Let this process open more files than the usual 256 or 1,024, which idle connections would take up."""
+    if sys.platform != "win32":
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        most = MAX_FILES if hard == resource.RLIM_INFINITY else min(MAX_FILES, hard)
+        if soft != resource.RLIM_INFINITY and soft < most:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
 
 
 def new_token() -> str:

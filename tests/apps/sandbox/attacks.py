@@ -22,6 +22,8 @@ from typing import Any
 import aiohttp
 from trame_server.client import WsLinkSession
 
+from decals.apps.sandbox.guard import allow_connections
+
 PYTHON = [sys.executable, "-m", "decals", "sandbox"]
 PATIENCE = 90.0
 """Seconds in which a server starts; its first frame compiles shaders."""
@@ -55,6 +57,9 @@ WAYS: dict[str, list[str]] = {
     "notebook": [*PYTHON, "--done", "--port", "0", "--no-browser"],
 }
 """Commands of the ways of starting."""
+
+USUAL_LIMIT = 'ulimit -Sn 1024 && exec "$@"'
+"""Runs a command that may have as many files open at its start as is usual."""
 
 
 @dataclass
@@ -115,7 +120,7 @@ def served(way: str) -> Iterator[Server]:
         folder = Path(name)
         (folder / "private.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
         with subprocess.Popen(
-            WAYS[way],
+            ["sh", "-c", USUAL_LIMIT, "sh", *WAYS[way]],
             cwd=folder,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -547,13 +552,18 @@ async def _call(session: WsLinkSession, name: str, *arguments: Any) -> Any:
 # -- a slow or flooding client ------------------------------------------------------------------------------
 
 
+IDLE_CONNECTIONS = 1200
+"""More than the files that servers may have open at their start."""
+
+
 async def flood(server: Server) -> str:
-    """A program opens connections that say nothing, or half a request; the user's page still opens."""
+    """A program opens idle connections, or sends half requests; the user's page still opens."""
+    allow_connections()
     cookies = await server.enter()
     half = f"GET / HTTP/1.1\r\nHost: {server.authority}\r\n".encode()
     open_ = []
     try:
-        for number in range(200):
+        for number in range(IDLE_CONNECTIONS):
             client = socket.create_connection(("127.0.0.1", server.port), 10)
             client.sendall(half if number % 2 else b"")
             open_.append(client)
