@@ -42,15 +42,17 @@ def test_killed_runs_resume_to_the_same_table(tmp_path: Path) -> None:
     expected = rows(run(functions.slow, Grid(x=range(40)), tmp_path / "whole", workers=0))
     script = tmp_path / "script.py"
     script.write_text(SCRIPT)
-    clock = random.Random(7)
-    for _ in range(4):
+    clock, begun = random.Random(7), tmp_path / "out" / "experiment.json"
+    for number in range(4):
         child = subprocess.Popen(
             [sys.executable, script, tmp_path / "out"], env=ENVIRONMENT, stderr=subprocess.DEVNULL
         )
+        while number and not begun.exists() and child.poll() is None:
+            time.sleep(0.1)
         time.sleep(clock.uniform(0.5, 4.0))
         child.kill()
         assert child.wait() in (0, -signal.SIGKILL)
-    assert (tmp_path / "out" / "experiment.json").exists()
+    assert begun.exists()
     results = run(functions.slow, Grid(x=range(40)), tmp_path / "out", workers=2)
     assert rows(results) == expected
 
