@@ -255,6 +255,11 @@ def _refuse_counts(listed: list[Any], name: str) -> None:
 def _refuse_columns(faces: NDArray[Any], name: str) -> None:
     """Refuse an array whose columns are the faces: its rows share vertices as polygons never do."""
     corners, count = faces.shape
+    if corners > 3 and count > COUNTED_ROWS and (faces[0] == corners - 1).all():
+        raise InvalidMesh(
+            f"{name}: expected faces as rows of corner indices, got an array of {corners} rows whose {count} "
+            "columns begin with the number of their corners; give faces[1:].T"
+        )
     if corners not in TRANSPOSED_ROWS or count <= corners or len(np.unique(faces)) > faces.size // 2:
         return
     repeated, column_repeated = (

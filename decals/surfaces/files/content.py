@@ -1,6 +1,7 @@
 """Contents of mesh files: bytes, lines of text in any encoding that its mark names, numbers, and errors."""
 
 import codecs
+import re
 from collections.abc import Callable, Iterable
 from itertools import chain
 from pathlib import Path
@@ -21,6 +22,9 @@ _MARKS = {
     codecs.BOM_UTF16_BE: "utf-16-be",
 }
 """Byte order marks and the encodings that they name."""
+
+_UNDEFINED = re.compile(rb"[+-]?(nan\(\w*\)|1\.#(qnan|snan|ind)\d*)", re.IGNORECASE)
+"""Undefined numbers as programs on Windows write them."""
 
 
 class Line(NamedTuple):
@@ -89,7 +93,20 @@ def decimal_numbers(words: Iterable[bytes]) -> Float64Array:
     """Return words of text as numbers, also infinite ones; ValueError if one is none."""
     words = list(words)
     _refuse_underscores(words)
-    return np.array(list(map(float, words)), np.float64)
+    try:
+        return np.array(list(map(float, words)), np.float64)
+    except ValueError:
+        return np.array(list(map(_number, words)), np.float64)
+
+
+def _number(word: bytes) -> float:
+    """Return a word as a number; programs on Windows write undefined ones as -nan(ind) or 1.#QNAN."""
+    if _UNDEFINED.fullmatch(word):
+        return np.nan
+    try:
+        return float(word)
+    except ValueError:
+        raise ValueError(f"expected a number, got {shown(word)}") from None
 
 
 def finite_numbers(words: Iterable[bytes]) -> Float64Array:

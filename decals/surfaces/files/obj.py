@@ -119,7 +119,8 @@ def _goes_on(text: bytes, *, first: bool) -> bool:
     """Return True if a backslash continues a line; those that end comments and names do not."""
     if not text.rstrip().endswith(b"\\") or b"#" in text:
         return False
-    return not first or text.split(None, 1)[0] in _NUMBERS
+    keyword = text.split(None, 1)[0].removesuffix(b"\\")
+    return not first or keyword in _NUMBERS or (keyword == b"mtllib" and text.split()[-1] == b"\\")
 
 
 def _references(faces: list[Line]) -> Int64Array:

@@ -93,28 +93,31 @@ def read_ply(path: Path) -> tuple[Float64Array, Polygons, Paint]:
 
 def _read(content: bytes, path: Path) -> tuple[Float64Array, Polygons, Paint]:
     order, elements, body = _header(content)
-    tables = list(_tables(order, elements, body))
-    vertices = [table for table in tables if table.name == "vertex"]
-    if len(vertices) != 1 or not {"x", "y", "z"} <= vertices[0].scalars.keys():
+    tables = list(zip(_tables(order, elements, body), elements, strict=True))
+    vertices = [(table, element) for table, element in tables if table.name == "vertex"]
+    if len(vertices) != 1 or not {"x", "y", "z"} <= vertices[0][0].scalars.keys():
         raise ValueError("it has no element of vertices with x, y and z")
-    points = np.stack([np.asarray(vertices[0].scalars[axis], np.float64) for axis in "xyz"], axis=-1)
+    points = np.stack([np.asarray(vertices[0][0].scalars[axis], np.float64) for axis in "xyz"], axis=-1)
     parts = [
-        _faces(table, elements) for name in ("face", "tristrips") for table in tables if table.name == name
+        _faces(table, element)
+        for name in ("face", "tristrips")
+        for table, element in tables
+        if table.name == name
     ]
     if not parts:
         raise ValueError("it has no faces")
     paint = PlyColors(
         path,
         _TEXTURE_FILE.findall(content[: len(content) - len(body)].decode("utf-8", "replace")),
-        _typed(vertices[0], elements),
+        _typed(*vertices[0]),
         parts,
     )
     return points, Polygons.joined([part.polygons for part in parts]), paint
 
 
-def _faces(table: _Table, elements: list[_Element]) -> PlyFaces:
+def _faces(table: _Table, element: _Element) -> PlyFaces:
     """Return the polygons of an element with what it says of each; strips are divided into triangles."""
-    polygons, columns = _corners(table), _typed(table, elements)
+    polygons, columns = _corners(table), _typed(table, element)
     if table.name == "face":
         return PlyFaces(polygons, columns, _places(table, polygons.sizes))
     strips = [strip_triangles(strip) for strip in np.split(polygons.corners, np.cumsum(polygons.sizes)[:-1])]
@@ -131,11 +134,21 @@ def _places(face: _Table, sizes: Int64Array) -> NDArray[np.generic] | None:
     return lists.entries.reshape(-1, 2)
 
 
-def _typed(table: _Table, elements: list[_Element]) -> dict[str, NDArray[np.generic]]:
-    """Return the numbers of a table in the types that the header names; ASCII has them as float64."""
-    properties = next(element.properties for element in elements if element.name == table.name)
-    kinds = {one.name: one.kind for one in properties}
-    return {name: values.astype(kinds[name]) for name, values in table.scalars.items()}
+def _typed(table: _Table, element: _Element) -> dict[str, NDArray[np.generic]]:
+    """Return the numbers of a table in the types that the header names, unless a number does not fit."""
+    kinds = {one.name: np.dtype(one.kind) for one in element.properties}
+    return {
+        name: values.astype(kinds[name]) if _fits(values, kinds[name]) else values
+        for name, values in table.scalars.items()
+    }
+
+
+def _fits(values: NDArray[Any], kind: np.dtype[Any]) -> bool:
+    """Return True if a type has all numbers; ASCII has them as float64."""
+    if values.dtype == kind or kind.kind == "f":
+        return True
+    limits = np.iinfo(kind)
+    return bool(((values >= limits.min) & (values <= limits.max)).all())
 
 
 def _corners(table: _Table) -> Polygons:
@@ -190,9 +203,9 @@ def _header(content: bytes) -> tuple[str, list[_Element], bytes]:
 
 
 def _row_count(text: str) -> int:
-    count = int(text)
+    count = int(text) if text.isdecimal() else -1
     if not 0 <= count <= np.iinfo(np.int64).max:
-        raise ValueError(f"an element claims {text[:40]} rows")
+        raise ValueError(f"an element claims {text[:40]!r} rows")
     return count
 
 

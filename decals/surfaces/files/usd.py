@@ -37,6 +37,8 @@ def usd_objects(path: Path) -> dict[str, MeshData]:
         except tf.ErrorException as error:
             raise Unreadable("it is damaged or of another format") from error
         _check_layers(stage, path)
+        for lost in stage.GetCompositionErrors():
+            notes.add("left out what cannot be found, or refers to itself", " ".join(str(lost).split()))
         budget = Budget()
         budget.grow(path.stat().st_size)
         first = usd.TimeCode.EarliestTime()

@@ -182,6 +182,14 @@ def test_transposed_faces_are_refused(mesh: tuple[Any, Any]) -> None:
             as_surface((points, columns))
 
 
+@pytest.mark.parametrize("mesh", [pv.Sphere(), grid_of_quads(4)], ids=["ball", "quads"])
+def test_transposed_faces_with_counts_are_refused(mesh: Any) -> None:
+    points, faces = (mesh.points, mesh.regular_faces) if isinstance(mesh, pv.PolyData) else mesh
+    counted = np.insert(np.asarray(faces), 0, np.shape(faces)[1], axis=1)
+    with pytest.raises(InvalidMesh, match=r"begin with the number of their corners; give faces\[1:\]\.T"):
+        as_surface((np.asarray(points), counted.T))
+
+
 def test_a_few_polygons_with_many_corners_are_no_transposed_faces() -> None:
     """Hexagons of a truncated tetrahedron, quads around a corner of a cube, and twelve corners each."""
     solid = pv.Icosahedron()

@@ -15,6 +15,7 @@ from decals.images.texels import decode_srgb
 from decals.scenes.objects import MeshObject, as_object
 from decals.surfaces import BaseColor, Wrap
 from decals.surfaces.base_color import CLAY
+from decals.surfaces.mesh_file import read_mesh_data
 from tests.oracles.base_color import base_light, linear
 
 COUNT = 30
@@ -145,6 +146,27 @@ def test_names_of_materials_and_their_files_may_have_a_hash(tmp_path: Path) -> N
     (tmp_path / "b.mtl").write_text("newmtl plain\nKd 0 1 0\n")
     light = light_of(read(tmp_path / "a.obj"), [0, 1, 2], np.full((3, 3), 1 / 3))
     np.testing.assert_allclose(light, [[1, 0, 0], [0, 0, 1], [0, 1, 0]], atol=1e-6)
+
+
+def test_a_list_of_material_files_goes_on_behind_a_backslash(tmp_path: Path) -> None:
+    text = "mtllib a.mtl \\\nb.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 2 3\n"
+    (tmp_path / "a.obj").write_text(text)
+    (tmp_path / "a.mtl").write_text("newmtl a\nKd 1 0 0\n")
+    (tmp_path / "b.mtl").write_text("newmtl b\nKd 0 0 1\n")
+    light = light_of(read(tmp_path / "a.obj"), [0, 1], np.full((2, 3), 1 / 3))
+    np.testing.assert_allclose(light, [[1, 0, 0], [0, 0, 1]], atol=1e-6)
+
+
+def test_a_ply_colour_that_its_type_has_not_is_left_out(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    points, faces = polygons(2)
+    rows = np.hstack([points.astype(object), np.full((len(points), 3), 300, object)])
+    columns = ["uchar red", "uchar green", "uchar blue"]
+    (tmp_path / "a.ply").write_text(ply(rows, columns, [" ".join(map(str, [len(f), *f])) for f in faces], []))
+    with caplog.at_level(logging.WARNING):
+        assert read_mesh_data(tmp_path / "a.ply").color is None
+    assert "300" in caplog.text
 
 
 def test_a_name_that_no_file_can_have_costs_no_face(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

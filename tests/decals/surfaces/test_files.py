@@ -56,6 +56,7 @@ OBJ_SQUARES: dict[str, str | bytes] = {
     "relative between": "v 0 0 0\nv 1 0 0\nv 1 1 0\nf -3 -2 -1\nv 0 1 0\nf 1 3 -1\n",
     "faces first": "f 1 2 3 4\n" + V,
     "continued": V.replace("v 1 1 0", "v 1 \\\n1 0") + "f 1 2 \\\n3 4\n",
+    "continued behind a keyword": V.replace("v 1 1 0", "v\\\n1 1 0") + "f\\\n1 2 3 4\n",
     "comments": "# a \\\n" + V.replace("\n", " # corner\n") + "f 1 2 3 4 # and all\n",
     "numbers": "v 0e0 -0 0.\nv +1 .0 0\nv 1e+0 1E-0 0.0\nv 0 1.00e0 0\nf +1 +2 +3 +4\n",
     "names": "o a name with spaces\ng\nusemtl\nmtllib no file.mtl\n" + V + "s off\nf 1 2 3 4\nxyzzy 1 2\n",
@@ -360,6 +361,9 @@ def test_ply_of_odd_headers(tmp_path: Path) -> None:
         ),
     ):
         assert area(written(tmp_path, "a.ply", content)) == pytest.approx(1.0)
+    for undefined in ("-nan(ind)", "NaN(snan)", "1.#QNAN", "-1.#IND00"):
+        content = PLY.replace("float z", "float z\nproperty float nx").replace(" 0\n", f" 0 {undefined}\n")
+        assert area(written(tmp_path, "a.ply", content)) == pytest.approx(1.0), undefined
     more = PLY.replace("4 0 1 2 3", "3 0 1 2 9 1 1 1\n3 0 2 3 9 2 2 2").replace("face 1", "face 2")
     assert area(written(tmp_path, "a.ply", more)) == pytest.approx(1.0), "more words than the header declares"
     twice = PLY.replace("float z\n", "float z\nproperty uchar quality\nproperty float quality\n")
@@ -375,6 +379,9 @@ def test_ply_of_odd_headers(tmp_path: Path) -> None:
     for content, reason in (
         (PLY.replace("element face 1", "element face 2"), "ends within its 2 rows of 'face'"),
         (PLY.replace("4 0 1 2 3", "4 0 1 2 2.5"), "not whole"),
+        (PLY.replace("1 1 0", "1 one 0"), "expected a number, got 'one'"),
+        (PLY.replace("1 1 0", "1 -nan(ind) 0"), "finite"),
+        (PLY.replace("face 1", "face four"), "claims 'four' rows"),
         (PLY.replace("property float z", "property float x"), "two properties 'x'"),
         (PLY.replace("element face", "element edges"), "no faces"),
         (PLY.replace("ascii", "binary_middle_endian"), "unknown format 'binary_middle_endian'"),
@@ -383,6 +390,12 @@ def test_ply_of_odd_headers(tmp_path: Path) -> None:
     ):
         with pytest.raises(InvalidMesh, match=reason):
             read_mesh(written(tmp_path, "a.ply", content))
+
+
+def test_ply_elements_of_one_name_may_have_other_properties(tmp_path: Path) -> None:
+    face = "element face 1\nproperty list uchar int vertex_indices\n"
+    head = PLY.replace(face, face + "property uchar red\n" + face).replace("4 0 1 2 3", "3 0 1 2 9\n3 0 2 3")
+    assert area(written(tmp_path, "a.ply", head)) == pytest.approx(1.0)
 
 
 def test_what_is_left_out_is_logged(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

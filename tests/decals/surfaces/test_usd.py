@@ -76,6 +76,27 @@ def test_meshes_lie_where_the_file_places_them_with_their_outside_outside(
 
 
 @pytest.mark.parametrize(
+    ("arc", "named"),
+    [
+        ("references = @./none.usda@</a>", "none.usda"),
+        ("payload = @http://example.org/x.usda@", "x.usda"),
+        ("references = </nowhere>", "/nowhere"),
+        ("references = </p>", "/p"),
+    ],
+)
+def test_references_that_lead_nowhere_are_named(
+    arc: str, named: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = written(tmp_path / "a.usda", f'def "p" ({arc}) {{}}\n', cube("cube"))
+    with caplog.at_level("WARNING"):
+        assert [name for name, _ in read_objects(path)] == ["/cube"]
+    (message,) = caplog.messages
+    assert "left out what cannot be found" in message
+    assert named in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
     ("content", "message"),
     [
         ("no USD at all", "damaged or of another format"),
