@@ -18,7 +18,7 @@ def attempt(words: str, *settings: tuple[str, float | str], right: bool = False)
 
 PROBE, BLUE, MODE, STEP = "Probe, left and right", "Blue decal, left and right", "Contact mode", "Step"
 YELLOW, GREEN = "Yellow ball, up and down", "Stiffness of the green ball"
-DECAL, MAPPING = "Decal, left and right", "Mapping"
+DECAL = "Decal, left and right"
 
 ANSWERS = [
     [
@@ -62,8 +62,7 @@ ANSWERS = [
     ],
     [
         attempt("onto the bump"),
-        attempt("Choose the other mapping", (DECAL, 0.9)),
-        attempt("the corrected mapping lengthens it", (MAPPING, "corrected"), right=True),
+        attempt("the less it is stretched", (DECAL, 0.9), right=True),
     ],
 ]
 """For each lesson, attempts one after the other; the first changes nothing."""

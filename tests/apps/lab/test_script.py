@@ -13,7 +13,7 @@ import decals
 from decals.apps.lab.lab import Lab
 from decals.apps.lab.lesson import LESSONS, load_lessons
 from decals.window import EditWindow
-from tests.apps.lab.answers import BLUE, DECAL, GREEN, MAPPING, MODE, STEP
+from tests.apps.lab.answers import BLUE, DECAL, GREEN, MODE, STEP
 from tests.apps.lab.test_lab import EMPTY, begin, number_of, wait
 
 CHANGES: list[list[tuple[str, Any]]] = [
@@ -24,7 +24,7 @@ CHANGES: list[list[tuple[str, Any]]] = [
     [(STEP, 7)],
     [("Green ball", 1.1), (GREEN, 0.2)],
     [("Green ball", 0.5), (GREEN, 0.25)],
-    [(DECAL, 0.9), (MAPPING, "corrected")],
+    [(DECAL, 0.9)],
 ]
 """For each lesson, what a student sets."""
 
