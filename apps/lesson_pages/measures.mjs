@@ -12,7 +12,7 @@ import {
   unit,
 } from "../../decals/pages/viewer/vectors.mjs";
 
-const SIDE = 80; // pixels of a map
+const SIDE = 120; // pixels of a map
 const SAMPLES = 201; // of a curve
 const FINE = 1e-3; // between the points of `jump`, in model units
 const MOST = 4001; // of these points

@@ -65,6 +65,11 @@ def test_html_pages(check: str) -> None:
     assert "done" in run_module("tests.frontends.in_html_page", check)
 
 
+def test_lesson_pages() -> None:
+    require("playwright", "axe_playwright_python")
+    assert "done" in run_module("tests.frontends.in_lesson_page")
+
+
 @pytest.mark.parametrize("check", HTML_CHECKS)
 def test_html_pages_in_firefox(display: str, check: str) -> None:
     require("playwright", "axe_playwright_python")

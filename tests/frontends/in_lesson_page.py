@@ -1,0 +1,124 @@
+"""Pages of lessons in Chromium beside the lab, as a program.
+
+    python -m tests.frontends.in_lesson_page [NUMBER ...]
+
+Each page shows the numbers of the lab, judges answers as it does, and asks no server.
+"""
+
+import asyncio
+import re
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.async_api import Browser, Page, async_playwright
+
+from decals.apps.lab.experiment import Experiment, Scope
+from decals.apps.lab.lesson import LESSONS, Lesson, load_lessons
+from decals.apps.lesson_pages.page import lesson_page, no_page
+from tests.apps.lab.answers import ANSWERS, Attempt
+from tests.frontends.browsing import ERRORS
+from tests.frontends.in_html_page import accessible, launched
+
+SIZE = {"width": 1280, "height": 800}
+PATIENCE = 120_000
+"""Milliseconds for a page to start, or to show the values of a state, without a graphics card."""
+
+CLOSE = 0.02
+"""Relative difference of values: of shares of the map, some of its points lie on a rim."""
+
+SET = """(input, value) => {
+  input.value = value;
+  for (const name of ["input", "change"]) input.dispatchEvent(new Event(name));
+}"""
+
+
+def truths(lesson: Lesson) -> list[float]:
+    """Return the values that the lab shows at the beginning of a lesson."""
+    settings, scene = lesson.settings, lesson.scene
+    modes = {name: getattr(settings, name) for name in ("contact", "stiffness", "mapping")}
+    experiment = Experiment(
+        objects=scene.objects,
+        decals=scene.decals,
+        rules=scene.drawing.overridden(**modes).rules,
+        probe=settings.probe,
+        camera=scene.camera,
+        size=lesson.size,
+        in_space=settings.space,
+        line=settings.line,
+    )
+    scope = Scope.at_probe(experiment)
+    return [float(np.ravel(lesson.formulas[v.formula].evaluate(scope))[0]) for v in settings.values]
+
+
+async def settled(page: Page) -> None:
+    """Wait until the page shows the values of its state."""
+    await page.evaluate("() => new Promise(requestAnimationFrame)")
+    await page.wait_for_function("page.root.dataset.shown", timeout=PATIENCE)
+    assert not await page.inner_text(".problem")
+
+
+async def answered(page: Page, attempt: Attempt) -> None:
+    """Make sure that a page judges an attempt as the lab does."""
+    for label, value in attempt.settings:
+        slider = page.locator(".sliders label", has_text=label).locator("input, select").first
+        await slider.evaluate(SET, str(value) if isinstance(value, str) else f"{value:g}")
+    await page.get_by_role("button", name="Check the answer").click()
+    await settled(page)
+    verdict = page.locator(".verdict")
+    assert attempt.words in await verdict.inner_text(), await verdict.inner_text()
+    assert await verdict.get_attribute("data-right") == str(attempt.right).lower()
+
+
+async def learned(browser: Browser, lesson: Lesson, attempts: list[Attempt], path: Path) -> None:
+    """Take a lesson by its page, from the guess to the right answer."""
+    lesson_page(lesson).save(path)
+    page = await browser.new_page(viewport=SIZE)
+    requests: list[str] = []
+    page.on("request", lambda request: requests.append(request.url))
+    await page.add_init_script(ERRORS)
+    await page.goto(path.as_uri())
+    await page.wait_for_function("document.getElementById('lesson').dataset.ready", timeout=PATIENCE)
+    first = await page.evaluate("performance.getEntriesByName('first frame')[0].startTime")
+    await accessible(page)
+    assert not await page.locator(".after:visible").count()
+    await page.locator("[name=guess]").fill("1")
+    await page.get_by_role("button", name="See", exact=True).click()
+    await settled(page)
+    assert re.match(r"You guessed .*, it is", await page.inner_text(".seen"))
+    for text, value in zip(
+        await page.locator(".values td:last-child").all_inner_texts(), truths(lesson), strict=True
+    ):
+        found = text == "yes" if text in ("yes", "no") else float(text)
+        assert found == pytest.approx(value, rel=CLOSE, abs=1e-3), (text, value)
+    for attempt in attempts:
+        await answered(page, attempt)
+    assert await page.locator('[data-task][data-done="false"]').count() == 0
+    await accessible(page)
+    await page.goto(f"{path.as_uri()}#task=1")
+    await page.reload()
+    await page.wait_for_selector("#task-1[aria-current]", timeout=PATIENCE)
+    assert await page.evaluate("window.pageErrors") == []
+    assert {request.split("#")[0] for request in requests if request.startswith(("http", "file"))} == {
+        path.as_uri()
+    }
+    await page.close()
+    print(f"{lesson.settings.title}: first frame after {first / 1000:.1f} s", flush=True)
+
+
+async def learn(numbers: set[int]) -> None:
+    """Take all lessons that have pages, or those of some numbers."""
+    with tempfile.TemporaryDirectory() as folder:
+        async with async_playwright() as player:
+            browser = await launched(player, "chromium")
+            for number, lesson in enumerate(load_lessons(LESSONS), 1):
+                if not no_page(lesson) and number in (numbers or {number}):
+                    await learned(browser, lesson, ANSWERS[number - 1], Path(folder) / f"{lesson.name}.html")
+            await browser.close()
+
+
+if __name__ == "__main__":
+    asyncio.run(learn({int(text) for text in sys.argv[1:]}))
+    print("done")
