@@ -328,8 +328,9 @@ def _unreadable(path: Path, text: str) -> InvalidMesh:
     """Return the exception for a file that a reader of VTK or pyvista refused with a text."""
     line = (text.strip().splitlines() or [""])[0].rstrip('.!"')
     if "automatically read by pyvista" in line:
+        kind = repr(path.suffix) if path.suffix else "a name without an end"
         return InvalidMesh(
-            f"expected a mesh file, got {str(path)!r}: no reader is known for {path.suffix or 'its name'!r}; "
+            f"expected a mesh file, got {str(path)!r}: no reader is known for {kind}; "
             "convert it to .ply, .obj or .stl"
         )
     if not line or re.match(r"Algorithm vtk|(VTKExecutionError: )?ERROR: In vtk", line):

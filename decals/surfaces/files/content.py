@@ -27,6 +27,10 @@ _UNDEFINED = re.compile(rb"[+-]?(nan\(\w*\)|1\.#(qnan|snan|ind)\d*)", re.IGNOREC
 """Undefined numbers as programs on Windows write them."""
 
 
+MAX_TEXT = 300
+"""Letters of a reason in a message."""
+
+
 class Line(NamedTuple):
     """A line of a text: its number from 1 on, and its content."""
 
@@ -54,7 +58,7 @@ def file_bytes(path: Path) -> bytes:
 
 def refusal(path: Path, kind: str, error: Exception) -> InvalidMesh:
     """Return the exception for a file that a reader of some kind of files refused with an error."""
-    reason = "it takes too much memory" if isinstance(error, MemoryError) else str(error)
+    reason = "it takes too much memory" if isinstance(error, MemoryError) else shortened(str(error))
     return InvalidMesh(f"could not read {str(path)!r} as {kind} ({reason}); correct it or export it again")
 
 
@@ -82,6 +86,11 @@ def text_lines(content: bytes) -> list[bytes]:
         raise ValueError("it holds null bytes: it is binary, or UTF-16 without a byte order mark")
     text = text.replace(codecs.BOM_UTF8, b"")  # where several files were joined to one
     return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n").split(b"\n")
+
+
+def shortened(text: str) -> str:
+    """Return a text for a message, whose names and numbers of a file may be of any length."""
+    return text if len(text) <= MAX_TEXT else f"{text[:MAX_TEXT]} …"
 
 
 def shown(text: bytes) -> str:

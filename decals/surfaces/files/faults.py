@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from decals.errors import InvalidMesh
+from decals.surfaces.files.content import shortened
 
 _logger = logging.getLogger(__name__)
 
@@ -41,7 +42,7 @@ class Notes:
         for kind, places in self._places.items():
             known = list(dict.fromkeys(places))
             rest = f" and {len(known) - SHOWN} more" if len(known) > SHOWN else ""
-            _logger.warning("%s: %s: %s%s", path, kind, ", ".join(known[:SHOWN]), rest)
+            _logger.warning("%s: %s: %s%s", path, kind, shortened(", ".join(known[:SHOWN])), rest)
 
 
 @contextmanager
@@ -52,7 +53,9 @@ def reading(path: Path, kind: str) -> Iterator[Notes]:
         with np.errstate(over="ignore", invalid="ignore"):  # the results are checked
             yield notes
     except Unreadable as fault:
-        raise InvalidMesh(f"could not read {str(path)!r} as {kind} ({fault}); {fault.advice}") from fault
+        raise InvalidMesh(
+            f"could not read {str(path)!r} as {kind} ({shortened(str(fault))}); {fault.advice}"
+        ) from fault
     except MemoryError as fault:
         raise InvalidMesh(f"could not read {str(path)!r}: it takes too much memory; reduce it") from fault
     except OSError as fault:

@@ -40,6 +40,9 @@ _SOLID = re.compile(
 
 _END = re.compile(rb"(?<!\S)endsolid(?!\S)", re.IGNORECASE)
 
+_PART = re.compile(rb"(?<!\S)(solid|facet|outer|vertex)(?!\S)", re.IGNORECASE)
+"""Words of a solid, which remarks behind the last one do not have."""
+
 
 def read_stl(path: Path) -> tuple[Float64Array, Polygons, Paint]:
     """Read the facets of an STL file; equal corners become one vertex.
@@ -98,8 +101,10 @@ def _text_corners(content: bytes) -> Float64Array:
     lines = [Line(number, text) for number, text in enumerate(text_lines(content), 1) if text.strip()]
     if not lines:
         raise ValueError("it is empty")
-    if not _END.search(lines[-1].text):
+    last = max((place for place, line in enumerate(lines) if _END.search(line.text)), default=-1)
+    if last < 0 or any(_PART.search(line.text) for line in lines[last + 1 :]):
         raise ValueError("it ends without 'endsolid', so it is cut off")
+    lines = lines[: last + 1]
     within = [
         Line(line.number, _SOLID.sub(b" ", line.text)) if b"solid" in line.text.lower() else line
         for line in lines

@@ -159,6 +159,7 @@ STL_SQUARES = {
     "upper case": STL.upper(),
     "two solids": STL.replace("endfacet\nfacet", "endfacet\nendsolid a\nsolid b\nfacet"),
     "no name": STL.replace(" a b c", ""),
+    "remarks at the end": STL + "# exported by a program\nand its version\n",
     "name of keywords": STL.replace("a b c", "facet normal vertex"),
     "one facet a line": STL.replace("\n", " ")
     .replace("facet n", "\nfacet n")
@@ -204,6 +205,7 @@ def test_binary_stl(tmp_path: Path) -> None:
     ("content", "reason"),
     [
         (STL.replace("endsolid a b c\n", ""), "without 'endsolid'"),
+        (STL + "solid b\nfacet normal 0 0 1\n", "without 'endsolid'"),
         (STL.replace("vertex 1 1 0\nendloop", "endloop", 1), "line 2: expected a facet"),
         (STL.replace("vertex 0 1 0", "vertex 0 x 0"), "line 9: expected a facet"),
         (STL.replace("vertex 0 1 0", "vertex 0 inf 0"), "line 9: expected a facet"),

@@ -139,6 +139,13 @@ def test_each_fault_is_named(tmp_path: Path, fault: str) -> None:
         read_mesh(saved(tmp_path, text))
 
 
+def test_a_long_name_is_cut_in_the_message(tmp_path: Path) -> None:
+    path = saved(tmp_path, model(OBJECT, f'<item objectid="{"7" * 5000}"/>'))
+    with pytest.raises(InvalidMesh) as info:
+        read_mesh(path)
+    assert len(str(info.value)) < len(str(path)) + 500
+
+
 def test_components_of_components_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(threemf, "MAX_PLACES", 5_000)
     twice = '<object id="{}"><components>{}</components></object>'
