@@ -183,7 +183,10 @@ class LessonPage {
   // Show the state in the next frame; what was measured before is known no more, unless the camera alone moved.
   changed(isOther) {
     this.isOther ||= isOther;
-    if (isOther) delete this.root.dataset.shown;
+    if (isOther) {
+      delete this.root.dataset.shown;
+      clearTimeout(this.rest); // the verdict that was asked for is that of the new state
+    }
     cancelAnimationFrame(this.frame);
     this.frame = requestAnimationFrame(() => this.show());
   }
