@@ -235,7 +235,7 @@ def test_wrong_events_change_nothing(lab: Lab, window: EditWindow, number: Any, 
     before = digest(window.document)
     with pytest.raises(ImplicitDecalsError, match="expected"):
         lab.set_value(number, value)
-    with pytest.raises(InvalidEdit, match="lesson: expected a whole number from 0 to 5"):
+    with pytest.raises(InvalidEdit, match="lesson: expected a whole number from 0 to 7"):
         lab.start(number if number != 0 else True)
     assert digest(window.document) == before
 
