@@ -14,10 +14,13 @@ from decals.editing.queries import nearest_points
 from decals.field.rules import PictureRules
 from decals.model import Decals
 from decals.scenes.camera import Camera
-from decals.scenes.objects import SceneObject
+from decals.scenes.objects import SceneObject, bounds_of
 
 MAP_PIXELS = 120
 """Width and height of a map in samples."""
+
+NORMAL_STEP = 1e-3
+"""Step along the surface for derivatives of its normals, over the diagonal of the box of the objects."""
 
 EYE_DISTANCE = 10.0
 """Distance from which the rays of a map start, in widths of the map."""
@@ -158,6 +161,10 @@ class Experiment:
         """Return the points that pixels of a map show, row by row from the top."""
         return _map_points(self.objects, self.camera, self.size, self.in_space)
 
+    def normal_derivatives(self, points: Points) -> Float64Array | None:
+        """Return derivatives of the surfaces' normals by the points, float64[n, 3, 3]; None in space."""
+        return None if self.in_space or not self.objects else _normal_derivatives(self.objects, points)
+
     def on_map(self, position: ArrayLike) -> tuple[float, float]:
         """Return where a position is on a map, to the right and up in model units from the middle."""
         right, up, _ = self.camera.axes
@@ -179,6 +186,24 @@ def _map_points(objects: tuple[SceneObject, ...], camera: Camera, size: float, i
     exists = np.isfinite(distances)
     near = nearest_points(objects, eyes + np.where(exists, distances, 0.0)[:, None] * rays)
     return Points(near.positions.astype(np.float64), near.normals.astype(np.float64), exists)
+
+
+@lru_cache(maxsize=4)
+def _normal_derivatives(objects: tuple[SceneObject, ...], points: Points) -> Float64Array:
+    """Return derivatives of normals by differences along the surface."""
+    low, high = bounds_of(objects)
+    step = NORMAL_STEP * float(np.linalg.norm(np.subtract(high, low)))
+    least = np.eye(3)[np.abs(points.normals).argmin(axis=1)]
+    first = np.cross(points.normals, least)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    derivatives = np.zeros((len(first), 3, 3))
+    for tangent in (first, np.cross(points.normals, first)):
+        ahead, behind = (
+            nearest_points(objects, points.positions + way * tangent).normals.astype(np.float64)
+            for way in (step, -step)
+        )
+        derivatives += (ahead - behind)[:, :, None] * tangent[:, None, :] / (2.0 * step)
+    return derivatives
 
 
 @dataclass(frozen=True, eq=False)

@@ -186,6 +186,7 @@ def _samples(scope: Scope, *, jacobian: bool = False) -> Samples:
         points.positions.astype(np.float32),
         points.normals.astype(np.float32),
         jacobian=jacobian,
+        normal_derivatives=experiment.normal_derivatives(points) if jacobian else None,
         device="cpu",
         **evaluation_options(experiment.rules, experiment.decals, experiment.objects),
     )

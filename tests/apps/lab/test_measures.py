@@ -99,6 +99,16 @@ def test_a_decal_alone_is_neither_stretched_nor_folded() -> None:
     assert value("share(folded)", state) == 0
 
 
+@pytest.mark.parametrize("angle", [0.2, 0.5, 0.8])
+def test_a_curved_surface_stretches_the_image_of_the_corrected_mapping(angle: float) -> None:
+    """On a ball, circles of the arc's length are drawn on circles of radius sin(angle)."""
+    ball = TreeObject("ball", Point((0, 0, 0), radius=2.0))
+    decals = Decals([[0.0, 0.0, 2.0]], [[0, 0, 1]], [[1, 0, 0]], [2.2])
+    state = experiment(objects=(ball,), decals=decals, rules=PictureRules(mapping="corrected"))
+    near = state.points_near([[2 * np.sin(angle), 0.0, 2 * np.cos(angle)]])
+    assert float(value("stretch", state, near)[0]) == pytest.approx(angle / np.sin(angle), rel=2e-3)
+
+
 def test_radial_contact_stretches_by_the_distance_of_the_plane() -> None:
     """At the line of centres the ray is scaled by 1/R towards the plane, R in visible radii."""
     decals = Decals([[0.0, 0.0, 0.0], [0.8, 0, 0]], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, [0.5, 0.5])
