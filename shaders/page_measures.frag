@@ -8,7 +8,7 @@ layout(location = 0) out vec4 measured_point;
 layout(location = 1) out vec4 measured_normal;  // and 1 where there is a surface
 layout(location = 2) out vec4 measured_image;   // field after contact, stretch, 1 where it is mirrored
 
-const float MIN_AREA = 1e-12;  // least one of two sides of an image, in larger ones squared
+const float LEAST_SHARE = 1e-12;  // least one of two sides of an image, in larger ones squared
 
 // Change of the normal along the surface, from the pixels beside this one.
 vec3 turn_along(vec3 way, vec3 normal, ivec2 texel) {
@@ -80,7 +80,7 @@ void main() {
         float squares = dot(changes[0], changes[0]) + dot(changes[1], changes[1]);
         float area = changes[0].x * changes[1].y - changes[0].y * changes[1].x;
         float larger = 0.5 * (squares + sqrt(max(squares * squares - 4.0 * area * area, 0.0)));
-        image = vec2(larger / max(abs(area), MIN_AREA * max(larger, 1e-30)), area < 0.0 ? 1.0 : 0.0);
+        image = vec2(larger / max(abs(area), LEAST_SHARE * max(larger, 1e-30)), area < 0.0 ? 1.0 : 0.0);
     }
     measured_point = vec4(position.xyz, float(number));
     measured_normal = vec4(normal, 1.0);
