@@ -138,7 +138,7 @@ def served(way: str) -> Iterator[Server]:
                 with suppress(OSError):
                     process.stdin.close()
                 try:
-                    process.wait(40)
+                    process.wait(PATIENCE)
                 finally:
                     process.kill()
 
