@@ -375,6 +375,7 @@ class DuplicateDecals(DecalCommand):
     """
 
     label: ClassVar[str] = "duplicate"
+    reads_looks: ClassVar[bool] = True
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""

@@ -78,9 +78,14 @@ COLUMNS = tuple(field.name for field in fields(Decals))
 
 
 def inputs_of(command: object) -> Inputs:
-    """Return what a command reads by its method ``inputs``, else all objects, and decals but their looks."""
+    """Return what a command reads by its method ``inputs``, else all objects, and decals but their looks.
+
+    A command that copies decals says by its attribute ``reads_looks`` that it reads these too.
+    """
     own: Inputs | None = getattr(command, "inputs", None)
-    return usual_inputs if own is None else own
+    if own is not None:
+        return own
+    return all_inputs if getattr(command, "reads_looks", False) else usual_inputs
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +107,12 @@ class _Same:
 def usual_inputs(document: Document) -> object:
     """Return all objects, and all arrays of decals but their looks."""
     return tuple(map(_Same, document.objects)), columns_of(document.decals.decals)
+
+
+def all_inputs(document: Document) -> object:
+    """Return all objects, and all arrays of decals."""
+    decals = document.decals.decals
+    return usual_inputs(document), tuple(_comparable(getattr(decals, name)) for name in LOOKS)
 
 
 def shapes_of(objects: tuple[SceneObject, ...]) -> object:

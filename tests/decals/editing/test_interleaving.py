@@ -113,6 +113,15 @@ def test_whatever_comes_between_many_times_nothing_is_lost(
     check_operations(tmp_path_factory, operations, few)
 
 
+@pytest.mark.parametrize("key", ["next_tint", "fainter", "layer_up"])
+@pytest.mark.parametrize("chosen", ["one", "two", "all"])
+@pytest.mark.parametrize("few", [0, 5, 500])
+def test_copies_have_the_looks_of_decals_that_change_meanwhile(
+    tmp_path_factory: Any, few: int, chosen: str, key: str
+) -> None:
+    check_operations(tmp_path_factory, [("press", "duplicate", "all"), ("press", key, chosen)], few)
+
+
 def check_operations(tmp_path_factory: Any, operations: Any, few: Any) -> None:
     with patch("decals.editing.session.MAX_REPLAYED_DECALS", few):
         go_through(operations, tmp_path_factory)
