@@ -157,6 +157,7 @@ CALLS: dict[str, Callable[[], object]] = {
     "images of a table": lambda: decals.save_table(SPOTS, "a.csv", images=[1e30]),  # type: ignore[list-item]
     "array as picture": lambda: decals.save_figure(SCENE, "a.svg", picture=np.zeros(3)),  # type: ignore[arg-type]
     "endless sampling": lambda: blobtree.check_kind(Point, samples=1e308),  # type: ignore[arg-type]
+    "trust in a table": lambda: decals.load_table("a.csv", trust=np.zeros(0)),  # type: ignore[arg-type]
     "origin of a table": lambda: decals.load_table("a.csv", origin=np.array("x")),  # type: ignore[arg-type]
     "no image to cover with": lambda: decals.cover(BALL, count=1, images=[]),
     "no direction": lambda: decals.cover(BALL, count=1, direction=(0, 0, 0)),

@@ -38,6 +38,7 @@ from msgspec import Raw, Struct
 from blobtree.files import is_file, is_folder, write_atomically
 from blobtree.json_errors import json_reason
 from blobtree.progress import Progress, reporting
+from blobtree.validation import truth
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.images.builtin import is_builtin
 from decals.images.load import embedded_image, is_embedded, load_image
@@ -236,7 +237,7 @@ def from_json(
     text: bytes, *, folder: Path, samples: SampleLoader | None = None, trust: bool = False
 ) -> Scene:
     """Read a scene from JSON; see `load_scene`."""
-    record = _decode(text)
+    trust, record = truth("trust", trust, InvalidScene), _decode(text)
     if not trust:
         meshes = [item.source for item in record.objects if isinstance(item, MeshRecord)]
         images = [source for image in record.images for source in sources_of(image)]

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from blobtree._typing import Float64Array
 from blobtree.files import is_file, replacing, write_atomically
-from blobtree.validation import items
+from blobtree.validation import items, truth
 from decals.errors import InvalidDecals, InvalidInput
 from decals.images.load import AnyImage
 from decals.model import Decals, Interaction
@@ -300,7 +300,7 @@ def load_table(path: str | os.PathLike[str], *, origin: Origin = WORLD, trust: b
     Raises
     ------
     InvalidDecals
-        No such file, no table of decals, or a wrong origin; the message names file, line and column.
+        No such file, no table of decals, or a wrong argument; the message names file, line and column.
     InvalidScene, InvalidImage
         A picture outside the folder, or a missing one.
 
@@ -313,6 +313,7 @@ def load_table(path: str | os.PathLike[str], *, origin: Origin = WORLD, trust: b
     True
     """
     source, shifts = as_path(path, InvalidDecals), finite_vector("origin", origin, InvalidDecals)
+    trust = truth("trust", trust, InvalidDecals)
     if not is_file(source):
         raise InvalidDecals(f"{str(path)!r}: expected a table of decals, found no such file")
     if source.suffix.lower() == ".parquet":

@@ -48,6 +48,13 @@ def test_files_in_the_folder_are_read(folder: Path) -> None:
     assert [len(image.pixels) for image in scene.images] == [2, 256]
 
 
+@pytest.mark.parametrize("trust", ["no", 1, None, np.zeros(2)])
+def test_a_word_for_trust_is_none(folder: Path, trust: Any) -> None:
+    path = write_scene(folder, "../ball.ply")
+    with pytest.raises(InvalidScene, match="trust: expected True or False"):
+        decals.load_scene(path, trust=trust)
+
+
 @pytest.mark.parametrize("kind", ["mesh", "image"])
 @pytest.mark.parametrize("place", ["above", "absolute", "link", "NUL"])
 def test_files_outside_the_folder_need_trust(folder: Path, kind: str, place: str) -> None:
