@@ -216,14 +216,14 @@ def _formulas(lesson: Lesson, table: Table | None) -> str:
     """Return all formulas of a lesson as members of an object of JavaScript."""
     if table is not None:
         return ",\n".join(
-            f"{json.dumps(text)}: (m) => {_script_json(values)}[m.state]"
+            f"{_script_json(text)}: (m) => {_script_json(values)}[m.state]"
             for text, values in table.values.items()
         )
     known = {text: formula.text for text, formula in lesson.formulas.items()}
     for template in lesson.templates.values():
         known |= {part.text: part.text for part in template.parts if not isinstance(part, str)}
     return ",\n".join(
-        f"{json.dumps(name)}: (m, q) => {javascript(text, MEASURES, KNOWN)}" for name, text in known.items()
+        f"{_script_json(name)}: (m, q) => {javascript(text, MEASURES, KNOWN)}" for name, text in known.items()
     )
 
 
@@ -294,14 +294,14 @@ def _slider(slider: Slider, lesson: Lesson, words: Translation, table: Table | N
     value = own.get(slider.path)
     if value is None:
         value = binding(slider.path).read(lesson.scene.objects, lesson.scene.decals)
-    data = f'data-path="{slider.path}" data-value="{value}"'
+    data = f'data-path="{html.escape(slider.path)}" data-value="{html.escape(str(value))}"'
     if table is not None and slider.path in table.positions:
         positions = table.positions[slider.path]
         data += f' data-count="{len(positions)}" data-place="{table.start[slider.path]}"'
     label = f"<label><span>{marked_text(words.said(slider.label), words.definitions)}</span>"
     if slider.choices:
         options = "".join(
-            f'<option value="{choice}">{html.escape(words.said(choice))}</option>'
+            f'<option value="{html.escape(choice)}">{html.escape(words.said(choice))}</option>'
             for choice in slider.choices
         )
         return f"{label}<select {data}>{options}</select></label>"

@@ -66,7 +66,7 @@ def positions_of(lesson: Lesson) -> dict[str, list[float]]:
     count = prod(map(len, positions.values()))
     if count > MOST:
         raise InvalidLesson(
-            f"a page has at most {MOST} positions of its sliders, got {count}; take larger steps"
+            f"a page has at most {MOST} positions of its sliders, got {count:,}; take larger steps"
         )
     return positions
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -155,6 +156,21 @@ def test_texts_of_a_lesson_are_no_markup(lessons: dict[str, Lesson]) -> None:
     assert "alert(1)</script>" not in text
     assert "<img src=x" not in text
     assert text.count("<script") == 2
+
+
+def test_choices_and_remarks_in_formulas_are_no_markup(tmp_path: Path) -> None:
+    bad = "</script><script>alert(1)</script>"
+    shutil.copytree(LESSONS, tmp_path, dirs_exist_ok=True, ignore=shutil.ignore_patterns("[!3]*.md"))
+    for source in tmp_path.glob("*.md"):
+        text = source.read_text(encoding="utf-8")
+        text = text.replace("choices = [", """choices = ['"><img src=x onerror=alert(1)>', """)
+        text = re.sub(r'(formula = "[^"]*)"', rf'\1 # {bad}"', text, count=1)
+        source.write_text(text, encoding="utf-8")
+    (lesson,) = load_lessons(tmp_path)
+    assert any(bad in formula for formula in lesson.formulas)
+    page = lesson_page(lesson).text
+    assert page.count("<script") == 2
+    assert "<img src=x" not in page
 
 
 def texts_of(lesson: Lesson) -> list[str]:
