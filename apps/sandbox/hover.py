@@ -94,7 +94,7 @@ class Hover:
             self._at is None,
         )
         found = self._window.actions.state.asked("place a node", lambda _document: _drawn(make(), box=box))
-        if found is None:  # a thread compiles kernels for it; then it is asked again
+        if found is None:  # a thread compiles its kernels; the next call asks again
             self._known = ()
             return self._lines
         return found

@@ -151,7 +151,7 @@ def read_mesh_data(path: str | PathLike[str]) -> MeshData:
 
 
 def _existing(path: str | PathLike[str]) -> Path:
-    """Return the path of a file; raise `InvalidMesh` if there is none."""
+    """Return the path of a file; raise `InvalidMesh` where no file is."""
     path = as_path(path, InvalidMesh)
     if not is_file(path):
         raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
