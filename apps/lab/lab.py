@@ -19,6 +19,7 @@ from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Scope
 from decals.apps.lab.lesson import Lesson, Slider, shown
 from decals.apps.lab.plots import drawn
+from decals.apps.lab.puzzles import Puzzle, read_puzzle
 from decals.apps.lab.relaxing import Recording
 from decals.apps.lab.script import script
 from decals.apps.lab.symbols import document, marked, readings, table
@@ -50,6 +51,7 @@ class Results:
     plots: list[dict[str, str]] = field(default_factory=list)
     tasks: list[dict[str, Any]] = field(default_factory=list)
     guess: dict[str, Any] = field(default_factory=dict)
+    scores: tuple[float, ...] = ()
     readings: str = ""
 
 
@@ -88,6 +90,7 @@ class Lab:
         self.probe = self.lesson.settings.probe
         self._guess: float | None = None
         self._recording: Recording | None = None
+        self._puzzle: Puzzle | None = None
 
     # -- state ------------------------------------------------------------------------------------------
 
@@ -148,7 +151,23 @@ class Lab:
             "lab_guess": {**guess, "waits": self.waits, **results.guess},
             **{f"lab_{name}": getattr(results, name) for name in ("values", "plots", "readings", "tasks")},
             "lab_verdict": {"right": right, "text": marked(escape(text))},
+            "lab_puzzle": self._scores(results.scores, right),
         }
+
+    def _scores(self, scores: tuple[float, ...], right: bool) -> dict[str, Any]:
+        """Return scores with their pars, which hold for the puzzle's sizes alone, and what is shared."""
+        if not scores:
+            return {}
+        decals, puzzle = self._window.document.decals, self._puzzle or Puzzle.of(self.lesson)
+        radii = [float(f"{radius:.4g}") for radius in decals.take(np.array(self.numbers)).radii.tolist()]
+        made = Puzzle.made(radii, scores).text
+        is_own = list(puzzle.radii) == radii
+        rows = [
+            {"label": score.label, "text": shown(value), "value": value, "par": par if is_own else None}
+            for score, value, par in zip(self.lesson.settings.scores, scores, puzzle.pars, strict=True)
+        ]
+        key = f"{self.lesson.name} {made.split('&')[0]}"
+        return {"rows": rows, "text": made, "key": key, "counts": right}
 
     def _slider(self, number: int, slider: Slider) -> dict[str, Any]:
         try:
@@ -222,9 +241,15 @@ class Lab:
 
     def guess(self, value: Any) -> None:
         """Take the student's guess, and switch contact on."""
-        self.start(self._number, number_of("guess", value, InvalidEdit))
+        self.start(self._number, number_of("guess", value, InvalidEdit), self._puzzle)
 
-    def start(self, number: int, guess: float | None = None) -> None:
+    def puzzle(self, text: Any) -> tuple[int, Puzzle]:
+        """Return the puzzle of a link, and the number of its lesson: the first one that has scores."""
+        found = (i for i, lesson in enumerate(self._lessons) if lesson.settings.scores)
+        number = next(found, self._number)
+        return number, read_puzzle(text, self._lessons[number])
+
+    def start(self, number: int, guess: float | None = None, puzzle: Puzzle | None = None) -> None:
         """Start a lesson, from its beginning: its scene replaces the present one, without contact first."""
         number = whole_number("lesson", number, 0, len(self._lessons) - 1, InvalidEdit)
         window, lesson = self._window, self._lessons[number]
@@ -236,6 +261,7 @@ class Lab:
                 window.session.mark_saved()  # a lesson without edits needs no recovery
             self._number, self._asked, self._asking, self.probe = number, None, False, settings.probe
             self._results, self._pending, self._guess = None, None, guess
+            self._puzzle = puzzle
             self._first = window.document.decals.next_number - len(lesson.scene.decals)
             self._step = self._target = 0
             self._recording = self._recorded(0) if settings.steps else None
@@ -248,6 +274,7 @@ class Lab:
 
         modes = {name: getattr(settings, name) for name in MODES}
         begin = lesson.apart if guess is None and settings.guess is not None else lesson.scene
+        begin = begin if puzzle is None else puzzle.sized(begin)
         scene = begin.replace(drawing=window.document.drawing.overridden(**modes))
         window.actions.state.run(ReplaceScene(scene, f"lesson: {settings.title}"), started)
 
@@ -347,4 +374,7 @@ def measured(
         truth = float(np.ravel(lesson.formulas[asked.truth].evaluate(scope))[0])
         compared = {"ends": [guess, truth if np.isfinite(truth) else None]}
         compared |= {"texts": [shown(guess), shown(truth)], "why": lesson.filled(asked.why, scope)}
-    return Results(key, lesson.verdict(scope), values, plots, done, compared, table(rows))
+    scores = tuple(
+        float(np.ravel(lesson.formulas[s.formula].evaluate(scope))[0]) for s in lesson.settings.scores
+    )
+    return Results(key, lesson.verdict(scope), values, plots, done, compared, scores, table(rows))

@@ -112,6 +112,14 @@ class Guess(Struct, forbid_unknown_fields=True, frozen=True):
     step: float = 0.01
 
 
+class Score(Struct, forbid_unknown_fields=True, frozen=True):
+    """A score of a puzzle, the lower the better, and a par: what a good answer reaches."""
+
+    label: str
+    formula: str
+    par: float
+
+
 class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     """What stands between the fences of a lesson."""
 
@@ -129,6 +137,7 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
     steps: int = 0
     sliders: tuple[Slider, ...] = ()
     values: tuple[Value, ...] = ()
+    scores: tuple[Score, ...] = ()
     plots: tuple[Plot, ...] = field(default=())
 
 
@@ -167,7 +176,7 @@ class Lesson:
     >>> from decals.apps.lab.lesson import LESSONS, load_lessons
     >>> lessons = load_lessons(LESSONS)
     >>> len(lessons), lessons[0].settings.title
-    (8, 'One decal')
+    (9, 'One decal')
     """
 
     settings: Settings
@@ -342,6 +351,8 @@ def _formulas(settings: Settings) -> Iterator[tuple[str, str, set[str]]]:
     """Yield place, text and variables of all formulas."""
     for i, value in enumerate(settings.values):
         yield f"values[{i}]", value.formula, set()
+    for i, score in enumerate(settings.scores):
+        yield f"scores[{i}]", score.formula, set()
     for i, plot in enumerate(settings.plots):
         names = ({"x", "y"} if plot.x else set()) if plot.map else {"x"}
         texts = [*(curve.formula for curve in plot.curves), *filter(None, (plot.map, plot.red))]

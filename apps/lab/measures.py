@@ -12,7 +12,7 @@ from blobtree._typing import Float64Array
 from blobtree.formulas.falloff import RIM
 from blobtree.meshing.clip import enclosed_volume
 from decals.apps.lab.errors import InvalidLesson
-from decals.apps.lab.experiment import Experiment, Points, Scope, as_index
+from decals.apps.lab.experiment import MAP_PIXELS, Experiment, Points, Scope, as_index
 from decals.apps.lab.formulas import Evaluate, Measure
 from decals.field.evaluate import Samples, evaluate
 from decals.field.jacobian import folds_of, stretch_of
@@ -376,6 +376,36 @@ def _on_map(scope: Scope, formula: Evaluate) -> Float64Array:
     points = scope.experiment.map_points()
     values = np.asarray(formula(scope.at(points)), np.float64)
     return np.broadcast_to(values, points.exists.shape)[points.exists]
+
+
+@measure("number")
+def kept(scope: Scope, i: Any) -> float:
+    """Return the part of the image of decal i that shows, on a flat surface that the map sees from above."""
+    shown = np.sum(_on_map(scope, lambda points: owner(points) == i))
+    return float(shown * _pixel(scope) / _areas(scope)[scope.experiment.decal(i)])
+
+
+@measure()
+def overlapped(scope: Scope) -> float:
+    """Return the area on which images would lie on others without contact, over that of all images."""
+    numbers = range(len(scope.experiment.decals))
+    counts = _on_map(scope, lambda points: sum(np.float64(f(points, number) >= 0.5) for number in numbers))
+    return float(np.maximum(counts - 1.0, 0.0).sum() * _pixel(scope) / _areas(scope).sum())
+
+
+@measure()
+def lost(scope: Scope) -> float:
+    """Return the part of the area of all images that does not show."""
+    shown = np.sum(_on_map(scope, lambda points: owner(points) >= 0))
+    return float(1.0 - shown * _pixel(scope) / _areas(scope).sum())
+
+
+def _pixel(scope: Scope) -> float:
+    return (scope.experiment.size / MAP_PIXELS) ** 2
+
+
+def _areas(scope: Scope) -> Float64Array:
+    return np.asarray(np.pi * scope.experiment.decals.radii.astype(np.float64) ** 2)
 
 
 @measure("number", "formula")

@@ -48,11 +48,12 @@ class LabPage(Page):
         **options: Any,
     ) -> None:
         self.lab = Lab(window, lessons)
-        server.state.update({"lab_side": "plots", "lab_script": "", **self.lab.values()})
+        server.state.update({"lab_side": "plots", "lab_script": "", "lab_shared": "", **self.lab.values()})
         titles = [lesson.settings.title for lesson in lessons]
         super().__init__(server, window, lessons=titles, start_lesson=self.lab.start, **options)
         trigger = server.controller.trigger
         trigger("check")(self.lab.check)
+        trigger("puzzle")(lambda text: self.sandbox.attempt(lambda: self._play(text)))
         trigger("guess")(lambda value: self.sandbox.attempt(lambda: self._guess(value)))
         if in_lesson:
             self.sandbox.open_lesson(0)
@@ -74,6 +75,7 @@ class LabPage(Page):
     def _build_left_side(self) -> None:
         with drawer("left", f"(in_lesson ? {LESSON_WIDTH} : {PANEL_WIDTH})"):
             client.Style(STYLE)
+            client.ClientTriggers(mounted="utils.sandbox.puzzles((text) => trigger('puzzle', [text]))")
             with html.Div(v_if="!in_lesson"):
                 self._build_outline()
             with html.Div(v_if="in_lesson", classes="pa-3 lesson-side"):
@@ -102,6 +104,13 @@ class LabPage(Page):
         if not (self.sandbox.in_lesson and self.lab.lesson.settings.guess):
             raise InvalidEdit("no lesson asks for a guess now; start one that does")
         self.lab.guess(value)
+
+    def _play(self, text: Any) -> None:
+        """Start the puzzle of a link."""
+        number, puzzle = self.lab.puzzle(text)
+        if not self.sandbox.in_lesson:
+            self.sandbox.open_lesson(number)
+        self.lab.start(number, puzzle=puzzle)
 
     def _restart(self, number: int) -> None:
         """Start a lesson from its beginning."""

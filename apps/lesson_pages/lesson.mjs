@@ -6,6 +6,7 @@ import { add, scaled } from "../../decals/pages/viewer/vectors.mjs";
 import { Viewer } from "../../decals/pages/viewer/viewer.mjs";
 import { Measures, numbersOver } from "./measures.mjs";
 import { drawCurves, drawMap } from "./plots.mjs";
+import { puzzleOf, share, showScores } from "./puzzles.mjs";
 
 const AXES = ["x", "y", "z"];
 const LEAST = 1e-6; // that is not shown as 0: fields have the precision of float32
@@ -35,6 +36,7 @@ class LessonPage {
     }
     root.querySelector("[name=again]").addEventListener("click", () => this.begin());
     root.querySelector("[name=check]").addEventListener("click", () => this.check());
+    root.querySelector("[name=share]")?.addEventListener("click", () => share(this));
     root.querySelector("[name=skip]")?.addEventListener("click", () => this.see(null));
     root.querySelector("form")?.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -42,7 +44,10 @@ class LessonPage {
     });
     this.addProbe();
     for (const event of ["view", "decals"]) viewer.on(event, () => this.changed(event === "decals"));
-    addEventListener("hashchange", () => this.goTo(location.hash));
+    addEventListener("hashchange", () => {
+      if (location.hash.startsWith("#puzzle=")) this.begin();
+      this.goTo(location.hash);
+    });
     this.begin();
     this.goTo(location.hash);
   }
@@ -75,15 +80,17 @@ class LessonPage {
       guess: undefined,
       step: null,
       waits: !!lesson.guess,
+      puzzle: puzzleOf(location.hash, lesson),
     });
     this.history(this.waits ? viewer.originals : lesson.rows);
     viewer.set({ selected: -1, camera: viewer.camera.home });
     this.changed(true);
   }
 
-  // Make these rows the first ones: undo leads back to them.
-  history(rows) {
+  // Make these rows, in the sizes of the puzzle, the first ones: undo leads back to them.
+  history(given) {
     const { viewer } = this;
+    const rows = given.map((row, number) => ({ ...row, radius: this.puzzle.radii[number] }));
     viewer.history.change([...viewer.decals.rows.keys()].map((number) => [number, null]));
     viewer.history.change(rows.map((row, number) => [number, row]));
     viewer.history = new History(viewer.decals, () => viewer.changed("decals"));
@@ -196,7 +203,7 @@ class LessonPage {
     this.showProbe();
     if (!this.isOther || viewer.painter.gl.isContextLost()) return;
     this.isOther = false;
-    this.measures.kept.clear();
+    this.measures.known.clear();
     const state = this.positions.reduce(
       (all, place, i) => all * Number(this.sliders[i].dataset.count ?? 1) + place,
       0,
@@ -274,6 +281,7 @@ class LessonPage {
       task.querySelector(".mark").ariaLabel = done[task.dataset.task] ? lesson.words.done : lesson.words.open;
     });
     const failed = done.indexOf(false);
+    showScores(this, failed < 0);
     const verdict = root.querySelector(".verdict");
     const text = failed < 0 ? question.right : this.tried ? question.checks[failed].otherwise : [""];
     verdict.dataset.right = failed < 0;

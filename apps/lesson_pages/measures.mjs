@@ -19,6 +19,7 @@ const MOST = 4001; // of these points
 const ANGLE = Math.PI / 360; // half of that at which maps and lines are seen: nearly from one side
 const DIFFERENCE = 1e-3; // of differences, in radii of the smallest decal
 
+const discOf = ({ radius }) => Math.PI * radius ** 2;
 export const falloff = (d) => (d < 1 ? (1 - d * d) ** 3 : 0);
 
 // The factor h of equation 5, of the owner's field and a neighbour's lower one.
@@ -31,13 +32,13 @@ export function factor(own, other) {
 export class Measures {
   // `lesson` has the camera, the size of maps, the ends of the line, and the words for a lost decal.
   constructor(viewer, lesson) {
-    Object.assign(this, { viewer, lesson, kept: new Map(), eyes: {} });
+    Object.assign(this, { viewer, lesson, known: new Map(), eyes: {} });
   }
 
-  // The result of a call, until the state changes (`kept.clear()`).
+  // The result of a call, until the state changes (`known.clear()`).
   once(name, call) {
-    if (!this.kept.has(name)) this.kept.set(name, call());
-    return this.kept.get(name);
+    if (!this.known.has(name)) this.known.set(name, call());
+    return this.known.get(name);
   }
 
   // -- what the shader knows ------------------------------------------------------------------------------
@@ -190,6 +191,22 @@ export class Measures {
   share(q, formula) {
     const values = this.onMap(formula);
     return values.filter((value) => value > 0).length / values.length;
+  }
+
+  // The part of the image of a decal that shows, of those that lie on others, and of all that do not show.
+  kept = (q, i) => this.areaOf((point) => point.owner === i) / discOf(this.row(i));
+  lost = () => 1 - this.areaOf(({ owner }) => owner >= 0) / this.discs;
+
+  overlapped() {
+    const { numbers } = this.viewer.decals;
+    const over = (point) => Math.max(numbers.filter((number) => this.f(point, number) >= 0.5).length - 1, 0);
+    return this.areaOf(over) / this.discs;
+  }
+
+  areaOf = (formula) => this.onMap(formula).reduce((a, b) => a + b, 0) * (this.lesson.size / SIDE) ** 2;
+
+  get discs() {
+    return this.viewer.decals.numbers.reduce((sum, number) => sum + discOf(this.row(number)), 0);
   }
 
   at = (q, i, formula) => formula(this.above(this.row(i)));

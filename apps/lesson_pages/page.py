@@ -28,12 +28,12 @@ from decals.scenes.scene import Scene
 from decals.shaders import compose
 
 FILES = Path(__file__).parent
-MODULES = "measures", "plots", "lesson"
+MODULES = "measures", "plots", "puzzles", "lesson"
 """Modules of a lesson, each after those that it imports."""
 
 NAMES = """
     abs at between contact count d distance f F folded g h influence interaction jump layer least max most
-    owner pushed radius share stiffness stretch top where
+    kept lost overlapped owner pushed radius share stiffness stretch top where
 """
 
 KNOWN = frozenset([*NAMES.split(), *WORDS])
@@ -174,6 +174,8 @@ def _record(lesson: Lesson, words: Translation, table: Table | None) -> dict[str
         "mapping": settings.mapping,
         "mappings": [mapping.name.lower() for mapping in sorted(ImageMapping)],
         "rows": rows,
+        "name": lesson.name,
+        "scores": [{"formula": score.formula, "par": score.par} for score in settings.scores],
         "states": len(table.objects) if table else 0,
         "values": [value.formula for value in settings.values],
         "plots": [_plot(plot, parts, words, table) for plot in _plots(lesson)],
@@ -259,6 +261,15 @@ def _markup(
         f'<button type="button" name="skip">{words.page["skip"]}</button></p></form>'
     )
     rows = "".join(f"<tr><td>{text(value.label)}</td><td></td></tr>" for value in settings.values)
+    heads = "".join(f'<th scope="col">{words.page[name]}</th>' for name in ("score", "now", "par", "best"))
+    lines = "".join(
+        f'<tr><th scope="row">{text(score.label)}</th>{"<td></td>" * 3}</tr>' for score in settings.scores
+    )
+    scores = (
+        f'<table class="scores"><thead><tr>{heads}</tr></thead><tbody>{lines}</tbody></table>'
+        f'<p><button type="button" name="share">{words.page["share"]}</button></p>'
+        '<p class="shared" role="status"></p>'
+    )
     plots = "".join(
         f'<div class="plot"><h2>{text(plot.title)}</h2><div class="formula"></div>'
         f'<canvas role="img" aria-label="{html.escape(words.said(plot.title))}"></canvas>'
@@ -279,6 +290,7 @@ def _markup(
         "GUESS": form or "",
         "QUESTION": text(settings.question.text),
         "TASKS": tasks,
+        "SCORES": scores if settings.scores else "",
         "SLIDERS": "".join(_slider(slider, lesson, words, table) for slider in settings.sliders),
         "ROWS": rows,
         "PLOTS": plots,

@@ -41,6 +41,11 @@ PAGE_TEXTS = {
     "probe": "Probe: drag it, or move it by the arrow keys",
     "decal": "decal",
     "stretch": "stretch",
+    "score": "Score",
+    "now": "now",
+    "par": "par",
+    "best": "best",
+    "share": "Share as a puzzle",
     "lost": "A decal of the lesson was deleted: undo, or start again.",
 }
 """Texts of a page that belong to no lesson, by their names."""

@@ -147,6 +147,25 @@
     copy(text) {
       navigator.clipboard.writeText(text);
     },
+    // Copy the address of this page with a puzzle behind it, and return it.
+    share(text) {
+      const link = `${location.href.split("#")[0]}#${text}`;
+      this.copy(link);
+      return link;
+    },
+    // Call a function with the puzzle of the address if there is one, now and when the address changes.
+    puzzles(call) {
+      const play = () => location.hash.startsWith("#puzzle=") && call(location.hash.slice(1));
+      addEventListener("hashchange", play);
+      play();
+    },
+    // Return the least value so far as a text, with a star at par; one that is given may be the new least.
+    best(key, value, par) {
+      const known = Number(localStorage.getItem(key) ?? Infinity);
+      const least = Math.min(value ?? Infinity, known);
+      if (least < known) localStorage.setItem(key, least);
+      return Number.isFinite(least) ? `${Number(least.toPrecision(3))}${least <= par ? " ★" : ""}` : "–";
+    },
     // Return true for a text that has what is sought, in large or small letters.
     found(text, sought) {
       return text.toLowerCase().includes((sought ?? "").trim().toLowerCase());

@@ -986,6 +986,7 @@ async def lab(picture: str | None = None) -> None:
                 image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
                 image.resize((960, 600), Image.Resampling.LANCZOS).save(picture, quality=80, optimize=True)
         assert all("127.0.0.1" in url or url.startswith("data:") for url in requests)
+        await puzzle(browser, lab_page)
         await choose(browser, "lesson", lab_page.lab.values()["lab_titles"][0]["title"])
         await until(partial(shows_lesson, lab_page, 0))
         await guess(browser, lab_page)
@@ -1028,6 +1029,19 @@ async def lab(picture: str | None = None) -> None:
         await until(lambda: not lab_page.sandbox.in_lesson)
         assert len(window.document.decals.numbers) == 1
     window.close()
+
+
+async def puzzle(browser: Page, lab_page: LabPage) -> None:
+    """Play the puzzle of the address, and share one of other sizes."""
+    await browser.evaluate("location.hash = '#puzzle=0.5,0.45,0.4,0.3&par=0.5,25'")
+    await until(lambda: lab_page.lab.waits and lab_page.lab.experiment().decals.radii[3] == np.float32(0.3))
+    await guess(browser, lab_page)
+    cells = browser.locator(".scores td")
+    await browser.locator(".scores").get_by_text("★").wait_for()  # of the second par
+    now, par, best = (await cells.all_inner_texts())[:3]
+    assert (par, best) == ("0.5", now)
+    await browser.get_by_role("button", name="Share as a puzzle").click()
+    await browser.get_by_text("Copied:").get_by_text("#puzzle=0.5,0.45,0.4,0.3&par=").wait_for()
 
 
 async def guess(browser: Page, lab_page: LabPage) -> None:

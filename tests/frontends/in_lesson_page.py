@@ -18,7 +18,7 @@ from playwright.async_api import Browser, Page, async_playwright
 from decals.apps.lab.experiment import Experiment, Scope
 from decals.apps.lab.lesson import LESSONS, Lesson, load_lessons
 from decals.apps.lesson_pages.page import lesson_page, no_page
-from tests.apps.lab.answers import ANSWERS, Attempt
+from tests.apps.lab.answers import ANSWERS, SOLVED, Attempt
 from tests.frontends.browsing import ERRORS
 from tests.frontends.in_html_page import accessible, launched
 
@@ -33,6 +33,10 @@ SET = """(input, value) => {
   input.value = value;
   for (const name of ["input", "change"]) input.dispatchEvent(new Event(name));
 }"""
+
+
+MOVE = """places => page.viewer.edit(
+  places.map((p, i) => [i, {...page.viewer.decals.rows[i], position: [...p, 0]}]))"""
 
 
 def truths(lesson: Lesson) -> list[float]:
@@ -108,6 +112,42 @@ async def learned(browser: Browser, lesson: Lesson, attempts: list[Attempt], pat
     print(f"{lesson.settings.title}: first frame after {first / 1000:.1f} s", flush=True)
 
 
+async def played(browser: Browser, lesson: Lesson, path: Path) -> None:
+    """Solve the puzzle by moving decals, find the scores again after a reload, and share other sizes."""
+    page = await browser.new_page(viewport=SIZE)
+    await page.add_init_script(ERRORS)
+    await page.goto(path.as_uri())
+    await page.get_by_role("button", name="Skip the guess").click(timeout=PATIENCE)
+    cells = page.locator(".scores td")
+    await settled(page)
+    assert (await cells.all_inner_texts())[2::3] == ["–", "–"]  # what overlaps too much does not count
+    await page.evaluate(MOVE, SOLVED)
+    await settled(page)
+    scores = await cells.all_inner_texts()
+    assert float(scores[0]) <= 1 < 4 >= float(scores[3])
+    assert scores[1::3] == ["1", "4"]
+    assert scores[2::3] == [f"{scores[0]} ★", f"{scores[3]} ★"]
+    await page.reload()
+    await page.get_by_role("button", name="Skip the guess").click(timeout=PATIENCE)
+    await settled(page)
+    assert (await cells.all_inner_texts())[2::3] == scores[2::3]
+    await page.locator(".sliders input").first.evaluate(SET, "0.3")
+    await settled(page)
+    assert (await cells.all_inner_texts())[1::3] == ["–", "–"]
+    await page.get_by_role("button", name="Share as a puzzle").click()
+    link = str(await page.locator(".shared a").get_attribute("href"))
+    assert "#puzzle=0.3,0.5,0.5,0.42&par=" in link
+    await page.goto("about:blank")
+    await page.goto(link)
+    await page.get_by_role("button", name="Skip the guess").click(timeout=PATIENCE)
+    await settled(page)
+    pars = link.split("par=")[1].split(",")
+    assert (await cells.all_inner_texts())[1::3] == [f"{float(par):g}" for par in pars]
+    assert await page.evaluate("page.viewer.decals.rows[0].radius") == 0.3
+    assert await page.evaluate("window.pageErrors") == []
+    await page.close()
+
+
 async def learn(numbers: set[int]) -> None:
     """Take all lessons that have pages, or those of some numbers."""
     with tempfile.TemporaryDirectory() as folder:
@@ -115,7 +155,10 @@ async def learn(numbers: set[int]) -> None:
             browser = await launched(player, "chromium")
             for number, lesson in enumerate(load_lessons(LESSONS), 1):
                 if not no_page(lesson) and number in (numbers or {number}):
-                    await learned(browser, lesson, ANSWERS[number - 1], Path(folder) / f"{lesson.name}.html")
+                    path = Path(folder) / f"{lesson.name}.html"
+                    await learned(browser, lesson, ANSWERS[number - 1], path)
+                    if lesson.settings.scores:
+                        await played(browser, lesson, path)
             await browser.close()
 
 

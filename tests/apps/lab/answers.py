@@ -64,5 +64,18 @@ ANSWERS = [
         attempt("onto the bump"),
         attempt("the less it is stretched", (DECAL, 0.9), right=True),
     ],
+    [
+        attempt("Move the one that shows least"),
+        attempt("Move the one that shows least", ("Radius of violet", 0.6)),
+        attempt(
+            "All four show",
+            ("Radius of orange", 0.2),
+            ("Radius of violet", 0.2),
+            right=True,
+        ),
+    ],
 ]
 """For each lesson, attempts one after the other; the first changes nothing."""
+
+SOLVED = [(-0.4, -0.46), (-0.5, 0.61), (0.47, 0.36), (0.62, -0.58)]
+"""Centres that reach both pars of the puzzle."""

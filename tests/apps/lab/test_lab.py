@@ -70,7 +70,7 @@ def number_of(lab: Lab, label: str) -> int:
 
 
 @pytest.mark.slow_cases("5")
-@pytest.mark.parametrize("number", range(8))
+@pytest.mark.parametrize("number", range(len(ANSWERS)))
 def test_wrong_and_right_answers_are_told_apart(lab: Lab, number: int) -> None:
     begin(lab, number)
     for attempt in ANSWERS[number]:
@@ -178,12 +178,12 @@ def test_a_right_answer_says_so_by_itself_and_vanishes_again(lab: Lab) -> None:
     assert [task["done"] for task in wait(lab)["lab_tasks"]] == [True, True, True, False]
 
 
-TRUTHS = [0.6 / 0.27252, 0.48, None, None, None, None, None, None]
+TRUTHS = [0.6 / 0.27252, 0.48, None, None, None, None, None, None, None]
 """Known answers to the guesses, from the oracle: s = r / 0.4542, and x = D r₀ / (r₀ + r₁)."""
 
 
 @pytest.mark.slow_cases("2", "3", "4")
-@pytest.mark.parametrize("number", range(8))
+@pytest.mark.parametrize("number", range(len(ANSWERS)))
 def test_a_guess_comes_before_contact_and_is_compared(lab: Lab, window: EditWindow, number: int) -> None:
     lab.start(number)
     values = wait(lab)
@@ -235,7 +235,7 @@ def test_wrong_events_change_nothing(lab: Lab, window: EditWindow, number: Any, 
     before = digest(window.document)
     with pytest.raises(ImplicitDecalsError, match="expected"):
         lab.set_value(number, value)
-    with pytest.raises(InvalidEdit, match="lesson: expected a whole number from 0 to 7"):
+    with pytest.raises(InvalidEdit, match="lesson: expected a whole number from 0 to 8"):
         lab.start(number if number != 0 else True)
     assert digest(window.document) == before
 
@@ -261,7 +261,7 @@ def test_a_lesson_without_edits_leaves_no_recovery_file(vtk_display: None, tmp_p
 
 
 @pytest.mark.slow_cases("5")
-@pytest.mark.parametrize("number", range(8))
+@pytest.mark.parametrize("number", range(len(ANSWERS)))
 def test_plots_are_pictures_without_addresses(lab: Lab, number: int) -> None:
     begin(lab, number)
     values = wait(lab)

@@ -72,6 +72,25 @@ def test_the_surface_of_figure_7_is_equation_5() -> None:
     np.testing.assert_allclose(got, expected, atol=1e-9)
 
 
+@pytest.mark.parametrize("apart", [0.3, 0.9, 1.6])
+def test_overlap_and_area_lost_are_those_of_discs(apart: float) -> None:
+    r, other, edge = 0.9, 0.7, 1.8
+    tray = MeshObject("tray", CORNERS * np.float32(edge / 3), PLATE.faces)
+    pair = Decals([[-apart / 2, 0, 0], [apart / 2, 0, 0]], [[0, 0, 1]] * 2, [[1, 0, 0]] * 2, [r, other])
+    first = np.arccos(np.clip((apart**2 + r**2 - other**2) / (2 * apart * r), -1, 1))
+    second = np.arccos(np.clip((apart**2 + other**2 - r**2) / (2 * apart * other), -1, 1))
+    lens = r**2 * (first - np.sin(2 * first) / 2) + other**2 * (second - np.sin(2 * second) / 2)
+    total = np.pi * (r**2 + other**2)
+    state = experiment(objects=(tray,), decals=pair)
+    assert value("overlapped", state) == pytest.approx(lens / total, abs=0.004)
+    assert value("lost", state) == pytest.approx(lens / total, abs=0.004)
+    kept = value("kept(0)", state) * r**2 + value("kept(1)", state) * other**2
+    assert 1 - np.pi * kept / total == pytest.approx(value("lost", state))
+    over = experiment(objects=(tray,), decals=Decals([[edge, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], [r]))
+    assert value("overlapped", over) == 0.0
+    assert value("lost", over) == pytest.approx(0.5, abs=0.01)  # a half hangs over the edge
+
+
 def test_the_four_constraints_hold() -> None:
     state = experiment()
     assert value("most(where(f(0) + f(1) <= 1, abs(F - top), 0))", state) < 1e-5

@@ -25,6 +25,7 @@ CHANGES: list[list[tuple[str, Any]]] = [
     [("Green ball", 1.1), (GREEN, 0.2)],
     [("Green ball", 0.5), (GREEN, 0.25)],
     [(DECAL, 0.9)],
+    [("Radius of orange", 0.4)],
 ]
 """For each lesson, what a student sets."""
 
@@ -39,7 +40,7 @@ def lab(vtk_display: None) -> Iterator[Lab]:
 
 
 @pytest.mark.ordinary_cases("1")
-@pytest.mark.parametrize("number", range(8))
+@pytest.mark.parametrize("number", range(len(CHANGES)))
 def test_the_lines_make_the_picture(
     lab: Lab, number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,6 +16,7 @@ import decals.apps.lesson_pages as package
 from decals.apps.cli import run
 from decals.apps.lab.lesson import LESSONS, PLACEHOLDER, Lesson, load_lesson, load_lessons, shown
 from decals.apps.lab.measures import MEASURES
+from decals.apps.lab.puzzles import Puzzle, read_puzzle
 from decals.apps.lab.symbols import DEFINITIONS
 from decals.apps.lesson_pages.code import WORDS, javascript
 from decals.apps.lesson_pages.page import KNOWN, lesson_page, no_page
@@ -27,7 +28,17 @@ from tests.oracles.contact import RIM, contact_field, falloff
 
 MODULES = Path(package.__file__).parent
 MOST_BYTES = 600_000
-PAGES = ["1-one-decal", "2-two-decals", "3-contact-modes", "4-many-decals", "8-over-a-bump"]
+PAGES = ["1-one-decal", "2-two-decals", "3-contact-modes", "4-many-decals", "8-over-a-bump", "9-packing"]
+
+LINKS = [
+    "puzzle=0.5,0.45,0.4,0.3&par=0.5,2",
+    "puzzle=0.5,0.45,0.4&par=0.5,2",
+    "puzzle=0.5,0.45,0.4,x&par=0.5,2",
+    "puzzle=0.5,0.45,0.4,-1&par=0.5,2",
+    "puzzle=0.5,0.45,0.4,99&par=0.5,2",
+    "puzzle=0.5,0.45,0.4,0.3",
+    "task=1",
+]
 
 MEASURED = f"""
 import {{ Measures }} from {json.dumps((MODULES / "measures.mjs").as_uri())};
@@ -112,6 +123,24 @@ def test_random_formulas_are_those_of_the_lab(seed: int) -> None:
     found = measured(formulas, [point], TWO.positions, TWO.radii)[0]
     expected = [float(np.ravel(value(text, experiment(probe=point)))[0]) for text in formulas]
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5)
+
+
+@needs_node
+def test_links_of_pages_are_those_of_the_lab(lessons: dict[str, Lesson]) -> None:
+    lesson = lessons["9-packing"]
+    rows = [{"radius": radius} for radius in Puzzle.of(lesson).radii]
+    scores = [{"par": score.par} for score in lesson.settings.scores]
+    links = [*LINKS, Puzzle.of(lesson).text]
+    script = f"""
+import {{ puzzleOf }} from {json.dumps((MODULES / "puzzles.mjs").as_uri())};
+console.log(JSON.stringify(data.links.map((link) => puzzleOf("#" + link, data))));"""
+    given = {"rows": rows, "scores": scores, "size": lesson.size, "links": links}
+    for link, found in zip(links, run_node(script, given), strict=True):
+        try:
+            expected = read_puzzle(link, lesson)
+        except InvalidInput:
+            expected = Puzzle.of(lesson)  # a page with a wrong link shows the lesson itself
+        assert Puzzle(tuple(found["radii"]), tuple(found["pars"])) == expected, link
 
 
 @needs_node
@@ -223,7 +252,7 @@ def test_lessons_without_a_page_say_why(lessons: dict[str, Lesson]) -> None:
     assert [name for name, lesson in lessons.items() if not no_page(lesson)] == [
         *PAGES[:4],
         "7-volume-and-area",
-        PAGES[4],
+        *PAGES[4:],
     ]
     assert "relaxation" in str(no_page(lessons["5-scattering"]))
     assert f"at most {MOST} positions" in str(no_page(lessons["6-solids"]))

@@ -121,6 +121,7 @@ EVENTS: dict[str, list[list[Any]]] = {
     ],
     "close_lesson": [[True, False]],
     "check": [],
+    "puzzle": [["puzzle=0.5,0.4,0.4,0.3&par=1,4", "puzzle=1", 7]],
     "guess": [[0.4, -3, 1e300, "x", [0.2]]],
     "upload": [[[{}], [{"name": "a.ply", "content": b"x"}], 3], [*KEYS_OF_ROWS, "light", "view 5000/5000"]],
 }

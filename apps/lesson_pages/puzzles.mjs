@@ -1,0 +1,47 @@
+// Puzzles: sizes of decals and pars from the address, and scores, of which the browser keeps the best.
+
+const digitsOf = (value, digits) => Number(value.toPrecision(digits));
+
+// The puzzle of an address, or that of the lesson.
+export function puzzleOf(fragment, { rows, scores, size }) {
+  const given = new URLSearchParams(fragment.slice(1));
+  const [radii, pars] = ["puzzle", "par"].map((name) => (given.get(name) ?? "").split(",").map(Number));
+  const fits = radii.length === rows.length && pars.length === scores.length;
+  if (fits && radii.every((radius) => radius > 0 && radius <= size) && pars.every(Number.isFinite))
+    return { radii, pars };
+  return { radii: rows.map(({ radius }) => radius), pars: scores.map(({ par }) => par) };
+}
+
+// The least value so far; one that counts may be the new least.
+function best(key, value, counts) {
+  try {
+    const known = Number(localStorage.getItem(key) ?? Infinity);
+    if (counts && value < known) localStorage.setItem(key, value);
+    return counts ? Math.min(value, known) : known;
+  } catch {
+    return value; // the browser keeps nothing
+  }
+}
+
+// Show the scores of a page, with the pars if its decals have the sizes of the puzzle.
+export function showScores(page, counts) {
+  const { lesson, puzzle, root, viewer } = page;
+  const sizes = viewer.decals.rows.map((row) => row && digitsOf(row.radius, 4)).join(",");
+  const isOwn = sizes === puzzle.radii.map((radius) => digitsOf(radius, 4)).join(",");
+  const values = lesson.scores.map(({ formula }) => page.value(formula));
+  root.querySelectorAll(".scores tbody tr").forEach((line, i) => {
+    const least = best(`${lesson.name} puzzle=${sizes} ${lesson.scores[i].formula}`, values[i], counts);
+    const star = isOwn && least <= puzzle.pars[i] ? " ★" : "";
+    const texts = [page.say(values[i]), isOwn ? page.say(puzzle.pars[i]) : "–", page.say(least) + star];
+    texts.forEach((text, column) => (line.cells[column + 1].textContent = text));
+  });
+  page.shared = `puzzle=${sizes}&par=${values.map((value) => Math.ceil(10 * value) / 10).join(",")}`;
+}
+
+// Copy a link to the puzzle of the present sizes, whose pars are the present scores, and show it.
+export function share(page) {
+  const link = `${location.href.split("#")[0]}#${page.shared}`;
+  navigator.clipboard?.writeText(link).catch(() => {}); // it can be copied from the page, too
+  const shown = Object.assign(document.createElement("a"), { href: link, textContent: link });
+  page.root.querySelector(".shared").replaceChildren(shown);
+}
