@@ -63,6 +63,7 @@ def sandbox(
     inputs: Inputs = Inputs(),
     lab: Annotated[bool, Parameter(negative=())] = False,
     lessons: Path | None = None,
+    classroom: Annotated[bool, Parameter(name="--class", negative=())] = False,
     done: Annotated[bool, Parameter(negative=())] = False,
     session: Annotated[bool, Parameter(negative=(), show=False)] = False,
 ) -> int:
@@ -94,6 +95,8 @@ def sandbox(
         Open the contact lab: nine lessons on decals and solids in contact.
     lessons
         A folder of other lessons for the lab.
+    classroom
+        Serve the lessons to students as pages, by an address of their own, and show what they send at /class.
     done
         Show a button that saves and ends, and print the URL alone, as notebooks need it.
     session
@@ -104,13 +107,16 @@ def sandbox(
     check_count("--sessions", sessions, 1, MAX_SESSIONS)
     if model and (lab or lessons is not None):
         raise InvalidInput("the lab has its own scenes; leave out the model, or --lab and --lessons")
+    if classroom and (desktop or share or done or session or not (lab or lessons is not None)):
+        raise InvalidInput("--class needs --lab or --lessons, without --share, --desktop and --done")
     if desktop or not (share or done or session):
         options = {**vars(start), **vars(inputs), "lab": lab, "lessons": lessons}
         command = _commands(model, options, options.pop("save"))
         if desktop:
             return _show_window(command(1))
         guard = _guard(host, allow_host, os.environ.pop(TOKEN, ""))
-        return _serve_sessions(command, sessions, guard, host, port, browser=browser)
+        room = _classroom(guard, lessons) if classroom else None
+        return _serve_sessions(command, sessions, guard, host, port, room, browser=browser)
     from decals.apps.commands.opening import check_options, opened, report_unsaved
     from decals.apps.memory import import_ahead, keep_memory_low, share_heap
     from decals.apps.models.loading import import_definitions
@@ -175,17 +181,37 @@ def _commands(
 
 
 def _serve_sessions(
-    command: Callable[[int], list[str]], limit: int, guard: Any, host: str, port: int, *, browser: bool
+    command: Callable[[int], list[str]],
+    limit: int,
+    guard: Any,
+    host: str,
+    port: int,
+    room: Any = None,
+    *,
+    browser: bool,
 ) -> int:
-    """Serve a session to each browser, and return the exit code."""
+    """Serve a session to each browser, and pages to the students of a class; return the exit code."""
     from decals.apps.sandbox.sessions import Sessions
 
-    served = Sessions(command, limit=limit, guard=guard)
+    served = Sessions(command, limit=limit, guard=guard, **({"join": room.join} if room else {}))
+
+    def ready(found: int) -> None:
+        _announce(guard, found, open_browser=browser)
+        if room:
+            address = f"students at {room.url(found)}, their answers at {guard.address(found)}class"
+            Console(stderr=True, soft_wrap=True).print(address, highlight=False, markup=False)
+
     with suppress(KeyboardInterrupt), _port_in_use_reported(port):
-        return asyncio.run(
-            served.serve(host, port, lambda found: _announce(guard, found, open_browser=browser))
-        )
+        return asyncio.run(served.serve(host, port, ready))
     return 0
+
+
+def _classroom(guard: Any, folder: Path | None) -> Any:
+    """Return the class that takes the lessons of a folder."""
+    from decals.apps.lab.lesson import LESSONS, load_lessons
+    from decals.apps.lesson_pages.classroom import Classroom
+
+    return Classroom(guard, load_lessons(LESSONS if folder is None else folder))
 
 
 @contextmanager

@@ -4,6 +4,7 @@ import { History } from "../../decals/pages/viewer/history.mjs";
 import { unpacked } from "../../decals/pages/viewer/packing.mjs";
 import { add, scaled } from "../../decals/pages/viewer/vectors.mjs";
 import { Viewer } from "../../decals/pages/viewer/viewer.mjs";
+import { send } from "./answers.mjs";
 import { Measures, numbersOver } from "./measures.mjs";
 import { drawCurves, drawMap } from "./plots.mjs";
 import { puzzleOf, share, showScores } from "./puzzles.mjs";
@@ -38,7 +39,11 @@ class LessonPage {
     root.querySelector("[name=check]").addEventListener("click", () => this.check());
     root.querySelector("[name=share]")?.addEventListener("click", () => share(this));
     root.querySelector("[name=skip]")?.addEventListener("click", () => this.see(null));
-    root.querySelector("form")?.addEventListener("submit", (event) => {
+    root.querySelector(".send")?.addEventListener("submit", (event) => {
+      event.preventDefault();
+      send(this, event.target);
+    });
+    root.querySelector("form.guess")?.addEventListener("submit", (event) => {
       event.preventDefault();
       this.see(Number(event.target.guess.value));
     });

@@ -28,7 +28,7 @@ from decals.scenes.scene import Scene
 from decals.shaders import compose
 
 FILES = Path(__file__).parent
-MODULES = "measures", "plots", "puzzles", "lesson"
+MODULES = "measures", "plots", "puzzles", "answers", "lesson"
 """Modules of a lesson, each after those that it imports."""
 
 NAMES = """
@@ -45,6 +45,12 @@ IMAGE_SIDE = 128
 BLOCKS = 8
 """Blocks along trees, for rays: few, as a page has many trees."""
 
+SEND = (
+    '<form class="send"><label>{person} <input name="person" maxlength="40" autocomplete="off"></label> '
+    '<button>{send}</button> <output role="status"></output></form>'
+)
+"""What a student sends in a class."""
+
 STEPS = 200
 """Steps of a slider whose lesson gives none."""
 
@@ -54,6 +60,7 @@ def lesson_page(
     *,
     language: str = "en",
     links: Sequence[tuple[str, str]] = (),
+    sends: bool = False,
     progress: Progress | None = None,
 ) -> Page:
     """Return a lesson as one HTML page, which needs no server and no network.
@@ -69,6 +76,8 @@ def lesson_page(
         Code of the language: "en", or one with a file in ``languages``.
     links : sequence of (str, str), optional
         Text and address of links to other lessons and languages.
+    sends : bool
+        The page sends its numbers to the server of a class, once its student asks for that.
     progress : callable, optional
         Function of the stage and its finished fraction, 0 to 1, called repeatedly.
 
@@ -107,6 +116,7 @@ def lesson_page(
         f"{_script_json(known)}, {{{formulas}}}).then((page) => (globalThis.page = page));\n"
     )
     slots |= _markup(lesson, words, table, links)
+    slots["SEND"] = SEND.format(**words.page) if sends else ""
     slots["STYLE"] += (FILES / "lesson.css").read_text(encoding="utf-8")
     slots["SCRIPT"] = as_script(lesson_script(), "begin") + begin
     template = (FILES / "lesson.html").read_text(encoding="utf-8")

@@ -46,6 +46,10 @@ PAGE_TEXTS = {
     "par": "par",
     "best": "best",
     "share": "Share as a puzzle",
+    "person": "Name (optional)",
+    "send": "Send my numbers",
+    "sent": "Sent to the teacher.",
+    "unsent": "Not sent: wait a second, then send again.",
     "lost": "A decal of the lesson was deleted: undo, or start again.",
 }
 """Texts of a page that belong to no lesson, by their names."""

@@ -195,7 +195,7 @@ class Guard:
         if token and self._framed:
             self._add_frames(request.query.get("frame", ""))
         if not bearer:  # a page cannot send that header; the process that does has checked its browser
-            self._check_names(request)
+            self.check_names(request)
         if not near and not (visit and (token or bearer)):
             raise web.HTTPForbidden(text="expected a request of the page itself")
         if in_frame and not (token and self._frames) and not (bearer and near):
@@ -232,7 +232,7 @@ class Guard:
         finally:
             self._sockets[trusted] -= 1
 
-    def _check_names(self, request: web.Request) -> None:
+    def check_names(self, request: web.Request) -> None:
         """Refuse requests by a foreign name of this machine, and those of pages of other servers."""
         hosts, origins = (request.headers.getall(name, []) for name in ("Host", "Origin"))
         if len(hosts) != 1 or not self._allows(request):

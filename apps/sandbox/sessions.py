@@ -145,9 +145,19 @@ class Sessions:
         Most sessions at the same time.
     guard
         Checks all requests.
+    join
+        Adds further pages to the server, such as those of a class.
     """
 
-    def __init__(self, command: Callable[[int], Sequence[str]], *, limit: int, guard: Guard) -> None:
+    def __init__(
+        self,
+        command: Callable[[int], Sequence[str]],
+        *,
+        limit: int,
+        guard: Guard,
+        join: Callable[[web.Application], None] = lambda _: None,
+    ) -> None:
+        self._join = join
         self._command, self._limit, self._guard = command, limit, guard
         self._sessions: dict[str, Session] = {}
         self._numbers: dict[str, int] = {}
@@ -163,6 +173,7 @@ class Sessions:
         self._waiting = first = await self._start(1)
         app = web.Application()
         self._guard.protect(app)
+        self._join(app)
         app.router.add_get("/ws", self._socket)
         app.router.add_get("/{path:.*}", self._get)
         runner = web.AppRunner(app)

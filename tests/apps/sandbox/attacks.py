@@ -53,6 +53,7 @@ WAYS: dict[str, list[str]] = {
     "--session": [*PYTHON, "--session", "--port", "0", "--no-browser"],
     "--share": [*PYTHON, "--share", "--port", "0", "--no-browser"],
     "--lab": [*PYTHON, "--lab", "--share", "--port", "0", "--no-browser"],
+    "--class": [*PYTHON, "--lab", "--class", "--port", "0", "--no-browser"],
     "--desktop": [sys.executable, "-c", WINDOW],
     "notebook": [*PYTHON, "--done", "--port", "0", "--no-browser"],
 }
@@ -155,6 +156,8 @@ def _read_address(server: Server) -> None:
         server.lines.append(line)
         if found := re.search(r"http://([^/\s]+):(\d+)/(?:\?token=(\S+))?", line):
             server.address, server.token = f"http://127.0.0.1:{found[2]}/", found[3] or server.token
+            if server.way == "--class":
+                server.lines.append(server.process.stdout.readline())
             return
     raise RuntimeError(f"expected an address, got {''.join(server.lines)}")
 
@@ -549,6 +552,109 @@ async def _call(session: WsLinkSession, name: str, *arguments: Any) -> Any:
             return None
 
 
+# -- a student of a class -----------------------------------------------------------------------------------
+
+ODD_ANSWERS: list[Any] = [
+    None,
+    [],
+    "x",
+    {},
+    {"numbers": ["x"] * 6},
+    {"numbers": [1.0] * 5},
+    {"numbers": [[1.0]] * 6},
+    {"numbers": [1e999] * 6},
+    {"lesson": "5-scattering"},
+    {"lesson": 3},
+    {"name": "n" * 41},
+    {"name": "a\x1b[2J"},
+    {"right": "yes"},
+    {"token": "x"},
+]
+"""Changes of an answer that make it none; those that are no dictionaries stand for the answer."""
+
+
+async def student(server: Server) -> str:
+    """A student tries all but one answer, and other pages try that."""
+    token = re.search(r"/student/([\w-]+)/", server.lines[-1])
+    assert token
+    own, path = f"http://{server.authority}", f"student/{token[1]}/"
+    jar = aiohttp.CookieJar(unsafe=True)
+    good = {"lesson": "9-packing", "name": "", "numbers": [1.0] * 6, "right": True}
+    async with aiohttp.ClientSession(cookie_jar=jar) as http:
+
+        async def ask(method: str, where: str, body: Any = None, **headers: str) -> int:
+            sent = {"Origin": own, "Content-Type": "application/json"}
+            sent |= {name.replace("_", "-"): text for name, text in headers.items()}
+            data = body if isinstance(body, bytes) else json.dumps(body).encode()
+            url = f"{server.address}{where}"
+            async with http.request(method, url, data=data, headers=sent, allow_redirects=False) as answer:
+                return int(answer.status)
+
+        if await ask("POST", f"{path}answer", good) < 400:
+            return "answered without a page"
+        for wrong in ("x", token[1][:-1], token[1].upper(), server.token, "%00", "é"):
+            for method, name in (("GET", ""), ("GET", "1-one-decal.html"), ("POST", "answer")):
+                if await ask(method, f"student/{wrong}/{name}", good) < 400:
+                    return f"the token {wrong!r} opens {name or 'the list'}"
+        async with http.get(f"{server.address}{path}", headers=NAVIGATE) as page:
+            if page.status != 200 or "Path=/student/" not in page.headers["Set-Cookie"]:
+                return f"the list answers {page.status}"
+        for headers in (
+            {"Origin": FOREIGN},
+            {"Origin": "null"},
+            {"Host": "foreign.example", "Origin": "http://foreign.example"},
+            {"Sec_Fetch_Site": "cross-site"},
+            {"Content_Type": "text/plain"},
+            {"Content_Type": "application/x-www-form-urlencoded"},
+        ):
+            if await ask("POST", f"{path}answer", good, **headers) < 400:
+                return f"answered with {headers}"
+        for method in ("GET", "PUT", "DELETE", "OPTIONS", "PATCH"):
+            if await ask(method, f"{path}answer", good) < 400:
+                return f"{method} of an answer"
+        for name in (
+            "class",
+            "answers",
+            "../../class",
+            "%2e%2e/%2e%2e/class",
+            "ws",
+            "index.html",
+            "../9-packing.html",
+        ):
+            for method in ("GET", "POST"):
+                if await ask(method, f"{path}{name}", good) < 400:
+                    return f"{method} {name}"
+        if await ask("POST", f"{path}answer", b" " * 2001) != 413:
+            return "sent a long answer"
+        for odd in ODD_ANSWERS:
+            await asyncio.sleep(0.51)
+            sent = {**good, **odd} if isinstance(odd, dict) and odd else odd
+            if await ask("POST", f"{path}answer", sent) < 400:
+                return f"sent {odd}"
+        await asyncio.sleep(0.51)
+        many = [await ask("POST", f"{path}answer", good) for _ in range(5)]
+        if many[0] != 204 or any(status < 400 for status in many[1:]):
+            return f"sent many answers: {many}"
+        cookie = next(morsel.value for morsel in jar if morsel.key == "class")
+        for name in ("class", f"implicit-decals-{server.port}"):
+            known = {name: cookie}
+            for where in (
+                "",
+                "index.html",
+                "class",
+                "class/answers",
+                "class/1-one-decal.csv",
+                f"?token={token[1]}",
+            ):
+                status, text, _ = await get(server, where, known, **NAVIGATE)
+                if status < 400 and (opens(status, text) or "Class" in text or "answers" in text):
+                    return f"opened /{where}"
+            bearer = {"Authorization": f"Bearer {token[1]}"}
+            if await talk(server, secret=token[1], cookies=known, Origin=own, **bearer):
+                return "read the scene"
+    return ""
+
+
 # -- a slow or flooding client ------------------------------------------------------------------------------
 
 
@@ -611,7 +717,7 @@ ATTACKS: dict[str, Attack] = {
     for one in (
         foreign_socket, rebinding, image, link, frame, form, leak,
         stranger, hello, processes, account, path,
-        watcher, flood, parts,
+        watcher, student, flood, parts,
     )
 }  # fmt: skip
 
@@ -621,7 +727,7 @@ SHARED = "--share", "--lab"
 
 def applies(attack: str, way: str) -> bool:
     """Return True if an attack can be tried in a way of starting."""
-    return attack != "watcher" or way in SHARED
+    return {"watcher": way in SHARED, "student": way == "--class"}.get(attack, True)
 
 
 LEFT_OUT: dict[str, Callable[[], str]] = {

@@ -1,0 +1,262 @@
+"""A class: students take pages of lessons from the teacher's server, and send their numbers to it.
+
+The address of a student has a token of its own, which opens the pages and takes answers, and nothing else.
+"""
+
+import asyncio
+import base64
+import csv
+import hashlib
+import hmac
+import io
+import math
+import re
+import secrets
+import time
+from collections.abc import Awaitable, Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from aiohttp import web
+from msgspec import Struct
+
+from decals.apps.lab.lesson import Lesson
+from decals.apps.lesson_pages.page import lesson_page, no_page
+from decals.apps.sandbox.guard import FRAMES, NEAR, Guard, new_token, page_of
+
+STUDENT, ANSWER = "/student/", "answer"
+"""Beginning of the addresses of students, and the name to which they send answers."""
+
+MAX_STUDENTS = 200
+"""Most browsers of a class."""
+
+MAX_BYTES = 2000
+"""Longest answer."""
+
+MAX_NAME = 40
+"""Most characters of the name of a student."""
+
+LEAST_SECONDS = 0.5
+"""Least time between two answers of a student."""
+
+MAX_RATE = 100
+"""Most requests to answer in a second, of all students together."""
+
+BODY_SECONDS = 10.0
+"""Time in which an answer must have come."""
+
+FILES = Path(__file__).parent
+
+POLICY = (
+    "default-src 'none'; script-src 'sha256-{}'; style-src 'unsafe-inline'; img-src data: blob:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+"""What a student's page may load: its own script, and nothing of other pages."""
+
+FORMULA = tuple("=+-@\t\r")
+"""First characters of what a spreadsheet would compute."""
+
+
+class Answer(Struct, forbid_unknown_fields=True, frozen=True):
+    """What a student sends: the numbers of a lesson, in the order of `labels`, and whether it is solved."""
+
+    lesson: str
+    name: str
+    numbers: tuple[float | None, ...]
+    right: bool
+
+
+def labels(lesson: Lesson) -> list[str]:
+    """Return the names of the numbers of an answer."""
+    settings = lesson.settings
+    sliders = [slider for slider in settings.sliders if not slider.choices]
+    rows: list[Any] = [*sliders, *settings.values, *settings.scores]
+    return ["guess", *(row.label for row in rows)]
+
+
+class Classroom:
+    """Serves pages to students, and their answers to the teacher.
+
+    Parameters
+    ----------
+    guard
+        Checks the requests of the teacher; those of students have their own token.
+    lessons
+        The lessons; those without a page are left out.
+
+    Attributes
+    ----------
+    token
+        The token of students.
+    answers
+        The newest answer by the number of its student, and its lesson.
+    """
+
+    def __init__(self, guard: Guard, lessons: Sequence[Lesson]) -> None:
+        self._guard = guard
+        self._lessons = {lesson.name: lesson for lesson in lessons if not no_page(lesson)}
+        self.token = new_token()
+        self.answers: dict[tuple[int, str], Answer] = {}
+        self._secret = secrets.token_bytes(32)
+        self._times: dict[int, float] = {}
+        self._second, self._asked = 0, 0
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix="pages")
+        self._pages: dict[str, asyncio.Future[web.Response]] = {}
+
+    def url(self, port: int) -> str:
+        """Return the address of students."""
+        return f"{self._guard.address(port).rstrip('/')}{STUDENT}{self.token}/"
+
+    def join(self, app: web.Application) -> None:
+        """Answer requests of students before the guard does, and those of the teacher behind it."""
+        app.middlewares.insert(0, self._check)
+        app.on_response_prepare.append(_limit)
+        app.router.add_get("/class", self._board)
+        app.router.add_get("/class/answers", self._answers)
+        app.router.add_get("/class/{name}.mjs", _script)
+        app.router.add_get("/class/{name}.csv", self._table)
+
+    # -- students ---------------------------------------------------------------------------------------
+
+    @web.middleware
+    async def _check(
+        self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
+    ) -> web.StreamResponse:
+        """Answer a request of a student, or refuse it; pass others on to the guard."""
+        if not request.path.startswith(STUDENT):
+            return await handler(request)
+        token, _, name = request.path.removeprefix(STUDENT).partition("/")
+        self._guard.check_names(request)
+        if not hmac.compare_digest(token.encode(errors="replace"), self.token.encode()):
+            raise web.HTTPForbidden(text="expected the address that the teacher shows")
+        if name == ANSWER:
+            return await self._take(request)
+        if request.method != "GET":
+            raise web.HTTPMethodNotAllowed(request.method, ["GET"])
+        if request.headers.get("Sec-Fetch-Dest") in FRAMES:
+            raise web.HTTPForbidden(text="expected a window for the page, not a frame")
+        number = self._number(request) or len(self._times) + 1
+        if number > MAX_STUDENTS:
+            return page_of(f"The class is full: it has {MAX_STUDENTS} students.", 503)
+        response = await self._page(name.removesuffix(".html"), request)
+        self._times.setdefault(number, -math.inf)
+        response.set_cookie(
+            "class", f"{number}.{self._signature(number)}", path=STUDENT, httponly=True, samesite="Strict"
+        )
+        return response
+
+    def _signature(self, number: int) -> str:
+        return hmac.new(self._secret, str(number).encode(), hashlib.sha256).hexdigest()
+
+    def _number(self, request: web.Request) -> int:
+        """Return the number of a student from the cookie, or 0."""
+        text, _, signature = request.cookies.get("class", "").partition(".")
+        known = re.fullmatch(r"[1-9]\d{0,3}", text) and hmac.compare_digest(
+            signature.encode(errors="replace"), self._signature(int(text)).encode()
+        )
+        return int(text) if known else 0
+
+    async def _page(self, name: str, request: web.Request) -> web.Response:
+        """Return the page of a lesson, which is made once, or the list of all."""
+        if not name:
+            names = self._lessons.items()
+            rows = "".join(f"<li><a href='{n}.html'>{escape(one.settings.title)}</a>" for n, one in names)
+            return _html(LIST.format(rows))
+        if name not in self._lessons:
+            raise web.HTTPNotFound(text="expected a page of a lesson")
+        if name not in self._pages:
+            self._pages[name] = asyncio.get_running_loop().run_in_executor(
+                self._worker,
+                lambda: lesson_page(self._lessons[name], links=[("Lessons", "./")], sends=True).text,
+            )
+        return _html(await asyncio.shield(self._pages[name]))
+
+    async def _take(self, request: web.Request) -> web.Response:
+        """Take an answer: the one thing that a student can send."""
+        now, number = time.monotonic(), self._number(request)
+        self._second, self._asked = int(now), self._asked + 1 if self._second == int(now) else 1
+        if self._asked > MAX_RATE:
+            raise web.HTTPTooManyRequests(text="expected fewer answers of the class")
+        if request.method != "POST" or request.content_type != "application/json":
+            raise web.HTTPMethodNotAllowed(request.method, ["POST"], text="expected an answer in JSON")
+        if request.headers.get("Sec-Fetch-Site", NEAR[0]) not in NEAR or "Origin" not in request.headers:
+            raise web.HTTPForbidden(text="expected an answer of a student's page")
+        if number not in self._times:
+            raise web.HTTPForbidden(text="expected a student; load the page again")
+        if (request.content_length or MAX_BYTES + 1) > MAX_BYTES:
+            raise web.HTTPRequestEntityTooLarge(MAX_BYTES, text=f"expected at most {MAX_BYTES} bytes")
+        if now - self._times[number] < LEAST_SECONDS:
+            raise web.HTTPTooManyRequests(text="expected fewer answers; wait a second")
+        self._times[number] = now
+        try:
+            async with asyncio.timeout(BODY_SECONDS):
+                answer = msgspec.json.decode(await request.read(), type=Answer)
+        except (msgspec.MsgspecError, UnicodeDecodeError, TimeoutError):
+            raise web.HTTPBadRequest(text="expected an answer of a lesson") from None
+        lesson = self._lessons.get(answer.lesson)
+        fits = lesson is not None and len(answer.numbers) == len(labels(lesson))
+        finite = all(value is None or math.isfinite(value) for value in answer.numbers)
+        if not fits or not finite or len(answer.name) > MAX_NAME or not answer.name.isprintable():
+            raise web.HTTPBadRequest(text="expected an answer of a lesson")
+        self.answers[number, answer.lesson] = answer
+        return web.Response(status=204)
+
+    # -- the teacher ------------------------------------------------------------------------------------
+
+    async def _board(self, request: web.Request) -> web.Response:
+        bound = request.get_extra_info("sockname")
+        page = (FILES / "class.html").read_text(encoding="utf-8")
+        return _html(page.replace("<!--URL-->", escape(self.url(bound[1]))))
+
+    async def _answers(self, _request: web.Request) -> web.Response:
+        lessons = {
+            name: {"title": one.settings.title, "labels": labels(one)} for name, one in self._lessons.items()
+        }
+        rows = [{"student": who, **msgspec.to_builtins(one)} for (who, _), one in self.answers.items()]
+        return web.json_response({"lessons": lessons, "answers": rows}, headers={"Cache-Control": "no-store"})
+
+    async def _table(self, request: web.Request) -> web.Response:
+        """Return the answers to a lesson as CSV, without texts that a spreadsheet would compute."""
+        lesson = self._lessons.get(request.match_info["name"])
+        if lesson is None:
+            raise web.HTTPNotFound(text="expected the name of a lesson")
+        file = io.StringIO()
+        table = csv.writer(file)
+        table.writerow(["student", "name", "right", *labels(lesson)])
+        for (student, name), one in sorted(self.answers.items()):
+            if name == lesson.name:
+                shown = f"'{one.name}" if one.name.startswith(FORMULA) else one.name
+                table.writerow([student, shown, one.right, *one.numbers])
+        headers = {"Content-Disposition": f'attachment; filename="{lesson.name}.csv"'}
+        return web.Response(text=file.getvalue(), content_type="text/csv", headers=headers)
+
+
+LIST = (
+    "<!doctype html><html lang='en'><meta charset='utf-8'><title>Lessons</title>"
+    "<meta name='viewport' content='width=device-width'>"
+    "<style>body {{ font: 18px/2 sans-serif; margin: 2em }}</style>"
+    "<h1>Lessons</h1><ul>{}</ul></html>"
+)
+
+
+def _html(text: str) -> web.Response:
+    return web.Response(text=text, content_type="text/html")
+
+
+async def _limit(request: web.Request, response: web.StreamResponse) -> None:
+    """Let a page of a student run the script that it has, and load nothing."""
+    if request.path.startswith(STUDENT) and isinstance(response, web.Response):
+        script = re.search(r"<script>(.*?)</script>", response.text or "", re.DOTALL)
+        digest = hashlib.sha256((script[1] if script else "").encode()).digest()
+        response.headers["Content-Security-Policy"] = POLICY.format(base64.b64encode(digest).decode())
+
+
+async def _script(request: web.Request) -> web.Response:
+    name = request.match_info["name"]
+    if name not in ("class", "plots"):
+        raise web.HTTPNotFound(text="expected a script of the class")
+    text = (FILES / f"{name}.mjs").read_text(encoding="utf-8")
+    return web.Response(text=text, content_type="text/javascript")

@@ -1,0 +1,131 @@
+"""A class of forty students, what the teacher sees of it, and attacks by a student."""
+
+import asyncio
+import csv
+import io
+import json
+import sys
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+
+pytest.importorskip("aiohttp")
+
+import aiohttp
+
+from decals.apps.cli import run
+from decals.apps.lab.lesson import LESSONS, load_lesson
+from decals.apps.lesson_pages.classroom import MAX_STUDENTS, Classroom, labels
+from decals.apps.sandbox.guard import Guard
+from decals.apps.sandbox.sessions import Sessions
+from tests.apps.sandbox.attacks import NAVIGATE, Server, student
+from tests.apps.sandbox.test_sessions import PROGRAM, TOKEN
+
+STUDENTS = 40
+
+
+def serve(check: Callable[[Classroom, str], Awaitable[None]]) -> Sessions:
+    """Serve a class to a check, then end it."""
+
+    async def served() -> Sessions:
+        guard = Guard(token=TOKEN)
+        names = ("1-one-decal", "7-volume-and-area", "9-packing")
+        room = Classroom(guard, [load_lesson(LESSONS / f"{name}.md") for name in names])
+        command = [sys.executable, "-c", PROGRAM, "1"]
+        sessions = Sessions(lambda _: command, limit=2, guard=guard, join=room.join)
+        port: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+        task = asyncio.create_task(sessions.serve("127.0.0.1", 0, port.set_result))
+        try:
+            await check(room, guard.address(await port))
+        finally:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+        return sessions
+
+    return asyncio.run(served())
+
+
+def pupil() -> aiohttp.ClientSession:
+    return aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True), headers=NAVIGATE)
+
+
+async def answer(http: aiohttp.ClientSession, address: str, room: Classroom, **changes: Any) -> int:
+    sent = {
+        "lesson": "9-packing",
+        "name": "",
+        "numbers": [20.0, 0.5, 0.4, 90.0, 1.0, 4.0],
+        "right": True,
+        **changes,
+    }
+    own = {"Origin": address.rstrip("/"), "Sec-Fetch-Site": "same-origin", "Sec-Fetch-Mode": "cors"}
+    async with http.post(f"{address}student/{room.token}/answer", json=sent, headers=own) as found:
+        return int(found.status)
+
+
+def test_forty_students_answer_and_the_teacher_sees_all() -> None:
+    async def check(room: Classroom, address: str) -> None:
+        async def learns(number: int) -> None:
+            async with pupil() as http:
+                async with http.get(f"{address}student/{room.token}/") as found:
+                    assert "9-packing.html" in await found.text()
+                for turn in range(3):
+                    numbers = [float(number), 0.5, 0.4, 50.0 + turn, 1.0, None]
+                    assert await answer(http, address, room, name=f"=Ü {number}", numbers=numbers) == 204
+                    await asyncio.sleep(0.55)
+
+        async with pupil() as first, first.get(f"{address}student/{room.token}/9-packing.html") as page:
+            assert "Send my numbers" in await page.text()
+            assert "script-src 'sha256-" in page.headers["Content-Security-Policy"]
+        await asyncio.gather(*(learns(number) for number in range(STUDENTS)))
+        async with pupil() as teacher:
+            async with teacher.get(f"{address}?token={TOKEN}") as found:
+                assert found.status == 200
+            near = {"Sec-Fetch-Site": "same-origin", "Sec-Fetch-Mode": "cors"}
+            async with teacher.get(f"{address}class/answers", headers=near) as found:
+                seen = await found.json()
+            assert sorted(one["numbers"][0] for one in seen["answers"]) == [*range(STUDENTS)]
+            assert {one["numbers"][3] for one in seen["answers"]} == {52.0}  # the newest ones
+            assert seen["lessons"]["9-packing"]["labels"] == labels(load_lesson(LESSONS / "9-packing.md"))
+            async with teacher.get(f"{address}class/9-packing.csv", headers=near) as found:
+                rows = [*csv.DictReader(io.StringIO(await found.text()))]
+            assert {row["name"] for row in rows} == {f"'=Ü {number}" for number in range(STUDENTS)}
+            assert {float(row["guess"]) for row in rows} == {*range(STUDENTS)}
+            async with teacher.get(f"{address}class") as found:
+                text = await found.text()
+            assert f"{address}student/{room.token}/" in text
+
+    sessions = serve(check)
+    assert len(sessions._numbers) == 1  # the teacher alone has a process
+
+
+def test_attacks_of_a_student_are_refused() -> None:
+    async def check(room: Classroom, address: str) -> None:
+        lines = [room.url(int(address.rsplit(":", 1)[1].rstrip("/")))]
+        got = await student(Server("--class", cast("Any", None), Path(), address, TOKEN, lines))
+        assert not got
+
+    serve(check)
+
+
+def test_a_class_has_so_many_students_and_answers() -> None:
+    async def check(room: Classroom, address: str) -> None:
+        statuses = []
+        for _ in range(MAX_STUDENTS + 1):
+            async with pupil() as http, http.get(f"{address}student/{room.token}/") as found:
+                statuses.append(found.status)
+        assert statuses == [200] * MAX_STUDENTS + [503]
+        async with pupil() as http:
+            asked = [answer(http, address, room) for _ in range(150)]
+            codes = [await one for one in asked]
+        assert 429 in codes[100:]
+        assert len(room.answers) == 0
+
+    serve(check)
+
+
+def test_a_class_needs_lessons(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["sandbox", "--class"]) != 0
+    assert "--class needs --lab or --lessons" in capsys.readouterr().err
+    assert json.dumps(labels(load_lesson(LESSONS / "1-one-decal.md"))).startswith('["guess"')
