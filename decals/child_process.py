@@ -1,14 +1,17 @@
-"""Processes of our own for code that may crash, hang or take much memory: readers of files, and xatlas."""
+"""Processes of our own for code that may crash, hang or take much memory: readers, xatlas, OpenUSD."""
 
 import os
 import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
+
+from blobtree.progress import check_cancelled, ended_by_cancel
 
 Child = subprocess.Popen[bytes]
 
@@ -48,6 +51,36 @@ def time_limit(child: Child, seconds: float) -> Iterator[None]:
         yield
     finally:
         timer.cancel()
+
+
+def answer_of(child: Child, work: str, given: bytes | None = None) -> tuple[bytes, bytes]:
+    """Return what a process writes to its output and its errors; it is killed if its work is cancelled.
+
+    Parameters
+    ----------
+    child
+        The process.
+    work
+        What it does, as progress reports say it.
+    given
+        Its input.
+    """
+    with child:
+        try:
+            with ended_by_cancel(partial(kill, child)):
+                answer = child.communicate(given)
+            check_cancelled(work)
+        except BaseException:
+            kill(child)
+            raise
+    return answer
+
+
+def answer_once(work: Callable[[bytes], bytes]) -> None:
+    """In a child: write the answer to its input; what libraries print goes to its errors."""
+    with os.fdopen(os.dup(1), "wb") as answer:
+        os.dup2(2, 1)
+        answer.write(work(sys.stdin.buffer.read()))
 
 
 def kill(child: Child) -> None:

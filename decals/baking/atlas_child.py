@@ -4,27 +4,22 @@ It reads arrays from stdin and writes arrays to stdout, as NumPy's archives.
 """
 
 import io
-import os
-import sys
 from collections.abc import Sequence
 from importlib import import_module
-from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
+
+from decals.child_process import answer_once
 
 Arrays: TypeAlias = Sequence[Any]
 """Arrays of different types."""
 
 
-def main() -> None:
-    """Answer one request."""
-    answer = os.fdopen(os.dup(1), "wb")
-    with Path(os.devnull).open("r+b") as nothing:  # libraries may print
-        os.dup2(nothing.fileno(), 1)
-    texels_per_unit, max_area, padding, *arrays = unpacked(sys.stdin.buffer.read())
-    with answer:
-        answer.write(packed(atlas(arrays, float(texels_per_unit), float(max_area), int(padding))))
+def answer(request: bytes) -> bytes:
+    """Return the answer to a request."""
+    texels_per_unit, max_area, padding, *arrays = unpacked(request)
+    return packed(atlas(arrays, float(texels_per_unit), float(max_area), int(padding)))
 
 
 def atlas(arrays: Arrays, texels_per_unit: float, max_area: float, padding: int) -> Arrays:
@@ -74,4 +69,4 @@ def unpacked(content: bytes) -> Arrays:
 
 
 if __name__ == "__main__":
-    main()
+    answer_once(answer)

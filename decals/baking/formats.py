@@ -8,7 +8,7 @@ from decals.baking.obj import obj_files
 from decals.baking.parts import Baked
 from decals.baking.plain_files import ply_files, stl_bytes, vtp_file
 from decals.baking.threemf import threemf_bytes
-from decals.baking.usd import MODULES, usdz_bytes
+from decals.baking.usd import usdz_bytes
 
 Files = Mapping[str, bytes]
 """Contents by names; the main file has the name ""."""
@@ -33,8 +33,7 @@ class Format:
     recipe : bool
         True if a file keeps how it was made.
     packages : tuple of (str, str)
-        Packages that the writer needs, and the extras that install them. They are imported before threads
-        start: while OpenUSD is loaded, NumPy in another thread can wait for the loader, which waits for it.
+        Packages that the writer needs, and the extras that install them.
     """
 
     write: Callable[[Baked, str], Files]
@@ -52,7 +51,6 @@ def _alone(encode: Callable[[Baked], bytes]) -> Callable[[Baked, str], Files]:
 
 
 _TRIMESH = (("trimesh", "bake"),)
-_OPENUSD = tuple((module, "usd") for module in MODULES)
 
 FORMATS: dict[str, Format] = {
     ".glb": Format(_alone(glb_bytes), ("texture", "vertices"), True, True, True, True, _TRIMESH),
@@ -61,7 +59,7 @@ FORMATS: dict[str, Format] = {
     ".ply": Format(ply_files, ("vertices", "texture"), True),
     ".stl": Format(_alone(stl_bytes)),
     ".3mf": Format(_alone(threemf_bytes), ("vertices", "texture")),
-    ".usdz": Format(_alone(usdz_bytes), ("texture", "vertices"), True, packages=_OPENUSD),
+    ".usdz": Format(_alone(usdz_bytes), ("texture", "vertices"), True, packages=(("pxr", "usd"),)),
     ".vtp": Format(_alone(vtp_file), ("vertices",), True),
 }
 """Formats by suffix."""

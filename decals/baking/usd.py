@@ -1,7 +1,14 @@
-"""USDZ files, written by OpenUSD: a mesh for each part, with one preview surface."""
+"""USDZ files, written by OpenUSD: a mesh for each part, with one preview surface.
+
+OpenUSD works in a process of its own, which runs this module: while it is loaded, NumPy in another thread can
+wait for the loader, which waits for it.
+"""
 
 import json
+import pickle
+import subprocess
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -9,10 +16,13 @@ from typing import Any
 from decals.baking.materials import ROUGHNESS, Maps
 from decals.baking.parts import METRES, Baked, Part
 from decals.baking.pictures import png_bytes
+from decals.child_process import answer_of, answer_once, can_isolate, start_child
+from decals.errors import InvalidScene
 from decals.validation import optional_package
 
 MODULES = tuple(f"pxr.{name}" for name in ("Gf", "Sdf", "Tf", "Usd", "UsdGeom", "UsdShade", "Vt"))
 """Modules of OpenUSD that write a file."""
+MODULE = "decals.baking.usd"
 
 STAGE = "scene.usdc"
 """First file of the package, as the format demands."""
@@ -25,7 +35,24 @@ def usdz_bytes(baked: Baked) -> bytes:
     ------
     MissingPackage
         If usd-core is not installed.
+    InvalidScene
+        If OpenUSD cannot write the scene.
     """
+    optional_package("pxr", "usd")
+    if not can_isolate():
+        return written(baked)
+    fresh = [replace(part) for part in baked.parts]  # without checks, which another thread adds
+    request = pickle.dumps(replace(baked, parts=fresh))
+    child = start_child(MODULE, stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+    content, errors = answer_of(child, "writing the file", request)
+    if child.returncode:
+        reason = (errors.decode(errors="replace").strip() or "it crashed").splitlines()[-1]
+        raise InvalidScene(f"OpenUSD could not write the scene ({reason:.200}); write a .glb file")
+    return content
+
+
+def written(baked: Baked) -> bytes:
+    """Return a USDZ file that OpenUSD writes in this process."""
     pxr = SimpleNamespace(**{name.rpartition(".")[2]: optional_package(name, "usd") for name in MODULES})
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -141,3 +168,7 @@ def _material(pxr: Any, stage: Any, baked: Baked) -> Any:
         for key, kind, channel in inputs:
             surface.CreateInput(key, kind).ConnectToSource(texture.ConnectableAPI(), channel)
     return material
+
+
+if __name__ == "__main__":
+    answer_once(lambda request: written(pickle.loads(request)))

@@ -3,12 +3,10 @@
 import json
 import os
 import subprocess
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from blobtree.progress import check_cancelled, ended_by_cancel
-from decals.child_process import can_isolate, kill, start_child, time_limit
+from decals.child_process import answer_of, can_isolate, start_child, time_limit
 from decals.errors import InvalidDecals
 from decals.scenes import parquet_child
 from decals.validation import optional_package
@@ -56,14 +54,8 @@ def read_parquet(path: Path) -> "pyarrow.Table":
         stdin=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    with child:
-        try:
-            with time_limit(child, PATIENCE * seconds), ended_by_cancel(partial(kill, child)):
-                answer, _ = child.communicate()
-            check_cancelled("reading the table")
-        except BaseException:
-            kill(child)
-            raise
+    with time_limit(child, PATIENCE * seconds):
+        answer, _ = answer_of(child, "reading the table")
     line, _, stream = answer.partition(b"\n")
     header = json.loads(line) if line else {}
     if "error" in header or child.returncode:
