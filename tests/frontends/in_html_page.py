@@ -2,7 +2,7 @@
 
     python -m tests.frontends.in_html_page CHECK [chromium|firefox]
 
-The checks are picture, sizes, use, touch, mounts, losses, drags and refusals.
+The checks are picture, sizes, use, touch, mounts, address, losses, drags and refusals.
 Firefox needs a display, such as that of ``xvfb-run -a``, and a version of playwright that knows it: Debian's
 Firefox 153 is driven by playwright 1.60, but not by 1.65. Touch is for Chromium alone.
 """
@@ -380,8 +380,13 @@ async def used(scene: Scene, browser: str, **options: Any) -> None:
         assert first["decals"][len(scene.decals) :] == [None]
         assert "d=" not in first["link"]
         await page.evaluate("(link) => viewer.set({ link })", link)
-        assert (await state(page))["link"] == link
+        assert np.allclose(numbers((await state(page))["link"]), numbers(link), rtol=1e-4, atol=1e-5)
         await accessible(page)
+
+
+def numbers(link: str) -> list[float]:
+    """Return the numbers of a link."""
+    return [float(text) for text in re.findall(r"-?\d+(?:\.\d+)?(?:e-?\d+)?", link)]
 
 
 async def keys_reach_the_page(page: Page) -> None:
@@ -444,6 +449,40 @@ LOSE = """() => {
   return new Promise((resolve) => setTimeout(resolve, 200));
 }"""
 """Takes the graphics card away from a page, as its reset or a full memory does."""
+
+
+async def address(browser: str) -> None:
+    """The address holds each state at rest, of which a page that opens anew begins; it says if that ends."""
+    async with shown(meshed(tree_scene()), browser=browser) as page:
+        await page.set_viewport_size({"width": 420, "height": 300})
+        await page.wait_for_timeout(1000)
+        assert await page.evaluate("location.hash") == ""
+        entries = await page.evaluate("history.length")
+        await page.locator("canvas").focus()
+        for key in ("n", "ArrowRight", "e", "Delete", "n", "+"):
+            await page.keyboard.press(key)
+        line = page.locator("[role=status]")
+        link = (await state(page))["link"]
+        await page.wait_for_function("(link) => location.hash === `#${link}`", arg=link)
+        before = await state(page)
+        await page.reload()
+        await page.wait_for_function(STARTED)
+        again = await state(page)
+        assert np.allclose(numbers(again["link"]), numbers(link), rtol=1e-4, atol=1e-5)
+        assert [row is None for row in again["decals"]] == [row is None for row in before["decals"]]
+        await page.evaluate(MANY_EDITS)
+        assert await line.inner_text() == ""
+        await line.get_by_text("no link can hold them: save a scene file").wait_for()
+        assert await page.evaluate("location.hash") == f"#{link}"
+        await page.locator("canvas").press("n")
+        await page.wait_for_timeout(1000)
+        assert "is selected" in await line.inner_text()
+        assert await page.evaluate("history.length") == entries
+
+
+MANY_EDITS = """viewer.set({ decals: Object.fromEntries(
+  viewer.get().decals.map((row, number) => [number, row && { ...row, radius: 0.9 * row.radius }])
+) })"""
 
 
 async def losses(browser: str) -> None:
@@ -731,6 +770,7 @@ CHECKS = {
     "use": use,
     "touch": touch,
     "mounts": mounts,
+    "address": address,
     "losses": losses,
     "drags": drags,
     "refusals": refusals,

@@ -16,7 +16,7 @@ __all__ = ["display"]
 pytestmark = pytest.mark.browser
 
 NEEDED = ("playwright", "axe_playwright_python", "trame_pyvista")
-HTML_CHECKS = "picture", "sizes", "use", "mounts", "losses", "drags", "refusals"
+HTML_CHECKS = "picture", "sizes", "use", "mounts", "address", "losses", "drags", "refusals"
 FIREFOX_DRIVER = 1, 60
 """The newest version of playwright that is known to start Firefox of Debian; 1.65 waits for ever."""
 FOR_NOTEBOOKS = ("nbclient", "ipykernel", "ipywidgets", "nest_asyncio2")

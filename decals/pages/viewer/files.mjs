@@ -1,19 +1,24 @@
 // What leaves a page: a link to its state, and its scene as a file.
 
 const READING = 60_000; // milliseconds in which a browser begins to read a file
+const TOO_MANY = "So many decals have changed that no link can hold them: save a scene file.";
+const NOWHERE = "A page inside a notebook has no link of its own: save a scene file.";
+
+// Why a state has no link; empty if it has one.
+const refusal = ({ link }) => (link === null ? TOO_MANY : location.protocol === "about:" ? NOWHERE : "");
+
+// Keep a state in the address; only if a file is needed instead, say so where nothing else is said.
+export function keepLink({ controls }, state) {
+  if (!refusal(state)) history.replaceState(null, "", `#${state.link}`);
+  else if (refusal(state) === TOO_MANY && !controls.status.textContent) controls.say(TOO_MANY);
+}
 
 export function copyLink(viewer) {
-  const [{ controls }, { link }] = [viewer, viewer.get()];
-  if (link === null)
-    return controls.say("So many decals have changed that no link can hold them: save a scene file.");
-  try {
-    history.replaceState(null, "", `#${link}`);
-  } catch {
-    return controls.say("A page inside a notebook has no link of its own: save a scene file.");
-  }
-  controls.say("The link of this state is in the address bar.");
+  const [{ controls }, state] = [viewer, viewer.get()];
+  keepLink(viewer, state);
+  controls.say(refusal(state) || "The link of this state is in the address bar.");
   const sayBoth = () => controls.say("The link of this state is in the address bar and in the clipboard.");
-  navigator.clipboard?.writeText(location.href).then(sayBoth, () => {}); // may be refused
+  if (!refusal(state)) navigator.clipboard?.writeText(location.href).then(sayBoth, () => {}); // may be refused
 }
 
 // The scene as a file that `decals.load_scene` takes.

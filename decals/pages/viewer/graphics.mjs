@@ -65,16 +65,13 @@ export function uploaded(gl, { array, changes, width }, description, onCard) {
   const rows = [...changes];
   changes.clear();
   if (onCard?.array !== array) {
-    if (size[1] > gl.getParameter(gl.MAX_TEXTURE_SIZE))
-      throw new Error("this device has no room for the decals");
+    if (size[1] > gl.getParameter(gl.MAX_TEXTURE_SIZE)) throw new Error("this device has no room for decals");
     return { ...makeTexture(gl, { ...description, size }, [array], onCard?.texture), array };
   }
   const inMemory = description.format.slice(1).map((word) => gl[word]);
   gl.bindTexture(gl.TEXTURE_2D, onCard.texture);
-  for (const row of rows) {
-    const part = array.subarray(row * numbers, (row + 1) * numbers);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, ROW, 1, ...inMemory, part);
-  }
+  for (const row of rows)
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, ROW, 1, ...inMemory, array, row * numbers);
   return onCard;
 }
 

@@ -15,9 +15,8 @@ export function exponentAbove(x) {
 export class DecalIndex {
   // `rules` holds constants of the index, and its parity and floor; `numbers` are those of the decals in `records`.
   constructor(rules, records, numbers) {
-    Object.assign(this, { rules, records, end: 0 });
-    this.levels = new Texels(Float32Array, 4, 1);
-    this.ids = new Texels(Int32Array, 1, 1);
+    const [levels, ids] = [new Texels(Float32Array, 4, 1), new Texels(Int32Array, 1, 1)];
+    Object.assign(this, { rules, records, levels, ids, end: 0 });
     this.seatAll([], 1);
     this.levelOf = new Map(rules.exponents.map((exponent, level) => [exponent, level]));
     for (const number of numbers) this.insert(number);
@@ -56,7 +55,7 @@ export class DecalIndex {
 
   // The cell of a key in the table: the numbers in it, and where their list lies.
   cell(key) {
-    return this.cells[this.slotOf(key)] ?? this.seat({ key, numbers: [], head: EMPTY, room: 0 });
+    return this.cells.get(this.slotOf(key)) ?? this.seat({ key, numbers: [], head: EMPTY, room: 0 });
   }
 
   // The slot of a key, or the free one where it belongs.
@@ -74,15 +73,14 @@ export class DecalIndex {
   // Write a cell into the table.
   seat(cell) {
     const slot = this.slotOf(cell.key);
-    this.used += this.cells[slot] ? 0 : 1;
-    this.cells[slot] = cell;
+    this.cells.set(slot, cell);
     this.table.set(slot, [...cell.key, cell.head]);
     return cell;
   }
 
   // Make a table of some slots at least, with some cells.
   seatAll(cells, slots) {
-    Object.assign(this, { table: new Texels(Int32Array, 4, slots, EMPTY), cells: [], used: 0 });
+    Object.assign(this, { table: new Texels(Int32Array, 4, slots, EMPTY), cells: new Map() });
     this.mask = this.table.array.length / 4 - 1;
     cells.forEach((cell) => this.seat(cell));
   }
@@ -111,7 +109,7 @@ export class DecalIndex {
       cell.numbers.splice(before + 1, 0, number);
       this.store(cell);
     }
-    if (4 * this.used > 3 * this.mask) this.seatAll(this.cells, 2 * (this.mask + 1));
+    if (4 * this.cells.size > 3 * this.mask) this.seatAll(this.cells, 2 * (this.mask + 1));
   }
 
   // Remove a decal, whose record is still unchanged, from the lists of its cells.

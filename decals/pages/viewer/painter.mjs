@@ -11,11 +11,10 @@ export class Painter {
     if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("this device cannot draw float textures");
     const side = gl.getParameter(gl.MAX_TEXTURE_SIZE);
     if (side < ROW) throw new Error(`textures have ${side} texels here, and ${ROW} are needed`);
-    Object.assign(this, { gl, canvas, header, programs: {}, textures: {} });
+    Object.assign(this, { gl, canvas, header, programs: {}, textures: {}, screen: gl.createVertexArray() });
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     gl.cullFace(gl.FRONT);
     gl.bindBufferBase(gl.UNIFORM_BUFFER, 0, gl.createBuffer()); // of the camera
-    this.screen = gl.createVertexArray();
     this.picked = makeTarget(gl, [2, 1], [header.targets.picked]);
     const renderer = gl.getExtension("WEBGL_debug_renderer_info")?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER;
     const device = gl.getParameter(renderer);

@@ -2,7 +2,7 @@
 addEventListener("hashchange", () => location.reload()); // another link was pasted
 const root = document.getElementById("viewer");
 const still = root.firstElementChild;
-mount(root, document.getElementById("data").textContent, { link: location.hash }).then(
+mount(root, document.getElementById("data").textContent, { link: location.hash, address: true }).then(
   (viewer) => (globalThis.viewer = viewer),
   (error) => {
     root.className = "";

@@ -2,6 +2,7 @@
 import { Camera } from "./camera.mjs";
 import { Controls } from "./controls.mjs";
 import { DecalSet, framed, wrongValue } from "./decals.mjs";
+import { keepLink } from "./files.mjs";
 import { History } from "./history.mjs";
 import { read, written } from "./link.mjs";
 import { unpacked } from "./packing.mjs";
@@ -14,13 +15,14 @@ const ROUNDS = 4; // in which the closest surface is found
 const NARROW = 1; // angle of view, in degrees, of a look along one ray
 const STEP = 0.25; // of a decal, in radii, at a press
 const ORBIT = Math.PI / 24; // of the model, at a press
+const REST = 500; // milliseconds without a change after which the address holds the state
 const LOST = "The graphics card has let this picture go. It returns as soon as the browser allows it.";
 
 export class Viewer {
   constructor(root, { header, arrays }, options) {
     const { mode, stiffness, scene, rules } = header;
     Object.assign(this, { header, arrays, mode, stiffness, originals: scene.decals });
-    Object.assign(this, { selected: -1, sample: 0, listeners: new Map() });
+    Object.assign(this, { selected: -1, sample: 0, listeners: new Map(), address: options.address });
     this.controls = new Controls(root, { ...header, ...options }, this);
     this.canvas = this.controls.canvas;
     this.painter = new Painter(this.canvas, header, arrays);
@@ -72,7 +74,7 @@ export class Viewer {
     canvas.height = Math.max(1, Math.round(canvas.clientHeight * devicePixelRatio));
     this.aspect = canvas.width / canvas.height;
     this.camera.fitTo(this.aspect);
-    this.changed("view");
+    this.changed("view", false);
   }
 
   // The browser has taken all textures away, as when the graphics card is reset, or allows new ones.
@@ -82,12 +84,16 @@ export class Viewer {
     this.changed("view");
   }
 
-  changed(event) {
+  // Tell of a change, and draw; the address keeps changes, but not the size of the window.
+  changed(event, keeps = this.address) {
     this.controls.say(this.painter.gl.isContextLost() ? LOST : (this.refused ?? ""));
     if (event === "view") this.refused = "";
     for (const call of this.listeners.get(event) ?? []) call(this.get());
     this.sample = 0;
     this.request();
+    if (!keeps) return;
+    clearTimeout(this.rest);
+    this.rest = setTimeout(() => keepLink(this, this.get()), REST);
   }
 
   request() {
