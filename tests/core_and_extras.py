@@ -56,7 +56,7 @@ EXTRAS: dict[str, str] = {
         dataset_colors mesh_check mesh_file tree_parts trimesh_colors vtk_child vtk_process
         """,
     "decals.surfaces.files": "*",
-    "decals.vtk": "exports injection mapper",
+    "decals.vtk": "actor_object exports injection mapper",
     "decals.window": "browser notebook opening view_modes",
 }
 """The modules of each package that are extras, ``*`` for all."""

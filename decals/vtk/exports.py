@@ -9,14 +9,16 @@ from contextvars import ContextVar
 from functools import wraps
 from typing import Any
 
+import numpy as np
 import pyvista as pv
 
+from blobtree._typing import Float64Array
 from blobtree.progress import reporting
 from decals.baking.export import TEXTURE, VERTICES, bake_parts
 from decals.baking.parts import Baked
 from decals.baking.plain_files import as_polydata
 from decals.errors import MissingPackage
-from decals.rendering.options import drawn_objects
+from decals.rendering.options import SceneLike, drawn_objects
 
 WATCHED = "add_on_render_callback"
 """Method of a plotter that every view of trame-pyvista calls."""
@@ -35,7 +37,7 @@ TRAME = "trame"
 """Component of a plotter, of the package trame-pyvista, that has the exports for browsers too."""
 
 BAKED = "plotter.decals, baked"
-"""Name in pyvista of the actor with baked decals, while an export writes it."""
+"""Beginning of the names in pyvista of actors with baked decals, while an export writes them."""
 
 TEXTURE_SIZE, TEXTURE_SAMPLES = 1024, 2
 """Width and height of baked textures in texels, and the samples along each axis of a texel."""
@@ -85,25 +87,32 @@ def _baking_exporter(name: str, method: Any, plotter: Any) -> Any:
             return method(*arguments, **options)
         with ExitStack() as stack:
             for subplot in plotter.decals.subplots:
-                if len(subplot.applied):
-                    _warn(
-                        f"{name} writes actors of VTK without the decals that plotter.decals.apply shows on "
-                        "them; add their meshes with plotter.decals.add_mesh instead"
-                    )
-                baked = _baked_scene(name, subplot)
-                if baked is not None:
-                    stack.enter_context(_shown(baked, subplot))
+                for number, (scene, actor, world) in enumerate(_sources(subplot)):
+                    made = _actor(_baked(name, scene, subplot))
+                    made.user_matrix = world
+                    if actor is not subplot.actor:
+                        made.GetProperty().DeepCopy(actor.GetProperty())
+                        made.prop.color = "white"
+                    stack.enter_context(_shown(made, f"{BAKED} {number}", actor, subplot.vtk_renderer))
             stack.enter_context(_silent_views())
             return method(*arguments, **options)
 
     return export
 
 
-def _baked_scene(name: str, subplot: Any) -> Baked | None:
-    """Return the objects of a subplot with baked decals; None without objects."""
-    scene = subplot.scene
-    if scene is None or not drawn_objects(scene):
-        return None
+def _sources(subplot: Any) -> Iterator[tuple[SceneLike, Any, Float64Array]]:
+    """Yield each scene of a subplot to bake, the actor that shows it, and the matrix to the world."""
+    if subplot.scene is not None and drawn_objects(subplot.scene):
+        yield subplot.scene, subplot.actor, np.eye(4)
+    for injection in subplot.applied:
+        found = injection.as_scene() if injection.actor.GetVisibility() else None
+        if found is not None:
+            scene, world = found
+            yield scene, injection.actor, world
+
+
+def _baked(name: str, scene: SceneLike, subplot: Any) -> Baked:
+    """Return the objects of a scene with baked decals, drawn as a subplot draws them."""
     options = subplot.drawing.modes | {"size": TEXTURE_SIZE, "samples": TEXTURE_SAMPLES}
     with reporting() as report:
         try:
@@ -114,11 +123,10 @@ def _baked_scene(name: str, subplot: Any) -> Baked | None:
 
 
 @contextmanager
-def _shown(baked: Baked, subplot: Any) -> Iterator[None]:
-    """Show what is baked as an actor in place of the objects of a subplot."""
-    renderer = subplot.vtk_renderer
-    with _hidden(subplot.actor):
-        actor, _ = renderer.add_actor(_actor(baked), name=BAKED, reset_camera=False, render=False)
+def _shown(made: pv.Actor, name: str, hidden: Any, renderer: Any) -> Iterator[None]:
+    """Show an actor in place of another one."""
+    with _hidden(hidden):
+        actor, _ = renderer.add_actor(made, name=name, reset_camera=False, render=False)
         try:
             yield
         finally:
@@ -127,7 +135,7 @@ def _shown(baked: Baked, subplot: Any) -> Iterator[None]:
 
 @contextmanager
 def _hidden(proxy: Any) -> Iterator[None]:
-    """Hide a proxy actor, which an exporter would draw, also before the window has OpenGL."""
+    """Hide an actor, which an exporter would draw, also before the window has OpenGL."""
     visible = proxy.GetVisibility()
     proxy.SetVisibility(False)
     try:

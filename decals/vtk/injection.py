@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
@@ -16,16 +17,21 @@ from blobtree._typing import Float64Array
 from decals.errors import InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.hosts.code import Code, code_of
-from decals.receivers import EVERYTHING, surface_mask
+from decals.index.editor import DecalEditor
+from decals.receivers import EVERYTHING, codes_of, surface_mask
 from decals.rendering import Drawing, Renderer, SceneLike
 from decals.rendering.decal_data import DecalData
 from decals.rendering.decal_library import Form
 from decals.rendering.image_array import ImageArray
 from decals.rendering.viewpoint import Projection
+from decals.scenes.cover import as_scene
+from decals.scenes.origin import WORLD
+from decals.scenes.scene import Scene
 from decals.shaders import compose
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.surfaces.windings import MeshOrientation
 from decals.validation import describe
+from decals.vtk.actor_object import actor_object
 from decals.vtk.adapters import matrix_of, vtk_projection
 from decals.vtk.mapper import NORMALS, ShaderAdditions, ShaderTag, SmoothNormals, polygon_mapper
 
@@ -118,7 +124,8 @@ class Injection:
     ) -> None:
         self.actor, self._follow, self._labels, self._paint = actor, follow, labels, paint
         self._mapper = polygon_mapper(actor)
-        self._normals = SmoothNormals(crease_angle, orientation)
+        self._shape: dict[str, Any] = {"crease_angle": crease_angle, "orientation": orientation}
+        self._normals = SmoothNormals(**self._shape)
         self._add_normals()
         self._mapper.SetVBOShiftScaleMethod(NO_SHIFT_SCALE)
         self._subplot = weakref.ref(subplot)
@@ -207,6 +214,24 @@ class Injection:
     def _world_matrix(self, subplot: InjectionTarget) -> Float64Array:
         """Return the matrix from the decals' space to the world."""
         return matrix_of(self.actor) if self._follow else subplot.world_matrix()
+
+    def as_scene(self) -> tuple[Scene, Float64Array] | None:
+        """Return the actor as an object under its decals, and the matrix from it to the world.
+
+        None without polygons or without decals.
+        """
+        subplot = self._subplot()
+        if subplot is None or subplot.scene is None:
+            return None
+        scene, world = subplot.scene, self._world_matrix(subplot)
+        model = np.linalg.inv(world) @ matrix_of(self.actor)
+        item = actor_object(self.actor, self._mapper, model, origin=WORLD, **self._shape)
+        if item is None:
+            return None
+        rows = scene.decals.decals if isinstance(scene.decals, DecalEditor) else scene.decals
+        bits = codes_of(rows.receivers, rows.receiver_table)
+        rows = rows[np.flatnonzero(self._mask(subplot) >> bits & 1)].replace(receivers=None)
+        return as_scene(item).replace(decals=rows, images=scene.images, drawing=subplot.drawing), world
 
     def release(self) -> None:
         """Restore the actor."""
@@ -299,9 +324,9 @@ class InjectedDecals:
             )
         )
 
-    def __len__(self) -> int:
-        """Return the number of actors with decals."""
-        return len(self._injections)
+    def __iter__(self) -> Iterator[Injection]:
+        """Return an iterator over the actors with decals."""
+        return iter(self._injections)
 
     def refuse(self, mapping: ImageMapping) -> bool:
         """Return True if there are actors that cannot be drawn in a mapping."""

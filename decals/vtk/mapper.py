@@ -200,9 +200,9 @@ class SmoothNormals(_Filter):  # type: ignore[misc]
 
 def turned_cells(dataset: pv.DataSet, orientation: MeshOrientation) -> NDArray[np.bool_]:
     """Return the cells of a dataset's surface to turn for an orientation, ``bool[n]``; see `wind`."""
-    surface, _ = _surface(dataset)
+    surface, _ = surface_of(dataset)
     turned = np.zeros(surface.n_cells, np.bool_)
-    triangles, cells = _triangles(surface)
+    triangles, cells = triangles_of(surface)
     if len(triangles):
         turned[cells[turned_faces(np.asarray(surface.points, np.float32), triangles, orientation)]] = True
     return turned
@@ -219,7 +219,7 @@ def split_polygons(
         return dataset
     mixed = turned is not None and turned.any() and not turned.all() and not dataset.n_strips
     alike = _with_turned_polygons(dataset, turned) if turned is not None and mixed else dataset
-    triangles, _ = _triangles(alike)
+    triangles, _ = triangles_of(alike)
     split = split_at_creases(np.asarray(dataset.points, np.float32), triangles, crease_angle)
     if len(split.rows) == dataset.n_points:
         return dataset
@@ -265,8 +265,8 @@ def smooth_normals(dataset: pv.DataSet, turned: NDArray[np.bool_] | None = None)
     Cells that are ``turned`` wind in the opposite direction for that.
     """
     normals = np.zeros((dataset.n_points, 3), np.float32)
-    surface, where = _surface(dataset)
-    triangles, cells = _triangles(surface)
+    surface, where = surface_of(dataset)
+    triangles, cells = triangles_of(surface)
     if len(triangles):
         if turned is not None:
             triangles = np.where(turned[cells][:, None], triangles[:, ::-1], triangles)
@@ -274,7 +274,7 @@ def smooth_normals(dataset: pv.DataSet, turned: NDArray[np.bool_] | None = None)
     return normals
 
 
-def _triangles(surface: pv.PolyData) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+def triangles_of(surface: pv.PolyData) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Return the triangles of the polygons of a surface, and the cell of each."""
     numbered = pv.PolyData()
     numbered.CopyStructure(surface)
@@ -285,7 +285,7 @@ def _triangles(surface: pv.PolyData) -> tuple[NDArray[np.int32], NDArray[np.int6
     return triangles, cells[len(cells) - len(triangles) :]
 
 
-def _surface(dataset: pv.DataSet) -> tuple[pv.PolyData, Any]:
+def surface_of(dataset: pv.DataSet) -> tuple[pv.PolyData, Any]:
     """Return the outer faces, and the indices of their points in the dataset."""
     if isinstance(dataset, pv.PolyData):
         return dataset, slice(None)

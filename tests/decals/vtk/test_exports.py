@@ -17,6 +17,7 @@ import pytest
 import pyvista as pv
 from PIL import Image
 
+from decals import Decals
 from decals.baking import box_atlas
 from decals.scenes.scene import Scene
 from decals.vtk import exports
@@ -116,7 +117,7 @@ def test_files_have_the_colours_of_the_decals(
     assert colors_are_right(points[inside], normals[inside], uv[inside], texture, scene)
     np.testing.assert_array_equal(shot(pl), before)
     assert set(pl.renderer.actors) >= {"own", "plotter.decals"}
-    assert exports.BAKED not in pl.renderer.actors
+    assert not [name for name in pl.renderer.actors if name.startswith(exports.BAKED)]
 
 
 @pytest.mark.slow
@@ -182,14 +183,59 @@ def test_an_export_before_the_first_frame_only_warns(
     assert np.ptp(shot(pl)) > 0
 
 
-def test_decals_on_actors_are_left_out_with_a_warning(plotter: Factory, tmp_path: Path) -> None:
-    pl = plotter()
-    actor = pl.add_mesh(pv.Sphere(), color="tan")
-    pl.decals.apply(actor)
-    pl.decals.add(ball_and_cube(count=4).decals.replace(images=[-1] * 4))
-    shot(pl)
-    with pytest.warns(UserWarning, match="without the decals that plotter.decals.apply shows"):
-        pl.export_gltf(str(tmp_path / "a.gltf"))
+GREENS = np.full((64, 64, 3), 255, np.uint8)
+GREENS[..., 1] = np.add.outer(np.arange(0, 192, 3), np.arange(64))
+"""A texture that leaves red and blue decals as they are, as VTK multiplies them by it."""
+ACTORS: dict[str, Callable[[pv.PolyData], dict[str, Any]]] = {
+    "color": lambda _: {"color": (0.8, 0.4, 0.2)},
+    "points": lambda ball: {"scalars": ball.points[:, 2]},
+    "cells": lambda ball: {"scalars": np.arange(ball.n_cells) // 700, "n_colors": 5},
+    "texture": lambda _: {"texture": GREENS},
+}
+"""Options of actors with a colour, scalars of points and cells, and a texture."""
+
+
+@pytest.mark.parametrize("look", ACTORS)
+@pytest.mark.parametrize("follow", [True, False])
+def test_decals_on_actors_are_baked(
+    plotter: Factory, monkeypatch: pytest.MonkeyPatch, look: str, follow: bool
+) -> None:
+    """Without light, the actor with baked decals looks as that whose shader draws them."""
+    need("xatlas")
+    seen: list[Array] = []
+    monkeypatch.setattr(pv.Plotter, "export_gltf", lambda plotter, _: seen.append(shot(plotter)))
+    pl: Any = plotter()
+    ball: Any = pv.Sphere(theta_resolution=40, phi_resolution=40).texture_map_to_sphere()
+    actor = pl.add_mesh(ball, lighting=False, **ACTORS[look](ball))
+    actor.user_matrix = np.array([[0, -2, 0, 1], [2, 0, 0, 2], [0, 0, 2, 3], [0, 0, 0, 1.0]])
+    place = Decals(
+        positions=[(0.1, 0.1, 0.5), (0.3, 0, 0.4)],
+        normals=[(0, 0, 1)] * 2,
+        tangents=[(1, 0, 0)] * 2,
+        radii=0.25,
+    )
+    if not follow:
+        matrix = np.asarray(actor.user_matrix)
+        turn = matrix[:3, :3] / 2
+        place = place.replace(
+            positions=place.positions @ matrix[:3, :3].T + matrix[:3, 3],
+            normals=place.normals @ turn.T,
+            tangents=place.tangents @ turn.T,
+            radii=2 * place.radii,
+        )
+    pl.decals.apply(actor, follow=follow, labels=["ball"])
+    pl.decals.add(place.replace(images=[-1, -1], tints=[(1, 0, 0), (0, 0, 1)], receivers=["", ""]))
+    pl.view_xy()
+    live = shot(pl)
+    pl.export_gltf("a.gltf")
+    np.testing.assert_array_equal(shot(pl), live)
+    (baked,) = seen
+    inner = (baked != live[0, 0]).any(axis=2) & (live != live[0, 0]).any(axis=2)
+    off = np.abs(baked - live).max(axis=2)[inner]
+    assert inner.mean() > 0.1
+    assert (off <= 12).mean() > 0.97
+    hits = [(live[..., one] > 2 * live[..., other]) & inner for one, other in ((0, 2), (2, 0))]
+    assert np.min([hit.sum() for hit in hits]) > 100
 
 
 def test_an_export_that_fails_leaves_the_plotter_as_it_was(plotter: Factory, tmp_path: Path) -> None:
@@ -226,6 +272,6 @@ def test_exports_of_the_component_of_trame_are_watched(plotter: Factory) -> None
         component.export_html()
     with pytest.warns(UserWarning, match="export_vtksz writes VTK's own actors"):
         component.export_vtksz()
-    assert component.written == [{exports.BAKED}, set()]
+    assert component.written == [{f"{exports.BAKED} 0"}, set()]
     pl.close()
     assert "export_html" not in vars(component)
