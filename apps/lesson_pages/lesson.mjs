@@ -1,17 +1,15 @@
 // A lesson: its guess, sliders, tasks, probe and plots beside the viewer.
-import { Camera } from "../../decals/pages/viewer/camera.mjs";
 import { History } from "../../decals/pages/viewer/history.mjs";
-import { unpacked } from "../../decals/pages/viewer/packing.mjs";
 import { add, scaled } from "../../decals/pages/viewer/vectors.mjs";
-import { Viewer } from "../../decals/pages/viewer/viewer.mjs";
+import { mount } from "../../decals/pages/viewer/viewer.mjs";
 import { send } from "./answers.mjs";
 import { Measures, numbersOver } from "./measures.mjs";
 import { drawCurves, drawMap } from "./plots.mjs";
 import { puzzleOf, share, showScores } from "./puzzles.mjs";
 
 const AXES = ["x", "y", "z"];
+const USUAL = { interaction: "push", layer: 0, opacity: 1 }; // what rows leave out
 const LEAST = 1e-6; // that is not shown as 0: fields have the precision of float32
-const RAY = 1; // angle of view, in degrees, of a look along one ray
 const REST = 60; // milliseconds without a change, after which the whole map is read
 
 // A value as a text: three digits, yes or no.
@@ -28,25 +26,23 @@ class LessonPage {
     Object.assign(this, { root, viewer, lesson, formulas, tried: false, probe: lesson.probe });
     this.measures = new Measures(viewer, lesson);
     this.sliders = [...root.querySelectorAll("[data-path]")];
-    this.positions = this.sliders.map(() => 0);
     this.canvases = [...root.querySelectorAll(".plot canvas")];
     viewer.header.shaders.ends.measure = lesson.shader;
-    for (const [number, input] of this.sliders.entries()) {
-      input.addEventListener("input", () => this.slide(number, input.value));
+    for (const input of this.sliders) {
+      input.addEventListener("input", () => this.slide(input));
       input.addEventListener("change", () => (this.step = null));
     }
-    root.querySelector("[name=again]").addEventListener("click", () => this.begin());
-    root.querySelector("[name=check]").addEventListener("click", () => this.check());
-    root.querySelector("[name=share]")?.addEventListener("click", () => share(this));
-    root.querySelector("[name=skip]")?.addEventListener("click", () => this.see(null));
-    root.querySelector(".send")?.addEventListener("submit", (event) => {
-      event.preventDefault();
-      send(this, event.target);
-    });
-    root.querySelector("form.guess")?.addEventListener("submit", (event) => {
-      event.preventDefault();
-      this.see(Number(event.target.guess.value));
-    });
+    const on = (selector, event, call) =>
+      root.querySelector(selector)?.addEventListener(event, (given) => {
+        given.preventDefault(); // no form asks the server
+        call(given.target);
+      });
+    on("[name=again]", "click", () => this.begin());
+    on("[name=check]", "click", () => this.check());
+    on("[name=share]", "click", () => share(this));
+    on("[name=skip]", "click", () => this.see(null));
+    on(".send", "submit", (form) => send(this, form));
+    on("form.guess", "submit", (form) => this.see(Number(form.guess.value)));
     this.addProbe();
     for (const event of ["view", "decals"]) viewer.on(event, () => this.changed(event === "decals"));
     addEventListener("hashchange", () => {
@@ -78,15 +74,8 @@ class LessonPage {
     for (const name of ["mode", "stiffness"]) viewer.set({ [name]: lesson[name] });
     viewer.header.uniforms.decal_mapping = ["1i", lesson.mappings.indexOf(lesson.mapping)];
     this.sliders.forEach((input) => (input.value = input.dataset.value));
-    this.positions = this.sliders.map((input) => Number(input.dataset.place ?? 0));
-    Object.assign(this, {
-      probe: lesson.probe,
-      tried: false,
-      guess: undefined,
-      step: null,
-      waits: !!lesson.guess,
-      puzzle: puzzleOf(location.hash, lesson),
-    });
+    Object.assign(this, { probe: lesson.probe, tried: false, guess: undefined, step: null });
+    Object.assign(this, { waits: !!lesson.guess, puzzle: puzzleOf(location.hash, lesson) });
     this.history(this.waits ? viewer.originals : lesson.rows);
     viewer.set({ selected: -1, camera: viewer.camera.home });
     this.changed(true);
@@ -110,37 +99,41 @@ class LessonPage {
     this.root.querySelector(".question").focus();
   }
 
-  slide(number, value) {
-    const input = this.sliders[number];
-    const { path } = input.dataset;
+  // What a slider moves: its value, and the function that sets it.
+  parameter({ dataset }) {
     const { viewer, lesson } = this;
-    const amount = input.type === "range" ? Number(value) : value;
-    const [first, which, name] = path.split(".");
-    if (path === "contact") viewer.set({ mode: value });
-    else if (path === "stiffness") viewer.set({ stiffness: amount });
-    else if (path === "mapping")
-      viewer.header.uniforms.decal_mapping = ["1i", lesson.mappings.indexOf(value)];
-    else if (first === "probe")
-      this.probe = this.probe.map((old, axis) => (AXES[axis] === which ? amount : old));
-    else if (first === "decals") this.edit(which, name, amount);
-    else this.positions[number] = input.selectedIndex ?? Math.round((amount - input.min) / input.step);
-    viewer.set({});
+    const { uniforms } = viewer.header;
+    const [first, which, name] = dataset.path.split(".");
+    const row = viewer.decals.rows[which === "*" ? 0 : which];
+    const axis = AXES.indexOf(which);
+    const setMapping = (kind) => (uniforms.decal_mapping = ["1i", lesson.mappings.indexOf(kind)]);
+    const parameters = {
+      contact: [viewer.mode, (mode) => viewer.set({ mode })],
+      stiffness: [viewer.stiffness, (stiffness) => viewer.set({ stiffness })],
+      mapping: [lesson.mappings[uniforms.decal_mapping[1]], setMapping],
+      probe: [
+        this.probe[axis],
+        (value) => (this.probe = this.probe.map((old, i) => (i === axis ? value : old))),
+      ],
+      decals: [
+        row?.position[AXES.indexOf(name)] ?? row?.[name] ?? USUAL[name],
+        (value) => this.edit(which, name, value),
+      ],
+    };
+    return parameters[first] ?? []; // the sliders of a table are read when its state is shown
+  }
+
+  slide(input) {
+    this.parameter(input)[1]?.(input.type === "range" ? Number(input.value) : input.value);
+    this.viewer.set({});
     this.changed(true);
   }
 
   edit(which, name, value) {
     const { viewer } = this;
     const numbers = which === "*" ? viewer.decals.numbers : [Number(which)];
-    const moved = (row) => {
-      const position = row.position.map((old, axis) => (AXES[axis] === name ? value : old));
-      const above = {
-        position: add(position, scaled(row.normal, row.radius)),
-        target: position,
-        up: row.tangent,
-      };
-      const seen = new Camera({ ...above, fov: RAY }, viewer.header.bounds);
-      return viewer.pick(0, 0, seen).surface ?? {};
-    };
+    const moved = (row) =>
+      viewer.under(row, row.position.map((old, axis) => (AXES[axis] === name ? value : old)), row.tangent); // prettier-ignore
     const change = (row) => (AXES.includes(name) ? moved(row) : { [name]: value });
     const rows = numbers.map((number) => [number, viewer.decals.rows[number]]).filter(([, row]) => row);
     this.step = viewer.edit(rows.map(([number, row]) => [number, { ...row, ...change(row) }]), this.step); // prettier-ignore
@@ -175,7 +168,7 @@ class LessonPage {
     if (!own.length) this.probe = place;
     for (const input of own) {
       input.value = place[AXES.indexOf(input.dataset.path.at(-1))];
-      this.slide(this.sliders.indexOf(input), input.value);
+      this.slide(input);
     }
     this.changed(true);
   }
@@ -209,30 +202,25 @@ class LessonPage {
     if (!this.isOther || viewer.painter.gl.isContextLost()) return;
     this.isOther = false;
     this.measures.known.clear();
-    const state = this.positions.reduce(
-      (all, place, i) => all * Number(this.sliders[i].dataset.count ?? 1) + place,
-      0,
-    );
+    const place = ({ value, min, step }) => Math.round((value - min) / step);
+    const state = this.sliders.reduce((all, input) => all * Number(input.dataset.count) + place(input), 0);
     this.measures.state = state;
     if (lesson.states) this.showState(this.waits ? lesson.states : state);
     root.dataset.waits = this.waits;
     this.sliders.forEach((input) => this.showSlider(input));
     if (this.waits) return;
-    const known = this.probe && !lesson.states;
     this.attempt(() => {
-      this.point = known ? this.measures.above({ position: this.probe, normal: lesson.up }) : {};
-      if (known) root.querySelector(".readings").replaceChildren(this.readings());
+      this.point = lesson.states ? {} : this.measures.above({ position: this.probe, normal: lesson.up });
+      if (!lesson.states) root.querySelector(".readings").replaceChildren(this.readings());
       this.showPlots(false);
     });
     clearTimeout(this.rest);
-    this.rest = setTimeout(() => this.attempt(() => this.showWhole()), REST);
-  }
-
-  // Show what follows from the whole map, once nothing moves.
-  showWhole() {
-    this.showValues();
-    this.showPlots(true);
-    this.root.dataset.shown = performance.now();
+    const showWhole = () => {
+      this.showValues();
+      this.showPlots(true);
+      root.dataset.shown = performance.now();
+    };
+    this.rest = setTimeout(() => this.attempt(showWhole), REST); // what follows from the whole map, once nothing moves
   }
 
   attempt(call) {
@@ -259,19 +247,9 @@ class LessonPage {
   }
 
   showSlider(input) {
-    const { viewer, lesson } = this;
-    const [first, which, name] = input.dataset.path.split(".");
-    const row = viewer.decals.rows[which === "*" ? 0 : which];
-    const value = {
-      contact: () => viewer.mode,
-      stiffness: () => viewer.stiffness,
-      mapping: () => lesson.mappings[viewer.header.uniforms.decal_mapping[1]],
-      probe: () => this.probe[AXES.indexOf(which)],
-      decals: () =>
-        row?.position[AXES.indexOf(name)] ?? row?.[name] ?? { interaction: "push", layer: 0 }[name],
-    }[first]?.();
-    if (value !== undefined && document.activeElement !== input) input.value = value;
-    if (input.type === "range") input.nextElementSibling.textContent = this.say(Number(value ?? input.value));
+    const [value = Number(input.value)] = this.parameter(input);
+    if (document.activeElement !== input) input.value = value;
+    if (input.type === "range") input.nextElementSibling.textContent = this.say(Number(value));
   }
 
   showValues() {
@@ -303,74 +281,53 @@ class LessonPage {
   // A table of the symbols at the probe, for the decal that shows and for its strongest neighbour.
   readings() {
     const { measures, point, viewer } = this;
-    const field = (number) => measures.f(point, number);
-    const sorted = viewer.decals.numbers.sort((a, b) => field(b) - field(a));
+    const { words } = this.lesson;
+    const sorted = viewer.decals.numbers.sort((a, b) => measures.f(point, b) - measures.f(point, a));
     const own = point.owner >= 0 ? point.owner : sorted[0];
     const other = sorted.find((number) => number !== own);
     const pair = [own, other].filter((number) => number !== undefined).sort((a, b) => a - b);
     const kind = (number) => `${measures.layer(point, number)} ${measures.interaction(point, number)}`;
-    const isPush =
-      pair.length > 1 && pair.every((number) => kind(number) === kind(own) && kind(own).endsWith("push"));
+    const isPush = pair.every((number) => kind(number) === kind(own) && kind(own).endsWith("push"));
     const known = pair.length > 1 && ["product", "min"].includes(viewer.mode);
     const h = known ? (isPush ? measures.h(point, other, own) : 1) : NaN;
-    const ofPoint = { h, F: measures.F(point), [this.lesson.words.stretch]: point.stretch };
-    const columns = {
-      [this.lesson.words.decal]: (number) => number,
-      ...Object.fromEntries(["r", "s", "d", "f"].map((name, i) => [name, (n) => measures[["radius", "influence", "d", "f"][i]](point, n)])), // prettier-ignore
-    };
+    const columns = { [words.decal]: (q, number) => number, r: measures.radius, s: measures.influence, d: measures.d, f: measures.f }; // prettier-ignore
+    const ofPoint = { h, F: measures.F(point), [words.stretch]: point.stretch };
+    const cell = (tag, text) => `<${tag}>${text}</${tag.slice(0, 2)}>`;
+    const names = [...Object.keys(columns), ...Object.keys(ofPoint)];
+    const both = Object.values(ofPoint).map((value) => cell(`td rowspan="${pair.length}"`, this.say(value)));
+    const ofDecal = (number) => Object.values(columns).map((of) => cell("td", this.say(of(point, number))));
+    const rows = [names.map((name) => cell('th scope="col"', name)), ...pair.map(ofDecal)];
+    rows[1]?.push(...both);
     const table = document.createElement("table");
-    const cell = (tag, text) => `<${tag}>${text}</${tag.split(" ")[0]}>`;
-    const head = [...Object.keys(columns), ...Object.keys(ofPoint)].map((name) =>
-      cell('th scope="col"', name),
-    );
-    const rows = pair.map((number, i) => [
-      ...Object.values(columns).map((of) => cell("td", this.say(of(number)))),
-      ...(i
-        ? []
-        : Object.values(ofPoint).map((value) => cell(`td rowspan="${pair.length}"`, this.say(value)))),
-    ]);
-    table.innerHTML = [head, ...rows].map((cells) => cell("tr", cells.join(""))).join("");
+    table.innerHTML = rows.map((cells) => cell("tr", cells.join(""))).join("");
     return table;
   }
 
   // Show the maps, or the curves.
   showPlots(areMaps) {
     const { lesson, measures, root } = this;
-    const say = (value) => this.say(value);
     lesson.plots.forEach((plot, number) => {
       if (Boolean(plot.map) !== areMaps) return;
       const canvas = this.canvases[number];
       const formula = plot.formula.find(({ when }) => this.value(when));
       root.querySelectorAll(".plot .formula")[number].innerHTML = formula ? this.filled(formula.text) : "";
       const marks = plot.marks.map((pair) => pair.map((text) => this.value(text)));
-      const look = { ends: plot.values, marks, say };
+      const look = { ends: plot.values, marks, say: (value) => this.say(value) };
+      const ofScene = () => (plot.map ? measures.map : measures.curve);
+      const points = lesson.states ? plot.at.map((x) => ({ x })) : plot.x ? numbersOver(plot.x, plot.y) : ofScene(); // prettier-ignore
+      const at = (text) => (point) => plot.map && !point.exists ? NaN : Number(this.value(text, point)); // prettier-ignore
+      const values = (text) => (lesson.states ? this.value(text) : points.map(at(text)));
       if (plot.map) {
-        const points = plot.x ? numbersOver(plot.x, plot.y) : measures.map;
-        const values = (text) =>
-          points.map((point) => (point.exists ? Number(this.value(text, point)) : NaN));
-        const half = lesson.size / 2;
-        const ends = plot.x ? { x: plot.x, y: plot.y } : { x: [-half, half], y: [-half, half] };
+        const side = [-lesson.size / 2, lesson.size / 2];
         if (!plot.x) marks.push(measures.onPlane(this.point.position));
-        const regions = plot.x
-          ? values(plot.map).map((value) => value >= 0.5)
-          : points.map(({ owner }) => owner);
+        const shades = values(plot.map);
+        const regions = plot.x ? shades.map((value) => value >= 0.5) : points.map(({ owner }) => owner);
         const red = plot.red && values(plot.red).map((value) => value > 0);
-        drawMap(canvas, {
-          ...look,
-          ...ends,
-          values: values(plot.map),
-          red,
-          redLabel: plot.redLabel,
-          regions,
-        });
-      } else if (lesson.states) {
-        const curves = plot.curves.map(({ label, formula: text }) => ({ label, values: this.value(text) }));
-        drawCurves(canvas, { ...look, x: plot.at, curves });
+        const [x, y] = [plot.x ?? side, plot.y ?? side];
+        drawMap(canvas, { ...look, x, y, values: shades, red, redLabel: plot.redLabel, regions });
       } else {
-        const points = plot.x ? numbersOver(plot.x) : measures.curve;
-        const values = (text) => points.map((point) => Number(this.value(text, point)));
         const curves = plot.curves.map(({ label, formula: text }) => ({ label, values: values(text) }));
-        const here = plot.x ? NaN : measures.onLine(this.point.position);
+        const here = plot.x || lesson.states ? NaN : measures.onLine(this.point.position);
         drawCurves(canvas, { ...look, x: points.map(({ x }) => x), curves, here });
       }
     });
@@ -397,16 +354,14 @@ class LessonPage {
 export async function begin(root, data, lesson, formulas) {
   const place = root.querySelector("#viewer");
   const still = place.firstElementChild;
-  try {
-    const viewer = new Viewer(place, await unpacked(data), {});
-    viewer.resize();
-    const page = new LessonPage(root, viewer, lesson, formulas);
+  let page;
+  const prepare = (viewer) => {
+    page = new LessonPage(root, viewer, lesson, formulas);
     if (lesson.states) page.showState(lesson.states);
-    viewer.draw();
-    viewer.painter.finish();
-    performance.mark("first frame");
+  };
+  try {
+    await mount(place, data, { prepare });
     page.show();
-    setTimeout(() => viewer.painter.decalProgram("pick", viewer)); // so that the first click does not wait
     root.dataset.ready = true;
     return page;
   } catch (error) {

@@ -1,16 +1,8 @@
 // The measures of formulas: numbers of the scene, fields at points, and what the shader knows there.
 import { Camera } from "../../decals/pages/viewer/camera.mjs";
 import { makeTarget } from "../../decals/pages/viewer/graphics.mjs";
-import {
-  add,
-  cross,
-  dot,
-  length,
-  scaled,
-  subtract,
-  tangential,
-  unit,
-} from "../../decals/pages/viewer/vectors.mjs";
+import { add, cross, dot, length, scaled } from "../../decals/pages/viewer/vectors.mjs";
+import { subtract, tangential, unit } from "../../decals/pages/viewer/vectors.mjs";
 
 const SIDE = 120; // pixels of a map
 const SAMPLES = 201; // of a curve

@@ -319,7 +319,7 @@ def _slider(slider: Slider, lesson: Lesson, words: Translation, table: Table | N
     data = f'data-path="{html.escape(slider.path)}" data-value="{html.escape(str(value))}"'
     if table is not None and slider.path in table.positions:
         positions = table.positions[slider.path]
-        data += f' data-count="{len(positions)}" data-place="{table.start[slider.path]}"'
+        data += f' data-count="{len(positions)}"'
     label = f"<label><span>{marked_text(words.said(slider.label), words.definitions)}</span>"
     if slider.choices:
         options = "".join(

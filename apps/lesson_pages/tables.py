@@ -32,8 +32,6 @@ class Table:
     ----------
     positions
         Positions of each slider, by its path.
-    start
-        Number of the first position of each slider in the lesson's own scene.
     objects
         A model for each state.
     line
@@ -43,7 +41,6 @@ class Table:
     """
 
     positions: dict[str, list[float]]
-    start: dict[str, int]
     objects: list[SceneObject]
     line: list[float]
     values: dict[str, list[Any]]
@@ -81,11 +78,6 @@ def tabulated(lesson: Lesson) -> Table:
     """
     settings, positions = lesson.settings, positions_of(lesson)
     paths = [binding(path) for path in positions]
-    begin = [path.read(lesson.scene.objects, lesson.scene.decals) for path in paths]
-    start = {
-        name: int(np.argmin(np.abs(np.subtract(places, value))))
-        for (name, places), value in zip(positions.items(), begin, strict=True)
-    }
     curves = {
         curve.formula: lesson.formulas[curve.formula] for plot in settings.plots for curve in plot.curves
     }
@@ -113,7 +105,7 @@ def tabulated(lesson: Lesson) -> Table:
             values[text].append([_short(value) for value in found])
         for text, formula in scalars.items():
             values[text].append(_short(np.ravel(formula.evaluate(scope))[0]))
-    return Table(positions, start, models, line, values)
+    return Table(positions, models, line, values)
 
 
 def _experiment(lesson: Lesson, objects: tuple[SceneObject, ...]) -> Experiment:

@@ -155,13 +155,17 @@ export class Viewer {
   // Move the selected decal along the surface, to where a look from above ends; or turn the model.
   arrow(right, up) {
     if (this.selected < 0) return this.moveCamera("orbit", ORBIT * right, ORBIT * up);
-    const { position, normal, radius } = this.decals.rows[this.selected];
-    const along = this.camera.upAlong(normal);
-    const step = add(scaled(cross(along, normal), right), scaled(along, up));
-    const target = add(position, scaled(step, STEP * radius));
-    const above = { position: add(target, scaled(normal, radius)), target, up: along, fov: NARROW };
-    const hit = this.pick(0, 0, new Camera(above, this.header.bounds)).surface;
-    if (hit && length(subtract(hit.position, position)) < 3 * radius) this.moveTo(hit);
+    const row = this.decals.rows[this.selected];
+    const along = this.camera.upAlong(row.normal);
+    const step = add(scaled(cross(along, row.normal), right), scaled(along, up));
+    const hit = this.under(row, add(row.position, scaled(step, STEP * row.radius)), along);
+    if (hit && length(subtract(hit.position, row.position)) < 3 * row.radius) this.moveTo(hit);
+  }
+
+  // The surface that is seen at a place, from a radius above it along the normal of a decal; null for none.
+  under({ normal, radius }, target, up) {
+    const above = { position: add(target, scaled(normal, radius)), target, up, fov: NARROW };
+    return this.pick(0, 0, new Camera(above, this.header.bounds)).surface;
   }
 
   addAt(x, y) {
@@ -195,6 +199,7 @@ export async function mount(root, data, options = {}) {
   const viewer = new Viewer(root, await unpacked(data), options);
   if (options.link) viewer.set({ link: options.link });
   viewer.resize();
+  options.prepare?.(viewer); // of pages that have more than a viewer
   viewer.draw();
   viewer.painter.finish();
   performance.mark("first frame");
