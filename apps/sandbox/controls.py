@@ -13,6 +13,7 @@ from blobtree.declare.falloff import Falloff
 from blobtree.declare.parameters import UNITS, Parameter, Quantity, describe, parameters_of
 from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.transpile.python import plain_python
+from decals.apps.sandbox.words import TEXTS
 from decals.editing.new_nodes import alternatives, name_of
 from decals.errors import InvalidEdit
 from decals.options import Option, options_of
@@ -27,22 +28,6 @@ CURVE_STEPS = 24
 
 STEPS = 200
 """Steps of a slider from end to end."""
-
-WORDS = {
-    "sizing": "Covering radii leave no bare place, touching ones no overlap. "
-    "More: “Choose size, direction and image” in docs/scattering.md.",
-    "regularity": "From 0, anywhere, to 1, as evenly as possible; 0.5 to 0.8 looks natural. "
-    "More: “Choose number, density and region” in docs/scattering.md.",
-    "factor": "Scales all radii: above 1, neighbours press on each other more; below 1, gaps open. "
-    "More: “Choose size, direction and image” in docs/scattering.md.",
-    "stiffness": "1 squeezes images evenly; more keeps most of an image and squeezes it near the contact. "
-    "More: “Stiffness” in docs/contact-modes.md.",
-    "spill": "With spill, a decal also colours surface that faces away from it, as beyond an edge. "
-    "More: “Create decals” in docs/decals.md.",
-    "interaction": "Push: neighbours deform each other. Overlap: undeformed above them; independent: below. "
-    "More: “Interactions and layers” in docs/decals.md.",
-}
-"""What options that are words of the theory mean, and where to read on."""
 
 KIND = "kind"
 """Name of the control of a node's class."""
@@ -80,8 +65,8 @@ class Control:
         Points of the curve of a choice, in a square of the size 1, as SVG writes them; "" for none.
     label
         What the page calls it; by default its name in words.
-    help
-        What its word means; "" for plain words.
+    word
+        The word of the theory that it is, see `words`; "" for others.
     """
 
     name: str
@@ -95,7 +80,7 @@ class Control:
     choices: tuple[str, ...] = ()
     curve: str = ""
     label: str = ""
-    help: str = ""
+    word: str = ""
 
     @classmethod
     def choice(cls, name: str, value: str, choices: Iterable[str], doc: str) -> Self:
@@ -170,8 +155,8 @@ def option_control(
         low = high = 0.0
     step = 1.0 if option.kind is int else (high - low) / STEPS
     slider = values.unit, low, high, step, choices
-    text = WORDS.get(option.name, "")
-    return vars(Control(option.name, kind, value, option.doc, *slider, label=values.label, help=text))
+    word = option.name if option.name in TEXTS else ""
+    return vars(Control(option.name, kind, value, option.doc, *slider, label=values.label, word=word))
 
 
 def parsed_option(of: Any, name: Any, raw: Any) -> Any:

@@ -17,6 +17,7 @@ from decals.apps.sandbox.guard import Guard
 from decals.apps.sandbox.panels import DEFAULTS, named
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.apps.sandbox.view import StreamedView
+from decals.apps.sandbox.words import words
 from decals.editing.actions import KEYS
 from decals.editing.formats import EXPORT_SUFFIXES, Video
 from decals.window import EditWindow, browser_keys
@@ -168,11 +169,19 @@ class Page:
         self._task: asyncio.Task[None] | None = None
         self._end: asyncio.Task[None] | None = None
         server.state.client_only(
-            "left_open", "right_open", "file_open", "theme", "folded", "sought", "kind_sought", "placing"
+            "left_open",
+            "right_open",
+            "file_open",
+            "theme",
+            "folded",
+            "sought",
+            "kind_sought",
+            "placing",
+            "word",
         )  # another browser has its own
         server.state.update({**self.values(), "catalog": self.sandbox.catalog(), "thumbnails": thumbnails()})
         server.state.update({"theme": "light", "dropped": None, "dropped_on": "", "folded": [], "sought": ""})
-        server.state.update({"kind_sought": "", "placing": ""})
+        server.state.update({"kind_sought": "", "placing": "", "word": "", "words": words()})
         server.state.update({"file_open": False, "file_name": "", "file_size": "", "replace_file": False})
         server.state.update({"file_video": str(Video.TURNTABLE), "formats": FORMATS})
         server.state.renamed = {"key": "", "name": ""}
@@ -270,6 +279,7 @@ class Page:
                     self.sandbox.schedule = self.view.update
                     html.Div(TEMPLATES["view"])
                 template("start")
+                template("word")
                 with vuetify3.VFooter(app=True, order="2", height=28, classes="text-caption"):
                     template("status")
 

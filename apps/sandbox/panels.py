@@ -55,6 +55,10 @@ CURVE = """<svg viewBox="-0.02 -0.02 1.04 1.04" preserveAspectRatio="none"
   stroke-width="2" vector-effect="non-scaling-stroke"/></svg>"""
 """The curve of the control ``c``."""
 
+HELP = """<img :src="words[c.word].picture" alt=""> {{ words[c.word].sentence }}
+  <button type="button" :aria-label="'more about ' + c.word" @click="word = c.word">More</button>"""
+"""What the word of the control ``c`` means."""
+
 
 def named(expression: str) -> list[str]:
     """Return the attribute that names an element for screen readers, from an expression of the page."""
@@ -141,7 +145,7 @@ def build_controls(source: str, event: Any, identifiers: str, *, key: str = "c.n
             update_modelValue=(event, f"[{identifiers}, $event, true]"),
         )
         html.Div(CURVE, v_if="c.curve")
-        html.Div("{{ c.help }}", v_if="c.help", classes="text-caption help")
+        html.Div(HELP, v_if="c.word", classes="text-caption help")
         vuetify3.VSwitch(
             v_if="c.kind === 'switch'",
             model_value=("c.value",),

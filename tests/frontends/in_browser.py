@@ -695,6 +695,10 @@ async def sandbox_start(picture: str | None = None) -> None:
         await until(lambda: window.actions.state.selection == (number,))
         await browser.get_by_role("slider", name="opacity").press("ArrowLeft")
         await until(lambda: window.session.labels[-1] == "set opacity")
+        await browser.get_by_role("button", name="more about interaction").click()
+        await browser.locator(".word").get_by_text("Only decals of one layer").wait_for()
+        await browser.keyboard.press("Escape")
+        await browser.locator(".word").wait_for(state="hidden")
         assert sandbox_page.sandbox.values()["pick"]["decal"] == str(number)
         await shows(browser, plotter)
         if picture is not None:

@@ -9,6 +9,7 @@ from functools import cache, partial
 from itertools import product
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -19,10 +20,10 @@ import decals
 from blobtree import Point, Segment, Torus, Twist, Union
 from blobtree.nodes.paths import node_at
 from blobtree.nodes.surgery import dominant_primitive
-from decals.apps.sandbox.controls import WORDS
 from decals.apps.sandbox.hover import outlines
 from decals.apps.sandbox.outline import outline
 from decals.apps.sandbox.sandbox import REST_SECONDS, Sandbox
+from decals.apps.sandbox.words import FOLDER, TEXTS, words
 from decals.editing import tree_actions
 from decals.editing.action_state import SLOW_STEP
 from decals.editing.actions import KEYS
@@ -218,9 +219,11 @@ def test_words_of_the_theory_are_explained_and_their_pages_have_these_sections(w
     sandbox.perform("select_all")
     values = sandbox.values()
     controls = [*values["scattering"], *values["drawing"], *values["decal"]["controls"]]
-    explained = {control["name"]: control["help"] for control in controls if control["help"]}
-    assert explained.keys() == WORDS.keys()
-    for text in explained.values():
+    assert {control["name"] for control in controls if control["word"]} == TEXTS.keys()
+    for name, text in TEXTS.items():
+        assert text.split("\n\n")[0].endswith(".")
+        assert words()[name]["picture"].startswith("data:image/svg+xml")
+        assert ElementTree.parse(FOLDER / f"{name}.svg").findall("*")
         section, page = re.findall("“(.*)” in (docs/.*[.]md)", text)[0]
         assert f"## {section}\n" in (ROOT / page).read_text(encoding="utf-8")
 
