@@ -19,7 +19,7 @@ from pathlib import Path
 
 PACKAGES = ("blobtree", "decals", "decals.apps", "decals.shaders")
 PARTS_OF_SANDBOX = ("connections", "guard", "page", "panels", "sessions", "view")
-OF_BROWSER = ("lab.page", *(f"sandbox.{name}" for name in PARTS_OF_SANDBOX))
+OF_BROWSER = ("lab.page", "lesson_pages.classroom", *(f"sandbox.{name}" for name in PARTS_OF_SANDBOX))
 """Modules that need the extra `browser`."""
 
 PICTURES = ("hero.png", "contact.png", "span.png")

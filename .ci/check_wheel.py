@@ -14,8 +14,8 @@ from build_distributions import COMPILED, ROOT, build_sdist, build_wheel
 from check_installed import PACKAGES
 
 PATTERNS = (
-    *("*.py", "*.glsl", "*.vert", "*.frag", "*.comp", "*.css", "*.html", "*.js"),
-    *("lessons/*", "thumbnails/*"),
+    *("*.py", "*.glsl", "*.vert", "*.frag", "*.comp", "*.css", "*.html", "*.js", "*.mjs"),
+    *("languages/*", "lessons/*", "thumbnails/*"),
 )
 """Files of the packages that the wheel holds."""
 

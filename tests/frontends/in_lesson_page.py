@@ -1,8 +1,9 @@
-"""Pages of lessons in Chromium beside the lab, as a program.
+"""Pages of lessons in a browser beside the lab, as a program.
 
-    python -m tests.frontends.in_lesson_page [NUMBER ...]
+    python -m tests.frontends.in_lesson_page [firefox] [NUMBER ...]
 
-Each page shows the numbers of the lab, judges answers as it does, and asks no server.
+Each page shows the numbers of the lab, judges answers as it does, and asks no server. Without ``firefox`` it
+runs in Chromium, where fingers use it; see `in_html_page` for what Firefox needs.
 """
 
 import asyncio

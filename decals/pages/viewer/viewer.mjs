@@ -15,7 +15,7 @@ const ROUNDS = 4; // in which the closest surface is found
 const NARROW = 1; // angle of view, in degrees, of a look along one ray
 const STEP = 0.25; // of a decal, in radii, at a press
 const ORBIT = Math.PI / 24; // of the model, at a press
-const REST = 500; // milliseconds without a change after which the address holds the state
+const KEPT_AFTER = 500; // milliseconds without a change after which the address holds the state
 const LOST = "The graphics card has let this picture go. It returns as soon as the browser allows it.";
 
 export class Viewer {
@@ -93,7 +93,7 @@ export class Viewer {
     this.request();
     if (!keeps) return;
     clearTimeout(this.rest);
-    this.rest = setTimeout(() => keepLink(this, this.get()), REST);
+    this.rest = setTimeout(() => keepLink(this, this.get()), KEPT_AFTER);
   }
 
   request() {

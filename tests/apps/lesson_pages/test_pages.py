@@ -91,6 +91,14 @@ def test_fields_and_h_are_those_of_the_float64_formulas() -> None:
 
 
 @needs_node
+def test_the_modules_of_a_page_share_no_names(lessons: dict[str, Lesson]) -> None:
+    """All of them are one script, which would not start."""
+    text = lesson_page(lessons["1-one-decal"]).text
+    (script,) = re.findall(r"<script>\n(.*?)</script>", text, re.DOTALL)
+    assert run_node("new Function(data); console.log(true);", script)
+
+
+@needs_node
 def test_the_surface_of_figure_7_is_equation_5() -> None:
     own, other = (grid.ravel() for grid in np.meshgrid(np.linspace(0.51, 0.999, 20), np.linspace(0, 1, 21)))
     found = measured(["pushed(x, y)"], np.column_stack([own, other, 0 * own]), [[0, 0, 0]], [1.0])[:, 0]
