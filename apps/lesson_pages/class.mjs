@@ -23,7 +23,7 @@ function show() {
   document.querySelector("#count").textContent = `answers: ${answers.length}`;
   const marks = answers.map(({ numbers }) => [numbers[x.value], numbers[y.value]]);
   const ends = [0, 1].map((axis) => range(marks.map((mark) => mark[axis])));
-  drawCurves(document.querySelector("canvas"), { x: ends[0], curves: [], ends: ends[1], marks, say });
+  drawCurves(document.querySelector(".chart"), { x: ends[0], curves: [], ends: ends[1], marks, say });
 }
 
 function choose() {

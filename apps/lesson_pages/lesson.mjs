@@ -10,7 +10,7 @@ import { puzzleOf, share, showScores } from "./puzzles.mjs";
 const AXES = ["x", "y", "z"];
 const USUAL = { interaction: "push", layer: 0, opacity: 1 }; // what rows leave out
 const LEAST = 1e-6; // that is not shown as 0: fields have the precision of float32
-const REST = 60; // milliseconds without a change, after which the whole map is read
+const CALM = 60; // milliseconds without a change, after which the whole map is read
 
 // A value as a text: three digits, yes or no.
 export function shown(value, words) {
@@ -26,7 +26,7 @@ class LessonPage {
     Object.assign(this, { root, viewer, lesson, formulas, tried: false, probe: lesson.probe });
     this.measures = new Measures(viewer, lesson);
     this.sliders = [...root.querySelectorAll("[data-path]")];
-    this.canvases = [...root.querySelectorAll(".plot canvas")];
+    this.charts = [...root.querySelectorAll(".chart")];
     viewer.header.shaders.ends.measure = lesson.shader;
     for (const input of this.sliders) {
       input.addEventListener("input", () => this.slide(input));
@@ -220,7 +220,7 @@ class LessonPage {
       this.showPlots(true);
       root.dataset.shown = performance.now();
     };
-    this.rest = setTimeout(() => this.attempt(showWhole), REST); // what follows from the whole map, once nothing moves
+    this.rest = setTimeout(() => this.attempt(showWhole), CALM); // what follows from the whole map, once nothing moves
   }
 
   attempt(call) {
@@ -308,7 +308,7 @@ class LessonPage {
     const { lesson, measures, root } = this;
     lesson.plots.forEach((plot, number) => {
       if (Boolean(plot.map) !== areMaps) return;
-      const canvas = this.canvases[number];
+      const chart = this.charts[number];
       const formula = plot.formula.find(({ when }) => this.value(when));
       root.querySelectorAll(".plot .formula")[number].innerHTML = formula ? this.filled(formula.text) : "";
       const marks = plot.marks.map((pair) => pair.map((text) => this.value(text)));
@@ -324,11 +324,11 @@ class LessonPage {
         const regions = plot.x ? shades.map((value) => value >= 0.5) : points.map(({ owner }) => owner);
         const red = plot.red && values(plot.red).map((value) => value > 0);
         const [x, y] = [plot.x ?? side, plot.y ?? side];
-        drawMap(canvas, { ...look, x, y, values: shades, red, redLabel: plot.redLabel, regions });
+        drawMap(chart, { ...look, x, y, values: shades, red, redLabel: plot.redLabel, regions });
       } else {
         const curves = plot.curves.map(({ label, formula: text }) => ({ label, values: values(text) }));
         const here = plot.x || lesson.states ? NaN : measures.onLine(this.point.position);
-        drawCurves(canvas, { ...look, x: points.map(({ x }) => x), curves, here });
+        drawCurves(chart, { ...look, x: points.map(({ x }) => x), curves, here });
       }
     });
   }

@@ -282,7 +282,7 @@ def _markup(
     )
     plots = "".join(
         f'<div class="plot"><h2>{text(plot.title)}</h2><div class="formula"></div>'
-        f'<canvas role="img" aria-label="{html.escape(words.said(plot.title))}"></canvas>'
+        f'<div class="chart" role="img" aria-label="{html.escape(words.said(plot.title))}"></div>'
         f'<div class="note">{text(plot.note)}</div></div>'
         for plot in _plots(lesson)
     )

@@ -19,10 +19,11 @@ from decals.apps.lab.measures import MEASURES
 from decals.apps.lab.puzzles import Puzzle, read_puzzle
 from decals.apps.lab.symbols import DEFINITIONS
 from decals.apps.lesson_pages.code import WORDS, javascript
-from decals.apps.lesson_pages.page import KNOWN, lesson_page, no_page
+from decals.apps.lesson_pages.page import KNOWN, lesson_page, lesson_script, no_page
 from decals.apps.lesson_pages.tables import MOST, positions_of, tabulated
 from decals.apps.lesson_pages.translation import LANGUAGES, translation
 from decals.errors import InvalidInput
+from decals.pages.page import as_script
 from tests.decals.pages.viewer_scripts import needs_node, run_node
 from tests.oracles.contact import RIM, contact_field, falloff
 
@@ -131,6 +132,12 @@ def test_random_formulas_are_those_of_the_lab(seed: int) -> None:
     found = measured(formulas, [point], TWO.positions, TWO.radii)[0]
     expected = [float(np.ravel(value(text, experiment(probe=point)))[0]) for text in formulas]
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5)
+
+
+@needs_node
+def test_no_two_modules_of_a_page_declare_one_name() -> None:
+    script = as_script(lesson_script(), "begin")
+    assert run_node("new Function(data); console.log(JSON.stringify(true));", script) is True
 
 
 @needs_node
