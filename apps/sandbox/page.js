@@ -161,9 +161,13 @@
     },
     // Return the least value so far as a text, with a star at par; one that is given may be the new least.
     best(key, value, par) {
-      const known = Number(localStorage.getItem(key) ?? Infinity);
-      const least = Math.min(value ?? Infinity, known);
-      if (least < known) localStorage.setItem(key, least);
+      let least = value ?? Infinity;
+      try {
+        least = Math.min(least, Number(localStorage.getItem(key) ?? Infinity));
+        if (Number.isFinite(least)) localStorage.setItem(key, least);
+      } catch {
+        // the browser keeps nothing for this page, as in some frames
+      }
       return Number.isFinite(least) ? `${Number(least.toPrecision(3))}${least <= par ? " ★" : ""}` : "–";
     },
     // Return true for a text that has what is sought, in large or small letters.
