@@ -46,8 +46,9 @@ def page(package: str, title: str, documented: dict[int, str]) -> str:
     module = import_module(package)
     names: dict[str, list[str]] = {group: [] for group in GROUPS}
     elsewhere: list[str] = []
-    for name in sorted(getattr(module, "__all__", ())):
-        value = getattr(module, name)
+    exported = {name: getattr(module, name) for name in sorted(getattr(module, "__all__", ()))}
+    # Former names of a class come last: autodoc has no page of them.
+    for name, value in sorted(exported.items(), key=lambda item: getattr(item[1], "__name__", "") != item[0]):
         if inspect.ismodule(value):
             continue
         group = group_of(value)

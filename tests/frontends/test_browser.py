@@ -70,8 +70,8 @@ def test_lesson_pages() -> None:
     assert "done" in run_module("tests.frontends.in_lesson_page")
 
 
-@pytest.mark.parametrize("check", HTML_CHECKS)
-def test_html_pages_in_firefox(display: str, check: str) -> None:
+@pytest.mark.parametrize("check", [*HTML_CHECKS, "lessons"])
+def test_pages_in_firefox(display: str, check: str) -> None:
     require("playwright", "axe_playwright_python")
     from tests.frontends.browsing import firefox_path
 
@@ -80,7 +80,8 @@ def test_html_pages_in_firefox(display: str, check: str) -> None:
     numbers = tuple(map(int, version("playwright").split(".")[:2]))
     if numbers > FIREFOX_DRIVER:
         pytest.skip("newer versions of playwright do not start this Firefox: pip install playwright==1.60")
-    assert "done" in run_module("tests.frontends.in_html_page", check, "firefox", DISPLAY=display)
+    module = ("in_lesson_page",) if check == "lessons" else ("in_html_page", check)
+    assert "done" in run_module(f"tests.frontends.{module[0]}", *module[1:], "firefox", DISPLAY=display)
 
 
 def test_in_a_live_notebook() -> None:
