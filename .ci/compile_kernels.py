@@ -40,7 +40,7 @@ def compile_all(source: Path, cache: Path) -> None:
 
     from blobtree import GradientBlend
     from blobtree.device import start_warp
-    from blobtree.tape.instruction_set import BUILT_IN, instruction_set_for, library
+    from blobtree.tape.instruction_set import core, instruction_set_for, library
 
     start_warp()
     kernels = [
@@ -50,7 +50,7 @@ def compile_all(source: Path, cache: Path) -> None:
         if isinstance(value, wp.Kernel) and value.module.name == name
     ]
     with_gradients = [
-        instruction_set_for((*base.rows, GradientBlend.operator)) for base in (BUILT_IN, library())
+        instruction_set_for((*base.rows, GradientBlend.operator)) for base in (core(), library())
     ]
     instances = [library().kernel_for(kernel) for kernel in kernels]
     instances += [

@@ -10,21 +10,20 @@ import warp as wp
 
 from blobtree.declare.claims import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT
 from blobtree.formulas.falloff import falloff_range
-from blobtree.formulas.operators import OPERATORS, SUM
 from blobtree.formulas.skeletons import (
     HALF_DIAGONAL,
-    POINT,
-    SKELETONS,
     box_to_point,
     squared_distances_to_ball,
 )
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.codes import (
     FIELD,
+    OPERATORS,
     POP_SWAPPED,
     PREFIX,
     PUSH,
     REGISTERS,
+    SKELETONS,
     STRETCHED,
     UNWARP,
     WARP,
@@ -49,7 +48,7 @@ from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
 
-SUM_CODE = wp.constant(OPERATORS.index(SUM))
+SUM_CODE = wp.constant(OPERATORS.index("sum"))
 
 RANGE_MARGIN = wp.constant(2e-6)
 """Widening of ranges, so that float32 rounds no value out of them."""
@@ -58,7 +57,7 @@ _Ranges = wp.types.matrix(shape=(REGISTERS, 2), dtype=wp.float32)
 _Starts = wp.types.vector(length=REGISTERS, dtype=wp.int32)
 _Points = wp.types.matrix(shape=(WARP_REGISTERS, 3), dtype=wp.float32)
 _Balls = wp.types.vector(length=WARP_REGISTERS, dtype=wp.float32)
-POINT_CODE = SKELETONS.index(POINT)
+POINT_CODE = SKELETONS.index("point")
 
 _OuterStarts = wp.types.vector(length=WARP_REGISTERS, dtype=wp.int32)
 

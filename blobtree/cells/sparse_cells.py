@@ -33,10 +33,9 @@ from blobtree.cells.scan import DeviceArray, arange, exclusive_scan, where_negat
 from blobtree.cells.scan_kernels import summarize
 from blobtree.device import demand_memory, known_device, launch
 from blobtree.errors import InvalidNode, InvalidResolution
-from blobtree.formulas.operators import DIFFERENCE, RICCI, SUM, UNION
 from blobtree.progress import Progress
 from blobtree.struct_rows import struct_rows
-from blobtree.tape.codes import UNWARP, WARP
+from blobtree.tape.codes import OPERATORS, UNWARP, WARP
 from blobtree.tape.tape import Tape
 
 MAX_BLOCKS = 1 << 21
@@ -58,8 +57,8 @@ MIN_CULLED_SHARE = 0.9
 CELL_KERNELS = (refine_children, summarize)
 """Kernels of every refinement, for `load_together`."""
 
-_NEUTRAL_OPERATORS = (SUM, RICCI, UNION, DIFFERENCE)
-"""Operators that return their first operand if the second is 0."""
+_NEUTRAL_OPERATORS = [OPERATORS.index(tag) for tag in ("sum", "ricci", "union", "difference")]
+"""Codes of operators that return their first operand if the second is 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -381,8 +380,7 @@ def split_tape(tape: Tape) -> Int32Array | None:
     code, operator, count = tape.data[headers, :3].astype(np.int64).T
     lengths = np.diff(headers, append=len(tape.data))
     warped = np.cumsum(code == WARP) - np.cumsum(code == UNWARP) > 0
-    neutral = [tape.instruction_set.operators.index(row) for row in _NEUTRAL_OPERATORS]
-    run = (code >= 0) & ~warped & np.isin(operator, neutral)
+    run = (code >= 0) & ~warped & np.isin(operator, _NEUTRAL_OPERATORS)
     if lengths[run].sum() < MIN_CULLED_SHARE * (len(tape.data) - tape.start):
         return None
     parts = np.where(run, -(-count // PRIMITIVES_PER_PIECE), 1)

@@ -1,8 +1,8 @@
 """Registries: kinds of nodes by their tags in files, and users' definitions by their names.
 
 A class of nodes registers itself when it is defined. So files, panels and the nodes' own methods find a kind
-by its tag, and need not import it. The package's root says how to load the library (`register_library`),
-which is done when a kind is looked up that is not loaded.
+by its tag, and need not import it. The package's root says how to load kinds (`register_kinds`), which is
+done when one is looked up that is not loaded.
 """
 
 import copyreg
@@ -23,17 +23,22 @@ CUSTOM_TAGS: dict[str, type[Any]] = {}
 LIBRARY_ROWS: list[Any] = []
 """What the loaded kinds of this package put on tapes beyond the core, in any order."""
 
-_libraries: list[Callable[[], object]] = []
+_loaders: list[Callable[[], object]] = []
 
 
-def register_library(load: Callable[[], object]) -> None:
-    """Let `load` be called when a kind is looked up that is not loaded; it imports more kinds."""
-    _libraries.append(load)
+def register_kinds(*loaders: Callable[[], object]) -> None:
+    """Let functions import kinds when they are needed: the first one those of the core, the others more."""
+    _loaders.extend(loaders)
+
+
+def load_core() -> None:
+    """Load all kinds of the core."""
+    _loaders[0]()
 
 
 def load_libraries() -> None:
-    """Load all kinds of the libraries."""
-    for load in _libraries:
+    """Load all kinds."""
+    for load in _loaders:
         load()
 
 
@@ -45,9 +50,17 @@ def library_rows(*rows: Definition) -> tuple[Definition, ...]:
 
 def kind_of(tag: str) -> type[Any]:
     """Return the class of nodes with this tag."""
-    if tag not in NODE_KINDS:
-        load_libraries()
+    for load in _loaders:
+        if tag in NODE_KINDS:
+            break
+        load()
     return NODE_KINDS[tag]
+
+
+def row_of(tag: str) -> Any:
+    """Return the row of the kind with this tag."""
+    kind = kind_of(tag)
+    return getattr(kind, kind.row_name)
 
 
 class Definitions(dict[str, Definition]):

@@ -3,11 +3,14 @@
 import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
+from blobtree.tape.dispatch import core_tables
 from blobtree.tape.interpreter import field_gradient
 from blobtree.texels import Texels
 from blobtree.transpile.derivative import directional_derivative
 
 wp.set_module_options(KERNEL_OPTIONS)
+
+core_tables()  # fills the functions that are derived here
 
 gradient_derivative = directional_derivative(field_gradient, ["tape"])
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, UNION
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.codes import (
     FIELD,
+    OPERATORS,
     POP,
     POP_SWAPPED,
     PREFIX,
@@ -52,9 +52,9 @@ LEFT = 1
 RIGHT = 2
 NEITHER = 3
 
-UNION_CODE = wp.constant(OPERATORS.index(UNION))
-INTERSECTION_CODE = wp.constant(OPERATORS.index(INTERSECTION))
-DIFFERENCE_CODE = wp.constant(OPERATORS.index(DIFFERENCE))
+UNION_CODE = wp.constant(OPERATORS.index("union"))
+INTERSECTION_CODE = wp.constant(OPERATORS.index("intersection"))
+DIFFERENCE_CODE = wp.constant(OPERATORS.index("difference"))
 """The operators that choose; all others, custom ones included, are taken to be smooth."""
 
 LABEL_MODULUS = wp.constant(8388593)

@@ -1,5 +1,10 @@
 """Codes of instructions on a tape, and the sizes that interpreters have; `tape` states the layout."""
 
+SKELETONS = ("point", "segment", "cone", "torus", "disc", "box")
+OPERATORS = ("sum", "ricci", "union", "intersection", "difference")
+WARPS = ("twist",)
+"""Tags of the kinds of the core, by sort; the index of one here is its code on the tape."""
+
 PUSH = -1
 POP = -2
 POP_SWAPPED = -3

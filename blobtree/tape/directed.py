@@ -19,9 +19,10 @@ from typing import Any
 import warp as wp
 
 from blobtree.declare.claims import UNBOUNDED
-from blobtree.formulas.operators import OPERATORS, SUM
 from blobtree.kernels import KERNEL_OPTIONS
+from blobtree.tape.codes import OPERATORS
 from blobtree.tape.dispatch import (
+    core_tables,
     directed_partials,
     directed_slope,
     is_monotone,
@@ -54,7 +55,9 @@ from blobtree.transpile.derivative import directional_derivative
 
 wp.set_module_options(KERNEL_OPTIONS)
 
-SUM_CODE = wp.constant(OPERATORS.index(SUM))
+core_tables()  # fills the functions that are derived here
+
+SUM_CODE = wp.constant(OPERATORS.index("sum"))
 
 STEEPEST_TURN = wp.constant(6.0)
 """Largest second derivative of (1 − d²)³, which |g'(d)| / d does not exceed either."""

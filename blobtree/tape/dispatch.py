@@ -3,42 +3,66 @@
 A row's function may declare fewer parameters than its dispatch: it gets the first ones. So operators without
 several parameters do not take the tape. `decals/rendering/tracing_shader.py` writes the same dispatch in
 GLSL, over the kinds in use alone.
+
+The classes of the kinds import this file by way of their methods. So the functions are filled when the first
+tape is compiled (`core_tables`).
 """
 
+import os
 from collections.abc import Callable
+from threading import RLock
 from types import FunctionType
 from typing import Any
 
 import warp as wp
 
-from blobtree.formulas.operators import OPERATORS
-from blobtree.formulas.skeletons import SKELETONS
-from blobtree.formulas.warps import WARPS
+from blobtree.declare.registry import load_core, row_of
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.kinds.falloff import FALLOFFS
+from blobtree.tape.codes import OPERATORS, SKELETONS, WARPS
 from blobtree.texels import Texels
 from blobtree.transpile.specialize import RowChoice
 
 wp.set_module_options(KERNEL_OPTIONS)
 
-CORE_TABLES: dict[str, tuple[Any, ...]] = {
-    "skeletons": SKELETONS,
-    "operators": OPERATORS,
-    "warps": WARPS,
-    "fields": (),
-    "falloffs": FALLOFFS,
-}
-"""The tables of core kinds by their names in instruction sets."""
+LOCK = RLock()
+"""Held while functions are registered: Warp's registry is not safe for threads."""
+
+if hasattr(os, "register_at_fork"):  # a child forked while another thread holds the lock would wait forever
+    os.register_at_fork(before=LOCK.acquire, after_in_parent=LOCK.release, after_in_child=LOCK.release)
+
+_choices: list[tuple[RowChoice, wp.Function]] = []
+_core_tables: dict[str, tuple[Any, ...]] = {}
 
 
 def of_row(table: str, attribute: str = "") -> Callable[[FunctionType], Any]:
-    """Return a decorator that writes the body of a function: the attribute, of its name, of a row."""
+    """Return a decorator that gives a function its body: the attribute, of its name, of a row."""
 
-    def write(prototype: FunctionType) -> Any:
+    def open_choice(prototype: FunctionType) -> Any:
         choice = RowChoice(prototype, table, attribute or prototype.__name__)
-        return choice.over(CORE_TABLES[table], prototype.__module__)
+        function = choice.over((), prototype.__module__)
+        _choices.append((choice, function))
+        return function
 
-    return write
+    return open_choice
+
+
+def core_tables() -> dict[str, tuple[Any, ...]]:
+    """Return the tables of core kinds by their names in instruction sets.
+
+    The first call fills the functions of this file; derivatives of what calls them come after it.
+    """
+    if not _core_tables:
+        load_core()
+        with LOCK:
+            if not _core_tables:
+                tables = {"skeletons": SKELETONS, "operators": OPERATORS, "warps": WARPS, "fields": ()}
+                rows = {name: tuple(map(row_of, tags)) for name, tags in tables.items()}
+                rows["falloffs"] = FALLOFFS
+                for choice, function in _choices:
+                    choice.fill(function, rows[choice.table])
+                _core_tables.update(rows)
+    return _core_tables
 
 
 @of_row("skeletons")

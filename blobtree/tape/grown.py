@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from blobtree._typing import Float64Array
-from blobtree.formulas.operators import SUM
+from blobtree.declare.registry import row_of
 from blobtree.lazy import Lazy
 from blobtree.tape.model import ImplicitModel
 from blobtree.tape.program import (
@@ -74,7 +74,7 @@ def leaf_tape(program: list[Instruction], number: int, growth: float = 0.0) -> T
             case Run(primitives=primitives):
                 if first <= number < first + len(primitives):
                     leaf = grown(primitives[number - first], growth)
-                    run = Run(step.kind, step.stretched, SUM, (), [leaf])
+                    run = Run(step.kind, step.stretched, row_of("sum"), (), [leaf])
                     return compile_tape([*warps, run, *map(LeaveWarp, reversed(warps))])
                 first += len(primitives)
     raise IndexError(f"expected the number of a leaf below {first}, got {number}")

@@ -1,18 +1,16 @@
 """Instruction sets: the skeletons, operators, warps and falloffs that the codes on a tape stand for.
 
-Kernels are written against the tables of core kinds; a tree of core kinds has BUILT_IN, whose kernels are
+Kernels are written against the tables of core kinds; a tree of core kinds has `core`, whose kernels are
 those in the files. For any other set of kinds the same kernels are instantiated (`transpile.specialize`). A
 tree with library kinds has `library`: the core rows, then those of the registry. A tree with custom
-kinds has a set of its own: the rows of BUILT_IN or `library`, then the custom ones.
+kinds has a set of its own: the rows of `core` or `library`, then the custom ones.
 """
 
 import hashlib
-import os
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache
-from threading import RLock
 from types import FunctionType
 from typing import Any
 
@@ -24,13 +22,10 @@ from blobtree.declare.field import FieldKind
 from blobtree.declare.registry import LIBRARY_ROWS, load_libraries
 from blobtree.declare.skeleton import Skeleton
 from blobtree.declare.warp import SpaceWarp
-from blobtree.formulas.operators import OPERATORS
-from blobtree.formulas.skeletons import SKELETONS
-from blobtree.formulas.warps import WARPS
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.kinds.falloff import FALLOFFS
 from blobtree.lazy import Lazy
-from blobtree.tape.dispatch import CORE_TABLES
+from blobtree.tape.dispatch import LOCK, core_tables
 from blobtree.tape.extras import gradient_evaluations
 from blobtree.transpile.derivative import derivative_along, differentiated
 from blobtree.transpile.specialize import rebind, referenced_values, row_choice, warp_function
@@ -44,12 +39,6 @@ _ROW_OF_TABLE: dict[str, type[Row]] = {
     "fields": FieldKind,
     "falloffs": Falloff,
 }
-
-_LOCK = RLock()
-"""Held while functions are registered: Warp's registry is not safe for threads."""
-
-if hasattr(os, "register_at_fork"):  # a child forked while another thread holds the lock would wait forever
-    os.register_at_fork(before=_LOCK.acquire, after_in_parent=_LOCK.release, after_in_child=_LOCK.release)
 
 
 @dataclass(frozen=True)
@@ -99,16 +88,16 @@ class InstructionSet:
 
     def kernel_for(self, kernel: wp.Kernel) -> wp.Kernel:
         """Return `kernel` compiled for tapes of this instruction set; itself if it reads no table."""
-        if self is BUILT_IN:
+        if self is core():
             return kernel
-        with _LOCK:
+        with LOCK:
             if kernel not in self._kernels:
                 self._kernels[kernel] = self._instantiate_kernel(kernel)
             return self._kernels[kernel]
 
     def function_for(self, function: wp.Function) -> wp.Function:
         """Return a typed function for tapes of this instruction set; itself if it reads no table."""
-        with _LOCK:
+        with LOCK:
             return self._instantiate(self._exchanged(function))
 
     def _instantiate_kernel(self, kernel: wp.Kernel) -> wp.Kernel:
@@ -132,7 +121,7 @@ class InstructionSet:
             )
         if function not in self._functions and (choice := row_choice(function)):
             rows, module = getattr(self, choice.table), self._module_of(choice.prototype)
-            same = rows is CORE_TABLES[choice.table]
+            same = rows is core_tables()[choice.table]
             self._functions[function] = function if same else choice.over(rows, module)
         if function not in self._functions:
             source = _python_function(function)
@@ -171,35 +160,43 @@ def _python_function(typed: wp.Function | wp.Kernel) -> FunctionType:
     return function
 
 
-BUILT_IN = InstructionSet(SKELETONS, OPERATORS, WARPS, ())
-"""The instruction set of trees of core kinds."""
-
 _created: list[InstructionSet] = []
-"""The other instruction sets."""
+"""All instruction sets: that of the core, that with the library, then others."""
+
+
+def core() -> InstructionSet:
+    """Return the instruction set of trees of core kinds."""
+    if not _created:
+        tables = core_tables()
+        with LOCK:
+            if not _created:
+                _created.append(InstructionSet(**tables))
+    return _created[0]
 
 
 @cache
 def library() -> InstructionSet:
     """Return the instruction set of trees with library kinds, whose formulas take long to import."""
     load_libraries()
-    with _LOCK:
-        if not _created:
-            _created.append(BUILT_IN.with_rows(LIBRARY_ROWS))
-        return _created[0]
+    only = core()
+    with LOCK:
+        if len(_created) == 1:
+            _created.append(only.with_rows(LIBRARY_ROWS))
+        return _created[1]
 
 
 def instruction_set_for(rows: Iterable[Row]) -> InstructionSet:
     """Return an instruction set that has these rows.
 
     That is the smallest existing one, so that a tree with fewer kinds than an earlier tree compiles nothing.
-    If none fits, a new one has the rows of BUILT_IN or `library`, and then the custom rows in a fixed order.
+    If none fits, a new one has the rows of `core` or `library`, and then the custom rows in a fixed order.
     """
     needed = set(rows)
-    if needed.issubset(BUILT_IN.rows):
-        return BUILT_IN
+    if needed.issubset(core().rows):
+        return core()
     with_library = library()
     reads_gradients = any(isinstance(row, OperatorRow) and row.gradients for row in needed)
-    with _LOCK:
+    with LOCK:
         fitting = [
             existing
             for existing in _created
@@ -208,7 +205,7 @@ def instruction_set_for(rows: Iterable[Row]) -> InstructionSet:
         if fitting:
             return min(fitting, key=lambda existing: len(existing.rows))
         custom = needed.difference(with_library.rows)
-        base = BUILT_IN if needed.issubset({*BUILT_IN.rows, *custom}) else with_library
+        base = core() if needed.issubset({*core().rows, *custom}) else with_library
         created = base.with_rows(needed)
         _created.append(created)
         return created
@@ -217,4 +214,4 @@ def instruction_set_for(rows: Iterable[Row]) -> InstructionSet:
 @cache
 def single_skeleton_set(skeleton: Skeleton) -> InstructionSet:
     """Return the instruction set of one skeleton, whose code is 0."""
-    return InstructionSet((skeleton,), OPERATORS, WARPS, ())
+    return InstructionSet((skeleton,), core().operators, core().warps, ())

@@ -12,7 +12,7 @@ import numpy as np
 
 from blobtree._typing import Float32Array
 from blobtree.declare.claims import OperatorRow, Support
-from blobtree.formulas.operators import SUM, UNION
+from blobtree.tape.codes import OPERATORS
 from blobtree.tape.program import EnterWarp, Instruction, LeaveWarp, Pop, ProgramLeaf, Push, Run
 from blobtree.tape.tape import Tape
 
@@ -160,7 +160,7 @@ def _pieces(tape: Tape) -> list[Float32Array]:
 
 def _alone(texels: Float32Array, own: Float32Array, tape: Tape) -> Float32Array:
     """Return the texels of a run with one of its primitives."""
-    header = [texels[0, 0], tape.instruction_set.operators.index(SUM), 1.0, 0.0]
+    header = [texels[0, 0], OPERATORS.index("sum"), 1.0, 0.0]
     return np.vstack([header, own])
 
 
@@ -169,9 +169,8 @@ def _runs(step: Run, texels: Float32Array, tape: Tape, numbers: tuple[int, ...])
 
     What tools cut away lies outside all of them, so a union of tools has all of the surface that is left.
     """
-    operators = tape.instruction_set.operators
     if step.operator.support is Support.LEFT:
-        header = [texels[0, 0], operators.index(UNION), texels[0, 2], 0.0]
+        header = [texels[0, 0], OPERATORS.index("union"), texels[0, 2], 0.0]
         yield _Part((np.vstack([header, texels[1:]]),), numbers, tool=True)
         return
     for number, own in zip(numbers, np.split(texels[1:], len(numbers)), strict=True):

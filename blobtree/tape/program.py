@@ -23,11 +23,11 @@ from blobtree._typing import Box, Float64Array, IndexArray
 from blobtree.declare.claims import OperatorRow, Support
 from blobtree.declare.falloff import Falloff
 from blobtree.declare.field import FieldKind
+from blobtree.declare.registry import row_of
 from blobtree.declare.skeleton import Skeleton
 from blobtree.declare.warp import SpaceWarp
 from blobtree.errors import InvalidNode
 from blobtree.formulas.falloff import RIM
-from blobtree.formulas.operators import RICCI, SUM, UNION
 from blobtree.lazy import Lazy
 from blobtree.validation import Vector
 
@@ -507,7 +507,7 @@ def _expand(step: _Emit, weights: dict[int, int], signed: frozenset[int]) -> Ite
     """Yield smaller steps for a step that starts from an empty accumulator."""
     node, placement = _strip(step.node, step.placement)
     if isinstance(node, ProgramLeaf):
-        yield from _runs([PlacedPrimitive(node, placement)], SUM, ())
+        yield from _runs([PlacedPrimitive(node, placement)], row_of("sum"), ())
     elif node.warp is not None:
         yield from _expand_warp(replace(step, node=node, placement=placement), node, node.warp)
     elif node.operator is not None:
@@ -529,7 +529,7 @@ def _raised(step: _Emit, operator: OperatorRow, signed: frozenset[int]) -> Itera
     yield step
     if not operator.signed and (step.node.signed or id(step.node) in signed):
         yield Push(step.register)
-        yield Pop(step.register, UNION, ())
+        yield Pop(step.register, row_of("union"), ())
 
 
 def _raised_primitive(placed: PlacedPrimitive) -> PlacedPrimitive:
@@ -561,7 +561,7 @@ def _expand_commutative(
             yield Pop(step.register, operator, parameters)
     if not subtrees and not operator.starts_from_zero:
         first, *primitives = primitives
-        yield from _runs([first], SUM, ())
+        yield from _runs([first], row_of("sum"), ())
     yield from _runs(primitives, operator, parameters)
 
 
@@ -617,8 +617,8 @@ def _runs(
 def _operation(node: ProgramNode) -> tuple[OperatorRow, tuple[float, ...]]:
     """Return operator and parameters; a Ricci blend of exponent 1 is the sum (GLSL has no pow(0, 0))."""
     assert node.operator is not None
-    if node.operator is RICCI and node.operator_parameters == (1.0,):
-        return SUM, ()
+    if node.operator is row_of("ricci") and node.operator_parameters == (1.0,):
+        return row_of("sum"), ()
     return node.operator, node.operator_parameters
 
 

@@ -45,10 +45,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array
 from blobtree.declare.field import FieldKind
+from blobtree.declare.registry import row_of
 from blobtree.declare.skeleton import Skeleton
 from blobtree.device import known_device
 from blobtree.errors import InvalidNode
-from blobtree.formulas.operators import SUM
 from blobtree.kinds.falloff import WYVILL
 from blobtree.tape.bounds import warp_parameters
 from blobtree.tape.codes import (
@@ -64,7 +64,7 @@ from blobtree.tape.codes import (
     WARP_REGISTERS,
 )
 from blobtree.tape.data_region import DataRegion
-from blobtree.tape.instruction_set import BUILT_IN, InstructionSet, Row, instruction_set_for
+from blobtree.tape.instruction_set import InstructionSet, Row, core, instruction_set_for
 from blobtree.tape.program import (
     EnterWarp,
     Instruction,
@@ -134,7 +134,7 @@ class Tape:
     stretched: bool
     warps: tuple[int, ...] = ()
     warp_registers: int = 0
-    instruction_set: InstructionSet = BUILT_IN
+    instruction_set: InstructionSet = field(default_factory=core)
     headers: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     fields: tuple[int, ...] = ()
     start: int = 0
@@ -175,7 +175,7 @@ def compile_tape(program: list[Instruction], precision: Precision = np.float32) 
     operators = {step.operator for step in program if isinstance(step, Run | Pop)}
     rows |= operators
     if not all(operator.starts_from_zero for operator in operators):
-        rows.add(SUM)  # a pruned tape may begin with any operand, see `prune_kernels.first_operator`
+        rows.add(row_of("sum"))  # a pruned tape may begin with any operand: `prune_kernels.first_operator`
     carrying = [placed.primitive for run in runs if run.stretched for placed in run.primitives]
     rows |= {primitive.profile[0] for primitive in carrying if primitive.profiled}
     instruction_set = instruction_set_for(rows)

@@ -108,6 +108,17 @@ class RowChoice:
 
     def over(self, rows: Sequence[Any], module: str) -> wp.Function:
         """Return the function for a table."""
+        result = warp_function(self._written(rows, module))
+        _CHOICES[result] = self
+        return result
+
+    def fill(self, function: wp.Function, rows: Sequence[Any]) -> None:
+        """Write a function anew, for another table, before Warp compiles it."""
+        assert isinstance(function.func, FunctionType)
+        full = warp_function(self._written(rows, function.func.__module__))
+        function.func, function.adj = full.func, full.adj
+
+    def _written(self, rows: Sequence[Any], module: str) -> FunctionType:
         code, *arguments = inspect.signature(self.prototype).parameters
         returned = self.prototype.__annotations__["return"]
         scope: dict[str, Any] = {"wp": wp, "__name__": module}
@@ -130,9 +141,7 @@ class RowChoice:
         function = defined(self.prototype.__name__, "\n".join([*lines, "    return result", ""]), scope)
         function.__annotations__ = dict(self.prototype.__annotations__)
         function.__qualname__ = self.prototype.__qualname__
-        result = warp_function(function)
-        _CHOICES[result] = self
-        return result
+        return function
 
 
 _EMPTY: dict[Any, str] = {wp.float32: "float(0.0)", wp.int32: "int(0)", wp.bool: "bool(False)"}

@@ -6,7 +6,7 @@ milliseconds: so one program per set of kinds, none per tree.
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -47,7 +47,7 @@ from blobtree.tape.evaluators import (
     way_outside,
 )
 from blobtree.tape.extras import gradient_evaluators, gradient_steps
-from blobtree.tape.instruction_set import BUILT_IN, InstructionSet
+from blobtree.tape.instruction_set import InstructionSet, core
 from blobtree.tape.interpreter import field_bound, field_gradient
 from blobtree.tape.tape import Tape
 from blobtree.tracing.ray_kernels import passed_way, trace_ray
@@ -98,7 +98,7 @@ class Kinds:
     warps: tuple[int, ...]
     warp_registers: int
     fields: tuple[int, ...] = ()
-    instruction_set: InstructionSet = BUILT_IN
+    instruction_set: InstructionSet = field(default_factory=core)
     falloffs: tuple[int, ...] = ()
     """Codes of the falloffs of primitives with a profile."""
 

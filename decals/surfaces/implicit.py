@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from blobtree import ISO, Node, polygonize
 from blobtree._typing import BoolArray, Float32Array, Int64Array
 from blobtree.device import known_device, launch
-from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, UNION
 from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
+from blobtree.tape.codes import OPERATORS
 from blobtree.tape.model import values_at
 from blobtree.tracing.trace import trace
 from blobtree.validation import point_array
@@ -49,7 +49,7 @@ MAX_STEP = 0.5
 LEAST_WAY = 0.2
 """Way of a projected point, in longest steps, from which on it must not be far longer than to the mesh."""
 
-CREASED = frozenset(map(OPERATORS.index, (UNION, INTERSECTION, DIFFERENCE)))
+CREASED = frozenset(map(OPERATORS.index, ("union", "intersection", "difference")))
 """Codes of the operators that leave creases; the coarse mesh of other trees needs no search for them."""
 
 MAX_PROJECTION_ROUNDS = 4

@@ -8,7 +8,7 @@ from warp._src.context import user_modules
 
 from blobtree import ISO, Node, Point, Polygonizer, polygonize
 from blobtree.formulas.falloff import RIM
-from blobtree.tape.instruction_set import BUILT_IN
+from blobtree.tape.instruction_set import core
 from blobtree.tape.program import postorder
 from blobtree.tracing.trace import trace
 from tests.blobtree.custom_kinds import CUSTOM, CUSTOM_TREES, EVERYTHING, KINDS, Brick, Mean, Path, Ring, Soft
@@ -96,7 +96,7 @@ def test_every_way_to_a_mesh_knows_custom_kinds() -> None:
 @pytest.mark.gpu
 @pytest.mark.parametrize("number", range(6))
 def test_a_graphics_card_gives_the_same_surface(number: int) -> None:
-    tree = [tree for tree in CUSTOM_TREES if tree.tape.instruction_set is not BUILT_IN][number]
+    tree = [tree for tree in CUSTOM_TREES if tree.tape.instruction_set is not core()][number]
     with wp.ScopedDevice("cuda:0"):
         there = polygonize(tree, resolution=24, device="cuda:0")
         points = points_around(np.random.default_rng(1), tree, POINTS)
@@ -159,8 +159,8 @@ def test_one_kind_many_primitives_is_one_run() -> None:
 
 
 def test_trees_of_built_in_kinds_have_the_built_in_instruction_set() -> None:
-    assert (Point((0, 0, 0), radius=1.0) + Point((1, 0, 0), radius=1.0)).tape.instruction_set is BUILT_IN
-    assert UNIT_RING.tape.instruction_set is not BUILT_IN
+    assert (Point((0, 0, 0), radius=1.0) + Point((1, 0, 0), radius=1.0)).tape.instruction_set is core()
+    assert UNIT_RING.tape.instruction_set is not core()
     assert UNIT_RING.skeleton in EVERYTHING.tape.instruction_set.skeletons
 
 

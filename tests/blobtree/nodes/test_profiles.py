@@ -49,7 +49,7 @@ from blobtree.declare.parameters import parameters_of
 from blobtree.formulas.skeletons import JOINT_YIELD
 from blobtree.nodes.paths import moved, resized
 from blobtree.nodes.primitives import PROFILE, Primitive
-from blobtree.tape.instruction_set import BUILT_IN
+from blobtree.tape.instruction_set import core
 from blobtree.transpile.python import plain_python
 from tests.blobtree.custom_kinds import Ring, Staircase, Tent
 from tests.blobtree.kernels import rising, short, staircase_slope, tent, tent_slope, vector
@@ -147,8 +147,8 @@ def test_a_custom_falloff_is_evaluated_and_bounded(falloff: Any) -> None:
 
 def test_a_falloff_outside_the_core_uses_the_library_and_a_width_does_not() -> None:
     ball: dict[str, Any] = {"center": (0, 0, 0), "radius": 1.0}
-    assert Point(**ball, width=0.5, weight=2.0).tape.instruction_set is BUILT_IN
-    assert Point(**ball, falloff="gaussian").tape.instruction_set is not BUILT_IN
+    assert Point(**ball, width=0.5, weight=2.0).tape.instruction_set is core()
+    assert Point(**ball, falloff="gaussian").tape.instruction_set is not core()
     assert Point(**ball, falloff="gaussian").tape.falloffs != ()
     assert Point(**ball).tape.falloffs == ()
 
