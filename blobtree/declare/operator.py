@@ -134,6 +134,7 @@ class Claims:
     associative: bool
     lipschitz: Any = None
     paints: bool = True
+    signed: bool = False
 
 
 @dataclass(frozen=True)
@@ -293,6 +294,7 @@ class OperatorFormulas:
             commutes=claims.associative,
             monotone=claims.monotone and claims.like != "difference",
             paints=claims.paints,
+            signed=claims.signed,
             gradients=rows.gradients,
             digest=digest,
         )

@@ -145,11 +145,19 @@ class Reader:
         return f"{partials.key}({', '.join([point, *self.readings])})", partials
 
     def written(
-        self, part: str, leading: dict[str, Any], returns: Any, lines: str, *called: wp.Function
+        self,
+        part: str,
+        leading: dict[str, Any],
+        returns: Any,
+        lines: str,
+        *called: wp.Function,
+        tape_first: bool = False,
     ) -> wp.Function:
         """Return the typed function of some lines, which read texels t0, t1 and so on."""
-        typed = "".join(f"{name}: {spelled(kind)}, " for name, kind in leading.items())
-        text = f"def {{name}}({typed}tape: wp.array(dtype=wp.vec4), at: wp.int32) -> {spelled(returns)}:\n"
+        typed = [f"{name}: {spelled(kind)}" for name, kind in leading.items()]
+        place = ["tape: wp.array(dtype=wp.vec4)", "at: wp.int32"]
+        parameters = ", ".join(place + typed if tape_first else typed + place)
+        text = f"def {{name}}({parameters}) -> {spelled(returns)}:\n"
         reads = "".join(f"    t{i} = tape[at + {i}]\n" for i in range(self.texels) if f"t{i}[" in lines)
         scope: dict[str, Any] = {function.key: function for function in called}
         if self.module:

@@ -19,10 +19,12 @@ RESULTS: dict[str, Any] = {
     "closest_with_influence": wp.vec4,
     "least_influence": wp.float32,
     "depth": wp.float32,
+    "influence_near": wp.float32,
 }
 """The formulas of a primitive, and the types of their results."""
 
 _POINT = {"q": wp.vec3}
+_LEADING: dict[str, dict[str, Any]] = {"depth": _POINT, "influence_near": {"q": wp.vec3, "c": wp.vec4}}
 _SQUARED = """\
     c = {0}(q, tape, at)
     w = q - wp.vec3(c[0], c[1], c[2])
@@ -50,7 +52,7 @@ class Skeleton:
     cells: float = BALL_CELLS
     """Cells along the radius with which a mesh shows a thin primitive of this kind."""
     own_influence_near: wp.Function | None = None
-    """Of a set whose influence varies: a function of (tape, at, q, c) that returns its `influence_near`."""
+    """Of a set whose influence varies: a function of (tape, at, q, c) that returns its `influence_bound`."""
     depth: wp.Function | float = 0.0
     """Of a solid set: a lower bound on the distance of a point inside from its rim, at most 0 outside."""
     apart: wp.Function | float = 1.0
@@ -60,7 +62,7 @@ class Skeleton:
 
     @property
     def influence_near(self) -> wp.Function:
-        """Function of (tape, at, q, c) that returns `influence_near`, or the smallest influence."""
+        """Function of (tape, at, q, c) that returns `influence_bound`, or the smallest influence."""
         return self.own_influence_near or self.min_influence
 
     @property
@@ -93,7 +95,7 @@ class SkeletonFormulas(PointFormulas):
             raise self.source.refusal("radius: expected it in front of further radii; declare it there")
         if self.size == 4 and declared is not None:
             declared = [name for name in declared if name not in self.radii] + list(self.radii)
-        require_numbers(self.source, self.given, {"depth": _POINT}, declared)
+        require_numbers(self.source, self.given, _LEADING, declared)
 
     def digest(self, parameters: Sequence[Any]) -> str:
         """Return a digest of the formulas, the claims, and the declared parameters."""
@@ -117,6 +119,16 @@ class SkeletonFormulas(PointFormulas):
         smallest = self._least(reader)
         if "depth" in given:
             claims["depth"] = reader.around("depth", given["depth"], _POINT, wp.float32, "q")
+        if "influence_near" in given:
+            call = f"    return {reader.call(given['influence_near'], 'q', 'c')}\n"
+            claims["own_influence_near"] = reader.written(
+                "influence_near",
+                _LEADING["influence_near"],
+                wp.float32,
+                call,
+                given["influence_near"].function,
+                tape_first=True,
+            )
         if self.convex and digest:
             squared = _SQUARED.format(closest.key)
             claims["apart"] = reader.written("apart", _POINT, wp.float32, squared, closest)

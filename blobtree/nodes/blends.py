@@ -19,13 +19,6 @@ from blobtree.declare.claims import KEEP_BOTH, KEEP_LEFT, KEEP_NONE, KEEP_RIGHT,
 from blobtree.declare.formula import formula
 from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.errors import InvalidNode
-from blobtree.formulas.operators import (
-    difference_partials,
-    intersection_partials,
-    ricci_norm,
-    ricci_partials,
-    union_partials,
-)
 from blobtree.lazy import Lazy
 from blobtree.nodes.node import Node
 from blobtree.nodes.operator import ManyOperands, Operator
@@ -34,7 +27,12 @@ from blobtree.nodes.tree import (
     Macro,
     Sum,
     Union,
+    difference_partials,
     exponent_field,
+    intersection_partials,
+    ricci_norm,
+    ricci_partials,
+    union_partials,
 )
 
 wp.set_module_options({"enable_backward": False})
@@ -94,7 +92,7 @@ class SuperellipticBlend(Operator):
         """
         least = 0.5 - width
         if b <= least or a <= least:
-            return union_partials(a, b, 0.0)
+            return union_partials(a, b)
         f = ricci_partials(a - least, b - least, exponent)
         return wp.vec3(least + f[0], f[1], f[2])
 
@@ -213,7 +211,7 @@ class RUnion(Operator):
     def partials(a: wp.float32, b: wp.float32) -> wp.vec3:
         """F = φ⁻¹(φ(a) ∨ φ(b)), x ∨ y = −(−x ∧ −y): a union, smooth everywhere but where a = b = ½."""
         if a <= R_NOTHING or b <= R_NOTHING:
-            return union_partials(a, b, 0.0)
+            return union_partials(a, b)
         return r_met(a, b, -1.0, -1.0, -1.0)
 
     @formula
@@ -241,7 +239,7 @@ class RIntersection(Operator):
     def partials(a: wp.float32, b: wp.float32) -> wp.vec3:
         """F = φ⁻¹(φ(a) ∧ φ(b)): an intersection whose field is smooth everywhere but where a = b = ½."""
         if a <= R_NOTHING or b <= R_NOTHING:
-            return intersection_partials(a, b, 0.0)
+            return intersection_partials(a, b)
         return r_met(a, b, 1.0, 1.0, 1.0)
 
     @formula
@@ -314,7 +312,7 @@ class SmoothIntersection(Operator):
         total = a + b
         k = width * (total / (total + 2.0 * width))
         if wp.abs(a - b) >= k:
-            return intersection_partials(a, b, 0.0)
+            return intersection_partials(a, b)
         share = (a - b) / k
         growth = 2.0 * (k / total) * (k / total)
         fall = 0.25 * (1.0 - share * share) * growth
@@ -342,7 +340,7 @@ class SmoothIntersection(Operator):
 
 @wp.func
 def remainder(a: wp.float32, b: wp.float32) -> wp.float32:
-    """Return the complement of a tool of `operators.difference_partials`, never below 0."""
+    """Return the complement of a tool of `difference_partials`, never below 0."""
     top = wp.max(a, 1.0)
     return wp.max(top - b * (2.0 * top - 1.0), 0.0)
 
@@ -379,7 +377,7 @@ class SmoothDifference(Operator):
         total = a + c
         k = smooth_difference_width(total, b, width)
         if wp.abs(a - c) >= k:
-            return difference_partials(a, b, 0.0)
+            return difference_partials(a, b)
         share = (a - c) / k
         by_c = 0.5 * (1.0 + share)
         by_k = -0.25 * (1.0 - share * share)
@@ -456,12 +454,12 @@ class CleanUnion(Operator):
         the surface is that of the union, and where an operand is 0.
         """
         if b <= 0.0 or a <= 0.0:
-            return union_partials(a, b, 0.0)
+            return union_partials(a, b)
         below_a = inverse_distance(0.5 - a)
         below_b = inverse_distance(0.5 - b)
         k = 2.0 / (below_a + below_b + 1.0 / a + 1.0 / b)
         if wp.abs(a - b) >= k:
-            return union_partials(a, b, 0.0)
+            return union_partials(a, b)
         share = (a - b) / k
         side_a = wp.sign(0.5 - a)
         side_b = wp.sign(0.5 - b)
@@ -626,7 +624,7 @@ def opened_partials(a: wp.float32, b: wp.float32, o: wp.float32) -> wp.vec3:
     fade_b = inside_fade(b)
     k = o * total * fade_a * fade_b
     if k <= 0.0 or wp.abs(a - b) >= k:
-        return union_partials(a, b, 0.0)
+        return union_partials(a, b)
     share = (a - b) / k
     bend = 0.25 * (1.0 - share * share)
     k_by_a = o * fade_b * (fade_a + total * inside_fade_slope(a))
@@ -696,7 +694,7 @@ class GradientBlend(Operator):
         operators, which are smooth to any order. This one is a closed form whose derivative is continuous.
         """
         if b <= 0.0 or a <= 0.0:
-            return union_partials(a, b, 0.0)
+            return union_partials(a, b)
         return opened_partials(a, b, opening(direction_a, direction_b, first, last))
 
     @formula

@@ -1,6 +1,6 @@
 """Primitives along curves: circles, arcs, Bézier curves, polylines and strokes, each with visible radii.
 
-`formulas.skeletons` states what a skeleton is. For a curve c(t) with the influence s(t), 0 ≤ t ≤ 1, the
+`nodes.primitives` states what a skeleton is. For a curve c(t) with the influence s(t), 0 ≤ t ≤ 1, the
 closest point minimises |q − c(t)| / s(t). Its derivative has the sign of a polynomial N of degree 5 at most,
 so every local minimum is found: the roots of N''' bracket those of N'', these bracket those of N', and these
 bracket the minima. No start value can lead to the wrong one of two minima.
@@ -22,7 +22,7 @@ from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.declare.registry import library_rows
 from blobtree.declare.skeleton import TUBE_CELLS, Skeleton
 from blobtree.errors import InvalidNode
-from blobtree.formulas.skeletons import CIRCLE, JOINT_YIELD, distance_to_segment, influence_near
+from blobtree.formulas.skeletons import JOINT_YIELD, distance_to_segment, influence_bound
 from blobtree.lazy import Lazy
 from blobtree.nodes.node import Node
 from blobtree.nodes.pieces import Pieces
@@ -33,6 +33,7 @@ from blobtree.nodes.primitives import (
     Primitive,
     RoundPrimitive,
     Segment,
+    Torus,
     beside,
 )
 from blobtree.texels import Texels
@@ -78,7 +79,7 @@ class Circle(RoundPrimitive):
     """
 
     file_tag = "circle"
-    skeleton = CIRCLE
+    skeleton = Torus.skeleton
 
     center: Vector = par.point("centre of the circle")
     axis: Vector = par.direction("normal of the circle's plane, of any length")
@@ -435,8 +436,8 @@ def clearance_of_curve(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
 
 @wp.func
 def influence_near_curve(tape: Texels, at: wp.int32, q: wp.vec3, c: wp.vec4) -> wp.float32:
-    """Return `influence_near` of a curve."""
-    return influence_near(q, c, min_influence_of_curve(tape, at), clearance_of_curve(q, tape, at))
+    """Return `influence_bound` of a curve."""
+    return influence_bound(q, c, min_influence_of_curve(tape, at), clearance_of_curve(q, tape, at))
 
 
 JOINED_SEGMENT = Skeleton(

@@ -50,9 +50,9 @@ class DeclaredNode(Node, metaclass=CustomKind):
             require_claims(cls, cls.sort)
         tag = tag_of(cls)
         cls._formulas = {**cls._formulas, **declared_formulas(cls, tag, cls.formula_results)}
-        if own:
+        if own and not cls.__name__.startswith("_"):
             cls.file_tag = tag
-        else:
+        elif not own:
             _require_free_names(cls)
         super().__init_subclass__()
         dataclass(frozen=True, eq=False, repr=False, init=not cls.has_init)(cls)

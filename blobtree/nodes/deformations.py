@@ -22,8 +22,8 @@ from blobtree.declare.formula import formula
 from blobtree.declare.parameters import LARGEST_INTEGER, Parameter, Quantity
 from blobtree.declare.warp import UNKNOWN_EXTENT
 from blobtree.errors import InvalidNode
-from blobtree.formulas.warps import twist_box
 from blobtree.lazy import Lazy
+from blobtree.nodes.tree import cylinder_box
 from blobtree.nodes.warp import Warp
 from blobtree.texels import Texels
 from blobtree.validation import Vector
@@ -329,7 +329,7 @@ class LimitedTwist(Deformation):
     @classmethod
     def outer_box(cls, lower: Float64Array, upper: Float64Array, rate: float, low: float, high: float) -> Box:
         """Return the box around the cylinder around a box; a box below the limits stays as it is."""
-        return (lower, upper) if upper[2] <= low else twist_box(lower, upper)
+        return (lower, upper) if upper[2] <= low else cylinder_box(lower, upper)
 
 
 @wp.func

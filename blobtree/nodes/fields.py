@@ -22,10 +22,10 @@ from blobtree.declare.readers import named_values
 from blobtree.errors import InvalidDefinition, InvalidNode
 from blobtree.formulas.falloff import RIM
 from blobtree.formulas.noise import LARGEST_NOISE, MEAN_NOISE_SLOPE, STEEPEST_NOISE, gradient_noise
-from blobtree.formulas.operators import ricci_partials
 from blobtree.formulas.windows import smooth_step, smooth_step_slope, steepest_smooth_step
 from blobtree.nodes.declared import DeclaredNode
 from blobtree.nodes.primitives import DEFAULT_COLOR, PROFILE, Columns, Falling, Leaf, Profile, rows_of
+from blobtree.nodes.tree import ricci_partials
 from blobtree.tape.program import ProgramField, profile_extent, profile_factor
 from blobtree.validation import Vector
 

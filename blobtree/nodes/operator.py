@@ -32,10 +32,12 @@ class Combination(DeclaredNode):
     associative: ClassVar[bool] = False
     lipschitz: ClassVar[float | None] = None
     paints: ClassVar[bool] = True
+    _signed: ClassVar[bool] = False
+    """Operands below 0, of primitives with a negative weight, act as they are."""
 
     @classmethod
     def _declaration(cls, tag: str) -> OperatorFormulas:
-        claims = Claims(cls.like, cls.monotone, cls.associative, cls.lipschitz, cls.paints)
+        claims = Claims(cls.like, cls.monotone, cls.associative, cls.lipschitz, cls.paints, cls._signed)
         return OperatorFormulas(tag, cls._formulas, claims)
 
     @classmethod

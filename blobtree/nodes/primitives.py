@@ -1,8 +1,11 @@
 """Primitives: the leaves of a tree, each a skeleton with a visible radius and a colour.
 
-A kind is a class with its parameters, formulas and claims. Those of the core have their formulas in
-`formulas.skeletons`, because the kernels of all trees read them. Falloff, width and weight are those of every
+A kind is a class with its parameters, formulas and claims. Falloff, width and weight are those of every
 primitive (`Profile`).
+
+The field of a primitive is g(|q − closest| / influence). Because the closest point minimises that ratio, its
+own motion does not enter the gradient (envelope theorem), so gradients are exact; and the ratio changes by at
+most 1 / least influence per unit.
 """
 
 import inspect
@@ -12,11 +15,12 @@ from itertools import product
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, dataclass_transform
 
 import numpy as np
+import warp as wp
 
 from blobtree import par
 from blobtree._typing import Float64Array
 from blobtree.declare.falloff import Falloff
-from blobtree.declare.formula import Declared, is_own
+from blobtree.declare.formula import Declared, formula, is_own
 from blobtree.declare.parameters import (
     OPTIONAL,
     SPECIFIED,
@@ -30,15 +34,25 @@ from blobtree.declare.parameters import (
     unit_vectors,
 )
 from blobtree.declare.readers import named_values
-from blobtree.declare.skeleton import BALL_CELLS, INFLUENCE_SLOT, RESULTS, Skeleton, SkeletonFormulas
+from blobtree.declare.skeleton import (
+    BALL_CELLS,
+    INFLUENCE_SLOT,
+    PLATE_CELLS,
+    RESULTS,
+    TUBE_CELLS,
+    Skeleton,
+    SkeletonFormulas,
+)
 from blobtree.errors import InvalidDefinition
-from blobtree.formulas.skeletons import BOX, CIRCLE, CONE, DISC, POINT, SEGMENT
+from blobtree.formulas.skeletons import distance_to_segment, influence_bound
 from blobtree.kinds.falloff import WYVILL
 from blobtree.nodes.attributes import NO_ATTRIBUTES, AttributeMapping
 from blobtree.nodes.declared import DeclaredNode
 from blobtree.nodes.node import Node
 from blobtree.tape.program import ProgramPrimitive
 from blobtree.validation import Vector
+
+wp.set_module_options({"enable_backward": False})
 
 DEFAULT_COLOR: Any = (0.8, 0.8, 0.8)
 
@@ -402,10 +416,15 @@ class Point(Primitive):
     [0.5]
     """
 
-    file_tag = "point"
-    skeleton = POINT
+    tag = "point"
+    convex = True
 
     center: Vector = par.point("centre of the ball")
+
+    @formula
+    def closest(q: wp.vec3, center: wp.vec3) -> wp.vec3:
+        """Return the centre."""
+        return center
 
 
 class Segment(Primitive):
@@ -418,20 +437,26 @@ class Segment(Primitive):
     [0.5]
     """
 
-    file_tag = "segment"
-    skeleton = SEGMENT
+    tag = "segment"
+    convex = True
+    cells = TUBE_CELLS
 
     start: Vector = par.point("start of the line")
     end: Vector = par.point("end of the line")
 
+    @formula
+    def closest(q: wp.vec3, start: wp.vec3, axis: wp.vec3, inverse: wp.float32) -> wp.vec3:
+        """Return the closest point of the line; `inverse` is 1 / length² or 0."""
+        return start + axis * wp.clamp(wp.dot(q - start, axis) * inverse, 0.0, 1.0)
+
     @classmethod
-    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
-        """Return start and influence radius; axis and 1 / length²."""
+    def numbers(cls, columns: Columns, influences: Float64Array) -> Float64Array:
+        """Return start, axis and 1 / length²."""
         axes = columns["end"] - columns["start"]
         squares = (axes**2).sum(axis=1)
         short = squares <= SHORTEST_AXIS * influences[:, 0] ** 2
         inverses = np.where(short, 0.0, 1.0 / np.where(short, 1.0, squares))
-        return np.stack([beside(columns["start"], influences[:, 0]), beside(axes, inverses)], axis=1)
+        return np.column_stack([columns["start"], axes, inverses])
 
 
 class Cone(Primitive):
@@ -444,8 +469,8 @@ class Cone(Primitive):
     [0.5]
     """
 
-    file_tag = "cone"
-    skeleton = CONE
+    tag = "cone"
+    cells = TUBE_CELLS
 
     start: Vector = par.point("start of the axis")
     end: Vector = par.point("end of the axis")
@@ -453,11 +478,44 @@ class Cone(Primitive):
     radius: float = par.radius("visible radius at the start")
     end_radius: float = par.radius("visible radius at the end")
 
+    @formula
+    def closest_with_influence(
+        q: wp.vec3, start: wp.vec3, along: wp.vec3, radius: wp.float32, end_radius: wp.float32
+    ) -> wp.vec4:
+        """Return the closest point of a cone, and the influence radius there.
+
+        With x along the axis and y beside it, (y² + (x − τ)²) / (s₀ + kτ)² is least at
+        τ = x + k y² / (s₀ + k x); behind the apex, where s₀ + k x ≤ 0, at the thicker end.
+        """
+        length = wp.length(along)
+        t = float(0.0)
+        if length > 0.0:
+            axis = wp.normalize(along)
+            w = q - start
+            x = wp.dot(axis, w)
+            beside = w - axis * x
+            k = (end_radius - radius) / length
+            s = radius + k * x
+            if s > 0.0:
+                t = wp.clamp((x + k * wp.dot(beside, beside) / s) / length, 0.0, 1.0)
+            elif k > 0.0:
+                t = 1.0
+        elif end_radius > radius:
+            t = 1.0
+        c = start + along * t
+        return wp.vec4(c[0], c[1], c[2], radius + t * (end_radius - radius))
+
+    @formula
+    def influence_near(
+        q: wp.vec3, c: wp.vec4, start: wp.vec3, along: wp.vec3, radius: wp.float32, end_radius: wp.float32
+    ) -> wp.float32:
+        """Return `influence_bound` of a cone, whose clearance is the distance from the axis."""
+        return influence_bound(q, c, wp.min(radius, end_radius), distance_to_segment(q, start, start + along))
+
     @classmethod
-    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
-        """Return start and influence radius there; axis and influence radius at the end."""
-        axes = columns["end"] - columns["start"]
-        return np.stack([beside(columns["start"], influences[:, 0]), beside(axes, influences[:, 1])], axis=1)
+    def numbers(cls, columns: Columns, influences: Float64Array) -> Float64Array:
+        """Return start, axis and the influence radius at the end."""
+        return np.column_stack([columns["start"], columns["end"] - columns["start"], influences[:, 1:]])
 
 
 class Torus(RoundPrimitive):
@@ -471,14 +529,25 @@ class Torus(RoundPrimitive):
     [0.5, 0.5, 0.0]
     """
 
-    file_tag = "torus"
-    skeleton = CIRCLE
+    tag = "torus"
+    cells = TUBE_CELLS
 
     center: Vector = par.point("centre of the circle")
     axis: Vector = par.direction("normal of the circle's plane, of any length")
     ring_radius: float = par.length("radius of the circle")
     _: KW_ONLY
     radius: float = par.radius("visible radius of the tube")
+
+    @formula
+    def closest(q: wp.vec3, center: wp.vec3, axis: wp.vec3, ring_radius: wp.float32) -> wp.vec3:
+        """Return the closest point of the circle; on the axis any of them."""
+        w = q - center
+        flat = w - axis * wp.dot(w, axis)
+        if wp.length(flat) <= 1.0e-6 * wp.length(w):
+            flat = wp.cross(axis, wp.vec3(0.0, 1.0, 0.0))
+            if wp.abs(axis[0]) < 0.6:
+                flat = wp.cross(axis, wp.vec3(1.0, 0.0, 0.0))
+        return center + wp.normalize(flat) * ring_radius
 
 
 class Disc(RoundPrimitive):
@@ -492,14 +561,24 @@ class Disc(RoundPrimitive):
     [0.5, 0.5]
     """
 
-    file_tag = "disc"
-    skeleton = DISC
+    tag = "disc"
+    convex = True
+    cells = PLATE_CELLS
 
     center: Vector = par.point("centre of the disc")
     axis: Vector = par.direction("normal of the disc's plane, of any length")
     disc_radius: float = par.length("radius of the disc, without its edge")
     _: KW_ONLY
     radius: float = par.radius("visible radius of the edge, half the thickness")
+
+    @formula
+    def closest(q: wp.vec3, center: wp.vec3, axis: wp.vec3, disc_radius: wp.float32) -> wp.vec3:
+        """Return the closest point of the disc."""
+        w = q - center
+        c = w - axis * wp.dot(w, axis)
+        if wp.length(c) > disc_radius:
+            c = wp.normalize(c) * disc_radius
+        return center + c
 
 
 class Box(Primitive):
@@ -513,13 +592,33 @@ class Box(Primitive):
     [0.5, 0.5, 1.0]
     """
 
-    file_tag = "box"
-    skeleton = BOX
+    tag = "box"
+    convex = True
 
     center: Vector = par.point("centre of the box")
     size: Vector = par.extents("lengths along x, y and z, without the radius")
     _: KW_ONLY
     radius: float = par.radius("visible radius of the edges")
+
+    @formula
+    def closest(q: wp.vec3, center: wp.vec3, size: wp.vec3) -> wp.vec3:
+        """Return the closest point of the box."""
+        return wp.vec3(
+            wp.clamp(q[0], center[0] - 0.5 * size[0], center[0] + 0.5 * size[0]),
+            wp.clamp(q[1], center[1] - 0.5 * size[1], center[1] + 0.5 * size[1]),
+            wp.clamp(q[2], center[2] - 0.5 * size[2], center[2] + 0.5 * size[2]),
+        )
+
+    @formula
+    def depth(q: wp.vec3, center: wp.vec3, size: wp.vec3) -> wp.float32:
+        """Return the distance from the faces, below 0 outside."""
+        return wp.min(
+            wp.min(
+                0.5 * size[0] - wp.abs(q[0] - center[0]),
+                0.5 * size[1] - wp.abs(q[1] - center[1]),
+            ),
+            0.5 * size[2] - wp.abs(q[2] - center[2]),
+        )
 
     @classmethod
     def hull(cls, columns: Columns) -> Float64Array:

@@ -72,7 +72,7 @@ def closest(kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
 
 @of_row("skeletons", "influence_near")
 def influence_around(kind: wp.int32, tape: Texels, at: wp.int32, q: wp.vec3, c: wp.vec4) -> wp.float32:
-    """Return `influence_near` of a skeleton, c being its closest point to q."""
+    """Return `influence_bound` of a skeleton, c being its closest point to q."""
 
 
 @of_row("skeletons")

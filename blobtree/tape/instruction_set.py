@@ -167,7 +167,7 @@ _created: list[InstructionSet] = []
 def core() -> InstructionSet:
     """Return the instruction set of trees of core kinds."""
     if not _created:
-        tables = core_tables()
+        tables: dict[str, Any] = core_tables()
         with LOCK:
             if not _created:
                 _created.append(InstructionSet(**tables))

@@ -51,9 +51,11 @@ COMPILED = ("blobtree.tape.evaluate_kernels", "blobtree.cells.refine_kernels", "
 
 COMPILE = """
 import importlib, sys, time, warp as wp
+from blobtree import Point
 from blobtree.device import start_warp
 from blobtree.kernels import _parse_headers
 start_warp()
+Point((0, 0, 0), radius=1.0).tape
 _parse_headers()
 for name in sys.argv[1:]:
     module = next(v.module for v in vars(importlib.import_module(name)).values() if isinstance(v, wp.Kernel))

@@ -17,8 +17,8 @@ from blobtree.conformance.laws import LAWS, Case, NotChecked
 from blobtree.conformance.plain_field import PlainField
 from blobtree.conformance.samples import drawn_node
 from blobtree.declare.claims import difference_like_choice, intersection_like_choice
-from blobtree.formulas.operators import union_choice
 from blobtree.nodes.kinds import NODE_KINDS
+from blobtree.nodes.tree import union_keeps
 from blobtree.transpile.specialize import defined, warp_function
 from tests.blobtree.transpile.warp_functions import python_function
 from tests.conformance import exact_field
@@ -137,7 +137,7 @@ def faults(tag: str) -> Iterator[tuple[str, Any]]:
         less = scaled(formula_in(kind, part), "less")
         yield f"{tag} {part} × 0.7", with_formula(kind, part, part, less)
     if name == "operator":
-        choices: tuple[Any, ...] = (union_choice, intersection_like_choice, difference_like_choice)
+        choices: tuple[Any, ...] = (union_keeps, intersection_like_choice, difference_like_choice)
         for choice in choices:
             yield f"{tag} pruned by {choice.key}", with_row(kind, choice.key, choice=choice)
         if not row.monotone:

@@ -11,14 +11,17 @@ import pytest
 from numpy.typing import NDArray
 
 from blobtree.declare.claims import KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OperatorRow, Support
-from blobtree.formulas.operators import DEEPEST, DIFFERENCE, RICCI
 from blobtree.nodes.kinds import NODE_KINDS
+from blobtree.nodes.pieces import _Deepest
+from blobtree.nodes.tree import Difference, Ricci
 from tests.blobtree.transpile.warp_functions import call, python_function
 from tests.oracles import blends as oracle
 from tests.oracles.blobtree import Field, pressed_field, rated
 
 Floats = NDArray[np.float64]
 Setting = dict[str, float]
+
+DEEPEST, DIFFERENCE, RICCI = _Deepest.operator, Difference.operator, Ricci.operator
 
 CONTACTS: list[Setting] = [
     {"ratio": ratio, "width": width, "height": height}

@@ -38,7 +38,7 @@ def _changed(rng: np.random.Generator, node: Node) -> Node:
     if isinstance(node, Point | Segment | Cone):
         return _changed_leaf(rng, node)
     if isinstance(node, Ricci) and rng.random() < 0.4:
-        return replace(node, exponent=float(rng.choice([1.0, 1.5, 2.0, 5.0])))
+        return replace(node, exponent=float(rng.choice([1.0, 1.5, 2.0, 5.0])))  # type: ignore[call-arg]
     if isinstance(node, Twist):
         return replace(node, degrees=node.degrees + float(rng.normal() * 5.0))
     if isinstance(node, Offset):

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from blobtree import InvalidNode, Node, Point, Ricci, Segment, Sum, Union
-from blobtree.formulas.operators import INTERSECTION, SUM, UNION
+from blobtree import Intersection, InvalidNode, Node, Point, Ricci, Segment, Sum, Union
 from blobtree.tape.program import Pop, Push, Run, compile_program, postorder, registers_needed
 from tests.blobtree.trees import trees
 
@@ -100,7 +99,7 @@ def test_points_of_one_sum_are_one_run() -> None:
     (run,) = compile_program(Sum(tuple(points)))
     assert isinstance(run, Run)
     assert [placed.primitive for placed in run.primitives] == points
-    assert run.operator is SUM
+    assert run.operator is Sum.operator
 
 
 def test_a_run_holds_one_skeleton_one_operator_and_one_kind_of_map() -> None:
@@ -112,8 +111,9 @@ def test_a_run_holds_one_skeleton_one_operator_and_one_kind_of_map() -> None:
         (2, False), (2, True),
     ]  # fmt: skip
     # a fold that may start from the empty field does; an intersection has to start from its first operand
-    assert [s.operator for s in compile_program(Union((ball, ball))) if isinstance(s, Run)] == [UNION]
-    assert [s.operator for s in compile_program(ball & ball) if isinstance(s, Run)] == [SUM, INTERSECTION]
+    united, common = (compile_program(node) for node in (Union((ball, ball)), ball & ball))
+    assert [s.operator for s in united if isinstance(s, Run)] == [Union.operator]
+    assert [s.operator for s in common if isinstance(s, Run)] == [Sum.operator, Intersection.operator]
     different = Ricci((ball, Ricci((ball, ball), exponent=2.0)), exponent=3.0)
     assert [s.parameters for s in compile_program(different) if isinstance(s, Run)] == [(2.0,), (3.0,)]
 
@@ -130,7 +130,7 @@ def test_a_ricci_blend_of_exponent_1_is_a_sum() -> None:
     ball = Point((0, 0, 0), radius=1.0)
     (run,) = compile_program(Sum((Ricci((ball, ball), exponent=1.0), ball)))
     assert isinstance(run, Run)
-    assert (run.operator, len(run.primitives)) == (SUM, 3)
+    assert (run.operator, len(run.primitives)) == (Sum.operator, 3)
 
 
 def test_transforms_multiply_from_the_outside_in() -> None:

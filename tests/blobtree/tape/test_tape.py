@@ -5,14 +5,13 @@ import pytest
 import warp as wp
 
 from blobtree import RIM, InvalidNode, Node, Point, Segment, polygonize
-from blobtree.formulas.operators import DIFFERENCE, INTERSECTION, OPERATORS, RICCI, SUM, UNION
-from blobtree.formulas.skeletons import POINT, SEGMENT, SKELETONS
-from blobtree.tape.codes import POP, POP_SWAPPED, PREFIX, PUSH, STRETCHED, UNWARP, WARP
+from blobtree.tape.codes import OPERATORS, POP, POP_SWAPPED, PREFIX, PUSH, SKELETONS, STRETCHED, UNWARP, WARP
+from blobtree.tape.instruction_set import core
 from blobtree.tape.tape import Tape
 from tests.blobtree.trees import random_trees
 
-CODES = {skeleton: code for code, skeleton in enumerate(SKELETONS)}
-OPERATOR = {operator: code for code, operator in enumerate(OPERATORS)}
+CODES = {tag: code for code, tag in enumerate(SKELETONS)}
+OPERATOR = {tag: code for code, tag in enumerate(OPERATORS)}
 BALL = Point((1, 2, 3), radius=0.5, color=(1, 0.5, 0.25))
 BONE = Segment((0, 0, 0), (0, 0, 2), radius=0.25, color=(0, 0, 1))
 INFLUENCE = 0.5 / RIM
@@ -27,7 +26,7 @@ def instructions(tape: Tape) -> list[tuple[int, int, int, float]]:
         at += 1
         if code >= 0:
             stretched = code >= STRETCHED
-            skeleton = SKELETONS[int(code) - STRETCHED * stretched]
+            skeleton = core().skeletons[int(code) - STRETCHED * stretched]
             at += int(count) * (PREFIX * stretched + skeleton.parameters + 1)
         elif code in (WARP, UNWARP):
             at += PREFIX
@@ -36,14 +35,14 @@ def instructions(tape: Tape) -> list[tuple[int, int, int, float]]:
 
 
 def test_a_point() -> None:
-    expected = [[CODES[POINT], OPERATOR[SUM], 1, 0], [1, 2, 3, INFLUENCE], [1, 0.5, 0.25, 1]]
+    expected = [[CODES["point"], OPERATOR["sum"], 1, 0], [1, 2, 3, INFLUENCE], [1, 0.5, 0.25, 1]]
     np.testing.assert_allclose(BALL.tape.data, np.array(expected), rtol=1e-6)
     assert BALL.tape.data.dtype == np.float32
 
 
 def test_a_segment_and_one_without_length() -> None:
     expected = [
-        [CODES[SEGMENT], OPERATOR[SUM], 1, 0],
+        [CODES["segment"], OPERATOR["sum"], 1, 0],
         [0, 0, 0, INFLUENCE / 2],
         [0, 0, 2, 0.25],
         [0, 0, 1, 1],
@@ -65,7 +64,7 @@ def test_a_similar_map_folds_into_the_parameters() -> None:
 def test_a_stretched_primitive_carries_its_inverse_map() -> None:
     tape = BALL.scale((2, 1, 0.5)).translate((1, 0, 0)).tape
     expected = [
-        [CODES[POINT] + STRETCHED, OPERATOR[SUM], 1, 0],
+        [CODES["point"] + STRETCHED, OPERATOR["sum"], 1, 0],
         [0.5, 0, 0, -0.5], [0, 1, 0, 0], [0, 0, 2, 0], [2, 0, 0, 0],
         [1, 2, 3, INFLUENCE], [1, 0.5, 0.25, 1],
     ]  # fmt: skip
@@ -76,14 +75,14 @@ def test_a_stretched_primitive_carries_its_inverse_map() -> None:
 def test_push_and_pop() -> None:
     pair = BALL | BONE
     assert instructions((pair - (BALL & BONE)).tape) == [
-        (CODES[POINT], OPERATOR[UNION], 1, 0.0),
-        (CODES[SEGMENT], OPERATOR[UNION], 1, 0.0),
+        (CODES["point"], OPERATOR["union"], 1, 0.0),
+        (CODES["segment"], OPERATOR["union"], 1, 0.0),
         (PUSH, 0, 0, 0.0),
-        (CODES[POINT], OPERATOR[SUM], 1, 0.0),
-        (CODES[SEGMENT], OPERATOR[INTERSECTION], 1, 0.0),
-        (POP, OPERATOR[DIFFERENCE], 0, 0.0),
+        (CODES["point"], OPERATOR["sum"], 1, 0.0),
+        (CODES["segment"], OPERATOR["intersection"], 1, 0.0),
+        (POP, OPERATOR["difference"], 0, 0.0),
     ]
-    assert instructions((BALL - pair).tape)[-1] == (POP_SWAPPED, OPERATOR[DIFFERENCE], 0, 0.0)
+    assert instructions((BALL - pair).tape)[-1] == (POP_SWAPPED, OPERATOR["difference"], 0, 0.0)
 
 
 @pytest.mark.parametrize("tree", random_trees(seed=8, count=40), ids=range(40))
@@ -95,14 +94,14 @@ def test_a_tape_lists_the_kinds_in_use(tree: Node) -> None:
     combines = [header for header in found if header[0] not in (PUSH, WARP, UNWARP)]
     operators = {operator for _, operator, *_ in combines}
     from_operand = (
-        {OPERATOR[SUM]} if not all(OPERATORS[code].starts_from_zero for code in operators) else set()
+        {OPERATOR["sum"]} if not all(core().operators[code].starts_from_zero for code in operators) else set()
     )
     assert set(tape.operators) == operators | from_operand
     assert set(tape.warps) == {kind for code, kind, *_ in found if code == WARP}
     assert tape.warp_registers == max((count + 1 for code, _, count, _ in found if code == WARP), default=0)
     assert tape.stretched == any(code >= STRETCHED for code, *_ in runs)
     assert tape.registers == max((count + 1 for code, _, count, _ in found if code == PUSH), default=0)
-    assert all(parameter > 1.0 for _, operator, _, parameter in runs if OPERATORS[operator] is RICCI)
+    assert all(parameter > 1.0 for _, operator, _, parameter in runs if OPERATORS[operator] == "ricci")
     assert np.isfinite(tape.data).all()
 
 
@@ -114,7 +113,7 @@ def test_a_tape_on_a_device_has_the_same_texels() -> None:
 
 def test_a_twist_encloses_its_child() -> None:
     tape = (BALL.twist(90.0).translate((0, 0, 5)) | BONE).tape
-    assert [code for code, *_ in instructions(tape)] == [WARP, CODES[POINT], UNWARP, CODES[SEGMENT]]
+    assert [code for code, *_ in instructions(tape)] == [WARP, CODES["point"], UNWARP, CODES["segment"]]
     np.testing.assert_allclose(tape.data[1:4], [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, -5]])
     np.testing.assert_allclose(tape.data[4], [1, np.pi / 2, 0, 0], rtol=1e-6)
     assert tape.warps == (0,)

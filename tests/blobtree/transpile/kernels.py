@@ -7,7 +7,7 @@ from typing import Any
 
 import warp as wp
 
-from blobtree.formulas import operators
+from blobtree.nodes import tree
 from blobtree.transpile.specialize import RowChoice
 
 wp.set_module_options({"enable_backward": False})
@@ -95,7 +95,7 @@ def reciprocal(x: wp.float32) -> wp.float32:
 def of_two_rows(prototype: FunctionType) -> Any:
     """Write the body of a choice between a sum and a union."""
     choice = RowChoice(prototype, "operators", "partials")
-    return choice.over((operators.SUM, operators.UNION), prototype.__module__)
+    return choice.over((tree.Sum.operator, tree.Union.operator), prototype.__module__)
 
 
 @of_two_rows

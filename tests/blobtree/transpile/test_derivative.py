@@ -14,9 +14,8 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree import UntranslatableFunction
-from blobtree.formulas.skeletons import SKELETONS
 from blobtree.tape import interpreter
-from blobtree.tape.instruction_set import library
+from blobtree.tape.instruction_set import core, library
 from blobtree.transpile.derivative import (
     derivative_along,
     differentiated,
@@ -36,8 +35,8 @@ Numbers = NDArray[np.float64]
 
 FORMULAS = [
     typed
-    for name in ("falloff", "operators", "warps")
-    for typed in typed_functions(import_module(f"blobtree.formulas.{name}"))
+    for name in ("formulas.falloff", "nodes.tree")
+    for typed in typed_functions(import_module(f"blobtree.{name}"))
     if is_differentiable(typed.returned)
 ]
 SAMPLES: list[Any] = [
@@ -199,7 +198,7 @@ def test_slopes_of_falloffs_are_those_of_the_engine(row: Any) -> None:
         np.testing.assert_allclose(derived(d)[1], slope(d), rtol=1e-12, atol=1e-12)
 
 
-@pytest.mark.parametrize("skeleton", SKELETONS, ids=lambda skeleton: skeleton.name)
+@pytest.mark.parametrize("skeleton", core().skeletons, ids=lambda skeleton: skeleton.name)
 def test_skeletons_have_derivatives(skeleton: Any) -> None:
     for seed in SEEDS:
         check(skeleton.closest, ("q",), seed, {"at": 1})

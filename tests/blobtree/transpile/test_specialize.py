@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from blobtree.formulas import operators
 from blobtree.kinds.falloff import WYVILL
+from blobtree.nodes import tree
 from blobtree.tape import dispatch
+from blobtree.tape.dispatch import core_tables
 from blobtree.transpile.specialize import rebind, referenced_values, row_choice
 from tests.blobtree.transpile.kernels import choose, chosen
 
@@ -19,7 +20,7 @@ from tests.blobtree.transpile.kernels import choose, chosen
 def test_a_choice_by_a_code_calls_the_function_of_the_row() -> None:
     text = inspect.getsource(chosen.func)
     assert text.count("if code == ") == 2
-    assert "union_partials_1(a, b, parameter)\n" in text  # as many arguments as it declares
+    assert "union_partials_1(a, b)\n" in text  # as many arguments as it declares
     out = wp.zeros(3, dtype=wp.float32, device="cpu")
     wp.launch(choose, dim=3, outputs=[out], device="cpu")
     np.testing.assert_array_equal(out.numpy(), [7.0, 4.0, 0.0])
@@ -28,8 +29,8 @@ def test_a_choice_by_a_code_calls_the_function_of_the_row() -> None:
 def test_another_table_makes_another_function() -> None:
     choice = row_choice(chosen)
     assert choice is not None
-    longer: Any = choice.over(operators.OPERATORS, __name__)
-    assert inspect.getsource(longer.func).count("if code == ") == len(operators.OPERATORS)
+    longer: Any = choice.over(core_tables()["operators"], __name__)
+    assert inspect.getsource(longer.func).count("if code == ") == len(core_tables()["operators"])
     assert inspect.getsource(chosen.func).count("if code == ") == 2
 
 
@@ -45,18 +46,18 @@ def test_references_are_globals_and_closures_and_no_attributes() -> None:
     factor = 3.0
 
     def scaled(code: int, slope: float) -> float:
-        return factor * slope * len(str(operators.SUM.partials)) * sys._getframe().f_lineno
+        return factor * slope * len(str(tree.Sum.operator)) * sys._getframe().f_lineno
 
     assert isinstance(scaled, FunctionType)
     found = referenced_values(scaled)
     assert found["factor"] == 3.0
-    assert found["operators"] is operators
-    assert not {"partials", "slope", "f_lineno", "SUM"} & set(found)
+    assert found["tree"] is tree
+    assert not {"operator", "slope", "f_lineno", "Sum"} & set(found)
     assert rebind(scaled, {"factor": 0.0}, module=__name__)(1, 2.0) == 0.0
 
 
 def test_the_dispatchers_name_every_function_of_their_tables() -> None:
-    for operator in operators.OPERATORS:
+    for operator in core_tables()["operators"]:
         assert f"{operator.partials.key}_" in inspect.getsource(dispatch.partials.func)
         assert f"{operator.slope.key}_" in inspect.getsource(dispatch.slope.func)
 

@@ -25,6 +25,8 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree.declare.claims import OperatorRow
+from blobtree.declare.skeleton import Skeleton
+from blobtree.declare.warp import SpaceWarp
 from blobtree.transpile.glsl import uniforms_of
 
 _SCALARS = {wp.float32: np.float32, wp.int32: np.int32, wp.uint32: np.uint32, wp.bool: np.bool_}
@@ -45,8 +47,10 @@ class TypedFunction:
 
 def typed_functions(module: ModuleType) -> list[TypedFunction]:
     """The typed functions that `module` and its kinds define, save those that Warp specialises."""
-    kinds: list[Any] = [value for value in vars(module).values() if isinstance(value, type | OperatorRow)]
-    kinds += [kind.operator for kind in kinds if isinstance(vars(kind).get("operator"), OperatorRow)]
+    rows = OperatorRow | Skeleton | SpaceWarp
+    kinds: list[Any] = [value for value in vars(module).values() if isinstance(value, type | rows)]
+    names = ("operator", "skeleton", "warp")
+    kinds += [row for kind in kinds for name in names if isinstance(row := vars(kind).get(name), rows)]
     found = {}
     for value in chain(vars(module).values(), *(vars(kind).values() for kind in kinds)):
         if (

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blobtree.formulas.operators import OPERATORS
-from blobtree.formulas.warps import WARPS
+from blobtree.tape.codes import OPERATORS, WARPS
 from decals.field.contact import MIN_COMPLEMENT, MIN_SPAN
 from decals.field.mapping import ImageMapping
 from decals.field.ownership import owner_at
@@ -98,6 +97,7 @@ BY_NAME: dict[str, Draw] = {
     "farthest": uniform(0.0, 1.5), "half": uniform(0.0, 1.0), "lower": uniform(-1.5, 0.0, 3),
     "inverse": uniform(-3.0, 3.0, 3), "length": uniform(0.0, 1.5), "m": place,
     "mapping": whole(0, 2), "n": units, "n_p": units, "n_q": units, "nearest": uniform(0.0, 1.5),
+    "most": uniform(0.0, 3.0, 2), "rise": uniform(0.0, 5.0, 2),
     "offset": beside(powers(-9, 9), powers(-9, 9)),
     "packed_rank": among(0.0, 0.5, 1.0, 4194303.5), "rank": whole(0, 4), "ray": units,
     "operator": whole(0, len(OPERATORS)), "origin": place,
@@ -165,12 +165,12 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
     "cell_hash": dict.fromkeys("xyz", whole(-(2**31), 2**31)),
     **{
         f"{name}_{kind}": {"a": interval(2.0), "b": interval(2.0)}
-        for name in ("sum", "ricci", "union", "intersection", "difference", "blend")
-        for kind in ("range", "choice")
+        for name in OPERATORS
+        for kind in ("interval", "keeps")
     },
     **{
         f"{name}_choice": {"a": interval(2.0), "b": interval(2.0)}
-        for name in ("intersection_like", "difference_like", "unclaimed", "deepest")
+        for name in ("blend", "intersection_like", "difference_like", "unclaimed")
     },
     "newton_step": {"gap": uniform(0.0, 0.01), "rise": uniform(-1.0, 3.0), "tolerance": uniform(1e-3, 0.1)},
     "widened_range": {"smallest": field, "largest": field},

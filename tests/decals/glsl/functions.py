@@ -8,10 +8,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from blobtree.formulas.operators import OPERATORS
-from blobtree.formulas.skeletons import SKELETONS
-from blobtree.formulas.warps import WARPS
 from blobtree.kinds.falloff import FALLOFFS
+from blobtree.tape.codes import OPERATORS, SKELETONS, WARPS
 from blobtree.transpile.builtins import type_name
 from blobtree.transpile.glsl import uniforms_of
 from decals.rendering.context import Context

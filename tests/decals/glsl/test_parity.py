@@ -7,9 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree.formulas.operators import OPERATORS
-from blobtree.formulas.warps import WARPS
-from blobtree.kinds.falloff import FALLOFFS
 from blobtree.tape.dispatch import (
     falloff_numbers,
     falloff_slope,
@@ -24,6 +21,7 @@ from blobtree.tape.dispatch import (
     warp_pullback,
     warp_stretch,
 )
+from blobtree.tape.instruction_set import core
 from blobtree.transpile.builtins import BUILTINS, HELPERS, Expression
 from blobtree.transpile.glsl import translate_library
 from decals.rendering.context import Context
@@ -38,11 +36,11 @@ MODULES = (
     "blobtree.kinds.falloff",
     "blobtree.formulas.skeletons",
     "blobtree.declare.claims",
-    "blobtree.formulas.operators",
+    "blobtree.nodes.tree",
+    "blobtree.nodes.primitives",
     "blobtree.tape.dispatch",
     "blobtree.tape.evaluators",
     "blobtree.tracing.ray_kernels",
-    "blobtree.formulas.warps",
     "decals.field.contact",
     "decals.field.mapping",
     "decals.index.lookup",
@@ -116,9 +114,9 @@ def test_a_function_is_the_same_in_both_languages(context: Context, name: str) -
     typed = FUNCTIONS[name]
     arguments = arguments_of(typed)
     library = _dispatch(ALL_KINDS)
-    rows_of_operators = [f for operator in OPERATORS for f in (operator.partials, operator.slope)]
-    rows_of_warps = [f for warp in WARPS for f in (warp.forward, warp.pullback, warp.lipschitz)]
-    rows_of_falloffs = [f for row in FALLOFFS for f in (row.value, row.slope)]
+    rows_of_operators = [f for operator in core().operators for f in (operator.partials, operator.slope)]
+    rows_of_warps = [f for warp in core().warps for f in (warp.forward, warp.pullback, warp.lipschitz)]
+    rows_of_falloffs = [f for row in core().falloffs for f in (row.value, row.slope)]
     chosen = [*rows_of_operators, *rows_of_warps, *rows_of_falloffs]
     if typed.function in CHOOSERS:
         library = translate_library(chosen) + library
