@@ -1,4 +1,7 @@
 // The ray through a pixel against an implicit object (blobtree/tracing/rays.py); body of trace.frag and trace.comp.
+#ifdef MANY_KINDS
+#pragma optionNV(inline none)  // NVIDIA's compiler else copies functions into their callers, which takes minutes
+#endif
 //@ include camera.glsl
 //@ include surface.glsl
 //@ include loop_guard.glsl

@@ -28,7 +28,7 @@ from decals.rendering.decal_pass import DecalSource
 from decals.rendering.gbuffer import GBuffer
 from decals.rendering.pixel_pass import GROUP, PassBackend, PixelPass, Program, attach_camera, set_uniform
 from decals.rendering.rest_buffer import RestBuffer
-from decals.rendering.tracing_shader import Kinds, tracing_slots
+from decals.rendering.tracing_shader import Kinds, many_kinds, tracing_slots
 from decals.rendering.tree import TreeDrawable, covered_rectangle, draw_box
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile
 from decals.shaders import Source, compose
@@ -248,4 +248,10 @@ def _filled(
     """Return slots and defines of ``offset_foot.glsl``."""
     compute = context.backend is PassBackend.COMPUTE
     slots = offset_slots(kinds, source.form, buffers=compute)
-    return slots, {"RELIEF": True, "LIMITED": source.form.limited, "BLOCK": BLOCK, "STORED": compute}
+    return slots, {
+        "RELIEF": True,
+        "LIMITED": source.form.limited,
+        "BLOCK": BLOCK,
+        "STORED": compute,
+        "MANY_KINDS": many_kinds(slots),
+    }

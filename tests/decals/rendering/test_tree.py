@@ -5,13 +5,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import Node, Point, Segment
+from blobtree import Box, Cylinder, Node, Point, Segment, Torus
 from blobtree.sized_cache import SizedCache
 from blobtree.tracing import tree_cells
 from blobtree.tracing.tree_cells import TracingCells, tracing_cells
 from decals.rendering.options import RenderOptions
 from decals.rendering.picture import Buffers
+from decals.rendering.pixel_pass import PassBackend
 from decals.rendering.renderer import Renderer
+from decals.rendering.tracing_shader import Kinds, tracing_shader
 from decals.rendering.tree import covered_rectangle
 from decals.rendering.viewpoint import PictureView, Projection, Viewpoint, tiles
 from decals.scenes.camera import Camera
@@ -218,6 +220,17 @@ def test_a_tree_of_every_kind_compiles_as_compute_shader(compute: Renderer) -> N
     for tree in trees:
         view = View((TreeObject("tree", tree),), Camera.framing(tree.support))
         assert (compute.buffers(view, RenderOptions(size=(24, 18))).object_id == 0).any()
+
+
+def test_functions_of_many_kinds_are_called() -> None:
+    """NVIDIA's compiler takes minutes to copy many kinds into each place that evaluates the field."""
+    box, ring = Box((0, 0, 0), (1, 1, 1), radius=0.1), Torus((1, 0, 0), (0, 1, 0), 0.5, radius=0.2)
+    solids = box.rotate((0, 0, 1), 30) | ring | Cylinder((0, 0, 0), (0, 2, 0), 0.3, radius=0.05)
+    for tree, many in ((BALL, False), (CUT, False), (solids | CUT, True)):
+        for backend in PassBackend:
+            text = str(tracing_shader(Kinds.of(tree.tape), backend))
+            assert ("#define MANY_KINDS" in text) == many
+            assert text.index("#pragma optionNV(inline none)") < text.index("vec3 trace_ray(")
 
 
 def test_cells_of_drawn_trees_are_made_once(fragment: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
