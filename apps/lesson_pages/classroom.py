@@ -13,7 +13,7 @@ import math
 import re
 import secrets
 import time
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from html import escape
 from pathlib import Path
@@ -104,16 +104,15 @@ class Classroom:
         self._times: dict[int, float] = {}
         self._second, self._asked = 0, 0
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="pages")
-        self._pages: dict[str, asyncio.Future[web.Response]] = {}
+        self._pages: dict[str, asyncio.Future[str]] = {}
 
     def url(self, port: int) -> str:
         """Return the address of students."""
-        return f"{self._guard.address(port).rstrip('/')}{STUDENT}{self.token}/"
+        return f"{self._guard.origin(port)}{STUDENT}{self.token}/"
 
     def join(self, app: web.Application) -> None:
         """Answer requests of students before the guard does, and those of the teacher behind it."""
-        app.middlewares.insert(0, self._check)
-        app.on_response_prepare.append(_limit)
+        self._guard.doors[STUDENT] = self._answer
         app.router.add_get("/class", self._board)
         app.router.add_get("/class/answers", self._answers)
         app.router.add_get("/class/{name}.mjs", _script)
@@ -121,13 +120,8 @@ class Classroom:
 
     # -- students ---------------------------------------------------------------------------------------
 
-    @web.middleware
-    async def _check(
-        self, request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
-    ) -> web.StreamResponse:
-        """Answer a request of a student, or refuse it; pass others on to the guard."""
-        if not request.path.startswith(STUDENT):
-            return await handler(request)
+    async def _answer(self, request: web.Request) -> web.Response:
+        """Answer a request of a student, or refuse it."""
         token, _, name = request.path.removeprefix(STUDENT).partition("/")
         self._guard.check_names(request)
         if not hmac.compare_digest(token.encode(errors="replace"), self.token.encode()):
@@ -164,7 +158,7 @@ class Classroom:
         if not name:
             names = self._lessons.items()
             rows = "".join(f"<li><a href='{n}.html'>{escape(one.settings.title)}</a>" for n, one in names)
-            return _html(LIST.format(rows))
+            return _limited(LIST.format(rows))
         if name not in self._lessons:
             raise web.HTTPNotFound(text="expected a page of a lesson")
         if name not in self._pages:
@@ -172,7 +166,7 @@ class Classroom:
                 self._worker,
                 lambda: lesson_page(self._lessons[name], links=[("Lessons", "./")], sends=True).text,
             )
-        return _html(await asyncio.shield(self._pages[name]))
+        return _limited(await asyncio.shield(self._pages[name]))
 
     async def _take(self, request: web.Request) -> web.Response:
         """Take an answer: the one thing that a student can send."""
@@ -246,12 +240,13 @@ def _html(text: str) -> web.Response:
     return web.Response(text=text, content_type="text/html")
 
 
-async def _limit(request: web.Request, response: web.StreamResponse) -> None:
-    """Let a page of a student run the script that it has, and load nothing."""
-    if request.path.startswith(STUDENT) and isinstance(response, web.Response):
-        script = re.search(r"<script>(.*?)</script>", response.text or "", re.DOTALL)
-        digest = hashlib.sha256((script[1] if script else "").encode()).digest()
-        response.headers["Content-Security-Policy"] = POLICY.format(base64.b64encode(digest).decode())
+def _limited(text: str) -> web.Response:
+    """Return a page of a student, which may run the script that it has, and load nothing."""
+    script = re.search(r"<script>(.*?)</script>", text, re.DOTALL)
+    digest = hashlib.sha256((script[1] if script else "").encode()).digest()
+    response = _html(text)
+    response.headers["Content-Security-Policy"] = POLICY.format(base64.b64encode(digest).decode())
+    return response
 
 
 async def _script(request: web.Request) -> web.Response:

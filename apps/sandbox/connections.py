@@ -242,7 +242,9 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         self._web = bound
         bound.config["ws_compress"] = False
         bound.app.middlewares.append(_compressed)
-        self._guard.protect(bound.app)
+        routes, bound._default_routes = bound._default_routes, []
+        bound.app.add_routes(routes)  # wslink would add them to the application that is served
+        bound.set_app(self._guard.protected(bound.app))
         for handler in bound._ws_handlers:
             handler.onMessage = _closing(handler, handler.onMessage, self._limit_of)
             for name, (part, call) in handler.functionMap.items():

@@ -2,6 +2,9 @@
 
 A browser opens the page by a URL with a token, and gets a cookie for it. A process of this machine sends the
 token in the header `Authorization`. A page in the frame of a notebook sends it in its first message.
+
+All ports of a machine share their cookies. The page therefore lies below a path that no other server knows,
+and browsers send its cookie there only.
 """
 
 import base64
@@ -137,6 +140,10 @@ class Guard:
         The token.
     own_token
         True if the guard has made the token itself.
+    place
+        Path of the page, which others cannot guess.
+    doors
+        What answers requests below other paths, by the path. It checks them itself.
     """
 
     def __init__(
@@ -148,6 +155,8 @@ class Guard:
         framed: bool = False,
     ) -> None:
         self.token, self.own_token = token or new_token(), not token
+        self.place = f"/{secrets.token_hex(16)}"  # trame's page asks for its messages in small letters
+        self.doors: dict[str, Callable[[web.Request], Awaitable[web.StreamResponse]]] = {}
         self._host, self._framed = host, framed
         self._hosts = {name.lower() for name in (host, *allow_hosts)}
         if host in ANY_ADDRESS:
@@ -162,16 +171,22 @@ class Guard:
 
     def address(self, port: int) -> str:
         """Return the URL of the page without the token."""
+        return f"{self.origin(port)}{self.place}/"
+
+    def origin(self, port: int) -> str:
+        """Return the URL of the server."""
         host = self._host
         shown = socket.gethostname() if host in ANY_ADDRESS else f"[{host}]" if ":" in host else host
-        return f"http://{shown}:{port}/"
+        return f"http://{shown}:{port}"
 
-    def protect(self, app: web.Application) -> None:
-        """Check the requests of an application, before all its other parts and before its start."""
+    def protected(self, app: web.Application) -> web.Application:
+        """Return what serves an application at the place of the page, and checks all requests before."""
         logging.getLogger(SERVER_LOG).addFilter(_is_no_wrong_request)
         allow_connections()
-        app.middlewares.insert(0, self._check)
-        app.on_response_prepare.append(self._add_headers)
+        outer = web.Application(middlewares=[self._check])
+        outer.on_response_prepare.append(self._add_headers)
+        outer.add_subapp(self.place, app)
+        return outer
 
     def is_token(self, text: object) -> bool:
         """Return True for the token, in a time that says nothing about it."""
@@ -182,7 +197,10 @@ class Guard:
     @web.middleware
     async def _check(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Answer a request, or refuse it."""
-        finds = request.method == "POST" and request.path == FINDER
+        for path, answer in self.doors.items():
+            if request.path.startswith(path):
+                return await answer(request)
+        finds = request.method == "POST" and request.path == f"{self.place}{FINDER}"
         if request.method not in ("GET", "HEAD") and not finds:
             raise web.HTTPMethodNotAllowed(request.method, ["GET", "HEAD"])
         if any(len(name.encode(errors="replace")) > MAX_NAME_BYTES for name in request.path.split("/")):
@@ -198,6 +216,11 @@ class Guard:
             self.check_names(request)
         if not near and not (visit and (token or bearer)):
             raise web.HTTPForbidden(text="expected a request of the page itself")
+        if not request.path.startswith(f"{self.place}/"):
+            if visit and (token or bearer) and request.path in ("/", "/index.html"):
+                query = request.rel_url.raw_query_string  # proxies change addresses that begin with a slash
+                return web.Response(status=303, headers={"Location": f".{self.place}/?{query}"})
+            return self._refuse(visit=visit)
         if in_frame and not (token and self._frames) and not (bearer and near):
             raise web.HTTPForbidden(text="expected a window for the page, not a frame")
         browser = self._browser(request)
@@ -205,19 +228,26 @@ class Guard:
             return await self._exchange(request, handler, browser, in_frame=in_frame)
         of_frame = bool(self._frames) and not visit  # its files are public, its messages bring the token
         if not (browser or bearer or of_frame):
-            if visit:
-                return page_of(CLOSED, 403)
-            raise web.HTTPForbidden(text="expected the address with the token that the terminal shows")
+            return self._refuse(visit=visit)
         if not near:  # the browser sends its cookie once a page of this server asks
             return page_of("The sandbox opens.", refresh="?")
         if finds:
-            return web.json_response({"sessionURL": f"ws://USE_HOST{_prefix(request)}/ws"})
+            return web.json_response({"sessionURL": f"ws://USE_HOST{self._path(request)}ws"})
         name = browser or (_new_name() if visit else "")
         ASKING.set(Asking(name, visit, bool(browser or bearer)))
         response = await self._counted(request, handler)
         if visit and not response.prepared:
             self._remember(request, response, name)
         return response
+
+    def _refuse(self, *, visit: bool) -> web.Response:
+        if visit:
+            return page_of(CLOSED, 403)
+        raise web.HTTPForbidden(text="expected the address with the token that the terminal shows")
+
+    def _path(self, request: web.Request) -> str:
+        """Return the path of the page as browsers see it."""
+        return f"{_prefix(request)}{self.place}/"
 
     async def _counted(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Answer a request, unless too many connections for messages are open."""
@@ -286,13 +316,13 @@ class Guard:
         return hmac.new(self._secret, name.encode(), hashlib.sha256).hexdigest()
 
     def _remember(self, request: web.Request, response: web.StreamResponse, browser: str) -> None:
-        """Give a browser its cookie; behind a proxy, for the part of the address that is ours."""
+        """Give a browser its cookie, for the place of the page."""
         proxied = self._is_bearer(request)
         response.set_cookie(
             _cookie_of(request),
             f"{browser}.{self._signature(browser)}",
             max_age=COOKIE_SECONDS,
-            path=f"{_prefix(request)}/" if proxied else "/",
+            path=self._path(request) if proxied else f"{self.place}/",
             httponly=True,
             samesite="Strict",
             secure=proxied and request.headers.get("X-Forwarded-Proto", "").startswith("https"),
@@ -313,7 +343,7 @@ class Guard:
         frames = "'self'" if self._is_bearer(request) else " ".join(sorted(self._frames)) or "'none'"
         host = request.host if HOST.fullmatch(request.host) else ""
         sockets = f"ws://{host} wss://{host}" if host else ""
-        response.headers["Content-Security-Policy"] = "; ".join(
+        own = "; ".join(
             (
                 "default-src 'none'",
                 f"script-src 'self' 'unsafe-eval' {script_hashes()}",  # the browser compiles the templates
@@ -326,6 +356,7 @@ class Guard:
                 f"frame-ancestors {frames}",
             )
         )
+        response.headers.setdefault("Content-Security-Policy", own)
         response.headers.update(HEADERS)
 
 

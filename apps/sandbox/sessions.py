@@ -172,11 +172,10 @@ class Sessions:
         """
         self._waiting = first = await self._start(1)
         app = web.Application()
-        self._guard.protect(app)
         self._join(app)
         app.router.add_get("/ws", self._socket)
         app.router.add_get("/{path:.*}", self._get)
-        runner = web.AppRunner(app)
+        runner = web.AppRunner(self._guard.protected(app))
         await runner.setup()
         async with ClientSession(auto_decompress=False) as self._http:
             try:
@@ -232,23 +231,23 @@ class Sessions:
     async def _get(self, request: web.Request) -> web.StreamResponse:
         """Return a file of the browser's session; a user that opens the page starts one."""
         asking = ASKING.get()
-        browser = asking.browser
-        if asking.visits and request.method == "GET" and request.path in ("/", "/index.html"):
+        browser, path = asking.browser, request.match_info["path"]
+        if asking.visits and request.method == "GET" and path in ("", "index.html"):
             async with self._opening:  # a browser may ask twice at once
                 if not await self._open(browser):
                     limit = f"{self._limit} sessions are open already"
                     return page_of(f"{limit}. Close one, and load this page again.", 503)
         session = self._sessions.get(browser)
         if session is None:
-            return page_of(AGAIN, 200 if request.path == "/" else 404)
+            return page_of(AGAIN, 404 if path else 200)
         if session.exit_code is not None:
             del self._sessions[browser]
             return page_of(AGAIN, 503)
         if not session.url:
             return page_of("The session starts. This takes some seconds.", refresh=".", seconds=1)
-        if request.path == "/":
+        if not path:
             return web.Response(status=302, headers={"Location": "index.html"})
-        return await self._file(session, request)
+        return await self._file(session, path, request)
 
     async def _open(self, key: str) -> bool:
         """Start the session of a browser, or return False if there is no place for it."""
@@ -267,11 +266,11 @@ class Sessions:
         self._sessions[key] = await self._start(number)
         return True
 
-    async def _file(self, session: Session, request: web.Request) -> web.Response:
+    async def _file(self, session: Session, path: str, request: web.Request) -> web.Response:
         """Return a file of a session, in the encoding in which it comes."""
         headers = {**session.headers, "Accept-Encoding": request.headers.get("Accept-Encoding", "identity")}
         try:
-            async with self._http.get(f"{session.url.rstrip('/')}{request.path}", headers=headers) as answer:
+            async with self._http.get(f"{session.url}{path}", headers=headers) as answer:
                 names = ("Content-Type", "Content-Encoding")
                 kept = {name: answer.headers[name] for name in names if name in answer.headers}
                 return web.Response(body=await answer.read(), status=answer.status, headers=kept)

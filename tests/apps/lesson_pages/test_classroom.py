@@ -14,6 +14,7 @@ import pytest
 pytest.importorskip("aiohttp")
 
 import aiohttp
+from yarl import URL
 
 from decals.apps.cli import run
 from decals.apps.lab.lesson import LESSONS, load_lesson
@@ -47,6 +48,11 @@ def serve(check: Callable[[Classroom, str], Awaitable[None]]) -> Sessions:
     return asyncio.run(served())
 
 
+def students(address: str) -> str:
+    """Return the beginning of the address of students, which lacks the path of the teacher's page."""
+    return f"{URL(address).origin()}/student"
+
+
 def pupil() -> aiohttp.ClientSession:
     return aiohttp.ClientSession(cookie_jar=aiohttp.CookieJar(unsafe=True), headers=NAVIGATE)
 
@@ -59,8 +65,8 @@ async def answer(http: aiohttp.ClientSession, address: str, room: Classroom, **c
         "right": True,
         **changes,
     }
-    own = {"Origin": address.rstrip("/"), "Sec-Fetch-Site": "same-origin", "Sec-Fetch-Mode": "cors"}
-    async with http.post(f"{address}student/{room.token}/answer", json=sent, headers=own) as found:
+    own = {"Origin": str(URL(address).origin()), "Sec-Fetch-Site": "same-origin", "Sec-Fetch-Mode": "cors"}
+    async with http.post(f"{students(address)}/{room.token}/answer", json=sent, headers=own) as found:
         return int(found.status)
 
 
@@ -68,14 +74,14 @@ def test_forty_students_answer_and_the_teacher_sees_all() -> None:
     async def check(room: Classroom, address: str) -> None:
         async def learns(number: int) -> None:
             async with pupil() as http:
-                async with http.get(f"{address}student/{room.token}/") as found:
+                async with http.get(f"{students(address)}/{room.token}/") as found:
                     assert "9-packing.html" in await found.text()
                 for turn in range(3):
                     numbers = [float(number), 0.5, 0.4, 50.0 + turn, 1.0, None]
                     assert await answer(http, address, room, name=f"=Ü {number}", numbers=numbers) == 204
                     await asyncio.sleep(0.55)
 
-        async with pupil() as first, first.get(f"{address}student/{room.token}/9-packing.html") as page:
+        async with pupil() as first, first.get(f"{students(address)}/{room.token}/9-packing.html") as page:
             assert "Send my numbers" in await page.text()
             assert "script-src 'sha256-" in page.headers["Content-Security-Policy"]
         await asyncio.gather(*(learns(number) for number in range(STUDENTS)))
@@ -94,7 +100,7 @@ def test_forty_students_answer_and_the_teacher_sees_all() -> None:
             assert {float(row["guess"]) for row in rows} == {*range(STUDENTS)}
             async with teacher.get(f"{address}class") as found:
                 text = await found.text()
-            assert f"{address}student/{room.token}/" in text
+            assert f"{students(address)}/{room.token}/" in text
 
     sessions = serve(check)
     assert len(sessions._numbers) == 1  # the teacher alone has a process
@@ -102,7 +108,7 @@ def test_forty_students_answer_and_the_teacher_sees_all() -> None:
 
 def test_attacks_of_a_student_are_refused() -> None:
     async def check(room: Classroom, address: str) -> None:
-        lines = [room.url(int(address.rsplit(":", 1)[1].rstrip("/")))]
+        lines = [room.url(URL(address).port or 0)]
         got = await student(Server("--class", cast("Any", None), Path(), address, TOKEN, lines))
         assert not got
 
@@ -113,7 +119,7 @@ def test_a_class_has_so_many_students_and_answers() -> None:
     async def check(room: Classroom, address: str) -> None:
         statuses = []
         for _ in range(MAX_STUDENTS + 1):
-            async with pupil() as http, http.get(f"{address}student/{room.token}/") as found:
+            async with pupil() as http, http.get(f"{students(address)}/{room.token}/") as found:
                 statuses.append(found.status)
         assert statuses == [200] * MAX_STUDENTS + [503]
         async with pupil() as http:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import aiohttp
+from aiohttp import web
 from trame_server.client import WsLinkSession
 
 from decals.apps.sandbox.guard import allow_connections
@@ -77,7 +78,12 @@ class Server:
 
     @property
     def authority(self) -> str:
-        return self.address.removeprefix("http://").rstrip("/")
+        return self.address.removeprefix("http://").partition("/")[0]
+
+    @property
+    def messages(self) -> str:
+        """URL of the messages of the page."""
+        return f"{self.address.replace('http', 'ws', 1)}ws"
 
     @property
     def port(self) -> int:
@@ -154,8 +160,8 @@ def _read_address(server: Server) -> None:
         server.process.stdin.flush()
     for line in server.process.stdout:
         server.lines.append(line)
-        if found := re.search(r"http://([^/\s]+):(\d+)/(?:\?token=(\S+))?", line):
-            server.address, server.token = f"http://127.0.0.1:{found[2]}/", found[3] or server.token
+        if found := re.search(r"http://[^/\s]+:(\d+/[\w-]+/)(?:\?token=(\S+))?", line):
+            server.address, server.token = f"http://127.0.0.1:{found[1]}", found[2] or server.token
             if server.way == "--class":
                 server.lines.append(server.process.stdout.readline())
             return
@@ -173,7 +179,7 @@ async def talk(
     sent = {name.replace("_", "-"): text for name, text in headers.items()}
     async with aiohttp.ClientSession(cookies=cookies) as http:
         try:
-            async with http.ws_connect(f"ws://{server.authority}/ws", headers=sent) as socket_:
+            async with http.ws_connect(server.messages, headers=sent) as socket_:
                 session = WsLinkSession(socket_)
                 listening = asyncio.create_task(session.listen())
                 try:
@@ -318,13 +324,42 @@ async def leak(server: Server) -> str:
     ):
         return f"a cookie without its limits: {cookie}"
     if str(server.port) not in cookie.split("=")[0]:
-        return "servers of other ports share the cookie"
+        return "servers of other ports share the name of the cookie"
     status, text, headers = await get(server, "index.html", await server.enter(), **NAVIGATE)
     if server.token in text or headers.get("Referrer-Policy") != "no-referrer":
         return "the page gives the token away"
     policy = headers.get("Content-Security-Policy", "")
     strict = "default-src 'none'" in policy and "'unsafe-inline'" not in policy.split("style-src")[0]
     return "" if strict and headers.get("X-Content-Type-Options") == "nosniff" else f"a weak policy: {policy}"
+
+
+async def other_port(server: Server) -> str:
+    """A user opens the page of another server at another port of this machine; all ports share cookies."""
+    got: list[str] = []
+
+    async def answer(request: web.Request) -> web.Response:
+        got.append(request.headers.get("Cookie", ""))
+        return web.Response(text="a page")
+
+    other = web.Application()
+    other.router.add_get("/{path:.*}", answer)
+    runner = web.AppRunner(other)
+    await runner.setup()
+    jar = aiohttp.CookieJar(unsafe=True)
+    try:
+        await web.TCPSite(runner, "127.0.0.1", 0).start()
+        foreign = f"http://127.0.0.1:{runner.addresses[0][1]}"
+        async with aiohttp.ClientSession(cookie_jar=jar, headers=NAVIGATE) as browser:
+            async with browser.get(f"{server.address}?token={server.token}") as page:
+                await page.read()
+            if not len(jar):
+                raise RuntimeError("expected a cookie")
+            for path in ("/", "/index.html", "/ws", "/paraview/"):
+                async with browser.get(f"{foreign}{path}") as page:
+                    await page.read()
+    finally:
+        await runner.cleanup()
+    return "the cookie came to another server" if any(got) else ""
 
 
 # -- another account, another machine -----------------------------------------------------------------------
@@ -357,7 +392,7 @@ async def hello(server: Server) -> str:
             return f"read the scene with {token!r}"
     async with aiohttp.ClientSession() as http:
         try:
-            async with http.ws_connect(f"ws://{server.authority}/ws", origin=own) as socket_:
+            async with http.ws_connect(server.messages, origin=own) as socket_:
                 session = WsLinkSession(socket_)
                 listening = asyncio.create_task(session.listen())
                 for call in ("trame.state.get", "application.exit"):
@@ -385,12 +420,13 @@ async def processes(server: Server) -> str:
 async def account(server: Server) -> str:
     """Another account of the machine tries all that needs no token, and reads what it may."""
     await server.enter()
+    place = server.address.partition(server.authority)[2].rstrip("/")  # even if it were known
     program = f"""
 import glob, http.client, json
 found = []
 for path in ("/", "/index.html", "/vue.global.js", "/?secret=wslink-secret"):
     connection = http.client.HTTPConnection("127.0.0.1", {server.port}, timeout=20)
-    connection.request("GET", path, headers={{"Accept": "text/html"}})
+    connection.request("GET", {place!r} + path, headers={{"Accept": "text/html"}})
     found.append(connection.getresponse().status)
 places = ("/proc/[0-9]*/cmdline", "/proc/[0-9]*/environ", "/tmp/*/*.html")
 for name in [name for place in places for name in glob.glob(place)]:
@@ -534,7 +570,7 @@ def _files(server: Server) -> dict[str, bytes]:
 async def _connected(server: Server, cookies: dict[str, str]) -> AsyncIterator[WsLinkSession]:
     async with (
         aiohttp.ClientSession(cookies=cookies) as http,
-        http.ws_connect(f"ws://{server.authority}/ws", origin=f"http://{server.authority}") as socket_,
+        http.ws_connect(server.messages, origin=f"http://{server.authority}") as socket_,
     ):
         session = WsLinkSession(socket_)
         listening = asyncio.create_task(session.listen())
@@ -577,7 +613,7 @@ async def student(server: Server) -> str:
     """A student tries all but one answer, and other pages try that."""
     token = re.search(r"/student/([\w-]+)/", server.lines[-1])
     assert token
-    own, path = f"http://{server.authority}", f"student/{token[1]}/"
+    own, path = f"http://{server.authority}", f"/student/{token[1]}/"
     jar = aiohttp.CookieJar(unsafe=True)
     good = {"lesson": "9-packing", "name": "", "numbers": [1.0] * 6, "right": True}
     async with aiohttp.ClientSession(cookie_jar=jar) as http:
@@ -586,7 +622,7 @@ async def student(server: Server) -> str:
             sent = {"Origin": own, "Content-Type": "application/json"}
             sent |= {name.replace("_", "-"): text for name, text in headers.items()}
             data = body if isinstance(body, bytes) else json.dumps(body).encode()
-            url = f"{server.address}{where}"
+            url = f"{own if where.startswith('/') else server.address}{where}"
             async with http.request(method, url, data=data, headers=sent, allow_redirects=False) as answer:
                 return int(answer.status)
 
@@ -594,9 +630,9 @@ async def student(server: Server) -> str:
             return "answered without a page"
         for wrong in ("x", token[1][:-1], token[1].upper(), server.token, "%00", "é"):
             for method, name in (("GET", ""), ("GET", "1-one-decal.html"), ("POST", "answer")):
-                if await ask(method, f"student/{wrong}/{name}", good) < 400:
+                if await ask(method, f"/student/{wrong}/{name}", good) < 400:
                     return f"the token {wrong!r} opens {name or 'the list'}"
-        async with http.get(f"{server.address}{path}", headers=NAVIGATE) as page:
+        async with http.get(f"{own}{path}", headers=NAVIGATE) as page:
             if page.status != 200 or "Path=/student/" not in page.headers["Set-Cookie"]:
                 return f"the list answers {page.status}"
         for headers in (
@@ -715,7 +751,7 @@ Attack = Callable[[Server], Awaitable[str]]
 ATTACKS: dict[str, Attack] = {
     one.__name__: one
     for one in (
-        foreign_socket, rebinding, image, link, frame, form, leak,
+        foreign_socket, rebinding, image, link, frame, form, leak, other_port,
         stranger, hello, processes, account, path,
         watcher, student, flood, parts,
     )

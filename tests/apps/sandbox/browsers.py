@@ -41,10 +41,12 @@ class Browser:
         """Connect as a page in the frame of a notebook does: the first message brings the token."""
         import aiohttp
         from trame_server.client import WsLinkSession
+        from yarl import URL
 
         self._http = aiohttp.ClientSession()
-        own = f"127.0.0.1:{self._server.port}"
-        self.socket = await self._http.ws_connect(f"ws://{own}/ws", origin=f"http://{own}", autoping=True)
+        page = URL(self._page.guard.address(self._server.port))
+        url = page.with_scheme("ws") / "ws"
+        self.socket = await self._http.ws_connect(url, origin=str(page.origin()), autoping=True)
         self._session = WsLinkSession(self.socket)
         self._listens = asyncio.create_task(self._session.listen())
         answer = await self._session.auth(secret=self._page.guard.token if token is None else token)

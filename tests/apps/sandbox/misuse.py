@@ -71,7 +71,7 @@ async def _without_hello(server: Server) -> bool:
     """Return True if values of the page come before the first message has brought the token."""
     async with (
         aiohttp.ClientSession() as http,
-        http.ws_connect(f"ws://{server.authority}/ws", origin=f"http://{server.authority}") as socket,
+        http.ws_connect(server.messages, origin=f"http://{server.authority}") as socket,
     ):
         session = WsLinkSession(socket)
         listening = asyncio.create_task(session.listen())

@@ -136,7 +136,7 @@ def test_the_page_is_small_and_names_no_other_server(vtk_display: None) -> None:
     async def check(_: EditWindow, page: Any, _connect: Connect) -> None:
         import aiohttp
 
-        state, base = page._server.state, f"http://127.0.0.1:{page._server.port}/"
+        state, base = page._server.state, page.guard.address(page._server.port)
         names = ["index.html", "vue.global.js", *state.trame__scripts, *state.trame__styles]
         bearer = {"Authorization": f"Bearer {page.guard.token}"}
         async with aiohttp.ClientSession(auto_decompress=False, headers=bearer) as client:

@@ -27,19 +27,22 @@ class Site:
     def __init__(self, guard: Guard) -> None:
         self.guard, self.port = guard, 0
 
-    async def get(self, path: str = "/", cookies: Any = None, **options: Any) -> tuple[int, str, Any]:
+    async def get(
+        self, path: str = "/", cookies: Any = None, *, inside: bool = True, **options: Any
+    ) -> tuple[int, str, Any]:
         """Return status, text and headers, with the header of the application: what the guard knows."""
         headers = options.pop("headers", {})
         async with aiohttp.ClientSession(cookies=cookies) as http:
-            url = f"http://127.0.0.1:{self.port}{path}"
+            url = f"http://127.0.0.1:{self.port}{self.guard.place if inside else ''}{path}"
             async with http.get(url, headers=headers, allow_redirects=False, **options) as answer:
                 return answer.status, await answer.text(), answer.headers
 
     async def connect(self, cookies: Any = None, **headers: str) -> str:
         """Return what the application sends through a connection for messages, or the status of a refusal."""
+        url = f"ws://127.0.0.1:{self.port}{self.guard.place}/ws"
         async with aiohttp.ClientSession(cookies=cookies) as http:
             try:
-                async with http.ws_connect(f"ws://127.0.0.1:{self.port}/ws", headers=headers) as socket:
+                async with http.ws_connect(url, headers=headers) as socket:
                     return str(await socket.receive_str())
             except aiohttp.WSServerHandshakeError as error:
                 return str(error.status)
@@ -68,8 +71,7 @@ def serve(check: Callable[[Site], Awaitable[None]], **options: Any) -> None:
         app = web.Application()
         app.router.add_get("/ws", socket)
         app.router.add_get("/{path:.*}", page)
-        site.guard.protect(app)
-        runner = web.AppRunner(app)
+        runner = web.AppRunner(site.guard.protected(app))
         await runner.setup()
         await web.TCPSite(runner, "127.0.0.1", 0).start()
         site.port = runner.addresses[0][1]
@@ -133,6 +135,25 @@ def test_a_cookie_for_the_token_opens_the_page_and_keeps_its_browser() -> None:
             assert status == 403
 
     serve(check)
+
+
+def test_the_page_lies_at_a_place_that_only_the_token_opens() -> None:
+    """All ports of a machine share cookies, and a page at another port knows no path of this server."""
+
+    async def check(site: Site) -> None:
+        cookies, place = await site.cookie(), site.guard.place
+        assert (await site.get("/", headers=VISIT))[0] == 403
+        status, _, headers = await site.get(f"/?token={TOKEN}", inside=False, headers=VISIT)
+        assert (status, headers["Location"]) == (303, f".{place}/?token={TOKEN}")
+        assert f"Path={place}/;" in (await site.get("/", cookies, headers=VISIT))[2]["Set-Cookie"]
+        for path in ("/", "/index.html", "/ws", place, f"{place}x/", "/?token=wrong", f"//{place[1:]}/"):
+            status, text, headers = await site.get(path, cookies, inside=False, headers=VISIT)
+            assert (status, place in text, "Location" in headers) == (403, False, False), path
+        assert (await site.get("/vue.js", cookies, inside=False))[0] == 403
+
+    serve(check)
+    assert len({Guard().place for _ in range(100)}) == 100
+    assert len(Guard().place) > 20
 
 
 def test_a_link_of_another_page_opens_through_a_page_of_this_server() -> None:
@@ -204,13 +225,15 @@ def test_a_proxy_that_sends_the_token_has_checked_names_and_keeps_the_cookie_to_
         proxied |= {"X-Forwarded-Prefix": "/user/a/sandbox", "X-Forwarded-Proto": "https,http"}
         status, text, headers = await site.get("/", headers=proxied)
         assert (status, text.startswith("page visits True")) == (200, True)
-        assert "Path=/user/a/sandbox/" in headers["Set-Cookie"]
+        assert f"Path=/user/a/sandbox{site.guard.place}/;" in headers["Set-Cookie"]
         assert "Secure" in headers["Set-Cookie"]
         assert headers["Content-Security-Policy"].endswith("frame-ancestors 'self'")
         status, text, headers = await site.get("/", headers={**proxied, "Sec-Fetch-Site": "cross-site"})
         assert (status, "opens" in text, "Set-Cookie" in headers) == (200, True, False)
         odd = {**proxied, "X-Forwarded-Prefix": "/a; Domain=b"}
-        assert "Path=/;" in (await site.get("/", headers=odd))[2]["Set-Cookie"]
+        assert f"Path={site.guard.place}/;" in (await site.get("/", headers=odd))[2]["Set-Cookie"]
+        status, _, headers = await site.get("/?a=b%0d%0ac", inside=False, headers=proxied)
+        assert (status, headers["Location"]) == (303, f".{site.guard.place}/?a=b%0D%0Ac")
 
     serve(check)
 
