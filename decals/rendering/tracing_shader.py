@@ -67,8 +67,8 @@ _EVALUATORS: dict[str, tuple[Evaluator, str]] = {
 LONGEST_COPIED = 40_000
 """Characters of kinds up to which NVIDIA's compiler may copy functions into their callers.
 
-On an H200 it takes 1.5 s for 34,000 characters, 22 s for 50,000 and 150 s for 97,000. With calls in their place
-it takes at most 2 s, and rays take two to six times as long.
+On an H200 it takes 1.5 s for 34,000 characters, 22 s for 50,000 and 150 s for 97,000. With calls in their
+place it takes at most 2 s, and rays take two to six times as long.
 """
 
 _ALONG: dict[Any, tuple[str, ...]] = {
