@@ -235,7 +235,7 @@ class Sessions:
         if asking.visits and request.method == "GET" and path in ("", "index.html"):
             async with self._opening:  # a browser may ask twice at once
                 if not await self._open(browser):
-                    limit = f"{self._limit} sessions are open already"
+                    limit = f"The limit of open sessions is {self._limit}"
                     return page_of(f"{limit}. Close one, and load this page again.", 503)
         session = self._sessions.get(browser)
         if session is None:

@@ -326,6 +326,8 @@ def traced_triangles(
     """Return vertices and triangles as `polygon_triangles` does, and which corners the triangles have."""
     vertices: Any = precise_points(points)
     polygons = Polygons.of(polygons)
+    if len(polygons) == len(vertices) == 0:
+        raise InvalidMesh(f"{name!r} holds neither points nor faces; is it a mesh of another format?")
     if len(polygons) == 0:
         raise InvalidMesh(f"{name!r} has {len(vertices)} points but no faces; give a surface mesh")
     check_indices(polygons.corners, len(vertices), name)

@@ -84,11 +84,11 @@ def _binary_corners(content: bytes) -> Float64Array:
     size = _declared_size(body)
     if size < 0:
         raise ValueError("it is neither text that starts with 'solid' nor long enough for a binary file")
-    if len(body) < size:
-        there = (len(body) - _HEADER) // _FACET.itemsize
-        declared = (size - _HEADER) // _FACET.itemsize
+    there, rest = divmod(len(body) - _HEADER, _FACET.itemsize)
+    declared = (size - _HEADER) // _FACET.itemsize
+    if there < declared or (there > declared and not rest):  # what else stands at the end is no facet
         raise ValueError(f"it declares {declared} facets and holds {there}")
-    facets = np.frombuffer(body, _FACET, (size - _HEADER) // _FACET.itemsize, _HEADER)
+    facets = np.frombuffer(body, _FACET, declared, _HEADER)
     with np.errstate(invalid="ignore"):  # refused below
         corners: Float64Array = facets["corners"].reshape(-1, 3).astype(np.float64)
     wrong = ~np.isfinite(corners).all(axis=1)

@@ -58,6 +58,11 @@ def _objects(path: Path) -> dict[str, Piece]:
         return pieces
 
 
+def _key_of(use: Use, part: str) -> _Key:
+    """Return the key of an object that a part uses."""
+    return use.part or part, use.number
+
+
 class _Build:
     """The objects of a package, and where they are built."""
 
@@ -75,6 +80,10 @@ class _Build:
             raise Unreadable(f"object {number} of {part!r} is missing")
         return model.objects[number]
 
+    def _parts(self, key: _Key) -> Iterator[_Key]:
+        """Yield the components of an object."""
+        return (_key_of(component, key[0]) for component in self.object(key).components)
+
     @property
     def unit(self) -> str:
         """Unit of the numbers."""
@@ -90,18 +99,16 @@ class _Build:
 
     def places(self) -> dict[_Key, list[Float64Array]]:
         """Return the maps of each object's copies to the build."""
+        main = self._package.model_part
+        uses = [*self._uses()]
+        if sum(self._counts([_key_of(use, main) for use in uses])) > MAX_PLACES:
+            raise Unreadable(f"it places more than {MAX_PLACES:,} objects")
         found: dict[_Key, list[Float64Array]] = {}
-        rest = [(use, self._package.model_part, np.eye(4), 0) for use in self._uses()]
-        count = 0
+        rest = [(use, main, np.eye(4)) for use in uses]
         while rest:
-            use, part, parent, depth = rest.pop()
-            key = use.part or part, use.number
-            count += 1
+            use, part, parent = rest.pop()
+            key = _key_of(use, part)
             item = self.object(key)
-            if depth > sum(len(model.objects) for model in self._models.values()):
-                raise Unreadable(f"object {use.number} is a component of itself")
-            if count > MAX_PLACES:
-                raise Unreadable(f"it places more than {MAX_PLACES:,} objects")
             with np.errstate(over="ignore", invalid="ignore"):
                 matrix = parent @ use.matrix
             if not np.isfinite(matrix).all():
@@ -109,8 +116,25 @@ class _Build:
             if item.mesh is None and not item.components:
                 self._notes.add("objects without triangles are left out", f"object {use.number}")
             found.setdefault(key, []).append(matrix)
-            rest.extend((component, key[0], matrix, depth + 1) for component in reversed(item.components))
+            rest.extend((component, key[0], matrix) for component in reversed(item.components))
         return found
+
+    def _counts(self, keys: list[_Key]) -> list[int]:
+        """Return how many objects each of some objects places, itself included."""
+        counts: dict[_Key, int] = {}
+        for first in keys:
+            path = {first: self._parts(first)}  # from the object to the one that is counted
+            while path:
+                key, parts = next(reversed(path.items()))
+                part = next((part for part in parts if part not in counts), None)
+                if part is None:
+                    counts[key] = 1 + sum(counts[part] for part in self._parts(key))
+                    del path[key]
+                elif part in path:
+                    raise Unreadable(f"object {key[1]} is a component of itself")
+                else:
+                    path[part] = self._parts(part)
+        return [counts[key] for key in keys]
 
     def _uses(self) -> Iterator[Use]:
         """Yield what is built, the last first; all objects that are no components if that is nothing."""

@@ -129,6 +129,8 @@ class _Parser:
         self._name = f"object {number}"
         if number in self._parsed.objects:
             raise Unreadable(f"{self._name} is there twice")
+        if attributes.get("type") == "support":
+            self._notes.add("supports are kept as parts of the mesh", self._name)
         self._object = self._parsed.objects[number] = Object()
         self._defaults = _index(attributes, "pid"), _index(attributes, "pindex")
 

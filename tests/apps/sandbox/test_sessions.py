@@ -159,7 +159,7 @@ def test_idle_sessions_are_saved_and_ended_and_their_number_is_limited(
             assert await opened(one, url)
             assert await opened(two, url)
             status, page = await text(three, f"{url}/?token={TOKEN}")
-            assert (status, "2 sessions are open" in page) == (503, True)
+            assert (status, "limit of open sessions is 2" in page) == (503, True)
             async with await connected(two, url) as socket:  # it is not idle
                 monkeypatch.setattr(module, "IDLE_SECONDS", 0.1)
                 async with asyncio.timeout(30):

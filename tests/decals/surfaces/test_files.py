@@ -196,7 +196,10 @@ def binary_stl(facets: int, declared: int, header: bytes = b"solid of no text") 
 def test_binary_stl(tmp_path: Path) -> None:
     assert area(written(tmp_path, "a.stl", binary_stl(2, 2))) == pytest.approx(1.0)
     assert area(written(tmp_path, "a.stl", b"\xef\xbb\xbf" + binary_stl(2, 2))) == pytest.approx(1.0)
-    assert area(written(tmp_path, "a.stl", binary_stl(3, 2, b"\0"))) == pytest.approx(1.0)
+    assert area(written(tmp_path, "a.stl", binary_stl(2, 2) + b"a remark")) == pytest.approx(1.0)
+    for declared in (0, 1):
+        with pytest.raises(InvalidMesh, match=f"declares {declared} facets and holds 2"):
+            read_mesh(written(tmp_path, "a.stl", binary_stl(2, declared, b"\0")))
     with pytest.raises(InvalidMesh, match="declares 3 facets and holds 2"):
         read_mesh(written(tmp_path, "a.stl", binary_stl(2, 3, b"\0")))
 

@@ -128,7 +128,7 @@ BROKEN: dict[str, tuple[str, str]] = {
     "no number": (model(OBJECT, '<item objectid="x"/>'), "the build has 'x' in place of a number 'objectid'"),
     "other XML": ("<html/>", "a part of it holds no model"),
     "cut": (model(OBJECT)[:-9], "its XML is wrong"),
-    "faceless": (model('<object id="1"><mesh><vertices/></mesh></object>'), "0 points but no faces"),
+    "faceless": (model('<object id="1"><mesh><vertices/></mesh></object>'), "neither points nor faces"),
 }  # fmt: skip
 
 
@@ -152,6 +152,32 @@ def test_components_of_components_are_counted(tmp_path: Path, monkeypatch: pytes
     objects = [twice.format(k, f'<component objectid="{k - 1}"/>' * 2) for k in range(2, 60)]
     with pytest.raises(InvalidMesh, match="it places more than 5,000 objects"):
         read_mesh(saved(tmp_path, model(OBJECT + "".join(objects), '<item objectid="59"/>')))
+
+
+def test_a_build_of_many_objects_is_refused_before_they_are_placed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A chain of 38 objects, each of which has the one before twice, places 2³⁸ of them."""
+    monkeypatch.setattr(threemf, "MAX_PLACES", 10**9)  # placing so many would take hours
+    twice = '<object id="{}"><components>{}</components></object>'
+    objects = [twice.format(k, f'<component objectid="{k - 1}"/>' * 2) for k in range(2, 40)]
+    with pytest.raises(InvalidMesh, match="it places more than 1,000,000,000 objects"):
+        read_mesh(saved(tmp_path, model(OBJECT + "".join(objects), '<item objectid="39"/>')))
+
+
+@pytest.mark.parametrize("order", [(2, 1, 3), (3, 2, 1)])
+def test_a_cycle_of_several_objects_is_named(tmp_path: Path, order: tuple[int, ...]) -> None:
+    pairs = zip(order, (*order[1:], order[0]), strict=True)
+    use = '<object id="{}"><components><component objectid="{}"/></components></object>'
+    objects = "".join(use.format(*pair) for pair in pairs)
+    with pytest.raises(InvalidMesh, match=r"object \d is a component of itself"):
+        read_mesh(saved(tmp_path, model(objects, f'<item objectid="{order[0]}"/>')))
+
+
+def test_supports_are_kept_and_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    support = OBJECT.replace("<object ", '<object type="support" ')
+    assert read_mesh(saved(tmp_path, model(support)))[0].shape == (4, 3)
+    assert "supports are kept as parts of the mesh: object 1" in caplog.text
 
 
 def test_a_part_that_unpacks_to_very_much_is_refused(tmp_path: Path) -> None:
