@@ -2,6 +2,11 @@
 (() => {
   const { trame } = window;
 
+  // The connection ends with the page, which is no error.
+  window.addEventListener("pagehide", () => {
+    window.addEventListener("unhandledrejection", (event) => event.preventDefault());
+  });
+
   // Return where the middle of two fingers is, and how far apart they are, in heights of the view.
   const fingersOf = (event) => {
     const [a, b] = event.touches;

@@ -52,6 +52,9 @@ TOOLBAR_HEIGHT = (
 STYLE, SCRIPT = (
     Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("page.css", "page.js")
 )
+QUIET = "({ install: () => { console.info = console.log = () => {}; } })"
+"""Plugin of Vue that comes before others, of which trame tells the console; it keeps warnings and errors."""
+
 TEMPLATES = {
     path.stem: path.read_text(encoding="utf-8") for path in sorted(Path(__file__).parent.glob("*.html"))
 }
@@ -244,6 +247,7 @@ class Page:
     # -- layout -----------------------------------------------------------------------------------------
 
     def _build(self) -> None:
+        self._server.enable_module({"vue_use": [QUIET]})
         with VAppLayout(self._server, vuetify_config={"defaults": DEFAULTS}, full_height=True) as layout:
             layout.root.theme = ("theme",)
             client.Style(STYLE)

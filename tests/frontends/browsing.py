@@ -25,8 +25,6 @@ ABOVE = "svg, .brush { visibility: hidden !important }"
 ERRORS = """window.pageErrors = [];
 window.addEventListener('error', event => window.pageErrors.push(event.message));"""
 """Collects the errors that a page shows in its console, also those of observers."""
-WORDS = "error", "warning"
-"""Kinds of console messages that no page may write."""
 REFUSED = "net::ERR_CONNECTION_REFUSED"
 LOSS = 2.0
 """Levels of 255 in the mean that JPEG may take away."""
@@ -57,7 +55,8 @@ async def opened(
         page = await browser.new_page(viewport={"width": size[0], "height": size[1]}, has_touch=touch)
         page.set_default_timeout(1000 * PATIENCE)
         written: list[str] = []
-        page.on("console", lambda message: written.extend(lines_of(message)))
+        page.on("console", lambda message: written.append(line_of(message)))
+        page.on("pageerror", lambda error: written.append(str(error)))
         await page.add_init_script(ERRORS)
         await page.goto(url)
         await page.wait_for_selector(PICTURE)
@@ -69,10 +68,9 @@ async def opened(
         await browser.close()
 
 
-def lines_of(message: ConsoleMessage) -> list[str]:
-    """What a page writes to its console, and where, if it is an error or a warning."""
-    place = message.location.get("url")
-    return [f"{message.type}: {message.text} ({place})"] if message.type in WORDS else []
+def line_of(message: ConsoleMessage) -> str:
+    """What a page writes to its console, and where."""
+    return f"{message.type}: {message.text} ({message.location.get('url')})"
 
 
 @asynccontextmanager
