@@ -86,12 +86,12 @@ def test_a_fork_during_work_in_a_thread_does_not_hang(tmp_path: Path) -> None:
         from blobtree.tape import instruction_set
 
         def hold():
-            with instruction_set._LOCK:
+            with instruction_set.LOCK:
                 held.set()
                 time.sleep(1.0)
 
         def polygonize(number):
-            with instruction_set._LOCK:
+            with instruction_set.LOCK:
                 return len(blobtree.polygonize(blobtree.Point((0, 0, 0), radius=1), resolution=20).faces)
 
         held = threading.Event()

@@ -12,6 +12,7 @@ from typing import Any, cast
 import pytest
 
 pytest.importorskip("aiohttp")
+pytest.importorskip("trame_server")
 
 import aiohttp
 from yarl import URL
