@@ -1,7 +1,7 @@
 """Objects of a scene as meshes with normals and base colours, ready to be unwrapped and coloured."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from blobtree.meshing.polygonize import polygonize
 from blobtree.nodes.numeric_parameters import nodes_with_paths
 from blobtree.nodes.primitives import Leaf
 from blobtree.progress import Progress
+from decals.baking.flat_faces import without_flat_faces
 from decals.errors import InvalidMesh, InvalidScene
 from decals.images.texels import decode_srgb
 from decals.rendering.mesh import split_mesh
@@ -127,6 +128,7 @@ def _tree_mesh(name: str, tree: Node, resolution: int | None, creases: bool, rep
             f"object {name!r}: expected a tree with a surface, got none in cells of this size; "
             "increase the resolution"
         )
+    mesh = replace(mesh, faces=without_flat_faces(mesh.vertices, mesh.faces))
     shown = split_creases(tree, mesh)
     return _used_parts(
         name,

@@ -356,12 +356,17 @@ def _as_faces(faces: ArrayLike, vertex_count: int) -> Int32Array:
     return np.array(indices, dtype=np.int32, order="C")
 
 
+def have_area(triangles: Triangles) -> BoolArray:
+    """Return True for triangles with a usable normal, ``bool[m]``."""
+    a, b, c = np.moveaxis(triangles.corners, 1, 0)
+    edges = sum(np.einsum("ij,ij->i", edge, edge) for edge in (b - a, c - a, c - b))
+    found: BoolArray = np.linalg.norm(triangles.crosses, axis=1) > MIN_FACE_QUALITY * edges
+    return found
+
+
 def _sound_faces(triangles: Triangles, copies: BoolArray) -> Int64Array:
     """Return the rows of the faces that have a normal and are no copies."""
-    a, b, c = np.moveaxis(triangles.corners, 1, 0)
-    doubled = np.linalg.norm(triangles.crosses, axis=1)
-    edges = sum(np.einsum("ij,ij->i", edge, edge) for edge in (b - a, c - a, c - b))
-    sound = (doubled > MIN_FACE_QUALITY * edges) & ~copies
+    sound = have_area(triangles) & ~copies
     if not sound.any():
         raise InvalidMesh(
             f"expected a mesh with area, got {len(copies)} degenerate faces; check its units and its indices"
