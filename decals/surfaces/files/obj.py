@@ -80,6 +80,8 @@ def _read(content: bytes, path: Path) -> tuple[Float64Array, Polygons, Paint]:
     ]
     if others := sum(len(lines[keyword]) for keyword in _FREE_FORM):
         _logger.warning("%s: left out %d free-form curves and surfaces; only polygons are read", path, others)
+    if b"#MRGB" in content:
+        _logger.warning("%s: left out the colours that ZBrush writes as comments (#MRGB)", path)
     paint = ObjColors(path, lines, corners[0], corners[1])
     return points_of(lines[b"v"]), Polygons(corners[0], sizes), paint
 

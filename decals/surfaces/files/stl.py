@@ -1,5 +1,6 @@
 """Reader of STL files, ASCII and binary, of one or several solids."""
 
+import logging
 import re
 from itertools import pairwise
 from pathlib import Path
@@ -19,6 +20,8 @@ from decals.surfaces.files.content import (
 )
 from decals.surfaces.files.paint import Paint, unpainted
 from decals.surfaces.triangulate import Polygons
+
+_logger = logging.getLogger(__name__)
 
 _HEADER = 84
 """Bytes before the first facet of a binary file; the last four hold the number of facets."""
@@ -45,7 +48,7 @@ _PART = re.compile(rb"(?<!\S)(solid|facet|outer|vertex)(?!\S)", re.IGNORECASE)
 
 
 def read_stl(path: Path) -> tuple[Float64Array, Polygons, Paint]:
-    """Read the facets of an STL file; equal corners become one vertex.
+    """Read the facets of an STL file; equal corners become one vertex. Colours are left out with a warning.
 
     Raises
     ------
@@ -57,6 +60,8 @@ def read_stl(path: Path) -> tuple[Float64Array, Polygons, Paint]:
         corners = _text_corners(content) if _is_text(content) else _binary_corners(content)
     except (ValueError, MemoryError) as error:
         raise refusal(path, "STL", error) from error
+    if b"COLOR=" in content[:_HEADER]:
+        _logger.warning("%s: left out the colours of facets; save them as PLY, GLB or 3MF", path)
     return *_merged(corners), unpainted
 
 

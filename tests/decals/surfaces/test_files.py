@@ -3,6 +3,7 @@
 import itertools
 import logging
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -401,6 +402,20 @@ def test_ply_elements_of_one_name_may_have_other_properties(tmp_path: Path) -> N
     face = "element face 1\nproperty list uchar int vertex_indices\n"
     head = PLY.replace(face, face + "property uchar red\n" + face).replace("4 0 1 2 3", "3 0 1 2 9\n3 0 2 3")
     assert area(written(tmp_path, "a.ply", head)) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.stl", lambda: binary_stl(2, 2, b"COLOR=\xff\x00\x00\xff"), "colours of facets"),
+        ("a.obj", lambda: b"v 0 0 0\nv 1 0 0\nv 0 1 0\n#MRGB ffff0000ffff0000ffff0000\nf 1 2 3\n", "#MRGB"),
+    ],
+)
+def test_colours_of_other_forms_are_left_out_with_a_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, name: str, content: Callable[[], bytes], message: str
+) -> None:
+    assert area(written(tmp_path, name, content())) > 0.4
+    assert message in caplog.text
 
 
 def test_what_is_left_out_is_logged(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
