@@ -39,12 +39,14 @@ def without_flat_faces(vertices: Float32Array, faces: Int32Array) -> Int32Array:
         kept = kept[(kept != np.roll(kept, 1, axis=1)).all(axis=1)]
         triangles = Triangles.of(vertices, kept.astype(np.int32))
         rows = np.flatnonzero(~have_area(triangles))
+        if not len(rows):
+            break
         corners = triangles.corners[rows]
         sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-        short = sides.min(axis=1, initial=np.inf) < SHORT * sides.max(axis=1, initial=0.0)
+        short = sides.min(axis=1) < SHORT * sides.max(axis=1)
         if short.any():
             kept = _collapsed(kept, rows[short], sides[short].argmin(axis=1), len(vertices))
-        elif len(rows):
+        else:
             kept = kept[~_flip(kept, rows, sides.argmax(axis=1), len(vertices))]
     return kept.astype(np.int32)
 
