@@ -132,10 +132,10 @@ class Classroom:
             raise web.HTTPMethodNotAllowed(request.method, ["GET"])
         if request.headers.get("Sec-Fetch-Dest") in FRAMES:
             raise web.HTTPForbidden(text="expected a window for the page, not a frame")
-        number = self._number(request) or len(self._times) + 1
+        response = await self._page(name.removesuffix(".html"), request)
+        number = self._number(request) or len(self._times) + 1  # others may have come meanwhile
         if number > MAX_STUDENTS:
             return page_of(f"The class is full: it has {MAX_STUDENTS} students.", 503)
-        response = await self._page(name.removesuffix(".html"), request)
         self._times.setdefault(number, -math.inf)
         response.set_cookie(
             "class", f"{number}.{self._signature(number)}", path=STUDENT, httponly=True, samesite="Strict"

@@ -132,6 +132,22 @@ def test_a_class_has_so_many_students_and_answers() -> None:
     serve(check)
 
 
+def test_students_who_wait_for_one_page_are_told_apart() -> None:
+    """A page is made when it is first opened, which takes seconds; a class opens it at once."""
+
+    async def check(room: Classroom, address: str) -> None:
+        async def learns(number: int) -> None:
+            async with pupil() as http:
+                async with http.get(f"{students(address)}/{room.token}/9-packing.html") as found:
+                    assert found.status == 200
+                assert await answer(http, address, room, name=str(number)) == 204
+
+        await asyncio.gather(*map(learns, range(8)))
+        assert sorted(one.name for one in room.answers.values()) == [*map(str, range(8))]
+
+    serve(check)
+
+
 def test_a_class_needs_lessons(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["sandbox", "--class"]) != 0
     assert "--class needs --lab or --lessons" in capsys.readouterr().err
