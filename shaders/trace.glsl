@@ -1,6 +1,6 @@
 // The ray through a pixel against an implicit object (blobtree/tracing/rays.py); body of trace.frag and trace.comp.
 #ifdef MANY_KINDS
-#pragma optionNV(inline none)  // NVIDIA's compiler else copies functions into their callers, which takes minutes
+#pragma optionNV(inline none)  // else NVIDIA's compiler copies functions into their callers, for minutes
 #endif
 //@ include camera.glsl
 //@ include surface.glsl

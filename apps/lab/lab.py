@@ -155,7 +155,7 @@ class Lab:
         }
 
     def _scores(self, scores: tuple[float, ...], right: bool) -> dict[str, Any]:
-        """Return scores with their pars, which hold for the puzzle's sizes alone, and what is shared."""
+        """Return the scores, the text of their link, and the pars if the decals have the puzzle's sizes."""
         if not scores:
             return {}
         decals, puzzle = self._window.document.decals, self._puzzle or Puzzle.of(self.lesson)

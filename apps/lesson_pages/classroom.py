@@ -57,7 +57,7 @@ POLICY = (
 """What a student's page may load: its own script, and nothing of other pages."""
 
 FORMULA = tuple("=+-@\t\r")
-"""First characters of what a spreadsheet would compute."""
+"""First characters of a text that a spreadsheet would compute."""
 
 
 class Answer(Struct, forbid_unknown_fields=True, frozen=True):

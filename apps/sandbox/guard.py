@@ -143,7 +143,7 @@ class Guard:
     place
         Path of the page, which others cannot guess.
     doors
-        What answers requests below other paths, by the path. It checks them itself.
+        Functions that answer requests below other paths, by the path. Each checks its requests itself.
     """
 
     def __init__(

@@ -53,7 +53,7 @@ STYLE, SCRIPT = (
     Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("page.css", "page.js")
 )
 QUIET = "({ install: () => { console.info = console.log = () => {}; } })"
-"""Plugin of Vue that comes before others, of which trame tells the console; it keeps warnings and errors."""
+"""The first plugin of Vue. It turns off trame's notes in the console; warnings and errors stay."""
 
 TEMPLATES = {
     path.stem: path.read_text(encoding="utf-8") for path in sorted(Path(__file__).parent.glob("*.html"))

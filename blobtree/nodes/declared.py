@@ -50,7 +50,7 @@ class DeclaredNode(Node, metaclass=CustomKind):
             require_claims(cls, cls.sort)
         tag = tag_of(cls)
         cls._formulas = {**cls._formulas, **declared_formulas(cls, tag, cls.formula_results)}
-        if own and not cls.__name__.startswith("_"):
+        if own and not cls.__name__.startswith("_"):  # no file holds a private kind: its parent is written
             cls.file_tag = tag
         elif not own:
             _require_free_names(cls)

@@ -4,8 +4,8 @@ A row's function may declare fewer parameters than its dispatch: it gets the fir
 several parameters do not take the tape. `decals/rendering/tracing_shader.py` writes the same dispatch in
 GLSL, over the kinds in use alone.
 
-The classes of the kinds import this file by way of their methods. So the functions are filled when the first
-tape is compiled (`core_tables`).
+The methods of the kinds' classes import this file. So `core_tables` fills the functions later, when the first
+tape is compiled.
 """
 
 import os
@@ -50,7 +50,7 @@ def of_row(table: str, attribute: str = "") -> Callable[[FunctionType], Any]:
 def core_tables() -> dict[str, tuple[Any, ...]]:
     """Return the tables of core kinds by their names in instruction sets.
 
-    The first call fills the functions of this file; derivatives of what calls them come after it.
+    The first call fills the functions of this file. Derive functions that call them after it.
     """
     if not _core_tables:
         load_core()
