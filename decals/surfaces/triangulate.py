@@ -327,7 +327,9 @@ def traced_triangles(
     vertices: Any = precise_points(points)
     polygons = Polygons.of(polygons)
     if len(polygons) == len(vertices) == 0:
-        raise InvalidMesh(f"{name!r} holds neither points nor faces; is it a mesh of another format?")
+        raise InvalidMesh(
+            f"{name!r} has no points and no faces; give a surface mesh (a file may be of another format)"
+        )
     if len(polygons) == 0:
         raise InvalidMesh(f"{name!r} has {len(vertices)} points but no faces; give a surface mesh")
     check_indices(polygons.corners, len(vertices), name)

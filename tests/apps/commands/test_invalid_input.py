@@ -75,7 +75,7 @@ def _obj(rows: str) -> bytes:
     [
         ("junk.stl", b"hello world\n" * 9, "junk.stl"),
         ("cut.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 9\n", "cut.ply"),
-        ("empty.obj", b"", "neither points nor faces"),
+        ("empty.obj", b"", "no points and no faces"),
         ("cloud.obj", _obj("v 0 0 0; v 1 0 0; v 0 1 0"), "no faces"),
         ("nan.obj", _obj("v 0 0 0; v nan 0 0; v 0 1 0; f 1 2 3"), "nan.obj"),
         ("flat.obj", _obj("v 0 0 0; v 1 1 1; v 2 2 2; f 1 2 3"), "area"),

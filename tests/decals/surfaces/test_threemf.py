@@ -128,7 +128,7 @@ BROKEN: dict[str, tuple[str, str]] = {
     "no number": (model(OBJECT, '<item objectid="x"/>'), "the build has 'x' in place of a number 'objectid'"),
     "other XML": ("<html/>", "a part of it holds no model"),
     "cut": (model(OBJECT)[:-9], "its XML is wrong"),
-    "faceless": (model('<object id="1"><mesh><vertices/></mesh></object>'), "neither points nor faces"),
+    "faceless": (model('<object id="1"><mesh><vertices/></mesh></object>'), "no points and no faces"),
 }  # fmt: skip
 
 
