@@ -769,6 +769,12 @@ DROP = """(label) => {
 }"""
 """Drop a picture on a row of the outline."""
 
+FOLLOWS = """(labels) => {
+  const rows = [...document.querySelectorAll('[role=button]')].map(one => one.innerText.trim());
+  return rows.indexOf(labels[0]) < rows.indexOf(labels[1]);
+}"""
+"""Return True if one row of the outline is above another."""
+
 
 async def panels(picture: str | None = None) -> None:
     """A user renames and drags rows, drops images, and sets material, scattering and drawing."""
@@ -853,6 +859,7 @@ async def panels(picture: str | None = None) -> None:
         assert [item.name for item in document.objects] == ["snail 2", "snail"]
         await browser.keyboard.press("Control+z")
         await done("duplicate snail")
+        await browser.wait_for_function(FOLLOWS, arg=["snail", "snail 2"])
         await row("snail 2").drag_to(row("snail"))
         await done("move snail 2 into snail")
         assert len(document.objects) == 1
