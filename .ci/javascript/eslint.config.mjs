@@ -20,6 +20,6 @@ export default [
   { files: ["**/*.html"], plugins: { html } },
   { files: ["**/*.mjs", "**/*.js", "**/*.html"], languageOptions: { globals: globals.browser } },
   { files: ["**/*.js"], languageOptions: { sourceType: "script" } },
-  { files: ["decals/pages/viewer/start.js"], languageOptions: { globals: { mount: "readonly" } } },
+  { files: ["decals/pages/viewer/start.js"], languageOptions: { globals: { mountOver: "readonly" } } },
   { files: ["tests/**/*.js"], languageOptions: { sourceType: "commonjs", globals: globals.node } },
 ];

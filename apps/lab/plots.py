@@ -235,15 +235,20 @@ def _borders(regions: Any) -> BoolArray:
     return borders
 
 
+def viridis(parts: Any) -> Float64Array:
+    """Return colours of parts from 0 to 1 of the way from the lowest value to the highest."""
+    place = np.nan_to_num(parts).clip(0.0, 1.0) * (len(SCALE) - 1)
+    return np.stack(
+        [np.interp(place, np.arange(len(SCALE)), SCALE[:, channel]) for channel in range(3)], axis=-1
+    )
+
+
 def _colored(
     values: Float64Array, low: float, high: float, red: BoolArray, lines: BoolArray | None
 ) -> Image.Image:
     """Return colours of values; NaN and infinities are transparent."""
-    place = np.nan_to_num((values - low) / (high - low)).clip(0.0, 1.0) * (len(SCALE) - 1)
-    steps = np.arange(len(SCALE))
-    channels = [np.interp(place, steps, SCALE[:, channel]) for channel in range(3)]
-    alpha = np.where(np.isfinite(values), 255.0, 0.0)
-    image = np.stack([*channels, alpha], axis=-1).astype(np.uint8)
+    alpha = np.where(np.isfinite(values), 255.0, 0.0)[..., None]
+    image = np.concatenate([viridis((values - low) / (high - low)), alpha], axis=-1).astype(np.uint8)
     if lines is not None:
         image[lines & np.isfinite(values)] = (*LINE, 255)
     image[red] = (*RED, 255)

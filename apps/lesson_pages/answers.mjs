@@ -1,15 +1,13 @@
 // Answers: the numbers of a page, sent to the teacher of a class.
 
-export async function send(page, form) {
-  const { lesson, root } = page;
-  const sliders = page.sliders.filter(({ type }) => type === "range").map(({ value }) => Number(value));
-  const formulas = [...lesson.values, ...lesson.scores.map(({ formula }) => formula)];
-  const values = formulas.map((text) => Number(page.value(text))); // those that are no numbers become null
+export async function send({ lesson, live, root, guess, sliders, value }, form) {
+  const places = sliders.filter(({ type }) => type === "range").map((input) => Number(input.value));
+  const values = [...live.values, ...live.scores].map((of) => Number(value(of)));
+  const numbers = [guess, ...places, ...values]; // those that are no numbers become null
   const right = root.querySelector(".verdict").dataset.right === "true";
-  const answer = { lesson: lesson.name, name: form.person.value, numbers: [page.guess ?? null, ...sliders, ...values], right }; // prettier-ignore
+  const answer = { lesson: lesson.name, name: form.person.value, numbers, right };
   const headers = { "Content-Type": "application/json" };
-  const sent = await fetch("answer", { method: "POST", body: JSON.stringify(answer), headers }).catch(
-    () => ({}),
-  );
+  const request = { method: "POST", body: JSON.stringify(answer), headers };
+  const sent = await fetch("answer", request).catch(() => ({}));
   form.querySelector("output").textContent = lesson.words[sent.ok ? "sent" : "unsent"];
 }

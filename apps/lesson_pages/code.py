@@ -3,8 +3,12 @@
 import ast
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
+import msgspec
+
+from decals.apps.lab.bindings import AXES, DecalPath, binding
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.formulas import Measure
 from decals.apps.lab.lesson import PLACEHOLDER
@@ -36,6 +40,21 @@ WORDS = [kind.name.lower() for kind in (*Contact, *Interaction)]
 
 VARIABLES = "x", "y"
 
+FORMS = {
+    "abs": "Math.abs({})",
+    "max": "Math.max({}, {})",
+    "where": "({} ? {} : {})",
+    "count": "m.viewer.decals.numbers.length",
+    "contact": "m.viewer.mode",
+    "stiffness": "m.viewer.stiffness",
+    "layer": "m.row({}).layer",
+    "interaction": "m.row({}).interaction",
+    "owner": "q.owner",
+    "stretch": "q.stretch",
+    "folded": "q.folded",
+}
+"""Measures in plain JavaScript, with places for arguments. The others are methods in ``measures.mjs``."""
+
 
 def javascript(text: str, measures: Mapping[str, Measure], known: frozenset[str]) -> str:
     """Return a checked formula as an expression of JavaScript, of measures ``m`` at a point ``q``.
@@ -50,7 +69,7 @@ def javascript(text: str, measures: Mapping[str, Measure], known: frozenset[str]
     >>> from decals.apps.lab.measures import MEASURES
     >>> from decals.apps.lesson_pages.code import javascript
     >>> javascript("f(0) + 2*f(1) >= share(owner == 1)", MEASURES, frozenset({"f", "share", "owner"}))
-    '((m.f(q, 0) + (2 * m.f(q, 1))) >= m.share(q, (q) => (m.owner(q) === 1)))'
+    '((m.f(q, 0) + (2 * m.f(q, 1))) >= m.share(q, (q) => (q.owner === 1)))'
     """
 
     def part(node: ast.AST) -> str:
@@ -82,6 +101,8 @@ def javascript(text: str, measures: Mapping[str, Measure], known: frozenset[str]
             raise InvalidLesson(
                 f"formula {text!r}: pages do not know {name!r}; known are {', '.join(sorted(known))}"
             )
+        if name in FORMS:
+            return FORMS[name].format(*map(part, arguments))
         kinds = measures[name].arguments
         parts = [
             f"(q) => {part(argument)}" if kind == "formula" else part(argument)
@@ -92,10 +113,63 @@ def javascript(text: str, measures: Mapping[str, Measure], known: frozenset[str]
     return part(ast.parse(text.strip(), mode="eval").body)
 
 
-def pieces(text: str, definitions: Mapping[str, str]) -> list[str]:
-    """Return a text with formulas in braces as HTML and formulas in turns; symbols are marked in the HTML."""
+def said(text: str, code: Callable[[str], str], definitions: Mapping[str, str]) -> str:
+    """Return a text with formulas in braces as an expression of JavaScript for its HTML; symbols are marked.
+
+    Code is a function that returns formulas in JavaScript.
+    """
     parts = PLACEHOLDER.split(text)
-    return [part if i % 2 else marked_text(part, definitions) for i, part in enumerate(parts)]
+    return " + ".join(
+        f"m.say({code(part)})" if i % 2 else script_json(marked_text(part, definitions))
+        for i, part in enumerate(parts)
+    )
+
+
+def access(path: str) -> dict[str, "Code"]:
+    """Return functions that read and write what a slider moves: a value of a page ``p`` of a lesson."""
+    read, write = {
+        "contact": ("p.viewer.mode", "p.viewer.set({ mode: value })"),
+        "stiffness": ("p.viewer.stiffness", "p.viewer.set({ stiffness: value })"),
+        "mapping": ("p.mapping", "p.map(value)"),
+        **{f"probe.{axis}": (f"p.probe[{i}]", f"p.probe[{i}] = value") for i, axis in enumerate(AXES)},
+    }.get(path) or _access_to_decals(path)
+    return {"read": Code(f"(p) => {read}"), "write": Code(f"(p, value) => {write}")}
+
+
+def _access_to_decals(path: str) -> tuple[str, str]:
+    match binding(path):
+        case DecalPath(row=int(row), name=name) if name in AXES:
+            i = AXES.index(name)
+            moved = f"p.viewer.under(row, row.position.with({i}, value), row.tangent)"
+            return f"p.viewer.decals.rows[{row}]?.position[{i}]", f"p.edit([{row}], (row) => {moved})"
+        case DecalPath(row=row, name=name):
+            numbers = "p.viewer.decals.numbers" if row is None else f"[{row}]"
+            return (
+                f"p.viewer.decals.rows[{row or 0}]?.{name}",
+                f"p.edit({numbers}, () => ({{ {name}: value }}))",
+            )
+    return "undefined", "undefined"  # the sliders of a table are read when its state is shown
+
+
+class Code(str):
+    """A text that is JavaScript."""
+
+
+def script(value: Any) -> str:
+    """Return a value as JavaScript that may stand in a script; `Code` in it stays as it is."""
+    match value:
+        case Code():
+            return value
+        case dict():
+            return "{" + ", ".join(f"{script_json(name)}: {script(one)}" for name, one in value.items()) + "}"
+        case list() | tuple():
+            return "[" + ", ".join(map(script, value)) + "]"
+    return script_json(value)
+
+
+def script_json(value: Any) -> str:
+    """Return a value as JSON that may stand in a script."""
+    return msgspec.json.encode(value).decode().replace("<", "\\u003c")
 
 
 def marked_text(text: str, definitions: Mapping[str, str]) -> str:

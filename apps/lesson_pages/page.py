@@ -4,20 +4,31 @@ import html
 import json
 from collections.abc import Mapping, Sequence
 from functools import cache
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 from PIL import Image
 
 from blobtree.progress import Progress, reporting
-from decals.apps.lab.bindings import binding
+from decals.apps.lab.bindings import AXES, binding
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.lesson import Lesson, Plot, Slider
 from decals.apps.lab.measures import MEASURES
+from decals.apps.lab.plots import COLORS, DASHES, SCALE, viridis
 from decals.apps.lab.symbols import document
-from decals.apps.lesson_pages.code import WORDS, javascript, marked_text, pieces
+from decals.apps.lesson_pages.code import (
+    FORMS,
+    WORDS,
+    Code,
+    access,
+    javascript,
+    marked_text,
+    said,
+    script,
+    script_json,
+)
 from decals.apps.lesson_pages.tables import Table, positions_of, tabulated
 from decals.apps.lesson_pages.translation import Translation, translation
 from decals.field.mapping import ImageMapping
@@ -32,12 +43,11 @@ MODULES = "measures", "plots", "puzzles", "answers", "lesson"
 """Modules of a lesson, each after those that it imports."""
 
 NAMES = """
-    abs at between contact count d distance f F folded g h influence interaction jump layer least max most
-    kept lost overlapped owner pushed radius share stiffness stretch top where
+    at between d distance f F g h influence jump kept least lost most overlapped pushed radius share top
 """
 
-KNOWN = frozenset([*NAMES.split(), *WORDS])
-"""Measures that ``measures.mjs`` has, and names of modes. Other ones have values in a table."""
+KNOWN = frozenset([*NAMES.split(), *FORMS, *WORDS])
+"""Measures that pages have, and names of modes. Other ones have values in a table."""
 
 IMAGE_SIDE = 128
 """Most pixels of a side of an image: pages of lessons are small."""
@@ -50,6 +60,22 @@ SEND = (
     '<button>{send}</button> <output role="status"></output></form>'
 )
 """What a student sends in a class."""
+
+SYMBOLS = (
+    '<table><thead><tr><th scope="col">{decal}</th>'
+    + "".join(f'<th scope="col">{symbol}</th>' for symbol in "rsdfhF")
+    + '<th scope="col">{stretch}</th></tr></thead><tbody></tbody></table>'
+)
+"""The readings at the probe."""
+
+LOOKS = [
+    f'stroke="{color}" stroke-width="2" stroke-dasharray="{dashes}"'
+    for color, dashes in zip(COLORS, DASHES, strict=True)
+]
+"""Lines of plots."""
+
+COLORS_OF_MAP = 64
+"""Colours between the lowest and the highest value of a map."""
 
 STEPS = 200
 """Steps of a slider whose lesson gives none."""
@@ -110,10 +136,10 @@ def lesson_page(
             report=report,
             picture=lesson.scene,
         )
-    known, formulas = _record(lesson, words, table), _formulas(lesson, table)
     begin = (
         "begin(document.getElementById('lesson'), document.getElementById('data').textContent, "
-        f"{_script_json(known)}, {{{formulas}}}).then((page) => (globalThis.page = page));\n"
+        f"{script_json(_record(lesson, words, table))}, {script(_live(lesson, words, table))})"
+        ".then((page) => (globalThis.page = page));\n"
     )
     slots |= _markup(lesson, words, table, links)
     slots["SEND"] = SEND.format(**words.page) if sends else ""
@@ -132,7 +158,7 @@ def no_page(lesson: Lesson) -> str | None:
         if settings.space:
             positions_of(lesson)
         else:
-            _formulas(lesson, None)
+            _live(lesson, translation("en"), None)
     except InvalidLesson as error:
         return f"{settings.title}: {error}"
     return None
@@ -166,39 +192,29 @@ def _small(scene: Scene) -> Scene:
 
 def _record(lesson: Lesson, words: Translation, table: Table | None) -> dict[str, Any]:
     """Return what the script of a page knows of its lesson."""
-    settings, question, guess = lesson.settings, lesson.settings.question, lesson.settings.guess
+    settings = lesson.settings
     camera = lesson.scene.camera
-
-    def parts(text: str) -> list[str]:
-        return pieces(words.said(text), words.definitions)
-
-    rows = json.loads(to_json(_small(lesson.scene).replace(objects=[]), folder=Path()))["decals"]
+    paths = [slider.path for slider in settings.sliders]
+    axes = [i for i, axis in enumerate(AXES) if f"probe.{axis}" in paths]
     return {
         "camera": {name: getattr(camera, name) for name in ("position", "target", "up", "fov")},
         "size": lesson.size,
         "line": settings.line,
         "probe": settings.probe,
+        "axes": axes or [0, 1, 2],
         "up": np.asarray(camera.axes[2]).tolist(),
         "mode": settings.contact,
         "stiffness": settings.stiffness,
         "mapping": settings.mapping,
         "mappings": [mapping.name.lower() for mapping in sorted(ImageMapping)],
-        "rows": rows,
+        "rows": _rows(lesson.scene),
+        "apart": _rows(lesson.apart),
         "name": lesson.name,
         "scores": [{"formula": score.formula, "par": score.par} for score in settings.scores],
         "states": len(table.objects) if table else 0,
-        "values": [value.formula for value in settings.values],
-        "plots": [_plot(plot, parts, words, table) for plot in _plots(lesson)],
-        "question": {
-            "right": parts(question.right),
-            "checks": [{"holds": c.holds, "otherwise": parts(c.otherwise)} for c in question.checks],
-        },
-        "guess": guess
-        and {
-            "truth": guess.truth,
-            "why": parts(guess.why),
-            "compared": html.escape(words.page["compared"]) + " ",
-        },
+        "table": table.values if table else {},
+        "colors": viridis(np.linspace(0.0, 1.0, COLORS_OF_MAP)).astype(int).tolist(),
+        "guess": settings.guess is not None,
         "words": words.page,
         "shader": compose("page_measures.frag", version=None).text.replace(
             "decal_surface_receivers", f"{PREFIX}surface_receivers"
@@ -206,42 +222,70 @@ def _record(lesson: Lesson, words: Translation, table: Table | None) -> dict[str
     }
 
 
-def _plots(lesson: Lesson) -> list[Plot]:
-    """Return the plots of a page: maps in space are left out."""
-    return [plot for plot in lesson.settings.plots if not (plot.map and lesson.settings.space)]
+def _rows(scene: Scene) -> list[dict[str, Any]]:
+    """Return the decals of a scene as files have them, with the values that lessons name."""
+    rows = json.loads(to_json(_small(scene).replace(objects=[]), folder=Path()))["decals"]
+    return [{"interaction": "push", "layer": 0, "opacity": 1, **row} for row in rows]
 
 
-def _plot(plot: Plot, parts: Any, words: Translation, table: Table | None) -> dict[str, Any]:
+def _live(lesson: Lesson, words: Translation, table: Table | None) -> dict[str, Any]:
+    """Return the functions of a page: its formulas, texts with formulas, plots and sliders."""
+    settings, guess, checks = lesson.settings, lesson.settings.guess, lesson.settings.question.checks
+
+    def code(text: str) -> str:
+        if table is None:
+            return javascript(text, MEASURES, KNOWN)
+        return f"m.lesson.table[{script_json(text)}][m.state]"
+
+    def value(text: str, end: str = "") -> Code:
+        return Code(f"(m, q) => {code(text)}{end}")
+
+    def text(given: str) -> Code:
+        return Code(f"(m, q) => {said(words.said(given), code, words.definitions)}")
+
+    def plotted(plot: Plot) -> dict[str, Any]:
+        curves = zip(plot.curves, cycle(LOOKS), strict=False)
+        return {
+            "points": Code(_points(plot, table)),
+            "curves": [
+                {"formula": value(c.formula, "[q.i]" if table else ""), "look": look} for c, look in curves
+            ],
+            "map": plot.map and value(plot.map),
+            "red": plot.red and value(plot.red),
+            "marks": () if table else [[value(one) for one in pair] for pair in plot.marks],
+            "formula": () if table else [{"text": text(c.text), "when": value(c.when)} for c in plot.formula],
+            **{name: ends for name in ("x", "y", "values") if (ends := getattr(plot, name))},
+        }
+
+    def seen(truth: str, why: str) -> Code:
+        numbers = {"guess": "m.guess", "truth": code(truth)}
+        compared = said(words.page["compared"] + " ", numbers.__getitem__, {})
+        return Code(f"(m, q) => {compared} + {said(words.said(why), code, words.definitions)}")
+
     return {
-        "curves": [{"label": words.said(curve.label), "formula": curve.formula} for curve in plot.curves],
-        "map": plot.map,
-        "red": plot.red,
-        "redLabel": words.said(plot.red_label),
-        **{name: getattr(plot, name) for name in ("x", "y", "values")},
-        "marks": () if table else plot.marks,
-        "formula": () if table else [{"text": parts(case.text), "when": case.when} for case in plot.formula],
-        "at": table.line if table else (),
+        "values": [value(one.formula) for one in settings.values],
+        "scores": [value(score.formula) for score in settings.scores],
+        "checks": [{"holds": value(check.holds), "otherwise": text(check.otherwise)} for check in checks],
+        "right": text(settings.question.right),
+        "seen": guess and seen(guess.truth, guess.why),
+        "plots": [plotted(plot) for plot in _plots(lesson)],
+        "sliders": [access(slider.path) for slider in settings.sliders],
     }
 
 
-def _formulas(lesson: Lesson, table: Table | None) -> str:
-    """Return all formulas of a lesson as members of an object of JavaScript."""
+def _points(plot: Plot, table: Table | None) -> str:
+    """Return the function of the points of a plot, in JavaScript."""
     if table is not None:
-        return ",\n".join(
-            f"{_script_json(text)}: (m) => {_script_json(values)}[m.state]"
-            for text, values in table.values.items()
-        )
-    known = {text: formula.text for text, formula in lesson.formulas.items()}
-    for template in lesson.templates.values():
-        known |= {part.text: part.text for part in template.parts if not isinstance(part, str)}
-    return ",\n".join(
-        f"{_script_json(name)}: (m, q) => {javascript(text, MEASURES, KNOWN)}" for name, text in known.items()
-    )
+        return f"() => {script_json([{'x': x, 'i': i} for i, x in enumerate(table.line)])}"
+    if plot.x is None:
+        return "(m) => m.map()" if plot.map else "(m) => m.curve()"
+    ranges = [script_json(ends) for ends in (plot.x, plot.y) if ends]
+    return f"(m) => m.{'numbersOver' if plot.y else 'numbersAlong'}({', '.join(ranges)})"
 
 
-def _script_json(value: Any) -> str:
-    """Return a value as JSON that may stand in a script."""
-    return msgspec.json.encode(value).decode().replace("<", "\\u003c")
+def _plots(lesson: Lesson) -> list[Plot]:
+    """Return the plots of a page: maps in space are left out."""
+    return [plot for plot in lesson.settings.plots if not (plot.map and lesson.settings.space)]
 
 
 # -- the markup -----------------------------------------------------------------------------------------
@@ -257,10 +301,9 @@ def _markup(
         return marked_text(words.said(given), words.definitions)
 
     tasks = "".join(
-        f'<li data-task="{i}" id="task-{i + 1}"><span class="mark" role="img" '
-        f'aria-label="{html.escape(words.page["open"])}"></span>'
-        f'<span>{text(c.task)} <a href="#task={i + 1}" '
-        f'aria-label="{html.escape(words.said(c.task))}">#</a></span></li>'
+        f'<li data-task id="task={i + 1}"><label><input type="checkbox" disabled value="{i}"> '
+        f'{text(c.task)}</label> <a href="#task={i + 1}" '
+        f'aria-label="{html.escape(words.said(c.task))}">#</a></li>'
         for i, c in enumerate(settings.question.checks)
         if c.task
     )
@@ -281,7 +324,7 @@ def _markup(
         '<p class="shared" role="status"></p>'
     )
     plots = "".join(
-        f'<div class="plot"><h2>{text(plot.title)}</h2><div class="formula"></div>'
+        f'<div class="plot"><h2>{text(plot.title)}</h2><div class="formula"></div>{_key(plot, words)}'
         f'<div class="chart" role="img" aria-label="{html.escape(words.said(plot.title))}"></div>'
         f'<div class="note">{text(plot.note)}</div></div>'
         for plot in _plots(lesson)
@@ -303,8 +346,26 @@ def _markup(
         "SCORES": scores if settings.scores else "",
         "SLIDERS": "".join(_slider(slider, lesson, words, table) for slider in settings.sliders),
         "ROWS": rows,
+        "COLORS": "".join(
+            f'<stop offset="{part}" stop-color="rgb({", ".join(map(str, color))})"/>'
+            for part, color in zip(np.linspace(0, 1, len(SCALE)), SCALE.astype(int), strict=True)
+        ),
+        "SYMBOLS": "" if settings.space else SYMBOLS.format(**words.page),
+        "PROBE": html.escape(words.page["probe"]),
         "PLOTS": plots,
     }
+
+
+def _key(plot: Plot, words: Translation) -> str:
+    """Return the key of the lines of a plot, or of the red part of its map."""
+    if plot.red:
+        return f'<p class="red">{html.escape(words.said(plot.red_label))}</p>'
+    lines = "".join(
+        f'<span><svg viewBox="0 0 22 4" aria-hidden="true"><path d="M0 2h22" {look}/></svg> '
+        f"{html.escape(words.said(curve.label))}</span>"
+        for curve, look in zip(plot.curves, cycle(LOOKS), strict=False)
+    )
+    return f'<div class="key">{lines}</div>'
 
 
 def _slider(slider: Slider, lesson: Lesson, words: Translation, table: Table | None) -> str:

@@ -1,7 +1,5 @@
 // Puzzles: sizes of decals and pars from the address, and scores, of which the browser keeps the best.
 
-const digitsOf = (value, digits) => Number(value.toPrecision(digits));
-
 // The puzzle of an address, or that of the lesson.
 export function puzzleOf(fragment, { rows, scores, size }) {
   const given = new URLSearchParams(fragment.slice(1));
@@ -25,14 +23,16 @@ function best(key, value, counts) {
 
 // Show the scores of a page, with the pars if its decals have the sizes of the puzzle.
 export function showScores(page, counts) {
-  const { lesson, puzzle, root, viewer } = page;
-  const sizes = viewer.decals.rows.map((row) => row && digitsOf(row.radius, 4)).join(",");
-  const isOwn = sizes === puzzle.radii.map((radius) => digitsOf(radius, 4)).join(",");
-  const values = lesson.scores.map(({ formula }) => page.value(formula));
-  root.querySelectorAll(".scores tbody tr").forEach((line, i) => {
+  const { lesson, live, puzzle } = page;
+  const { say } = page.measures;
+  const sizesOf = (radii) => radii.map((radius) => Number(radius?.toPrecision(4))).join(",");
+  const sizes = sizesOf(page.viewer.decals.rows.map((row) => row?.radius));
+  const isOwn = sizes === sizesOf(puzzle.radii);
+  const values = live.scores.map((score) => page.value(score));
+  page.all(".scores tbody tr").forEach((line, i) => {
     const least = best(`${lesson.name} puzzle=${sizes} ${lesson.scores[i].formula}`, values[i], counts);
     const star = isOwn && least <= puzzle.pars[i] ? " ★" : "";
-    const texts = [page.say(values[i]), isOwn ? page.say(puzzle.pars[i]) : "–", page.say(least) + star];
+    const texts = [say(values[i]), isOwn ? say(puzzle.pars[i]) : "–", say(least) + star];
     texts.forEach((text, column) => (line.cells[column + 1].textContent = text));
   });
   page.shared = `puzzle=${sizes}&par=${values.map((value) => Math.ceil(10 * value) / 10).join(",")}`;

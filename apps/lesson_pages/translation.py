@@ -35,8 +35,6 @@ PAGE_TEXTS = {
     "compared": "You guessed {guess}, it is {truth}.",
     "yes": "yes",
     "no": "no",
-    "done": "done",
-    "open": "to do",
     "point": ".",
     "probe": "Probe: drag it, or move it by the arrow keys",
     "decal": "decal",

@@ -197,7 +197,7 @@ def page(
             resolution=resolution,
             report=report,
         )
-    script = as_script(viewer_script(), "mount") + _read("start.js")
+    script = as_script(viewer_script(name="mountOver"), "mountOver") + _read("start.js")
     return Page(filled(_read("page.html"), {**slots, "SCRIPT": script}), slots["DATA"], title)
 
 

@@ -24,6 +24,21 @@ from tests.frontends.browsing import ERRORS
 from tests.frontends.in_html_page import Fingers, accessible, launched
 
 SIZE = {"width": 1280, "height": 800}
+SIZES = (390, 844), (820, 1180), (1280, 800)
+"""Windows of a phone, of a tablet and of a laptop."""
+
+CUT = """() => [...document.querySelectorAll("#lesson :is(button, input, select, a, td, th, svg, canvas)")]
+  .filter((e) => e.checkVisibility())
+  .filter((e) => e.getBoundingClientRect().left < 0 || e.getBoundingClientRect().right > innerWidth)
+  .map((e) => e.outerHTML.slice(0, 80))"""
+"""Parts of a page that its window cuts."""
+
+UNPRINTED = """() => [".body", "canvas", ".question", ".tasks", ".values", ".chart svg", "output"].filter(
+  (name) => document.querySelector(`#lesson ${name}`)?.checkVisibility() === false)"""
+"""Names of parts that a print lacks; not all lessons have all of them."""
+
+CONTROLS = "#lesson :is(button:not(.probe), input:not([type=checkbox]), nav):visible"
+"""Parts that a print does not have."""
 PATIENCE = 120_000
 """Milliseconds for a page to start, or to show the values of a state, without a graphics card."""
 
@@ -123,18 +138,39 @@ async def learned(browser: Browser, lesson: Lesson, attempts: list[Attempt], pat
         assert found == pytest.approx(value, rel=CLOSE, abs=1e-3), (text, value)
     for attempt in attempts:
         await answered(page, attempt)
-    assert await page.locator('[data-task][data-done="false"]').count() == 0
+    assert await page.locator("[data-task] input:not(:checked)").count() == 0
     await accessible(page)
     if browser.browser_type.name == "chromium":
         await touched(page)
     await page.goto(f"{path.as_uri()}#task=1")
     await page.reload()
-    await page.wait_for_selector("#task-1[aria-current]", timeout=PATIENCE)
+    await page.wait_for_selector("[id='task=1']:target", timeout=PATIENCE)
     assert await page.evaluate("window.pageErrors") == []
     asked = {request.split("#")[0] for request in requests if request.startswith(("http", "file"))}
     assert asked <= {path.as_uri()}  # Firefox reports none of files
     await page.close()
     print(f"{lesson.settings.title}: first frame after {first / 1000:.1f} s", flush=True)
+
+
+async def fitted(browser: Browser, lesson: Lesson, path: Path) -> None:
+    """Take a lesson by fingers at three sizes, of which none cuts anything, and print it."""
+    for width, height in SIZES:
+        page = await browser.new_page(viewport={"width": width, "height": height}, has_touch=True)
+        await page.goto(path.as_uri())
+        await page.wait_for_function("document.getElementById('lesson').dataset.ready", timeout=PATIENCE)
+        assert await page.evaluate(CUT) == []
+        await page.get_by_role("button", name="Skip the guess").tap()
+        await settled(page)
+        await page.get_by_role("button", name="Check the answer").tap()
+        await settled(page)
+        assert await page.inner_text(".verdict")
+        assert await page.evaluate("document.documentElement.scrollWidth") <= width
+        assert await page.evaluate(CUT) == []
+        await accessible(page)
+        await page.emulate_media(media="print")
+        assert await page.evaluate(UNPRINTED) == []
+        assert await page.locator(CONTROLS).count() == 0
+        await page.close()
 
 
 async def played(browser: Browser, lesson: Lesson, path: Path) -> None:
@@ -182,6 +218,7 @@ async def learn(name: str, numbers: set[int]) -> None:
                 if not no_page(lesson) and number in (numbers or {number}):
                     path = Path(folder) / f"{lesson.name}.html"
                     await learned(browser, lesson, ANSWERS[number - 1], path)
+                    await fitted(browser, lesson, path)
                     if lesson.settings.scores:
                         await played(browser, lesson, path)
             await browser.close()

@@ -125,11 +125,6 @@ export class Painter {
     return this.gl.clientWaitSync(this.fence, 0, 0) === this.gl.TIMEOUT_EXPIRED;
   }
 
-  // Wait until the picture that was drawn last is there, as a read of it does.
-  finish() {
-    this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));
-  }
-
   // What a camera sees at a place of the picture, from −1 to 1 to the right and upward: the number of the decal, −1 for
   // none, and the surface as a point and the normal on the outside, null for none.
   pick(state, place) {

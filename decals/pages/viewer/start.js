@@ -1,12 +1,5 @@
-// Show the data of this page, or else say why its picture stays.
+// Show the data of this page.
 addEventListener("hashchange", () => location.reload()); // another link was pasted
-const root = document.getElementById("viewer");
-const still = root.firstElementChild;
-mount(root, document.getElementById("data").textContent, { link: location.hash, address: true }).then(
-  (viewer) => (globalThis.viewer = viewer),
-  (error) => {
-    root.className = "";
-    root.replaceChildren(still);
-    still.lastElementChild.textContent = `The model cannot be turned here: ${error.message}.`;
-  },
-);
+const [root, data] = ["viewer", "data"].map((name) => document.getElementById(name));
+const options = { link: location.hash, address: true, reason: "The model cannot be turned here:" };
+mountOver(root, data.textContent, options).then((viewer) => (globalThis.viewer = viewer));

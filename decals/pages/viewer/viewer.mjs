@@ -201,8 +201,20 @@ export async function mount(root, data, options = {}) {
   viewer.resize();
   options.prepare?.(viewer); // of pages that have more than a viewer
   viewer.draw();
-  viewer.painter.finish();
+  const { gl } = viewer.painter;
+  gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // waits until the picture is there
   performance.mark("first frame");
   setTimeout(() => viewer.painter.decalProgram("pick", viewer)); // so that the first click does not wait
   return viewer;
+}
+
+// The same, in place of a picture: it comes back where nothing can be mounted, with the reason, and null is returned.
+export function mountOver(root, data, { reason, ...options }) {
+  const picture = root.firstElementChild;
+  return mount(root, data, options).catch((error) => {
+    root.className = "";
+    root.replaceChildren(picture);
+    picture.lastElementChild.textContent = `${reason} ${error.message}`;
+    return null;
+  });
 }
