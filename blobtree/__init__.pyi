@@ -1,30 +1,10 @@
 from . import par
 from ._version import __version__
 from .conformance.laws import check_kind
-from .custom.field import CustomField, define_field
-from .custom.operator import CustomCombination, define_operator
-from .custom.skeleton import CustomPrimitive, define_skeleton
-from .custom.warp import CustomWarp, define_warp
-from .declare.falloff import Falloff, define_falloff
+from .declare.falloff import Falloff
 from .declare.formula import formula
 from .derivatives.curvature import Curvatures
-from .errors import (
-    Cancelled,
-    ImplicitDecalsError,
-    InvalidDefinition,
-    InvalidDevice,
-    InvalidFile,
-    InvalidNode,
-    InvalidPoints,
-    InvalidResolution,
-    MissingFile,
-    MissingPackage,
-    NoGraphics,
-    UnknownKind,
-    UntranslatableFunction,
-    UnusableCache,
-    UnusableFile,
-)
+from .errors import ImplicitDecalsError
 from .fitting import Fit, fit
 from .formulas.falloff import ISO, RIM
 from .formulas.falloffs import FALLOFF_NAMES
@@ -79,25 +59,22 @@ from .nodes.tree_volumes import sample
 from .nodes.volumes import Volume, from_mesh, from_sdf
 from .nodes.warp import Warp
 from .progress import Cancel, Progress
-from .sampling.field_grid import FieldGrid, field_grid
-from .sampling.tree_distances import SignedDistances, to_sdf
+from .sampling.field_grid import field_grid
+from .sampling.tree_distances import to_sdf
 from .tape.tape import Tape
-from .tracing.batch import BatchHits, raycast_batch
-from .tracing.trace import Hits
+from .tracing.batch import raycast_batch
 
 __all__ = [
     "FALLOFF_NAMES",
     "ISO",
     "RIM",
     "Arc",
-    "BatchHits",
     "Bend",
     "BlendGraph",
     "Box",
     "BoxedField",
     "Bulge",
     "Cancel",
-    "Cancelled",
     "Circle",
     "CleanUnion",
     "Cone",
@@ -110,38 +87,23 @@ __all__ = [
     "CubicBezier",
     "Curvatures",
     "CurveWarp",
-    "CustomCombination",
-    "CustomField",
-    "CustomPrimitive",
-    "CustomWarp",
     "Cylinder",
     "Difference",
     "Disc",
     "Ellipsoid",
     "Falloff",
-    "FieldGrid",
     "FieldPrimitive",
     "Fit",
     "GradientBlend",
     "Gyroid",
     "HalfSpace",
-    "Hits",
     "ImplicitDecalsError",
     "Intersection",
-    "InvalidDefinition",
-    "InvalidDevice",
-    "InvalidFile",
-    "InvalidNode",
-    "InvalidPoints",
-    "InvalidResolution",
     "LimitedTwist",
     "LocalBlend",
     "Masked",
     "Mesh",
     "Mirror",
-    "MissingFile",
-    "MissingPackage",
-    "NoGraphics",
     "Node",
     "Noise",
     "NoiseWarp",
@@ -166,7 +128,6 @@ __all__ = [
     "Segment",
     "Shear",
     "Shell",
-    "SignedDistances",
     "SmoothDifference",
     "SmoothIntersection",
     "SolidContact",
@@ -184,20 +145,11 @@ __all__ = [
     "Triangle",
     "Twist",
     "Union",
-    "UnknownKind",
-    "UntranslatableFunction",
-    "UnusableCache",
-    "UnusableFile",
     "Volume",
     "Warp",
     "__version__",
     "check_kind",
     "content_hash",
-    "define_falloff",
-    "define_field",
-    "define_operator",
-    "define_skeleton",
-    "define_warp",
     "field_grid",
     "fit",
     "formula",

@@ -27,6 +27,25 @@ import errno
 import os
 from typing import Literal
 
+__all__ = [
+    "Cancelled",
+    "ImplicitDecalsError",
+    "InvalidDefinition",
+    "InvalidDevice",
+    "InvalidFile",
+    "InvalidInput",
+    "InvalidNode",
+    "InvalidPoints",
+    "InvalidResolution",
+    "MissingFile",
+    "MissingPackage",
+    "NoGraphics",
+    "UnknownKind",
+    "UntranslatableFunction",
+    "UnusableCache",
+    "UnusableFile",
+]
+
 
 class ImplicitDecalsError(Exception):
     """Root of every error that `blobtree` and `decals` raise on purpose."""

@@ -6,6 +6,10 @@ from pathlib import Path
 
 PACKAGES = {
     "blobtree": "Models",
+    "blobtree.custom": "Kinds of nodes from single functions",
+    "blobtree.tracing": "Rays",
+    "blobtree.sampling": "Grids of fields and distances",
+    "blobtree.errors": "Exceptions of models",
     "decals": "Decals, scenes and pictures",
     "decals.scattering": "Scattering in steps",
     "decals.surfaces": "Surfaces",

@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import blobtree
-from blobtree import InvalidNode, Node, check_kind
+from blobtree import Node, check_kind
 from blobtree.conformance.laws import LAWS, Case
 from blobtree.conformance.samples import DRAWS, Draw, Rng, drawn_node
 from blobtree.declare.parameters import Quantity, parameters_of
+from blobtree.errors import InvalidNode
 from blobtree.nodes.primitives import Falling, Leaf
 from tests.blobtree.trees import BUILT_IN_FALLOFFS, random_leaf, random_profile, triple
 from tests.oracles import blobtree as oracle

@@ -11,7 +11,7 @@ import pyvista as pv
 
 import blobtree
 import decals
-from blobtree import Node, Point
+from blobtree import Node, Point, custom, sampling, tracing
 from blobtree.declare.parameters import fields_of
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.paths import primitive_paths
@@ -50,7 +50,7 @@ def not_called() -> list[str]:
     """Return the public functions and classes for which the table has no arguments."""
     called = {name.split()[0] for name in call_table()} | UNCALLED
     missing = []
-    for module in (blobtree, decals, editing):
+    for module in (blobtree, custom, sampling, tracing, decals, editing):
         for name in set(module.__all__) - called:
             value = getattr(module, name)
             if callable(value) and not (isinstance(value, type) and issubclass(value, Exception | Enum)):
@@ -527,21 +527,21 @@ def call_table() -> Calls:
             blobtree.Polygonizer,
             {"tree": tree, "resolution": 8, "cell_size": None, "creases": False, "device": "cpu"},
         ),
-        "define_falloff": (blobtree.define_falloff, {"value": None, "slope": None, "name": "odd"}),
+        "define_falloff": (custom.define_falloff, {"value": None, "slope": None, "name": "odd"}),
         "define_skeleton": (
-            blobtree.define_skeleton,
+            custom.define_skeleton,
             {"function": None, "convex": False, "name": "odd", "limits": None},
         ),
         "define_operator": (
-            blobtree.define_operator,
+            custom.define_operator,
             {"function": None, "like": "blend", "name": "odd", "limits": None},
         ),
         "define_warp": (
-            blobtree.define_warp,
+            custom.define_warp,
             {"forward": None, "stretch": None, "box": None, "extent": 1.0, "name": "odd"},
         ),
         "define_field": (
-            blobtree.define_field,
+            custom.define_field,
             {"function": None, "steepest": None, "extent": 1.0, "name": "odd"},
         ),
         "field": (lambda points: tree(points), {"points": points}),

@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from blobtree import InvalidNode, Node, NumericParameter, Polygon, Segment, numeric_parameters, numeric_values
+from blobtree import Node, NumericParameter, Polygon, Segment, numeric_parameters, numeric_values
 from blobtree import with_numeric_values as changed
+from blobtree.errors import InvalidNode
 from blobtree.nodes.numeric_parameters import node_along
 from tests.blobtree.trees import points_around
 from tests.oracles import blobtree as oracle

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from blobtree import InvalidNode, Mesh, Node, polygonize
+from blobtree import Mesh, Node, polygonize
 from blobtree.conformance.samples import Rng
+from blobtree.errors import InvalidNode
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.tracing.trace import trace
 from blobtree.tracing.tree_cells import trace_tolerance

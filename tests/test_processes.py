@@ -162,7 +162,7 @@ def test_a_cuda_device_after_a_fork_names_spawn(tmp_path: Path) -> None:
             get_device, wp.get_device = wp.get_device, lambda _: SimpleNamespace(is_cuda=True)
             try:
                 return device.known_device(name)
-            except blobtree.InvalidDevice as error:
+            except blobtree.errors.InvalidDevice as error:
                 return str(error)
             finally:
                 wp.get_device = get_device

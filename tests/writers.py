@@ -23,6 +23,7 @@ import numpy as np
 import blobtree
 import decals
 from blobtree.pyvista_views import write_polydata
+from blobtree.sampling import FieldGrid
 from decals.apps import cli
 from decals.errors import ImplicitDecalsError, InvalidInput
 from decals.rendering import Picture
@@ -67,7 +68,7 @@ def surface() -> Any:
 
 
 @cache
-def grid() -> blobtree.FieldGrid:
+def grid() -> FieldGrid:
     """A field on a grid."""
     return blobtree.field_grid(blobtree.Point((0, 0, 0), radius=1.0), resolution=10)
 

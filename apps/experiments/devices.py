@@ -35,9 +35,9 @@ EXPLAINED: dict[Kind, str] = {
 
 BY_KIND: dict[Kind, str] = {
     "processor": """
-        blobtree.check_kind
-        blobtree.content_hash blobtree.define_falloff blobtree.define_field blobtree.define_operator
-        blobtree.define_skeleton blobtree.define_warp blobtree.formula blobtree.from_json blobtree.from_sdf
+        blobtree.check_kind blobtree.content_hash blobtree.custom.define_falloff blobtree.custom.define_field
+        blobtree.custom.define_operator blobtree.custom.define_skeleton blobtree.custom.define_warp
+        blobtree.formula blobtree.from_json blobtree.from_sdf
         blobtree.load blobtree.numeric_parameters blobtree.numeric_values blobtree.save blobtree.to_json
         blobtree.with_numeric_values blobtree.split_creases decals.define_contact decals.load_image
         decals.load_model decals.load_scene decals.pose decals.save_scene decals.shader decals.skin

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 import warp as wp
 
-from blobtree import Node, Point, Union, define_operator, define_skeleton
+from blobtree import Node, Point, Union
+from blobtree.custom import define_operator, define_skeleton
 from decals import DecalImage, Decals, Scene, TreeObject
 from decals.apps.gallery.helpers import CLAY, Panel, camera_at, main, ring_image, single_decal
 

@@ -73,7 +73,7 @@ def define_field(
     Examples
     --------
     >>> import warp as wp
-    >>> from blobtree import define_field
+    >>> from blobtree.custom import define_field
     >>> @wp.func
     ... def ripples(q: wp.vec3, rate: wp.float32) -> wp.float32:
     ...     return 0.5 + 0.5 * wp.sin(rate * q[0])

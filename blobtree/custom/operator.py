@@ -87,7 +87,7 @@ def define_operator(
     Examples
     --------
     >>> import warp as wp
-    >>> from blobtree import define_operator
+    >>> from blobtree.custom import define_operator
     >>> @wp.func
     ... def average(a: wp.float32, b: wp.float32) -> wp.float32:
     ...     return 0.5 * (a + b)

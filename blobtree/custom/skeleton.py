@@ -63,7 +63,7 @@ def define_skeleton(
     Examples
     --------
     >>> import warp as wp
-    >>> from blobtree import define_skeleton
+    >>> from blobtree.custom import define_skeleton
     >>> @wp.func
     ... def rod(q: wp.vec3, half: wp.float32) -> wp.vec3:
     ...     return wp.vec3(wp.clamp(q[0], -half, half), 0.0, 0.0)

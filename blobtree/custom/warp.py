@@ -75,7 +75,8 @@ def define_warp(
     Examples
     --------
     >>> import warp as wp
-    >>> from blobtree import Point, define_warp
+    >>> from blobtree import Point
+    >>> from blobtree.custom import define_warp
     >>> @wp.func
     ... def sway(q: wp.vec3, width: wp.float32) -> wp.vec3:
     ...     return wp.vec3(q[0] - width * wp.sin(q[2]), q[1], q[2])

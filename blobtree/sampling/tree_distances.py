@@ -32,7 +32,8 @@ class SignedDistances:
 
     Examples
     --------
-    >>> from blobtree import Point, SignedDistances, to_sdf
+    >>> from blobtree import Point, to_sdf
+    >>> from blobtree.sampling import SignedDistances
     >>> distances = to_sdf(Point((0, 0, 0), radius=1.0), [[3, 0, 0]], resolution=32)
     >>> isinstance(distances, SignedDistances), bool(abs(distances.values[0] - 2.0) <= distances.error)
     (True, True)

@@ -11,10 +11,11 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-from blobtree import InvalidNode, Node
+from blobtree import Node
 from blobtree._typing import Float64Array
 from blobtree.declare.parameters import OPTIONAL, Parameter, Quantity, fields_of, parameters_of
 from blobtree.declare.registry import CUSTOM_KINDS
+from blobtree.errors import InvalidNode
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.operator import Operator
 from blobtree.nodes.primitives import Leaf

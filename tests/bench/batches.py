@@ -20,6 +20,7 @@ import blobtree
 import decals
 from blobtree import Node, Point, Segment, Sum
 from blobtree.device import known_device
+from blobtree.tracing import Hits
 from decals import Decals
 from decals.index import DecalBatch, DecalIndex
 
@@ -132,7 +133,7 @@ def raycast_figures(device: str, count: int, repeats: int) -> dict[str, float]:
         "loop": lambda: [tree.raycast(origins, directions, device=device) for tree in trees],
     }
     seconds = alternately(functions, device, repeats)
-    names = [field.name for field in fields(blobtree.Hits)]
+    names = [field.name for field in fields(Hits)]
     pairs = list(zip(functions["batch"](), functions["loop"](), strict=True))
     return {
         "raycast_batch_s": seconds["batch"],

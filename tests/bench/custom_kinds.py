@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 import warp as wp
 
-from blobtree import Node, Sum, define_operator, define_skeleton, polygonize
+from blobtree import Node, Sum, polygonize
+from blobtree.custom import define_operator, define_skeleton
 from tests.bench.blobtree import blobs
 from tests.bench.tracing import pixel_rays
 

@@ -47,10 +47,10 @@ from blobtree import (
     Segment,
     SolidContact,
     Sum,
-    define_warp,
     from_mesh,
     polygonize,
 )
+from blobtree.custom import define_warp
 from blobtree.nodes.kinds import NODE_KINDS
 from tests.bench import contact, convolution_surfaces, fitting
 from tests.blobtree.derivatives import test_curvature

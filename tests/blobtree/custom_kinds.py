@@ -9,16 +9,9 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blobtree import (
-    Node,
-    Point,
-    define_falloff,
-    define_field,
-    define_operator,
-    define_skeleton,
-    define_warp,
-)
+from blobtree import Node, Point
 from blobtree._typing import Float64Array
+from blobtree.custom import define_falloff, define_field, define_operator, define_skeleton, define_warp
 from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.nodes.primitives import Columns
 from blobtree.validation import Vector

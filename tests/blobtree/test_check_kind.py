@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 import warp as wp
 
-from blobtree import Falloff, InvalidNode, Operator, Point, Union, check_kind, formula, par
+from blobtree import Falloff, Operator, Point, Union, check_kind, formula, par
 from blobtree.conformance import laws
 from blobtree.conformance.samples import drawn_node
 from blobtree.declare.registry import CUSTOM_KINDS, CustomKind
+from blobtree.errors import InvalidNode
 
 
 def larger(node: Any, points: Any) -> Any:

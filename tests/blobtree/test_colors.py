@@ -7,8 +7,9 @@ import pytest
 import pyvista as pv
 from PIL import ImageColor
 
-from blobtree import InvalidNode, Point, from_json, to_json
+from blobtree import Point, from_json, to_json
 from blobtree.colors import color_rgb, color_rgba
+from blobtree.errors import InvalidNode
 
 
 @pytest.mark.parametrize(

@@ -232,14 +232,18 @@ def test_a_kill_while_saving_leaves_one_of_the_files(tmp_path: Path) -> None:
 def test_an_error_of_the_system_is_one_of_ours(tmp_path: Path) -> None:
     """It still is the error of the system that programs catch."""
     tree = blobtree.Point((0, 0, 0), radius=1.0)
-    with pytest.raises(blobtree.UnusableFile, match=r"could not write .* too long.*; choose a shorter name"):
+    with pytest.raises(
+        blobtree.errors.UnusableFile, match=r"could not write .* too long.*; choose a shorter name"
+    ):
         blobtree.save(tree, tmp_path / f"{'x' * 300}.json")
-    with pytest.raises(blobtree.MissingFile, match=r"could not write .*; create its folder first") as raised:
+    with pytest.raises(
+        blobtree.errors.MissingFile, match=r"could not write .*; create its folder first"
+    ) as raised:
         blobtree.save(tree, tmp_path / "none" / "tree.json")
     assert isinstance(raised.value, FileNotFoundError)
     assert raised.value.errno == errno.ENOENT
     for name in (f"{'x' * 300}.json", "none.json", "."):
-        with pytest.raises(blobtree.UnusableFile, match="could not read") as unreadable:
+        with pytest.raises(blobtree.errors.UnusableFile, match="could not read") as unreadable:
             blobtree.load(tmp_path / name)
         copy = pickle.loads(pickle.dumps(unreadable.value))
         assert (type(copy), str(copy)) == (type(unreadable.value), str(unreadable.value))

@@ -6,9 +6,6 @@ from numpy.typing import NDArray
 
 from blobtree import (
     Box,
-    Cancelled,
-    InvalidNode,
-    InvalidPoints,
     Node,
     Point,
     Ricci,
@@ -19,6 +16,7 @@ from blobtree import (
     polygonize,
     with_numeric_values,
 )
+from blobtree.errors import Cancelled, InvalidNode, InvalidPoints
 from tests.bench.fitting import perturbed, random_model, recovery_error, samples_in
 from tests.blobtree.tape.evaluations import project
 

@@ -18,19 +18,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blobtree import (
-    InvalidNode,
     Node,
     Point,
     Segment,
     content_hash,
-    define_skeleton,
     from_json,
     numeric_parameters,
     numeric_values,
     to_json,
     with_numeric_values,
 )
-from blobtree.errors import InvalidInput, UnusableFile
+from blobtree.custom import define_skeleton
+from blobtree.errors import InvalidInput, InvalidNode, UnusableFile
 from blobtree.nodes.samples import Samples
 from tests.blobtree.custom_kinds import EVERYTHING
 from tests.blobtree.trees import random_trees, trees

@@ -7,10 +7,6 @@ import pytest
 
 from blobtree import (
     ImplicitDecalsError,
-    InvalidDevice,
-    InvalidFile,
-    InvalidNode,
-    InvalidPoints,
     Point,
     Polygonizer,
     from_json,
@@ -20,6 +16,7 @@ from blobtree import (
     split_creases,
     to_json,
 )
+from blobtree.errors import InvalidDevice, InvalidFile, InvalidNode, InvalidPoints
 
 BALL = Point((0, 0, 0), radius=1.0)
 NO_TREES: list[Any] = [None, 5, "x", [BALL], {}, Point]

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blobtree import InvalidFile, Node, Point, Union, from_json, load, save, to_json
+from blobtree import Node, Point, Union, from_json, load, save, to_json
+from blobtree.errors import InvalidFile
 from blobtree.io import RECORD_OF_KIND
 from blobtree.nodes.kinds import NODE_KINDS
 from tests.blobtree.custom_kinds import Ring, Soft

@@ -8,13 +8,14 @@ import pytest
 import warp as wp
 
 import blobtree
-from blobtree import Hits, Mesh, Node, Point, Sum, from_sdf, polygonize, polygonize_batch, raycast_batch
+from blobtree import Mesh, Node, Point, Sum, from_sdf, polygonize, polygonize_batch, raycast_batch
 from blobtree.cells import joint_cells, sparse_cells
 from blobtree.cells.joint_cells import build_joint_cells, joint_tape
 from blobtree.cells.sparse_cells import first_blocks
 from blobtree.errors import InvalidDevice, InvalidNode, InvalidPoints, InvalidResolution
 from blobtree.meshing import batch as mesh_batch
 from blobtree.tape.evaluate_kernels import evaluate_values
+from blobtree.tracing import Hits
 from blobtree.tracing import batch as ray_batch
 from blobtree.tracing.tables import device_tables, numpy_tables
 from blobtree.tracing.tree_cells import block_counts, cells_grid
@@ -254,7 +255,7 @@ def test_refuses_meshes(wrong: dict[str, Any], error: type[Exception], says: str
 
 
 def test_a_batch_is_cancelled() -> None:
-    with pytest.raises(blobtree.Cancelled):
+    with pytest.raises(blobtree.errors.Cancelled):
         polygonize_batch([Point((0, 0, 0), radius=1.0)] * 3, resolution=CELLS, cancel=lambda: True)
 
 

@@ -1,8 +1,12 @@
 """The public names of blobtree."""
 
 import inspect
+from types import ModuleType
+
+import pytest
 
 import blobtree
+from blobtree import custom, errors, sampling, tracing
 
 
 def test_public_names_are_sorted_complete_and_documented() -> None:
@@ -18,3 +22,16 @@ def test_public_names_are_sorted_complete_and_documented() -> None:
 
 def test_the_version_is_that_of_the_distribution() -> None:
     assert blobtree.__version__.count(".") >= 1
+
+
+@pytest.mark.parametrize("module", [custom, errors, sampling, tracing])
+def test_names_that_moved_are_still_found(module: ModuleType) -> None:
+    for name in set(module.__all__) - {"ImplicitDecalsError", "InvalidInput"}:
+        assert name not in blobtree.__all__
+        with pytest.warns(DeprecationWarning, match=f"{module.__name__}.{name}"):
+            assert getattr(blobtree, name) is getattr(module, name)
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="nothing"):
+        blobtree.nothing  # type: ignore[attr-defined]  # noqa: B018

@@ -9,16 +9,8 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from blobtree import (
-    InvalidFile,
-    InvalidNode,
-    InvalidPoints,
-    InvalidResolution,
-    MissingPackage,
-    Node,
-    Point,
-    polygonize,
-)
+from blobtree import Node, Point, polygonize
+from blobtree.errors import InvalidFile, InvalidNode, InvalidPoints, InvalidResolution, MissingPackage
 from tests.blobtree.trees import random_trees
 
 A = Point((0, 0, 0), radius=1.0, color=(1, 0.5, 0))

@@ -32,7 +32,6 @@ from blobtree import (
     Gyroid,
     HalfSpace,
     Intersection,
-    InvalidNode,
     LocalBlend,
     Node,
     Noise,
@@ -66,6 +65,7 @@ from blobtree import (
     Union,
 )
 from blobtree.conformance.samples import points_around as points_around
+from blobtree.errors import InvalidNode
 from blobtree.nodes.primitives import Falling, Leaf, Primitive, Profile
 from blobtree.validation import Vector
 

@@ -18,7 +18,8 @@ Capture = pytest.CaptureFixture[str]
 
 DOTS = """\
 import warp as wp
-from blobtree import define_skeleton, save
+from blobtree import save
+from blobtree.custom import define_skeleton
 {imports}
 
 def far_dot(q: wp.vec3, center: wp.vec3) -> wp.vec3:
@@ -113,7 +114,10 @@ def test_a_file_defines_kinds_and_imports_its_neighbours(dots: Path, parts: str)
         ("def f(:\n", "SyntaxError"),
         ("raise SystemExit(3)\n", "SystemExit: 3"),
         ("import nosuchmodule\n", "No module named 'nosuchmodule'"),
-        ("from blobtree import define_skeleton\ndefine_skeleton(5)\n", "wrong.py:2: InvalidDefinition"),
+        (
+            "from blobtree.custom import define_skeleton\ndefine_skeleton(5)\n",
+            "wrong.py:2: InvalidDefinition",
+        ),
     ],
 )
 @pytest.mark.parametrize("command", ["polygonize", "scatter", "render"])

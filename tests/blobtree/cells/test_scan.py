@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from blobtree import InvalidResolution
 from blobtree.cells.scan import compact, exclusive_scan, where_negative
+from blobtree.errors import InvalidResolution
 
 LARGEST = np.iinfo(np.int32).max
 

@@ -6,20 +6,8 @@ from typing import Any
 import pytest
 import warp as wp
 
-from blobtree import (
-    BoxedField,
-    Falloff,
-    FieldPrimitive,
-    InvalidDefinition,
-    InvalidNode,
-    Operator,
-    Point,
-    Primitive,
-    UnknownKind,
-    Warp,
-    formula,
-    par,
-)
+from blobtree import BoxedField, Falloff, FieldPrimitive, Operator, Point, Primitive, Warp, formula, par
+from blobtree.errors import InvalidDefinition, InvalidNode, UnknownKind
 from blobtree.validation import Vector
 
 CLAIMS: dict[Any, tuple[str, ...]] = {

@@ -11,21 +11,16 @@ import pytest
 import warp as wp
 
 import blobtree
-from blobtree import (
+from blobtree import Point, from_json, to_json
+from blobtree.custom import (
     CustomCombination,
     CustomPrimitive,
-    InvalidDefinition,
-    InvalidFile,
-    InvalidNode,
-    Point,
-    UnknownKind,
     define_falloff,
     define_operator,
     define_skeleton,
-    from_json,
-    to_json,
 )
 from blobtree.declare.registry import CUSTOM_KINDS, CustomKind
+from blobtree.errors import InvalidDefinition, InvalidFile, InvalidNode, UnknownKind
 from blobtree.transpile.python import plain_python
 from tests.blobtree import custom_kinds, kernels
 from tests.blobtree.custom_kinds import CUSTOM_TREES, SOFTEST, Carve, Mean, Ring, Soft, Swell, Tent
@@ -177,7 +172,7 @@ def test_a_file_that_does_not_fit_the_definition_is_refused(
 
 MODULE = """\
 import warp as wp
-from blobtree import define_skeleton
+from blobtree.custom import define_skeleton
 
 
 def dot(q: wp.vec3, place: wp.vec3) -> wp.vec3:

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import warp as wp
 
-from blobtree import BoxedField, FieldPrimitive, InvalidDefinition, check_kind, define_field, formula, par
+from blobtree import BoxedField, FieldPrimitive, check_kind, formula, par
 from blobtree._typing import Box, Float64Array
+from blobtree.custom import define_field
 from blobtree.declare.parameters import Quantity, parameters_of
+from blobtree.errors import InvalidDefinition
 from blobtree.nodes.primitives import Columns
 from blobtree.validation import Vector
 from tests.blobtree.custom import field_kernels as kernels

@@ -7,22 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import (
-    ISO,
-    CustomField,
-    InvalidDefinition,
-    InvalidFile,
-    InvalidNode,
-    Node,
-    Point,
-    UntranslatableFunction,
-    check_kind,
-    define_field,
-    from_json,
-    polygonize,
-    to_json,
-)
+from blobtree import ISO, Node, Point, check_kind, from_json, polygonize, to_json
 from blobtree._typing import Float32Array, Float64Array
+from blobtree.custom import CustomField, define_field
+from blobtree.errors import InvalidDefinition, InvalidFile, InvalidNode, UntranslatableFunction
 from tests.blobtree.custom import field_kernels as kernels
 from tests.blobtree.custom_kinds import Lump, Waves
 from tests.blobtree.meshing.test_polygonize import assert_closed

@@ -6,14 +6,10 @@ from typing import Any
 import pytest
 import warp as wp
 
-from blobtree import (
-    ImplicitDecalsError,
-    InvalidDefinition,
-    UntranslatableFunction,
-    define_operator,
-    define_skeleton,
-)
+from blobtree import ImplicitDecalsError
+from blobtree.custom import define_operator, define_skeleton
 from blobtree.declare.registry import CUSTOM_KINDS
+from blobtree.errors import InvalidDefinition, UntranslatableFunction
 from tests.blobtree import kernels as valid
 from tests.blobtree.custom import kernels
 

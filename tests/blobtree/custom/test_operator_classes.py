@@ -6,21 +6,10 @@ from typing import Any
 import pytest
 import warp as wp
 
-from blobtree import (
-    Falloff,
-    InvalidDefinition,
-    InvalidNode,
-    Node,
-    Operator,
-    Point,
-    Union,
-    formula,
-    from_json,
-    par,
-    to_json,
-)
+from blobtree import Falloff, Node, Operator, Point, Union, formula, from_json, par, to_json
 from blobtree.declare.parameters import parameters_of
 from blobtree.declare.registry import CUSTOM_KINDS, CustomKind
+from blobtree.errors import InvalidDefinition, InvalidNode
 from decals.editing.new_nodes import new_node
 
 

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 import warp as wp
 
-from blobtree import Cone, InvalidDefinition, Point, Primitive, check_kind, define_skeleton, formula, par
+from blobtree import Cone, Point, Primitive, check_kind, formula, par
 from blobtree._typing import Float64Array
+from blobtree.custom import define_skeleton
 from blobtree.declare.parameters import Quantity, parameters_of
+from blobtree.errors import InvalidDefinition
 from blobtree.nodes.primitives import Columns
 from blobtree.validation import Vector
 from tests.blobtree import kernels

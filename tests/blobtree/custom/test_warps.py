@@ -7,18 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import (
-    InvalidDefinition,
-    InvalidNode,
-    Point,
-    Segment,
-    define_warp,
-    formula,
-    from_json,
-    polygonize,
-    to_json,
-)
+from blobtree import Point, Segment, formula, from_json, polygonize, to_json
 from blobtree._typing import Float64Array
+from blobtree.custom import define_warp
+from blobtree.errors import InvalidDefinition, InvalidNode
 from blobtree.tracing.trace import trace
 from tests.blobtree.custom.warp_kernels import (
     Swirl,

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from blobtree import Box, InvalidPoints, Node, Point, Torus
+from blobtree import Box, Node, Point, Torus
+from blobtree.errors import InvalidPoints
 from tests.blobtree.custom_kinds import CUSTOM_TREES
 from tests.blobtree.trees import CONTACTS, DEFORMED, FIELDS, SHAPES, SOLIDS, RandomTrees, points_around
 from tests.oracles import blobtree as oracle

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from blobtree import Cancelled, Node, Point, Polygonizer, polygonize
+from blobtree import Node, Point, Polygonizer, polygonize
+from blobtree.errors import Cancelled
 
 TREE: Node = Point((0, 0, 0), radius=1.0) - Point((0.8, 0, 0), radius=0.8)
 

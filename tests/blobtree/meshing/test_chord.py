@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import Cone, InvalidResolution, Mesh, Node, Point, Segment, polygonize
+from blobtree import Cone, Mesh, Node, Point, Segment, polygonize
 from blobtree._typing import Float64Array
+from blobtree.errors import InvalidResolution
 from blobtree.kernels import COMPILING
 from tests.blobtree.meshing.test_polygonize import assert_closed
 

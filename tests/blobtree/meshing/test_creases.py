@@ -9,18 +9,9 @@ import numpy as np
 import pytest
 import warp as wp
 
-from blobtree import (
-    Mesh,
-    Node,
-    Point,
-    Polygonizer,
-    Segment,
-    Transform,
-    define_skeleton,
-    polygonize,
-    split_creases,
-)
+from blobtree import Mesh, Node, Point, Polygonizer, Segment, Transform, polygonize, split_creases
 from blobtree._typing import Float64Array
+from blobtree.custom import define_skeleton
 from tests.bench import creases as creases_bench
 from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid, crosses, volume
 from tests.blobtree.trees import random_trees

@@ -5,8 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from blobtree import ISO, InvalidResolution, Mesh, Node, Point, Segment, Sum, polygonize
+from blobtree import ISO, Mesh, Node, Point, Segment, Sum, polygonize
 from blobtree._typing import Float64Array
+from blobtree.errors import InvalidResolution
 from blobtree.kernels import COMPILING
 from tests.blobtree.trees import random_trees
 

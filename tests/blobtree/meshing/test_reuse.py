@@ -7,7 +7,8 @@ import pytest
 import warp as wp
 from hypothesis import assume, given, settings
 
-from blobtree import InvalidResolution, Mesh, Node, Point, Polygonizer, Segment, Sum, Union, polygonize
+from blobtree import Mesh, Node, Point, Polygonizer, Segment, Sum, Union, polygonize
+from blobtree.errors import InvalidResolution
 from tests.blobtree.meshing.edits import edited
 from tests.blobtree.trees import random_trees, trees
 

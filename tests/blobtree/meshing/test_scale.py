@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from blobtree import InvalidResolution, Node, Point, Polygonizer, Segment, Sum, Union, polygonize
+from blobtree import Node, Point, Polygonizer, Segment, Sum, Union, polygonize
 from blobtree import device as memory
+from blobtree.errors import InvalidResolution
 from tests.blobtree.meshing.test_polygonize import BALL, assert_closed, assert_valid, euler, volume
 from tests.blobtree.meshing.test_reuse import assert_same_bits
 

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 import blobtree
 from blobtree import (
     Bend,
-    InvalidFile,
-    InvalidNode,
     Node,
     NoiseWarp,
     Point,
@@ -30,6 +28,7 @@ from blobtree import (
     from_json,
     to_json,
 )
+from blobtree.errors import InvalidFile, InvalidNode
 from blobtree.nodes.deformations import Deformation
 from blobtree.nodes.paths import primitive_paths, with_node
 from blobtree.nodes.primitives import Leaf

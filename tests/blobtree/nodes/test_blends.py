@@ -11,7 +11,6 @@ from blobtree import (
     CleanUnion,
     ControllableBlend,
     Intersection,
-    InvalidNode,
     LocalBlend,
     Masked,
     Mirror,
@@ -31,6 +30,7 @@ from blobtree import (
     Union,
     polygonize,
 )
+from blobtree.errors import InvalidNode
 from tests.blobtree.custom_kinds import Soft, Stew, Swell
 
 A, B, C, D = (Point((0.8 * x, 0.1 * x, 0.0), radius=0.7) for x in range(4))

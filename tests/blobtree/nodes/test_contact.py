@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from blobtree import (
     ISO,
     Ellipsoid,
-    InvalidNode,
     Node,
     Point,
     Press,
@@ -23,6 +22,7 @@ from blobtree import (
     polygonize,
     to_json,
 )
+from blobtree.errors import InvalidNode
 from blobtree.meshing.clip import clipped, enclosed_volume, outlines_of
 from blobtree.nodes import surgery
 from blobtree.nodes.paths import node_at, primitive_paths, with_node

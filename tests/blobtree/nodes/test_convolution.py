@@ -13,7 +13,6 @@ from blobtree import (
     ConvolutionSegment,
     ConvolutionStroke,
     ConvolutionTriangle,
-    InvalidNode,
     Node,
     Point,
     Sum,
@@ -21,6 +20,7 @@ from blobtree import (
     polygonize,
     to_json,
 )
+from blobtree.errors import InvalidNode
 from blobtree.transpile.python import plain_python, vector
 from tests.bench.convolution_surfaces import elbow_error, even, joint_bulge, plain, surface_distances
 from tests.blobtree.trees import points_around

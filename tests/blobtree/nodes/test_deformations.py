@@ -11,7 +11,6 @@ from blobtree import (
     Bend,
     Box,
     CurveWarp,
-    InvalidNode,
     LimitedTwist,
     Node,
     NoiseWarp,
@@ -26,6 +25,7 @@ from blobtree import (
     to_json,
 )
 from blobtree._typing import Float64Array
+from blobtree.errors import InvalidNode
 from blobtree.nodes.places import _forward
 from blobtree.tape.codes import WARP_REGISTERS
 from blobtree.tape.model import gradients_at

@@ -15,7 +15,6 @@ from blobtree import (
     ConvolutionTriangle,
     FieldPrimitive,
     Gyroid,
-    InvalidNode,
     Node,
     Noise,
     Point,
@@ -25,6 +24,7 @@ from blobtree import (
     to_json,
 )
 from blobtree.declare.parameters import Quantity, parameters_of
+from blobtree.errors import InvalidNode
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.paths import moved, primitive_at, primitive_paths, resized
 from blobtree.nodes.surgery import dominant_primitive

@@ -12,18 +12,17 @@ from blobtree import (
     CleanUnion,
     Cone,
     GradientBlend,
-    InvalidDefinition,
-    InvalidNode,
     Mesh,
     Node,
     Point,
     Segment,
     Superquadric,
-    define_operator,
     from_json,
     polygonize,
     to_json,
 )
+from blobtree.custom import define_operator
+from blobtree.errors import InvalidDefinition, InvalidNode
 from blobtree.tape.model import colors_at, gradients_at
 from tests.blobtree.trees import points_around
 from tests.conformance import broken_laws

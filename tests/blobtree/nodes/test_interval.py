@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from blobtree import InvalidPoints, Point, Ricci, Segment
+from blobtree import Point, Ricci, Segment
+from blobtree.errors import InvalidPoints
 from tests.blobtree.tree_sets import FIRST_BATCHES, Batch
 
 BALL = Point((0, 0, 0), radius=1.0)

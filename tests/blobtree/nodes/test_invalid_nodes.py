@@ -10,7 +10,6 @@ from blobtree import (
     Difference,
     ImplicitDecalsError,
     Intersection,
-    InvalidNode,
     Node,
     Point,
     Ricci,
@@ -19,6 +18,7 @@ from blobtree import (
     Transform,
     Union,
 )
+from blobtree.errors import InvalidNode
 
 A = Point((0, 0, 0), radius=1.0)
 B = Point((1, 0, 0), radius=0.5, color=(1, 0, 0))

@@ -8,7 +8,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from blobtree import Ellipsoid, InvalidNode, Node, Point, Sum, Transform, from_json, polygonize, to_json
+from blobtree import Ellipsoid, Node, Point, Sum, Transform, from_json, polygonize, to_json
+from blobtree.errors import InvalidNode
 from blobtree.lazy import Lazy
 from blobtree.nodes import surgery
 from blobtree.nodes.paths import node_at, primitive_at, primitive_paths, resized, with_node

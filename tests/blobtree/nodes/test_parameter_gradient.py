@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from blobtree import (
     Box,
     Ellipsoid,
-    InvalidNode,
-    InvalidPoints,
     Node,
     Point,
     Polygon,
@@ -22,6 +20,7 @@ from blobtree import (
     numeric_values,
     with_numeric_values,
 )
+from blobtree.errors import InvalidNode, InvalidPoints
 from blobtree.nodes.kinds import NODE_KINDS
 from tests.blobtree.custom_kinds import CUSTOM_TREES
 from tests.blobtree.trees import (

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from blobtree import Cone, InvalidNode, Point, Segment, Transform
+from blobtree import Cone, Point, Segment, Transform
+from blobtree.errors import InvalidNode
 from blobtree.nodes.paths import (
     moved,
     node_in_world,

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from blobtree import InvalidNode, Mirror, Node, Point, Sum
+from blobtree import Mirror, Node, Point, Sum
+from blobtree.errors import InvalidNode
 from blobtree.nodes.paths import node_at
 from blobtree.nodes.places import Place, mirror_maps
 from tests.blobtree.custom_kinds import Sway

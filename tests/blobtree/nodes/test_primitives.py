@@ -22,7 +22,6 @@ from blobtree import (
     Disc,
     Ellipsoid,
     HalfSpace,
-    InvalidNode,
     Node,
     Point,
     Polygon,
@@ -38,6 +37,7 @@ from blobtree import (
     to_json,
 )
 from blobtree.declare.parameters import Quantity, describe, parameters_of
+from blobtree.errors import InvalidNode
 from blobtree.formulas.falloff import RIM
 from blobtree.nodes.curves import JoinedSegment
 from blobtree.nodes.kinds import NODE_KINDS

@@ -21,8 +21,6 @@ from blobtree import (
     Falloff,
     Gyroid,
     HalfSpace,
-    InvalidDefinition,
-    InvalidNode,
     Node,
     Noise,
     NumericParameter,
@@ -35,7 +33,6 @@ from blobtree import (
     Superquadric,
     Torus,
     Union,
-    define_falloff,
     formula,
     from_json,
     from_sdf,
@@ -45,7 +42,9 @@ from blobtree import (
     to_json,
     with_numeric_values,
 )
+from blobtree.custom import define_falloff
 from blobtree.declare.parameters import parameters_of
+from blobtree.errors import InvalidDefinition, InvalidNode
 from blobtree.formulas.skeletons import JOINT_YIELD
 from blobtree.nodes.paths import moved, resized
 from blobtree.nodes.primitives import PROFILE, Primitive

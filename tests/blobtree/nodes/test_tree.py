@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 
 import blobtree
-from blobtree import Difference, Intersection, InvalidNode, Node, Point, Ricci, Segment, Sum, Transform, Union
+from blobtree import Difference, Intersection, Node, Point, Ricci, Segment, Sum, Transform, Union
+from blobtree.errors import InvalidNode
 from tests.blobtree.trees import random_trees, trees
 
 A = Point((0, 0, 0), radius=1.0)

@@ -11,8 +11,6 @@ import pyvista as pv
 from blobtree import (
     ISO,
     RIM,
-    InvalidFile,
-    InvalidNode,
     Point,
     Segment,
     Volume,
@@ -25,6 +23,7 @@ from blobtree import (
     to_sdf,
 )
 from blobtree._typing import Float64Array
+from blobtree.errors import InvalidFile, InvalidNode
 from blobtree.nodes.paths import moved, resized
 from blobtree.nodes.samples import Samples
 from tests.blobtree.meshing.test_polygonize import assert_closed

@@ -10,8 +10,9 @@ import pytest
 import pyvista as pv
 from numpy.typing import NDArray
 
-from blobtree import Box, FieldGrid, Node, Point, Segment, Torus, field_grid
+from blobtree import Box, Node, Point, Segment, Torus, field_grid
 from blobtree.errors import ImplicitDecalsError, InvalidNode
+from blobtree.sampling import FieldGrid
 from tests.blobtree.trees import random_tree, triple
 from tests.oracles.blobtree import value
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
-from blobtree import InvalidPoints, Point, Segment, Transform
+from blobtree import Point, Segment, Transform
+from blobtree.errors import InvalidPoints
 from blobtree.tape.model import colors_at, gradients_at, values_at
 from blobtree.tape.program import postorder
 from tests.blobtree.tape.evaluations import bounds_along, bounds_at

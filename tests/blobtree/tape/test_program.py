@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from blobtree import Intersection, InvalidNode, Node, Point, Ricci, Segment, Sum, Union
+from blobtree import Intersection, Node, Point, Ricci, Segment, Sum, Union
+from blobtree.errors import InvalidNode
 from blobtree.tape.program import Pop, Push, Run, compile_program, postorder, registers_needed
 from tests.blobtree.trees import trees
 

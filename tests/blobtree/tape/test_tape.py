@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from blobtree import RIM, InvalidNode, Node, Point, Segment, polygonize
+from blobtree import RIM, Node, Point, Segment, polygonize
+from blobtree.errors import InvalidNode
 from blobtree.tape.codes import OPERATORS, POP, POP_SWAPPED, PREFIX, PUSH, SKELETONS, STRETCHED, UNWARP, WARP
 from blobtree.tape.instruction_set import core
 from blobtree.tape.tape import Tape

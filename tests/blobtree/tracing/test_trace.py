@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from blobtree import Cone, InvalidPoints, Node, Point, Segment
+from blobtree import Cone, Node, Point, Segment
 from blobtree._typing import Float32Array, Float64Array
+from blobtree.errors import InvalidPoints
 from blobtree.tracing.ray_kernels import MAX_DISTANCE, box_interval, exit_distance, reciprocal
 from blobtree.tracing.trace import trace
 from blobtree.tracing.tree_cells import trace_tolerance

@@ -13,7 +13,7 @@ import pytest
 import warp as wp
 from numpy.typing import NDArray
 
-from blobtree import UntranslatableFunction
+from blobtree.errors import UntranslatableFunction
 from blobtree.tape import interpreter
 from blobtree.tape.instruction_set import core, library
 from blobtree.transpile.derivative import (

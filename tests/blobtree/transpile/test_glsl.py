@@ -8,7 +8,7 @@ import pytest
 import warp as wp
 
 import blobtree
-from blobtree import UntranslatableFunction
+from blobtree.errors import UntranslatableFunction
 from blobtree.transpile.builtins import BUILTINS, RESERVED_WORDS
 from blobtree.transpile.glsl import TEXTURE_WIDTH_BITS, translate_library, uniform_struct
 from tests.blobtree.transpile import glsl_samples as samples
@@ -183,4 +183,4 @@ def test_the_whole_subset() -> None:
 def test_built_in_functions_exist_in_warp_and_the_error_is_public() -> None:
     for name in BUILTINS:
         assert hasattr(wp, name), name
-    assert blobtree.UntranslatableFunction is UntranslatableFunction
+    assert blobtree.errors.UntranslatableFunction is UntranslatableFunction

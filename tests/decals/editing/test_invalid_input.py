@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from blobtree import InvalidNode
+from blobtree.errors import InvalidNode
 from blobtree.nodes.paths import primitive_paths
 from blobtree.nodes.surgery import dominant_primitive
 from decals.editing import (

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from blobtree import ISO, InvalidNode, Node, Point, Ricci, Segment, Union
+from blobtree import ISO, Node, Point, Ricci, Segment, Union
+from blobtree.errors import InvalidNode
 from blobtree.nodes.paths import Path as TreePath
 from blobtree.nodes.paths import moved, node_at, node_in_world, with_node
 from blobtree.nodes.surgery import SOFTNESS, move_branch_into

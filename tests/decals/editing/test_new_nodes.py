@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import Cone, InvalidNode, Node, Point, Polyline, Segment
+from blobtree import Cone, Node, Point, Polyline, Segment
 from blobtree.declare.parameters import parameters_of
+from blobtree.errors import InvalidNode
 from blobtree.nodes.kinds import NODE_KINDS
 from decals.editing import new_nodes
 from decals.errors import InvalidEdit

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import ISO, Cone, InvalidNode, Mirror, Point, Ricci, Segment
+from blobtree import ISO, Cone, Mirror, Point, Ricci, Segment
+from blobtree.errors import InvalidNode
 from blobtree.nodes.paths import node_in_world, primitive_at
 from blobtree.nodes.places import Place
 from decals.editing import (

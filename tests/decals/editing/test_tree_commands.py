@@ -7,7 +7,8 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from blobtree import ISO, Difference, Intersection, InvalidNode, Point, Ricci, Segment, Sum, Union
+from blobtree import ISO, Difference, Intersection, Point, Ricci, Segment, Sum, Union
+from blobtree.errors import InvalidNode
 from blobtree.nodes.paths import moved, node_at, node_in_world, primitive_paths, with_node
 from blobtree.nodes.surgery import (
     SOFTNESS,

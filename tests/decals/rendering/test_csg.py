@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from blobtree import Box, CustomPrimitive, Node
+from blobtree import Box, Node
+from blobtree.custom import CustomPrimitive
 from decals.rendering.renderer import Renderer
 from decals.scenes.camera import Camera
 from tests.bench.trust_csg import holes_of, scene

@@ -319,7 +319,7 @@ def test_a_truncated_tree_is_reported_as_a_tree(tmp_path: Path) -> None:
     path = tmp_path / "cut.json"
     blobtree.save(blobtree.Point((0, 0, 0), radius=1.0), path)
     path.write_bytes(path.read_bytes()[:-9])
-    with pytest.raises(blobtree.InvalidFile, match="BlobTree"):
+    with pytest.raises(blobtree.errors.InvalidFile, match="BlobTree"):
         load_model(path)
 
 

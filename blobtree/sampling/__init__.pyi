@@ -1,0 +1,7 @@
+from .field_grid import FieldGrid
+from .tree_distances import SignedDistances
+
+__all__ = [
+    "FieldGrid",
+    "SignedDistances",
+]

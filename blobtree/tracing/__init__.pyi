@@ -1,0 +1,7 @@
+from .batch import BatchHits
+from .trace import Hits
+
+__all__ = [
+    "BatchHits",
+    "Hits",
+]
