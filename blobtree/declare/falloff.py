@@ -14,7 +14,7 @@ from blobtree.declare.formula import (
     require_claims,
     tag_of,
 )
-from blobtree.declare.registry import Definitions, library_rows, load_libraries
+from blobtree.declare.registry import LIBRARY_ROWS, Definitions, load_libraries
 from blobtree.errors import InvalidDefinition
 from blobtree.identity import content_hash
 from blobtree.lazy import Lazy
@@ -94,7 +94,7 @@ class Falloff:
             setattr(cls, name, declared.function)
         falloff = object.__new__(cls)
         if is_own(cls):
-            library_rows(falloff)
+            LIBRARY_ROWS.append(falloff)
         else:
             falloff = falloff._checked()
         cls._instance = FALLOFF_NAMES[cls.name] = falloff

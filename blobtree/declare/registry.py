@@ -42,12 +42,6 @@ def load_libraries() -> None:
         load()
 
 
-def library_rows(*rows: Definition) -> tuple[Definition, ...]:
-    """Return rows after adding them to those of the library."""
-    LIBRARY_ROWS.extend(rows)
-    return rows
-
-
 def kind_of(tag: str) -> type[Any]:
     """Return the class of nodes with this tag."""
     for load in _loaders:

@@ -108,6 +108,8 @@ class SkeletonFormulas(PointFormulas):
         source, given = self.source, self.given
         if self.numbers == PLACE:
             least = given["least_influence"].function
+            if "influence_near" in given:
+                claims["own_influence_near"] = given["influence_near"].function
             return Skeleton(self.kind, source.function, least, self.texels, **claims)
         named = {self.radii[0]: INFLUENCE_SLOT} if self.size == 4 else {}
         reader = self.reader(digest, named=named, taken=INFLUENCE_SLOT)

@@ -19,8 +19,7 @@ from blobtree import par
 from blobtree._typing import Float64Array
 from blobtree.declare.formula import formula
 from blobtree.declare.parameters import Parameter, Quantity
-from blobtree.declare.registry import library_rows
-from blobtree.declare.skeleton import TUBE_CELLS, Skeleton
+from blobtree.declare.skeleton import TUBE_CELLS
 from blobtree.errors import InvalidNode
 from blobtree.formulas.skeletons import JOINT_YIELD, distance_to_segment, influence_bound
 from blobtree.lazy import Lazy
@@ -32,7 +31,6 @@ from blobtree.nodes.primitives import (
     JoinedPrimitive,
     Primitive,
     RoundPrimitive,
-    Segment,
     Torus,
     beside,
 )
@@ -440,30 +438,49 @@ def influence_near_curve(tape: Texels, at: wp.int32, q: wp.vec3, c: wp.vec4) -> 
     return influence_bound(q, c, min_influence_of_curve(tape, at), clearance_of_curve(q, tape, at))
 
 
-JOINED_SEGMENT = Skeleton(
-    "joined_segment",
-    closest_on_joined_segment,
-    min_influence_of_joined_segment,
-    parameters=2,
-    convex=True,
-    cells=TUBE_CELLS,
-)
-CURVE = Skeleton(
-    "curve",
-    closest_on_curve,
-    min_influence_of_curve,
-    parameters=4,
-    own_influence_near=influence_near_curve,
-    cells=TUBE_CELLS,
-)
+class TaperedBezier(JoinedPrimitive):
+    """A tube around a parabola, whose radius varies as the fourth coordinate of a quadratic Bézier curve.
 
-library_rows(JOINED_SEGMENT, CURVE)
+    The radius is (1 − t)² r₀ + 2 t (1 − t) r₁ + t² r₂, with `control_radius` as r₁.
+
+    Examples
+    --------
+    >>> from blobtree import TaperedBezier
+    >>> horn = TaperedBezier(
+    ...     (-1, 0, 0), (0, 2, 0), (1, 0, 0), radius=0.3, control_radius=0.2, end_radius=0.1
+    ... )
+    >>> horn([[0, 1, 0.2]]).round(2).tolist()
+    [0.5]
+    """
+
+    cells = TUBE_CELLS
+    joint_texels = (3,)
+    texels_read = 4
+    closest_with_influence = formula(closest_on_curve)
+    least_influence = formula(min_influence_of_curve)
+    influence_near = formula(influence_near_curve)
+
+    start: Vector = par.point("start of the curve")
+    control: Vector = par.point("where the tangents of the ends meet")
+    end: Vector = par.point("end of the curve")
+    _: KW_ONLY
+    radius: float = par.radius("visible radius at the start")
+    control_radius: float = par.radius("second Bernstein coefficient of the radius")
+    end_radius: float = par.radius("visible radius at the end")
+
+    @classmethod
+    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
+        """Return the coefficients of powers of t of the curve and of its influence radius."""
+        balls = np.concatenate([np.stack(list(columns.values()), axis=1), influences[:, :, None]], axis=2)
+        start, control, end = balls.transpose(1, 0, 2)
+        powers = [start, 2.0 * (control - start), start - 2.0 * control + end, np.zeros_like(start)]
+        return np.stack(powers, axis=1)
 
 
 class BezierCurve(Primitive):
     """A tube around a Bézier curve, whose control points are the parameters in order."""
 
-    skeleton = CURVE
+    skeleton = TaperedBezier.skeleton
 
     @classmethod
     def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
@@ -518,47 +535,19 @@ class CubicBezier(BezierCurve):
     end: Vector = par.point("end of the curve")
 
 
-class TaperedBezier(JoinedPrimitive):
-    """A tube around a parabola, whose radius varies as the fourth coordinate of a quadratic Bézier curve.
-
-    The radius is (1 − t)² r₀ + 2 t (1 − t) r₁ + t² r₂, with `control_radius` as r₁.
-
-    Examples
-    --------
-    >>> from blobtree import TaperedBezier
-    >>> horn = TaperedBezier(
-    ...     (-1, 0, 0), (0, 2, 0), (1, 0, 0), radius=0.3, control_radius=0.2, end_radius=0.1
-    ... )
-    >>> horn([[0, 1, 0.2]]).round(2).tolist()
-    [0.5]
-    """
-
-    file_tag = "tapered_bezier"
-    skeleton = CURVE
-    joint_texels = (3,)
-
-    start: Vector = par.point("start of the curve")
-    control: Vector = par.point("where the tangents of the ends meet")
-    end: Vector = par.point("end of the curve")
-    _: KW_ONLY
-    radius: float = par.radius("visible radius at the start")
-    control_radius: float = par.radius("second Bernstein coefficient of the radius")
-    end_radius: float = par.radius("visible radius at the end")
-
-    @classmethod
-    def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
-        """Return the coefficients of powers of t of the curve and of its influence radius."""
-        balls = np.concatenate([np.stack(list(columns.values()), axis=1), influences[:, :, None]], axis=2)
-        start, control, end = balls.transpose(1, 0, 2)
-        powers = [start, 2.0 * (control - start), start - 2.0 * control + end, np.zeros_like(start)]
-        return np.stack(powers, axis=1)
-
-
-class JoinedSegment(JoinedPrimitive, Segment):
+class _JoinedSegment(JoinedPrimitive):
     """A piece of a polyline."""
 
-    skeleton = JOINED_SEGMENT
+    tag = "joined_segment"
+    convex = True
+    cells = TUBE_CELLS
+    texels_read = 2
     joint_texels = (1,)
+    closest_with_influence = formula(closest_on_joined_segment)
+    least_influence = formula(min_influence_of_joined_segment)
+
+    start: Vector = par.point("start of the line")
+    end: Vector = par.point("end of the line")
 
     @classmethod
     def texels(cls, columns: Columns, influences: Float64Array) -> Float64Array:
@@ -603,7 +592,7 @@ class Polyline(Pieces):
         """Return the union of segments between different neighbours."""
         ends = [pair for pair in pairwise(self.points) if pair[0] != pair[1]]
         return self.united(
-            JoinedSegment(*pair, radius=self.radius, **self.shared).joined(joints)
+            _JoinedSegment(*pair, radius=self.radius, **self.shared).joined(joints)
             for pair, joints in zip(ends, _joints(ends), strict=True)
         )
 

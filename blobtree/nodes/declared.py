@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 
 from blobtree.declare.formula import Declared, Formula, declared_formulas, is_own, require_claims, tag_of
 from blobtree.declare.parameters import Parameter, documented, fields_of, parameters_of
-from blobtree.declare.registry import CUSTOM_KINDS, CUSTOM_TAGS, CustomKind, library_rows
+from blobtree.declare.registry import CUSTOM_KINDS, CUSTOM_TAGS, LIBRARY_ROWS, CustomKind
 from blobtree.errors import InvalidDefinition, InvalidNode
 from blobtree.nodes.node import Node
 
@@ -60,7 +60,7 @@ class DeclaredNode(Node, metaclass=CustomKind):
             row = cls._declaration(tag).row()
             setattr(cls, cls.row_name, row)
             if not getattr(row, "gradients", False):
-                library_rows(row)
+                LIBRARY_ROWS.append(row)
         elif not cls._formulas.keys() & {*cls.needed}:
             raise InvalidDefinition(
                 f"{cls.__qualname__}: expected {cls.sort} with the formula `{cls.needed[0]}`"

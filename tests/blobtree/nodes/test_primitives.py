@@ -39,7 +39,7 @@ from blobtree import (
 from blobtree.declare.parameters import Quantity, describe, parameters_of
 from blobtree.errors import InvalidNode
 from blobtree.formulas.falloff import RIM
-from blobtree.nodes.curves import JoinedSegment
+from blobtree.nodes.curves import _JoinedSegment
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.paths import moved, resized
 from blobtree.nodes.primitives import PROFILE, Leaf, Primitive, Profile
@@ -337,7 +337,7 @@ def test_every_parameter_is_declared_documented_and_in_files(kind: type[Node]) -
 
 def test_every_skeleton_has_a_primitive_with_a_radius_and_a_color() -> None:
     kinds = [kind for kind in NODE_KINDS.values() if issubclass(kind, Primitive)]
-    pieces = {JoinedSegment.skeleton}  # of polylines, which files hold as a whole
+    pieces = {_JoinedSegment.skeleton}  # of polylines, which files hold as a whole
     assert {kind.skeleton for kind in kinds} | pieces == {*library().skeletons}
     for kind in kinds:
         quantities = [parameter.quantity for parameter in parameters_of(kind).values()]
