@@ -45,8 +45,8 @@ EXTRAS: dict[str, str] = {
         walk_cache
         """,
     "decals.scattering": """
-        bare_places center_normals covering covering_rule creases deform density gap_filling
-        image_projections owned_points part_shares polish relocation remesh trial_points turned_normals
+        bare_places center_normals covering creases deform density gap_filling
+        image_projections owned_points polish relocation remesh trial_points
         """,
     "decals.scenes": """
         animation area_gradient figure gaps measure outlines pose reproduction

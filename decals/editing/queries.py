@@ -17,7 +17,7 @@ from decals.field.extras import WALKS
 from decals.field.mapping import ImageMapping
 from decals.model import Decals
 from decals.record import DEFAULT_CONTACT
-from decals.scattering.mean_normals import mean_normals
+from decals.scattering.decal_normals import mean_normals
 from decals.scenes.objects import SceneObject, TreeObject
 from decals.surfaces.implicit import project_without_mesh
 from decals.surfaces.surface import unit_rows

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from decals.errors import InvalidScattering
 from decals.model import Decals
+from decals.scattering.decal_normals import mean_normals
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.extras import RULES
-from decals.scattering.mean_normals import mean_normals
 from decals.scattering.orientation import Direction, as_direction, max_curvatures, tangents
 from decals.scattering.sizing import EXPECTED_RADIUS, Sizing, delaunay_radii, touching_radii
 from decals.scattering.variation import ImageChoice, Jitter, image_shares, random_images, ranked_images

@@ -25,12 +25,11 @@ CARRIERS: list[Callable[..., Any]] = []
 """Functions particles → particles when surfaces deform."""
 
 with if_present():
-    from decals.scattering.covering_rule import covering_decals
+    from decals.scattering.covering import covering_decals
     from decals.scattering.deform import carried
     from decals.scattering.gap_filling import fill_gaps
-    from decals.scattering.part_shares import PartShares
     from decals.scattering.polish import polish
-    from decals.scattering.relocation import Relocation
+    from decals.scattering.relocation import PartShares, Relocation
 
     RULES[Sizing.COVERING] = covering_decals
     RELOCATIONS += [Relocation, PartShares]

@@ -5,19 +5,19 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blobtree._typing import BoolArray, Float32Array, Int32Array
+from blobtree._typing import BoolArray, Float32Array, Int32Array, Int64Array
 from blobtree.progress import Progress, reporting
 from blobtree.validation import point_array, truth
 from decals.errors import InvalidScattering
 from decals.model import Decals
 from decals.scattering.appearance import Appearance
-from decals.scattering.density_anchors import DensityAnchors
 from decals.scattering.domain import (
     Density,
     Domain,
     Mask,
     OrientedPoints,
     apportion,
+    crosses_density_step,
     particle_count,
     remaining_counts,
 )
@@ -54,6 +54,43 @@ POLISHING_ROUNDS = 150
 
 CHECK_INTERVAL = 2
 """Steps between two tests whether the particles lie evenly enough."""
+
+
+class _DensityAnchors:
+    """Spacing at which each particle began, and the last position where it had about that spacing.
+
+    The initial sample follows the density. Afterwards no force keeps the counts at a step of the density:
+    pressures are equal on both sides, and the gap between the last two rows belongs to neither, so the coarse
+    side gains about half a row. Hence particles that drift across a step of the density return.
+
+    Parameters
+    ----------
+    sizes_at
+        Spacing at positions, a function of ``points[n, 3]`` to ``[n]``.
+    """
+
+    def __init__(self, sizes_at: Callable[[Float32Array], Float32Array]) -> None:
+        self._sizes_at = sizes_at
+        self._sizes: Float32Array | None = None
+        self._points: OrientedPoints | None = None
+
+    def restore(self, state: ParticleState) -> None:
+        """Return drifted particles to their last anchors, and update the spacings of all particles."""
+        sizes = self._sizes_at(state.positions.numpy())
+        if self._sizes is None or self._points is None:
+            self._sizes = sizes
+        else:
+            drifted = np.flatnonzero(crosses_density_step(self._sizes, sizes))
+            state.move_to(drifted, self._points.positions[drifted], self._points.normals[drifted])
+            sizes[drifted] = self._sizes_at(self._points.positions[drifted])
+        state.resize(sizes)
+        self._points = state.points()
+
+    def set(self, state: ParticleState, rows: Int64Array) -> None:
+        """Anchor some particles where they are now."""
+        if self._sizes is not None:
+            self._points = state.points()
+            self._sizes[rows] = self._sizes_at(self._points.positions[rows])
 
 
 class Relaxation:
@@ -146,7 +183,7 @@ class Relaxation:
         first, last, interval = (int(part * self.iterations) for part in RELOCATION_SCHEDULE)
         self._relocation_steps = set(range(max(first, 1), last + 1, max(interval, MIN_RELOCATION_INTERVAL)))
         self._relocations = [make(self.domain, self.sizes_at) for make in RELOCATIONS]
-        self._anchors = DensityAnchors(self.sizes_at)
+        self._anchors = _DensityAnchors(self.sizes_at)
         self._points: OrientedPoints | None = joined[order]
         self._state: ParticleState | None = None
 
@@ -447,7 +484,7 @@ class Relaxation:
     def _restart(self, points: OrientedPoints) -> None:
         """Replace the particles, and forget their state on the device."""
         self._points, self._state = points, None
-        self._anchors = DensityAnchors(self.sizes_at)
+        self._anchors = _DensityAnchors(self.sizes_at)
 
     # -- decals -------------------------------------------------------------------------------------------
 
