@@ -12,6 +12,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -37,10 +38,13 @@ REPORTED_SLICES_PER_THREAD = 32
 """Slices per thread of a launch with reports, so that reports come often and a cancelled launch ends soon."""
 
 MIN_SLICE = 256
-"""Fewest indices of a slice."""
+"""Fewest indices of a slice while their cost is not known."""
 
 MIN_SLICE_SECONDS = 2.5e-4
-"""Least processor time of a slice; its start takes about a fifth of that, and only one starts at a time."""
+"""Least processor time of a slice; its start takes a tenth of that."""
+
+JOIN_SECONDS = 1e-4
+"""Time in which one more thread joins a launch; only one joins at a time."""
 
 CHECKED_SLICE_SECONDS = 0.02
 """Processor time of a slice from which on a launch without reports looks after it whether it is cancelled."""
@@ -200,11 +204,23 @@ def _slice_count(kernel: wp.Kernel, count: int, *, reported: bool) -> int:
 
     A launch with reports is long work. It has the same slices every time, so that it reports as often.
     """
-    most = -(-count // MIN_SLICE)
+    by_indices = -(-count // MIN_SLICE)
     if reported:
-        return min(_thread_count() * REPORTED_SLICES_PER_THREAD, most)
-    worthwhile = count * _index_seconds.get(kernel, math.inf) / MIN_SLICE_SECONDS
-    return max(1, int(min(_thread_count() * SLICES_PER_THREAD, most, worthwhile)))
+        return min(_thread_count() * REPORTED_SLICES_PER_THREAD, by_indices)
+    known = kernel in _index_seconds
+    most = int(_expected_seconds(kernel, count) / MIN_SLICE_SECONDS) if known else by_indices
+    return max(1, min(_thread_count() * SLICES_PER_THREAD, count, most))
+
+
+def _worker_count(kernel: wp.Kernel, count: int, slices: int) -> int:
+    """Return the number of threads with which a launch ends first: n of them take n j + t / n seconds."""
+    quickest = math.sqrt(_expected_seconds(kernel, count) / JOIN_SECONDS)
+    return max(1, int(min(_thread_count(), slices, quickest)))
+
+
+def _expected_seconds(kernel: wp.Kernel, count: int) -> float:
+    """Return the processor time of a launch by former ones, infinite without."""
+    return count * _index_seconds.get(kernel, math.inf)
 
 
 def _note_cost(kernel: wp.Kernel, index_seconds: float) -> None:
@@ -240,24 +256,40 @@ def launch(
         wp.launch(kernel, dim=count, inputs=[0, *inputs], outputs=[*outputs], device=device)
         return
     slices = _slice_count(kernel, count, reported=step is not None)
-    bounds = [count * i // slices for i in range(slices + 1)]
+    numbers = iter(range(slices))  # each slice is taken once, by whichever thread is free
 
-    def run(first: int, last: int) -> float:
-        began = time.thread_time()
-        wp.launch(kernel, dim=last - first, inputs=[first, *inputs], outputs=[*outputs], device=device)
-        return time.thread_time() - began
+    def run(taken: Callable[[int, float], None]) -> float:
+        command: Any = wp.launch(
+            kernel, dim=1, inputs=[0, *inputs], outputs=[*outputs], device=device, record_cmd=True
+        )
+        whole = 0.0
+        for number in numbers:
+            first, last = count * number // slices, count * (number + 1) // slices
+            began = time.thread_time()
+            command.set_dim(last - first)
+            command.set_param_at_index(0, first)
+            command.launch()
+            seconds = time.thread_time() - began
+            whole += seconds
+            taken(number, seconds)
+        return whole
 
-    if slices == 1:
-        _note_cost(kernel, run(0, count) / count)
-        return
-    seconds = 0.0
-    for number, taken in enumerate(_thread_pool().map(run, bounds[:-1], bounds[1:]), 1):
-        seconds += taken
+    def taken_here(number: int, seconds: float) -> None:
         if step is not None:
             step(number / slices)
-        elif taken > CHECKED_SLICE_SECONDS:
+        elif seconds > CHECKED_SLICE_SECONDS:
             check_cancelled()
-    _note_cost(kernel, seconds / count)
+
+    workers = _worker_count(kernel, count, slices)
+    others = [_thread_pool().submit(run, lambda *_: None) for _ in range(workers - 1)]
+    try:
+        seconds = run(taken_here)
+    finally:
+        deque(numbers, maxlen=0)  # after an error, no further slice begins
+        elsewhere = [other.result() for other in others if not other.cancel()]
+    if step is not None:
+        step(1.0)
+    _note_cost(kernel, (seconds + sum(elsewhere)) / count)
 
 
 # -- memory ---------------------------------------------------------------------------------------------

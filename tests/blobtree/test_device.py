@@ -5,9 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import warp as wp
 
 import blobtree.device as blobtree_launch
 from blobtree.cells.scan import arange
+from blobtree.cells.scan_kernels import enumerate_indices
 from blobtree.device import core_left_free, prefaulted_array
 
 
@@ -58,13 +60,43 @@ def test_slices_are_as_long_as_former_launches_of_a_kernel_suggest(monkeypatch: 
             blobtree_launch._note_cost(kernel, index_seconds)
         return blobtree_launch._slice_count(kernel, 100_000, reported=False)
 
+    unknown: Any = _Kernel()
     assert slices(None) == 16, "four per thread while the cost is not known"
     assert slices(1e-8) == 4, "a thousandth of a second is four slices"
     assert [slices(0.0), slices(0.0), slices(0.0)] == [2, 1, 1], "the cost falls by half at most"
     assert slices(1e-4) == 16
-    assert blobtree_launch._slice_count(kernel, 300, reported=False) == 2, "256 indices or more are a slice"
+    assert blobtree_launch._slice_count(kernel, 8, reported=False) == 3, "few indices may cost much"
+    assert blobtree_launch._slice_count(unknown, 300, reported=False) == 2, "or little: 256 are a slice"
     blobtree_launch._index_seconds[kernel] = 0.0
     assert blobtree_launch._slice_count(kernel, 100_000, reported=True) == 128, "reports come as often"
+
+
+def test_threads_join_a_launch_where_that_ends_it_sooner(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(blobtree_launch, "_core_count", lambda: 16)
+    kernel: Any = _Kernel()
+
+    def workers(seconds: float | None, slices: int = 64) -> int:
+        if seconds is not None:
+            blobtree_launch._index_seconds[kernel] = seconds / 1000
+        return blobtree_launch._worker_count(kernel, 1000, slices)
+
+    assert workers(None) == 16, "all while the cost is not known"
+    assert [workers(0.0), workers(1e-3), workers(1e-2), workers(1.0)] == [1, 3, 10, 16]
+    assert workers(1.0, slices=5) == 5, "each has a slice"
+
+
+def test_an_error_of_a_step_ends_a_launch(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(blobtree_launch, "_core_count", lambda: 1)
+    written: Any = wp.zeros(100_000, dtype=wp.int32, device="cpu")
+
+    def step(done: float) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        blobtree_launch.launch(enumerate_indices, len(written), [], [written], "cpu", step=step)
+    assert 0 < np.count_nonzero(written.numpy()) < 50_000, "slices that had not begun are left out"
+    blobtree_launch.launch(enumerate_indices, len(written), [], [written], "cpu")
+    assert np.array_equal(written.numpy(), np.arange(100_000))
 
 
 @pytest.mark.parametrize("slices", [1, 7])
