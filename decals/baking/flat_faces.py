@@ -3,8 +3,9 @@
 import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array, Int32Array, Int64Array
+from decals.sorting import stable_order
 from decals.surfaces.mesh import have_area
-from decals.surfaces.topology import welded
+from decals.surfaces.topology import components, welded
 from decals.surfaces.windings import Triangles
 
 ROUNDS = 16
@@ -19,7 +20,8 @@ def without_flat_faces(vertices: Float32Array, faces: Int32Array) -> Int32Array:
 
     Equal vertices become one, and so do the ends of very short sides of flat faces. Another flat face lies on
     its longest side; it goes, and the face beyond that side is divided at its third corner (an edge flip).
-    Flat faces that stay after some rounds are left.
+    Faces on a line that enclose nothing go together, as do the two sides of a fold. Flat faces that stay
+    after some rounds are left.
 
     Parameters
     ----------
@@ -46,19 +48,51 @@ def without_flat_faces(vertices: Float32Array, faces: Int32Array) -> Int32Array:
         short = sides.min(axis=1) < SHORT * sides.max(axis=1)
         if short.any():
             kept = _collapsed(kept, rows[short], sides[short].argmin(axis=1), len(vertices))
+        elif len(closed := _closed_groups(kept[rows], len(vertices))):
+            kept = np.delete(kept, rows[closed], axis=0)
         else:
             kept = kept[~_flip(kept, rows, sides.argmax(axis=1), len(vertices))]
     return kept.astype(np.int32)
 
 
 def _collapsed(faces: Int64Array, rows: Int64Array, sides: Int64Array, count: int) -> Int64Array:
-    """Return the faces after both ends of one side of some faces have become one vertex."""
+    """Return the faces after both ends of one side of some faces are one vertex, without new folds."""
     ends = np.stack([faces[rows, sides], faces[rows, (sides + 1) % 3]], axis=1)
     places = np.arange(count)
     places[ends.max(axis=1)] = ends.min(axis=1)
     while (places[places] != places).any():
         places = places[places]
-    return places[faces]
+    moved = places[faces]
+    changed = (moved != faces).any(axis=1)
+    pairs = _folds(moved)
+    return np.delete(moved, pairs[:, changed[pairs].any(axis=0)], axis=0)
+
+
+def _folds(faces: Int64Array) -> Int64Array:
+    """Return pairs of faces that have the same corners and wind the other way round, ``int64[2, k]``."""
+    first = faces.argmin(axis=1)[:, None]
+    turned = np.take_along_axis(faces, (first + np.arange(3)) % 3, axis=1)
+    ordered = np.sort(turned, axis=1)
+    order = np.lexsort(ordered.T)
+    alike = (ordered[order[1:]] == ordered[order[:-1]]).all(axis=1)
+    against = turned[order[1:], 1] != turned[order[:-1], 1]
+    pairs = np.flatnonzero(alike & against)
+    pairs = pairs[np.diff(pairs, prepend=-2) > 1]  # a face goes with one other
+    return np.stack([order[pairs], order[pairs + 1]])
+
+
+def _closed_groups(faces: Int64Array, count: int) -> Int64Array:
+    """Return the rows of faces in groups without a border: each side has another face of its group."""
+    ends = np.roll(faces, -1, axis=1)
+    keys, opposite = (faces * count + ends).reshape(-1), (ends * count + faces).reshape(-1)
+    order = stable_order(keys)
+    at = order[np.searchsorted(keys[order], opposite) % len(keys)]
+    shared = keys[at] == opposite
+    links = np.stack([np.flatnonzero(shared), at[shared]], axis=1) // 3
+    group = components(links, len(faces))
+    has_border = np.zeros(len(faces), np.bool_)
+    has_border[group[np.flatnonzero(~shared) // 3]] = True
+    return np.flatnonzero(~has_border[group])
 
 
 def _flip(faces: Int64Array, rows: Int64Array, sides: Int64Array, count: int) -> BoolArray:
@@ -78,5 +112,6 @@ def _flip(faces: Int64Array, rows: Int64Array, sides: Int64Array, count: int) ->
             continue  # that edge has its two faces already
         else:
             faces[beyond], faces[row] = (a, b, d), (b, c, d)
+            places[b * count + d] = 3 * row + 2
         changed |= {row, beyond}
     return gone
