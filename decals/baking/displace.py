@@ -164,8 +164,8 @@ def displace(
         raise InvalidScene(
             "expected a decal whose image has relief, got none; give a DecalMaterial height= and relief="
         )
-    need = _Edges(rows, edge_length)
-    fewest = [need.fewest_triangles(item.surface) for item in known.objects]
+    needs = [_Edges(rows, edge_length) for _ in known.objects]
+    fewest = [need.fewest_triangles(item.surface) for need, item in zip(needs, known.objects, strict=True)]
     if sum(fewest) > subdivide.MAX_FACES:
         raise subdivide.too_many(f"about {sum(fewest):.2g}")
     objects: list[SceneObject | PosedMesh] = []
@@ -173,7 +173,7 @@ def displace(
     with reporting(progress, cancel) as report:
         for number, item in enumerate(known.objects):
             report_part = partial(_report_part, report, number, len(known.objects))
-            are_long = partial(need.are_long, more=1.5 * fewest[number], report=report_part)
+            are_long = partial(needs[number].are_long, more=1.5 * fewest[number], report=report_part)
             rest, normals, colors = (
                 _fine_mesh(item, are_long)
                 if isinstance(item, MeshObject)
@@ -206,7 +206,7 @@ class _Edges:
     def __init__(self, decals: Decals, length: float | None) -> None:
         self._centers, self._radii = decals.positions.astype(np.float64), decals.radii.astype(np.float64)
         limits = self._radii / EDGES_PER_RADIUS if length is None else np.full(len(decals), length)
-        self._limits = limits
+        self._limits, self._seen = limits, 0
 
     def fewest_triangles(self, surface: Surface) -> float:
         """Return the number of triangles below the decals if each is as large as allowed, by samples."""
@@ -224,11 +224,12 @@ class _Edges:
     ) -> BoolArray:
         """Return True for edges of which a part may lie in a decal, and that are longer than its limit.
 
-        For reports: ``first`` edges in the beginning, and about ``more`` new ones in the end.
+        For reports: ``first`` edges in the first call, and about ``more`` in the others.
         """
         from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
 
-        report("dividing triangles", min(max(len(starts) - first, 0.0) / max(more, 1.0), 1.0))
+        self._seen += len(starts)
+        report("dividing triangles", min(max(self._seen - first, 0.0) / max(more, 1.0), 1.0))
         lengths = np.sqrt(((ends - starts) ** 2).sum(axis=1))
         long = np.zeros(len(lengths), np.bool_)
         rows = np.flatnonzero(lengths > self._limits.min())

@@ -5,9 +5,9 @@ import logging
 import os
 import zlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -215,10 +215,8 @@ def export(
                 **shape,
             }
             baked = replace(baked, made=_made(scene, path.parent, given))
-        with ThreadPoolExecutor(1) as pool:  # meshes are checked while textures are compressed
-            checking = pool.submit(lambda: tuple(part.check for part in baked.parts))
-            content = rules.write(replace(baked, unit=unit, up=up), path.stem)
-            checks = checking.result()
+        content = rules.write(replace(baked, unit=unit, up=up), path.stem)
+        checks = tuple(part.check for part in baked.parts)
         report("writing the file", 0.5)
         write_together(
             {path: content[""], **{path.with_name(name): content[name] for name in content if name}}
@@ -276,8 +274,11 @@ def bake_parts(
     texels = tiles * size**2 if textured else 0
     own = textured and layout == OWN
     work = _Work(source, source.drawing.overridden(**modes), resolution, creases, texels, own, report)
-    parts, maps = work.textured(size, samples, layout, tiles) if textured else (work.plain(place), [])
+    parts = work.laid_out(size, layout, tiles) if textured else work.plain(place)
     parts = [work.with_attributes(number, part, attributes) for number, part in enumerate(parts)]
+    if textured:  # meshes are checked while textures are made
+        Thread(target=lambda: [part.check for part in parts], daemon=True).start()
+    maps = work.maps(size, samples) if textured else []
     return Baked(parts, maps, source.origin, recipe=source.recipe, instances=copies)
 
 
@@ -380,18 +381,24 @@ class _Work:
         self._rows = [np.arange(len(mesh.vertices)) for mesh in self._meshes]
         self._report = report
 
-    def textured(self, size: int, samples: int, layout: str, tiles: int) -> tuple[list[Part], list[Maps]]:
-        """Return all meshes with coordinates in textures, and their maps."""
-        unwrapped = lay_out(self._meshes, size, layout, tiles, self._report)
-        self._rows = [part.rows for part in unwrapped]
-        pairs = list(zip(self._meshes, unwrapped, strict=True))
+    def laid_out(self, size: int, layout: str, tiles: int) -> list[Part]:
+        """Return all meshes with coordinates in textures."""
+        self._unwrapped = lay_out(self._meshes, size, layout, tiles, self._report)
+        self._rows = [part.rows for part in self._unwrapped]
+        return [
+            _textured_part(mesh, part, size, self._colors.has_materials)
+            for mesh, part in zip(self._meshes, self._unwrapped, strict=True)
+        ]
+
+    def maps(self, size: int, samples: int) -> list[Maps]:
+        """Return the textures of meshes that are laid out."""
         channels = Channels(self._colors.at, on_device=self._colors.on_device)
         if self._colors.has_materials:  # maps are of the rest pose
+            pairs = zip(self._meshes, self._unwrapped, strict=True)
             resting = [vertex_tangents(mesh.places, mesh.facings, part) for mesh, part in pairs]
             channels = Channels(self._colors.at, len(SRGB), material_bytes, resting, SRGB)
-        texels = bake_texture(self._meshes, unwrapped, size, samples, channels, self._report)
-        parts = [_textured_part(mesh, part, size, self._colors.has_materials) for mesh, part in pairs]
-        return parts, [split_maps(of) for of in texels]
+        texels = bake_texture(self._meshes, self._unwrapped, size, samples, channels, self._report)
+        return [split_maps(of) for of in texels]
 
     def plain(self, place: str) -> list[Part]:
         """Return all meshes, with colours at the vertices if that is their place."""

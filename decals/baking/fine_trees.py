@@ -26,7 +26,7 @@ EXPECTED_USE = 0.6
 """Part of a texture that charts are expected to cover."""
 
 MAX_EDGES = 500_000
-"""Edges of a mesh from which on none is halved any more."""
+"""New edges of a mesh from which on none is halved any more."""
 
 ALIKE = 0.9
 """Cosine from which on the normal of the surface is that of the edge's side; else a crease lies between."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from blobtree import Node
-from blobtree._typing import Float32Array, Int32Array
+from blobtree._typing import Float32Array, Int32Array, Int64Array
 from blobtree.lazy import Lazy
 from blobtree.meshing.creases import split_creases
 from blobtree.meshing.polygonize import polygonize
@@ -22,6 +22,7 @@ from decals.scenes.pose import PosedMesh
 from decals.surfaces.base_color import WHITE, BaseColor, Color
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.normals import SplitMesh, split_at_colors, split_at_creases, vertex_normals
+from decals.surfaces.topology import welded
 from decals.surfaces.windings import MeshOrientation
 from decals.validation import describe
 
@@ -59,6 +60,11 @@ class BakeMesh:
     places: Float32Array
     facings: Float32Array
     base: BaseColor | None = None
+
+    @Lazy
+    def welded(self) -> Int64Array:
+        """Return for each vertex the first vertex at the same position, ``int64[n]``."""
+        return welded(self.vertices)
 
     @Lazy
     def vertex_light(self) -> Float32Array:

@@ -3,7 +3,6 @@
 import os
 import struct
 import zlib
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import BinaryIO
 
@@ -16,12 +15,18 @@ SIGNATURE = b"\x89PNG\r\n\x1a\n"
 COLOR_TYPES = {1: 0, 2: 4, 3: 2, 4: 6}
 """Color type of a PNG file by its number of channels."""
 
+ZLIB_HEADER = b"\x78\x01"
+"""Begin of compressed data (RFC 1950): deflate with a window of 32 kB."""
+
 UP = 2
 """Filter that writes each row as its difference from the row above."""
 
 LEVEL, STRATEGY = 1, zlib.Z_RLE
 """How zlib compresses: higher levels take twice as long and save one hundredth of the size. Other strategies
 look for repeated bytes farther back, take half as long again and save a thirtieth."""
+
+ADLER_BASE = 65521
+"""The largest prime below 2^16."""
 
 STRIP_BYTES = 1 << 20
 """Bytes that a thread compresses at once."""
@@ -36,16 +41,24 @@ def png_bytes(texels: UInt8Array) -> bytes:
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         strips = list(pool.map(lambda first, last: _strip(rows, first, last), starts, ends))
     checksum = 1
-    for filtered, _ in strips:
-        checksum = zlib.adler32(filtered.data, checksum)
-    content = b"".join([b"\x78\x01", *(packed for _, packed in strips), checksum.to_bytes(4, "big")])
+    for _, own, length in strips:
+        checksum = _joined_checksum(checksum, own, length)
     header = struct.pack(">IIBBBBB", texels.shape[1], len(texels), 8, COLOR_TYPES[channels], 0, 0, 0)
-    chunks = [(b"IHDR", header), (b"IDAT", content), (b"IEND", b"")]
-    return b"".join([SIGNATURE, *(part for name, data in chunks for part in _chunk(name, data))])
+    begin = SIGNATURE + _chunk(b"IHDR", header) + _chunk(b"IDAT", ZLIB_HEADER)
+    end = _chunk(b"IDAT", checksum.to_bytes(4, "big")) + _chunk(b"IEND", b"")
+    return b"".join([begin, *(chunk for chunk, *_ in strips), end])
 
 
-def _strip(rows: UInt8Array, first: int, last: int) -> tuple[UInt8Array, bytes]:
-    """Return some rows filtered, and compressed so that others may follow."""
+def _joined_checksum(checksum: int, following: int, length: int) -> int:
+    """Return Adler's checksum (RFC 1950) of bytes and of ``length`` bytes that follow, from that of both."""
+    high, low = divmod(checksum, 1 << 16)
+    next_high, next_low = divmod(following, 1 << 16)
+    total = (high + next_high + length * (low - 1)) % ADLER_BASE
+    return (total << 16) | (low + next_low - 1) % ADLER_BASE
+
+
+def _strip(rows: UInt8Array, first: int, last: int) -> tuple[bytes, int, int]:
+    """Return a chunk with some rows, filtered and compressed, and checksum and length of what it holds."""
     filtered = np.empty((last - first, rows.shape[1] + 1), np.uint8)
     filtered[:, 0] = UP
     above = rows[first - 1] if first else np.zeros_like(rows[0])
@@ -53,15 +66,16 @@ def _strip(rows: UInt8Array, first: int, last: int) -> tuple[UInt8Array, bytes]:
     np.subtract(rows[first + 1 : last], rows[first : last - 1], out=filtered[1:, 1:])
     packer = zlib.compressobj(LEVEL, zlib.DEFLATED, -zlib.MAX_WBITS, zlib.DEF_MEM_LEVEL, STRATEGY)
     packed = packer.compress(filtered.data)
-    return filtered, packed + packer.flush(zlib.Z_FINISH if last == len(rows) else zlib.Z_SYNC_FLUSH)
+    packed += packer.flush(zlib.Z_FINISH if last == len(rows) else zlib.Z_SYNC_FLUSH)
+    return _chunk(b"IDAT", packed), zlib.adler32(filtered.data), filtered.nbytes
 
 
-def _chunk(name: bytes, data: bytes) -> Iterator[bytes]:
-    """Yield the parts of a chunk of a PNG file."""
-    yield len(data).to_bytes(4, "big")
-    yield name
-    yield data
-    yield zlib.crc32(data, zlib.crc32(name)).to_bytes(4, "big")
+def _chunk(name: bytes, data: bytes) -> bytes:
+    """Return a chunk of a PNG file."""
+    length, checksum = (
+        number.to_bytes(4, "big") for number in (len(data), zlib.crc32(data, zlib.crc32(name)))
+    )
+    return b"".join([length, name, data, checksum])
 
 
 class PngTexture:

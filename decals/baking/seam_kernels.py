@@ -20,6 +20,9 @@ MAX_SQUARE = 4095
 POINT_BITS = 40
 """Bits of a number in which the number of a point lies."""
 
+SQUARE = 36
+"""Numbers in the lower triangle of a symmetric matrix of eight rows."""
+
 MIN_POWER = 1.0e-6
 """Sum of squared slopes of a point from which on its texels can move it."""
 
@@ -49,18 +52,21 @@ def slope(level: wp.float32, light: wp.float32, srgb: wp.bool) -> wp.float32:
 
 
 @wp.kernel
-def decode_listed(
+def change_levels(
     first: wp.int32,
     numbers: wp.array(dtype=wp.int32),
+    values: wp.array(dtype=wp.float64),
     srgb: wp.array(dtype=wp.uint8),
     levels: wp.array(dtype=wp.float64),
     light: wp.array(dtype=wp.float64),
 ):
-    """Write the linear light of some levels, which lie one channel after another."""
-    at = numbers[first + wp.tid()]
-    light[at] = levels[at]
+    """Write some levels, which lie one channel after another, and their linear light."""
+    i = first + wp.tid()
+    at = numbers[i]
+    levels[at] = values[i]
+    light[at] = values[i]
     if srgb[at % srgb.shape[0]] != wp.uint8(0):
-        light[at] = decoded64(levels[at])
+        light[at] = decoded64(values[i])
 
 
 @wp.func
@@ -175,26 +181,51 @@ def find_lowest(
 
 
 @wp.kernel
-def solve_parts(
+def square_strips(
     first: wp.int32,
-    parts: wp.array(dtype=wp.int32),
     rows: wp.array(dtype=wp.int32),
-    strips: wp.array(dtype=wp.int32),
-    bounds: wp.array(dtype=wp.int32),
     columns: wp.array2d(dtype=wp.int32),
     chosen: wp.array(dtype=wp.uint8),
     force: wp.array(dtype=wp.float64),
     gaps: wp.array(dtype=wp.float64),
     slopes: wp.array2d(dtype=wp.float64),
+    levels: wp.array(dtype=wp.float64),
+    squares: wp.array2d(dtype=wp.float64),
+):
+    """Write the normal equations of the chosen rows of strips: the lower triangle, then the right side."""
+    strip = first + wp.tid()
+    for k in range(SQUARE + 8):
+        squares[strip, k] = wp.float64(0.0)
+    for row in range(rows[strip], rows[strip + 1]):
+        if chosen[row] != wp.uint8(0):
+            target = -gaps[row]
+            for k in range(8):
+                target += slopes[row, k] * levels[columns[strip, k]]
+            at = wp.int32(0)
+            for a in range(8):
+                weighted = force[row] * force[row] * slopes[row, a]
+                squares[strip, SQUARE + a] += weighted * target
+                for b in range(a + 1):
+                    squares[strip, at] += weighted * slopes[row, b]
+                    at += 1
+
+
+@wp.kernel
+def solve_parts(
+    first: wp.int32,
+    parts: wp.array(dtype=wp.int32),
+    strips: wp.array(dtype=wp.int32),
+    bounds: wp.array(dtype=wp.int32),
+    columns: wp.array2d(dtype=wp.int32),
     lowest: wp.array(dtype=wp.int32),
     diagonal: wp.array(dtype=wp.int64),
+    squares: wp.array2d(dtype=wp.float64),
     held: wp.array(dtype=wp.float64),
     aims: wp.array(dtype=wp.float64),
-    levels: wp.array(dtype=wp.float64),
     factors: wp.array(dtype=wp.float64),
     solution: wp.array(dtype=wp.float64),
 ):
-    """Solve the normal equations of some parts by Cholesky's method.
+    """Solve the normal equations of some parts by Cholesky's method, from those of their strips.
 
     Row i of the factor has the columns from ``lowest[i]`` to i, the last of them at ``diagonal[i]``.
     """
@@ -208,20 +239,15 @@ def solve_parts(
         factors[diagonal[i]] = held[i]
         solution[i] = held[i] * aims[i]
     for strip in range(strips[part], strips[part + 1]):
-        for row in range(rows[strip], rows[strip + 1]):
-            if chosen[row] != wp.uint8(0):
-                target = -gaps[row]
-                for k in range(8):
-                    target += slopes[row, k] * levels[columns[strip, k]]
-                for a in range(8):
-                    i = columns[strip, a]
-                    base = diagonal[i] - wp.int64(i)
-                    weighted = force[row] * force[row] * slopes[row, a]
-                    solution[i] += weighted * target
-                    for b in range(8):
-                        j = columns[strip, b]
-                        if j <= i:
-                            factors[base + wp.int64(j)] += weighted * slopes[row, b]
+        at = wp.int32(0)
+        for a in range(8):
+            i = columns[strip, a]
+            solution[i] += squares[strip, SQUARE + a]
+            for b in range(a + 1):
+                j = columns[strip, b]
+                row = wp.max(i, j)
+                factors[diagonal[row] - wp.int64(row - wp.min(i, j))] += squares[strip, at]
+                at += 1
     for i in range(begin, end):
         base = diagonal[i] - wp.int64(i)
         low = lowest[i]
@@ -315,8 +341,8 @@ def settle(
 
     The change is about the smallest after which both sides differ by ``aim`` (the method of Kaczmarz). Strips
     whose levels have not changed since the sweep ``seen`` are left out; ``changed`` has the sweep of each
-    level. One thread has the strips from one of ``bounds`` to the next, since each step needs the steps
-    before; strips of different threads have no level in common.
+    level, and ``light`` its linear light. One thread has the strips from one of ``bounds`` to the next, since
+    each step needs the steps before; strips of different threads have no level in common.
     """
     part = first + wp.tid()
     begin = bounds[part]
@@ -324,6 +350,9 @@ def settle(
     channels = srgb.shape[0]
     channel = strips[begin] % channels
     gamma = srgb[channel] != wp.uint8(0)
+    for i in range(begin, begin + count):
+        for k in range(8):
+            light[columns[i, k]] = light_of(levels[columns[i, k]], gamma)
     for sweep in range(sweeps):
         updates = wp.int32(0)
         for at in range(count):

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -10,10 +11,10 @@ from scipy.sparse.linalg import splu
 
 from blobtree._typing import BoolArray, Float64Array, Int32Array, Int64Array
 from blobtree.device import array_on, launch
-from decals.baking.seam_kernels import find_lowest, solve_parts
+from decals.baking.seam_kernels import SQUARE, find_lowest, solve_parts, square_strips
 
 CPU = "cpu"
-"""Device on which seams are settled and layouts are checked; textures are made on the default device."""
+"""Device on which seams are settled and layouts are checked; all else is done on the default device."""
 
 FIRST_WEIGHT, MAX_WEIGHT, MAX_GROWTH = 3.0, 300.0, 4.0
 """Weight of a point of a seam beside that of a texel, its limit, and its growth in a step at most."""
@@ -49,10 +50,12 @@ class SeamSystem:
         The first row of each strip, and the end.
     parts, levels : int64[c + 1]
         The first strip and the first level of each part, and the ends.
+    device : str
+        Where the parts are solved.
 
     Attributes
     ----------
-    slopes : float64[k, 8]
+    slopes : array of float64[k, 8] on the device
         Derivatives of the differences by the levels, which the caller writes before each step.
     """
 
@@ -64,21 +67,26 @@ class SeamSystem:
         rows: Int64Array,
         parts: Int64Array,
         levels: Int64Array,
+        device: str,
     ) -> None:
         self._first, self._columns, self._chosen = first, columns, chosen
         self._rows, self._parts, self._levels, self._sizes = rows, parts, levels, np.diff(levels)
         self._held, self._aims = np.ones(len(first)), first.copy()
         self._force = np.full(len(chosen), FIRST_WEIGHT)
-        self.slopes: Float64Array = np.empty((len(chosen), 8))
-        self._bounds = [array_on(CPU, of, wp.int32) for of in (rows, parts, levels)]
+        self._device = device
+        self.slopes: Any = wp.empty((len(chosen), 8), dtype=wp.float64, device=device)
         lowest: Int32Array = np.arange(len(first), dtype=np.int32)
-        inputs = [self._bounds[1], array_on(CPU, columns, wp.int32)]
+        inputs = [array_on(CPU, of, wp.int32) for of in (parts, columns)]
         launch(find_lowest, len(self._sizes), inputs, [array_on(CPU, lowest, wp.int32)], CPU)
         widths = np.arange(1, len(first) + 1) - lowest
         self._wide = np.add.reduceat(widths**2.0, levels[:-1]) > MAX_WIDTH**2 * self._sizes
         kept = np.where(np.repeat(self._wide, self._sizes), 0, widths)
-        self._lowest, self._diagonal = lowest, np.cumsum(kept) - 1
-        self._factors: Float64Array = np.empty(int(kept.sum()))
+        self._ends, *shapes = (
+            array_on(device, of, wp.int32) for of in (rows, parts, levels, columns, lowest)
+        )
+        self._shapes = [*shapes, array_on(device, np.cumsum(kept) - 1, wp.int64)]
+        self._squares: Any = wp.empty((len(columns), SQUARE + 8), dtype=wp.float64, device=device)
+        self._factors: Any = wp.empty(int(kept.sum()), dtype=wp.float64, device=device)
 
     def strengthen(self, off: Float64Array) -> None:
         """Give more weight to rows that differ; ``off`` are their differences beside that aimed at."""
@@ -87,9 +95,12 @@ class SeamSystem:
         self._force = np.where(off > 1.0, grown, self._force)
 
     def stepped(
-        self, levels: Float64Array, gaps: Float64Array, active: BoolArray, tick: Callable[[], None]
+        self, levels: Float64Array, gaps: Any, active: BoolArray, tick: Callable[[], None]
     ) -> Float64Array:
-        """Return the levels after a step of some parts, ``bool[c]``, from the differences at the rows."""
+        """Return the levels after a step of some parts, ``bool[c]``, from the differences at the rows.
+
+        ``gaps`` are these, ``float64[k]`` on the device.
+        """
         solution = levels.copy()
         self._solve_narrow(np.flatnonzero(active & ~self._wide), levels, gaps, solution)
         self._solve_wide(np.flatnonzero(active & self._wide), levels, gaps, solution, tick)
@@ -101,42 +112,36 @@ class SeamSystem:
         return np.where(np.repeat(active, self._sizes), np.clip(levels + step, 0.0, 1.0), levels)
 
     def _solve_narrow(
-        self, parts: Int64Array, levels: Float64Array, gaps: Float64Array, solution: Float64Array
+        self, parts: Int64Array, levels: Float64Array, gaps: Any, solution: Float64Array
     ) -> None:
         """Write the solutions of some parts, each by Cholesky's method within its envelope."""
-        columns, lowest, diagonal, chosen = (
-            array_on(CPU, of, kind)
-            for of, kind in (
-                (self._columns, wp.int32),
-                (self._lowest, wp.int32),
-                (self._diagonal, wp.int64),
-                (self._chosen, wp.uint8),
-            )
+        if not len(parts):
+            return
+        chosen, listed = (
+            array_on(self._device, *each) for each in ((self._chosen, wp.uint8), (parts, wp.int32))
         )
-        rows = [array_on(CPU, of, wp.float64) for of in (self._force, gaps, self.slopes)]
-        own = [array_on(CPU, of, wp.float64) for of in (self._held, self._aims, levels)]
-        inputs = [
-            array_on(CPU, parts, wp.int32),
-            *self._bounds,
-            columns,
-            chosen,
-            *rows,
-            lowest,
-            diagonal,
-            *own,
-        ]
-        outputs = [array_on(CPU, of, wp.float64) for of in (self._factors, solution)]
-        launch(solve_parts, len(parts), inputs, outputs, CPU)
+        force, held, aims, given = (
+            array_on(self._device, of, wp.float64) for of in (self._force, self._held, self._aims, levels)
+        )
+        found = wp.clone(given)
+        inputs = [self._ends, self._shapes[2], chosen, force, gaps, self.slopes, given]
+        launch(square_strips, len(self._columns), inputs, [self._squares], self._device)
+        inputs = [listed, *self._shapes, self._squares, held, aims]
+        launch(solve_parts, len(parts), inputs, [self._factors, found], self._device)
+        solution[:] = found.numpy()
 
     def _solve_wide(
         self,
         parts: Int64Array,
         levels: Float64Array,
-        gaps: Float64Array,
+        gaps: Any,
         solution: Float64Array,
         tick: Callable[[], None],
     ) -> None:
         """Write the solutions of some parts, each by SuperLU."""
+        if not len(parts):
+            return
+        all_slopes, all_gaps = self.slopes.numpy(), gaps.numpy()
 
         def solve(part: int) -> None:
             own = slice(*self._levels[part : part + 2])
@@ -144,16 +149,14 @@ class SeamSystem:
             of = np.flatnonzero(self._chosen[begin:end]) + begin
             strips = np.searchsorted(self._rows, of, side="right") - 1
             ends, columns = np.arange(0, 8 * len(of) + 1, 8), (self._columns[strips] - own.start).reshape(-1)
-            slopes, held = self.slopes[of], self._held[own]
+            slopes, held = all_slopes[of], self._held[own]
             weights = slopes * self._force[of, None] ** 2
             change = csr_array((slopes.reshape(-1), columns, ends), (len(of), len(held)))
             weighted = csc_array((weights.reshape(-1), columns, ends), (len(held), len(of))).tocsr()
             matrix = (weighted @ change + diags_array(held)).tocsc()
-            right = held * self._aims[own] + weighted @ (change @ levels[own] - gaps[of])
+            right = held * self._aims[own] + weighted @ (change @ levels[own] - all_gaps[of])
             solution[own] = _solved(matrix, right)
 
-        if not len(parts):
-            return
         with ThreadPoolExecutor() as pool:
             running = [pool.submit(solve, part) for part in parts.tolist()]
             while wait(running, REPORT_SECONDS).not_done:

@@ -8,7 +8,7 @@ so that the colours on both sides agree, and as little as that takes.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
@@ -20,7 +20,7 @@ from blobtree.device import array_on, launch
 from decals.baking.meshes import BakeMesh
 from decals.baking.seam_kernels import (
     POINT_BITS,
-    decode_listed,
+    change_levels,
     find_closest,
     linearize,
     settle,
@@ -28,7 +28,6 @@ from decals.baking.seam_kernels import (
 from decals.baking.seam_system import CPU, SeamSystem
 from decals.baking.unwrapped import Unwrapped
 from decals.sorting import distinct_numbers, groups, ranges, stable_order
-from decals.surfaces.topology import welded
 
 STEP = 0.1
 """Largest distance in texels between points of a seam."""
@@ -109,7 +108,7 @@ def _cut_edges(
 ) -> tuple[Int64Array, Int64Array, Float64Array, Int64Array, Float64Array]:
     """Return faces, tiles, ends, corners and lengths of the edges that lie at two places; see `Seams`."""
     corners = part.faces.astype(np.int64)
-    numbers = welded(mesh.vertices)[part.rows[corners]]
+    numbers = mesh.welded[part.rows[corners]]
     begin, end, one, other = (
         of.reshape(-1) for rows in (corners, numbers) for of in (rows, np.roll(rows, -1, axis=1))
     )
@@ -197,6 +196,7 @@ def match_seams(
     smooth: BoolArray,
     srgb: Sequence[bool],
     report: Callable[[float], None],
+    device: str = CPU,
 ) -> UInt8Array:
     """Return texels along seams whose two sides agree.
 
@@ -212,9 +212,11 @@ def match_seams(
         True for channels that hold sRGB, which programs decode before they mix texels.
     report : callable
         Called often with the fraction done.
+    device : str
+        Where the least squares are solved.
     """
     report(0.0)
-    levels = _Match(texels, mixed, smooth, srgb, report).solved()
+    levels = _Match(texels, mixed, smooth, srgb, report, device).solved()
     matched: UInt8Array = np.rint(255.0 * levels).astype(np.uint8)
     return matched
 
@@ -236,6 +238,8 @@ class _Match:
         True for channels that are decoded before they are mixed.
     report : callable
         Called often with the fraction done; an error that it raises ends the work.
+    device : str
+        Where the least squares are solved.
     """
 
     def __init__(
@@ -245,8 +249,10 @@ class _Match:
         smooth: BoolArray,
         srgb: Sequence[bool],
         report: Callable[[float], None],
+        device: str,
     ) -> None:
         self._shape, self._channels, self._report = texels.shape, len(srgb), report
+        self._srgb = np.asarray(srgb)
         self._first = (texels / 255.0).reshape(-1)
         self._smooth, self._starts, self._index = smooth, mixed.starts, mixed.mixed
         self._counts = np.diff(mixed.starts, append=len(smooth))
@@ -254,15 +260,19 @@ class _Match:
         ends, shape = np.arange(0, self._index.size + 1, 8), (len(self._index), len(texels))
         each = np.ones(self._index.size, np.bool_), self._index.reshape(-1), ends
         self._runs_at = csr_array(each, shape).tocsc()
-        self._srgb = array_on(CPU, np.asarray(srgb), wp.uint8)
-        self._points = [
-            array_on(CPU, np.append(mixed.starts, len(smooth)), wp.int32),
-            array_on(CPU, mixed.places, wp.vec2d),
-            array_on(CPU, smooth, wp.uint8),
-            self._srgb,
-        ]
-        self._levels, self._light = self._first.copy(), np.empty_like(self._first)
-        self._decode(np.arange(len(self._first)))
+        self._device, self._levels = device, self._first.copy()
+        self._points, self._points_here = (
+            [
+                array_on(on, np.append(mixed.starts, len(smooth)), wp.int32),
+                array_on(on, mixed.places, wp.vec2d),
+                array_on(on, smooth, wp.uint8),
+                array_on(on, np.asarray(srgb), wp.uint8),
+            ]
+            for on in (device, CPU)
+        )
+        self._index_there = array_on(device, self._index, wp.int32)
+        self._states = [wp.empty(len(self._first), dtype=wp.float64, device=device) for _ in range(2)]
+        self._change(np.arange(len(self._first)), self._first)
 
     def solved(self) -> Float64Array:
         """Return levels ``float64[n, channels]`` that differ as little from the texels as the seams need."""
@@ -277,26 +287,29 @@ class _Match:
         """Return the first row of each strip, and the end; a row is a point of a strip."""
         return np.append(0, np.cumsum(self._counts[strips // self._channels]))
 
-    def _gaps(self, strips: Int64Array, rows: Int64Array, slopes: Float64Array | None = None) -> Float64Array:
-        """Return the differences of both sides at rows, and write their derivatives, ``float64[k, 8]``."""
-        gaps = np.empty(rows[-1])
-        known = np.empty((0, 8)) if slopes is None else slopes
-        inputs = [array_on(CPU, each, wp.int32) for each in (strips, rows, self._index)]
-        states = [array_on(CPU, state, wp.float64) for state in (self._levels, self._light)]
-        outputs = [array_on(CPU, values, wp.float64) for values in (gaps, known)]
-        launch(linearize, len(strips), [*inputs, *self._points, *states], outputs, CPU)
+    def _gaps(self, strips: Any, rows: Any, count: int, slopes: Any = None) -> Any:
+        """Return the differences of both sides at rows on the device, and write their derivatives."""
+        gaps: Any = wp.empty(int(count), dtype=wp.float64, device=self._device)
+        known = wp.empty((0, 8), dtype=wp.float64, device=self._device) if slopes is None else slopes
+        inputs = [strips, rows, self._index_there, *self._points, *self._states]
+        launch(linearize, len(strips), inputs, [gaps, known], self._device)
         return gaps
 
     def _wrong(self, strips: Int64Array, most: float) -> Int64Array:
         """Return the strips where both sides differ by more than so much of 255."""
         rows = self._rows_of(strips)
-        gaps = np.abs(self._gaps(strips, rows))
+        there, ends = (array_on(self._device, each, wp.int32) for each in (strips, rows))
+        gaps = np.abs(self._gaps(there, ends, rows[-1]).numpy())
         return strips[np.maximum.reduceat(gaps, rows[:-1]) > most / 255.0] if len(gaps) else strips
 
-    def _decode(self, numbers: Int64Array) -> None:
-        """Make the light of some levels that of these."""
-        inputs = [array_on(CPU, numbers, wp.int32), self._srgb, array_on(CPU, self._levels, wp.float64)]
-        launch(decode_listed, len(numbers), inputs, [array_on(CPU, self._light, wp.float64)], CPU)
+    def _change(self, numbers: Int64Array, values: Float64Array) -> None:
+        """Change some levels."""
+        self._levels[numbers] = values
+        listed = [
+            array_on(self._device, *each)
+            for each in ((numbers, wp.int32), (values, wp.float64), (self._srgb, wp.uint8))
+        ]
+        launch(change_levels, len(numbers), listed, self._states, self._device)
 
     def _around(self, strips: Int64Array) -> tuple[Int64Array, Int64Array]:
         """Return some strips with those in `RINGS` rings around them, and with one ring more."""
@@ -320,8 +333,8 @@ class _Match:
         run, channel = np.divmod(strips, self._channels)
         return self._index[run] * np.int64(self._channels) + channel[:, None]
 
-    def _linked(self, strips: Int64Array) -> tuple[Int64Array, Int32Array, csr_array, Int64Array]:
-        """Return the levels of strips, their columns there, links of levels, and the component of each level.
+    def _linked(self, strips: Int64Array) -> tuple[Int64Array, Int32Array, Int64Array]:
+        """Return the levels of strips, their columns there, and the component of each level.
 
         Levels of one strip are in one component. Its number is larger in a later channel.
         """
@@ -330,15 +343,18 @@ class _Match:
         number = np.empty(len(self._first), np.int32)
         number[used] = np.arange(len(used))
         columns = number[listed]
-        links = np.repeat(columns[:, 0], 7), columns[:, 1:].reshape(-1)
-        both = np.concatenate(links), np.concatenate(links[::-1])
-        graph = coo_array((np.ones(len(both[0]), np.int8), both), (len(used), len(used))).tocsr()
-        count, label = connected_components(graph, connection="weak")
-        return used, columns, graph, label + count * (used % self._channels)
+        nodes = len(strips) + len(used)  # each strip is linked to its levels
+        ends = np.minimum(np.arange(nodes + 1) * columns.shape[1], columns.size)
+        each = np.ones(columns.size, np.int8), columns.reshape(-1) + len(strips), ends
+        count, label = connected_components(csr_array(each, (nodes, nodes)), directed=False)
+        return used, columns, label[len(strips) :] + count * (used % self._channels)
 
     def _least_squares(self, strips: Int64Array) -> None:
         """Minimise the change of texels and the weighted differences, with more weight where these stay."""
-        used, columns, graph, label = self._linked(strips)
+        used, columns, label = self._linked(strips)
+        links = np.repeat(columns[:, 0], 7), columns[:, 1:].reshape(-1)
+        both = np.concatenate(links), np.concatenate(links[::-1])
+        graph = coo_array((np.ones(len(both[0]), np.int8), both), (len(used), len(used))).tocsr()
         order = stable_order(label[columns[:, 0]])
         near = reverse_cuthill_mckee(graph, symmetric_mode=True)
         ranked = near[stable_order(label[near])]
@@ -349,12 +365,14 @@ class _Match:
         parts = np.flatnonzero(np.diff(label[ranked][columns[:, 0]], prepend=-1, append=-1))
         channel = used[levels[:-1]] % self._channels
         rows = self._rows_of(strips)
-        system = SeamSystem(self._first[used], columns, self._coarse(strips), rows, parts, levels)
+        coarse = self._coarse(strips)
+        system = SeamSystem(self._first[used], columns, coarse, rows, parts, levels, self._device)
+        there, ends = (array_on(self._device, each, wp.int32) for each in (strips, rows))
         for step in range(ROUNDS):
             tick = partial(self._report, 0.9 * step / ROUNDS)
             tick()
-            gaps = self._gaps(strips, rows, system.slopes)
-            off = np.abs(gaps) * 255.0 / TOLERANCE
+            gaps = self._gaps(there, ends, rows[-1], system.slopes)
+            off = np.abs(gaps.numpy()) * 255.0 / TOLERANCE
             worst = np.zeros(self._channels)
             np.maximum.at(worst, channel, np.maximum.reduceat(off, rows[parts[:-1]]))
             active = (worst > LARGEST / TOLERANCE)[channel]
@@ -362,8 +380,7 @@ class _Match:
                 return
             if step:
                 system.strengthen(off)
-            self._levels[used] = system.stepped(self._levels[used], gaps, active, tick)
-            self._decode(used)
+            self._change(used, system.stepped(self._levels[used], gaps, active, tick))
 
     def _coarse(self, strips: Int64Array) -> BoolArray:
         """Return True for one of `COARSE` smooth points, for the rows of strips."""
@@ -382,16 +399,15 @@ class _Match:
             if not len(wrong):
                 return
             chosen, strips = self._around(wrong)
-            touched, columns, _, label = self._linked(chosen)
+            touched, columns, label = self._linked(chosen)
             component = label[columns[:, 0]]
             order = stable_order(component)
             bounds = np.flatnonzero(np.diff(component[order], prepend=-1, append=-1))
             inputs = [array_on(CPU, each, wp.int32) for each in (bounds, chosen[order], columns[order])]
-            states = self._levels[touched], self._light[touched]
-            levels, light = (array_on(CPU, state, wp.float32) for state in states)
+            levels = array_on(CPU, self._levels[touched], wp.float32)
+            light = wp.empty_like(levels)
             counts = len(touched), len(chosen)
             changed, seen = (wp.zeros(count, dtype=wp.int32, device=CPU) for count in counts)
-            inputs += [*self._points, SWEEPS, SETTLED / 255.0, LARGEST / 255.0]
+            inputs += [*self._points_here, SWEEPS, SETTLED / 255.0, LARGEST / 255.0]
             launch(settle, len(bounds) - 1, inputs, [levels, light, changed, seen], CPU)
-            self._levels[touched] = levels.numpy()
-            self._decode(touched)
+            self._change(touched, levels.numpy().astype(np.float64))

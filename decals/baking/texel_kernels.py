@@ -24,6 +24,8 @@ def cover_rows(
     listed: wp.array(dtype=wp.int32),
     faces: wp.array(dtype=wp.vec3i),
     places: wp.array(dtype=wp.vec2),
+    band: wp.int32,
+    parts: wp.int32,
     top: wp.int32,
     steps: wp.int32,
     width: wp.int32,
@@ -32,20 +34,23 @@ def cover_rows(
     found: wp.array(dtype=wp.int32),
     overlaps: wp.array(dtype=wp.int32),
 ):
-    """Write the first face at each sample of a row, and count the samples that lie in another one too.
+    """Write the first face at each sample of a part of a row, and count those that lie in another one too.
 
-    There are ``steps`` rows and columns of samples in a texel, from the row of texels ``top`` on. The faces
-    at the row of texels r are ``listed[starts[r]:starts[r + 1]]``. Each face is widened by ``margin``
-    samples. If ``wanted`` has the texels of the texture, samples of those with 0 are left out. -1 stands for
-    no face.
+    A row has ``parts``. There are ``steps`` rows and columns of samples in a texel, from the row of texels
+    ``top`` on. ``band`` rows of texels share a list of faces; those of the r-th ones are
+    ``listed[starts[r]:starts[r + 1]]``. Each face is widened by ``margin`` samples. If ``wanted`` has the
+    texels of the texture, samples of those with 0 are left out. -1 stands for no face.
     """
-    row = first + wp.tid()
+    at = first + wp.tid()
+    row = at / parts
+    left = at % parts * width / parts
+    right = (at % parts + 1) * width / parts
     texel_row = top + row / steps
     y = float(top) + (float(row) + 0.5) / float(steps)
     scale = float(steps)
     limited = wanted.shape[0] > 0
     twice = wp.int32(0)
-    for j in range(starts[texel_row], starts[texel_row + 1]):
+    for j in range(starts[texel_row / band], starts[texel_row / band + 1]):
         face = faces[listed[j]]
         low = wp.float32(FAR)
         high = wp.float32(-FAR)
@@ -61,8 +66,8 @@ def cover_rows(
                     low = wp.min(low, x)
                     high = wp.max(high, x)
         if low <= high:
-            begin = wp.max(int(wp.ceil(low * scale - 0.5 - margin)), 0)
-            end = wp.min(int(wp.floor(high * scale - 0.5 + margin)), width - 1)
+            begin = wp.max(int(wp.ceil(low * scale - 0.5 - margin)), left)
+            end = wp.min(int(wp.floor(high * scale - 0.5 + margin)), right - 1)
             for column in range(begin, end + 1):
                 slot = row * width + column
                 use = wp.bool(True)
@@ -73,7 +78,23 @@ def cover_rows(
                         found[slot] = listed[j]
                     else:
                         twice += 1
-    overlaps[row] = twice
+    overlaps[at] = twice
+
+
+@wp.kernel
+def share_alike(
+    first: wp.int32,
+    points: wp.array(dtype=wp.vec3),
+    units: wp.array(dtype=wp.vec3),
+    alike: wp.float32,
+    other_points: wp.array(dtype=wp.vec3),
+    other_units: wp.array(dtype=wp.vec3),
+):
+    """Replace points by others where the cosine between both unit normals is more than ``alike``."""
+    i = first + wp.tid()
+    if wp.dot(units[i], other_units[i]) > alike:
+        other_points[i] = points[i]
+        other_units[i] = units[i]
 
 
 @wp.kernel

@@ -1,8 +1,8 @@
 """Textures of unwrapped meshes: colours of the surface below each texel, seams that match, and gutters."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,6 +41,7 @@ from decals.baking.texel_kernels import (
     points_beyond,
     read_listed,
     sample_points,
+    share_alike,
     sum_parts,
     surface_points,
     write_listed,
@@ -48,10 +49,16 @@ from decals.baking.texel_kernels import (
 )
 from decals.baking.unwrapped import Unwrapped
 from decals.images.texels import decode_srgb
-from decals.sorting import ranges
+from decals.sorting import groups, ranges
 
 BLOCK_SAMPLES, CARD_BLOCK_SAMPLES = 1 << 20, 1 << 23
 """Samples that a processor or a card looks up at once; they bound the memory besides that of the texture."""
+
+BAND = 8
+"""Rows of texels that share one list of faces: longer lists, but fewer of them."""
+
+CARD_ROW_PARTS = 32
+"""Parts of a row of samples that threads of a card cover; a processor covers whole rows."""
 
 PART_ROWS = 1024
 """Colours that are summed at once."""
@@ -182,13 +189,12 @@ def bake_texture(
         pages[tile].color(sheet, beyond, samples, partial(_report_part, report, done, len(sheets)))
     if len(seams.faces):
         report("matching seams", 0.0)
-        smooth = _smooth_points(seams, rows, places, sheets, channels)
+        smooth = _smooth_points(seams, rows, places, list(sheets.values()), channels)
         bounds = np.searchsorted(mixed.texels, np.arange(tiles + 1) * size**2)
         own = [slice(*bounds[tile : tile + 2]) for tile in range(tiles)]
         before = [page.texels(mixed.texels[of] % size**2) for page, of in zip(pages, own, strict=True)]
-        matched = match_seams(
-            np.concatenate(before), mixed, smooth, channels.srgb, partial(report, "matching seams")
-        )
+        tell = partial(report, "matching seams")
+        matched = match_seams(np.concatenate(before), mixed, smooth, channels.srgb, tell, device)
         for page, of in zip(pages, own, strict=True):
             page.replace(mixed.texels[of] % size**2, matched[of])
     for page in pages:
@@ -201,33 +207,21 @@ def _report_part(report: Progress, done: int, count: int, share: float) -> None:
 
 
 def _smooth_points(
-    seams: Seams,
-    rows: Int64Array,
-    places: Float64Array,
-    sheets: Mapping[tuple[int, int], "Sheet"],
-    channels: Channels,
+    seams: Seams, rows: Int64Array, places: Float64Array, sheets: Sequence["Sheet"], channels: Channels
 ) -> BoolArray:
     """Return True where the surface has no step, for points of seams and channels, ``bool[n, channels]``."""
-    parts = [
-        (side, own, sheet, sheet.surface(seams.faces[rows[own], side], places[own, side]))
-        for side in (0, 1)
-        for (tile, number), sheet in sheets.items()
-        for own in [np.flatnonzero(((seams.tiles[:, side] == tile) & (seams.meshes == number))[rows])]
-    ]
-    points, units = np.zeros((2, 2, len(rows), 3), np.float32)
-    for side, own, _, at in parts:
-        points[side, own], units[side, own] = at.points.numpy(), at.units.numpy()
-    # at one point with one normal, rounding may not decide on which side of a rim it is
-    alike = np.einsum("na,na->n", *units) > ALIKE
-    for values in (points, units):
-        values[1] = np.where(alike[:, None], values[0], values[1])
-    levels = np.zeros((2, len(rows), channels.count), np.int16)
-    for side, own, sheet, at in parts:
-        device = sheet.device
-        shared = [array_on(device, values[side, own], wp.vec3) for values in (points, units)]
-        values = sheet.colors(at._replace(points=shared[0], units=shared[1]))
-        levels[side, own] = channels.levels(values).numpy().reshape(-1, channels.count)
-    smooth: BoolArray = np.abs(levels[0] - levels[1]) <= SEAM_STEP
+    smooth = np.zeros((len(rows), channels.count), np.bool_)
+    for number, sheet in {sheet.number: sheet for sheet in sheets}.items():
+        own = slice(*np.searchsorted(seams.meshes[rows], [number, number + 1]))
+        one, other = (sheet.surface(seams.faces[rows[own], side], places[own, side]) for side in (0, 1))
+        # at one point with one normal, rounding may not decide on which side of a rim it is
+        inputs, outputs = [one.points, one.units, ALIKE], [other.points, other.units]
+        launch(share_alike, len(one.points), inputs, outputs, sheet.device)
+        levels = [
+            channels.levels(sheet.colors(at)).numpy().reshape(-1, channels.count).astype(np.int16)
+            for at in (one, other)
+        ]
+        smooth[own] = np.abs(levels[0] - levels[1]) <= SEAM_STEP
     return smooth
 
 
@@ -262,7 +256,7 @@ class Sheet:
         channels: Channels | None = None,
         device: str = CPU,
     ) -> None:
-        self._number, self._mesh, self._part, self._channels = number, mesh, part, channels
+        self.number, self._mesh, self._part, self._channels = number, mesh, part, channels
         self.device = device
         self._chosen = np.flatnonzero(part.tile_of_face == tile)
         self._arrays: list[Any] = [
@@ -287,7 +281,7 @@ class Sheet:
     def faces_at(
         self, top: int, bottom: int, size: int, steps: int, wanted: Any = None, margin: float = ROUNDING
     ) -> tuple[Any, Any]:
-        """Return the face at each sample of rows of texels, and how many samples of a row lie in two faces.
+        """Return the face at each sample of rows of texels, and how many samples of each thread lie in two.
 
         Parameters
         ----------
@@ -304,25 +298,28 @@ class Sheet:
         """
         rows = (bottom - top) * steps
         found: Any = wp.full(rows * size * steps, -1, dtype=wp.int32, device=self.device)
-        overlaps: Any = wp.empty(rows, dtype=wp.int32, device=self.device)
+        parts = 1 if wp.get_device(self.device).is_cpu else CARD_ROW_PARTS
+        overlaps: Any = wp.empty(rows * parts, dtype=wp.int32, device=self.device)
         use: Any = wp.empty(0, dtype=wp.uint8, device=self.device) if wanted is None else wanted
-        lists = self._faces_of_rows(size)
-        inputs = [*lists, *self._arrays[:2], top, steps, size * steps, margin, use]
-        launch(cover_rows, rows, inputs, [found, overlaps], self.device)
+        lists = self._faces_of_bands(size)
+        inputs = [*lists, *self._arrays[:2], BAND, parts, top, steps, size * steps, margin, use]
+        launch(cover_rows, rows * parts, inputs, [found, overlaps], self.device)
         return found, overlaps
 
-    def _faces_of_rows(self, size: int) -> list[Any]:
-        """Return the faces at each row of texels, in their order."""
+    def _faces_of_bands(self, size: int) -> list[Any]:
+        """Return the faces at each band of rows of texels, in their order."""
         if self._lists[0] != size:
-            heights = self._part.places[:, 1][self._part.faces[self._chosen].T]
+            bands = -(-size // BAND)
+            faces, heights = self._part.faces[self._chosen], self._part.places[:, 1] / np.float32(BAND)
+            corners = [heights[faces[:, k]] for k in range(3)]
             first, last = (
-                np.clip(np.floor(of(axis=0)), 0, size - 1).astype(np.int64)
-                for of in (heights.min, heights.max)
+                np.clip(np.floor(reduce(of, corners)), 0, bands - 1).astype(np.int64)
+                for of in (np.minimum, np.maximum)
             )
             counts = last - first + 1
             ends, rows = np.append(0, np.cumsum(counts)), ranges(first, counts)
             each = np.ones(len(rows), np.bool_), rows, ends
-            lists = csr_array(each, (len(counts), size)).tocsc()
+            lists = csr_array(each, (len(counts), bands)).tocsc()
             listed = self._chosen[lists.indices]
             self._lists = size, [array_on(self.device, of, wp.int32) for of in (lists.indptr, listed)]
         return self._lists[1]
@@ -364,13 +361,13 @@ class Sheet:
         channels = self._channels
         assert channels is not None  # only sheets with channels have colours
         if channels.on_device is not None:
-            return channels.on_device(self._number, at.points, at.units, self._base_light(at))
+            return channels.on_device(self.number, at.points, at.units, self._base_light(at))
         light: Float32Array | None = None
         if tangents is None and channels.tangents is not None:
             tangents = self._mean_tangents(self._part.faces[at.faces.numpy()], at.weights.numpy())
         if self._mesh.base is not None:
             light = self._textured_light(at)
-        values = channels.color_at(self._number, at.points.numpy(), at.units.numpy(), tangents, light)
+        values = channels.color_at(self.number, at.points.numpy(), at.units.numpy(), tangents, light)
         return array_on(self.device, values.reshape(-1), wp.float32)
 
     def _mean_tangents(self, corners: NDArray[np.integer], weights: Float32Array) -> Float32Array | None:
@@ -379,7 +376,7 @@ class Sheet:
         if self._channels.tangents is None:
             return None
         tangents: Float32Array = np.einsum(
-            "nc,nca->na", weights, self._channels.tangents[self._number][corners]
+            "nc,nca->na", weights, self._channels.tangents[self.number][corners]
         )
         return tangents
 
@@ -406,7 +403,7 @@ class Sheet:
         faces, places = self._part.faces[self._chosen], self._part.places
         starts, stops = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
         keys = np.minimum(starts, stops) * np.int64(len(places)) + np.maximum(starts, stops)
-        _, first, counts = np.unique(keys, return_index=True, return_counts=True)
+        first, _, counts = groups(keys)
         rows = first[counts == 1]
         begin, end = places[starts[rows]], places[stops[rows]]
         steps = np.ceil(np.linalg.norm(end - begin, axis=1) / BORDER_STEP).astype(np.int64) + 1

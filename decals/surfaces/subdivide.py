@@ -57,7 +57,8 @@ def subdivided(
     faces : int64[m, 3]
         Corner indices.
     is_long : callable
-        From the positions of both ends of k edges, ``float64[k, 3]`` each, to ``bool[k]``.
+        From the positions of both ends of k edges, ``float64[k, 3]`` each, to ``bool[k]``. Each round asks
+        for the new edges.
     midpoints : callable
         Rows of new vertices, by default the means of those of the ends.
 
@@ -72,12 +73,14 @@ def subdivided(
     InvalidMesh
         More than MAX_FACES triangles would be needed.
     """
+    before = 0
     while True:
         next_corners = np.roll(faces, -1, axis=1)
         low, high = (of(faces, next_corners).reshape(-1) for of in (np.minimum, np.maximum))
         first, edge_of, _ = groups(low * len(rows) + high)
         edges = np.stack([low[first], high[first]], axis=1)
-        halved = is_long(rows[edges[:, 0], :3], rows[edges[:, 1], :3])
+        halved = edges[:, 1] >= before  # the others were short before
+        halved[halved] = is_long(*(rows[ends, :3] for ends in edges[halved].T))
         if not halved.any():
             return rows, faces
         numbers = np.full(len(edges), -1)
@@ -86,6 +89,7 @@ def subdivided(
         kinds = (middles >= 0) @ [1, 2, 4]
         if (1 + np.bitwise_count(kinds)).sum() > MAX_FACES:  # each middle adds a triangle
             raise too_many("more")
+        before = len(rows)
         rows = np.concatenate([rows, midpoints(rows, edges[halved])])
         corners = np.concatenate([faces, middles], axis=1)
         faces = np.concatenate(
