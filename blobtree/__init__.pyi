@@ -53,6 +53,7 @@ from .nodes.numeric_parameters import (
 from .nodes.operator import Operator
 from .nodes.parameter_gradient import ParameterGradient
 from .nodes.primitives import Box, Cone, Disc, Point, Primitive, Segment, Torus
+from .nodes.sharp import Frustum, Prism
 from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
 from .nodes.tree import Difference, Intersection, Offset, Ricci, Sum, Transform, Twist, Union
 from .nodes.tree_volumes import sample
@@ -94,6 +95,7 @@ __all__ = [
     "Falloff",
     "FieldPrimitive",
     "Fit",
+    "Frustum",
     "GradientBlend",
     "Gyroid",
     "HalfSpace",
@@ -117,6 +119,7 @@ __all__ = [
     "Polyline",
     "Press",
     "Primitive",
+    "Prism",
     "Progress",
     "QuadraticBezier",
     "RDifference",

@@ -36,11 +36,18 @@ ATTEMPTS = 60
 NAMES = {name: getattr(blobtree, name) for name in blobtree.__all__}
 
 
-def _polygon(rng: Rng, _: Operand) -> Node:
+def _corners(rng: Rng) -> tuple[tuple[float, float, float], ...]:
     angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, 6))
     flat = rng.uniform(0.3, 0.9, 6)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
-    points = [(x, y, 0.3 * x - 0.2 * y) for x, y in flat.tolist()]
-    return blobtree.Polygon(tuple(points), radius=0.2)
+    return tuple((x, y, 0.3 * x - 0.2 * y) for x, y in flat.tolist())
+
+
+def _polygon(rng: Rng, _: Operand) -> Node:
+    return blobtree.Polygon(_corners(rng), radius=0.2)
+
+
+def _prism(rng: Rng, _: Operand) -> Node:
+    return blobtree.Prism(_corners(rng), float(rng.uniform(0.3, 0.9)), radius=float(rng.choice([0.0, 0.2])))
 
 
 def _contact(rng: Rng, operand: Operand) -> Node:
@@ -79,6 +86,7 @@ def _curve_warp(rng: Rng, operand: Operand) -> Node:
 SPECIAL: dict[str, Callable[[Rng, Operand], Node]] = {
     "transform": _transform,
     "polygon": _polygon,
+    "prism": _prism,
     "contact": _contact,
     "blend_graph": _graph,
     "volume": _volume,
@@ -112,7 +120,10 @@ def variants(kind: type[Node]) -> Iterator[Callable[[Rng, Any], Node]]:
     changes: list[Callable[[Rng, Any], Node]] = [lambda _, node: node]
     if issubclass(kind, Leaf):
         changes.append(lambda rng, node: replace(random_profile(rng, node, (1.0,)), weight=-0.7))  # type: ignore[type-var]
-        if Quantity.RADIUS in {item.quantity for item in parameters_of(kind).values()}:
+        radii = [item for item in parameters_of(kind).values() if item.quantity is Quantity.RADIUS]
+        if radii and radii[0].low == 0.0:
+            changes.append(lambda rng, node: random_profile(rng, sharpened(node), (1.0,)))
+        if radii:
             changes.append(
                 lambda rng, node: random_profile(rng, node, (1.0,)).offset(float(rng.uniform(-0.1, 0.2)))
             )
@@ -122,6 +133,12 @@ def variants(kind: type[Node]) -> Iterator[Callable[[Rng, Any], Node]]:
                 for name in BUILT_IN_FALLOFFS
             ]
     return cycle(changes)
+
+
+def sharpened(node: Any) -> Node:
+    """Return a node with sharp edges; a width that suited its radius is left out."""
+    sharp: Node = replace(node, radius=0.0, width=None)
+    return sharp
 
 
 def exact_field(node: Node, points: Floats) -> tuple[Floats, Floats]:

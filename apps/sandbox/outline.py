@@ -48,6 +48,7 @@ ICONS = {
     "Cylinder": "cylinder",
     "Mirror": "flip-horizontal",
     "Polygon": "vector-polygon",
+    "Prism": "hexagon-outline",
     "Rectangle": "vector-rectangle",
     "Torus": "circle-double",
     "Transform": "axis-arrow",

@@ -375,7 +375,7 @@ def _copied(copy: Callable[[Node], Any], case: Case) -> Contradictions:
 
 
 def bad_values_are_refused(case: Case) -> Contradictions:
-    """Pass NaN, infinity, and 0 for sizes: the class must refuse them."""
+    """Pass NaN, infinity, −1 and mostly 0 for sizes: the class must refuse them."""
     node: Any = case.node
     for name, parameter in parameters_of(type(node)).items():
         for wrong in _bad_values(parameter, getattr(node, name)):
@@ -389,6 +389,7 @@ def bad_values_are_refused(case: Case) -> Contradictions:
 def _bad_values(parameter: Parameter, value: Any) -> list[Any]:
     sizes = (Quantity.LENGTH, Quantity.RADIUS, Quantity.WIDTH)
     bad: list[Any] = [0.0, -1.0] if parameter.quantity in sizes else []
+    bad = bad[parameter.low == 0.0 :]  # some solids have radius 0
     if isinstance(value, float) or parameter.quantity in sizes:
         return [*bad, float("nan"), float("inf")]
     if isinstance(value, tuple) and value and isinstance(value[0], float):

@@ -32,6 +32,8 @@ RESULTS: dict[str, Any] = {
     "lipschitz": wp.float32,
     "interval": wp.vec2,
     "bounds": wp.vec3,
+    "sheet_at": wp.int32,
+    "sheet_value_gradient": wp.vec4,
 }
 """The formulas of a direct field, and the types of their results."""
 
@@ -41,7 +43,9 @@ ROUNDING = 4e-6
 BEHIND_BOX = 7
 """Place of the first number of a field in a box, in floats: behind middle, `fade` and half lengths."""
 
-_CLAIMS = ("lipschitz", "interval", "bounds")
+_CLAIMS = ("lipschitz", "interval", "bounds", "sheet_at", "sheet_value_gradient")
+_POINT: dict[str, Any] = {"q": wp.vec3}
+_SHEET: dict[str, Any] = {"q": wp.vec3, "sheet": wp.int32}
 _BALL: dict[str, Any] = {"center": wp.vec3, "radius": wp.float32}
 
 
@@ -60,6 +64,20 @@ class FieldKind:
     """The field ends at a box with tape[at] = (middle, fade) and tape[at + 1] = (half lengths, ·)."""
     digest: str = ""
     """Digest of the sources of a custom kind."""
+    sheet_at: wp.Function | int = 0
+    """The function (q, tape, at) of the smooth piece of the surface at a point, from 1 on; 0 for none."""
+    own_sheet: wp.Function | None = None
+    """The function (q, sheet, tape, at) of the value and the gradient of a piece, beyond its edges too."""
+
+    @property
+    def has_sheets(self) -> bool:
+        """True if the surface has edges where smooth pieces meet."""
+        return self.own_sheet is not None
+
+    @property
+    def sheet_value_gradient(self) -> wp.Function | tuple[float, ...]:
+        """The function of a piece; a kind without pieces has zeros, which nothing reads."""
+        return self.own_sheet or (0.0, 0.0, 0.0, 0.0)
 
     @property
     def stride(self) -> int:
@@ -87,7 +105,10 @@ class FieldFormulas(PointFormulas):
     def require(self, declared: Sequence[str] | None) -> None:
         """Raise `InvalidDefinition` for formulas or claims that do not fit, see `require_numbers`."""
         source = self.source
-        require_numbers(source, self.given, dict.fromkeys(RESULTS, _BALL), declared)
+        leading = {**dict.fromkeys(RESULTS, _BALL), "sheet_at": _POINT, "sheet_value_gradient": _SHEET}
+        require_numbers(source, self.given, leading, declared)
+        if len(self.given.keys() & {"sheet_at", "sheet_value_gradient"}) == 1:
+            raise source.refusal("expected both formulas `sheet_at` and `sheet_value_gradient`, or none")
         if len(self.given.keys() & {"value", "value_gradient"}) == 2:
             raise source.refusal("expected one of the formulas `value` and `value_gradient`, got both")
         bound = self.lipschitz
@@ -99,24 +120,31 @@ class FieldFormulas(PointFormulas):
         """Return a digest of the formulas, the claims, and the declared parameters."""
         claims = [self.given[name].digest if name in self.given else None for name in _CLAIMS]
         slope = claims[0] or float(self.lipschitz or 0.0)
-        more = [claims[2]] * bool(claims[2]) + ["free"] * (not self.windowed)
+        more = [claim for claim in claims[2:] if claim] + ["free"] * (not self.windowed)
         return self.source.digest_with(self.kind, tuple(parameters), (slope, claims[1]), *more)
 
     def row(self, digest: str = "") -> FieldKind:
         """Return the row of the field; one with a digest is a user's."""
         flags: dict[str, Any] = {"distance": self.distance, "windowed": self.windowed, "digest": digest}
         if self.numbers == PLACE:
-            value, bounds = (self.given[name].function for name in ("value_gradient", "bounds"))
-            return FieldKind(self.kind, value, bounds, self.texels, **flags)
+            given = {name: part.function for name, part in self.given.items()}
+            flags |= {"sheet_at": given.get("sheet_at", 0), "own_sheet": given.get("sheet_value_gradient")}
+            return FieldKind(self.kind, given["value_gradient"], given["bounds"], self.texels, **flags)
         reader = self.reader(digest, BEHIND_BOX if self.windowed else 0)
         x = "{} - wp.vec3(t0[0], t0[1], t0[2])" if self.windowed else "{}"
         value = self._value(reader, x.format("q"))
         bounds = self._bounds(reader, x.format("center"))
+        if "sheet_at" in self.given:
+            sheet_at, sheet = self.given["sheet_at"], self.given["sheet_value_gradient"]
+            flags["sheet_at"] = reader.around("sheet_at", sheet_at, _POINT, wp.int32, x.format("q"))
+            flags["own_sheet"] = reader.around(
+                "sheet_value_gradient", sheet, _SHEET, wp.vec4, x.format("q"), "sheet"
+            )
         return FieldKind(self.kind, value, bounds, reader.texels, **flags)
 
     def _value(self, reader: Reader, x: str) -> wp.Function:
         """Return the function of the field and its gradient, which is derived from `value`."""
-        at_point, source = {"q": wp.vec3}, self.source
+        at_point, source = _POINT, self.source
         if "value" not in self.given:
             return reader.around("value_gradient", source, at_point, wp.vec4, x)
         call, partials = reader.derivative(source, x)

@@ -60,7 +60,8 @@ class Quantity(Enum):
     LENGTH = "length"
     """A length above 0; it scales with the node."""
     RADIUS = "radius"
-    """Visible radius around the skeleton, above 0; offsets and resizing change it."""
+    """Visible radius around the skeleton, above 0, or from 0 on if that is the range; offsets and resizing
+    change it."""
     SEMI_AXES = "semi_axes"
     """Visible radii (3,) along the axes of the node's space, above 0; resizing changes them."""
     RADII = "radii"
@@ -160,7 +161,8 @@ class Parameter:
         return self._checked_in_range if self.is_bounded else partial(CHECKS[self.quantity], self.name)
 
     def _checked_in_range(self, value: Any) -> Any:
-        result = CHECKS[self.quantity](self.name, value)
+        zero = self.quantity is Quantity.RADIUS and self.low == 0.0
+        result = (finite_number if zero else CHECKS[self.quantity])(self.name, value)
         if self.low <= result <= self.high:
             return result
         ends = math.isfinite(self.low) and math.isfinite(self.high)

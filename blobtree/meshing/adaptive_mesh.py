@@ -413,7 +413,7 @@ class AdaptiveMesher:
             inputs = [lattice, positions, sheet_counts]
             launch(self._kernel(turn_diagonals), len(listed), inputs, [turned], device)
             quads[listed] = turned.numpy().reshape(-1, 6)
-        return replace(mesh, faces=faces)
+        return replace(mesh, faces=_with_single_diagonals(faces, mesh.faces, mesh.quads))
 
     def _lattice(self, leaves: Leaves, chosen: IndexArray, size: int) -> tuple[Any, IndexArray, IndexArray]:
         """Return blocks of cells as large as some leaves, and for each of these its block and its cell.
@@ -485,6 +485,20 @@ def _triangles(polygons: Int32Array, positions: Float32Array) -> tuple[Int32Arra
     return np.concatenate([quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3), triangles]).astype(np.int32), len(
         quads
     )
+
+
+def _with_single_diagonals(turned: Int32Array, faces: Int32Array, quads: int) -> Int32Array:
+    """Return faces with turned diagonals but where two quads, or another edge, would have the same one."""
+    while True:
+        edges = np.sort(np.stack([turned, np.roll(turned, -1, axis=1)], axis=2), axis=2)
+        keys = edges[..., 0].astype(np.int64) * (int(turned.max(initial=0)) + 1) + edges[..., 1]
+        _, places, counts = np.unique(keys, return_inverse=True, return_counts=True)
+        uses = counts[places.reshape(-1)].reshape(-1, 3)[: 2 * quads].reshape(-1, 6)
+        rows, before = turned[: 2 * quads].reshape(-1, 6), faces[: 2 * quads].reshape(-1, 6)
+        wrong = (uses > 2).any(axis=1) & (rows != before).any(axis=1)
+        if not wrong.any():
+            return turned
+        rows[wrong] = before[wrong]
 
 
 def _is_closed(faces: Int32Array, vertices: int) -> bool:

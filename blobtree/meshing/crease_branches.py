@@ -28,6 +28,9 @@ from blobtree.tape.codes import (
 from blobtree.tape.dispatch import (
     closest,
     direct_stride,
+    has_sheets,
+    kind_sheet_at,
+    kind_sheet_value_gradient,
     partials,
     stride,
     warp_forward,
@@ -38,6 +41,8 @@ from blobtree.tape.evaluators import (
     gradient_combine,
     gradient_leaf,
     gradient_pullback_affine,
+    profile_slope,
+    profile_value,
     profiled_gradient_leaf,
     profiled_value_leaf,
     to_local,
@@ -212,11 +217,26 @@ def stretched_branch(q: wp.vec3, r: wp.vec3, kind: wp.int32, tape: Texels, at: w
 
 
 @wp.func
+def sheet_value_gradient(kind: wp.int32, sheet: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
+    """Return (value, gradient) of a distance's field on one smooth piece of its surface, beyond its edges."""
+    profile = tape[at - 1]
+    u = kind_sheet_value_gradient(kind, q, sheet, tape, at)
+    rate = profile_slope(u[0], profile)
+    return wp.vec4(profile_value(u[0], profile), rate * u[1], rate * u[2], rate * u[3]) * profile[3]
+
+
+@wp.func
 def direct_branch(q: wp.vec3, r: wp.vec3, kind: wp.int32, tape: Texels, at: wp.int32) -> Branch:
-    """Return the branch of a direct field with a map at tape[at], which is smooth."""
-    f = direct_value_gradient(kind, to_local(q, tape, at), tape, at + PREFIX)
-    value = direct_value_gradient(kind, to_local(r, tape, at), tape, at + PREFIX)[0]
-    return make_branch(value, 0, gradient_pullback_affine(f, tape, at))
+    """Return the branch of a direct field with a map at tape[at]: the piece of its surface near r."""
+    point = to_local(q, tape, at)
+    reference = to_local(r, tape, at)
+    value = direct_value_gradient(kind, reference, tape, at + PREFIX)[0]
+    sheet = kind_sheet_at(kind, reference, tape, at + PREFIX)
+    if sheet == 0:
+        f = direct_value_gradient(kind, point, tape, at + PREFIX)
+        return make_branch(value, 0, gradient_pullback_affine(f, tape, at))
+    f = sheet_value_gradient(kind, sheet, point, tape, at + PREFIX)
+    return make_branch(value, sheet, gradient_pullback_affine(f, tape, at))
 
 
 @wp.func
@@ -279,7 +299,7 @@ def branch_at(q: wp.vec3, r: wp.vec3, tape: Texels, span: wp.vec2i) -> Branch:
 
 @wp.func
 def has_choice(tape: Texels, span: wp.vec2i) -> wp.bool:
-    """Return True if a tape has an operator with kinks."""
+    """Return True if a tape has an operator with kinks, or a solid with edges."""
     at = span[0]
     kinked = bool(False)
     while at < span[1] and not kinked:
@@ -289,7 +309,7 @@ def has_choice(tape: Texels, span: wp.vec2i) -> wp.bool:
         at += 1
         if code >= FIELD:
             at += int(header[2]) * (PREFIX + direct_stride(code - FIELD))
-            kinked = chooses(operator)
+            kinked = chooses(operator) or has_sheets(code - FIELD)
         elif code >= STRETCHED:
             at += int(header[2]) * (PREFIX + stride(code - STRETCHED))
             kinked = chooses(operator)

@@ -49,6 +49,15 @@ def reference_of(references: References, k: wp.int32) -> wp.vec3:
 
 
 @wp.func
+def member_count(members: wp.int32) -> wp.int32:
+    """Return the number of branches in a set."""
+    total = int(0)
+    for k in range(MAX_BRANCHES):
+        total += (members >> k) & 1
+    return total
+
+
+@wp.func
 def branch_plane(
     x: wp.vec3, references: References, k: wp.int32, cell: wp.float32, tape: Texels, span: wp.vec2i
 ) -> wp.vec4:
@@ -189,14 +198,14 @@ def intersect_in_cell(
     tape: Texels,
     span: wp.vec2i,
 ) -> wp.vec4:
-    """Return an intersection of the members: in the cell, else on its faces, else near it."""
+    """Return an intersection of the members: in the cell, else for a crease on its faces, else near it."""
     best = intersect_branches(start, references, members, -1, 0.0, cell, tape, span)
     x = wp.vec3(best[0], best[1], best[2])
     if best[3] > CONVERGED_STEP or inside_cell(x, low, cell):
         return best
     for axis in range(3):
         outside = distance_outside(x, low, cell, axis)
-        if outside != 0.0:
+        if outside != 0.0 and member_count(members) < 3:
             plane = low[axis]
             if outside > 0.0:
                 plane += cell

@@ -20,6 +20,7 @@ from blobtree.meshing.crease_intersections import (
     inside_cell,
     intersect_in_cell,
     mean_normal,
+    member_count,
     reference_of,
 )
 from blobtree.meshing.crease_sheets import (
@@ -45,7 +46,7 @@ SMOOTH_VERTEX = 1
 UNRESOLVED_VERTEX = 0
 """Sheet count of a vertex whose patch has several sheets without an intersection nearby."""
 
-MAX_HIDDEN_DISTANCE = 0.01
+MAX_HIDDEN_DISTANCE = 0.002
 """Distance of an intersection to the surface, in cells, from which another branch hides it."""
 
 PROBE_DISTANCE = 0.1
@@ -69,15 +70,6 @@ class Intersection:
     position: wp.vec3
     references: References
     """A point of each branch, members or not."""
-
-
-@wp.func
-def member_count(members: wp.int32) -> wp.int32:
-    """Return the number of branches in a set."""
-    total = int(0)
-    for k in range(MAX_BRANCHES):
-        total += (members >> k) & 1
-    return total
 
 
 @wp.func

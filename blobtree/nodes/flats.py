@@ -1,6 +1,7 @@
 """Primitives around flat skeletons: rectangles, triangles and polygons, with rounded edges."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import KW_ONLY
 from itertools import combinations, product
 
@@ -258,18 +259,12 @@ class Polygon(Pieces):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if len(self.points) < 3:
-            raise InvalidNode(f"points: expected at least three corners, got {self.points}; use a Segment")
-        if crossing := _crossing(_in_plane(np.array(self.points))):
-            raise InvalidNode(
-                f"points: expected a simple polygon, got edges from corners {crossing[0]} and {crossing[1]} "
-                "that meet; remove repeated corners, and split the polygon where it crosses itself"
-            )
+        polygon_in_plane(self.points)
 
     @Lazy
     def expanded(self) -> Node:
         """Return the union of ears."""
-        ears = _ears(_in_plane(np.array(self.points)))
+        ears = _ears(polygon_in_plane(self.points))
         edges = Counter(frozenset(pair) for ear in ears for pair in combinations(ear, 2))
         return self.united(
             Triangle(*(self.points[place] for place in ear), radius=self.radius, **self.shared).joined(
@@ -277,6 +272,19 @@ class Polygon(Pieces):
             )
             for ear in ears
         )
+
+
+def polygon_in_plane(points: Sequence[Vector]) -> Float64Array:
+    """Return `_in_plane` of the corners of a simple polygon; raise `InvalidNode` for any other."""
+    if len(points) < 3:
+        raise InvalidNode(f"points: expected at least three corners, got {points}; use a Segment")
+    flat = _in_plane(np.array(points))
+    if crossing := _crossing(flat):
+        raise InvalidNode(
+            f"points: expected a simple polygon, got edges from corners {crossing[0]} and {crossing[1]} "
+            "that meet; remove repeated corners, and split the polygon where it crosses itself"
+        )
+    return flat
 
 
 def _in_plane(points: Float64Array) -> Float64Array:

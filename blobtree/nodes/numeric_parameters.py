@@ -59,7 +59,7 @@ class NumericParameter:
 def numeric_parameters(tree: ProgramNode) -> list[NumericParameter]:
     """Return all numbers of a tree on which its field depends, node by node from the root, left to right.
 
-    Widths and weights that texts leave out are left out too.
+    Widths and weights that texts leave out are left out too, and so are radii of 0.
 
     Parameters
     ----------
@@ -219,7 +219,9 @@ def _numbers_of(path: Path, node: ProgramNode) -> Iterator[NumericParameter]:
     for field in fields_of(type(node)):
         value = getattr(node, field.name)
         declaration = declared.get(field.name)
-        if declaration and declaration.quantity is not Quantity.COLOR and not left_out(field, value):
+        if not declaration or declaration.quantity is Quantity.COLOR or left_out(field, value):
+            continue
+        if declaration.quantity is not Quantity.RADIUS or value > 0.0:  # a sharp solid has no smaller radius
             for index in _places(value):
                 yield NumericParameter(path, field.name, index, declaration)
 

@@ -32,7 +32,12 @@ class Pieces(Profile, Macro, Leaf):
     @property
     def shared(self) -> dict[str, Any]:
         """The keywords of all pieces."""
-        return {name: getattr(self, name) for name in (*PROFILE, "color", "attributes")}
+        return shared_of(self)
+
+
+def shared_of(leaf: Leaf) -> dict[str, Any]:
+    """Return the keywords that all leaves have, by name."""
+    return {name: getattr(leaf, name) for name in (*PROFILE, "color", "attributes")}
 
 
 class _Deepest(Operator):

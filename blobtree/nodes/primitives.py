@@ -9,7 +9,7 @@ most 1 / least influence per unit.
 """
 
 import inspect
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, MISSING, Field, dataclass, field
 from itertools import product
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, cast, dataclass_transform
@@ -34,6 +34,7 @@ from blobtree.declare.parameters import (
     unit_vectors,
 )
 from blobtree.declare.readers import named_values
+from blobtree.declare.registry import load_libraries
 from blobtree.declare.skeleton import (
     BALL_CELLS,
     INFLUENCE_SLOT,
@@ -43,9 +44,10 @@ from blobtree.declare.skeleton import (
     Skeleton,
     SkeletonFormulas,
 )
-from blobtree.errors import InvalidDefinition
+from blobtree.errors import InvalidDefinition, InvalidNode
 from blobtree.formulas.skeletons import distance_to_segment, influence_bound
 from blobtree.kinds.falloff import WYVILL
+from blobtree.lazy import Lazy
 from blobtree.nodes.attributes import NO_ATTRIBUTES, AttributeMapping
 from blobtree.nodes.declared import DeclaredNode
 from blobtree.nodes.node import Node
@@ -370,6 +372,30 @@ class Primitive(Profile, Leaf, ProgramPrimitive, DeclaredNode):
         return np.concatenate([*columns.values(), influences[:, 1:]], axis=1)
 
 
+SHARP_FORMS: dict[type, Callable[[Any], Node]] = {}
+"""Functions that return the direct field of a solid without a radius, by its kind; the library adds them."""
+
+
+class SolidPrimitive(Primitive):
+    """A primitive around a solid: with a radius of 0 it is that solid, with sharp edges."""
+
+    @property
+    def is_sharp(self) -> bool:
+        """True if the solid itself is shown."""
+        return self.radius == 0.0
+
+    @Lazy
+    def sharp(self) -> Node:
+        """Return the direct field of the solid."""
+        load_libraries()
+        return next(SHARP_FORMS[kind] for kind in type(self).__mro__ if kind in SHARP_FORMS)(self)
+
+    @property
+    def program_children(self) -> tuple[Node, ...]:
+        """The direct field of a sharp solid alone."""
+        return (self.sharp,) if self.is_sharp else ()
+
+
 class RoundPrimitive(Primitive):
     """A primitive around a circle or a disc, which declares a centre, an axis and a radius in this order."""
 
@@ -459,8 +485,15 @@ class Segment(Primitive):
         return np.column_stack([columns["start"], axes, inverses])
 
 
-class Cone(Primitive):
+class Cone(SolidPrimitive):
     """A round cone: the convex hull of two balls; if one ball holds the other, the larger ball alone.
+
+    One of both radii may be 0: then it ends in a point, and its field is that of a signed distance.
+
+    Raises
+    ------
+    InvalidNode
+        Both radii are 0.
 
     Examples
     --------
@@ -475,8 +508,18 @@ class Cone(Primitive):
     start: Vector = par.point("start of the axis")
     end: Vector = par.point("end of the axis")
     _: KW_ONLY
-    radius: float = par.radius("visible radius at the start")
-    end_radius: float = par.radius("visible radius at the end")
+    radius: float = par.radius("visible radius at the start", low=0.0)
+    end_radius: float = par.radius("visible radius at the end", low=0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.radius == self.end_radius == 0.0:
+            raise InvalidNode("end_radius: expected a radius above 0 at one end, got 0 at both")
+
+    @property
+    def is_sharp(self) -> bool:
+        """True if an end is a point."""
+        return self.radius == 0.0 or self.end_radius == 0.0
 
     @formula
     def closest_with_influence(
@@ -581,8 +624,11 @@ class Disc(RoundPrimitive):
         return center + c
 
 
-class Box(Primitive):
+class Box(SolidPrimitive):
     """A solid box with rounded edges, parallel to the axes: everything within `radius` of the box.
+
+    With `radius` 0 its edges are sharp, its field is that of the signed distance, and its width grows with
+    the shortest side.
 
     Examples
     --------
@@ -598,7 +644,7 @@ class Box(Primitive):
     center: Vector = par.point("centre of the box")
     size: Vector = par.extents("lengths along x, y and z, without the radius")
     _: KW_ONLY
-    radius: float = par.radius("visible radius of the edges")
+    radius: float = par.radius("visible radius of the edges, 0 for sharp ones", low=0.0)
 
     @formula
     def closest(q: wp.vec3, center: wp.vec3, size: wp.vec3) -> wp.vec3:

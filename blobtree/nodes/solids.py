@@ -18,7 +18,7 @@ from blobtree.nodes.pieces import Pieces
 from blobtree.nodes.primitives import (
     Columns,
     Point,
-    Primitive,
+    SolidPrimitive,
     octagons,
 )
 from blobtree.validation import Vector
@@ -73,8 +73,11 @@ def beside_axis(q: wp.vec3, start: wp.vec3, way: wp.vec3) -> wp.vec4:
     return wp.vec4(c[0], c[1], c[2], x)
 
 
-class Cylinder(Primitive):
+class Cylinder(SolidPrimitive):
     """A solid cylinder with rounded edges: everything within `radius` of the cylinder.
+
+    With `radius` 0 its edges are sharp, its field is that of the signed distance, and its width grows with
+    the largest ball inside.
 
     Raises
     ------
@@ -95,7 +98,7 @@ class Cylinder(Primitive):
     end: Vector = par.point("end of the axis")
     cylinder_radius: float = par.length("radius of the cylinder, without its rounded edge")
     _: KW_ONLY
-    radius: float = par.radius("visible radius of the edges")
+    radius: float = par.radius("visible radius of the edges, 0 for sharp ones", low=0.0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -165,7 +168,7 @@ class HalfSpace(Pieces):
     normal: Vector = par.direction("outward normal of the plane, of any length")
     extent: float = par.length("distance from the point up to which it is exact")
     _: KW_ONLY
-    radius: float = par.radius("visible radius of the edges: how far it blends")
+    radius: float = par.radius("visible radius of the edges: how far it blends; 0 for sharp ones", low=0.0)
 
     @Lazy
     def expanded(self) -> Node:

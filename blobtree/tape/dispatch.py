@@ -120,6 +120,23 @@ def direct_stride(kind: wp.int32) -> wp.int32:
     """Return the number of texels of a direct field behind its map: its parameters and its colour."""
 
 
+@of_row("fields", "has_sheets")
+def has_sheets(kind: wp.int32) -> wp.bool:
+    """Return `FieldKind.has_sheets`."""
+
+
+@of_row("fields", "sheet_at")
+def kind_sheet_at(kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.int32:
+    """Return `FieldKind.sheet_at`."""
+
+
+@of_row("fields", "sheet_value_gradient")
+def kind_sheet_value_gradient(
+    kind: wp.int32, q: wp.vec3, sheet: wp.int32, tape: Texels, at: wp.int32
+) -> wp.vec4:
+    """Return `FieldKind.sheet_value_gradient`."""
+
+
 @of_row("operators", "monotone")
 def is_monotone(operator: wp.int32) -> wp.bool:
     """Return `Operator.monotone`."""

@@ -55,7 +55,7 @@ def maps_to_rest(posed: ProgramNode, program: list[Instruction], rest: ProgramNo
         The trees have other leaves.
     """
     places, own = _placed_leaves(posed), _placed_leaves(rest)
-    names = [[type(place.leaf).__name__ for place in leaves] for leaves in (places, own)]
+    names = [[type(place.leaf).__name__.lstrip("_") for place in leaves] for leaves in (places, own)]
     if names[0] != names[1]:
         raise InvalidNode(
             f"rest: expected the leaves of the posed tree ({_summary(names[0])}), got {_summary(names[1])}"
@@ -91,7 +91,7 @@ def _placed_leaves(root: ProgramNode) -> list[_PlacedLeaf]:
     pending = [(root, WORLD, WORLD)]
     while pending:
         node, placement, unwarped = pending.pop()
-        if isinstance(node, ProgramLeaf):
+        if isinstance(node, ProgramLeaf) and not node.program_children:
             leaves.append(_PlacedLeaf(node, placement, unwarped))
             continue
         children = node.program_children
@@ -154,8 +154,8 @@ def invert_map(
 
 def _between(posed: ProgramLeaf, rest: ProgramLeaf) -> Float64Array:
     """Return the matrix (4, 4) that takes a leaf's skeleton to that of the leaf at rest."""
-    if isinstance(posed, ProgramField):
-        return _between_boxes(posed, cast(ProgramField, rest))
+    if not hasattr(posed, "hulls"):
+        return _between_boxes(cast(ProgramField, posed), cast(ProgramField, rest))
     a, b = cast(ProgramPrimitive, posed), cast(ProgramPrimitive, rest)
     start, end = type(a).hulls([a])[0], type(b).hulls([b])[0]
     across = float(np.mean(type(b).radii([b]))) / float(np.mean(type(a).radii([a])))

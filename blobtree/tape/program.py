@@ -166,7 +166,7 @@ class ProgramLeaf(ProgramNode):
 
     @property
     def program_children(self) -> tuple[ProgramNode, ...]:
-        """No nodes: a leaf stands for itself."""
+        """No nodes if this leaf stands for itself, or the leaf for which it stands."""
         return ()
 
     @property
@@ -651,6 +651,8 @@ def _flatten(root: ProgramNode, placement: Placement) -> Iterator[PlacedPrimitiv
 def _placed(nodes: tuple[ProgramNode, ...], placement: Placement) -> list[PlacedPrimitive | _PlacedNode]:
     """Return nodes and their placements, the last one first."""
     return [
-        PlacedPrimitive(node, placement) if isinstance(node, ProgramLeaf) else (node, placement)
+        PlacedPrimitive(node, placement)
+        if isinstance(node, ProgramLeaf) and not node.program_children
+        else (node, placement)
         for node in reversed(nodes)
     ]

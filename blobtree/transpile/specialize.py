@@ -96,8 +96,8 @@ def defined(name: str, text: str, scope: dict[str, Any]) -> FunctionType:
 class RowChoice:
     """A typed function that takes a code, and returns the attribute of that row of a table.
 
-    The attribute is a number, a bool or three numbers; or a typed function, which is called with the other
-    parameters. One that declares fewer parameters gets the first ones.
+    The attribute is a number, a bool or three or four numbers; or a typed function, which is called with the
+    other parameters. One that declares fewer parameters gets the first ones.
     """
 
     prototype: FunctionType
@@ -134,7 +134,7 @@ class RowChoice:
                 scope[name] = value
                 text = f"{name}({', '.join(arguments[: parameter_count(value)])})"
             elif isinstance(value, tuple):
-                text = f"wp.vec3{value}"
+                text = f"wp.vec{len(value)}{value}"
             else:
                 text = f"bool({value})" if isinstance(value, bool) else repr(value)
             lines += [f"    if {code} == {number}:", f"        result = {text}"]

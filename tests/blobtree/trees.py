@@ -200,7 +200,7 @@ def random_profile(rng: np.random.Generator, leaf: Any, weights: Sequence[float]
         if isinstance(leaf, Falling):
             changed["falloff"] = str(rng.choice(BUILT_IN_FALLOFFS))
         return cast(Node, replace(leaf, **changed))
-    size = float(getattr(leaf, "radius", 0.5))
+    size = float(getattr(leaf, "radius", 0.5)) or 0.3
     width = None if rng.random() < 0.4 else float(size * rng.uniform(0.4, 2.0))
     falloff, weight = str(rng.choice(BUILT_IN_FALLOFFS)), float(rng.choice(weights))
     profiled: Any = replace(cast(Any, leaf), falloff=falloff, width=width, weight=weight)

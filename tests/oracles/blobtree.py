@@ -8,7 +8,7 @@ fold does not matter, save on exact ties of a union or an intersection. A differ
 from dataclasses import dataclass, fields, replace
 from functools import reduce
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,6 +25,7 @@ from blobtree import (
     ConvolutionStroke,
     ConvolutionTriangle,
     CurveWarp,
+    Cylinder,
     Difference,
     Disc,
     Ellipsoid,
@@ -78,6 +79,7 @@ from tests.oracles import (
     direct_fields,
     falloffs,
     shapes,
+    sharp,
     volumes,
 )
 
@@ -111,6 +113,13 @@ def signed(node: Node, points: ArrayLike) -> Field:
     """The field of `node` at `points` (n, 3), below 0 where negative weights outweigh the rest."""
     q = np.asarray(points, np.float64)
     match node:
+        case Leaf() if sharp.is_sharp(node):
+            ratio, margin = sharp.ratio(node, q)
+            return _falling(ratio, sharp.mean_radius(node), getattr(node, "width", None), node, margin)
+        case HalfSpace(point=point, normal=normal, radius=0.0):
+            end = np.array(point) - node.extent * np.array(normal) / np.linalg.norm(normal)
+            same: Any = {name: getattr(node, name) for name in ("falloff", "width", "weight", "color")}
+            return signed(Cylinder(point, tuple(end), node.extent, radius=0.0, **same), q)
         case Primitive() if node.profiled:
             return _profiled(node, q)
         case Ellipsoid(semi_axes=axes, width=width):
@@ -266,6 +275,8 @@ def grown(node: Node, distance: float) -> Node:
     if isinstance(node, Profile) and node.weight < 0.0:
         distance = -distance
     match node:
+        case Leaf() if sharp.is_sharp(node):
+            return cast(Node, sharp.grown(node, distance))
         case Operator(operands=(solid, tool)) if node.operator.support is Support.LEFT:
             return replace(node, operands=(grown(solid, distance), grown(tool, -distance)))
         case Operator():

@@ -279,7 +279,8 @@ def test_a_move_and_a_resize_keep_the_kind(node: Leaf) -> None:
         (lambda: Ellipsoid((0, 0, 0), (1, 0, 1)), "semi_axes: expected three numbers above 0"),
         (lambda: Ellipsoid((0, 0, 0), (1, 1)), "semi_axes: expected three finite numbers"),  # type: ignore[arg-type]
         (lambda: Ellipsoid((0, 0, 0), (1, 1, 1e-9)), "semi_axes: expected lengths whose ratio is at most"),
-        (lambda: Box((0, 0, 0), (1, 1, 1), radius=0.0), "radius: expected a number above 0"),
+        (lambda: Box((0, 0, 0), (1, 1, 1), radius=-0.1), "radius: expected a number from 0, got -0.1"),
+        (lambda: Disc((0, 0, 0), (0, 0, 1), 1.0, radius=0.0), "radius: expected a number above 0"),
         (lambda: Circle((0, 0, 0), (0, 0, 1), np.nan, radius=0.2), "circle_radius: expected a finite number"),
         (
             lambda: Arc((0, 0, 0), (1, 1, 1), (2, 2, 2), radius=0.2),

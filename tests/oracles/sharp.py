@@ -1,0 +1,141 @@
+"""Signed distances of solids with sharp edges, in float64 NumPy, below 0 inside."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blobtree import Box, Cone, Cylinder, Frustum, Prism
+
+Floats = NDArray[np.float64]
+
+KINDS = (Box, Cone, Cylinder, Frustum, Prism)
+
+
+STENCIL = 5e-3
+"""Step of differences that show where a distance has a kink, over the mean radius."""
+
+
+def is_sharp(node: Any) -> bool:
+    """True for a solid whose field is that of its signed distance."""
+    if isinstance(node, Prism | Frustum):
+        return True
+    return isinstance(node, KINDS) and min(node.radius, getattr(node, "end_radius", node.radius)) == 0.0
+
+
+def grown(node: Any, distance: float) -> Any:
+    """A solid whose surface lies farther out by a distance, and whose field is the same function."""
+    larger = replace(node)
+    object.__setattr__(larger, "growth", getattr(node, "growth", 0.0) + distance)
+    return larger
+
+
+def ratio(node: Any, q: Floats) -> tuple[Floats, Floats]:
+    """One more than the distance (n,) from the surface over the mean radius; and 0 beside kinks, else ∞."""
+    mean = mean_radius(node)
+    offset = getattr(node, "growth", 0.0) + (0.0 if isinstance(node, Cone) else node.radius)
+    shifts = STENCIL * mean * np.concatenate([np.eye(3), -np.eye(3)])
+    around = distance(node, (q + shifts[:, None]).reshape(-1, 3)).reshape(2, 3, -1)
+    steepness = np.linalg.norm((around[0] - around[1]) / (2.0 * STENCIL * mean), axis=0)
+    return 1.0 + (distance(node, q) - offset) / mean, np.where(np.abs(steepness - 1.0) < 0.01, np.inf, 0.0)
+
+
+def mean_radius(node: Any) -> float:
+    """The length to which the width of a node is relative."""
+    match node:
+        case Cone():
+            return float(max(node.radius, node.end_radius))
+        case Prism() | Frustum() if node.radius > 0.0:
+            return float(node.radius)
+        case Box():
+            return 0.5 * min(node.size)
+        case Prism():
+            corners = in_plane(node)[0]
+            sides = np.roll(corners, -1, axis=0) - corners
+            area = 0.5 * np.abs((corners[:, 0] * sides[:, 1] - corners[:, 1] * sides[:, 0]).sum())
+            return min(0.5 * node.height, float(2.0 * area / np.linalg.norm(sides, axis=1).sum()))
+    corners = profile(node)
+    x = np.linspace(0.0, corners[2, 1], 200_001)
+    axis = np.column_stack([np.zeros_like(x), x])
+    return float(-outline(axis, corners, closed=False).min())
+
+
+def distance(node: Any, q: Floats) -> Floats:
+    """The signed distance (n,) of points from the surface of a solid, as if its radius were 0."""
+    match node:
+        case Box():
+            beyond = np.abs(q - np.array(node.center)) - 0.5 * np.array(node.size)
+            return extended(beyond.T)
+        case Cone():
+            return drop(node, q)
+        case Prism():
+            corners, height = in_plane(node, q)[1:]
+            flat = outline(corners, in_plane(node)[0])
+            return extended(np.stack([flat, np.abs(height - 0.5 * node.height) - 0.5 * node.height]))
+    axis = np.subtract(node.end, node.start)
+    unit = axis / np.linalg.norm(axis)
+    along = (q - np.array(node.start)) @ unit
+    across = np.linalg.norm(q - np.array(node.start) - along[:, None] * unit, axis=1)
+    return outline(np.column_stack([across, along]), profile(node), closed=False)
+
+
+def extended(beyond: Floats) -> Floats:
+    """The distance of a product of sets, from the distances (k, n) of each."""
+    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=0)
+    return np.asarray(outside + np.minimum(beyond.max(axis=0), 0.0))
+
+
+def drop(cone: Cone, q: Floats) -> Floats:
+    """The distance of the hull of a ball and a point: the least over the balls of which it is the union."""
+    ends, radii = np.array([cone.start, cone.end]), np.array([cone.radius, cone.end_radius])
+
+    def least(t: Floats) -> Floats:
+        centers = ends[0] + t[:, None] * (ends[1] - ends[0])
+        return np.asarray(np.linalg.norm(q - centers, axis=1) - (radii[0] + t * (radii[1] - radii[0])))
+
+    low, high = np.zeros(len(q)), np.ones(len(q))
+    for _ in range(80):  # convex in t
+        third = (high - low) / 3.0
+        falls = least(low + third) >= least(high - third)
+        low, high = np.where(falls, low + third, low), np.where(falls, high, high - third)
+    return np.minimum(least(0.5 * (low + high)), np.minimum(least(np.zeros(len(q))), least(np.ones(len(q)))))
+
+
+def profile(node: Any) -> Floats:
+    """The corners (4, 2), (across, along), of half a section through the axis of a cylinder or cone."""
+    first, last = (
+        (node.cylinder_radius, node.cylinder_radius)
+        if isinstance(node, Cylinder)
+        else (node.start_radius, node.end_radius)
+    )
+    length = float(np.linalg.norm(np.subtract(node.end, node.start)))
+    return np.array([(0.0, 0.0), (first, 0.0), (last, length), (0.0, length)])
+
+
+def outline(p: Floats, corners: Floats, closed: bool = True) -> Floats:
+    """The signed distance (n,) of points (n, 2) from a polygon; its last side counts if it is closed."""
+    count, inside = len(corners), np.zeros(len(p), bool)
+    nearest = np.full(len(p), np.inf)
+    for i in range(count):
+        a, b = corners[i], corners[(i + 1) % count]
+        way, w = b - a, p - a
+        if (closed or i < count - 1) and way.any():
+            t = np.clip(w @ way / (way @ way), 0.0, 1.0)
+            nearest = np.minimum(nearest, np.linalg.norm(w - t[:, None] * way, axis=1))
+        crosses = (a[1] > p[:, 1]) != (b[1] > p[:, 1])
+        height = np.where(crosses, b[1] - a[1], 1.0)
+        inside ^= crosses & (p[:, 0] < a[0] + (p[:, 1] - a[1]) * way[0] / height)
+    return np.where(inside, -nearest, nearest)
+
+
+def in_plane(prism: Prism, q: Floats | None = None) -> tuple[Floats, Floats, Floats]:
+    """The corners of the base in its plane (k, 2); points there (n, 2), and their heights (n,) above it."""
+    points = np.array(prism.points)
+    normal = sum(np.cross(points[i - 1] - points[0], points[i] - points[0]) for i in range(2, len(points)))
+    normal = np.asarray(normal) / np.linalg.norm(normal)
+    u = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    u /= np.linalg.norm(u)
+    frame = np.array([u, np.cross(normal, u)])
+    w = np.zeros((0, 3)) if q is None else q - points[0]
+    return (points - points[0]) @ frame.T, w @ frame.T, w @ normal
