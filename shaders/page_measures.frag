@@ -1,11 +1,12 @@
 // What decals do to the surfaces of a picture of a page, behind the code of decals: the point and the number of the
-// decal, and field, stretch and fold of its image (decals/field/jacobian.py).
+// decal, the normal, and field, stretch and fold of its image (decals/field/jacobian.py).
 uniform sampler2D g_position;
 uniform sampler2D g_normal;
 uniform isampler2D object_masks;  // see decals/receivers.py
 uniform float measure_step;       // of differences
 layout(location = 0) out vec4 measured_point;
-layout(location = 1) out vec4 measured_image;  // field after contact, stretch, 1 where it is mirrored, 1 where a surface is
+layout(location = 1) out vec4 measured_normal;  // and 1 where there is a surface
+layout(location = 2) out vec4 measured_image;   // field after contact, stretch, 1 where it is mirrored
 
 const float LEAST_SHARE = 1e-12;  // least one of two sides of an image, in larger ones squared
 
@@ -58,7 +59,7 @@ void main() {
     vec4 position = texelFetch(g_position, texel, 0);
     vec3 normal = texelFetch(g_normal, texel, 0).xyz;
     measured_point = vec4(0.0, 0.0, 0.0, -1.0);
-    measured_image = vec4(0.0);
+    measured_normal = measured_image = vec4(0.0);
     if (position.w <= 0.0) {
         return;
     }
@@ -82,5 +83,6 @@ void main() {
         image = vec2(larger / max(abs(area), LEAST_SHARE * max(larger, 1e-30)), area < 0.0 ? 1.0 : 0.0);
     }
     measured_point = vec4(position.xyz, float(number));
-    measured_image = vec4(field, image, 1.0);
+    measured_normal = vec4(normal, 1.0);
+    measured_image = vec4(field, image, 0.0);
 }

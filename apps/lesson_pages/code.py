@@ -140,8 +140,9 @@ def _access_to_decals(path: str) -> tuple[str, str]:
     match binding(path):
         case DecalPath(row=int(row), name=name) if name in AXES:
             i = AXES.index(name)
-            moved = f"p.viewer.under(row, row.position.with({i}, value), row.tangent)"
-            return f"p.viewer.decals.rows[{row}]?.position[{i}]", f"p.edit([{row}], (row) => {moved})"
+            moved = f"p.measures.above({{ ...row, position: row.position.with({i}, value) }})"
+            change = f"(row) => (({{ position, normal }}) => ({{ position, normal }}))({moved})"
+            return f"p.viewer.decals.rows[{row}]?.position[{i}]", f"p.edit([{row}], {change})"
         case DecalPath(row=row, name=name):
             numbers = "p.viewer.decals.numbers" if row is None else f"[{row}]"
             return (

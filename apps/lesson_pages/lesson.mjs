@@ -34,8 +34,7 @@ class LessonPage {
     this.listenToProbe();
     viewer.on("view", () => this.showProbe());
     viewer.on("decals", () => this.changed());
-    const isPuzzle = () => location.hash.startsWith("#puzzle=");
-    addEventListener("hashchange", () => (isPuzzle() ? this.begin() : this.goTo()));
+    addEventListener("hashchange", () => (location.hash.startsWith("#puzzle") ? this.begin() : this.goTo()));
     this.begin();
     this.goTo();
   }

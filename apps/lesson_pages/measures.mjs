@@ -23,7 +23,7 @@ const spread = (low, high, count) =>
   Array.from({ length: count }, (_, i) => low + ((i + 0.5) / count) * (high - low));
 
 // A point, which is at a place of its own if the surface has none there.
-const placed = (point, position) => (point.exists ? point : { ...point, position });
+const placed = (point, place) => (point.exists ? point : { ...point, ...place });
 
 // The factor h of equation 5, of an owner's field and a neighbour's lower one.
 function factor(own, other) {
@@ -60,7 +60,7 @@ export class Measures {
       canvas: { width, height },
       textures: Object.create(painter.textures),
       seen: undefined,
-      target: makeTarget(painter.gl, [width, height], Array(2).fill(painter.header.targets.picked)),
+      target: makeTarget(painter.gl, [width, height], Array(3).fill(painter.header.targets.picked)),
     }));
   }
 
@@ -72,21 +72,21 @@ export class Measures {
     const eye = this.eye(width, height);
     const smallest = Math.min(...viewer.decals.numbers.map((number) => viewer.decals.rows[number].radius));
     viewer.header.uniforms.measure_step = ["1f", DIFFERENCE * smallest];
-    const position = add(target, scaled(back, half / Math.tan(ANGLE)));
+    const from = add(target, scaled(back, half / Math.tan(ANGLE)));
     const fov = (360 / Math.PI) * Math.atan((Math.tan(ANGLE) * height) / width);
     eye.view = viewer.painter.view = ""; // they share the block of the camera
-    eye.look(new Camera({ position, target, up, fov }, viewer.header.bounds));
+    eye.look(new Camera({ position: from, target, up, fov }, viewer.header.bounds));
     eye.paint("measure", eye.target, viewer);
-    const [points, images] = [0, 1].map((number) => {
+    const targets = [0, 1, 2].map((number) => {
       const texels = new Float32Array(4 * width * height);
       gl.readBuffer(gl.COLOR_ATTACHMENT0 + number);
       gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, texels);
       return texels;
     });
     return Array.from({ length: width * height }, (_, i) => {
-      const [x, y, z, owner] = points.subarray(4 * i, 4 * i + 4);
-      const [field, stretch, folded, exists] = images.subarray(4 * i, 4 * i + 4);
-      return { position: [x, y, z], owner, field, stretch: owner < 0 ? NaN : stretch, folded, exists };
+      const [position, normal, image] = targets.map((texels) => [...texels.subarray(4 * i, 4 * i + 4)]);
+      const [owner, exists, [field, stretch, folded]] = [position.pop(), normal.pop(), image];
+      return { position, normal, owner, exists, field, stretch: owner < 0 ? NaN : stretch, folded };
     });
   }
 
@@ -126,14 +126,14 @@ export class Measures {
     ];
     const seen = { target: placeOf(low + half), back, up: cross(back, direction), half };
     const points = this.read(seen, count, 3).slice(count, 2 * count);
-    return spread(low, high, count).map((x, i) => ({ ...placed(points[i], placeOf(x)), x }));
+    return spread(low, high, count).map((x, i) => ({ ...placed(points[i], { position: placeOf(x) }), x }));
   }
 
   // The point of the surface that is seen from above a place.
   above({ position, normal }) {
     const up = tangential(Math.abs(normal[0]) < 0.7 ? [1, 0, 0] : [0, 1, 0], normal);
     const seen = { target: position, back: normal, up, half: NEAR * this.lesson.size };
-    return placed(this.read(seen, 3, 3)[4], position);
+    return placed(this.read(seen, 3, 3)[4], { position, normal });
   }
 
   // -- numbers of the scene, and at points -----------------------------------------------------------------

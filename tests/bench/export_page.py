@@ -29,6 +29,10 @@ STEPS = 50
 
 FIRST_FRAME = """() => performance.getEntriesByName("first frame")[0].startTime / 1000"""
 
+FINISH = """const { gl } = viewer.painter;
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));"""
+"""Wait until the picture that a viewer drew last is there."""
+
 DRAG = """(steps) => {
   const times = [], draws = [];
   viewer.set({ selected: 0 });
@@ -39,12 +43,12 @@ DRAG = """(steps) => {
     times.push(performance.now() - start);
     const drawn = performance.now();
     viewer.draw();
-    viewer.painter.finish();
+    FINISH
     draws.push(performance.now() - drawn);
   }
   const median = (values) => values.sort((a, b) => a - b)[Math.floor(values.length / 2)];
   return [median(times), median(draws)];
-}"""
+}""".replace("FINISH", FINISH)
 
 
 def sphere_scene(count: int, *, faces: int) -> Scene:

@@ -1,5 +1,8 @@
 """The sandbox in headless Chromium: milliseconds from a slider or a drag to the next frame in the browser.
 
+Of all pages of lessons, ``lesson_first_s`` is the longest time to the first picture, and ``lesson_drag_ms``
+the longest median of the script of one step of a drag.
+
 ``server_ms`` is the time of a drag on the server alone: from its message until the picture is sent.
 ``server_slider_ms`` is that of a slider. With ``--server-only``, ``server_traced_ms`` and so on are of a
 camera that turns, by the mode of the view.
@@ -87,7 +90,11 @@ async def measure(count: int, events: int, *, server_only: bool = False) -> dict
     page = SandboxPage(server, window)
     figures = await (_on_server if server_only else _in_browser)(server, page, window, events, began)
     window.close()
-    return figures
+    if server_only:
+        return figures
+    from tests.bench.lesson_pages import measured_lessons
+
+    return figures | await measured_lessons(events)
 
 
 async def _in_browser(
