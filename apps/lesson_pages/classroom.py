@@ -137,8 +137,9 @@ class Classroom:
         if number > MAX_STUDENTS:
             return page_of(f"The class is full: it has {MAX_STUDENTS} students.", 503)
         self._times.setdefault(number, -math.inf)
+        path = f"{STUDENT}{self.token}/"  # all ports of a machine share its cookies
         response.set_cookie(
-            "class", f"{number}.{self._signature(number)}", path=STUDENT, httponly=True, samesite="Strict"
+            "class", f"{number}.{self._signature(number)}", path=path, httponly=True, samesite="Strict"
         )
         return response
 

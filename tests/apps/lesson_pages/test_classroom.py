@@ -30,23 +30,23 @@ STUDENTS = 40
 
 def serve(check: Callable[[Classroom, str], Awaitable[None]]) -> Sessions:
     """Serve a class to a check, then end it."""
+    return asyncio.run(served(check))
 
-    async def served() -> Sessions:
-        guard = Guard(token=TOKEN)
-        names = ("1-one-decal", "7-volume-and-area", "9-packing")
-        room = Classroom(guard, [load_lesson(LESSONS / f"{name}.md") for name in names])
-        command = [sys.executable, "-c", PROGRAM, "1"]
-        sessions = Sessions(lambda _: command, limit=2, guard=guard, join=room.join)
-        port: asyncio.Future[int] = asyncio.get_running_loop().create_future()
-        task = asyncio.create_task(sessions.serve("127.0.0.1", 0, port.set_result))
-        try:
-            await check(room, guard.address(await port))
-        finally:
-            task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
-        return sessions
 
-    return asyncio.run(served())
+async def served(check: Callable[[Classroom, str], Awaitable[None]]) -> Sessions:
+    guard = Guard(token=TOKEN)
+    names = ("1-one-decal", "7-volume-and-area", "9-packing")
+    room = Classroom(guard, [load_lesson(LESSONS / f"{name}.md") for name in names])
+    command = [sys.executable, "-c", PROGRAM, "1"]
+    sessions = Sessions(lambda _: command, limit=2, guard=guard, join=room.join)
+    port: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+    task = asyncio.create_task(sessions.serve("127.0.0.1", 0, port.set_result))
+    try:
+        await check(room, guard.address(await port))
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+    return sessions
 
 
 def students(address: str) -> str:
@@ -146,6 +146,23 @@ def test_students_who_wait_for_one_page_are_told_apart() -> None:
         assert sorted(one.name for one in room.answers.values()) == [*map(str, range(8))]
 
     serve(check)
+
+
+def test_a_student_of_two_classes_on_one_machine_is_one_student_in_each() -> None:
+    async def first(room: Classroom, address: str) -> None:
+        async def second(other: Classroom, elsewhere: str) -> None:
+            async with pupil() as http:
+                for turn in range(2):
+                    for one, place in ((room, address), (other, elsewhere)):
+                        async with http.get(f"{students(place)}/{one.token}/"):
+                            assert await answer(http, place, one, name=str(turn)) == 204
+                    await asyncio.sleep(0.55)
+            for one in (room, other):
+                assert [found.name for found in one.answers.values()] == ["1"]
+
+        await served(second)
+
+    serve(first)
 
 
 def test_a_class_needs_lessons(capsys: pytest.CaptureFixture[str]) -> None:
