@@ -68,7 +68,7 @@ class LabPage(Page):
         if in_lesson:
             self.lab.refresh()
             values |= {**self.lab.values(), "title": self.lab.lesson.settings.title, "left_open": True}
-        elif self._shown.get("in_lesson"):
+        elif self._server.state.in_lesson:
             self.lab.leave()
         return values
 

@@ -168,7 +168,6 @@ class Page:
             end_input=self.sandbox.end_input,
             resized=lambda: self.view.fit(),
         )
-        self._shown: dict[str, Any] = {}
         self._task: asyncio.Task[None] | None = None
         self._end: asyncio.Task[None] | None = None
         server.state.client_only(
@@ -210,17 +209,14 @@ class Page:
         return self.sandbox.values()
 
     def refresh(self) -> None:
-        """Send the values that have changed since the last look."""
+        """Send the values that have changed; the state leaves out those that are equal."""
         keep_for_work(self._window.background.busy_editing)
         self.sandbox.settle()
         self.view.follow_size()
         values = self.values()
         values["trame__title"] = f"{values['title']} \N{EN DASH} sandbox"  # of the browser's tab
-        changed = {name: value for name, value in values.items() if self._shown.get(name, self) != value}
-        self._shown.update(changed)
-        if changed:
-            with self._server.state:
-                self._server.state.update(changed)
+        with self._server.state as state:
+            state.update(values)
 
     def _start(self, **_: Any) -> None:
         self._task = asyncio.get_running_loop().create_task(self._keep_fresh())
