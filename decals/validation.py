@@ -18,6 +18,7 @@ from blobtree._typing import BoolArray, Float64Array, Int32Array
 from blobtree.colors import color_rgb, is_named
 from blobtree.files import is_folder, is_read_only, is_too_long
 from blobtree.validation import as_count, is_whole, real
+from blobtree.validation import real_number as as_number
 from decals.errors import ImplicitDecalsError, InvalidDecals, InvalidImage, InvalidScene, MissingPackage
 
 T = TypeVar("T")
@@ -122,7 +123,7 @@ def real_number(
 ) -> float:
     """Return a finite number that is allowed; ``expected`` describes such numbers in the message."""
     try:
-        number = math.nan if isinstance(value, str | bytes | bool) else float(value)
+        number = as_number(value)
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not (math.isfinite(number) and allowed(number)):

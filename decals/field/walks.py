@@ -39,9 +39,10 @@ from decals.field.walk_kernels import (
 from decals.index.editor import RECORDS, DecalEditor
 from decals.model import Decals
 from decals.record import RECORD, RIM_RADIUS
-from decals.surfaces.convert import as_surface, is_model, is_surface
+from decals.surfaces.convert import as_surface, is_model
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
+from decals.surfaces.surface import is_surface
 
 TOLERANCE = 0.004
 """Largest error of the corrected mapping, in visible radii, at which a decal needs no relays."""

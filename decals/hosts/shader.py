@@ -15,8 +15,7 @@ from decals.field.mapping import ImageMapping
 from decals.hosts.code import FIRST_TEXTURE, VERSIONS, Code, code_of
 from decals.hosts.textures import ShaderTexture, data_size, data_texture, image_texture, map_texture
 from decals.hosts.unsupported import refuse_unsupported
-from decals.index.arrays import DecalArrays
-from decals.index.editor import DecalEditor
+from decals.index.editor import DecalArrays, DecalEditor
 from decals.receivers import EVERYTHING, mask_on
 from decals.record import Contact
 from decals.rendering.data_texture import rectangles

@@ -1,6 +1,7 @@
 """`DecalEditor`: decals and their index as arrays that change in place."""
 
 import copy
+from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -11,7 +12,7 @@ from blobtree.device import start_warp
 from decals.errors import InvalidDecals
 from decals.index.change_log import ChangeLog, DirtyBalls, Range
 from decals.index.editable_index import IDS, LEVELS, TABLE, EditableIndex
-from decals.index.index import DecalIndex
+from decals.index.index import DecalIndex, has_nested
 from decals.index.rows import DecalRows, runs_of
 from decals.model import RECORD, Decals
 from decals.receivers import codes_of
@@ -22,7 +23,7 @@ MAX_SINGLE_EDITS = 64
 
 RECORDS, LIMITS = "decal_records", "decal_limits"
 
-__all__ = ["IDS", "LEVELS", "LIMITS", "RECORDS", "TABLE", "DecalEditor"]
+__all__ = ["IDS", "LEVELS", "LIMITS", "RECORDS", "TABLE", "DecalArrays", "DecalEditor"]
 
 
 class DecalEditor:
@@ -316,3 +317,42 @@ def _require_one(one: Decals) -> None:
     _require_decals(one)
     if len(one) != 1:
         raise InvalidDecals(f"expected one decal, got {len(one)}; `assign` takes several")
+
+
+@dataclass(frozen=True, eq=False)
+class DecalArrays:
+    """Arrays of a set of decals, and what decides the form of a shader that reads them.
+
+    Attributes
+    ----------
+    arrays
+        Those of `DecalEditor.arrays`; an editor's change in place.
+    index
+        The index, for its number of levels and the mask of its table.
+    layered, nested
+        See `DecalEditor`.
+    version
+        Version of the editor, 0 without one.
+    """
+
+    arrays: dict[str, NDArray[Any]]
+    index: DecalIndex
+    layered: bool
+    nested: bool
+    version: int = 0
+
+    @classmethod
+    def of(cls, decals: Decals | DecalEditor) -> "DecalArrays":
+        """Return the arrays of decals, or those in an editor's own memory."""
+        if isinstance(decals, DecalEditor):
+            return cls(decals.arrays, decals.index, decals.layered, decals.nested, decals.version)
+        index, records = DecalIndex.of(decals), decals.packed()
+        arrays: dict[str, NDArray[Any]] = {RECORDS: records, LIMITS: decals.limits}
+        arrays |= {LEVELS: index.levels, TABLE: index.table, IDS: index.ids}
+        indexed = index.on("cpu", records=records, layered=decals.layered, copy=False)
+        return cls(arrays, index, decals.layered, has_nested(indexed, len(decals)))
+
+    @property
+    def uniforms(self) -> dict[str, int]:
+        """Uniforms of the index, by their names."""
+        return {"index_level_count": self.index.level_count, "index_mask": self.index.mask}

@@ -6,8 +6,7 @@ import numpy as np
 
 from blobtree._typing import Int64Array
 from decals.errors import TooMuchData
-from decals.index.arrays import DecalArrays
-from decals.index.editor import LIMITS, DecalEditor
+from decals.index.editor import LIMITS, DecalArrays, DecalEditor
 from decals.index.index import DecalIndex
 from decals.model import Decals
 from decals.rendering.context import Context

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias, TypeGuard
+from typing import Any, TypeAlias
 
 import numpy as np
 import warp as wp
@@ -17,7 +17,7 @@ from decals.scattering.projection import SurfaceProjection, spans_of
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.space_curve import curve_keys
-from decals.surfaces.surface import Surface, vectors
+from decals.surfaces.surface import Surface, is_surface, vectors
 from decals.validation import count_number, function_or_none, function_values, real_array, real_number
 
 AREA_SAMPLES = 16384
@@ -319,7 +319,7 @@ class Domain:
 def as_surfaces(models: object) -> tuple[Surface, ...]:
     """Return one model or several as a tuple of surfaces, or raise `InvalidScattering`."""
     several = tuple(models) if isinstance(models, list | tuple) else (models,)
-    if all(_is_surface(model) for model in several):
+    if all(is_surface(model) for model in several):
         return several
     from decals.surfaces.convert import as_surface, is_model  # imports pyvista, which surfaces do not need
 
@@ -328,11 +328,6 @@ def as_surfaces(models: object) -> tuple[Surface, ...]:
         as_surface(model, name="surfaces", error=InvalidScattering)
         for model in ((models,) if members is None else members)
     )
-
-
-def _is_surface(value: object) -> TypeGuard[Surface]:
-    """Return True for a surface, and False for a class of surfaces, which has the same attributes."""
-    return isinstance(value, Surface) and not isinstance(value, type)
 
 
 def particle_count(count: int | None, spacing: float | None, mass: float) -> int:

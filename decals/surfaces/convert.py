@@ -21,7 +21,7 @@ from decals.surfaces.extras import READERS
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.mesh_data import MeshData, joined
-from decals.surfaces.surface import Surface
+from decals.surfaces.surface import Surface, is_surface
 from decals.surfaces.triangulate import polygon_triangles
 from decals.validation import describe
 
@@ -135,11 +135,6 @@ def as_surface(
         return own
     shape = as_shape(model, name=name, error=error)
     return ImplicitSurface(shape) if isinstance(shape, Node) else MeshSurface(*shape.arrays)
-
-
-def is_surface(value: object) -> TypeGuard[Surface]:
-    """Return True for a surface; a class of surfaces is not one."""
-    return isinstance(value, Surface) and not isinstance(value, type)
 
 
 def is_model(value: object) -> bool:

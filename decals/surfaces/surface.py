@@ -4,7 +4,7 @@ A `DeviceSurface` is a surface in the memory of a Warp device: it projects point
 """
 
 from collections.abc import Iterator
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 import warp as wp
@@ -114,6 +114,11 @@ class Surface(Protocol):
     def contains(self, points: ArrayLike) -> BoolArray:
         """Return True for each point inside, ``bool[n]``; an open surface contains nothing."""
         ...
+
+
+def is_surface(value: object) -> TypeGuard[Surface]:
+    """Return True for a surface; a class of surfaces is not one."""
+    return isinstance(value, Surface) and not isinstance(value, type)
 
 
 class DeviceSurface(Protocol):
