@@ -26,6 +26,12 @@ HALF_DIAGONAL = math.sqrt(3.0)
 
 
 @wp.func
+def least_influence_at_joints(tape: Texels, at: wp.int32) -> wp.float32:
+    """Return the influence radius of a skeleton at its joints, which starts the tape there."""
+    return tape[at][3] * (1.0 - JOINT_YIELD)
+
+
+@wp.func
 def distance_to_segment(q: wp.vec3, a: wp.vec3, b: wp.vec3) -> wp.float32:
     """Return the distance of q from the line from a to b."""
     way = b - a

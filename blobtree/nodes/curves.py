@@ -21,7 +21,12 @@ from blobtree.declare.formula import formula
 from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.declare.skeleton import TUBE_CELLS
 from blobtree.errors import InvalidNode
-from blobtree.formulas.skeletons import JOINT_YIELD, distance_to_segment, influence_bound
+from blobtree.formulas.skeletons import (
+    JOINT_YIELD,
+    distance_to_segment,
+    influence_bound,
+    least_influence_at_joints,
+)
 from blobtree.lazy import Lazy
 from blobtree.nodes.node import Node
 from blobtree.nodes.pieces import Pieces
@@ -201,12 +206,6 @@ def closest_on_joined_segment(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4
     t = wp.clamp(wp.dot(q - a, ab) / wp.max(wp.dot(ab, ab), 1.0e-37), 0.0, 1.0)
     c = a + ab * t
     return wp.vec4(c[0], c[1], c[2], joined_influence(start[3], axis[3], t == 0.0, t == 1.0))
-
-
-@wp.func
-def min_influence_of_joined_segment(tape: Texels, at: wp.int32) -> wp.float32:
-    """Return the influence radius at joints."""
-    return tape[at][3] * (1.0 - JOINT_YIELD)
 
 
 @wp.func
@@ -544,7 +543,7 @@ class _JoinedSegment(JoinedPrimitive):
     texels_read = 2
     joint_texels = (1,)
     closest_with_influence = formula(closest_on_joined_segment)
-    least_influence = formula(min_influence_of_joined_segment)
+    least_influence = formula(least_influence_at_joints)
 
     start: Vector = par.point("start of the line")
     end: Vector = par.point("end of the line")

@@ -14,7 +14,7 @@ from blobtree.declare.formula import formula
 from blobtree.declare.parameters import unit_vectors
 from blobtree.declare.skeleton import PLATE_CELLS
 from blobtree.errors import InvalidNode
-from blobtree.formulas.skeletons import JOINT_YIELD
+from blobtree.formulas.skeletons import JOINT_YIELD, least_influence_at_joints
 from blobtree.lazy import Lazy
 from blobtree.nodes.node import Node
 from blobtree.nodes.pieces import Pieces
@@ -165,12 +165,6 @@ def closest_on_triangle(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
             joint = wp.max(wp.max(to_b[3], to_c[3]), upright[3])
     influence = corner[3] * (1.0 - JOINT_YIELD * joint)
     return wp.vec4(corner[0] + c[0], corner[1] + c[1], corner[2] + c[2], influence)
-
-
-@wp.func
-def least_influence_at_joints(tape: Texels, at: wp.int32) -> wp.float32:
-    """Return the influence radius at joints."""
-    return tape[at][3] * (1.0 - JOINT_YIELD)
 
 
 class Triangle(JoinedPrimitive):
