@@ -39,7 +39,7 @@ def test_a_closed_mesh_stays_closed_without_its_flat_faces(seed: int, count: int
     kept = without_flat_faces(vertices, faces)
     after = check_mesh(vertices, kept)
     assert (after.closed, after.degenerate) == (True, 0)
-    assert all(number <= before.faults.get(name, 0) for name, number in after.faults.items())
+    assert before.copies or not after.faults  # folds that were there stay
     np.testing.assert_allclose((after.area, after.volume), (before.area, before.volume), rtol=1e-5)
 
 
