@@ -51,7 +51,7 @@ class SeamSystem:
     parts, levels : int64[c + 1]
         The first strip and the first level of each part, and the ends.
     device : str
-        Where the parts are solved.
+        Where the equations are made; a processor solves them, since each step needs the steps before.
 
     Attributes
     ----------
@@ -81,12 +81,11 @@ class SeamSystem:
         widths = np.arange(1, len(first) + 1) - lowest
         self._wide = np.add.reduceat(widths**2.0, levels[:-1]) > MAX_WIDTH**2 * self._sizes
         kept = np.where(np.repeat(self._wide, self._sizes), 0, widths)
-        self._ends, *shapes = (
-            array_on(device, of, wp.int32) for of in (rows, parts, levels, columns, lowest)
-        )
-        self._shapes = [*shapes, array_on(device, np.cumsum(kept) - 1, wp.int64)]
+        self._there = [array_on(device, of, wp.int32) for of in (rows, columns)]
+        self._shapes = [array_on(CPU, of, wp.int32) for of in (parts, levels, columns, lowest)]
+        self._shapes.append(array_on(CPU, np.cumsum(kept) - 1, wp.int64))
         self._squares: Any = wp.empty((len(columns), SQUARE + 8), dtype=wp.float64, device=device)
-        self._factors: Any = wp.empty(int(kept.sum()), dtype=wp.float64, device=device)
+        self._factors: Any = wp.empty(int(kept.sum()), dtype=wp.float64, device=CPU)
 
     def strengthen(self, off: Float64Array) -> None:
         """Give more weight to rows that differ; ``off`` are their differences beside that aimed at."""
@@ -117,18 +116,14 @@ class SeamSystem:
         """Write the solutions of some parts, each by Cholesky's method within its envelope."""
         if not len(parts):
             return
-        chosen, listed = (
-            array_on(self._device, *each) for each in ((self._chosen, wp.uint8), (parts, wp.int32))
-        )
-        force, held, aims, given = (
-            array_on(self._device, of, wp.float64) for of in (self._force, self._held, self._aims, levels)
-        )
-        found = wp.clone(given)
-        inputs = [self._ends, self._shapes[2], chosen, force, gaps, self.slopes, given]
+        chosen = array_on(self._device, self._chosen, wp.uint8)
+        force, given = (array_on(self._device, of, wp.float64) for of in (self._force, levels))
+        inputs = [*self._there, chosen, force, gaps, self.slopes, given]
         launch(square_strips, len(self._columns), inputs, [self._squares], self._device)
-        inputs = [listed, *self._shapes, self._squares, held, aims]
-        launch(solve_parts, len(parts), inputs, [self._factors, found], self._device)
-        solution[:] = found.numpy()
+        listed = array_on(CPU, parts, wp.int32)
+        numbers = [array_on(CPU, of, wp.float64) for of in (self._squares.numpy(), self._held, self._aims)]
+        outputs = [self._factors, array_on(CPU, solution, wp.float64)]
+        launch(solve_parts, len(parts), [listed, *self._shapes, *numbers], outputs, CPU)
 
     def _solve_wide(
         self,

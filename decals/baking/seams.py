@@ -213,7 +213,7 @@ def match_seams(
     report : callable
         Called often with the fraction done.
     device : str
-        Where the least squares are solved.
+        Where differences and equations are computed.
     """
     report(0.0)
     levels = _Match(texels, mixed, smooth, srgb, report, device).solved()
@@ -239,7 +239,7 @@ class _Match:
     report : callable
         Called often with the fraction done; an error that it raises ends the work.
     device : str
-        Where the least squares are solved.
+        Where differences and equations are computed.
     """
 
     def __init__(
