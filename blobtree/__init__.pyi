@@ -53,6 +53,7 @@ from .nodes.numeric_parameters import (
 from .nodes.operator import Operator
 from .nodes.parameter_gradient import ParameterGradient
 from .nodes.primitives import Box, Cone, Disc, Point, Primitive, Segment, Torus
+from .nodes.repeats import PolarRepeat, Repeat
 from .nodes.sharp import Frustum, Prism
 from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
 from .nodes.tree import Difference, Intersection, Offset, Ricci, Sum, Transform, Twist, Union
@@ -114,6 +115,7 @@ __all__ = [
     "Operator",
     "ParameterGradient",
     "Point",
+    "PolarRepeat",
     "Polygon",
     "Polygonizer",
     "Polyline",
@@ -127,6 +129,7 @@ __all__ = [
     "RUnion",
     "RatedUnion",
     "Rectangle",
+    "Repeat",
     "Ricci",
     "Segment",
     "Shear",

@@ -69,6 +69,17 @@ def _volume(rng: Rng, _: Operand) -> Node:
     return blobtree.from_sdf(distance, (-1.5, -1.5, -1.5), (1.5, 1.5, 1.5), spacing=0.3, width=0.4)
 
 
+def _repeat(rng: Rng, operand: Operand) -> Node:
+    step, count = triple(rng.uniform(-0.8, 0.8, 3)), int(rng.integers(1, 4))
+    joining, copies = str(rng.choice(["sum", "union"])), str(rng.choice(["alike", "mirrored"]))
+    return blobtree.Repeat(operand(rng), step, count, joining, copies)
+
+
+def _polar_repeat(rng: Rng, operand: Operand) -> Node:
+    joining = str(rng.choice(["sum", "union"]))
+    return blobtree.PolarRepeat(operand(rng), triple(rng.normal(size=3)), int(rng.integers(1, 4)), joining)
+
+
 def _transform(rng: Rng, operand: Operand) -> Node:
     return operand(rng).rotate((1, 2, 3), 40).scale(triple(rng.uniform(0.6, 1.5, 3)))
 
@@ -85,6 +96,8 @@ def _curve_warp(rng: Rng, operand: Operand) -> Node:
 
 SPECIAL: dict[str, Callable[[Rng, Operand], Node]] = {
     "transform": _transform,
+    "repeat": _repeat,
+    "polar_repeat": _polar_repeat,
     "polygon": _polygon,
     "prism": _prism,
     "contact": _contact,

@@ -42,10 +42,12 @@ from blobtree import (
     NoiseWarp,
     Offset,
     Point,
+    PolarRepeat,
     Polygon,
     Polyline,
     Press,
     RatedUnion,
+    Repeat,
     Ricci,
     Segment,
     Shear,
@@ -229,7 +231,7 @@ def signed(node: Node, points: ArrayLike) -> Field:
             values = parameter_values(node)
             fields = [evaluate(x, q) for x in node.operands]
             return reduce(lambda a, b: _blended(a, b, node, **values), fields)
-        case ConvolutionStroke() | Mirror():
+        case ConvolutionStroke() | Mirror() | Repeat() | PolarRepeat():
             return signed(written_out(node), q)
         case Macro():
             return evaluate(written_out(node), q)
@@ -337,6 +339,9 @@ def written_out(node: Node) -> Node:
         case Mirror(child=child, axis=axis):
             signs = [-1.0 if name == axis else 1.0 for name in "xyz"]
             return Sum(child, Transform(child, tuple((*row, 0.0) for row in np.diag(signs).tolist())))
+        case Repeat() | PolarRepeat():
+            kind: Any = Sum if node.joining == "sum" else Union
+            return cast(Node, kind([Transform(node.child, matrix) for matrix in copy_maps(node)]))
         case SymmetricDifference(first=a, second=b):
             return Union(Difference(a, b), Difference(b, a))
         case ConvolutionStroke(points=points, radii=radii, color=color):
@@ -348,6 +353,23 @@ def written_out(node: Node) -> Node:
         case BlendGraph(operands=operands, names=names, pairs=pairs):
             return Union([Sum([operands[i] for i in group]) for group in blends.cliques(names, pairs)])
     raise TypeError(type(node))
+
+
+def copy_maps(node: Repeat | PolarRepeat) -> list[Any]:
+    """The maps, three rows of four numbers, from the child of a repeat to its copies."""
+    maps = []
+    for number in range(node.count):
+        linear, offset = np.eye(3), np.zeros(3)
+        if isinstance(node, Repeat):
+            offset = number * np.array(node.step)
+            if node.copies == "mirrored" and number % 2:
+                linear = linear - 2.0 * np.outer(node.step, node.step) / np.dot(node.step, node.step)
+        else:
+            n = np.array(node.axis) / np.linalg.norm(node.axis)
+            angle, cross = 2.0 * np.pi * number / node.count, np.cross(np.eye(3), n)
+            linear = np.cos(angle) * linear + np.sin(angle) * cross + (1.0 - np.cos(angle)) * np.outer(n, n)
+        maps.append(tuple(map(tuple, np.column_stack([linear, offset]).tolist())))
+    return maps
 
 
 def pressed_solids(contact: SolidContact) -> tuple[Node, ...]:
