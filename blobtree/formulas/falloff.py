@@ -1,15 +1,17 @@
-"""The falloff from normalised distance to field: g(d) = (1 − d²)³ on [0, 1], 0 beyond.
+"""The falloff of the core, from normalised distance to field: g(d) = (1 − d²)³ on [0, 1], 0 beyond.
 
 Source: Wyvill's field function, eq. 2 of the Implicit Decals paper. Its support is compact: outside its
 influence radius a skeleton contributes exactly 0, so evaluation can skip it.
 
-Primitives have this one unless they name another (`kinds.falloff`, `formulas.falloffs`).
+Primitives have this one unless they name another (`formulas.falloffs`).
 """
 
 import math
 
 import warp as wp
 
+from blobtree.declare.falloff import Falloff
+from blobtree.declare.formula import formula
 from blobtree.iso import ISO as ISO
 
 wp.set_module_options({"enable_backward": False})
@@ -72,3 +74,25 @@ def falloff_shallowest(nearest: wp.float32, farthest: wp.float32) -> wp.float32:
 def falloff_range(nearest: wp.float32, farthest: wp.float32) -> wp.vec2:
     """Return the smallest and largest g(d) over squared distances from `nearest` to `farthest`."""
     return wp.vec2(falloff(farthest), falloff(nearest))
+
+
+class Wyvill(Falloff):
+    """(1 − d²)³ (eq. 2 of the Implicit Decals paper); kernels of trees with this one alone take d²."""
+
+    numbers = RIM, STEEPEST_DISTANCE, STEEPEST_SLOPE
+
+    @formula
+    def value(distance: wp.float32) -> wp.float32:
+        """Return g(d) = (1 − d²)³, 0 ≤ d ≤ 1."""
+        return falloff(distance * distance)
+
+    @formula
+    def slope(distance: wp.float32) -> wp.float32:
+        """Return g'(d) = −6 d (1 − d²)²."""
+        return -falloff_steepness(distance)
+
+
+WYVILL = Wyvill()
+
+FALLOFFS: tuple[Falloff, ...] = (WYVILL,)
+"""The falloffs of the core; the index of one here is its code on the tape."""

@@ -45,8 +45,8 @@ from blobtree.declare.skeleton import (
     SkeletonFormulas,
 )
 from blobtree.errors import InvalidDefinition, InvalidNode
+from blobtree.formulas.falloff import WYVILL
 from blobtree.formulas.skeletons import distance_to_segment, influence_bound
-from blobtree.kinds.falloff import WYVILL
 from blobtree.lazy import Lazy
 from blobtree.nodes.attributes import NO_ATTRIBUTES, AttributeMapping
 from blobtree.nodes.declared import DeclaredNode

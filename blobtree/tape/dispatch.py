@@ -17,8 +17,8 @@ from typing import Any
 import warp as wp
 
 from blobtree.declare.registry import load_core, row_of
+from blobtree.formulas.falloff import FALLOFFS
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.kinds.falloff import FALLOFFS
 from blobtree.tape.codes import OPERATORS, SKELETONS, WARPS
 from blobtree.texels import Texels
 from blobtree.transpile.specialize import RowChoice

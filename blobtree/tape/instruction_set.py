@@ -22,8 +22,8 @@ from blobtree.declare.field import FieldKind
 from blobtree.declare.registry import LIBRARY_ROWS, load_libraries
 from blobtree.declare.skeleton import Skeleton
 from blobtree.declare.warp import SpaceWarp
+from blobtree.formulas.falloff import FALLOFFS
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.kinds.falloff import FALLOFFS
 from blobtree.lazy import Lazy
 from blobtree.tape.dispatch import LOCK, core_tables
 from blobtree.tape.extras import gradient_evaluations

@@ -49,7 +49,7 @@ from blobtree.declare.registry import row_of
 from blobtree.declare.skeleton import Skeleton
 from blobtree.device import known_device
 from blobtree.errors import InvalidNode
-from blobtree.kinds.falloff import WYVILL
+from blobtree.formulas.falloff import WYVILL
 from blobtree.tape.bounds import warp_parameters
 from blobtree.tape.codes import (
     FIELD,

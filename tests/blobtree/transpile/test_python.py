@@ -22,7 +22,7 @@ FUNCTIONS = [
     *(f for f in typed_functions(kernels) if row_choice(f.function) is None),
     *(
         f
-        for name in ("formulas.falloff", "nodes.tree", "kinds.falloff")
+        for name in ("formulas.falloff", "nodes.tree")
         for f in typed_functions(import_module(f"blobtree.{name}"))
         if "tape" not in f.parameters
     ),

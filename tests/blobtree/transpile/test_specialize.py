@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from blobtree.kinds.falloff import WYVILL
+from blobtree.formulas.falloff import WYVILL
 from blobtree.nodes import tree
 from blobtree.tape import dispatch
 from blobtree.tape.dispatch import core_tables

@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from blobtree.kinds.falloff import FALLOFFS
+from blobtree.formulas.falloff import FALLOFFS
 from blobtree.tape.codes import OPERATORS, SKELETONS, WARPS
 from blobtree.transpile.builtins import type_name
 from blobtree.transpile.glsl import uniforms_of

@@ -33,7 +33,6 @@ from tests.decals.glsl.functions import AGREEMENT, ALL_KINDS, run_program, throu
 MODULES = (
     "blobtree.formulas.falloff",
     "blobtree.formulas.falloffs",
-    "blobtree.kinds.falloff",
     "blobtree.formulas.skeletons",
     "blobtree.declare.claims",
     "blobtree.nodes.tree",

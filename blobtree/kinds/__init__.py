@@ -1,1 +1,0 @@
-"""Kinds of the core, one class each."""
