@@ -48,7 +48,16 @@ MODULES = (
     "decals.record",
     "decals.field.ownership",
 )
-OF_WARP_ALONE = {"operator_choice", "operator_range", "starts_from_zero", "unknown_extent", "warp_extent"}
+OF_WARP_ALONE = {
+    "has_sheets",
+    "kind_sheet_at",
+    "kind_sheet_value_gradient",
+    "operator_choice",
+    "operator_range",
+    "starts_from_zero",
+    "unknown_extent",
+    "warp_extent",
+}
 """Functions that no shader calls."""
 
 WRITTEN_TWICE = {
