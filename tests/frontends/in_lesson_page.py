@@ -173,12 +173,12 @@ async def fitted(browser: Browser, lesson: Lesson, path: Path) -> None:
         await page.close()
 
 
-async def played(browser: Browser, lesson: Lesson, path: Path) -> None:
+async def played(browser: Browser, path: Path, width: int, height: int) -> None:
     """Solve the puzzle by moving decals, find the scores again after a reload, and share other sizes."""
-    page = await browser.new_page(viewport=SIZE, has_touch=True)
+    page = await browser.new_page(viewport={"width": width, "height": height}, has_touch=True)
     await page.add_init_script(ERRORS)
     await page.goto(path.as_uri())
-    await page.get_by_role("button", name="Skip the guess").click(timeout=PATIENCE)
+    await page.get_by_role("button", name="Skip the guess").tap(timeout=PATIENCE)
     cells = page.locator(".scores td")
     await settled(page)
     assert (await cells.all_inner_texts())[2::3] == ["–", "–"]  # what overlaps too much does not count
@@ -189,18 +189,18 @@ async def played(browser: Browser, lesson: Lesson, path: Path) -> None:
     assert scores[1::3] == ["1", "4"]
     assert scores[2::3] == [f"{scores[0]} ★", f"{scores[3]} ★"]
     await page.reload()
-    await page.get_by_role("button", name="Skip the guess").click(timeout=PATIENCE)
+    await page.get_by_role("button", name="Skip the guess").tap(timeout=PATIENCE)
     await settled(page)
     assert (await cells.all_inner_texts())[2::3] == scores[2::3]
     await page.locator(".sliders input").first.evaluate(SET, "0.3")
     await settled(page)
     assert (await cells.all_inner_texts())[1::3] == ["–", "–"]
-    await page.get_by_role("button", name="Share as a puzzle").click()
+    await page.get_by_role("button", name="Share as a puzzle").tap()
     link = str(await page.locator(".shared a").get_attribute("href"))
     assert "#puzzle=0.3,0.5,0.5,0.42&par=" in link
     await page.goto("about:blank")
     await page.goto(link)
-    await page.get_by_role("button", name="Skip the guess").click(timeout=PATIENCE)
+    await page.get_by_role("button", name="Skip the guess").tap(timeout=PATIENCE)
     await settled(page)
     pars = link.split("par=")[1].split(",")
     assert (await cells.all_inner_texts())[1::3] == [f"{float(par):g}" for par in pars]
@@ -220,7 +220,8 @@ async def learn(name: str, numbers: set[int]) -> None:
                     await learned(browser, lesson, ANSWERS[number - 1], path)
                     await fitted(browser, lesson, path)
                     if lesson.settings.scores:
-                        await played(browser, lesson, path)
+                        for size in SIZES:
+                            await played(browser, path, *size)
             await browser.close()
 
 
