@@ -1,6 +1,7 @@
 """Pages of lessons in a browser beside the lab, as a program.
 
     python -m tests.frontends.in_lesson_page [firefox] [NUMBER ...]
+    python -m tests.frontends.in_lesson_page class
 
 Each page shows the numbers of the lab, judges answers as it does, and asks no server. Without ``firefox`` it
 runs in Chromium, where fingers use it; see `in_html_page` for what Firefox needs.
@@ -18,8 +19,11 @@ from playwright.async_api import Browser, Locator, Page, async_playwright
 
 from decals.apps.lab.experiment import Experiment, Scope
 from decals.apps.lab.lesson import LESSONS, Lesson, load_lessons
+from decals.apps.lesson_pages.classroom import Classroom
 from decals.apps.lesson_pages.page import lesson_page, no_page
 from tests.apps.lab.answers import ANSWERS, SOLVED, Attempt
+from tests.apps.lesson_pages.test_classroom import serve, students
+from tests.apps.sandbox.test_sessions import TOKEN
 from tests.frontends.browsing import ERRORS
 from tests.frontends.in_html_page import Fingers, accessible, launched
 
@@ -209,6 +213,38 @@ async def played(browser: Browser, path: Path, width: int, height: int) -> None:
     await page.close()
 
 
+async def taught(room: Classroom, address: str) -> None:
+    """Students with phones send their numbers, and the teacher sees them in a table and a plot."""
+    async with async_playwright() as player:
+        browser = await launched(player, "chromium")
+        for number in range(3):
+            page = await browser.new_page(viewport={"width": 390, "height": 844}, has_touch=True)
+            await page.add_init_script(ERRORS)
+            await page.goto(f"{students(address)}/{room.token}/9-packing.html")
+            await page.wait_for_selector("#lesson[data-ready]", timeout=PATIENCE)
+            await page.locator("[name=guess]").fill(str(10 + number))
+            await page.get_by_role("button", name="See", exact=True).tap()
+            await page.wait_for_selector("#lesson[data-shown]", timeout=PATIENCE)
+            await page.get_by_label("Name (optional)").fill(f"Anna {number}")
+            await page.get_by_role("button", name="Send my numbers").tap()
+            await page.get_by_text("Sent to the teacher.").wait_for()
+            assert await page.evaluate("window.pageErrors") == []
+            await page.close()
+        page = await browser.new_page(viewport=SIZE)
+        await page.add_init_script(ERRORS)
+        await page.goto(f"{address}?token={TOKEN}")
+        await page.goto(f"{address}class")
+        await page.get_by_role("combobox", name="Lesson").select_option("A puzzle: packing")
+        await page.get_by_role("combobox", name="Right").select_option("guess")
+        await page.get_by_text("answers: 3").wait_for()
+        rows = page.locator("tbody tr")
+        assert [await row.locator("td").nth(2).inner_text() for row in await rows.all()] == ["10", "11", "12"]
+        assert await page.locator(".chart circle").count() == 3
+        await accessible(page)
+        assert await page.evaluate("window.pageErrors") == []
+        await browser.close()
+
+
 async def learn(name: str, numbers: set[int]) -> None:
     """Take all lessons that have pages, or those of some numbers, in a browser."""
     with tempfile.TemporaryDirectory() as folder:
@@ -225,7 +261,15 @@ async def learn(name: str, numbers: set[int]) -> None:
             await browser.close()
 
 
-if __name__ == "__main__":
-    named = "firefox" if sys.argv[1:2] == ["firefox"] else "chromium"
-    asyncio.run(learn(named, {int(text) for text in sys.argv[1:] if text != named}))
+def main() -> None:
+    """Run the checks that the command line names."""
+    if sys.argv[1:] == ["class"]:
+        serve(taught)
+    else:
+        named = "firefox" if sys.argv[1:2] == ["firefox"] else "chromium"
+        asyncio.run(learn(named, {int(text) for text in sys.argv[1:] if text != named}))
     print("done")
+
+
+if __name__ == "__main__":
+    main()

@@ -65,9 +65,10 @@ def test_html_pages(check: str) -> None:
     assert "done" in run_module("tests.frontends.in_html_page", check)
 
 
-def test_lesson_pages() -> None:
+@pytest.mark.parametrize("check", [(), ("class",)])
+def test_lesson_pages(check: tuple[str, ...]) -> None:
     require("playwright", "axe_playwright_python")
-    assert "done" in run_module("tests.frontends.in_lesson_page")
+    assert "done" in run_module("tests.frontends.in_lesson_page", *check)
 
 
 @pytest.mark.parametrize("check", [*HTML_CHECKS, "lessons"])
