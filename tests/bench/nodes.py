@@ -16,6 +16,11 @@
   of a blend and of 10,000 rays with a mesh of 100,352 triangles.
 * blends: `gradient_bulge` and `sum_bulge`, heights of a bar in a cube of its own width above both, over its
   radius.
+* edges: of meshes of `sharp_solids` random solids with sharp edges, `sharp_edge_error`, the largest distance
+  of a vertex on a crease from the edges over the size, `sharp_volume_error`, and `sharp_open`, how many are
+  not closed.
+* repeats: `repeat_10000_over_visible`, the time of rays that meet 100 of 10,000 boxes in a grid, over that of
+  the same rays through these 100.
 * fits: see `tests.bench.fitting`.
 * costs: `mixed_over_sum` is the cost per crossing cell of a tree with a clean union, solids in contact and a
   bend, over that of the pure sum of its primitives; `gradient_over_sum` is the same with a gradient blend in
@@ -44,6 +49,7 @@ from blobtree import (
     GradientBlend,
     Node,
     Point,
+    Repeat,
     Segment,
     SolidContact,
     Sum,
@@ -59,6 +65,7 @@ from tests.blobtree.trees import points_around
 from tests.bounds import violations_of
 from tests.conformance import problems_of, sample
 from tests.parameter_derivatives import wrong_derivatives
+from tests.sharp_solids import measured
 from tests.soundness import failures_by_seed, random_tree
 
 Figures = dict[str, float]
@@ -289,6 +296,34 @@ def regression(other: Path, rounds: int) -> Figures:
     return {"sum_regression": here / there}
 
 
+def edges(options: argparse.Namespace) -> Figures:
+    """Measure meshes of random solids with sharp edges."""
+    found = [measured(seed) for seed in range(10 if options.quick else 100)]
+    return {
+        "sharp_solids": len(found),
+        "sharp_edge_error": max(one.edge for one in found),
+        "sharp_volume_error": max(one.volume for one in found),
+        "sharp_open": sum(not one.closed for one in found),
+    }
+
+
+def repeats(_: argparse.Namespace) -> Figures:
+    """Time rays down on a hundred boxes of a large grid, and of a grid of these alone."""
+    brick = Box((0, 0, 0), (0.6, 0.6, 0.6), radius=0)
+    grids = [Repeat(Repeat(brick, (1, 0, 0), side, "union"), (0, 1, 0), side, "union") for side in (100, 10)]
+    places = np.random.default_rng(0).uniform(0.0, 9.0, (100_000, 2))
+    origins = np.column_stack([places, np.full(len(places), 5.0)])
+    downward = np.tile([0.0, 0.0, -1.0], (len(places), 1))
+    times: list[list[float]] = [[], []]
+    for _round in range(4):
+        for grid, seconds in zip(grids, times, strict=True):
+            start = time.perf_counter()
+            grid.raycast(origins, downward)
+            seconds.append(time.perf_counter() - start)
+    many, few = (statistics.median(seconds[1:]) for seconds in times)
+    return {"repeat_10000_over_visible": many / few}
+
+
 GROUPS: dict[str, Callable[[argparse.Namespace], Figures]] = {
     "conformance": conformance,
     "bounds": bounds,
@@ -299,6 +334,8 @@ GROUPS: dict[str, Callable[[argparse.Namespace], Figures]] = {
     "convolution": lambda _: convolution_surfaces.figures(),
     "meshes": meshes,
     "blends": bulges,
+    "edges": edges,
+    "repeats": repeats,
     "costs": costs,
     "fits": fits,
 }

@@ -2,12 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import combinations, product
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from blobtree import (
@@ -17,7 +16,6 @@ from blobtree import (
     Disc,
     Frustum,
     HalfSpace,
-    Mesh,
     Node,
     Point,
     Prism,
@@ -33,7 +31,7 @@ from blobtree.tape.program import compile_program
 from tests.blobtree.meshing.test_polygonize import assert_closed
 from tests.oracles import blobtree as oracle
 from tests.oracles import sharp
-from tests.thin_trees import is_closed
+from tests.sharp_solids import measured, volume_of
 
 Floats = Any
 SQUARE = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0))
@@ -42,72 +40,12 @@ NEAR_EDGE, NEAR_VOLUME = 1e-4, 1e-3
 """Errors of meshes: distances of vertices from edges over the size, and relative errors of volumes."""
 
 
-def random_solid(rng: np.random.Generator) -> tuple[Any, float]:
-    """A sharp solid and its volume."""
-    a, b = rng.uniform(-1, 1, (2, 3))
-    first, last = rng.uniform(0.3, 0.8, 2).tolist()
-    length = float(np.linalg.norm(b - a))
-    match rng.integers(0, 4):
-        case 0:
-            size = rng.uniform(0.4, 2, 3)
-            return Box(tuple(a), tuple(size), radius=0), float(size.prod())
-        case 1:
-            return Cylinder(tuple(a), tuple(b), first, radius=0), np.pi * first**2 * length
-        case 2:
-            volume = np.pi / 3 * (first**2 + first * last + last**2) * length
-            return Frustum(tuple(a), tuple(b), first, last), volume
-    count = int(rng.integers(4, 8))
-    angles = np.arange(count) * 2 * np.pi / count
-    flat = rng.uniform(0.6, 1, count)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
-    x, y = flat.T
-    area = 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
-    return Prism(tuple(a + np.array([u, v, 0]) for u, v in flat), first), area * first
-
-
-def distance_from_edges(node: Any, q: Floats) -> Floats:
-    """Distances (n,) of points from the edges of a solid."""
-    if isinstance(node, Cylinder | Frustum):
-        corners = sharp.profile(node)[1:3]
-        axis = np.subtract(node.end, node.start)
-        axis = axis / np.linalg.norm(axis)
-        along = (q - np.array(node.start)) @ axis
-        across = np.linalg.norm(q - np.array(node.start) - along[:, None] * axis, axis=1)
-        return np.min([np.hypot(across - r, along - x) for r, x in corners], axis=0)
-    if isinstance(node, Box):
-        signs = np.array(list(product((-0.5, 0.5), repeat=3)))
-        edges = [(i, j) for i, j in combinations(range(8), 2) if np.abs(signs[i] - signs[j]).sum() == 1]
-        corners = np.array(node.center) + signs * np.array(node.size)
-    else:
-        base, count = np.array(node.points), len(node.points)
-        corners = np.concatenate([base, base + np.array([0, 0, node.height])])
-        ring = [(i, (i + 1) % count) for i in range(count)]
-        edges = [*ring, *((i + count, j + count) for i, j in ring), *((i, i + count) for i in range(count))]
-    best = np.full(len(q), np.inf)
-    for i, j in edges:
-        way, w = corners[j] - corners[i], q - corners[i]
-        t = np.clip(w @ way / (way @ way), 0, 1)
-        best = np.minimum(best, np.linalg.norm(w - t[:, None] * way, axis=1))
-    return best
-
-
-def volume_of(mesh: Mesh) -> float:
-    a, b, c = mesh.vertices.astype(np.float64)[mesh.faces].transpose(1, 0, 2)
-    return float((a * np.cross(b, c)).sum()) / 6.0
-
-
 def check_mesh(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    solid, volume = random_solid(rng)
-    turned = solid.rotate(tuple(rng.normal(size=3)), float(rng.uniform(0, 180)))
-    size = float((turned.bounds[1] - turned.bounds[0]).max())
-    mesh = polygonize(turned, chord_error=3e-4 * size, creases=True)
-    assert is_closed(mesh.faces)
-    assert volume_of(mesh) == pytest.approx(volume, rel=NEAR_VOLUME)
-    assert mesh.sheet_counts is not None
-    assert (mesh.sheet_counts > 0).all()
-    there = mesh.vertices[mesh.sheet_counts > 1] @ np.array(turned.matrix)[:, :3]  # a rotation
-    assert len(there) > 8
-    assert distance_from_edges(solid, there).max() <= NEAR_EDGE * size
+    found = measured(seed)
+    assert found.closed
+    assert found.edge <= NEAR_EDGE
+    assert found.volume <= NEAR_VOLUME
+    assert found.unresolved == 0
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -141,6 +79,7 @@ def test_edges_of_cuts_are_those_of_solids() -> None:
 lengths = st.floats(0.05, 3.0)
 
 
+@settings(deadline=None)  # the first call loads kernels
 @given(st.tuples(lengths, lengths, lengths), st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3))
 def test_a_field_is_a_falloff_of_the_distance(size: Any, place: list[float]) -> None:
     box = Box((0.1, -0.2, 0.3), size, radius=0)
@@ -151,6 +90,7 @@ def test_a_field_is_a_falloff_of_the_distance(size: Any, place: list[float]) -> 
     assert (value > 0.5) == inside or abs(value - 0.5) < 1e-5
 
 
+@settings(deadline=None)  # the first call loads kernels
 @given(
     st.sampled_from([BLOCK, Prism(SQUARE, 0.7), Frustum((0, 0, 0), (0, 0, 1), 0.8, 0.2)]),
     st.floats(-0.15, 0.3),
