@@ -257,39 +257,42 @@ def launch(
         return
     slices = _slice_count(kernel, count, reported=step is not None)
     numbers = iter(range(slices))  # each slice is taken once, by whichever thread is free
+    finished: list[float] = []  # processor time of each slice that is done
 
-    def run(taken: Callable[[int, float], None]) -> float:
+    def run(after_each: Callable[[], None]) -> None:
         command: Any = wp.launch(
             kernel, dim=1, inputs=[0, *inputs], outputs=[*outputs], device=device, record_cmd=True
         )
-        whole = 0.0
         for number in numbers:
             first, last = count * number // slices, count * (number + 1) // slices
             began = time.thread_time()
             command.set_dim(last - first)
             command.set_param_at_index(0, first)
             command.launch()
-            seconds = time.thread_time() - began
-            whole += seconds
-            taken(number, seconds)
-        return whole
+            finished.append(time.thread_time() - began)
+            after_each()
 
-    def taken_here(number: int, seconds: float) -> None:
-        if step is not None:
-            step(number / slices)
-        elif seconds > CHECKED_SLICE_SECONDS:
+    reported = 0
+
+    def report() -> None:
+        nonlocal reported
+        while step is not None and reported < len(finished):
+            reported += 1
+            step(reported / slices)
+        if step is None and finished[-1] > CHECKED_SLICE_SECONDS:
             check_cancelled()
 
     workers = _worker_count(kernel, count, slices)
-    others = [_thread_pool().submit(run, lambda *_: None) for _ in range(workers - 1)]
+    others = [_thread_pool().submit(run, lambda: None) for _ in range(workers - 1)]
     try:
-        seconds = run(taken_here)
+        run(report)
     finally:
         deque(numbers, maxlen=0)  # after an error, no further slice begins
-        elsewhere = [other.result() for other in others if not other.cancel()]
-    if step is not None:
-        step(1.0)
-    _note_cost(kernel, (seconds + sum(elsewhere)) / count)
+        for other in others:
+            if not other.cancel():
+                other.result()
+    report()
+    _note_cost(kernel, sum(finished) / count)
 
 
 # -- memory ---------------------------------------------------------------------------------------------
