@@ -7,20 +7,10 @@ import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from decals.scattering.domain import Domain, OrientedPoints
-from decals.scattering.neighbors import FacingTree, NearestFacing, wide_cells
-from decals.scattering.trial_points import random_points_around
+from decals.scattering.neighbors import FacingTree, NearestFacing
 
-TRIALS, TRIAL_SPREAD = 64, 0.6
-"""Random points around a particle among which gaps are looked for, and their deviation, in spacings."""
-
-BEYOND = 0.05
-"""Distance beyond a boundary or edge, in spacings, from which a random point is left out.
-
-It would be projected onto it, like very many others.
-"""
-
-AROUND = 3.0
-"""Distance from wide gaps, in spacings, within which the next round looks for some."""
+SAMPLES_PER_PARTICLE = 24
+"""Samples for each particle among which gaps are looked for."""
 
 WIDE_GAP = 0.74
 """Distance from the nearest particle, in spacings, from which a sample lies in a wide gap. In a hexagonal
@@ -29,8 +19,8 @@ tiling no point is farther than 0.577."""
 EVEN = 1.1
 """Largest ratio of spacings at which the density counts as even."""
 
-MIN_SAMPLES = 4
-"""Least number of random points in a wide gap; the corner of a square has fewer."""
+MIN_SAMPLES = 2
+"""Least number of samples of a wide gap; the corner of a square has fewer."""
 
 ROUNDS = 8
 """Largest number of rounds of moves."""
@@ -41,19 +31,19 @@ MOVE = 0.5
 ENCLOSING_STEPS = 24
 """Steps toward the centre of the least ball around points (Bădoiu and Clarkson 2003)."""
 
-CENTERING = ((1.3, 0.86), (1.38, 0.7))
-"""Ratio of a radius to the median, at samples alone, from which a decal moves, and its least distance then.
-
-The distance is in spacings. Decals move where they stay even first, then those that would be outsized.
-"""
+OUTSIZED = 1.3
+"""Ratio of a decal's radius to the median, at samples alone, from which it moves."""
 
 CENTERING_ROUNDS = 6
-"""Largest number of rounds of these moves, of each kind."""
+"""Largest number of rounds in which outsized decals move."""
+
+MIN_DISTANCE = 0.7
+"""Least distance of a decal that moved, in spacings."""
 
 NEIGHBORS = 8
 """Nearest decals whose largest radius must fall when a decal moves."""
 
-_TRIAL_STREAM = 11
+_SAMPLE_STREAM = 11
 
 Aim: TypeAlias = Callable[[OrientedPoints], OrientedPoints]
 """A function of centres, with the normals of their surfaces, to these with the normals of decals there."""
@@ -64,7 +54,7 @@ def fill_gaps(
 ) -> OrientedPoints:
     """Return particles, those beside wide gaps moved; gaps remain along lips and ragged boundaries.
 
-    A particle beside a wide gap moves toward the centre of the least ball around random points in its cell.
+    A particle beside a wide gap moves toward the centre of the least ball around the samples nearest to it.
     It stays if another particle would be nearer than before, and nearer than `least`. Where the density is
     not even, all stay: wide gaps belong beside its steps.
 
@@ -81,14 +71,11 @@ def fill_gaps(
     least
         Least distance of particles, in spacings.
     """
-    from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
-
     if sizes.max() > EVEN * sizes.min():
         return points
-    rng = np.random.default_rng(_TRIAL_STREAM)
-    wide = wide_cells(points, sizes, WIDE_GAP, domain.device)
+    counts = np.bincount(points.surface_ids, minlength=len(domain.surfaces))
+    samples = domain.sample(SAMPLES_PER_PARTICLE * counts, stream=_SAMPLE_STREAM)
     for _ in range(ROUNDS):
-        samples = _samples_around(domain, points[wide], float(np.median(sizes)), rng)
         tree = FacingTree(points.positions, points.normals)
         distances, indices = tree.nearest(samples.positions, samples.normals)
         gaps, owners = distances[:, 0], indices[:, 0]
@@ -103,21 +90,7 @@ def fill_gaps(
         if len(rows) == 0:
             break
         points = _replaced(points, rows, moved)
-        near = cKDTree(moved.positions).query(points.positions[wide])[0] < AROUND * sizes[wide]
-        wide = wide[near]
     return points
-
-
-def _samples_around(
-    domain: Domain, points: OrientedPoints, spacing: float, rng: np.random.Generator
-) -> OrientedPoints:
-    """Return random points of the surfaces around given ones."""
-    trials = random_points_around(points, TRIALS, TRIAL_SPREAD * spacing, rng)
-    samples, allowed = domain.project(trials)
-    offsets = (trials.positions - samples.positions).astype(np.float64)
-    squared = np.einsum("ni,ni->n", offsets, offsets)
-    squared -= np.einsum("ni,ni->n", offsets, samples.normals.astype(np.float64)) ** 2
-    return samples[np.flatnonzero(allowed & (squared < (BEYOND * spacing) ** 2))]
 
 
 def center_outsized(
@@ -132,7 +105,7 @@ def center_outsized(
 
     The decals' normals decide which of them face a point, so that beside lips and thin walls some cells are
     larger than those of the particles. A decal stays where its move would make one of its neighbours larger,
-    or bring it nearer to one than `CENTERING` allows.
+    or bring it nearer to one than `MIN_DISTANCE`.
 
     Parameters
     ----------
@@ -155,30 +128,29 @@ def center_outsized(
     decals = aim(centers)
     nearest = NearestFacing(samples.positions, samples.normals)
     radii, owners = _cells(decals, nearest)
-    for outsized, least in CENTERING:
-        for _ in range(CENTERING_ROUNDS):
-            rows = np.flatnonzero(movable & (radii > outsized * np.median(radii)))
-            if len(rows) == 0:
-                break
-            moved = _moved(domain, centers, rows, samples.positions, owners)
-            tree = FacingTree(centers.positions, centers.normals)
-            keep = np.flatnonzero(_far_enough(tree, centers, moved, rows, sizes, least))
-            rows, moved = rows[keep], moved[keep]
-            if len(rows) == 0:
-                break
-            trial = _replaced(centers, rows, moved)
-            count = min(NEIGHBORS, len(centers))
-            around = cKDTree(centers.positions).query(centers.positions[rows], k=np.arange(1, count + 1))[1]
+    for _ in range(CENTERING_ROUNDS):
+        rows = np.flatnonzero(movable & (radii > OUTSIZED * np.median(radii)))
+        if len(rows) == 0:
+            break
+        moved = _moved(domain, centers, rows, samples.positions, owners)
+        tree = FacingTree(centers.positions, centers.normals)
+        keep = np.flatnonzero(_far_enough(tree, centers, moved, rows, sizes, MIN_DISTANCE))
+        rows, moved = rows[keep], moved[keep]
+        if len(rows) == 0:
+            break
+        trial = _replaced(centers, rows, moved)
+        count = min(NEIGHBORS, len(centers))
+        around = cKDTree(centers.positions).query(centers.positions[rows], k=np.arange(1, count + 1))[1]
+        turned = aim(trial)
+        after = _cells(turned, nearest)
+        worse = after[0][around].max(axis=1) >= radii[around].max(axis=1)
+        if worse.any():
+            back = rows[worse]
+            movable[back] = False
+            trial = _replaced(trial, back, centers[back])
             turned = aim(trial)
             after = _cells(turned, nearest)
-            worse = after[0][around].max(axis=1) >= radii[around].max(axis=1)
-            if worse.any():
-                back = rows[worse]
-                movable[back] = False
-                trial = _replaced(trial, back, centers[back])
-                turned = aim(trial)
-                after = _cells(turned, nearest)
-            centers, decals, (radii, owners) = trial, turned, after
+        centers, decals, (radii, owners) = trial, turned, after
     return decals
 
 

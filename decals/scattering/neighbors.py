@@ -12,14 +12,12 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.device import launch
 from blobtree.progress import check_cancelled
 from decals.model import FACING_LIMIT
-from decals.scattering.domain import OrientedPoints
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.repulsion import make_grid, neighbor_search, particle_struct
 from decals.scattering.search_kernels import (
     MirrorPlanes,
     Particles,
     mark_local_maxima,
-    mark_wide_cells,
     nearest_distances,
     ring_distances,
 )
@@ -36,9 +34,6 @@ NEIGHBOR_COUNTS = (4, 16, 64, 256)
 
 ROWS_AT_ONCE = 16_384
 """Points that are searched for at once: NumPy keeps the interpreter's lock meanwhile, and a window waits."""
-
-ALIKE = 0.5
-"""Cosine of the angle between two normals from which two points face about the same other points."""
 
 NEIGHBOR_REACH = 2.0
 """Largest distance of neighbours, in spacings."""
@@ -142,24 +137,6 @@ def local_maxima(
     launch(mark_local_maxima, len(points), [grid.id, positions, *columns], [flags], device=device)
     maxima: BoolArray = flags.numpy() == 1
     return maxima
-
-
-def wide_cells(points: OrientedPoints, sizes: Float32Array, radius: float, device: str) -> Int64Array:
-    """Return the points whose cells may reach beyond a radius, in spacings that are about the same."""
-    count = len(points)
-    positions = vectors(np.ascontiguousarray(points.positions), device)
-    grid = make_grid(count, device)
-    grid.build(positions, 2.0 * radius * float(np.median(sizes)))
-    search: Any = neighbor_search(grid, 2.0 * radius, varied=False)
-    search.facing_limit = ALIKE
-    particles = particle_struct(
-        positions,
-        vectors(np.ascontiguousarray(points.normals), device),
-        wp.array(sizes, dtype=wp.float32, device=device),
-    )
-    flags: Any = wp.zeros(count, dtype=wp.int32, device=device)
-    launch(mark_wide_cells, count, [search, particles, radius], [flags], device=device)
-    return np.flatnonzero(flags.numpy())
 
 
 def index_array(rows: NDArray[np.integer], device: str) -> Scalars:

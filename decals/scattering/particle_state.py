@@ -83,7 +83,7 @@ class ParticleState:
         self._proposed_energy, self._accepted_energy = self._single(wp.float64), self._single(wp.float64)
         self._rejected = self._single(wp.int32)
         self._repulsion = Repulsion(self.count, device=self.device)
-        self._law = Law(0.0)
+        self._law = Law(0.0, 0.0)
         self._steps = self._age = 0
         self._drift = 0.0
         self._listed = False

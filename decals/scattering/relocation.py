@@ -11,7 +11,7 @@ from blobtree._typing import BoolArray, Float32Array, Int64Array
 from decals.scattering.domain import AREA_SAMPLES, Domain, OrientedPoints, apportion
 from decals.scattering.neighbors import NeighborQuery, index_array, local_maxima
 from decals.scattering.particle_state import ParticleState
-from decals.scattering.repulsion import no_mirror_planes, particle_struct
+from decals.scattering.repulsion import particle_struct
 from decals.surfaces.surface import vectors
 
 MIN_ENERGY_RATIO = 1.8
@@ -19,15 +19,6 @@ MIN_ENERGY_RATIO = 1.8
 
 MIN_GAP = 0.55
 """Least distance of a filled point from all particles, in spacings; a hole of a perfect tiling has 0.577."""
-
-WIDE_GAP = 0.86
-"""Distance of a point from all particles, in spacings, from which a decal that covers it would be outsized.
-
-For each such gap one particle leaves its place, the most crowded ones first.
-"""
-
-MOVERS_PER_GAP = 4
-"""Particles for each wide gap of which the most crowded ones leave, without their neighbours."""
 
 MIN_SEPARATION = 1.2
 """Least distance between points that are filled, or particles that leave, at the same time, in spacings."""
@@ -38,8 +29,8 @@ MAX_RELOCATED_SHARE = 0.02
 GAP_REACH = 1.5
 """Distance from all particles, in spacings, from which gaps count as equal."""
 
-CANDIDATES_PER_MOVER, CANDIDATES_PER_PARTICLE = 200, (1, 4)
-"""Candidate points for each crowded particle, and at least and at most for each particle."""
+CANDIDATES_PER_MOVER, CANDIDATES_PER_PARTICLE = 200, 4
+"""Candidate points for each particle that moves, and at most for each particle."""
 
 THIN_REACH, THIN_SHARE = 4.0, 0.45
 """Distance in spacings within which a thin part has less than this share of the area of a disc."""
@@ -70,22 +61,21 @@ class Relocation:
 
     def __call__(self, state: ParticleState, restore: Callable[[ParticleState], None]) -> Int64Array:
         """Move the crowded particles, before which `restore` is called; return those that moved."""
-        restore(state)
-        candidates, sizes = self._next_batch(len(crowded_particles(state)), state.count)
-        targets, gaps = largest_gaps(state, candidates, sizes)
-        if not self._domain.has_thin_parts:
-            movers = crowded_particles(state, least=int(np.count_nonzero(gaps > WIDE_GAP)))
-            return relocate(state, movers, targets)
         movers = crowded_particles(state)
-        targets = targets[np.flatnonzero(~self._on_thin_parts(targets.positions, state.count))]
-        movers = movers[~self._on_thin_parts(state.positions.numpy()[movers], state.count)]
-        return relocate(state, movers, targets)
+        if len(movers) == 0:
+            return movers
+        restore(state)
+        candidates, sizes = self._next_batch(len(movers), state.count)
+        if self._domain.has_thin_parts:
+            thick = np.flatnonzero(~self._on_thin_parts(candidates.positions, state.count))
+            candidates, sizes = candidates[thick], sizes[thick]
+            movers = movers[~self._on_thin_parts(state.positions.numpy()[movers], state.count)]
+        return relocate(state, movers, candidates, sizes)
 
     def _next_batch(self, mover_count: int, count: int) -> tuple[OrientedPoints, Float32Array]:
         """Return enough points for some movers of `count` particles, and the spacings there."""
-        least, most = (share * count for share in CANDIDATES_PER_PARTICLE)
-        points, sizes = self._drawn(most)
-        batch_size = min(most, max(least, CANDIDATES_PER_MOVER * mover_count + 1000))
+        points, sizes = self._drawn(CANDIDATES_PER_PARTICLE * count)
+        batch_size = min(len(points), CANDIDATES_PER_MOVER * mover_count + 1000)
         rows = (self._next + np.arange(batch_size)) % len(points)
         self._next = (self._next + batch_size) % len(points)
         return points[rows], sizes[rows]
@@ -105,62 +95,55 @@ class Relocation:
         """
         from scipy.spatial import cKDTree  # most domains have no thin parts
 
-        points, sizes = self._drawn(CANDIDATES_PER_PARTICLE[1] * count)
+        points, sizes = self._drawn(CANDIDATES_PER_PARTICLE * count)
         tree = cKDTree(points.positions)
         if self._thin is None:
             nearby = tree.query_ball_point(points.positions, THIN_REACH * sizes, return_length=True)
-            flat = CANDIDATES_PER_PARTICLE[1] * np.pi * THIN_REACH**2 / (0.5 * np.sqrt(3.0))
+            flat = CANDIDATES_PER_PARTICLE * np.pi * THIN_REACH**2 / (0.5 * np.sqrt(3.0))
             self._thin = nearby < THIN_SHARE * flat
         return np.asarray(self._thin[tree.query(positions)[1]], np.bool_)
 
 
-def crowded_particles(state: ParticleState, *, least: int = 0) -> Int64Array:
-    """Return the particles to relocate, at least so many, the most crowded first; of neighbours only one."""
+def crowded_particles(state: ParticleState) -> Int64Array:
+    """Return the particles to relocate, the most crowded first; of neighbours only one."""
     energies = state.energies
     max_count = 1 + int(MAX_RELOCATED_SHARE * state.count)
-    order = np.argsort(-energies, kind="stable")
-    order = order[state.movable[order]]
-    crowded = np.count_nonzero(energies[order] > MIN_ENERGY_RATIO * np.median(energies))
-    rows = order[: max(crowded, MOVERS_PER_GAP * least)]
+    rows = np.flatnonzero(state.movable & (energies > MIN_ENERGY_RATIO * np.median(energies)))
+    if len(rows) == 0:
+        return rows
+    rows = rows[np.argsort(-energies[rows], kind="stable")]
+    points = state.positions.numpy()[rows]
     separations = MIN_SEPARATION * state.host_sizes[rows]
-    maxima = local_maxima(state.positions.numpy()[rows], energies[rows], separations, device=state.device)
+    maxima = local_maxima(points, energies[rows], separations, device=state.device)
     return rows[maxima][:max_count]
 
 
-def largest_gaps(
-    state: ParticleState, candidates: OrientedPoints, sizes: Float32Array
-) -> tuple[OrientedPoints, Float32Array]:
-    """Return the candidates in the largest gaps, the largest first, and their distances from all particles.
-
-    `sizes` are spacings at the candidates.
-    """
-    gaps = gap_sizes(state, candidates, sizes, enough=MIN_GAP)
-    bare = np.flatnonzero(gaps > MIN_GAP)
-    separations = MIN_SEPARATION * sizes[bare]
-    maxima = local_maxima(candidates.positions[bare], gaps[bare], separations, device=state.device)
-    rows = bare[maxima]
-    rows = rows[np.argsort(-gaps[rows], kind="stable")]
-    return candidates[rows], gaps[rows]
-
-
-def relocate(state: ParticleState, movers: Int64Array, targets: OrientedPoints) -> Int64Array:
-    """Move particles to targets of their own parts, in turn; return those that moved.
+def relocate(
+    state: ParticleState, movers: Int64Array, candidates: OrientedPoints, candidate_sizes: Float32Array
+) -> Int64Array:
+    """Move particles to the candidates in the largest gaps of their own parts; return those that moved.
 
     Repulsion acts only nearby: it carries no particle to another component, round a sharp tip, or past
-    its neighbours. Counts of the parts stay the same.
+    its neighbours. Counts of the parts stay the same. `candidate_sizes` are spacings at the candidates.
     """
+    gaps = gap_sizes(state, candidates, candidate_sizes, enough=MIN_GAP)
+    bare = np.flatnonzero(gaps > MIN_GAP)
+    separations = MIN_SEPARATION * candidate_sizes[bare]
+    maxima = local_maxima(candidates.positions[bare], gaps[bare], separations, device=state.device)
+    targets = bare[maxima]
+    targets = targets[np.argsort(-gaps[targets], kind="stable")]
     moved: list[int] = []
     filled: list[int] = []
     parts = state.domain.parts(state.points()[movers])
-    parts_of_targets = state.domain.parts(targets)
+    parts_of_targets = state.domain.parts(candidates[targets])
     for part in np.unique(parts):
         own_movers = movers[parts == part].tolist()
-        own_targets = np.flatnonzero(parts_of_targets == part).tolist()
+        own_targets = targets[parts_of_targets == part].tolist()
         pairs = min(len(own_movers), len(own_targets))
         moved += own_movers[:pairs]
         filled += own_targets[:pairs]
     rows = np.array(moved, np.int64)
-    state.move_to(rows, targets.positions[filled], targets.normals[filled])
+    state.move_to(rows, candidates.positions[filled], candidates.normals[filled])
     return rows
 
 
@@ -180,12 +163,8 @@ def gap_sizes(
     own: Any = index_array(np.full(count, -1), device)
     surface_ids = index_array(candidates.surface_ids, device)
     enabled = index_array(np.ones(count, np.int32), device)
-    query = NeighborQuery(state, GAP_REACH)
     mirrors = state.mirror_planes(points, surface_ids, enabled)
-    gaps: Float32Array = query.nearest(points, own, mirrors, enough=enough).numpy()
-    if mirrors.per_point:  # beside a boundary a point's own image is nearer than the particles may be
-        plain = query.nearest(points, own, no_mirror_planes(device), enough=enough).numpy()
-        gaps = np.where(plain > WIDE_GAP, plain, gaps)
+    gaps: Float32Array = NeighborQuery(state, GAP_REACH).nearest(points, own, mirrors, enough=enough).numpy()
     return gaps
 
 

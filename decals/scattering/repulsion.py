@@ -43,6 +43,9 @@ SEARCH_WIDENING = 1.5
 GRID_CELLS = (16, 128)
 """Fewest and most cells of the hash grid along each axis."""
 
+EXPONENTS = (2.0, 3.0)
+"""Exponent of the soft law at the first and the last step."""
+
 STIFFNESS = 1000.0
 """Stiffness of the spring at the last step."""
 
@@ -74,17 +77,20 @@ class Law:
 
     Attributes
     ----------
+    exponent
+        Power p of the soft law x^-p.
     stiffness
         Stiffness of the spring between particles that are too close.
     ring_weight
         Weight of the ring term, which penalises deviations of the mean distance to six neighbours.
     """
 
+    exponent: float
     stiffness: float
     ring_weight: float = 0.0
 
 
-LOCAL_LAW = Law(STIFFNESS)
+LOCAL_LAW = Law(EXPONENTS[1], STIFFNESS)
 """Law for a few particles among others at rest, without ring term, since rings are cut off there."""
 
 
@@ -94,8 +100,13 @@ def law_at(progress: float, progress_since_deformation: float) -> Law:
     `progress_since_deformation` controls the ring term: before particles are nearly at rest it would fix
     the defects of their arrangement.
     """
+    first, last = EXPONENTS
     hardness, ring_share = np.interp((progress, progress_since_deformation), HARDENING, (0.0, 1.0))
-    return Law(STIFFNESS * float(hardness), RING_WEIGHT * float(ring_share))
+    return Law(
+        first + (last - first) * min(progress, 1.0),
+        STIFFNESS * float(hardness),
+        RING_WEIGHT * float(ring_share),
+    )
 
 
 class Repulsion:
@@ -169,7 +180,7 @@ class Repulsion:
 
 def _energy_law(law: Law) -> EnergyLaw:
     parameters: Any = EnergyLaw()
-    parameters.cutoff, parameters.core = CUTOFF, CORE
+    parameters.cutoff, parameters.exponent, parameters.core = CUTOFF, law.exponent, CORE
     parameters.stiffness, parameters.ring_weight = law.stiffness, law.ring_weight
     parameters.damping, parameters.max_move = DAMPING, MAX_MOVE
     struct: EnergyLaw = parameters

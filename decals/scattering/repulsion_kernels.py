@@ -2,7 +2,7 @@
 
 The energy has three terms (the family began with Witkin and Heckbert 1994):
 
-* a soft power law x^-2 of the distance x of two neighbours, in spacings, which spreads them evenly;
+* a soft power law x^-p of the distance x of two neighbours, in spacings, which spreads them evenly;
 * a stiff spring ½ k (core − x)² where x < core, which parts pairs that are too close;
 * a ring term for each particle: the deviation of its mean distance to the six nearest neighbours from the
   mean of all particles, under Tukey's biweight.
@@ -22,7 +22,6 @@ from decals.scattering.search_kernels import (
     NeighborSearch,
     Particles,
     Six,
-    any_tangent,
     insert_distance,
     mean_distance,
     mirrored,
@@ -74,6 +73,8 @@ class EnergyLaw:
 
     cutoff: wp.float32
     """Distance beyond which particles do not repel each other."""
+    exponent: wp.float32
+    """Power p of the soft law x^-p."""
     core: wp.float32
     """Distance below which the spring pushes."""
     stiffness: wp.float32
@@ -111,6 +112,19 @@ class Partner:
 
 
 @wp.struct
+class PairTerms:
+    """Soft law and spring at one distance."""
+
+    value: wp.float32
+    slope: wp.float32
+    """Negative derivative of the value."""
+    curvature: wp.float32
+    """Second derivative of value and spring."""
+    penetration: wp.float32
+    """Core less distance, at least 0."""
+
+
+@wp.struct
 class NewtonSystem:
     """Force and curvature of the energy in coordinates of the tangent plane."""
 
@@ -129,11 +143,20 @@ def facing_weight(cosine: wp.float32, facing_limit: wp.float32) -> wp.float32:
 
 
 @wp.func
-def direction_of(offset: wp.vec3, length: wp.float32, least: wp.float32, fallback: wp.vec3) -> wp.vec3:
-    """Return the unit direction of an offset of that length, or the fallback if it is below the least one."""
-    if length > least:
-        return offset * (1.0 / length)
-    return fallback
+def any_tangent(normal: wp.vec3) -> wp.vec3:
+    """Return a unit vector at right angles to the unit normal, the same for the same normal."""
+    axis = wp.vec3(1.0, 0.0, 0.0)
+    if wp.abs(normal[0]) > 0.6:
+        axis = wp.vec3(0.0, 1.0, 0.0)
+    return wp.normalize(axis - normal * wp.dot(axis, normal))
+
+
+@wp.func
+def separation(offset: wp.vec3, fallback_direction: wp.vec3, closest: wp.float32) -> wp.vec3:
+    """Return the offset of two particles, stretched to at least the closest distance."""
+    if wp.length_sq(offset) > 1.0e-12 * closest * closest:
+        return offset * wp.max(1.0, closest / wp.length(offset))
+    return fallback_direction * closest
 
 
 @wp.func
@@ -158,6 +181,19 @@ def ring_cost(deviation: wp.float32) -> wp.float32:
     """Return Tukey's biweight: half the square for small deviations, constant from the largest one on."""
     t = wp.max(1.0 - deviation * deviation / (MAX_RING_DEVIATION * MAX_RING_DEVIATION), 0.0)
     return MAX_RING_DEVIATION * MAX_RING_DEVIATION / 6.0 * (1.0 - t * t * t)
+
+
+@wp.func
+def pair_terms(x: wp.float32, law: EnergyLaw) -> PairTerms:
+    """Return the soft law x^-p with its derivatives, and the penetration of the core."""
+    terms = PairTerms()
+    terms.value = wp.pow(x, -law.exponent)
+    terms.slope = law.exponent * terms.value / x
+    terms.curvature = (law.exponent + 1.0) * terms.slope / x
+    terms.penetration = wp.max(law.core - x, 0.0)
+    if terms.penetration > 0.0:
+        terms.curvature += law.stiffness
+    return terms
 
 
 @wp.func
@@ -323,7 +359,7 @@ def repel(
 
     The energy of a pair at distance x, in the mean of its two spacings, is
 
-        E(x) = x^-2 − c^-2 + 2 c^-3 (x − c) + ½ k max(core − x, 0)²,    x < c (the cutoff),
+        E(x) = x^-p − c^-p + p c^(-p-1) (x − c) + ½ k max(core − x, 0)²,    x < c (the cutoff),
 
     so value and slope of the soft law vanish at the cutoff. Below `CLOSEST` E continues along its tangent.
     The curvature across the line of a pair is negative and left out.
@@ -341,12 +377,11 @@ def repel(
     u = any_tangent(particles.normals[i])
     v = wp.cross(particles.normals[i], u)
     size = particles.sizes[i]
-    inverse_size = 1.0 / size
     system = NewtonSystem()
     energy = float(0.0)
     pair_energy = wp.float64(0.0)
-    cutoff_value = 1.0 / (law.cutoff * law.cutoff)
-    cutoff_slope = 2.0 * cutoff_value / law.cutoff
+    cutoff_value = wp.pow(law.cutoff, -law.exponent)
+    cutoff_slope = law.exponent * cutoff_value / law.cutoff
     mean_ring = rings.total[0] / wp.float32(particles.positions.shape[0])
     for k in range(lists.counts[i] + 1):
         # after its neighbours the particle itself, for its own images
@@ -356,27 +391,21 @@ def repel(
             j = lists.indices[i * lists.capacity + k]
             list_weight = lists.weights[i * lists.capacity + k]
         pair_size = 0.5 * (size + particles.sizes[j])
-        reach = law.cutoff * pair_size
         for image in range(mirrors.per_point + 1):
             partner = partner_at(i, j, image, list_weight, u, particles, mirrors)
             offset = p - partner.position
-            square = wp.length_sq(offset)
-            if partner.weight > 0.0 and square < reach * reach:
-                length = wp.sqrt(square)
-                away = direction_of(offset, length, 1.0e-6 * pair_size, partner.fallback_direction)
-                distance = length / pair_size  # as `measure_rings` has it, bit for bit
-                x = wp.max(distance, CLOSEST)
+            reach_squared = law.cutoff * law.cutoff * pair_size * pair_size
+            if partner.weight > 0.0 and wp.length_sq(offset) < reach_squared:
+                # the distance, and the law at it
+                away = separation(offset, partner.fallback_direction, CLOSEST * pair_size) / pair_size
+                x = wp.length(away)
+                distance = wp.length(offset) / pair_size
+                terms = pair_terms(x, law)
+                slope = terms.slope - cutoff_slope + law.stiffness * terms.penetration
 
                 # force and curvature along the line of the pair
-                inverse = 1.0 / x
-                value = inverse * inverse
-                penetration = wp.max(law.core - x, 0.0)
-                slope = 2.0 * value * inverse - cutoff_slope + law.stiffness * penetration
-                push = partner.weight * pair_size * inverse_size * slope
-                bend = 6.0 * value * value
-                if penetration > 0.0:
-                    bend += law.stiffness
-                bend *= partner.weight
+                push = partner.weight * (pair_size / size) * slope
+                bend = partner.weight * terms.curvature
                 if law.ring_weight > 0.0 and partner.weight >= 1.0:
                     both = with_ring_terms(
                         wp.vec2(push, bend), i, j, distance, pair_size, mean_ring, particles, rings, law
@@ -384,8 +413,8 @@ def repel(
                     push = both[0]
                     bend = both[1]
                 bend *= partner.mirror_factor
-                ax = wp.dot(away, u)
-                ay = wp.dot(away, v)
+                ax = wp.dot(away, u) / x
+                ay = wp.dot(away, v) / x
                 system.fx += push * ax
                 system.fy += push * ay
                 system.hxx += bend * ax * ax
@@ -393,9 +422,13 @@ def repel(
                 system.hyy += bend * ay * ay
 
                 # the energy, along its tangent where particles are nearer than the closest distance
-                part = value - cutoff_value + cutoff_slope * (x - law.cutoff)
-                part += 0.5 * law.stiffness * penetration * penetration + (x - distance) * slope
-                part *= partner.weight
+                part = (
+                    terms.value
+                    - cutoff_value
+                    + cutoff_slope * (x - law.cutoff)
+                    + 0.5 * law.stiffness * terms.penetration * terms.penetration
+                )
+                part = partner.weight * (part + wp.max(x - distance, 0.0) * slope)
                 energy += part
                 pair_energy += wp.float64(0.5 * pair_size * pair_size * part)
     pair_energy += wp.float64(size * size * law.ring_weight * ring_cost(mean_ring - rings.means[i]))

@@ -3,21 +3,11 @@
 # mypy: disable-error-code="call-overload"
 # (Warp declares no arithmetic of vectors)
 
-import math
-
 import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
 
 wp.set_module_options(KERNEL_OPTIONS)
-
-DIRECTIONS = 24
-"""Points on the circle that `mark_wide_cells` tests."""
-
-ALL_DIRECTIONS = (1 << DIRECTIONS) - 1
-
-TURN = 2.0 * math.pi / DIRECTIONS
-"""Angle between two of these points."""
 
 Six = wp.types.vector(6, wp.float32)
 """Distances to the six nearest particles, ascending."""
@@ -57,15 +47,6 @@ class NeighborSearch:
     """Factor of the radius that the grid is searched with, above 1 where spacings vary."""
     facing_limit: wp.float32
     """Least cosine of two normals that face the same way."""
-
-
-@wp.func
-def any_tangent(normal: wp.vec3) -> wp.vec3:
-    """Return a unit vector at right angles to the unit normal, the same for the same normal."""
-    axis = wp.vec3(1.0, 0.0, 0.0)
-    if wp.abs(normal[0]) > 0.6:
-        axis = wp.vec3(0.0, 1.0, 0.0)
-    return wp.normalize(axis - normal * wp.dot(axis, normal))
 
 
 @wp.func
@@ -194,47 +175,6 @@ def ring_distances(
                         six = insert_distance(six, wp.length(p - image) / pair_size)
     nearest[k] = six[0]
     rings[k] = mean_distance(six)
-
-
-@wp.kernel
-def mark_wide_cells(
-    first: wp.int32,
-    search: NeighborSearch,
-    particles: Particles,
-    radius: wp.float32,
-    flags: wp.array(dtype=wp.int32),
-) -> None:
-    """Write 1 for particles whose cells may reach beyond a radius, in spacings.
-
-    A cell ends within the circle of that radius in the tangent plane if each of the points on it is nearer to
-    another particle, of almost the same normal. Of others it is unknown whether they face the cell's points.
-    """
-    i = first + wp.tid()
-    p = particles.positions[i]
-    n = particles.normals[i]
-    u = any_tangent(n)
-    v = wp.cross(n, u)
-    circle = radius * particles.sizes[i]
-    covered = int(0)
-    j = int(0)
-    query = wp.hash_grid_query(search.grid, p, 2.0 * circle)
-    while covered != ALL_DIRECTIONS and wp.hash_grid_query_next(query, j):
-        offset = particles.positions[j] - p
-        square = wp.length_sq(offset)
-        if (
-            j != i
-            and square < 4.0 * circle * circle
-            and wp.dot(n, particles.normals[j]) > search.facing_limit
-        ):
-            x = wp.dot(offset, u)
-            y = wp.dot(offset, v)
-            for k in range(DIRECTIONS):
-                angle = TURN * wp.float32(k)
-                if 2.0 * circle * (x * wp.cos(angle) + y * wp.sin(angle)) > square:
-                    covered = covered | (1 << k)
-    flags[i] = 0
-    if covered != ALL_DIRECTIONS:
-        flags[i] = 1
 
 
 @wp.kernel

@@ -301,14 +301,16 @@ def test_the_pair_energy_of_the_page_is_that_of_a_relaxation() -> None:
     positions = relaxation.positions.astype(np.float64)
     i, j = np.triu_indices(len(positions), 1)
     x = np.linalg.norm(positions[i] - positions[j], axis=1) / relaxation.spacing
-    cutoff, closest = 2.0, 0.6
+    exponent, cutoff, closest = 2 + 1 / 150, 2.0, 0.6
 
     def slope(distance: Array) -> Array:
-        result: Array = -2.0 * distance**-3 + 2.0 * cutoff**-3
+        result: Array = -exponent * distance ** (-exponent - 1) + exponent * cutoff ** (-exponent - 1)
         return result
 
     clamped = np.maximum(x, closest)
-    values = clamped**-2 - cutoff**-2 + 2.0 * cutoff**-3 * (clamped - cutoff)
+    values = (
+        clamped**-exponent - cutoff**-exponent + exponent * cutoff ** (-exponent - 1) * (clamped - cutoff)
+    )
     values -= (clamped - x) * slope(clamped)
     assert relaxation.energy == pytest.approx(values[x < cutoff].sum(), rel=1e-5)
 

@@ -16,7 +16,7 @@ from decals.scattering.neighbors import FacingTree, NearestFacing, NeighborQuery
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.polish import polish
 from decals.scattering.relaxation import Relaxation
-from decals.scattering.relocation import crowded_particles, largest_gaps, relocate
+from decals.scattering.relocation import crowded_particles, relocate
 from decals.scattering.repulsion import CORE, CUTOFF, Law
 from decals.scattering.repulsion_kernels import CLOSEST
 from decals.scattering.search_kernels import Candidates, ChoiceRule, move_to_best
@@ -40,7 +40,7 @@ def state_in_a_row(movable: ArrayLike) -> ParticleState:
     domain = Domain([plane(100.0)], seed=0)
     points = row_of([0.0, 0.01, 1.0, 2.0, 3.0, 4.0, 5.0])
     state = ParticleState(domain, points, np.asarray(movable), np.ones(7, np.float32))
-    state.begin_epoch(Law(0.0))
+    state.begin_epoch(Law(3.0, 0.0))
     return state
 
 
@@ -49,9 +49,7 @@ def test_crowded_particles_move_to_gaps() -> None:
     movers = crowded_particles(state)
     assert movers.tolist() == [1]  # as crowded as its neighbour from the left, and more from the right
     candidates = row_of([0.5, 9.0, 1.1])
-    targets, gaps = largest_gaps(state, candidates, np.ones(3, np.float32))
-    assert gaps.tolist() == [1.5]
-    relocate(state, movers, targets)
+    relocate(state, movers, candidates, np.ones(3, np.float32))
     assert state.points().positions[:, 0].tolist() == [0, 9, 1, 2, 3, 4, 5]
     assert crowded_particles(state_in_a_row(np.arange(7) > 1)).tolist() == []
 
@@ -59,7 +57,7 @@ def test_crowded_particles_move_to_gaps() -> None:
 def test_relocation_stays_on_the_surface() -> None:
     state = state_in_a_row([True] * 7)
     before = state.points().positions
-    relocate(state, np.array([1]), row_of([9.0, 11.0], surface_id=1))
+    relocate(state, np.array([1]), row_of([9.0, 11.0], surface_id=1), np.ones(2, np.float32))
     assert np.array_equal(state.points().positions, before)
 
 
@@ -103,11 +101,11 @@ def test_step_that_raises_the_energy_is_rejected() -> None:
         np.ones(count, bool),
         np.full(count, 0.3, np.float32),
     )
-    law = Law(300.0)
+    law = Law(3.0, 300.0)
     state.begin_epoch(law)
     guides = state.points().normals
     rule: dict[str, Any] = {"cutoff": CUTOFF, "core": CORE, "facing_limit": FACING_LIMIT, "closest": CLOSEST}
-    rule["stiffness"] = law.stiffness
+    rule |= {"exponent": law.exponent, "stiffness": law.stiffness}
     energies, stayed = [], 0
     for _ in range(12):
         before = state.points().positions
