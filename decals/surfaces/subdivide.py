@@ -15,7 +15,6 @@ Midpoints = Callable[[Float64Array, Int64Array], Float64Array]
 """Rows ``float64[k, c]`` of new vertices, from the rows of all and the ends ``int64[k, 2]`` of edges."""
 
 _CUTS = {
-    0: ((0, 1, 2),),
     1: ((0, 3, 2), (3, 1, 2)),
     2: ((0, 1, 4), (0, 4, 2)),
     4: ((0, 1, 5), (5, 1, 2)),
@@ -24,7 +23,7 @@ _CUTS = {
     5: ((5, 0, 3), (2, 5, 3), (2, 3, 1)),
     7: ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
 }
-"""Triangles by the set of edges that are halved: corners 0 to 2, middles 3 to 5 of the edges behind them."""
+"""Triangles by the edges that are halved, if any: corners 0 to 2, middles 3 to 5 of the edges behind them."""
 
 
 def means(rows: Float64Array, ends: Int64Array) -> Float64Array:
@@ -73,7 +72,7 @@ def subdivided(
     InvalidMesh
         More than MAX_FACES triangles would be needed.
     """
-    before = 0
+    before, done = 0, [faces[:0]]  # faces without a long edge stay as they are
     while True:
         next_corners = np.roll(faces, -1, axis=1)
         low, high = (of(faces, next_corners).reshape(-1) for of in (np.minimum, np.maximum))
@@ -82,13 +81,14 @@ def subdivided(
         halved = edges[:, 1] >= before  # the others were short before
         halved[halved] = is_long(*(rows[ends, :3] for ends in edges[halved].T))
         if not halved.any():
-            return rows, faces
+            return rows, np.concatenate([*done, faces])
         numbers = np.full(len(edges), -1)
         numbers[halved] = len(rows) + np.arange(int(halved.sum()))
         middles = numbers[edge_of.reshape(-1, 3)]
         kinds = (middles >= 0) @ [1, 2, 4]
-        if (1 + np.bitwise_count(kinds)).sum() > MAX_FACES:  # each middle adds a triangle
-            raise too_many("more")
+        if sum(map(len, done)) + (1 + np.bitwise_count(kinds)).sum() > MAX_FACES:
+            raise too_many("more")  # each middle adds a triangle
+        done.append(faces[kinds == 0])
         before = len(rows)
         rows = np.concatenate([rows, midpoints(rows, edges[halved])])
         corners = np.concatenate([faces, middles], axis=1)
