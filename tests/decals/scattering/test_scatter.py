@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import SphericalVoronoi
 
-from blobtree import Point, Segment
+from blobtree import Point, PolarRepeat, Repeat, Segment
 from blobtree.kernels import COMPILING
 from decals.errors import InvalidScattering
 from decals.model import Decals
@@ -302,3 +302,13 @@ def test_rules_by_name() -> None:
     )
     for column in ("radii", "images", "tangents"):
         np.testing.assert_array_equal(getattr(named, column), getattr(members, column))
+
+
+def test_copies_of_a_repeat_have_as_many_decals() -> None:
+    row = scatter(Repeat(Point((0, 0, 0), radius=0.5), (1.3, 0, 0), 5, joining="union"), count=150)
+    ring = scatter(PolarRepeat(Point((1.5, 0, 0), radius=0.5), (0, 0, 1), 7, joining="union"), count=210)
+    turns = np.arctan2(ring.positions[:, 1], ring.positions[:, 0]) / (2.0 * np.pi)
+    for copies, of in ((5, row.positions[:, 0] / 1.3), (7, 7.0 * turns % 7.0)):
+        counts = np.bincount(np.rint(of).astype(int) % copies, minlength=copies)
+        assert len(counts) == copies
+        assert 25 <= counts.min() <= counts.max() <= 35
