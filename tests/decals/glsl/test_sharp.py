@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from blobtree import Box, Cone, Cylinder, Node, Prism
+from blobtree.tape.instruction_set import library
 from blobtree.tape.model import gradients_at
 from decals.rendering.context import Context
 from decals.rendering.tracing_shader import Kinds
@@ -17,15 +18,20 @@ from tests.oracles import blobtree as oracle
 STAR = ((0, 0, 0), (1, 0.4, 0), (2, 0, 0), (1, 1.5, 0))
 
 
-@pytest.mark.parametrize(
-    "solid",
-    [
-        Box((0.1, 0.2, 0.3), (2, 1, 1), radius=0),
-        Cylinder((0, 0, 0), (1, 2, 0.5), 0.6, radius=0),
-        Cone((0, 0, 0), (1, 2, 0.5), radius=0.5, end_radius=0),
-        Prism(STAR, 0.7),
-    ],
-)
+SOLIDS: list[Node] = [
+    Box((0.1, 0.2, 0.3), (2, 1, 1), radius=0),
+    Cylinder((0, 0, 0), (1, 2, 0.5), 0.6, radius=0),
+    Cone((0, 0, 0), (1, 2, 0.5), radius=0.5, end_radius=0),
+    Prism(STAR, 0.7),
+]
+
+
+def test_the_solids_use_every_sharp_field() -> None:
+    used = {library().fields[code].name for solid in SOLIDS for code in solid.tape.fields}
+    assert used == {field.name for field in library().fields if field.name.startswith("sharp_")}
+
+
+@pytest.mark.parametrize("solid", SOLIDS)
 def test_fields_are_the_same_in_both_languages(context: Context, solid: Node) -> None:
     rng = np.random.default_rng(3)
     points = points_around(rng, solid, 200)

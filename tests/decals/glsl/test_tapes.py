@@ -91,7 +91,8 @@ def test_whole_tapes_are_the_same_in_both_languages(context: Context, start: int
 
 def test_direct_fields_are_the_same_in_both_languages(context: Context) -> None:
     kinds = kinds_of(FIELD_TREES)
-    assert kinds.fields == tuple(range(len(kinds.instruction_set.fields)))
+    others = [field.name for code, field in enumerate(library().fields) if code not in kinds.fields]
+    assert all(name.startswith("sharp_") for name in others)  # those are in test_sharp
     # Bounds of arcs depend on where the kernel ends, a square root of a difference that is near 0.
     assert_same_in_both_languages(context, FIELD_TREES, kinds, bounds_agreement=1e-4)
 

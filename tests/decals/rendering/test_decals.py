@@ -67,7 +67,7 @@ def test_without_nested_decals_their_code_is_left_out(
         points = decals, buffers.position[seen], buffers.normal[seen]
         uv = evaluate(*points).uv
         with monkeypatch.context() as patch:
-            patch.setattr("decals.index.arrays.has_nested", lambda *_, value=same: value)
+            patch.setattr("decals.index.editor.has_nested", lambda *_, value=same: value)
             patch.setattr("decals.field.evaluate.index_on", index_without_nested)
             other = renderer.render(replace(view, decals=decals[:]), options)
             change = np.abs(other.astype(int) - first).max()
