@@ -434,9 +434,9 @@ REMOUNTED = """async () => {
   const root = document.getElementById("viewer");
   const text = document.getElementById("data").textContent;
   viewer.dispose();
-  (await mount(root, text)).dispose();
+  (await mountOver(root, text, { reason: "" })).dispose();
   await new Promise((resolve) => setTimeout(resolve, 200));
-  globalThis.viewer = await mount(root, text);
+  globalThis.viewer = await mountOver(root, text, { reason: "" });
   window.saved = 0;
   URL.createObjectURL = () => `data:,${(window.saved += 1)}`;
   viewer.canvas.focus();
