@@ -53,7 +53,7 @@ FIREFOX = {"webgl.force-enabled": True}
 """Settings without which Firefox leaves WebGL out where there is no graphics card."""
 
 STARTED = (
-    """() => viewer.set || document.querySelector("main").textContent.includes("cannot be turned here")"""
+    """() => viewer?.set || document.querySelector("main").textContent.includes("cannot be turned here")"""
 )
 """True once a page is ready or says why it is not; its script, outside `main`, has these words too."""
 PIXELS = """() => {
