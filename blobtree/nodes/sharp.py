@@ -36,6 +36,9 @@ wp.set_module_options({"enable_backward": False})
 SHEET_TOLERANCE = wp.constant(1e-4)
 """Distance outside a solid, over its mean radius, up to which a point belongs to a face of it."""
 
+LEAST_RATE = 1e-15
+"""Least rate at which the distances from the side and from an end of a cone approach each other."""
+
 DISTANCE_MARGIN = wp.constant(1e-6)
 """Relative error of distances in float32."""
 
@@ -194,7 +197,7 @@ class SharpSolid(Profile, FieldPrimitive):
 
     @classmethod
     def inradii(cls, leaves: Sequence[Any]) -> Float64Array:
-        """Return the mean radii and the offsets."""
+        """Return the sums of mean radius and offset, 0 or less where nothing is left."""
         return np.array([leaf.mean + leaf.offset for leaf in leaves])
 
 
@@ -469,7 +472,7 @@ def prism_outline(place: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
 
 @wp.func
 def prism_gradient(g: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
-    """Return a direction along the axes of the base and its normal as one in space."""
+    """Return the direction in space that has coordinates g along both axes of the base and its normal."""
     along = tape[at + 1]
     across = tape[at + 2]
     u = wp.vec3(along[0], along[1], along[2])
@@ -630,9 +633,10 @@ def polygon_frame(points: Float64Array) -> tuple[Float64Array, Float64Array]:
 class Prism(Pieces):
     """A solid with a polygon as its base, also a concave one: it rises along the normal of the base.
 
-    The corners of the base are counter-clockwise seen from the top. With `radius` 0 all edges are sharp; a
-    larger one makes everything within `radius` of that solid. A width grows with the radius, or with a sharp
-    prism's mean radius: half its height, or twice the area of the base over its perimeter where that is less.
+    The corners of the base are counter-clockwise seen from the top. With `radius` 0 all edges are sharp. With
+    a larger one, the solid also holds all points within `radius` of the sharp one. A width grows with the
+    radius, or with the mean radius of a sharp prism: the smaller one of half its height and twice the area of
+    the base over its perimeter.
 
     Raises
     ------
@@ -672,8 +676,8 @@ class Prism(Pieces):
 class Frustum(Pieces):
     """A cone with flat ends: a truncated one, or a pointed one where one of both radii is 0.
 
-    With `radius` 0 all edges are sharp; a larger one makes everything within `radius` of that solid. A width
-    grows with the radius, or with that of the largest ball in a sharp one.
+    With `radius` 0 all edges are sharp. With a larger one, the solid also holds all points within `radius` of
+    the sharp one. A width grows with the radius, or with that of the largest ball in a sharp one.
 
     Raises
     ------
@@ -724,7 +728,8 @@ def sharp_frustum(solid: Any, first: float, last: float) -> Node:
     length = float(np.linalg.norm(np.subtract(solid.end, solid.start)))
     slant = float(np.hypot(length, first - last))
     widest, slope = first * length / slant, (last - first) / slant
-    middles = np.clip([0.5 * length, widest / (1.0 - slope), (length - widest) / (1.0 + slope)], 0.0, length)
+    rates = np.maximum([1.0 - slope, 1.0 + slope], LEAST_RATE)  # nearly 0 in a cone that is almost flat
+    middles = np.clip([0.5 * length, *np.array([widest, length - widest]) / rates], 0.0, length)
     inradius = np.minimum(np.minimum(middles, length - middles), widest + slope * middles).max()
     return _SharpFrustum(
         solid.start,

@@ -174,3 +174,9 @@ def test_a_pose_moves_the_solid(solid: Any) -> None:
 def test_wrong_solids_are_refused(make: Callable[[], Node], message: str) -> None:
     with pytest.raises(InvalidNode, match=message):
         make()
+
+
+@pytest.mark.parametrize("radii", [(1e12, 1.0), (1.0, 1e12), (1e12, 0.0)])
+def test_a_cone_that_is_almost_flat(radii: tuple[float, float]) -> None:
+    flat = Frustum((0, 0, 0), (0, 0, 1), *radii)
+    np.testing.assert_allclose(flat([[0, 0, 0], [0, 0, 1]]), 0.5, atol=1e-6)
