@@ -213,7 +213,10 @@ def _slice_count(kernel: wp.Kernel, count: int, *, reported: bool) -> int:
 
 
 def _worker_count(kernel: wp.Kernel, count: int, slices: int) -> int:
-    """Return the number of threads with which a launch ends first: n of them take n j + t / n seconds."""
+    """Return the number of threads with which a launch ends first.
+
+    A launch of t seconds of processor time takes n j + t / n seconds with n threads, j to join for each.
+    """
     quickest = math.sqrt(_expected_seconds(kernel, count) / JOIN_SECONDS)
     return max(1, int(min(_thread_count(), slices, quickest)))
 
@@ -256,7 +259,7 @@ def launch(
         wp.launch(kernel, dim=count, inputs=[0, *inputs], outputs=[*outputs], device=device)
         return
     slices = _slice_count(kernel, count, reported=step is not None)
-    numbers = iter(range(slices))  # each slice is taken once, by whichever thread is free
+    numbers = iter(range(slices))  # a free thread takes the next slice
     finished: list[float] = []  # processor time of each slice that is done
 
     def run(after_each: Callable[[], None]) -> None:

@@ -488,7 +488,7 @@ def _triangles(polygons: Int32Array, positions: Float32Array) -> tuple[Int32Arra
 
 
 def _with_single_diagonals(turned: Int32Array, faces: Int32Array, quads: int) -> Int32Array:
-    """Return faces with turned diagonals but where two quads, or another edge, would have the same one."""
+    """Return faces with turned diagonals, except those that are edges already or would serve two quads."""
     while True:
         edges = np.sort(np.stack([turned, np.roll(turned, -1, axis=1)], axis=2), axis=2)
         keys = edges[..., 0].astype(np.int64) * (int(turned.max(initial=0)) + 1) + edges[..., 1]
