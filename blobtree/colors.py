@@ -7,7 +7,7 @@ import numpy as np
 from PIL import ImageColor
 
 from blobtree.errors import ImplicitDecalsError, InvalidNode, MissingPackage
-from blobtree.validation import real, real_number, shown
+from blobtree.validation import describe, real, real_number
 
 Rgb = tuple[float, float, float]
 Rgba = tuple[float, float, float, float]
@@ -85,5 +85,5 @@ def _named_channels(value: Any) -> tuple[float, ...]:
 
 
 def _line(value: object) -> str:
-    text = " ".join(shown(value).split())
+    text = " ".join(describe(value).split())
     return f"{text:.60}"

@@ -28,7 +28,7 @@ from blobtree.nodes.numeric_parameters import (
 from blobtree.nodes.parameter_gradient import gradient_sensitivities, parameter_gradient_of
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import checked_tree, gradients_at
-from blobtree.validation import items, point_array, positive_count, positive_number, real, shown
+from blobtree.validation import describe, items, point_array, positive_count, positive_number, real
 
 MAX_EVALUATIONS = 60
 TOLERANCE = 1e-9
@@ -347,7 +347,7 @@ def _free(tree: Node, fixed: Iterable[Selection] | None) -> tuple[NumericParamet
         if selections is None or not all(
             isinstance(one, NumericParameter) or items(one) is not None for one in selections
         ):
-            raise InvalidNode(f"fixed: expected names of parameters or paths of nodes, got {shown(fixed)}")
+            raise InvalidNode(f"fixed: expected names of parameters or paths of nodes, got {describe(fixed)}")
         kept = set()
         for selection in selections:
             chosen = {parameter for parameter in parameters if _selects(selection, parameter)}

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from blobtree.errors import InvalidInput, UnusableFile
 from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
-from blobtree.validation import shown
+from blobtree.validation import describe
 
 FORM = b"implicit-decals 1"
 """Form of the encoding that is hashed; another one gives all values other hashes."""
@@ -145,7 +145,7 @@ def _encoded(value: Any) -> Iterable[bytes | memoryview]:
             yield from _encoded(item)
     else:
         raise InvalidInput(
-            f"expected a value with a content hash, got {shown(value)}; give numbers, texts, arrays, "
+            f"expected a value with a content hash, got {describe(value)}; give numbers, texts, arrays, "
             "dataclasses, lists and mappings of them, or values of this package"
         )
 

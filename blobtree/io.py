@@ -31,7 +31,7 @@ from blobtree.nodes.node import Node
 from blobtree.nodes.values import left_out, operand_names
 from blobtree.tape.model import checked_tree
 from blobtree.tape.program import postorder
-from blobtree.validation import shown
+from blobtree.validation import describe
 
 VERSION: Literal[1] = 1
 
@@ -274,7 +274,7 @@ def load(path: str | os.PathLike[str]) -> Node:
 
 def _checked_path(path: str | os.PathLike[str]) -> str | os.PathLike[str]:
     if not isinstance(path, str | os.PathLike):
-        raise InvalidFile(f"path: expected the path of a file, got {shown(path)}")
+        raise InvalidFile(f"path: expected the path of a file, got {describe(path)}")
     return path
 
 

@@ -7,7 +7,7 @@ from typing import TypeVar
 from blobtree.cells.sparse_cells import MIN_CULLED_TEXELS
 from blobtree.errors import InvalidNode, InvalidResolution
 from blobtree.tape.model import ImplicitModel, checked_tree
-from blobtree.validation import items, shown
+from blobtree.validation import describe, items
 
 Result = TypeVar("Result")
 
@@ -16,7 +16,7 @@ def checked_trees(trees: object) -> tuple[ImplicitModel, ...]:
     """Return several trees; raise InvalidNode for other values."""
     listed = None if isinstance(trees, ImplicitModel | str) else items(trees)
     if listed is None:
-        raise InvalidNode(f"trees: expected several BlobTree nodes, got {shown(trees)}")
+        raise InvalidNode(f"trees: expected several BlobTree nodes, got {describe(trees)}")
     for number, tree in enumerate(listed):
         try:
             checked_tree(tree)

@@ -1,6 +1,5 @@
 """What is loaded or computed at first access: the public names of packages, and properties of objects."""
 
-import atexit
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,16 +8,6 @@ from typing import Any, Generic, Self, TypeVar, overload
 import lazy_loader
 
 Value = TypeVar("Value")
-
-
-@atexit.register
-def _end_quickly() -> None:
-    """Collect the last cycles, but leave all imported objects to the end of the process.
-
-    The interpreter would go through them once more and take each apart, for most of a second.
-    """
-    gc.collect()
-    gc.freeze()
 
 
 def attach_stub(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:

@@ -19,7 +19,7 @@ from typing import Any
 
 from blobtree.declare.parameters import SPECIFIED, Parameter, Quantity
 from blobtree.errors import InvalidDefinition, InvalidNode
-from blobtree.validation import real_number, shown
+from blobtree.validation import describe, real_number
 
 
 def _field(
@@ -35,9 +35,11 @@ def _field(
 ) -> Any:
     """Return a field of a dataclass that declares a parameter."""
     if not isinstance(doc, str):
-        raise InvalidDefinition(f"par.{quantity.value}: expected a description, got {shown(doc)}")
+        raise InvalidDefinition(f"par.{quantity.value}: expected a description, got {describe(doc)}")
     if not _in_order(low, high):
-        raise InvalidDefinition(f"{doc}: expected numbers low ≤ high, got {shown(low)} and {shown(high)}")
+        raise InvalidDefinition(
+            f"{doc}: expected numbers low ≤ high, got {describe(low)} and {describe(high)}"
+        )
     if natural is None and default is not MISSING:
         natural = default
     parameter = Parameter(quantity, doc, low=low, high=high, hint=hint, natural=natural, whole=is_whole)

@@ -11,7 +11,7 @@ from blobtree.errors import InvalidPoints, InvalidResolution
 from blobtree.formulas.falloff import ISO
 from blobtree.pyvista_views import polydata_of, require_pyvista
 from blobtree.tape.model import ImplicitModel
-from blobtree.validation import finite_number, finite_vector, is_whole, items, shown
+from blobtree.validation import describe, finite_number, finite_vector, is_whole, items
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -63,7 +63,9 @@ def slice_tree(
 def _levels(values: Iterable[float]) -> list[float]:
     found = items(values)
     if found is None:
-        raise InvalidPoints(f"values: expected several field values, got {shown(values)}; put it in a list")
+        raise InvalidPoints(
+            f"values: expected several field values, got {describe(values)}; put it in a list"
+        )
     levels = sorted({finite_number("values", value) for value in found})
     if levels and levels[0] <= 0.0:
         raise InvalidPoints(

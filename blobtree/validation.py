@@ -22,12 +22,21 @@ SMALLEST_NUMBER = 1e-18
 LIMIT = f"none may be beyond {LARGEST_NUMBER:g}"
 
 
-def shown(value: object) -> str:
-    """Return the `repr` of a value; its type if it has none, such as a whole number of 10,000 digits."""
-    try:
-        return repr(value)
-    except Exception:  # of any kind, by a class of the user
-        return f"a {type(value).__name__}"
+def describe(value: object) -> str:
+    """Return a value in a few words: numbers and text as they are, other objects by their type."""
+    if isinstance(value, int | float | str | bytes | list | tuple | np.number | np.ndarray) or value is None:
+        try:
+            return " ".join(f"{value!r:.60}".split())
+        except ValueError:  # a whole number of thousands of digits
+            return f"a {type(value).__name__} of very many digits"
+        except Exception:  # of any kind, by a class of the user
+            pass
+    return with_article(type(value).__name__)
+
+
+def with_article(noun: str) -> str:
+    """Return a noun after "a" or "an"."""
+    return f"{'an' if noun[0] in 'AEIOUaeiou' else 'a'} {noun}"
 
 
 def items(value: object) -> tuple[Any, ...] | None:
@@ -81,19 +90,19 @@ def positive_count(name: str, value: object, error: type[ImplicitDecalsError]) -
     """Return a count from 1; raise `error` for other values."""
     count = as_count(value)
     if not is_whole(count) or count < 1:
-        raise error(f"{name}: expected a whole number from 1, got {shown(value)}")
+        raise error(f"{name}: expected a whole number from 1, got {describe(value)}")
     return int(count)
 
 
-def finite_vector(name: str, value: object) -> Vector:
-    """Return `value` as three floats; raise `InvalidNode` if it is not three finite numbers."""
+def finite_vector(name: str, value: object, error: type[ImplicitDecalsError] = InvalidNode) -> Vector:
+    """Return `value` as three floats; raise an error if it is not three finite numbers."""
     try:
         values = real(value) if isinstance(value, np.ndarray) else cast(Iterable[Any], value)
         numbers = tuple(map(real_number, values))
     except (TypeError, ValueError, OverflowError):
         numbers = ()
     if len(numbers) != 3 or not all(abs(number) <= LARGEST_NUMBER for number in numbers):
-        raise InvalidNode(f"{name}: expected three finite numbers (x, y, z), got {shown(value)}; {LIMIT}")
+        raise error(f"{name}: expected three finite numbers (x, y, z), got {describe(value)}; {LIMIT}")
     return numbers
 
 
@@ -122,7 +131,7 @@ def name_pairs(name: str, value: object) -> tuple[tuple[str, ...], ...]:
     except (TypeError, InvalidNode):
         pairs = (("",),)
     if isinstance(value, str) or any(len(pair) != 2 or pair[0] == pair[1] for pair in pairs):
-        raise InvalidNode(f"{name}: expected pairs of two different names, got {shown(value)}")
+        raise InvalidNode(f"{name}: expected pairs of two different names, got {describe(value)}")
     return pairs
 
 
@@ -138,7 +147,7 @@ def non_negative_vector(name: str, value: object) -> Vector:
     """Return `value` as three floats from 0; raise `InvalidNode` otherwise."""
     vector = finite_vector(name, value)
     if min(vector) < 0.0:
-        raise InvalidNode(f"{name}: expected three numbers from 0, got {shown(value)}")
+        raise InvalidNode(f"{name}: expected three numbers from 0, got {describe(value)}")
     return vector
 
 
@@ -146,7 +155,7 @@ def positive_vector(name: str, value: object) -> Vector:
     """Return `value` as three floats above 0; raise `InvalidNode` otherwise."""
     vector = finite_vector(name, value)
     if min(vector) <= 0.0:
-        raise InvalidNode(f"{name}: expected three numbers above 0, got {shown(value)}")
+        raise InvalidNode(f"{name}: expected three numbers above 0, got {describe(value)}")
     for number in vector:
         _check_size(name, number)
     return vector
@@ -156,7 +165,7 @@ def positive_number(name: str, value: object) -> float:
     """Return `value` as a finite float above 0; raise `InvalidNode` otherwise."""
     number = finite_number(name, value)
     if number <= 0.0:
-        raise InvalidNode(f"{name}: expected a number above 0, got {shown(value)}")
+        raise InvalidNode(f"{name}: expected a number above 0, got {describe(value)}")
     _check_size(name, number)
     return number
 
@@ -166,14 +175,14 @@ def _check_size(name: str, number: float) -> None:
         raise InvalidNode(f"{name}: expected at least {SMALLEST_NUMBER:g}, got {number:g}; rescale the model")
 
 
-def finite_number(name: str, value: object) -> float:
-    """Return `value` as a finite float; raise `InvalidNode` otherwise."""
+def finite_number(name: str, value: object, error: type[ImplicitDecalsError] = InvalidNode) -> float:
+    """Return `value` as a finite float; raise an error otherwise."""
     try:
         number = real_number(value)
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not abs(number) <= LARGEST_NUMBER:
-        raise InvalidNode(f"{name}: expected a finite number, got {shown(value)}; {LIMIT}")
+        raise error(f"{name}: expected a finite number, got {describe(value)}; {LIMIT}")
     return number
 
 
@@ -184,14 +193,14 @@ def finite_numbers(name: str, value: object) -> tuple[float, ...]:
     except (TypeError, ValueError, OverflowError):
         numbers = [math.nan]
     if not all(abs(number) <= LARGEST_NUMBER for number in numbers):
-        raise InvalidNode(f"{name}: expected finite numbers, got {shown(value)}; {LIMIT}")
+        raise InvalidNode(f"{name}: expected finite numbers, got {describe(value)}; {LIMIT}")
     return tuple(numbers)
 
 
 def truth(name: str, value: object, error: type[ImplicitDecalsError]) -> bool:
     """Return True or False; raise `error` for any other value."""
     if not isinstance(value, bool | np.bool_):
-        raise error(f"{name}: expected True or False, got {shown(value)}")
+        raise error(f"{name}: expected True or False, got {describe(value)}")
     return bool(value)
 
 
@@ -199,7 +208,7 @@ def texts(name: str, value: object) -> tuple[str, ...]:
     """Return several texts; raise `InvalidNode` if one is empty or no text."""
     found = None if isinstance(value, str) else items(value)
     if found is None or not all(isinstance(item, str) and item for item in found):
-        raise InvalidNode(f"{name}: expected texts that are not empty, got {shown(value)}")
+        raise InvalidNode(f"{name}: expected texts that are not empty, got {describe(value)}")
     return found
 
 
@@ -212,10 +221,12 @@ def affine_matrix(value: ArrayLike) -> Matrix:
     if matrix.shape == (4, 4) and np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0)):
         matrix = matrix[:3]
     if matrix.shape != (3, 4) or not np.all(np.abs(matrix) <= LARGEST_NUMBER):
-        raise InvalidNode(f"matrix: expected a finite 3×4 or affine 4×4 matrix, got {shown(value)}")
+        raise InvalidNode(f"matrix: expected a finite 3×4 or affine 4×4 matrix, got {describe(value)}")
     singular_values = np.linalg.svd(matrix[:, :3], compute_uv=False)
     if singular_values[-1] <= 1e-6 * singular_values[0]:
-        raise InvalidNode(f"matrix: expected an invertible map, got one that flattens space: {shown(value)}")
+        raise InvalidNode(
+            f"matrix: expected an invertible map, got one that flattens space: {describe(value)}"
+        )
     return tuple(tuple(float(number) for number in row) for row in matrix)
 
 

@@ -13,7 +13,7 @@ from blobtree._typing import BoolArray, Float32Array, Int32Array
 from blobtree.colors import Rgb
 from blobtree.formulas.falloff import RIM
 from blobtree.identity import Value
-from blobtree.validation import items
+from blobtree.validation import describe, items
 from decals.errors import InvalidDecals, InvalidRow
 from decals.images.texels import decode_srgb
 from decals.options import Values
@@ -22,7 +22,6 @@ from decals.validation import (
     bool_array,
     check_range,
     color_array,
-    describe,
     finite_array,
     instance,
     member_array,

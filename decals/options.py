@@ -17,9 +17,9 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from blobtree.colors import Rgb, Rgba, color_rgb
 from blobtree.declare.parameters import with_parameters
-from blobtree.validation import truth
+from blobtree.validation import describe, truth
 from decals.errors import InvalidInput
-from decals.validation import describe, member, number_of, one_of, whole_number
+from decals.validation import member, number_of, one_of, whole_number
 
 MAX_WHOLE = 1 << 53
 """Largest whole number that pages and files hold exactly."""

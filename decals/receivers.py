@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from blobtree.validation import describe
 from decals.errors import ImplicitDecalsError, InvalidDecals
-from decals.validation import describe, is_unicode
+from decals.validation import is_unicode
 
 TEXT = np.dtypes.StringDType()
 """Type of arrays of receivers."""

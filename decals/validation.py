@@ -17,8 +17,15 @@ from numpy.typing import ArrayLike, NDArray
 from blobtree._typing import BoolArray, Float64Array, Int32Array
 from blobtree.colors import color_rgb, is_named
 from blobtree.files import is_folder, is_read_only, is_too_long
-from blobtree.validation import as_count, is_whole, real
-from blobtree.validation import real_number as as_number
+from blobtree.validation import (
+    as_count,
+    describe,
+    finite_number,
+    is_whole,
+    real,
+    real_number,
+    with_article,
+)
 from decals.errors import ImplicitDecalsError, InvalidDecals, InvalidImage, InvalidScene, MissingPackage
 
 T = TypeVar("T")
@@ -29,21 +36,6 @@ LENGTH_TOLERANCE = 1e-6
 
 MIN_TANGENT_SINE = 1e-3
 """Sine of the angle between a tangent and its normal below which the tangent is refused."""
-
-
-def describe(value: object) -> str:
-    """Return a value in a few words: numbers and text as they are, other objects by their type."""
-    if isinstance(value, int | float | str | bytes | list | tuple | np.number | np.ndarray) or value is None:
-        try:
-            return " ".join(f"{value!r:.60}".split())
-        except ValueError:  # a whole number of thousands of digits
-            return f"a {type(value).__name__} of very many digits"
-    return with_article(type(value).__name__)
-
-
-def with_article(noun: str) -> str:
-    """Return a noun after "a" or "an"."""
-    return f"{'an' if noun[0] in 'AEIOUaeiou' else 'a'} {noun}"
 
 
 # -- single values: the error is the caller's -----------------------------------------------------------
@@ -102,11 +94,6 @@ def count_number(name: str, value: Any, low: int, high: int | None, error: type[
     return whole_number(name, as_count(value), low, high, error)
 
 
-def finite_number(name: str, value: Any, error: type[ImplicitDecalsError]) -> float:
-    """Return a finite number as a float."""
-    return real_number(name, value, "a finite number", math.isfinite, error)
-
-
 def number_of(name: str, value: Any, error: type[ImplicitDecalsError]) -> float:
     """Return a finite number that a form sent, as a number or as text."""
     with suppress(ValueError):
@@ -114,7 +101,7 @@ def number_of(name: str, value: Any, error: type[ImplicitDecalsError]) -> float:
     return finite_number(name, value, error)
 
 
-def real_number(
+def allowed_number(
     name: str,
     value: Any,
     expected: str,
@@ -123,7 +110,7 @@ def real_number(
 ) -> float:
     """Return a finite number that is allowed; ``expected`` describes such numbers in the message."""
     try:
-        number = as_number(value)
+        number = real_number(value)
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not (math.isfinite(number) and allowed(number)):
@@ -138,18 +125,7 @@ MAX_STIFFNESS = 64.0
 def stiffness_number(value: Any, error: type[ImplicitDecalsError]) -> float:
     """Return a stiffness of elastic contact as a float."""
     expected = f"a number from 1 to {MAX_STIFFNESS:g}"
-    return real_number("stiffness", value, expected, lambda number: 1.0 <= number <= MAX_STIFFNESS, error)
-
-
-def finite_vector(name: str, value: Any, error: type[ImplicitDecalsError]) -> Float64Array:
-    """Return three finite numbers as ``float64[3]``."""
-    try:
-        numbers = np.array(real(value), np.float64)
-    except (TypeError, ValueError, OverflowError):
-        numbers = np.zeros(0)
-    if numbers.shape != (3,) or not np.isfinite(numbers).all():
-        raise error(f"{name}: expected three finite numbers, got {describe(value)}")
-    return numbers
+    return allowed_number("stiffness", value, expected, lambda number: 1.0 <= number <= MAX_STIFFNESS, error)
 
 
 def real_array(

@@ -47,21 +47,16 @@ def test_warp_starts_without_a_warning(names: tuple[str, ...]) -> None:
     assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
 
 
-def test_imports_leave_slow_packages_and_the_collector_alone_until_the_end() -> None:
+def test_imports_leave_slow_packages_and_the_collector_alone() -> None:
     script = """
 import atexit, gc, sys
-atexit.register(lambda: print(gc.get_freeze_count() > 10_000))  # the last of these functions
-class Cycle:
-    def __init__(self):
-        self.itself = self
-    def __del__(self):
-        print("finalized")
+before = gc.get_threshold()
+atexit.register(lambda: print(gc.get_freeze_count() == 0, gc.get_threshold() == before))  # runs last
 from decals import cover
 print(gc.isenabled(), sorted({name.partition(".")[0] for name in sys.modules} & {"scipy", "pyvista", "vtk"}))
 gc.disable()
 from decals import render
 print(gc.isenabled())
-Cycle()
 """
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert run.stdout.splitlines() == ["True []", "False", "finalized", "True"]
+    assert run.stdout.splitlines() == ["True []", "False", "True True"]

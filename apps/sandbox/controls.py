@@ -10,14 +10,14 @@ from typing import Any, Self
 from blobtree import Node
 from blobtree.colors import Rgb, Rgba
 from blobtree.declare.falloff import Falloff
-from blobtree.declare.parameters import UNITS, Parameter, Quantity, describe, parameters_of
+from blobtree.declare.parameters import UNITS, Parameter, Quantity, described, parameters_of
 from blobtree.formulas.falloffs import FALLOFF_NAMES
 from blobtree.transpile.python import plain_python
+from blobtree.validation import describe
 from decals.apps.sandbox.words import TEXTS
 from decals.editing.new_nodes import alternatives, name_of
 from decals.errors import InvalidEdit
 from decals.options import Option, options_of
-from decals.validation import describe as described
 from decals.validation import number_of, one_of
 
 SLIDER_REACH = 4.0
@@ -113,7 +113,7 @@ def kind_control(node: Node) -> list[dict[str, Any]]:
 
 
 def _control(parameter: Parameter, value: Any, size: float) -> Control:
-    doc, quantity = describe(parameter), parameter.quantity
+    doc, quantity = described(parameter), parameter.quantity
     unit = UNITS.get(quantity, "°" if quantity is Quantity.ANGLE else "")
     if quantity is Quantity.COLOR:
         return Control(parameter.name, "color", hex_color(value), doc)
@@ -232,6 +232,6 @@ def exchanged(value: Any, index: object, raw: Any) -> Any:
     if index in ((), []):
         return raw
     if not isinstance(index, list) or not isinstance(value, tuple) or index[0] not in range(len(value)):
-        raise InvalidEdit(f"index: expected that of a number of the parameter, got {described(index)}")
+        raise InvalidEdit(f"index: expected that of a number of the parameter, got {describe(index)}")
     first, *rest = index
     return (*value[:first], exchanged(value[first], rest, raw), *value[first + 1 :])

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from blobtree.validation import describe
 from decals.apps.sandbox.controls import STEPS, Control, option_control, parsed_option
 from decals.apps.sandbox.outline import picture
 from decals.editing.action_state import ActionState
@@ -23,7 +24,7 @@ from decals.rendering.options import Drawing
 from decals.scattering.scatter import scatter
 from decals.scenes.material import DecalMaterial
 from decals.scenes.scene import DecalImage
-from decals.validation import describe, number_of, one_of
+from decals.validation import number_of, one_of
 
 PLAIN = "tint alone"
 """Choice of an image that stands for none."""

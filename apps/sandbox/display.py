@@ -8,6 +8,7 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
 
+from blobtree.validation import finite_number
 from decals.apps.sandbox.controls import STEPS, Control, exchanged
 from decals.apps.sandbox.cube import cube_cells
 from decals.apps.sandbox.decal_panel import brush_values
@@ -20,7 +21,7 @@ from decals.scenes.camera import UPRIGHT, Camera
 from decals.scenes.meshes import as_polydata, meshed
 from decals.scenes.objects import SceneObject, bounds_of, same_shape
 from decals.surfaces.surface import unit_rows
-from decals.validation import finite_number, number_of, one_of, whole_number
+from decals.validation import number_of, one_of, whole_number
 from decals.vtk.subplot import FrameStatus
 from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of, ray_through

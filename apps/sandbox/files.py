@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from blobtree.files import exists, is_file
 from blobtree.progress import Cancel, Progress
+from blobtree.validation import describe
 from decals import cover
 from decals.apps.models.samples import SAMPLES, axes_of, sample, sample_mesh
 from decals.apps.models.scenes import empty_scene, new_file
@@ -34,7 +35,7 @@ from decals.scenes.cover import fitting_camera
 from decals.scenes.files import is_scene_file, load_model, load_scene
 from decals.scenes.objects import MeshObject, SceneObject, unused_name
 from decals.scenes.scene import DecalImage, Scene
-from decals.validation import describe, one_of, whole_number
+from decals.validation import one_of, whole_number
 from decals.window import EditWindow
 from decals.window.host_plotter import ray_through
 

@@ -8,6 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 from blobtree.files import is_file, write_atomically
+from blobtree.validation import describe
 from decals import DecalImage, Scene, load_model
 from decals.apps.models.samples import sample_mesh
 from decals.editing.file_names import is_reserved
@@ -15,7 +16,6 @@ from decals.editing.recovery import SUFFIX, in_use
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.images import read_image
 from decals.scenes.objects import SceneObject, unused_name
-from decals.validation import describe
 
 MODELS = (".json", ".ply", ".obj", ".stl", ".vtp", ".vtk", ".glb", ".gltf", ".3mf", ".off")
 HDR = ".hdr"

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
 from blobtree import Node
+from blobtree.validation import finite_number
 from decals.apps.sandbox import decal_panel
 from decals.apps.sandbox.controls import KIND, controls_of, exchanged, kind_control, parsed, parsed_option
 from decals.apps.sandbox.display import PHASES, Display
@@ -29,7 +30,7 @@ from decals.errors import InvalidEdit
 from decals.options import arguments_of
 from decals.scattering.scatter import scatter
 from decals.scenes.objects import TreeObject, bounds_of
-from decals.validation import finite_number, one_of, whole_number
+from decals.validation import one_of, whole_number
 from decals.window import EditWindow
 from decals.window.host_plotter import show_background
 from decals.window.view_modes import DisplayOptions

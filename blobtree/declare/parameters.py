@@ -28,6 +28,7 @@ from blobtree.errors import InvalidDefinition, InvalidNode
 from blobtree.validation import (
     Vector,
     affine_matrix,
+    describe,
     finite_number,
     finite_numbers,
     finite_points,
@@ -38,7 +39,6 @@ from blobtree.validation import (
     positive_number,
     positive_numbers,
     positive_vector,
-    shown,
     texts,
 )
 
@@ -191,7 +191,9 @@ class Parameter:
     def _checked_choice(self, value: Any) -> Any:
         if isinstance(value, str) and value in self.choices:
             return value
-        raise InvalidNode(f"{self.name}: expected {' or '.join(map(repr, self.choices))}, got {shown(value)}")
+        raise InvalidNode(
+            f"{self.name}: expected {' or '.join(map(repr, self.choices))}, got {describe(value)}"
+        )
 
     def _checked_numbers(self, value: Any) -> Any:
         """Return `value` as a float, an int or a tuple of floats."""
@@ -225,7 +227,7 @@ def _falloff(name: str, value: Any) -> Falloff:
     if isinstance(value, str) and value in FALLOFF_NAMES:
         return FALLOFF_NAMES[value]
     raise InvalidNode(
-        f"{name}: expected a falloff or one of {', '.join(FALLOFF_NAMES)}, got {shown(value)}; "
+        f"{name}: expected a falloff or one of {', '.join(FALLOFF_NAMES)}, got {describe(value)}; "
         "a subclass of Falloff makes another"
     )
 
@@ -366,7 +368,7 @@ def documented(doc: str, kind: type) -> str:
     for name, hint in hints.items():
         parameter = _declared(hint)
         if parameter is not None and parameter.doc:
-            lines += [f"{name} : {_type_name(hint)}", f"    {describe(parameter)}"]
+            lines += [f"{name} : {_type_name(hint)}", f"    {described(parameter)}"]
     return doc if not lines or "Parameters\n" in doc else with_parameters(doc, lines)
 
 
@@ -376,7 +378,7 @@ def with_parameters(doc: str, lines: Sequence[str]) -> str:
     return "\n".join([f"{head}\n", "Parameters", "----------", *lines]) + examples + tail
 
 
-def describe(parameter: Parameter) -> str:
+def described(parameter: Parameter) -> str:
     """Return the description of a parameter as a sentence with its unit and range."""
     unit = UNITS.get(parameter.quantity)
     parts = [parameter.doc[:1].upper() + parameter.doc[1:]]

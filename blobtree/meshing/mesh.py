@@ -43,7 +43,7 @@ from blobtree.meshing.vertex_kernels import (
 )
 from blobtree.progress import Progress
 from blobtree.pyvista_views import MESH_SUFFIXES, to_polydata, write_polydata
-from blobtree.validation import shown
+from blobtree.validation import describe
 
 WORD_BYTES = 16
 """Bytes that one thread copies."""
@@ -112,7 +112,8 @@ class Mesh(Value):
         """
         if not isinstance(path, str | os.PathLike) or Path(path).suffix.lower() not in MESH_SUFFIXES:
             raise InvalidFile(
-                f"path: expected a file that ends in {', '.join(MESH_SUFFIXES)}, got {shown(path)}; rename it"
+                f"path: expected a file that ends in {', '.join(MESH_SUFFIXES)}, "
+                f"got {describe(path)}; rename it"
             )
         if not len(self.faces):
             raise InvalidFile("expected a mesh with faces, got none; its parts may be smaller than a cell")

@@ -22,7 +22,7 @@ from blobtree.meshing.mesh import DeviceMesh, Mesh, download, extract_mesh
 from blobtree.meshing.vertex_kernels import place_vertices
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import ImplicitModel, checked_tree
-from blobtree.validation import LARGEST_NUMBER, is_whole, real_number, shown, truth
+from blobtree.validation import LARGEST_NUMBER, describe, is_whole, real_number, truth
 
 DEFAULT_RESOLUTION = 64
 
@@ -171,7 +171,7 @@ def cell_size_of(tree: ImplicitModel, resolution: int | None, cell_size: float |
         if not is_whole(cells) or not 1 <= cells <= MAX_RESOLUTION:
             raise InvalidResolution(
                 f"resolution: expected a whole number of cells from 1 to {MAX_RESOLUTION:,}, "
-                f"got {shown(resolution)}"
+                f"got {describe(resolution)}"
             )
         cell_size = longest / int(cells)
     cell_size = above_zero("cell_size", "size", cell_size)
@@ -195,7 +195,7 @@ def above_zero(name: str, noun: str, value: object) -> float:
     except (TypeError, ValueError, OverflowError):
         number = np.nan
     if not 0.0 < number <= LARGEST_NUMBER:
-        raise InvalidResolution(f"{name}: expected a finite {noun} above 0, got {shown(value)}")
+        raise InvalidResolution(f"{name}: expected a finite {noun} above 0, got {describe(value)}")
     return number
 
 

@@ -5,7 +5,7 @@ from typing import Any, cast
 
 from blobtree.declare.parameters import CHECKS, Quantity
 from blobtree.errors import InvalidNode
-from blobtree.validation import finite_number, shown
+from blobtree.validation import describe, finite_number
 
 AttributeValue = float | tuple[float, ...] | str
 """A number, a vector of up to three numbers, or a label."""
@@ -53,13 +53,13 @@ def checked_attributes(name: str, value: object) -> Attributes:
     if isinstance(value, Attributes):
         return value
     if not isinstance(value, Mapping):
-        raise InvalidNode(f"{name}: expected a dictionary such as {{'age': 3.0}}, got {shown(value)}")
+        raise InvalidNode(f"{name}: expected a dictionary such as {{'age': 3.0}}, got {describe(value)}")
     return Attributes({_name(key): _value(f"{name}[{key!r}]", item) for key, item in value.items()})
 
 
 def _name(key: object) -> str:
     if not isinstance(key, str) or not key:
-        raise InvalidNode(f"attributes: expected names as keys, got {shown(key)}")
+        raise InvalidNode(f"attributes: expected names as keys, got {describe(key)}")
     return key
 
 
@@ -71,7 +71,7 @@ def _value(name: str, value: object) -> AttributeValue:
     except TypeError:
         return finite_number(name, value)
     if not 1 <= len(numbers) <= LONGEST_VECTOR:
-        raise InvalidNode(f"{name}: expected a number, up to three numbers or a label, got {shown(value)}")
+        raise InvalidNode(f"{name}: expected a number, up to three numbers or a label, got {describe(value)}")
     return tuple(finite_number(name, number) for number in numbers)
 
 

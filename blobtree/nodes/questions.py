@@ -27,7 +27,7 @@ from blobtree.tape.attributes import attribute_at, attribute_names, rest_coordin
 from blobtree.tape.model import one_or_rows
 from blobtree.tape.poses import has_warps, invert_map, maps_to_rest
 from blobtree.tape.tape import Tape
-from blobtree.validation import point_array, points_or_point, shown, texts, truth
+from blobtree.validation import describe, point_array, points_or_point, texts, truth
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -174,7 +174,7 @@ class Questions(Model):
         ['arm', 'hand']
         """
         if not isinstance(name, str):
-            raise InvalidNode(f"name: expected the name of an attribute, got {shown(name)}")
+            raise InvalidNode(f"name: expected the name of an attribute, got {describe(name)}")
         return one_or_rows(points, lambda rows: attribute_at(self.tape, self._program, name, rows, default))
 
     @Lazy
@@ -222,7 +222,7 @@ class Questions(Model):
         tape = self._rest_tape
         if rest is not None:
             if not isinstance(rest, Questions):
-                raise InvalidNode(f"rest: expected a BlobTree, got {shown(rest)}; leave it out")
+                raise InvalidNode(f"rest: expected a BlobTree, got {describe(rest)}; leave it out")
             tape = rest_tape(self.tape, self._program, maps_to_rest(self, self._program, rest))
         rows = rest_coordinates_at(tape, array)
         if rest is not None and has_warps(rest):

@@ -37,7 +37,7 @@ from blobtree.nodes.tree import (
     Transform,
     Union,
 )
-from blobtree.validation import finite_vector, items, shown
+from blobtree.validation import describe, finite_vector, items
 
 SOFTNESS = 3.0
 """Exponent of the Ricci blend that `Join.SOFT` makes: about half way from a sum to a union."""
@@ -294,7 +294,7 @@ def group_operands(tree: Node, path: Path, steps: Sequence[int]) -> tuple[Node, 
     parent: Any = node_at(tree, path)
     given = items(steps) or ()
     if not all(isinstance(step, int) for step in given):
-        raise InvalidNode(f"steps: expected indices of operands, got {shown(steps)}")
+        raise InvalidNode(f"steps: expected indices of operands, got {describe(steps)}")
     chosen = sorted(set(given))
     if JOIN_OF_KIND.get(type(parent), Join.DIFFERENCE) is Join.DIFFERENCE:
         raise InvalidNode(

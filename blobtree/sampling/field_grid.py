@@ -18,7 +18,7 @@ from blobtree.pyvista_views import to_image_data, xml_bytes
 from blobtree.sampling.mesh_distances import grid_points
 from blobtree.sampling.tree_distances import TreeMeter
 from blobtree.tape.model import ImplicitModel, checked_tree, values_at
-from blobtree.validation import positive_number, shown, truth
+from blobtree.validation import describe, positive_number, truth
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -107,7 +107,7 @@ class FieldGrid:
         (9, 9, 9)
         """
         if not isinstance(path, str | os.PathLike):
-            raise InvalidFile(f"path: expected the path of a file, got {shown(path)}")
+            raise InvalidFile(f"path: expected the path of a file, got {describe(path)}")
         suffix = Path(path).suffix.lower()
         if suffix not in GRID_FORMATS:
             known = " or ".join(GRID_FORMATS)
@@ -259,6 +259,6 @@ def _whole_resolution(resolution: Any) -> int:
     whole = isinstance(resolution, int | np.integer) and not isinstance(resolution, bool)
     if not whole or not 1 <= resolution <= MAX_POINTS:
         raise InvalidResolution(
-            f"resolution: expected a whole number from 1 to {MAX_POINTS:,}, got {shown(resolution)}"
+            f"resolution: expected a whole number from 1 to {MAX_POINTS:,}, got {describe(resolution)}"
         )
     return int(resolution)

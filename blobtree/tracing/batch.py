@@ -23,7 +23,7 @@ from blobtree.tracing.shade_kernels import shade_hits
 from blobtree.tracing.tables import device_tables, numpy_tables
 from blobtree.tracing.trace import Hits, checked_rays, load_ray_kernels, raycast, shaded
 from blobtree.tracing.tree_cells import block_counts, cells_grid, trace_tolerance
-from blobtree.validation import axis_count, items, shown
+from blobtree.validation import axis_count, describe, items
 
 MAX_JOINT_MODELS = 64
 """Most models whose cells are built at once; the cells of a model take about 5 MB."""
@@ -186,7 +186,7 @@ def _each_of(name: str, values: Any, is_each: bool, count: int) -> Sequence[Any]
         return [values] * count
     listed = items(values)
     if listed is None or len(listed) != count:
-        got = shown(values) if listed is None else f"{len(listed)}"
+        got = describe(values) if listed is None else f"{len(listed)}"
         raise InvalidPoints(
             f"{name}: expected one array for each of {count} trees, or one array (m, 3) for all, got {got}"
         )

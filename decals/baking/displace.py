@@ -35,7 +35,7 @@ from decals.surfaces.subdivide import subdivided
 from decals.surfaces.surface import Surface, unit_rows
 from decals.surfaces.topology import welded
 from decals.surfaces.windings import MeshOrientation
-from decals.validation import checked_path, real_number
+from decals.validation import allowed_number, checked_path
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -156,7 +156,9 @@ def displace(
     known = as_scene(scene)
     drawing = known.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping)
     if edge_length is not None:
-        edge_length = real_number("edge_length", edge_length, "a length above 0", _is_positive, InvalidScene)
+        edge_length = allowed_number(
+            "edge_length", edge_length, "a length above 0", _is_positive, InvalidScene
+        )
     creases = truth("creases", creases, InvalidScene)
     raised = [image for image, one in enumerate(known.images) if getattr(one, "relief", 0.0) != 0.0]
     rows = known.decals[np.isin(known.decals.images, raised)]

@@ -16,7 +16,7 @@ from blobtree._typing import Float64Array
 from blobtree.errors import InvalidResolution
 from blobtree.files import write_together
 from blobtree.progress import Cancel, Progress, reporting
-from blobtree.validation import truth
+from blobtree.validation import describe, truth
 from decals.baking.fine_trees import below_texture
 from decals.baking.formats import FORMATS
 from decals.baking.instances import Instances, decal_instances
@@ -44,7 +44,7 @@ from decals.scenes.render import option_value, scene_hashes
 from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model
 from decals.surfaces.mesh_check import MeshCheck
-from decals.validation import checked_path, count_number, describe, one_of, optional_package, whole_number
+from decals.validation import checked_path, count_number, one_of, optional_package, whole_number
 
 _logger = logging.getLogger(__name__)
 

@@ -13,6 +13,7 @@ from blobtree.meshing.polygonize import polygonize
 from blobtree.nodes.numeric_parameters import nodes_with_paths
 from blobtree.nodes.primitives import Leaf
 from blobtree.progress import Progress
+from blobtree.validation import describe
 from decals.baking.flat_faces import without_flat_faces
 from decals.errors import InvalidMesh, InvalidScene
 from decals.images.texels import decode_srgb
@@ -24,7 +25,6 @@ from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.normals import SplitMesh, split_at_colors, split_at_creases, vertex_normals
 from decals.surfaces.topology import welded
 from decals.surfaces.windings import MeshOrientation
-from decals.validation import describe
 
 BaseColors = Color | Callable[[Float32Array], Float32Array]
 """One sRGB colour of a surface, or a function from its points to their colours."""

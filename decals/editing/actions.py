@@ -6,6 +6,7 @@ the help follow from it.
 
 from os import PathLike
 
+from blobtree.validation import describe
 from decals.editing.action_state import ActionState, Cursor
 from decals.editing.bare_watch import BareWatch
 from decals.editing.brush_actions import BrushActions
@@ -19,7 +20,6 @@ from decals.editing.tree_actions import TreeActions
 from decals.editing.view_actions import ViewActions
 from decals.editing.visibility_actions import VisibilityActions
 from decals.errors import InvalidEdit
-from decals.validation import describe
 
 
 class Actions(SceneActions):

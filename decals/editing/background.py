@@ -18,12 +18,12 @@ from pathlib import Path
 
 from blobtree.device import core_left_free
 from blobtree.progress import Cancel, Progress, reporting
+from blobtree.validation import describe
 from decals.editing.carrying import CarriedEdit
 from decals.editing.session import Command, EditSession, SaveJob, UndoEntry
 from decals.editing.steps import Busy, Inputs, Step, step_of
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.camera import Camera
-from decals.validation import describe
 
 Completion = Callable[[], "Job | None"]
 """Applies the result of a job, in the thread of the window. It may return a job to run next."""

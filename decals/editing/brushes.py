@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array, Int64Array
-from blobtree.validation import LARGEST_NUMBER, SMALLEST_NUMBER
+from blobtree.validation import LARGEST_NUMBER, SMALLEST_NUMBER, describe, finite_number, finite_vector
 from decals.editing.brush_settings import Brush, BrushSettings
 from decals.editing.commands import DeleteDecals, SetValues
 from decals.editing.document import Document, Edit
@@ -19,7 +19,7 @@ from decals.errors import InvalidEdit
 from decals.model import NO_IMAGE, Decals
 from decals.scattering.orientation import tangents
 from decals.scenes.objects import bounds_of
-from decals.validation import describe, finite_number, finite_vector, whole_number
+from decals.validation import whole_number
 
 CLOSEST = 0.8
 """Least distance of new decals in spacings: random discs at full distance would leave two fifths bare."""
@@ -199,7 +199,7 @@ class PushDecals:
         center = finite_vector("point", self.point, InvalidEdit)
         offset = finite_vector("offset", self.offset, InvalidEdit)
         numbers = decals_within(document, center, self.radius)
-        if not len(numbers) or not offset.any():
+        if not len(numbers) or not any(offset):
             return Edit()
         before = document.decals.take(numbers)
         squares = np.square((before.positions - center) / self.radius).sum(axis=1)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array, Int64Array
-from blobtree.validation import point_array, truth
+from blobtree.validation import describe, finite_number, finite_vector, point_array, truth
 from decals.editing.document import Document, Edit, SceneParts
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points, shortest_rotations
 from decals.errors import InvalidEdit
@@ -20,15 +20,7 @@ from decals.rendering.options import Drawing
 from decals.scenes.camera import Camera
 from decals.scenes.scene import DecalImage, Scene
 from decals.surfaces.surface import unit_rows
-from decals.validation import (
-    called,
-    color_values,
-    describe,
-    finite_number,
-    finite_vector,
-    instance,
-    whole_number,
-)
+from decals.validation import called, color_values, instance, whole_number
 
 DUPLICATE_OFFSET = 1.0
 """Distance between a decal and its duplicate, in radii."""
@@ -593,9 +585,9 @@ def _checked_point(position: ArrayLike, normal: ArrayLike) -> tuple[Float32Array
     """Return a point and its unit normal as arrays of one row, or raise `InvalidEdit`."""
     point = finite_vector("position", position, InvalidEdit)
     direction = finite_vector("normal", normal, InvalidEdit)
-    if not direction.any():
+    if not any(direction):
         raise InvalidEdit("normal: expected a direction, got a zero vector")
-    return point_array(point[None]), unit_rows(direction[None])
+    return point_array([point]), unit_rows(np.array([direction]))
 
 
 def _array_named(decals: Decals, name: str) -> NDArray[Any]:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from blobtree.nodes.paths import Path
+from blobtree.validation import describe
 from decals.editing.action_state import ActionState, WindowActions
 from decals.editing.commands import DeleteDecals, RemoveImage, SetValues
 from decals.editing.document import Document
@@ -15,7 +16,6 @@ from decals.editing.tree_actions import TreeActions
 from decals.editing.visibility import RenameLayer, RenameNode, RenameObject, RenumberLayers
 from decals.editing.visibility_actions import VisibilityActions
 from decals.errors import InvalidEdit
-from decals.validation import describe
 
 FLAGS = {"hide": "hidden", "lock": "locked"}
 """Flags of two of the changes."""

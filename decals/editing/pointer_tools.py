@@ -6,6 +6,7 @@ from enum import Enum, auto
 import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array, Int64Array
+from blobtree.validation import describe, finite_number
 from decals.editing.actions import KEYS, Actions
 from decals.editing.brush_settings import Brush, Stroke
 from decals.editing.commands import MoveDecals
@@ -20,7 +21,7 @@ from decals.editing.queries import (
     shortest_rotations,
 )
 from decals.errors import InvalidEdit
-from decals.validation import describe, finite_number, instance
+from decals.validation import instance
 
 Occluded = Callable[[float, float, Float32Array], bool]
 """Returns True if another object in the window hides a surface point, at a pixel."""

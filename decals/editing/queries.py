@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
-from blobtree.validation import point_array
+from blobtree.validation import describe, finite_vector, point_array
 from decals.editing.document import Document
 from decals.errors import InvalidEdit, InvalidPoints, InvalidScene
 from decals.field.contact_mode import AnyContact, contact_mode
@@ -21,7 +21,7 @@ from decals.scattering.decal_normals import mean_normals
 from decals.scenes.objects import SceneObject, TreeObject
 from decals.surfaces.implicit import project_without_mesh
 from decals.surfaces.surface import unit_rows
-from decals.validation import describe, finite_vector, instance, member, whole_number
+from decals.validation import instance, member, whole_number
 
 OPPOSITE_COSINE = -0.999999
 """Cosine below which two normals count as opposite: the shortest rotation between them is not unique."""
@@ -108,8 +108,8 @@ def first_hit(objects: Sequence[SceneObject], origin: ArrayLike, direction: Arra
     >>> first_hit([ball], (0, 0, 5), (0, 0, -1)).positions.round(3)
     array([[0., 0., 1.]], dtype=float32)
     """
-    origins = point_array(finite_vector("origin", origin, InvalidPoints)[None])
-    directions = unit_rows(finite_vector("direction", direction, InvalidPoints)[None])
+    origins = point_array([finite_vector("origin", origin, InvalidPoints)])
+    directions = unit_rows(np.array([finite_vector("direction", direction, InvalidPoints)]))
     _check_objects(objects)
     distances = [float(item.surface.raycast(origins, directions)[0]) for item in objects]
     if not distances or not np.isfinite(min(distances)):
@@ -142,8 +142,8 @@ def mean_normal(
     >>> mean_normal(as_objects([pyvista.Cube()]), (0.5, 0.0, 0.5), (0, 0, 1), radius=0.2).round(1)
     array([0.7, 0. , 0.7], dtype=float32)
     """
-    center = finite_vector("position", position, InvalidPoints)[None].astype(np.float32)
-    own = unit_rows(finite_vector("normal", normal, InvalidPoints)[None])
+    center = np.array([finite_vector("position", position, InvalidPoints)], np.float32)
+    own = unit_rows(np.array([finite_vector("normal", normal, InvalidPoints)]))
 
     def near(points: Float32Array, _: Int64Array) -> tuple[Float32Array, Float32Array, Int64Array]:
         found = [part for item in objects if (part := _surface_near(item, points)) is not None]

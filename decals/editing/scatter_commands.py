@@ -1,5 +1,6 @@
 """Commands for whole objects and many decals: scatter, relax, add and remove objects."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -9,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, IndexArray, Int64Array
 from blobtree.progress import Progress
-from blobtree.validation import point_array
+from blobtree.validation import describe, finite_vector, point_array
 from decals.editing.document import Document, Edit
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points
 from decals.editing.steps import columns_of, shapes_of
@@ -28,15 +29,7 @@ from decals.scenes.objects import (
     same_shape,
 )
 from decals.scenes.recipe import Recipe
-from decals.validation import (
-    count_number,
-    describe,
-    finite_number,
-    finite_vector,
-    instance,
-    one_of,
-    whole_number,
-)
+from decals.validation import allowed_number, count_number, instance, one_of, whole_number
 
 SPACING = 3.0**0.5 / 1.03
 """Distance of neighbours among decals without gaps, in radii (see `covering.RADIUS_MARGIN`)."""
@@ -232,10 +225,11 @@ class RelaxDecals:
 
     def _around(self, document: Document) -> tuple[Float32Array, IndexArray]:
         """Return the point, and the rows of the decals that take part."""
-        center = point_array(finite_vector("point", self.point, InvalidEdit)[None])[0]
+        center = point_array([finite_vector("point", self.point, InvalidEdit)])[0]
         radius = self.radius
         if radius is not None:  # no scene is larger than the largest coordinate
-            radius = min(finite_number("radius", radius, InvalidEdit), MAX_COORDINATE)
+            number = allowed_number("radius", radius, "a finite number", math.isfinite, InvalidEdit)
+            radius = min(number, MAX_COORDINATE)
         decals = document.decals.decals
         if not len(decals) or not document.objects:
             return center, np.zeros(0, np.intp)

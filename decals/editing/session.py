@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from blobtree.progress import Progress
+from blobtree.validation import describe
 from decals.editing.document import DecalStates, Document, Edit, SceneParts
 from decals.editing.locks import check_locks
 from decals.errors import InvalidEdit
@@ -14,7 +15,7 @@ from decals.scenes.camera import Camera
 from decals.scenes.files import save_scene
 from decals.scenes.objects import forget_surface
 from decals.scenes.scene import Scene
-from decals.validation import describe, instance, whole_number
+from decals.validation import instance, whole_number
 
 MAX_REPLAYED_DECALS = 500
 """A session repeats a fork's edits of at most so many decals; otherwise it adopts the fork's index."""

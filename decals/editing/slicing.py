@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float64Array
+from blobtree.validation import finite_vector
 from decals.editing.gizmo import AXES, Handle, Ray, along_line, nearest_on_sphere, snap_distance, snapped
 from decals.errors import InvalidEdit
 from decals.scenes.camera import Vector
-from decals.validation import finite_vector
 
 MOVE, TILT = "slice", "tilt slice"
 """Names of the handles: one in the plane moves it along its normal, one at the end of that tilts it."""

@@ -14,6 +14,7 @@ from blobtree.formulas.falloff import RIM
 from blobtree.nodes.paths import Path, node_at, node_in_world, primitive_at
 from blobtree.nodes.places import Place
 from blobtree.nodes.surgery import Join, dominant_primitive, join_of, path_of, paths_after, world_space_path
+from blobtree.validation import describe
 from decals.editing.action_state import Cursor, WindowActions, joined, require_pick
 from decals.editing.decal_actions import TINTS
 from decals.editing.document import Document
@@ -47,7 +48,7 @@ from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.objects import SceneObject, TreeObject, bounds_of, displaced, unused_name
 from decals.surfaces.implicit import project_without_mesh
 from decals.surfaces.surface import unit_rows
-from decals.validation import describe, one_of
+from decals.validation import one_of
 
 RESIZE_STEP = 1.05
 """Factor of a primitive's radius by one key press."""

@@ -31,14 +31,14 @@ from blobtree.nodes.paths import (
 )
 from blobtree.nodes.places import Place
 from blobtree.nodes.surgery import Join
-from blobtree.validation import affine_matrix, truth
+from blobtree.validation import affine_matrix, describe, finite_number, finite_vector, truth
 from decals.editing.document import Document, Edit
 from decals.editing.followers import FIELD_TOLERANCE, followers
 from decals.editing.queries import move_decals, nearest_points
 from decals.errors import InvalidEdit
 from decals.options import inherit_descriptions
 from decals.scenes.objects import SceneObject, TreeObject, flagged, with_tree
-from decals.validation import describe, finite_number, finite_vector, instance, member, whole_number
+from decals.validation import instance, member, whole_number
 
 DRAGGED = (
     Quantity.POINT,
@@ -242,8 +242,9 @@ class DragSurface(PrimitiveCommand):
             raise InvalidEdit(
                 f"a {type(node_at(tree, path)).__name__} has no point, radius or length to drag"
             )
-        longest = max(DRAG_STEP * float((high - low).max()), float(np.linalg.norm(end - start)) / DRAG_STEPS)
-        count = max(1, math.ceil(float(np.linalg.norm(end - start)) / longest))
+        way = math.dist(start, end)
+        longest = max(DRAG_STEP * float((high - low).max()), way / DRAG_STEPS)
+        count = max(1, math.ceil(way / longest))
         for target in np.linspace(start, end, count + 1)[1:]:
             tree = _through(tree, parameters, target, longest)
         return self.compute_exchange(document, node_at(tree, path), quick=self.quick)

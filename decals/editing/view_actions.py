@@ -4,12 +4,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree.nodes.paths import node_in_world
+from blobtree.validation import describe
 from decals.editing.action_state import ActionState, Cursor, WindowActions
 from decals.editing.key_bindings import Group
 from decals.errors import InvalidEdit
 from decals.scenes.camera import PRESETS, UPRIGHT, Axes
 from decals.scenes.objects import TreeObject, bounds_of
-from decals.validation import describe
 
 SIDE_KEYS = {
     "front": "1",

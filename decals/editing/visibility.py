@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree.nodes.paths import Path, node_at
+from blobtree.validation import describe
 from decals.editing.document import DecalStates, Document, Edit
 from decals.editing.queries import move_decals, nearest_points
 from decals.errors import InvalidEdit
 from decals.index.rows import as_numbers
 from decals.scenes.objects import Paths, TreeObject, check_names, flagged
 from decals.scenes.scene import as_layer_names, as_layers
-from decals.validation import describe
 
 FOLLOW_DISTANCE = 0.02
 """Decals that were hidden go back to the surface if it is farther away than this, in their radii."""

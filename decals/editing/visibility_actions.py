@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from blobtree.nodes.paths import Path
+from blobtree.validation import describe
 from decals.editing.action_state import Cursor, WindowActions, require_pick
 from decals.editing.key_bindings import Group
 from decals.editing.visibility import (
@@ -15,7 +16,6 @@ from decals.editing.visibility import (
     isolating,
 )
 from decals.errors import InvalidEdit
-from decals.validation import describe
 
 
 class VisibilityActions(WindowActions):

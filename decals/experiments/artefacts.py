@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from blobtree.identity import content_hash
+from blobtree.validation import describe
 from decals.errors import InvalidInput
-from decals.validation import describe
 
 ARTEFACTS = "artefacts"
 """Folder of these files, in that of the experiment."""

@@ -11,8 +11,9 @@ from typing import Any, overload
 
 import numpy as np
 
+from blobtree.validation import describe
 from decals.errors import InvalidInput
-from decals.validation import count_number, describe, whole_number
+from decals.validation import count_number, whole_number
 
 Trial = dict[str, Any]
 """Parameters of one call, by name."""

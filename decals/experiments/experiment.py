@@ -13,6 +13,7 @@ from typing import Any
 import msgspec
 
 from blobtree.progress import Cancel, Progress, reporting
+from blobtree.validation import describe
 from decals.errors import InvalidInput
 from decals.experiments.design import Design, Trial
 from decals.experiments.fingerprint import fingerprint, trial_hash
@@ -22,7 +23,7 @@ from decals.experiments.store import Store, rows_in
 from decals.experiments.values import light
 from decals.experiments.workers import Rows, Started, Work, cluster, connected, here, processes
 from decals.scenes.recipe import plain
-from decals.validation import count_number, describe, real_number
+from decals.validation import allowed_number, count_number
 
 CONVERTED = (bool, int, float, str)
 """Types of parameters to which values of a design are converted."""
@@ -113,7 +114,7 @@ def run(
     if limit is not None:
         if count == 0:
             raise InvalidInput("limit: expected processes that can be ended, got workers=0; drop one")
-        real_number("limit", limit, "seconds above 0", lambda value: value > 0, InvalidInput)
+        allowed_number("limit", limit, "seconds above 0", lambda value: value > 0, InvalidInput)
     megabytes = _megabytes(memory, max(1, count))
     with Store(folder, about) as store, reporting(progress, cancel) as report:
         known = {row["trial"]: row for row in rows_in(folder) if row.get("function") == digest}
@@ -205,7 +206,7 @@ def _converted(name: str, value: Any, kind: Any) -> Any:
 def _megabytes(gigabytes: float | None, workers: int) -> float:
     """Return the memory of one worker."""
     if gigabytes is not None:
-        return 1024.0 * real_number(
+        return 1024.0 * allowed_number(
             "memory", gigabytes, "gigabytes above 0", lambda value: value > 0, InvalidInput
         )
     try:

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from blobtree.files import write_atomically
+from blobtree.validation import describe
 from decals.errors import InvalidInput, MissingPackage
 from decals.experiments.artefacts import is_artefact
 from decals.experiments.results import Results
-from decals.validation import describe
 
 PICTURES = 24
 """Most pictures of one measure in a report."""

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from blobtree.validation import describe
 from decals.errors import InvalidInput, MissingPackage
 from decals.experiments.outcome import COLUMNS, Row
 from decals.experiments.store import described, rows_in
-from decals.validation import describe
 
 
 class Results:

@@ -20,12 +20,12 @@ from typing import Any
 
 from blobtree.device import THREADS_VARIABLE
 from blobtree.progress import check_cancelled, displayed
+from blobtree.validation import describe
 from decals._version import __version__
 from decals.errors import InvalidInput, MissingPackage
 from decals.experiments.design import Trial
 from decals.experiments.outcome import Row, outcome
 from decals.experiments.values import light, pickled, stored, unpickled
-from decals.validation import describe
 
 Rows = Generator[tuple[int, Row], None, None]
 """Numbers of trials, and their rows."""

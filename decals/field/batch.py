@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import known_device
-from blobtree.validation import axis_count, items
+from blobtree.validation import axis_count, describe, items
 from decals.errors import InvalidDevice, InvalidPoints, InvalidScene
 from decals.field.contact_mode import AnyContact
 from decals.field.evaluate import (
@@ -45,7 +45,6 @@ from decals.index.build import starts_of
 from decals.model import Decals
 from decals.receivers import mask_on, takes_named_only
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, NEIGHBOR_REACH
-from decals.validation import describe
 
 MAX_DECALS = 1 << 18
 """Decals that are indexed at once; their index takes half a gigabyte at most."""

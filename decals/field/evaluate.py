@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array, Int32Array
 from blobtree.device import array_on, known_device, launch
-from blobtree.validation import truth
+from blobtree.validation import describe, truth
 from decals.errors import InvalidDecals, InvalidScene
 from decals.field.contact_mode import AnyContact, with_law
 from decals.field.extras import ANSWERS
@@ -25,7 +25,6 @@ from decals.index.index import DecalIndex, index_on
 from decals.model import Decals
 from decals.receivers import mask_on, takes_named_only
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, RECORD
-from decals.validation import describe
 
 
 @runtime_checkable

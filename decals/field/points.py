@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.device import known_device, start_warp
-from blobtree.validation import real
+from blobtree.validation import describe, real
 from decals.errors import InvalidDevice, InvalidPoints
-from decals.validation import describe
 
 HOST, CUDA, PINNED, MANAGED = 1, 2, 3, 13
 """Types of devices in DLPack: memory of the processor, of a card, and of both."""

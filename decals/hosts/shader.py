@@ -9,7 +9,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from blobtree.immutable import Immutable
-from blobtree.validation import truth
+from blobtree.validation import describe, truth
 from decals.errors import InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.hosts.code import FIRST_TEXTURE, VERSIONS, Code, code_of
@@ -24,7 +24,7 @@ from decals.rendering.options import SceneLike, check_scene, drawing_of, has_mat
 from decals.scenes.origin import WORLD, Origin
 from decals.shaders import ComposeError
 from decals.shaders.isolate import prefixed_name
-from decals.validation import describe, instance, one_of, whole_number
+from decals.validation import instance, one_of, whole_number
 
 RECEIVERS = "surface_receivers"
 """Uniform with the mask of an object."""

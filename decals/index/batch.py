@@ -10,7 +10,7 @@ import warp as wp
 from blobtree._typing import Int64Array
 from blobtree.device import known_device
 from blobtree.struct_rows import Part, struct_rows
-from blobtree.validation import items
+from blobtree.validation import describe, items
 from decals.errors import InvalidDecals
 from decals.index.build import build_indices, starts_of
 from decals.index.index import device_arrays, indexed_decals
@@ -18,7 +18,6 @@ from decals.index.lookup import IndexedDecals
 from decals.model import Decals
 from decals.receivers import EVERYTHING
 from decals.record import RECORD
-from decals.validation import describe
 
 
 class DecalBatch:

@@ -19,7 +19,7 @@ from blobtree.files import write_atomically
 from blobtree.immutable import Immutable
 from blobtree.progress import Progress, reporting
 from blobtree.tracing.tree_cells import BLOCKS_ALONG
-from blobtree.validation import truth
+from blobtree.validation import describe, truth
 from decals.errors import InvalidScene, NoGraphics
 from decals.field.mapping import ImageMapping
 from decals.hosts.unsupported import refuse_unsupported
@@ -33,7 +33,7 @@ from decals.scenes.objects import SceneObject
 from decals.scenes.pose import PosedScene
 from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model
-from decals.validation import MAX_STIFFNESS, checked_path, describe, is_unicode, one_of
+from decals.validation import MAX_STIFFNESS, checked_path, is_unicode, one_of
 
 MODULES = (
     *("vectors", "packing", "texels", "index", "decals", "history", "camera", "link", "graphics", "painter"),

@@ -9,11 +9,12 @@ import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.identity import Value
+from blobtree.validation import finite_number, finite_vector
 from decals.errors import InvalidImage, InvalidScene
 from decals.images.load import AnyImage, image_pixels, is_embedded, read_image
 from decals.images.texels import Pixels, linear_premultiplied
 from decals.options import Values
-from decals.validation import MAX_LIGHT, finite_number, finite_vector, instance
+from decals.validation import MAX_LIGHT, instance
 
 Vector = tuple[float, float, float]
 
@@ -125,19 +126,18 @@ class Environment:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        numbers = finite_vector("an environment's up", self.up, InvalidScene)
         checked: dict[str, Any] = {
             "rotation": finite_number("an environment's rotation", self.rotation, InvalidScene),
             "strength": finite_number("an environment's strength", self.strength, InvalidScene),
             "visible": instance("visible", self.visible, bool, InvalidScene, "such as True"),
-            "up": tuple(numbers.tolist()),
+            "up": finite_vector("an environment's up", self.up, InvalidScene),
         }
         if not 0.0 <= checked["strength"] <= MAX_LIGHT:
             raise InvalidScene(
                 f"an environment's strength: expected 0, which is darkness, to {MAX_LIGHT:g}, got "
                 f"{self.strength:g}"
             )
-        if not 0.0 < np.linalg.norm(numbers) < np.inf:
+        if not 0.0 < np.linalg.norm(checked["up"]) < np.inf:
             raise InvalidScene(f"an environment's up: expected a direction, got {self.up}; such as (0, 0, 1)")
         if not isinstance(self.picture, Panorama):
             checked["picture"] = Panorama(self.picture)

@@ -8,9 +8,9 @@ import numpy as np
 
 from blobtree._typing import Float64Array
 from blobtree.colors import ColorLike, color_rgb, is_named
+from blobtree.validation import describe, finite_number, finite_vector
 from decals.errors import InvalidScene
 from decals.shaders import constants
-from decals.validation import describe, finite_number, finite_vector
 
 MAX_LIGHTS = int(constants("light_rows.glsl")["MAX_LIGHTS"])
 """Number of lights that shaders have room for."""
@@ -76,7 +76,7 @@ class Light:
             object.__setattr__(self, "color", color_rgb("a light's color", self.color, InvalidScene))
         for name in ("color", "direction", "attenuation", *positions):
             numbers = finite_vector(f"a light's {name}", getattr(self, name), InvalidScene)
-            object.__setattr__(self, name, tuple(numbers.tolist()))
+            object.__setattr__(self, name, numbers)
         for name in ("cone", "exponent"):
             finite_number(f"a light's {name}", getattr(self, name), InvalidScene)
 

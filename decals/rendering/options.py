@@ -8,6 +8,7 @@ import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.colors import ColorLike, Rgba, color_rgba
+from blobtree.validation import describe
 from decals.errors import InvalidScene
 from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
@@ -21,7 +22,7 @@ from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS
 from decals.rendering.environment import Environment, as_environment
 from decals.rendering.lights import Lighting
 from decals.rendering.viewpoint import Viewpoint
-from decals.validation import count_number, describe, instance, whole_number
+from decals.validation import count_number, instance, whole_number
 
 Size: TypeAlias = tuple[int, int]
 """Width and height."""

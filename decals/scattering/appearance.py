@@ -16,7 +16,7 @@ from decals.scattering.extras import RULES
 from decals.scattering.orientation import Direction, as_direction, max_curvatures, tangents
 from decals.scattering.sizing import EXPECTED_RADIUS, Sizing, delaunay_radii, touching_radii
 from decals.scattering.variation import ImageChoice, Jitter, image_shares, random_images, ranked_images
-from decals.validation import member, real_number
+from decals.validation import allowed_number, member
 
 SAMPLES_PER_DECAL = 64
 """Samples for each decal from which its radius is measured."""
@@ -70,7 +70,7 @@ class Appearance:
             object.__setattr__(self, name, value)
         if not isinstance(self.jitter, Jitter | None):
             raise InvalidScattering(f"jitter: expected a Jitter, got {self.jitter!r}")
-        real_number(
+        allowed_number(
             "factor",
             self.factor,
             "a number above 0, at most 1e6",

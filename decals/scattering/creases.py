@@ -15,7 +15,7 @@ from decals.errors import InvalidScattering
 from decals.scattering.domain import MAX_PARTICLES
 from decals.sorting import ranges
 from decals.surfaces.mesh import MeshSurface, edges_of
-from decals.validation import instance, real_number
+from decals.validation import allowed_number, instance
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -76,7 +76,7 @@ class Creases:
             InvalidScattering,
             "polygonize a tree first",
         )
-        real_number(
+        allowed_number(
             "angle",
             angle,
             "degrees above 0 and below 180",
@@ -113,7 +113,7 @@ class Creases:
 
         With half a spacing, decals with `Sizing.TOUCHING` stay on their side of a crease.
         """
-        real_number("apart", apart, "a length from 0 upward", lambda value: value >= 0, InvalidScattering)
+        allowed_number("apart", apart, "a length from 0 upward", lambda value: value >= 0, InvalidScattering)
 
         def mask(points: Float32Array) -> BoolArray:
             far: BoolArray = self.distance(points) >= apart
@@ -127,7 +127,7 @@ class Creases:
         Corners, where lines meet, end or turn sharply, are among them. Pass them to `scatter` as `fixed`:
         decals line up along the creases, and the others keep away from them.
         """
-        real_number("spacing", spacing, "a length above 0", lambda value: value > 0, InvalidScattering)
+        allowed_number("spacing", spacing, "a length above 0", lambda value: value > 0, InvalidScattering)
         if spacing < self.length / MAX_PARTICLES:
             raise InvalidScattering(
                 f"spacing: {spacing:g} makes more than {MAX_PARTICLES:,} points; take a larger one"

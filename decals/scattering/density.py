@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
-from blobtree.validation import point_array
+from blobtree.validation import describe, point_array
 from decals.errors import InvalidImage, InvalidScattering
 from decals.images.load import AnyImage, image_pixels
 from decals.images.texels import as_bytes
 from decals.scattering.image_projections import Projection
 from decals.surfaces.mesh import MeshSurface
-from decals.validation import describe, function_values, instance, real_array, real_number
+from decals.validation import allowed_number, function_values, instance, real_array
 
 BLENDED_VERTICES = 3
 """Number of nearest vertices from which a value is interpolated where there are no faces."""
@@ -225,7 +225,7 @@ class PaintedImage:
             leave black regions empty, use `mask` as well.
         """
         for name, value in (("black", black), ("white", white)):
-            real_number(
+            allowed_number(
                 name,
                 value,
                 "a number above 0 (regions are barred by a mask)",
@@ -236,7 +236,7 @@ class PaintedImage:
 
     def mask(self, *, above: float = 0.5) -> Callable[[Float32Array], BoolArray]:
         """Return a mask for `scatter` and `Relaxation`: True where the image is brighter than `above`."""
-        real_number("above", above, "a number", np.isfinite, InvalidScattering)
+        allowed_number("above", above, "a number", np.isfinite, InvalidScattering)
         return lambda points: self(points) > above
 
     def _pixel_indices(self, ticks: Float64Array, count: int) -> Int64Array:

@@ -18,7 +18,7 @@ from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.space_curve import curve_keys
 from decals.surfaces.surface import Surface, is_surface, vectors
-from decals.validation import count_number, function_or_none, function_values, real_array, real_number
+from decals.validation import allowed_number, count_number, function_or_none, function_values, real_array
 
 AREA_SAMPLES = 16384
 """Samples that estimate the visible area of a surface."""
@@ -336,7 +336,9 @@ def particle_count(count: int | None, spacing: float | None, mass: float) -> int
         raise InvalidScattering("expected either a count or a spacing, got both or none; give one of them")
     if count is not None:
         return count_number("count", count, 0, MAX_PARTICLES, InvalidScattering)
-    length = real_number("spacing", spacing, "a length above 0", lambda value: value > 0, InvalidScattering)
+    length = allowed_number(
+        "spacing", spacing, "a length above 0", lambda value: value > 0, InvalidScattering
+    )
     if length < np.sqrt(2.0 * mass / (np.sqrt(3.0) * MAX_PARTICLES)):
         raise InvalidScattering(
             f"spacing: {length:g} makes more than {MAX_PARTICLES:,} particles; take a larger one, or a count"

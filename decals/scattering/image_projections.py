@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Box, Float32Array, Float64Array
+from blobtree.validation import describe, finite_vector
 from decals.errors import InvalidScattering
 from decals.scattering.domain import as_surfaces
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import Surface
-from decals.validation import describe, finite_vector, instance, real_array
+from decals.validation import instance, real_array
 
 Projection: TypeAlias = Callable[[Float32Array], Float64Array]
 """``points[n, 3]`` to ``uv[n, 2]``."""

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array
+from blobtree.validation import describe
 from decals.errors import InvalidScattering
 from decals.scattering.neighbors import FacingTree
 from decals.surfaces.surface import unit_rows
-from decals.validation import describe, function_values, member, real_array
+from decals.validation import function_values, member, real_array
 
 MIN_TANGENTIAL_SHARE = 1e-3
 """Least tangential share of a direction; below it the direction counts as normal to the surface."""

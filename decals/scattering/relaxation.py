@@ -36,7 +36,7 @@ from decals.scattering.repulsion import CUTOFF, law_at
 from decals.scattering.sizing import Sizing
 from decals.scattering.variation import ImageChoice, Jitter
 from decals.surfaces.surface import Surface
-from decals.validation import count_number, function_or_none, real_array, real_number, whole_number
+from decals.validation import allowed_number, count_number, function_or_none, real_array, whole_number
 
 RELOCATION_SCHEDULE = (0.1, 0.8, 0.05)
 """First and last part of the schedule at which crowded particles are relocated, and the interval."""
@@ -280,7 +280,7 @@ class Relaxation:
             If `until` is no number, or `progress` or `cancel` cannot be called.
         """
         if until is not None:
-            until = real_number(
+            until = allowed_number(
                 "until",
                 until,
                 "the rho that is enough, a number above 0",
@@ -307,7 +307,7 @@ class Relaxation:
     def polish(self, rounds: int = POLISHING_ROUNDS, *, close: float = CLOSE_DISTANCE) -> None:
         """Part the pairs that are closer than `close` spacings by trial, in at most so many rounds."""
         rounds = count_number("rounds", rounds, 0, None, InvalidScattering)
-        real_number(
+        allowed_number(
             "close",
             close,
             "a number of spacings from 0 to 100",

@@ -28,7 +28,7 @@ from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.mesh_kernels import closest_points
 from decals.surfaces.surface import Surface
 from decals.surfaces.tree_kernels import project_with_mesh
-from decals.validation import function_or_none, real_number
+from decals.validation import allowed_number, function_or_none
 
 if TYPE_CHECKING:  # pyvista takes long to import
     from decals.surfaces.convert import HasSurface, Model
@@ -179,7 +179,7 @@ def scatter(
 
 def check_regularity(regularity: float) -> None:
     """Raise `InvalidScattering` unless a regularity is a number from 0 to 1."""
-    real_number(
+    allowed_number(
         "regularity", regularity, "a number from 0 to 1", lambda value: 0.0 <= value <= 1.0, InvalidScattering
     )
 

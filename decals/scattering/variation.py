@@ -13,7 +13,7 @@ from decals.model import MAX_IMAGES
 from decals.options import Values
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.surfaces.surface import unit_rows
-from decals.validation import count_number, real_array, real_number
+from decals.validation import allowed_number, count_number, real_array
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Jitter:
     def __post_init__(self) -> None:
         for name in ("position", "size", "angle"):
             value = getattr(self, name)
-            real_number(
+            allowed_number(
                 f"{name} of a jitter",
                 value,
                 "a number from 0 upward",

@@ -14,6 +14,7 @@ from PIL import Image
 from blobtree._typing import UInt8Array
 from blobtree.files import is_file, is_folder, make_folder, replacing
 from blobtree.progress import Cancel, Progress, reporting
+from blobtree.validation import describe, finite_number
 from decals.errors import InvalidScene
 from decals.rendering.options import Size, check_scene, drawing_of
 from decals.rendering.picture import Picture, on_white
@@ -22,14 +23,7 @@ from decals.scenes.files import camera_values
 from decals.scenes.pose import PosedScene
 from decals.scenes.render import drawn_picture
 from decals.scenes.scene import Scene
-from decals.validation import (
-    checked_path,
-    count_number,
-    describe,
-    finite_number,
-    optional_package,
-    real_number,
-)
+from decals.validation import allowed_number, checked_path, count_number, optional_package
 
 MAX_FRAMES = 100_000
 """Largest number of frames that a turntable has."""
@@ -154,7 +148,7 @@ def animate(
     ['frame_0001.png', 'frame_0002.png', 'frame_0003.png']
     """
     target = _target(path)
-    speed = real_number("rate", rate, _RATE, lambda number: 0.1 <= number <= 240.0, InvalidScene)
+    speed = allowed_number("rate", rate, _RATE, lambda number: 0.1 <= number <= 240.0, InvalidScene)
     scenes = _scenes(frames)
     if count is None:
         expected = len(frames) if isinstance(frames, Sized) else 0

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float64Array
-from blobtree.validation import real
+from blobtree.validation import describe, finite_number, finite_vector, real
 from decals.errors import InvalidScene
 from decals.rendering.viewpoint import Bounds, Rays
-from decals.validation import describe, finite_number, finite_vector, real_array, real_number
+from decals.validation import allowed_number, real_array
 
 Vector = tuple[float, float, float]
 
@@ -424,7 +424,7 @@ class Filling:
 def _ratio(name: str, value: float) -> float:
     """Return a ratio that float64 can divide by and multiply with."""
     least, most = 1 / MAX_RATIO, MAX_RATIO
-    return real_number(
+    return allowed_number(
         name, value, "a number from 1e-6 to 1e6", lambda ratio: least <= ratio <= most, InvalidScene
     )
 
@@ -486,7 +486,7 @@ def _corners(bounds: Bounds) -> Float64Array:
 
 
 def _vector(name: str, value: ArrayLike) -> Vector:
-    return _triple(finite_vector(f"a camera's {name}", value, InvalidScene))
+    return finite_vector(f"a camera's {name}", value, InvalidScene)
 
 
 def _triple(array: Float64Array) -> Vector:

@@ -9,6 +9,7 @@ import numpy as np
 
 from blobtree._typing import Float32Array
 from blobtree.progress import Progress, reporting
+from blobtree.validation import describe
 from decals.errors import InvalidScattering, InvalidScene
 from decals.images.load import DEFAULT_IMAGE, AnyImage
 from decals.rendering.options import SceneLike, is_scene_like, relief_ranges
@@ -23,7 +24,7 @@ from decals.scenes.scene import Scene, as_images
 from decals.surfaces.convert import Model
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.surfaces.windings import MeshOrientation
-from decals.validation import describe, instance, member
+from decals.validation import instance, member
 
 FRAMING_SAMPLES = 2000
 """Points per object that the camera is fitted to."""

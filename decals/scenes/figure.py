@@ -14,7 +14,7 @@ from PIL import Image
 from blobtree._typing import BoolArray, Float64Array
 from blobtree.files import replacing, write_atomically
 from blobtree.progress import Progress, reporting
-from blobtree.validation import items, truth
+from blobtree.validation import describe, finite_number, items, truth
 from decals.errors import InvalidScene
 from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
@@ -24,7 +24,7 @@ from decals.scenes.outlines import STEP, LineKind, chains, outlines
 from decals.scenes.render import render
 from decals.scenes.scene import Scene, require_scene
 from decals.surfaces.mesh import edges_of
-from decals.validation import checked_path, describe, finite_number, instance, optional_package, real_number
+from decals.validation import allowed_number, checked_path, instance, optional_package
 
 SUFFIXES = (".svg", ".pdf")
 
@@ -177,7 +177,7 @@ def _widths(widths: object) -> dict[str, float]:
         raise InvalidScene(f"widths: expected the kinds {', '.join(WIDTHS)}, got {describe(unknown[0])}")
     expected = f"points from 0 to {MAX_WIDTH:g}"
     return WIDTHS | {
-        kind: real_number(
+        kind: allowed_number(
             f"width of {kind}", width, expected, lambda value: 0 <= value <= MAX_WIDTH, InvalidScene
         )
         for kind, width in widths.items()

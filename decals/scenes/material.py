@@ -11,13 +11,14 @@ import numpy as np
 from blobtree._typing import Float32Array, UInt8Array
 from blobtree.files import is_file
 from blobtree.immutable import read_only
+from blobtree.validation import describe
 from decals.errors import InvalidImage
 from decals.images.load import AnyImage, image_pixels
 from decals.images.texels import Pixels, as_bytes, decode_srgb, unit_levels, without_excess
 from decals.options import Values
 from decals.scenes.scene import DecalImage
 from decals.shaders import constants
-from decals.validation import describe, real_number
+from decals.validation import allowed_number
 
 MAP_NAMES = {
     "pixels": ("basecolor", "base_color", "albedo", "diffuse", "color", "col"),
@@ -230,7 +231,7 @@ class DecalMaterial(DecalImage):
     def _checked_relief(self) -> float:
         """Return the relief, after a check against the heights."""
         name = self._name("relief")
-        relief = real_number(name, self.relief, "a number of radii", np.isfinite, InvalidImage)
+        relief = allowed_number(name, self.relief, "a number of radii", np.isfinite, InvalidImage)
         highest = 0.0 if self.height is None else abs(relief) * float(np.abs(self.height).max(initial=0.0))
         if relief != 0.0 and self.height is None:
             raise InvalidImage(f"{name}: expected 0 without heights, got {relief:g}; give a height map")

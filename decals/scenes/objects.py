@@ -18,7 +18,7 @@ from blobtree.errors import InvalidNode
 from blobtree.identity import Value
 from blobtree.lazy import Lazy
 from blobtree.nodes.paths import Path, moved, node_at
-from blobtree.validation import truth
+from blobtree.validation import describe, truth
 from decals.errors import InvalidMesh, InvalidScene
 from decals.images.load import AnyImage
 from decals.receivers import label_names
@@ -30,7 +30,7 @@ from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.mesh_data import MeshData
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.surfaces.windings import MeshOrientation
-from decals.validation import describe, instance, is_unicode, member, real_number
+from decals.validation import allowed_number, instance, is_unicode, member
 
 Paths = tuple[Path, ...]
 """Paths of nodes in a tree; ``()`` is the path of its root."""
@@ -383,7 +383,7 @@ def shown_objects(objects: Iterable[SceneObject]) -> list[SceneObject]:
 
 def as_crease_angle(angle: object) -> float:
     """Return a crease angle in degrees; InvalidScene for other values."""
-    return real_number(
+    return allowed_number(
         "crease_angle", angle, "degrees from 0 to 180", lambda value: 0.0 <= value <= 180.0, InvalidScene
     )
 

@@ -9,9 +9,8 @@ from numpy.typing import ArrayLike
 
 from blobtree import Node
 from blobtree._typing import Float64Array
-from blobtree.validation import real
+from blobtree.validation import describe, real
 from decals.errors import InvalidScene
-from decals.validation import describe
 
 Origin = tuple[float, float, float]
 """A point in the coordinates that models come in."""

@@ -26,7 +26,7 @@ from decals.scenes.objects import MeshObject, SceneObject, TreeObject
 from decals.scenes.scene import Scene, require_scene
 from decals.surfaces.normals import split_at_creases
 from decals.surfaces.subdivide import subdivided
-from decals.validation import real_number
+from decals.validation import allowed_number
 
 STEP = 0.05
 """Default length of the edges that find lines, in visible radii of the smallest decal there."""
@@ -174,7 +174,7 @@ def outlines(
     True
     """
     require_scene("scene", scene, "take the scene that was posed, where its decals lie")
-    step = real_number("step", step, "a number above 0, at most 1", lambda x: 0.0 < x <= 1.0, InvalidScene)
+    step = allowed_number("step", step, "a number above 0, at most 1", lambda x: 0.0 < x <= 1.0, InvalidScene)
     drawing = scene.drawing.overridden(contact=contact, stiffness=stiffness, mapping=mapping)
     decals = scene.decals
     options = evaluation_options(drawing, decals, scene.objects)

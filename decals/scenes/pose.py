@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from blobtree import Node, polygonize
 from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.errors import InvalidNode
-from blobtree.validation import real, truth
+from blobtree.validation import describe, real, truth
 from decals.errors import InvalidScene
 from decals.model import Decals
 from decals.rendering.options import Drawing
@@ -31,7 +31,7 @@ from decals.surfaces.base_color import BaseColor, Color
 from decals.surfaces.convert import as_shape, is_model
 from decals.surfaces.mesh_data import MeshData
 from decals.surfaces.windings import MeshOrientation
-from decals.validation import describe, instance, whole_number
+from decals.validation import instance, whole_number
 
 if TYPE_CHECKING:
     import pyvista as pv

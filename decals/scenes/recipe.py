@@ -8,11 +8,12 @@ from typing import Any, Self
 import numpy as np
 
 from blobtree.identity import content_hash
+from blobtree.validation import describe
 from decals.errors import InvalidScene
 from decals.model import Decals
 from decals.scenes.objects import SceneObject, TreeObject
 from decals.scenes.provenance import device_text, package_versions, provenance
-from decals.validation import describe, instance, whole_number
+from decals.validation import instance, whole_number
 
 NEEDED = ("function", "parameters", "seed", "versions")
 """Parts that every file with a recipe has."""

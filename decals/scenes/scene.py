@@ -11,6 +11,7 @@ import numpy as np
 from blobtree.identity import Value
 from blobtree.immutable import read_only
 from blobtree.progress import Progress
+from blobtree.validation import describe
 from decals import rendering
 from decals.errors import ImplicitDecalsError, InvalidScene, NoGraphics
 from decals.images.builtin import generate_image, is_builtin
@@ -32,7 +33,7 @@ from decals.scenes.origin import WORLD, Origin
 from decals.scenes.recipe import Recipe
 from decals.shortcuts import public
 from decals.surfaces.convert import Model
-from decals.validation import describe, instance, require_rgba, whole_number
+from decals.validation import instance, require_rgba, whole_number
 
 NOTEBOOK_SIZE = (640, 480)
 """Size of the picture of a scene in a notebook."""

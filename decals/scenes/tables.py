@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from blobtree._typing import Float64Array
 from blobtree.files import is_file, replacing, write_atomically
-from blobtree.validation import items, truth
+from blobtree.validation import describe, finite_vector, items, truth
 from decals.errors import InvalidDecals, InvalidInput
 from decals.images.load import AnyImage
 from decals.model import Decals, Interaction
@@ -33,7 +33,7 @@ from decals.scenes.origin import WORLD, Origin
 from decals.scenes.parquet import read_parquet
 from decals.scenes.records import check_inside, decimals
 from decals.scenes.scene import DecalImage, as_images
-from decals.validation import as_path, checked_path, describe, finite_vector, instance, optional_package
+from decals.validation import as_path, checked_path, instance, optional_package
 
 if TYPE_CHECKING:
     import pandas
@@ -459,13 +459,13 @@ def _is_empty(value: Any) -> bool:
 # -- CSV and Parquet -------------------------------------------------------------------------------------
 
 
-def _texts(name: str, values: NDArray[Any], origin: Float64Array) -> list[Any]:
+def _texts(name: str, values: NDArray[Any], origin: tuple[float, float, float]) -> list[Any]:
     """Return the cells of a column as text: the shortest decimals that are read as the same float32."""
     if values.dtype == np.float32:
         shift = origin["xyz".index(name)] if name in ("x", "y", "z") else 0.0
         if shift:
             with localcontext(EXACT):
-                return [str(Decimal(float(value)) + Decimal(float(shift))) for value in values]
+                return [str(Decimal(float(value)) + Decimal(shift)) for value in values]
         return [repr(value) for value in decimals(values).tolist()]
     if values.dtype == bool:
         return [str(value).lower() for value in values.tolist()]
@@ -478,7 +478,7 @@ def _shifted(texts: NDArray[Any], shift: float) -> NDArray[Any]:
 
     def shifted(text: str) -> str:
         try:
-            return str(Decimal(text) - Decimal(float(shift)))
+            return str(Decimal(text) - Decimal(shift))
         except InvalidOperation:
             return text
 

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array, Float64Array, Int32Array, UInt8Array
 from blobtree.identity import Value
-from blobtree.validation import real
+from blobtree.validation import describe, real
 from decals.errors import InvalidMesh
 from decals.images.load import AnyImage, image_pixels
 from decals.images.texels import as_bytes, decode_srgb, encode_srgb, unit_levels
-from decals.validation import describe, member
+from decals.validation import member
 
 _logger = logging.getLogger(__name__)
 

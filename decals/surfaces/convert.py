@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 import blobtree
 from blobtree import Mesh, Node
 from blobtree.files import is_file
-from blobtree.validation import point_array
+from blobtree.validation import describe, point_array
 from decals.errors import ImplicitDecalsError, InvalidMesh
 from decals.model import MAX_COORDINATE
 from decals.surfaces.base_color import BaseColor, checked_color, linear_colors
@@ -23,7 +23,6 @@ from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.mesh_data import MeshData, joined
 from decals.surfaces.surface import Surface, is_surface
 from decals.surfaces.triangulate import polygon_triangles
-from decals.validation import describe
 
 if TYPE_CHECKING:
     import pyvista as pv

@@ -16,7 +16,7 @@ from blobtree.lazy import Lazy
 from blobtree.tape.codes import OPERATORS
 from blobtree.tape.model import values_at
 from blobtree.tracing.trace import trace
-from blobtree.validation import point_array
+from blobtree.validation import describe, point_array
 from decals.errors import InvalidMesh, InvalidScattering
 from decals.surfaces.curved import CurvedMesh
 from decals.surfaces.extras import SMALL_PARTS
@@ -31,7 +31,7 @@ from decals.surfaces.surface import (
 )
 from decals.surfaces.tree_kernels import mark_above, project, project_with_mesh
 from decals.surfaces.windings import MeshOrientation
-from decals.validation import describe, whole_number
+from decals.validation import whole_number
 
 FIELD_TOLERANCE = 1e-4
 """Largest field error of a point on the surface, in units of the iso value."""

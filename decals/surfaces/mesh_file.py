@@ -14,6 +14,7 @@ import numpy as np
 
 from blobtree._typing import Float64Array, Int64Array
 from blobtree.files import is_file
+from blobtree.validation import describe
 from decals.child_process import can_isolate
 from decals.errors import InvalidMesh
 from decals.surfaces.base_color import checked_color
@@ -37,7 +38,7 @@ from decals.surfaces.triangulate import (
     traced_triangles,
 )
 from decals.surfaces.vtk_process import read_isolated, read_isolated_usd
-from decals.validation import as_path, describe
+from decals.validation import as_path
 
 if TYPE_CHECKING:  # its import takes longer than ours, and meshes of arrays do without
     import pyvista as pv

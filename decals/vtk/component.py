@@ -14,6 +14,7 @@ import pyvista as pv
 from blobtree import Node
 from blobtree.colors import ColorLike
 from blobtree.graphics import opens_window, vtk_warnings_hidden
+from blobtree.validation import describe
 from decals.errors import InvalidScene, NoGraphics
 from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
@@ -28,7 +29,7 @@ from decals.surfaces.base_color import BaseColor, BaseTexture
 from decals.surfaces.convert import Model, as_shape
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.surfaces.windings import MeshOrientation
-from decals.validation import describe, instance
+from decals.validation import instance
 from decals.vtk.adapters import Lights
 from decals.vtk.attributes import KnownAttributes
 from decals.vtk.extras import ACTORS

@@ -14,6 +14,7 @@ from vtkmodules.vtkCommonDataModel import vtkDataObject
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
 from blobtree._typing import Float64Array
+from blobtree.validation import describe
 from decals.errors import InvalidScene
 from decals.field.mapping import ImageMapping
 from decals.hosts.code import Code, code_of
@@ -30,7 +31,6 @@ from decals.scenes.scene import Scene
 from decals.shaders import compose
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.surfaces.windings import MeshOrientation
-from decals.validation import describe
 from decals.vtk.actor_object import actor_object
 from decals.vtk.adapters import matrix_of, vtk_projection
 from decals.vtk.mapper import NORMALS, ShaderAdditions, ShaderTag, SmoothNormals, polygon_mapper

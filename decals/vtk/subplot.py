@@ -18,6 +18,7 @@ from vtkmodules.vtkRenderingCore import vtkActor
 
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.progress import displayed, reporting
+from blobtree.validation import finite_number
 from decals.errors import InvalidPoints, InvalidScene
 from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
@@ -33,7 +34,7 @@ from decals.scenes.origin import WORLD
 from decals.scenes.scene import Scene
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.surfaces.windings import MeshOrientation
-from decals.validation import count_number, finite_number, member
+from decals.validation import count_number, member
 from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
 from decals.vtk.attributes import KnownAttributes
 from decals.vtk.extras import ACTORS

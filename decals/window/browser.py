@@ -3,9 +3,10 @@
 import math
 from typing import Any
 
+from blobtree.validation import describe, finite_number
 from decals.editing.key_bindings import from_browser
 from decals.errors import InvalidEdit
-from decals.validation import describe, finite_number, instance
+from decals.validation import instance
 from decals.window.window import EditWindow
 
 _FOCUS = (

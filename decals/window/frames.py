@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable, Hashable
 from enum import Enum, auto
 
+from blobtree.validation import finite_number
 from decals.errors import InvalidScene
-from decals.validation import finite_number
 from decals.vtk.adapters import weak_callback
 from decals.vtk.subplot import SubplotRenderer
 

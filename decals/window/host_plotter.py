@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float64Array
 from blobtree.graphics import require_screen, vtk_warnings_hidden
+from blobtree.validation import describe
 from decals.editing.document import Document
 from decals.editing.gizmo import Ray
 from decals.errors import InvalidScene
@@ -21,7 +22,7 @@ from decals.rendering.options import STUDIO, Background
 from decals.rendering.viewpoint import Projection
 from decals.scenes.camera import Camera
 from decals.scenes.scene import Scene
-from decals.validation import describe, whole_number
+from decals.validation import whole_number
 from decals.vtk.subplot import SubplotRenderer
 
 DEFAULT_SIZE = (1200, 800)

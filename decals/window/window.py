@@ -14,6 +14,7 @@ import decals.vtk  # noqa: F401  (registers `plotter.decals`)
 from blobtree._typing import Float32Array
 from blobtree.graphics import require_gl, require_screen
 from blobtree.progress import displayed
+from blobtree.validation import describe
 from decals.editing.actions import Actions
 from decals.editing.background import BackgroundJobs
 from decals.editing.document import Document
@@ -23,7 +24,7 @@ from decals.errors import InvalidEdit, InvalidScene
 from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
 from decals.scenes.scene import Scene
-from decals.validation import count_number, describe
+from decals.validation import count_number
 from decals.vtk.adapters import weak_callback
 from decals.vtk.subplot import MAX_SAMPLES, SubplotRenderer
 from decals.vtk.window_title import WindowTitle

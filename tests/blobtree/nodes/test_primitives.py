@@ -36,7 +36,7 @@ from blobtree import (
     polygonize,
     to_json,
 )
-from blobtree.declare.parameters import Quantity, describe, parameters_of
+from blobtree.declare.parameters import Quantity, described, parameters_of
 from blobtree.errors import InvalidNode
 from blobtree.formulas.falloff import RIM
 from blobtree.nodes.curves import _JoinedSegment
@@ -330,7 +330,7 @@ def test_every_parameter_is_declared_documented_and_in_files(kind: type[Node]) -
     for name, parameter in parameters.items():
         assert parameter.name == name
         assert f"{name} : " in document
-        assert describe(parameter) in document
+        assert described(parameter) in document
     operands = {field.name for field in fields(kind)} - set(parameters)  # type: ignore[arg-type]
     assert operands <= {"operands", "child", "solid", "tool", "obstacle", "first", "second", "region"}
     assert ">>> " in document
