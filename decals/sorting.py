@@ -1,11 +1,16 @@
 """Orders, groups and ranges of whole numbers, in a fraction of the time of NumPy's stable sort."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from blobtree._typing import Int64Array
 
+WholeNumbers = NDArray[np.integer[Any]]
 
-def stable_order(keys: Int64Array) -> Int64Array:
+
+def stable_order(keys: WholeNumbers) -> Int64Array:
     """Return the rows of whole numbers in the order of the numbers; of equal ones the first comes first.
 
     Number and row are sorted as one number, if they fit into one.
@@ -37,7 +42,7 @@ def groups(keys: Int64Array) -> tuple[Int64Array, Int64Array, Int64Array]:
     return order[starts], group, counts
 
 
-def distinct_numbers(numbers: Int64Array, count: int) -> Int64Array:
+def distinct_numbers(numbers: WholeNumbers, count: int) -> Int64Array:
     """Return each of some numbers once, in order; all are from 0 to below `count`."""
     marked = np.zeros(count, np.bool_)
     marked[numbers.reshape(-1)] = True

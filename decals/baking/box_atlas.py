@@ -10,7 +10,7 @@ from decals.baking.meshes import BakeMesh
 from decals.baking.packing import pack
 from decals.baking.unwrapped import Unwrapped
 from decals.sorting import distinct_numbers, groups
-from decals.surfaces.topology import components, edge_twins
+from decals.surfaces.topology import components
 
 SIDES = 6
 """Sides of a box; axes 0 to 2 are +x, +y and +z, and 3 to 5 are −x, −y and −z."""
@@ -61,9 +61,8 @@ class BoxSides:
         crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         doubled = np.linalg.norm(crosses, axis=1)
         tick()
-        twins = edge_twins(mesh.welded[faces]).reshape(-1, 3).astype(np.int64)
+        neighbors = np.where(mesh.twins >= 0, mesh.twins // 3, -1).reshape(-1, 3)
         tick()
-        neighbors = np.where(twins >= 0, twins // 3, -1)
         normals = crosses / np.maximum(doubled, 1e-300)[:, None]
         return cls(normals, doubled, neighbors, _smoothed(np.hstack([normals, -normals]), neighbors, tick))
 

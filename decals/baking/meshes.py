@@ -23,7 +23,7 @@ from decals.scenes.pose import PosedMesh
 from decals.surfaces.base_color import WHITE, BaseColor, Color
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.normals import SplitMesh, split_at_colors, split_at_creases, vertex_normals
-from decals.surfaces.topology import welded
+from decals.surfaces.topology import edge_twins, welded
 from decals.surfaces.windings import MeshOrientation
 
 BaseColors = Color | Callable[[Float32Array], Float32Array]
@@ -65,6 +65,11 @@ class BakeMesh:
     def welded(self) -> Int64Array:
         """Return for each vertex the first vertex at the same position, ``int64[n]``."""
         return welded(self.vertices)
+
+    @Lazy
+    def twins(self) -> Int64Array:
+        """Return the side of the neighbour behind each side of a face, see `edge_twins`, ``int64[3 m]``."""
+        return edge_twins(self.welded[self.faces]).astype(np.int64)
 
     @Lazy
     def vertex_light(self) -> Float32Array:

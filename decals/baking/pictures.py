@@ -3,6 +3,7 @@
 import os
 import struct
 import zlib
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import BinaryIO
 
@@ -34,19 +35,30 @@ STRIP_BYTES = 1 << 20
 
 def png_bytes(texels: UInt8Array) -> bytes:
     """Return an image ``uint8[h, w]`` or ``uint8[h, w, channels]`` as a PNG file."""
+    return _begun(texels)()
+
+
+def _begun(texels: UInt8Array) -> Callable[[], bytes]:
+    """Begin to compress an image, and return a function that waits for its PNG file."""
     rows = texels.reshape(len(texels), -1)
     channels = 1 if texels.ndim == 2 else texels.shape[2]
     starts = range(0, len(rows), max(1, STRIP_BYTES // rows.shape[1]))
     ends = [*starts[1:], len(rows)]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        strips = list(pool.map(lambda first, last: _strip(rows, first, last), starts, ends))
-    checksum = 1
-    for _, own, length in strips:
-        checksum = _joined_checksum(checksum, own, length)
-    header = struct.pack(">IIBBBBB", texels.shape[1], len(texels), 8, COLOR_TYPES[channels], 0, 0, 0)
-    begin = SIGNATURE + _chunk(b"IHDR", header) + _chunk(b"IDAT", ZLIB_HEADER)
-    end = _chunk(b"IDAT", checksum.to_bytes(4, "big")) + _chunk(b"IEND", b"")
-    return b"".join([begin, *(chunk for chunk, *_ in strips), end])
+    pool = ThreadPoolExecutor(os.cpu_count())
+    strips = pool.map(lambda first, last: _strip(rows, first, last), starts, ends)
+    pool.shutdown(wait=False)
+
+    def content() -> bytes:
+        checksum, chunks = 1, [SIGNATURE]
+        header = struct.pack(">IIBBBBB", texels.shape[1], len(texels), 8, COLOR_TYPES[channels], 0, 0, 0)
+        chunks += [_chunk(b"IHDR", header), _chunk(b"IDAT", ZLIB_HEADER)]
+        for chunk, own, length in strips:
+            chunks.append(chunk)
+            checksum = _joined_checksum(checksum, own, length)
+        chunks += [_chunk(b"IDAT", checksum.to_bytes(4, "big")), _chunk(b"IEND", b"")]
+        return b"".join(chunks)
+
+    return content
 
 
 def _joined_checksum(checksum: int, following: int, length: int) -> int:
@@ -81,6 +93,8 @@ def _chunk(name: bytes, data: bytes) -> bytes:
 class PngTexture:
     """A texture in place of an image of Pillow, for libraries that save their images themselves.
 
+    It is compressed while the library does other work.
+
     Parameters
     ----------
     texels : uint8[h, w, channels]
@@ -89,11 +103,11 @@ class PngTexture:
     format = "PNG"
 
     def __init__(self, texels: UInt8Array) -> None:
-        self._texels = texels
+        self._wait = _begun(texels)
 
     @Lazy
     def _content(self) -> bytes:
-        return png_bytes(self._texels)
+        return self._wait()
 
     def save(self, file: BinaryIO, **_: object) -> None:
         """Write the PNG file; Pillow's options are ignored."""

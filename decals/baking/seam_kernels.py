@@ -56,16 +56,16 @@ def change_levels(
     first: wp.int32,
     numbers: wp.array(dtype=wp.int32),
     values: wp.array(dtype=wp.float64),
-    srgb: wp.array(dtype=wp.uint8),
+    srgb: wp.bool,
     levels: wp.array(dtype=wp.float64),
     light: wp.array(dtype=wp.float64),
 ):
-    """Write some levels, which lie one channel after another, and their linear light."""
+    """Write the levels of some texels, and their linear light."""
     i = first + wp.tid()
     at = numbers[i]
     levels[at] = values[i]
     light[at] = values[i]
-    if srgb[at % srgb.shape[0]] != wp.uint8(0):
+    if srgb:
         light[at] = decoded64(values[i])
 
 
@@ -116,37 +116,34 @@ def find_closest(
 @wp.kernel
 def linearize(
     first: wp.int32,
-    strips: wp.array(dtype=wp.int32),
+    runs: wp.array(dtype=wp.int32),
     rows: wp.array(dtype=wp.int32),
     index: wp.array2d(dtype=wp.int32),
     starts: wp.array(dtype=wp.int32),
     places: wp.array2d(dtype=wp.vec2d),
-    smooth: wp.array2d(dtype=wp.uint8),
-    srgb: wp.array(dtype=wp.uint8),
+    smooth: wp.array(dtype=wp.uint8),
+    srgb: wp.bool,
     levels: wp.array(dtype=wp.float64),
     light: wp.array(dtype=wp.float64),
     gaps: wp.array(dtype=wp.float64),
     slopes: wp.array2d(dtype=wp.float64),
 ):
-    """Write how far both sides differ at the points of strips, from a row on, and 0 where they may.
+    """Write how far both sides differ at the points of runs, from a row on, and 0 where they may.
 
     The derivatives by the eight levels are written too if there is room.
     """
     i = first + wp.tid()
-    channels = srgb.shape[0]
-    run = strips[i] / channels
-    channel = strips[i] % channels
-    gamma = srgb[channel] != wp.uint8(0)
+    run = runs[i]
     for row in range(rows[i], rows[i + 1]):
         point = starts[run] + row - rows[i]
         gaps[row] = wp.float64(0.0)
-        if smooth[point, channel] != wp.uint8(0):
+        if smooth[point] != wp.uint8(0):
             weights = mixed_weights(places[point])
             mixed = wp.vec2d()
             for k in range(8):
-                mixed[k / 4] += weights[k] * light[index[run, k] * channels + channel]
+                mixed[k / 4] += weights[k] * light[index[run, k]]
             seen = mixed
-            if gamma:
+            if srgb:
                 for side in range(2):
                     mixed[side] = wp.clamp(mixed[side], wp.float64(0.0), wp.float64(1.0))
                     seen[side] = encoded64(mixed[side])
@@ -154,8 +151,8 @@ def linearize(
             if slopes.shape[0] > 0:
                 for k in range(8):
                     value = weights[k]
-                    if gamma:
-                        at = index[run, k] * channels + channel
+                    if srgb:
+                        at = index[run, k]
                         value = value * decoded_slope64(levels[at], light[at])
                         value = value / decoded_slope64(seen[k / 4], mixed[k / 4])
                     if k >= 4:
@@ -166,22 +163,22 @@ def linearize(
 @wp.kernel
 def find_lowest(
     first: wp.int32,
-    strips: wp.array(dtype=wp.int32),
+    runs: wp.array(dtype=wp.int32),
     columns: wp.array2d(dtype=wp.int32),
     lowest: wp.array(dtype=wp.int32),
 ):
-    """Lower ``lowest`` of each level to the lowest one that is mixed with it, for parts of strips."""
+    """Lower ``lowest`` of each level to the lowest one that is mixed with it, for parts of runs."""
     part = first + wp.tid()
-    for strip in range(strips[part], strips[part + 1]):
-        least = columns[strip, 0]
+    for run in range(runs[part], runs[part + 1]):
+        least = columns[run, 0]
         for k in range(8):
-            least = wp.min(least, columns[strip, k])
+            least = wp.min(least, columns[run, k])
         for k in range(8):
-            lowest[columns[strip, k]] = wp.min(lowest[columns[strip, k]], least)
+            lowest[columns[run, k]] = wp.min(lowest[columns[run, k]], least)
 
 
 @wp.kernel
-def square_strips(
+def square_runs(
     first: wp.int32,
     rows: wp.array(dtype=wp.int32),
     columns: wp.array2d(dtype=wp.int32),
@@ -192,21 +189,21 @@ def square_strips(
     levels: wp.array(dtype=wp.float64),
     squares: wp.array2d(dtype=wp.float64),
 ):
-    """Write the normal equations of the chosen rows of strips: the lower triangle, then the right side."""
-    strip = first + wp.tid()
+    """Write the normal equations of the chosen rows of runs: the lower triangle, then the right side."""
+    run = first + wp.tid()
     for k in range(SQUARE + 8):
-        squares[strip, k] = wp.float64(0.0)
-    for row in range(rows[strip], rows[strip + 1]):
+        squares[run, k] = wp.float64(0.0)
+    for row in range(rows[run], rows[run + 1]):
         if chosen[row] != wp.uint8(0):
             target = -gaps[row]
             for k in range(8):
-                target += slopes[row, k] * levels[columns[strip, k]]
+                target += slopes[row, k] * levels[columns[run, k]]
             at = wp.int32(0)
             for a in range(8):
                 weighted = force[row] * force[row] * slopes[row, a]
-                squares[strip, SQUARE + a] += weighted * target
+                squares[run, SQUARE + a] += weighted * target
                 for b in range(a + 1):
-                    squares[strip, at] += weighted * slopes[row, b]
+                    squares[run, at] += weighted * slopes[row, b]
                     at += 1
 
 
@@ -214,7 +211,7 @@ def square_strips(
 def solve_parts(
     first: wp.int32,
     parts: wp.array(dtype=wp.int32),
-    strips: wp.array(dtype=wp.int32),
+    runs: wp.array(dtype=wp.int32),
     bounds: wp.array(dtype=wp.int32),
     columns: wp.array2d(dtype=wp.int32),
     lowest: wp.array(dtype=wp.int32),
@@ -225,7 +222,7 @@ def solve_parts(
     factors: wp.array(dtype=wp.float64),
     solution: wp.array(dtype=wp.float64),
 ):
-    """Solve the normal equations of some parts by Cholesky's method, from those of their strips.
+    """Solve the normal equations of some parts by Cholesky's method, from those of their runs.
 
     Row i of the factor has the columns from ``lowest[i]`` to i, the last of them at ``diagonal[i]``.
     """
@@ -238,15 +235,15 @@ def solve_parts(
             factors[base + wp.int64(j)] = wp.float64(0.0)
         factors[diagonal[i]] = held[i]
         solution[i] = held[i] * aims[i]
-    for strip in range(strips[part], strips[part + 1]):
+    for run in range(runs[part], runs[part + 1]):
         at = wp.int32(0)
         for a in range(8):
-            i = columns[strip, a]
-            solution[i] += squares[strip, SQUARE + a]
+            i = columns[run, a]
+            solution[i] += squares[run, SQUARE + a]
             for b in range(a + 1):
-                j = columns[strip, b]
+                j = columns[run, b]
                 row = wp.max(i, j)
-                factors[diagonal[row] - wp.int64(row - wp.min(i, j))] += squares[strip, at]
+                factors[diagonal[row] - wp.int64(row - wp.min(i, j))] += squares[run, at]
                 at += 1
     for i in range(begin, end):
         base = diagonal[i] - wp.int64(i)
@@ -323,12 +320,12 @@ def settle_point(
 def settle(
     first: wp.int32,
     bounds: wp.array(dtype=wp.int32),
-    strips: wp.array(dtype=wp.int32),
+    runs: wp.array(dtype=wp.int32),
     columns: wp.array2d(dtype=wp.int32),
     starts: wp.array(dtype=wp.int32),
     places: wp.array2d(dtype=wp.vec2d),
-    smooth: wp.array2d(dtype=wp.uint8),
-    srgb: wp.array(dtype=wp.uint8),
+    smooth: wp.array(dtype=wp.uint8),
+    srgb: wp.bool,
     sweeps: wp.int32,
     aim: wp.float32,
     limit: wp.float32,
@@ -337,22 +334,19 @@ def settle(
     changed: wp.array(dtype=wp.int32),
     seen: wp.array(dtype=wp.int32),
 ):
-    """Change levels at each point of strips, forth and back, where both sides differ by more than ``limit``.
+    """Change levels at each point of runs, forth and back, where both sides differ by more than ``limit``.
 
-    The change is about the smallest after which both sides differ by ``aim`` (the method of Kaczmarz). Strips
+    The change is about the smallest after which both sides differ by ``aim`` (the method of Kaczmarz). Runs
     whose levels have not changed since the sweep ``seen`` are left out; ``changed`` has the sweep of each
-    level, and ``light`` its linear light. One thread has the strips from one of ``bounds`` to the next, since
-    each step needs the steps before; strips of different threads have no level in common.
+    level, and ``light`` its linear light. One thread has the runs from one of ``bounds`` to the next, since
+    each step needs the steps before; runs of different threads have no level in common.
     """
     part = first + wp.tid()
     begin = bounds[part]
     count = bounds[part + 1] - begin
-    channels = srgb.shape[0]
-    channel = strips[begin] % channels
-    gamma = srgb[channel] != wp.uint8(0)
     for i in range(begin, begin + count):
         for k in range(8):
-            light[columns[i, k]] = light_of(levels[columns[i, k]], gamma)
+            light[columns[i, k]] = light_of(levels[columns[i, k]], srgb)
     for sweep in range(sweeps):
         updates = wp.int32(0)
         for at in range(count):
@@ -364,14 +358,14 @@ def settle(
                 newest = wp.max(newest, changed[columns[i, k]])
             if newest >= seen[i]:
                 seen[i] = sweep
-                run = strips[i] / channels
+                run = runs[i]
                 for number in range(starts[run + 1] - starts[run]):
                     point = starts[run] + number
                     if sweep % 2 == 1:
                         point = starts[run + 1] - 1 - number
-                    if smooth[point, channel] != wp.uint8(0):
+                    if smooth[point] != wp.uint8(0):
                         if settle_point(
-                            places[point], columns[i], gamma, aim, limit, sweep, levels, light, changed
+                            places[point], columns[i], srgb, aim, limit, sweep, levels, light, changed
                         ):
                             updates += 1
         if updates == 0:

@@ -6,8 +6,10 @@ so that the colours on both sides agree, and as little as that takes.
 """
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from functools import partial
+from threading import Event
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +19,7 @@ from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 
 from blobtree._typing import BoolArray, Float64Array, Int32Array, Int64Array, UInt8Array
 from blobtree.device import array_on, launch
+from blobtree.errors import Cancelled
 from decals.baking.meshes import BakeMesh
 from decals.baking.seam_kernels import (
     POINT_BITS,
@@ -55,6 +58,9 @@ RINGS = 2
 
 ATTEMPTS, SWEEPS = 20, 100
 """Times that single corrections begin, and most rounds of them."""
+
+REPORT_SECONDS = 0.1
+"""Seconds between reports."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,30 +113,39 @@ def _cut_edges(
     mesh: BakeMesh, part: Unwrapped
 ) -> tuple[Int64Array, Int64Array, Float64Array, Int64Array, Float64Array]:
     """Return faces, tiles, ends, corners and lengths of the edges that lie at two places; see `Seams`."""
-    corners = part.faces.astype(np.int64)
-    numbers = mesh.welded[part.rows[corners]]
-    begin, end, one, other = (
-        of.reshape(-1) for rows in (corners, numbers) for of in (rows, np.roll(rows, -1, axis=1))
-    )
-    turned = one > other
-    sides = np.stack([np.where(turned, end, begin), np.where(turned, begin, end)], axis=1)
-    keys = np.minimum(one, other) * len(mesh.vertices) + np.maximum(one, other)
-    order = stable_order(keys)
-    ordered = keys[order]
-    first = np.flatnonzero((ordered[1:] == ordered[:-1]) & (one != other)[order[1:]])
-    pairs = np.stack([order[first], order[first + 1]])
-    tile = part.tile_of_face[pairs // 3]
-    apart = (sides[pairs[0]] != sides[pairs[1]]).any(axis=1) | (tile[0] != tile[1])
-    pairs = pairs[:, apart].T  # edges whose sides have the same vertices lie at one place
+    corners, tile = part.faces.astype(np.int64), part.tile_of_face
+    begin, end = corners.reshape(-1), np.roll(corners, -1, axis=1).reshape(-1)
+    one = np.flatnonzero(mesh.twins > np.arange(len(begin)))
+    other = mesh.twins[one]
+    apart = (begin[one] != end[other]) | (end[one] != begin[other]) | (tile[one // 3] != tile[other // 3])
+    pairs = np.stack([one[apart], other[apart]], axis=1)
+    welded = mesh.welded[part.rows]
+    pairs = np.concatenate([pairs, _pairs_of_several(mesh.twins, welded[begin], welded[end])])
+    sides = np.stack([begin[pairs], end[pairs]], axis=2)
+    turned = welded[sides[..., 0]] > welded[sides[..., 1]]
+    sides[turned] = sides[turned][:, ::-1]
     faces = pairs // 3
-    tiles = part.tile_of_face[faces].astype(np.int64)
-    ends = part.places[sides[pairs]].astype(np.float64)
+    tiles = tile[faces].astype(np.int64)
+    ends = part.places[sides].astype(np.float64)
     apart = np.abs(ends[:, 0] - ends[:, 1]).reshape(-1, 4).T > SAME_PLACE
     cut = apart.any(axis=0) | (tiles[:, 0] != tiles[:, 1])
-    a, b = np.moveaxis(mesh.vertices[part.rows[sides[pairs[cut, 0]]]].astype(np.float64), 1, 0)
+    a, b = np.moveaxis(mesh.vertices[part.rows[sides[cut, 0]]].astype(np.float64), 1, 0)
     thirds = np.roll(corners, -2, axis=1).reshape(-1)[pairs[cut]]
-    each = np.concatenate([sides[pairs[cut]], thirds[:, :, None]], axis=2)
+    each = np.concatenate([sides[cut], thirds[:, :, None]], axis=2)
     return faces[cut], tiles[cut], ends[cut], each, np.linalg.norm(b - a, axis=1)
+
+
+def _pairs_of_several(twins: Int64Array, begin: Int64Array, end: Int64Array) -> Int64Array:
+    """Return pairs of sides without a twin that have the same welded ends, ``int64[k, 2]``.
+
+    Three or more faces meet there, or two that wind against each other.
+    """
+    rest = np.flatnonzero((twins < 0) & (begin != end))
+    low, high = np.sort([begin[rest], end[rest]], axis=0)
+    keys = low * len(twins) + high
+    order = stable_order(keys)
+    first = np.flatnonzero(np.diff(keys[order]) == 0)
+    return np.stack([rest[order[first]], rest[order[first + 1]]], axis=1)
 
 
 def bilinear_texels(places: Float64Array, tiles: Int64Array, size: int) -> Int64Array:
@@ -211,147 +226,183 @@ def match_seams(
     srgb : sequence of bool
         True for channels that hold sRGB, which programs decode before they mix texels.
     report : callable
-        Called often with the fraction done.
+        Called often with the fraction done; an error that it raises ends the work.
     device : str
         Where differences and equations are computed.
     """
     report(0.0)
-    levels = _Match(texels, mixed, smooth, srgb, report, device).solved()
-    matched: UInt8Array = np.rint(255.0 * levels).astype(np.uint8)
-    return matched
+    runs = _Runs.of(mixed, len(texels), device)
+    done, ended = np.zeros(len(srgb)), Event()
+
+    def matched(channel: int) -> UInt8Array:
+        def tell(share: float) -> None:
+            done[channel] = share
+            if ended.is_set():
+                raise Cancelled("cancelled")
+
+        levels = _Match(texels[:, channel], runs, smooth[:, channel], srgb[channel], tell).solved()
+        return np.rint(255.0 * levels).astype(np.uint8)
+
+    with ThreadPoolExecutor() as pool:  # channels have no level in common
+        running = [pool.submit(matched, channel) for channel in range(len(srgb))]
+        try:
+            while wait(running, REPORT_SECONDS).not_done:
+                report(float(done.mean()))
+        finally:
+            ended.set()
+    return np.stack([task.result() for task in running], axis=1)
+
+
+class _Runs(NamedTuple):
+    """What all channels of seams have in common: runs of points that mix the same texels, see `Mixed`.
+
+    Attributes
+    ----------
+    mixed : int32[r, 8]
+        The texels that each run mixes.
+    starts, counts : int64[r]
+        The first point of each run, and how many it has.
+    at_texel : csc_array
+        The runs that mix each texel, as its columns.
+    device : str
+        Where differences and equations are computed.
+    there, here : list of arrays
+        The first point of each run and the end, and the places of the points, on this device and the CPU.
+    mixed_there : array of int32[r, 8]
+        The texels on this device.
+    """
+
+    mixed: Int32Array
+    starts: Int64Array
+    counts: Int64Array
+    at_texel: Any
+    device: str
+    there: list[Any]
+    here: list[Any]
+    mixed_there: Any
+
+    @classmethod
+    def of(cls, mixed: Mixed, texels: int, device: str) -> "_Runs":
+        """Return the runs of points, of which so many texels are mixed."""
+        starts, index = np.append(mixed.starts, len(mixed.places)), mixed.mixed
+        each = np.ones(index.size, np.bool_), index.reshape(-1), np.arange(0, index.size + 1, 8)
+        there, here = (
+            [array_on(on, starts, wp.int32), array_on(on, mixed.places, wp.vec2d)] for on in (device, CPU)
+        )
+        return cls(
+            index,
+            mixed.starts,
+            np.diff(starts),
+            csr_array(each, (len(index), texels)).tocsc(),
+            device,
+            there,
+            here,
+            array_on(device, index, wp.int32),
+        )
 
 
 class _Match:
-    """Levels of texels, from 0 to 1, that become alike on both sides of seams, each channel by itself.
-
-    A strip is a run of points in a channel, ``run * channels + channel``; a level is a texel and a channel.
+    """Levels of texels in one channel, from 0 to 1, that become alike on both sides of seams.
 
     Parameters
     ----------
-    texels : uint8[n, channels]
+    texels : uint8[n]
         The texels.
-    mixed : Mixed
+    runs : _Runs
         Points of the seams.
-    smooth : bool[m, channels]
-        True where both sides are matched.
-    srgb : sequence of bool
-        True for channels that are decoded before they are mixed.
+    smooth : bool[m]
+        True for the points where both sides are matched.
+    srgb : bool
+        True if levels are decoded before they are mixed.
     report : callable
         Called often with the fraction done; an error that it raises ends the work.
-    device : str
-        Where differences and equations are computed.
     """
 
     def __init__(
         self,
         texels: UInt8Array,
-        mixed: Mixed,
+        runs: _Runs,
         smooth: BoolArray,
-        srgb: Sequence[bool],
+        srgb: bool,
         report: Callable[[float], None],
-        device: str,
     ) -> None:
-        self._shape, self._channels, self._report = texels.shape, len(srgb), report
-        self._srgb = np.asarray(srgb)
-        self._first = (texels / 255.0).reshape(-1)
-        self._smooth, self._starts, self._index = smooth, mixed.starts, mixed.mixed
-        self._counts = np.diff(mixed.starts, append=len(smooth))
-        self._valid = np.logical_or.reduceat(smooth, mixed.starts, axis=0).reshape(-1)
-        ends, shape = np.arange(0, self._index.size + 1, 8), (len(self._index), len(texels))
-        each = np.ones(self._index.size, np.bool_), self._index.reshape(-1), ends
-        self._runs_at = csr_array(each, shape).tocsc()
-        self._device, self._levels = device, self._first.copy()
-        self._points, self._points_here = (
-            [
-                array_on(on, np.append(mixed.starts, len(smooth)), wp.int32),
-                array_on(on, mixed.places, wp.vec2d),
-                array_on(on, smooth, wp.uint8),
-                array_on(on, np.asarray(srgb), wp.uint8),
-            ]
-            for on in (device, CPU)
-        )
-        self._index_there = array_on(device, self._index, wp.int32)
-        self._states = [wp.empty(len(self._first), dtype=wp.float64, device=device) for _ in range(2)]
-        self._change(np.arange(len(self._first)), self._first)
+        self._runs, self._smooth, self._srgb, self._report = runs, smooth, srgb, report
+        self._device = runs.device
+        self._valid = np.logical_or.reduceat(smooth, runs.starts)
+        self._smooth_there, self._smooth_here = (array_on(on, smooth, wp.uint8) for on in (self._device, CPU))
+        self._first = texels / 255.0
+        self._levels = self._first.copy()
+        self._states = [wp.empty(len(texels), dtype=wp.float64, device=self._device) for _ in range(2)]
+        self._change(np.arange(len(texels)), self._first)
 
     def solved(self) -> Float64Array:
-        """Return levels ``float64[n, channels]`` that differ as little from the texels as the seams need."""
-        strips = np.flatnonzero(self._valid)
-        chosen, _ = self._around(self._wrong(strips, SQUARES_FROM))
+        """Return levels ``float64[n]`` that differ as little from the texels as the seams need."""
+        runs = np.flatnonzero(self._valid)
+        chosen, _ = self._around(self._wrong(runs, SQUARES_FROM))
         if len(chosen):
             self._least_squares(chosen)
-        self._settle(strips)
-        return self._levels.reshape(self._shape)
+        self._settle(runs)
+        return self._levels
 
-    def _rows_of(self, strips: Int64Array) -> Int64Array:
-        """Return the first row of each strip, and the end; a row is a point of a strip."""
-        return np.append(0, np.cumsum(self._counts[strips // self._channels]))
+    def _rows_of(self, runs: Int64Array) -> Int64Array:
+        """Return the first row of each run, and the end; a row is a point of a run."""
+        return np.append(0, np.cumsum(self._runs.counts[runs]))
 
-    def _gaps(self, strips: Any, rows: Any, count: int, slopes: Any = None) -> Any:
+    def _gaps(self, runs: Any, rows: Any, count: int, slopes: Any = None) -> Any:
         """Return the differences of both sides at rows on the device, and write their derivatives."""
         gaps: Any = wp.empty(int(count), dtype=wp.float64, device=self._device)
         known = wp.empty((0, 8), dtype=wp.float64, device=self._device) if slopes is None else slopes
-        inputs = [strips, rows, self._index_there, *self._points, *self._states]
-        launch(linearize, len(strips), inputs, [gaps, known], self._device)
+        shared = [self._runs.mixed_there, *self._runs.there, self._smooth_there, self._srgb]
+        launch(linearize, len(runs), [runs, rows, *shared, *self._states], [gaps, known], self._device)
         return gaps
 
-    def _wrong(self, strips: Int64Array, most: float) -> Int64Array:
-        """Return the strips where both sides differ by more than so much of 255."""
-        rows = self._rows_of(strips)
-        there, ends = (array_on(self._device, each, wp.int32) for each in (strips, rows))
+    def _wrong(self, runs: Int64Array, most: float) -> Int64Array:
+        """Return the runs where both sides differ by more than so much of 255."""
+        rows = self._rows_of(runs)
+        there, ends = (array_on(self._device, each, wp.int32) for each in (runs, rows))
         gaps = np.abs(self._gaps(there, ends, rows[-1]).numpy())
-        return strips[np.maximum.reduceat(gaps, rows[:-1]) > most / 255.0] if len(gaps) else strips
+        return runs[np.maximum.reduceat(gaps, rows[:-1]) > most / 255.0] if len(gaps) else runs
 
-    def _change(self, numbers: Int64Array, values: Float64Array) -> None:
-        """Change some levels."""
-        self._levels[numbers] = values
-        listed = [
-            array_on(self._device, *each)
-            for each in ((numbers, wp.int32), (values, wp.float64), (self._srgb, wp.uint8))
-        ]
-        launch(change_levels, len(numbers), listed, self._states, self._device)
+    def _change(self, texels: Int64Array, values: Float64Array) -> None:
+        """Change the levels of some texels."""
+        self._levels[texels] = values
+        listed = [array_on(self._device, *each) for each in ((texels, wp.int32), (values, wp.float64))]
+        launch(change_levels, len(texels), [*listed, self._srgb], self._states, self._device)
 
-    def _around(self, strips: Int64Array) -> tuple[Int64Array, Int64Array]:
-        """Return some strips with those in `RINGS` rings around them, and with one ring more."""
-        inner = strips
+    def _around(self, runs: Int64Array) -> tuple[Int64Array, Int64Array]:
+        """Return some runs with those in `RINGS` rings around them, and with one ring more."""
+        inner = runs
         for _ in range(RINGS + 1):
-            inner, strips = strips, self._beside(strips)
-        return inner, strips
+            inner, runs = runs, self._beside(runs)
+        return inner, runs
 
-    def _beside(self, strips: Int64Array) -> Int64Array:
-        """Return the strips that have a level in common with some strips, and these, in order."""
-        levels = distinct_numbers(self._levels_of(strips), len(self._first))
-        texel, channel = np.divmod(levels, self._channels)
-        starts = self._runs_at.indptr
-        counts = starts[texel + 1] - starts[texel]
-        runs = self._runs_at.indices[ranges(starts[texel], counts)]
-        beside = distinct_numbers(runs * self._channels + np.repeat(channel, counts), len(self._valid))
+    def _beside(self, runs: Int64Array) -> Int64Array:
+        """Return the runs that have a texel in common with some runs, and these, in order."""
+        texels = distinct_numbers(self._runs.mixed[runs], len(self._first))
+        starts, at_texel = self._runs.at_texel.indptr, self._runs.at_texel.indices
+        listed = at_texel[ranges(starts[texels], starts[texels + 1] - starts[texels])]
+        beside = distinct_numbers(listed, len(self._valid))
         return beside[self._valid[beside]]
 
-    def _levels_of(self, strips: Int64Array) -> Int64Array:
-        """Return the levels that are mixed at strips, ``int64[k, 8]``."""
-        run, channel = np.divmod(strips, self._channels)
-        return self._index[run] * np.int64(self._channels) + channel[:, None]
+    def _linked(self, runs: Int64Array) -> tuple[Int64Array, Int32Array, Int32Array]:
+        """Return the texels of runs, their columns there, and the component of each texel.
 
-    def _linked(self, strips: Int64Array) -> tuple[Int64Array, Int32Array, Int64Array]:
-        """Return the levels of strips, their columns there, and the component of each level.
-
-        Levels of one strip are in one component. Its number is larger in a later channel.
+        Texels of one run are in one component.
         """
-        listed = self._levels_of(strips)
+        listed = self._runs.mixed[runs]
         used = distinct_numbers(listed, len(self._first))
         number = np.empty(len(self._first), np.int32)
         number[used] = np.arange(len(used))
         columns = number[listed]
-        nodes = len(strips) + len(used)  # each strip is linked to its levels
+        nodes = len(runs) + len(used)  # each run is linked to its texels
         ends = np.minimum(np.arange(nodes + 1) * columns.shape[1], columns.size)
-        each = np.ones(columns.size, np.int8), columns.reshape(-1) + len(strips), ends
-        count, label = connected_components(csr_array(each, (nodes, nodes)), directed=False)
-        return used, columns, label[len(strips) :] + count * (used % self._channels)
+        each = np.ones(columns.size, np.int8), columns.reshape(-1) + len(runs), ends
+        _, label = connected_components(csr_array(each, (nodes, nodes)), directed=False)
+        return used, columns, label[len(runs) :]
 
-    def _least_squares(self, strips: Int64Array) -> None:
+    def _least_squares(self, runs: Int64Array) -> None:
         """Minimise the change of texels and the weighted differences, with more weight where these stay."""
-        used, columns, label = self._linked(strips)
+        used, columns, label = self._linked(runs)
         links = np.repeat(columns[:, 0], 7), columns[:, 1:].reshape(-1)
         both = np.concatenate(links), np.concatenate(links[::-1])
         graph = coo_array((np.ones(len(both[0]), np.int8), both), (len(used), len(used))).tocsr()
@@ -360,45 +411,39 @@ class _Match:
         ranked = near[stable_order(label[near])]
         place = np.empty(len(used), np.int32)
         place[ranked] = np.arange(len(used))
-        strips, used, columns = strips[order], used[ranked], place[columns[order]]
+        runs, used, columns = runs[order], used[ranked], place[columns[order]]
         levels = np.flatnonzero(np.diff(label[ranked], prepend=-1, append=-1))
         parts = np.flatnonzero(np.diff(label[ranked][columns[:, 0]], prepend=-1, append=-1))
-        channel = used[levels[:-1]] % self._channels
-        rows = self._rows_of(strips)
-        coarse = self._coarse(strips)
+        rows = self._rows_of(runs)
+        coarse = self._coarse(runs)
         system = SeamSystem(self._first[used], columns, coarse, rows, parts, levels, self._device)
-        there, ends = (array_on(self._device, each, wp.int32) for each in (strips, rows))
+        there, ends = (array_on(self._device, each, wp.int32) for each in (runs, rows))
         for step in range(ROUNDS):
             tick = partial(self._report, 0.9 * step / ROUNDS)
             tick()
             gaps = self._gaps(there, ends, rows[-1], system.slopes)
             off = np.abs(gaps.numpy()) * 255.0 / TOLERANCE
-            worst = np.zeros(self._channels)
-            np.maximum.at(worst, channel, np.maximum.reduceat(off, rows[parts[:-1]]))
-            active = (worst > LARGEST / TOLERANCE)[channel]
-            if not active.any():
+            if off.max() <= LARGEST / TOLERANCE:
                 return
             if step:
                 system.strengthen(off)
-            self._change(used, system.stepped(self._levels[used], gaps, active, tick))
+            self._change(used, system.stepped(self._levels[used], gaps, tick))
 
-    def _coarse(self, strips: Int64Array) -> BoolArray:
-        """Return True for one of `COARSE` smooth points, for the rows of strips."""
-        run, channel = np.divmod(strips, self._channels)
-        counts = self._counts[run]
-        at = ranges(self._starts[run], counts), np.repeat(channel, counts)
-        number = np.cumsum(self._smooth, axis=0) - 1
-        coarse: BoolArray = self._smooth[at] & (number[at] % COARSE == 0)
+    def _coarse(self, runs: Int64Array) -> BoolArray:
+        """Return True for one of `COARSE` smooth points, for the rows of runs."""
+        rows = ranges(self._runs.starts[runs], self._runs.counts[runs])
+        number = np.cumsum(self._smooth) - 1
+        coarse: BoolArray = self._smooth[rows] & (number[rows] % COARSE == 0)
         return coarse
 
-    def _settle(self, strips: Int64Array) -> None:
+    def _settle(self, runs: Int64Array) -> None:
         """Move points that still differ one by one, see `settle`."""
         for attempt in range(ATTEMPTS):
             self._report(0.9 + 0.1 * attempt / ATTEMPTS)
-            wrong = self._wrong(strips, LARGEST)
+            wrong = self._wrong(runs, LARGEST)
             if not len(wrong):
                 return
-            chosen, strips = self._around(wrong)
+            chosen, runs = self._around(wrong)
             touched, columns, label = self._linked(chosen)
             component = label[columns[:, 0]]
             order = stable_order(component)
@@ -408,6 +453,7 @@ class _Match:
             light = wp.empty_like(levels)
             counts = len(touched), len(chosen)
             changed, seen = (wp.zeros(count, dtype=wp.int32, device=CPU) for count in counts)
-            inputs += [*self._points_here, SWEEPS, SETTLED / 255.0, LARGEST / 255.0]
+            inputs += [*self._runs.here, self._smooth_here, self._srgb]
+            inputs += [SWEEPS, SETTLED / 255.0, LARGEST / 255.0]
             launch(settle, len(bounds) - 1, inputs, [levels, light, changed, seen], CPU)
             self._change(touched, levels.numpy().astype(np.float64))

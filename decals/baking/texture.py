@@ -1,6 +1,7 @@
 """Textures of unwrapped meshes: colours of the surface below each texel, seams that match, and gutters."""
 
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial, reduce
 from typing import Any, NamedTuple
@@ -13,7 +14,6 @@ from scipy.sparse import csr_array
 from blobtree._typing import (
     BoolArray,
     Float32Array,
-    Float64Array,
     FloatArray,
     Int32Array,
     Int64Array,
@@ -174,27 +174,29 @@ def bake_texture(
     """
     device = known_device()
     tiles = 1 + max(int(part.tile_of_face.max(initial=0)) for part in unwrapped)
-    pages = [_Page(size, channels, device) for _ in range(tiles)]
-    sheets = {
-        (tile, number): Sheet(number, mesh, part, tile, channels, device)
-        for number, (mesh, part) in enumerate(zip(meshes, unwrapped, strict=True))
-        for tile in np.unique(part.tile_of_face).tolist()
-    }
-    seams = Seams.of(meshes, unwrapped)
-    rows, places = seams.points()
-    mixed = Mixed.of(places, seams.tiles[rows], size)
-    points, sides = mixed.closest(size)
-    for done, ((tile, number), sheet) in enumerate(sheets.items()):
-        beyond = Beyond.of(seams, mixed.texels, rows[points], sides, number, tile, size)
-        pages[tile].color(sheet, beyond, samples, partial(_report_part, report, done, len(sheets)))
-    if len(seams.faces):
+    with ThreadPoolExecutor() as pool:  # looks at edges while centres are coloured
+        later = pool.submit(_SeamPoints.of, meshes, unwrapped, size)
+        pages = [_Page(size, channels, device) for _ in range(tiles)]
+        sheets = {
+            (tile, number): Sheet(number, mesh, part, tile, channels, device)
+            for number, (mesh, part) in enumerate(zip(meshes, unwrapped, strict=True))
+            for tile in np.unique(part.tile_of_face).tolist()
+        }
+        borders = [pool.submit(sheet.border_points) for sheet in sheets.values()]
+        for done, ((tile, number), sheet) in enumerate(sheets.items()):
+            beyond = partial(_beyond, later, number, tile, size)
+            tell = partial(_report_part, report, done, len(sheets))
+            pages[tile].color(sheet, beyond, borders[done].result, samples, tell)
+    points = later.result()
+    if len(points.seams.faces):
         report("matching seams", 0.0)
-        smooth = _smooth_points(seams, rows, places, list(sheets.values()), channels)
+        smooth = _smooth_points(points, list(sheets.values()), channels)
+        mixed = points.mixed
         bounds = np.searchsorted(mixed.texels, np.arange(tiles + 1) * size**2)
         own = [slice(*bounds[tile : tile + 2]) for tile in range(tiles)]
         before = [page.texels(mixed.texels[of] % size**2) for page, of in zip(pages, own, strict=True)]
-        tell = partial(report, "matching seams")
-        matched = match_seams(np.concatenate(before), mixed, smooth, channels.srgb, tell, device)
+        share = partial(report, "matching seams")
+        matched = match_seams(np.concatenate(before), mixed, smooth, channels.srgb, share, device)
         for page, of in zip(pages, own, strict=True):
             page.replace(mixed.texels[of] % size**2, matched[of])
     for page in pages:
@@ -206,14 +208,49 @@ def _report_part(report: Progress, done: int, count: int, share: float) -> None:
     report("colouring texels", (done + share) / count)
 
 
-def _smooth_points(
-    seams: Seams, rows: Int64Array, places: Float64Array, sheets: Sequence["Sheet"], channels: Channels
-) -> BoolArray:
+class _SeamPoints(NamedTuple):
+    """Points along all seams, and the texels that are mixed there.
+
+    Attributes
+    ----------
+    seams : Seams
+    numbers : int64[n]
+        The seam of each point.
+    mixed : Mixed
+        The points and their texels.
+    closest, sides : int64[k]
+        For each texel, the closest of the seams that mix it, and on which side of it the texel is.
+    """
+
+    seams: Seams
+    numbers: Int64Array
+    mixed: Mixed
+    closest: Int64Array
+    sides: Int64Array
+
+    @classmethod
+    def of(cls, meshes: Sequence[BakeMesh], unwrapped: Sequence[Unwrapped], size: int) -> "_SeamPoints":
+        """Return the points of the seams of unwrapped meshes."""
+        seams = Seams.of(meshes, unwrapped)
+        numbers, places = seams.points()
+        mixed = Mixed.of(places, seams.tiles[numbers], size)
+        points, sides = mixed.closest(size)
+        return cls(seams, numbers, mixed, numbers[points], sides)
+
+
+def _beyond(points: "Future[_SeamPoints]", number: int, tile: int, size: int) -> Beyond:
+    """Return the texels beyond seams of a mesh on a tile, once the points are there."""
+    seams, _, mixed, closest, sides = points.result()
+    return Beyond.of(seams, mixed.texels, closest, sides, number, tile, size)
+
+
+def _smooth_points(points: _SeamPoints, sheets: Sequence["Sheet"], channels: Channels) -> BoolArray:
     """Return True where the surface has no step, for points of seams and channels, ``bool[n, channels]``."""
-    smooth = np.zeros((len(rows), channels.count), np.bool_)
+    seams, numbers, (*_, places) = points.seams, points.numbers, points.mixed
+    smooth = np.zeros((len(numbers), channels.count), np.bool_)
     for number, sheet in {sheet.number: sheet for sheet in sheets}.items():
-        own = slice(*np.searchsorted(seams.meshes[rows], [number, number + 1]))
-        one, other = (sheet.surface(seams.faces[rows[own], side], places[own, side]) for side in (0, 1))
+        own = slice(*np.searchsorted(seams.meshes[numbers], [number, number + 1]))
+        one, other = (sheet.surface(seams.faces[numbers[own], side], places[own, side]) for side in (0, 1))
         # at one point with one normal, rounding may not decide on which side of a rim it is
         inputs, outputs = [one.points, one.units, ALIKE], [other.points, other.units]
         launch(share_alike, len(one.points), inputs, outputs, sheet.device)
@@ -445,13 +482,23 @@ class _Page:
         outputs = [self._image, self._filled]
         launch(write_listed, len(listed), [*inputs, self._channels.count], outputs, self._device)
 
-    def color(self, sheet: Sheet, beyond: Beyond, samples: int, report: Callable[[float], None]) -> None:
-        """Colour the texels of the charts of a mesh."""
+    def color(
+        self,
+        sheet: Sheet,
+        beyond: Callable[[], Beyond],
+        border: Callable[[], tuple[Int64Array, Float32Array]],
+        samples: int,
+        report: Callable[[float], None],
+    ) -> None:
+        """Colour the texels of the charts of a mesh.
+
+        ``beyond`` and ``border`` return the texels beyond seams and the points of `Sheet.border_points`.
+        """
         own = self._zeros(self._texels, wp.uint8)
         for top, bottom in self._blocks(1):
             report(0.5 * top / self._size)
             self._color_centers(sheet, own, top, bottom)
-        self._color_beyond(sheet, beyond, own, samples)
+        self._color_beyond(sheet, beyond(), own, samples)
         if samples > 1:
             uneven = self._empty(self._texels, wp.uint8)
             inputs = [own, self._filled, self._image, self._size, self._channels.count, FINE_STEP]
@@ -459,7 +506,7 @@ class _Page:
             for top, bottom in self._blocks(samples):
                 report(0.5 + 0.5 * top / self._size)
                 self._refine(sheet, own, uneven, top, bottom, samples)
-        self._color_borders(sheet, own)
+        self._color_borders(sheet, *border(), own)
         if samples > 1:
             self._compensate(uneven, own)
         launch(fill_own, self._texels, [own], [self._filled], self._device)
@@ -543,9 +590,8 @@ class _Page:
             means, counts = self._means(sheet.colors(at, tangents), at.faces, samples)
             self._write(array_on(self._device, bare.texels, wp.int32), means, own, BEYOND, counts)
 
-    def _color_borders(self, sheet: Sheet, own: Any) -> None:
+    def _color_borders(self, sheet: Sheet, faces: Int64Array, places: Float32Array, own: Any) -> None:
         """Colour the texels of charts that no sample lies in, by points of their borders."""
-        faces, places = sheet.border_points()
         columns, lines = np.clip(places.astype(np.int64), 0, self._size - 1).T
         texels = lines * self._size + columns
         bare = self._bare(texels, own)

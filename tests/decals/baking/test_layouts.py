@@ -115,6 +115,22 @@ def test_the_seams_of_a_box_are_its_edges_and_those_of_charts_are_cut_once() -> 
 
 
 @pytest.mark.parametrize("seed", range(5))
+def test_edges_of_several_faces_are_seams_between_each_and_the_next(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    corners = np.array([rng.permutation(6)[:3] for _ in range(12)])  # each with vertices of its own
+    points = rng.normal(size=(6, 3)).astype(np.float32)[corners.reshape(-1)]
+    faces = np.arange(36, dtype=np.int32).reshape(-1, 3)
+    mesh = BakeMesh("fans", points, faces, points, (1.0, 1.0, 1.0), points, points)
+    places = rng.uniform(0.0, SIZE, (36, 2)).astype(np.float32)
+    seams = Seams.of([mesh], [Unwrapped(np.arange(36), faces, places, np.zeros(12, np.int32))])
+    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2))
+    assert len(seams.faces) == 36 - len(np.unique(ends, axis=0))
+    assert np.array_equal(seams.corners // 3, np.repeat(seams.faces[..., None], 3, axis=2))
+    assert np.array_equal(seams.ends, places[seams.corners[..., :2]])
+    assert np.array_equal(points[seams.corners[:, 0, :2]], points[seams.corners[:, 1, :2]])
+
+
+@pytest.mark.parametrize("seed", range(5))
 def test_rectangles_are_packed_apart(seed: int) -> None:
     rng = np.random.default_rng(seed)
     sides, tiles = rng.uniform(0.1, 1.0, (30, 2)), 1 + seed % 2

@@ -237,13 +237,18 @@ def test_points_at_which_the_surface_has_a_step_keep_it() -> None:
     assert np.array_equal(image, before)
 
 
-def test_a_match_of_seams_can_be_cancelled() -> None:
+@pytest.mark.parametrize("calls", [1, 2])
+def test_a_match_of_seams_can_be_cancelled(calls: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("decals.baking.seams.REPORT_SECONDS", 0.0)
     places, before = seams(3, 50_000)
     image = before.astype(np.uint8)
     tiles = np.zeros((len(places), 2), np.int64)
+    shares = []
 
     def report(share: float) -> None:
-        raise KeyboardInterrupt
+        shares.append(share)
+        if len(shares) == calls:
+            raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         match(image, places, tiles, np.ones((len(places), 1), bool), [True], report)
