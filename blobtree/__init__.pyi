@@ -54,6 +54,7 @@ from .nodes.operator import Operator
 from .nodes.parameter_gradient import ParameterGradient
 from .nodes.primitives import Box, Cone, Disc, Point, Primitive, Segment, Torus
 from .nodes.repeats import PolarRepeat, Repeat
+from .nodes.rounds import RoundDifference, RoundIntersection, RoundUnion
 from .nodes.sharp import Frustum, Prism
 from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
 from .nodes.tree import Difference, Intersection, Offset, Ricci, Sum, Transform, Twist, Union
@@ -131,6 +132,9 @@ __all__ = [
     "Rectangle",
     "Repeat",
     "Ricci",
+    "RoundDifference",
+    "RoundIntersection",
+    "RoundUnion",
     "Segment",
     "Shear",
     "Shell",

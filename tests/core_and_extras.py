@@ -22,7 +22,7 @@ EXTRAS: dict[str, str] = {
         """,
     "blobtree.nodes": """
         blends contact convolution curves deformations fields flats parameter_gradient pieces
-        questions repeats samples sharp solids tree_volumes volumes
+        questions repeats rounds samples sharp solids tree_volumes volumes
         """,
     "blobtree.sampling": "*",
     "blobtree.tape": "attributes directed directed_along grown operands part_sizes poses rest_kernels",

@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Self, cast
 
 import warp as wp
 
-from blobtree.declare.falloff_checks import check_falloff, find_numbers
+from blobtree.declare.falloff_checks import check_falloff, find_distance, find_numbers
 from blobtree.declare.formula import (
     Formula,
     declared_formulas,
@@ -17,6 +17,7 @@ from blobtree.declare.formula import (
 from blobtree.declare.registry import LIBRARY_ROWS, Definitions, load_libraries
 from blobtree.errors import InvalidDefinition
 from blobtree.identity import content_hash
+from blobtree.iso import ISO
 from blobtree.lazy import Lazy
 
 _SLOPE = '''\
@@ -135,6 +136,14 @@ class Falloff:
     def rim(self) -> float:
         """The distance with g = ISO."""
         return self.numbers[0]
+
+    def at(self, distance: float) -> float:
+        """Return g in double precision, also for distances below 0 or above 1."""
+        return float(self._formulas["value"].reference()(min(max(distance, 0.0), 1.0)))
+
+    def distance_of(self, level: float) -> float:
+        """Return the distance with g = level, between 0 and 1."""
+        return self.rim if level == ISO else find_distance(self.at, level)
 
     @property
     def steepest_distance(self) -> float:

@@ -97,13 +97,18 @@ def _check_single(source: Formula, distances: Floats, expected: Floats) -> None:
             )
 
 
-def find_rim(g: Sampled) -> float:
-    """Return the distance with g = ISO, by bisection."""
+def find_distance(g: Callable[[float], float], level: float) -> float:
+    """Return the distance with g = level, by bisection."""
     low, high = 0.0, 1.0
     for _ in range(53):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if g(np.array([middle]))[0] > ISO else (low, middle)
+        low, high = (middle, high) if g(middle) > level else (low, middle)
     return 0.5 * (low + high)
+
+
+def find_rim(g: Sampled) -> float:
+    """Return the distance with g = ISO."""
+    return find_distance(lambda d: float(g(np.array([d]))[0]), ISO)
 
 
 def find_numbers(source: Formula, derivative: Formula) -> tuple[float, float, float]:

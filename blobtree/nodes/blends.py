@@ -65,6 +65,7 @@ class SuperellipticBlend(Operator):
     """Blend within a width of the surfaces: F = l + (Σ (fᵢ − l)ⁿ)^(1/n), l = ½ − width (Rockwood 1989).
 
     An operand whose field is below l changes nothing there. With width ½ it is the `Ricci` blend.
+    The width is one of field values; that of a `RoundUnion` is a length.
 
     Examples
     --------
@@ -289,6 +290,8 @@ def smooth_minimum(a: wp.float32, b: wp.float32, width: wp.float32) -> wp.float3
 class SmoothIntersection(Operator):
     """Intersection of two operands with a rounded edge.
 
+    The width is one of field values; that of a `RoundIntersection` is a length.
+
     Examples
     --------
     >>> from blobtree import Point, SmoothIntersection
@@ -355,6 +358,8 @@ def smooth_difference_width(total: wp.float32, b: wp.float32, width: wp.float32)
 
 class SmoothDifference(Operator):
     """First operand without the second, with a rounded edge.
+
+    The width is one of field values; that of a `RoundDifference` is a length.
 
     Examples
     --------
@@ -507,6 +512,41 @@ def controllable_root(a: wp.float32, b: wp.float32, left: wp.float32, right: wp.
     return wp.sqrt(wp.max(wp.dot(v, v) - cross * cross, 1e-30))
 
 
+@wp.func
+def controllable_partials(a: wp.float32, b: wp.float32, left: wp.float32, right: wp.float32) -> wp.vec3:
+    """F = C, where an elliptical arc joins the lines of level C of both operands (Barthe et al. 2004).
+
+    F is a where b ≤ a tan θ₁, and b where a ≤ b tan θ₂. Between these rays of the (a, b) plane the level
+    line is the arc of an ellipse, ((a − C t₂) / (1 − t₂))² + ((b − C t₁) / (1 − t₁))² = C² with
+    t = tan θ, which is tangent to both lines. The paper's soft objects have the same surface, ½.
+    """
+    if b <= left * a:
+        return wp.vec3(a, 1.0, 0.0)
+    if a <= right * b:
+        return wp.vec3(b, 0.0, 1.0)
+    value = controllable_value(a, b, left, right)
+    root = controllable_root(a, b, left, right)
+    by_a = (a - right * value) / ((1.0 - right) * (1.0 - right) * root)
+    by_b = (b - left * value) / ((1.0 - left) * (1.0 - left) * root)
+    return wp.vec3(value, wp.clamp(by_a, 0.0, 1.0), wp.clamp(by_b, 0.0, 1.0))
+
+
+@wp.func
+def controllable_slope(rise: wp.vec2, most: wp.vec2, left: wp.float32, right: wp.float32) -> wp.float32:
+    """F is a norm of non-negative operands, so slopes combine by F itself."""
+    return 1.00001 * controllable_value(wp.max(rise[0], 0.0), wp.max(rise[1], 0.0), left, right)
+
+
+@wp.func
+def controllable_keeps(a: wp.vec2, b: wp.vec2, left: wp.float32, right: wp.float32) -> wp.int32:
+    """Return the operand outside whose ray the other one stays."""
+    if b[1] <= left * a[0] or b[1] <= 0.0:
+        return KEEP_LEFT
+    if a[1] <= right * b[0] or a[1] <= 0.0:
+        return KEEP_RIGHT
+    return KEEP_BOTH
+
+
 class ControllableBlend(Operator):
     """Blend of two operands between two angles (after Barthe, Wyvill & de Groot 2004).
 
@@ -526,6 +566,9 @@ class ControllableBlend(Operator):
     tag = "controllable_blend"
     like = "blend"
     monotone = True
+    partials = formula(controllable_partials)
+    slope = formula(controllable_slope)
+    keeps = formula(controllable_keeps)
 
     left_angle: float = _angle()
     right_angle: float = _angle()
@@ -534,38 +577,6 @@ class ControllableBlend(Operator):
     def operator_parameters(self) -> tuple[float, ...]:
         """The tangents of the angles."""
         return math.tan(math.radians(self.left_angle)), math.tan(math.radians(self.right_angle))
-
-    @formula
-    def partials(a: wp.float32, b: wp.float32, left: wp.float32, right: wp.float32) -> wp.vec3:
-        """F = C, where an elliptical arc joins the lines of level C of both operands (Barthe et al. 2004).
-
-        F is a where b ≤ a tan θ₁, and b where a ≤ b tan θ₂. Between these rays of the (a, b) plane the level
-        line is the arc of an ellipse, ((a − C t₂) / (1 − t₂))² + ((b − C t₁) / (1 − t₁))² = C² with
-        t = tan θ, which is tangent to both lines. The paper's soft objects have the same surface, ½.
-        """
-        if b <= left * a:
-            return wp.vec3(a, 1.0, 0.0)
-        if a <= right * b:
-            return wp.vec3(b, 0.0, 1.0)
-        value = controllable_value(a, b, left, right)
-        root = controllable_root(a, b, left, right)
-        by_a = (a - right * value) / ((1.0 - right) * (1.0 - right) * root)
-        by_b = (b - left * value) / ((1.0 - left) * (1.0 - left) * root)
-        return wp.vec3(value, wp.clamp(by_a, 0.0, 1.0), wp.clamp(by_b, 0.0, 1.0))
-
-    @formula
-    def slope(rise: wp.vec2, most: wp.vec2, left: wp.float32, right: wp.float32) -> wp.float32:
-        """F is a norm of non-negative operands, so slopes combine by F itself."""
-        return 1.00001 * controllable_value(wp.max(rise[0], 0.0), wp.max(rise[1], 0.0), left, right)
-
-    @formula
-    def keeps(a: wp.vec2, b: wp.vec2, left: wp.float32, right: wp.float32) -> wp.int32:
-        """Return the operand outside whose ray the other one stays."""
-        if b[1] <= left * a[0] or b[1] <= 0.0:
-            return KEEP_LEFT
-        if a[1] <= right * b[0] or a[1] <= 0.0:
-            return KEEP_RIGHT
-        return KEEP_BOTH
 
 
 FLAT = wp.constant(1.0 / 32.0)

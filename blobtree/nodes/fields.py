@@ -138,11 +138,6 @@ class FieldPrimitive(Leaf, ProgramField, DeclaredNode):
         return named_values(declaration.numbers, cls.numbers(rows_of(values))[0].tolist())
 
     @property
-    def mean_radius(self) -> float:
-        """Distance of the surface, to which a width is relative; for kinds with a width."""
-        raise NotImplementedError
-
-    @property
     def profile_factor(self) -> float:
         """Factor k of `evaluators.profile_distance`."""
         falloff, width, _ = self.profile

@@ -14,6 +14,7 @@ with if_present():
     import blobtree.nodes.fields
     import blobtree.nodes.flats
     import blobtree.nodes.repeats
+    import blobtree.nodes.rounds
     import blobtree.nodes.sharp
     import blobtree.nodes.solids
     import blobtree.nodes.volumes  # noqa: F401

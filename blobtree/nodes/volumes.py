@@ -179,6 +179,11 @@ class Volume(Falling, FieldPrimitive):
     )
 
     @property
+    def mean_radius(self) -> float:
+        """The radius to which the width is in proportion with the usual falloff."""
+        return self.width / (1.0 / RIM - 1.0)
+
+    @property
     def profile_factor(self) -> float:
         """Factor k of `evaluators.profile_distance`: whatever the falloff, the field ends at the width."""
         return (1.0 / self.profile[0].rim - 1.0) / (1.0 / RIM - 1.0)

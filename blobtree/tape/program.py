@@ -216,6 +216,11 @@ class ProgramField(ProgramLeaf):
         """Factor k of `evaluators.profile_distance`; unused by kinds without a distance."""
         return 1.0
 
+    @property
+    def mean_radius(self) -> float:
+        """Distance of the surface, to which a width is relative; for kinds with a distance."""
+        raise NotImplementedError
+
     def grown(self, distance: float) -> Self:
         """Return this leaf with its visible surface farther out by a distance, in its own units.
 

@@ -19,6 +19,8 @@
 * edges: of meshes of `sharp_solids` random solids with sharp edges, `sharp_edge_error`, the largest distance
   of a vertex on a crease from the edges over the size, `sharp_volume_error`, and `sharp_open`, how many are
   not closed.
+* widths: `width_error`, how far from the asked distance roundings begin on surfaces of random pairs of
+  half-spaces and balls, over that distance, the largest of all operators whose width is a length.
 * repeats: `repeat_10000_over_visible`, the time of rays that meet 100 of 10,000 boxes in a grid, over that of
   the same rays through these 100.
 * fits: see `tests.bench.fitting`.
@@ -58,6 +60,7 @@ from blobtree import (
 )
 from blobtree.custom import define_warp
 from blobtree.nodes.kinds import NODE_KINDS
+from tests import rounded_widths
 from tests.bench import contact, convolution_surfaces, fitting
 from tests.blobtree.derivatives import test_curvature
 from tests.blobtree.nodes.test_attributes import REST, rest
@@ -307,6 +310,12 @@ def edges(options: argparse.Namespace) -> Figures:
     }
 
 
+def widths(options: argparse.Namespace) -> Figures:
+    """Measure where roundings of random pairs begin."""
+    found = [pair for seed in range(5 if options.quick else 50) for pair in rounded_widths.errors(seed)]
+    return {"width_pairs": len(found), "width_error": max(error for _, error in found)}
+
+
 def repeats(_: argparse.Namespace) -> Figures:
     """Time rays down on a hundred boxes of a large grid, and of a grid of these alone."""
     brick = Box((0, 0, 0), (0.6, 0.6, 0.6), radius=0)
@@ -335,6 +344,7 @@ GROUPS: dict[str, Callable[[argparse.Namespace], Figures]] = {
     "meshes": meshes,
     "blends": bulges,
     "edges": edges,
+    "widths": widths,
     "repeats": repeats,
     "costs": costs,
     "fits": fits,

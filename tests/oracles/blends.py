@@ -99,6 +99,30 @@ def controllable(a: Floats, b: Floats, left_angle: float, right_angle: float) ->
     return 0.5 * (low + high)
 
 
+def arc_union(a: Floats, b: Floats, left: float, right: float) -> Floats:
+    return controllable(a, b, *np.degrees(np.arctan([left, right])))
+
+
+def arc_intersection(a: Floats, b: Floats, left: float, right: float) -> Floats:
+    """By bisection: the level C whose line of two rays and an elliptical arc passes through (a, b)."""
+    low, high = np.zeros_like(a), np.minimum(a, b)
+    for _ in range(60):
+        c = 0.5 * (low + high)
+        x, y = np.maximum(right * c - a, 0.0) / (right - 1.0), np.maximum(left * c - b, 0.0) / (left - 1.0)
+        inside = x**2 + y**2 <= c**2
+        low, high = np.where(inside, c, low), np.where(inside, high, c)
+    return 0.5 * (low + high)
+
+
+def arc_difference(a: Floats, b: Floats, left: float, right: float) -> Floats:
+    """Up to ½ the intersection with the complement; above, the complement of a union of complements."""
+    top = np.maximum(a, 1.0)
+    rest = np.maximum(top - b * (2.0 * top - 1.0), 0.0)
+    met = arc_intersection(a, rest, left, right)
+    cut = top - arc_union(top - a, top - rest, 2.0 - left, 2.0 - right)
+    return np.where(b <= 0.0, a, np.where(met <= 0.5, met, cut))
+
+
 def masked(a: Floats, b: Floats) -> Floats:
     t = np.minimum(2.0 * b, 1.0)
     shown: Floats = a * t**2 * (3.0 - 2.0 * t)
@@ -145,6 +169,9 @@ VALUES: dict[str, Callable[..., Floats]] = {
     "smooth_difference": smooth_difference,
     "clean_union": clean_union,
     "controllable_blend": controllable,
+    "arc_union": arc_union,
+    "arc_intersection": arc_intersection,
+    "arc_difference": arc_difference,
     "masked": masked,
     "deepest": deepest,
     "gradient_blend": opened,

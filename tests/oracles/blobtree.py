@@ -49,6 +49,9 @@ from blobtree import (
     RatedUnion,
     Repeat,
     Ricci,
+    RoundDifference,
+    RoundIntersection,
+    RoundUnion,
     Segment,
     Shear,
     Shell,
@@ -342,6 +345,8 @@ def written_out(node: Node) -> Node:
         case Repeat() | PolarRepeat():
             kind: Any = Sum if node.joining == "sum" else Union
             return cast(Node, kind([Transform(node.child, matrix) for matrix in copy_maps(node)]))
+        case RoundUnion() | RoundIntersection() | RoundDifference():
+            return node.expanded  # `tests.blobtree.nodes.test_rounds` measures where its arcs end
         case SymmetricDifference(first=a, second=b):
             return Union(Difference(a, b), Difference(b, a))
         case ConvolutionStroke(points=points, radii=radii, color=color):

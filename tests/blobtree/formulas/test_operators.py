@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from blobtree.declare.claims import KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OperatorRow, Support
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.pieces import _Deepest
+from blobtree.nodes.rounds import _ArcDifference, _ArcIntersection, _ArcUnion
 from blobtree.nodes.tree import Difference, Ricci
 from tests.blobtree.transpile.warp_functions import call, python_function
 from tests.oracles import blends as oracle
@@ -34,6 +35,9 @@ CONTACTS: list[Setting] = [
         (0.01, 0.5, 0.1),
     )
 ]
+CUTS: list[Setting] = [
+    {"left": left, "right": right} for left, right in ((2.0, 1.4), (1.1, 1.7), (1.01, 1.02))
+]
 SETTINGS: dict[str, list[Setting]] = {
     "ricci": [{"exponent": exponent} for exponent in (1.0, 1.5, 2.0, 7.0, 100.0)],
     "superelliptic_blend": [
@@ -45,6 +49,9 @@ SETTINGS: dict[str, list[Setting]] = {
         {"left_angle": left, "right_angle": right}
         for left, right in ((0, 0), (0, 30), (20, 5), (44, 44), (10, 43))
     ],
+    "arc_union": [{"left": 0.0, "right": 0.6}, {"left": 0.9, "right": 0.3}, {"left": 0.99, "right": 0.98}],
+    "arc_intersection": CUTS,
+    "arc_difference": CUTS,
     "press": CONTACTS,
     "bulge": CONTACTS,
     "rated_union": [{"ratio": ratio} for ratio in (0.01, 0.5, 1.0, 3.0, 100.0)],
@@ -85,7 +92,8 @@ VALUES: dict[str, Callable[..., Floats]] = {
 DECLARED = [
     row for kind in NODE_KINDS.values() if isinstance(row := getattr(kind, "operator", None), OperatorRow)
 ]
-ROWS = {row.name: row for row in (*DECLARED, DEEPEST)}
+ARCS = [kind.operator for kind in (_ArcUnion, _ArcIntersection, _ArcDifference)]
+ROWS = {row.name: row for row in (*DECLARED, DEEPEST, *ARCS)}
 CASES = [
     (row, setting) for row in ROWS.values() if not row.gradients for setting in SETTINGS.get(row.name, [{}])
 ]
