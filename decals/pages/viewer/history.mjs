@@ -16,8 +16,7 @@ export class History {
 
   // Undo steps, below 0, or do them again, as far as there are any.
   go(steps) {
-    const { decals, states } = this;
-    const rows = states[this.at + steps];
+    const [{ decals }, rows] = [this, this.states[this.at + steps]];
     if (!rows) return;
     this.at += steps;
     for (let number = 0; number < Math.max(rows.length, decals.rows.length); number++)

@@ -26,8 +26,7 @@ export class Pointer {
 
   // Take hold of the decal at a place, or of the model.
   grab(x, y) {
-    const { viewer } = this;
-    const { number, surface } = viewer.pick(x, y);
+    const [{ viewer }, { number, surface }] = [this, this.viewer.pick(x, y)];
     if (number < 0) return { move: this.orbit, click: { selected: -1 } };
     viewer.set({ selected: number });
     const offset = subtract(viewer.decals.rows[number].position, surface.position);
@@ -45,8 +44,7 @@ export class Pointer {
 
   // Move the decal so that the point that was taken hold of stays under the pointer, as `DecalDrag` of the editor.
   dragDecal([x, y]) {
-    const { viewer, drag } = this;
-    const { surface } = viewer.pick(x, y);
+    const [{ viewer, drag }, { surface }] = [this, this.viewer.pick(x, y)];
     if (!surface) return;
     const middle = add(surface.position, carried(drag.offset, drag.normal, surface.normal));
     drag.step = viewer.moveTo(viewer.closestTo(middle) ?? surface, drag.step);
