@@ -27,7 +27,7 @@ BLOCKS_ALONG = 64
 MAX_LAYERS = 16
 """Most layers of empty blocks that a ray skips at once."""
 
-MAX_CELLS_BYTES = 1 << 24
+MAX_CELLS_BYTES = 1 << 22
 """Bytes of the last cells, which are kept though no drawing uses them; those of a model take 1 MB or more."""
 
 Corner: TypeAlias = tuple[float, ...]

@@ -16,7 +16,7 @@ from decals.record import RIM_RADIUS, Contact
 Range = tuple[int, int]
 """First row, and the row after the last."""
 
-MAX_LOG_ENTRIES = 1 << 16
+MAX_LOG_ENTRIES = 1 << 13
 MAX_DIRTY_BALLS = 4096
 """Limit of the number of balls, and of the number of edits."""
 
