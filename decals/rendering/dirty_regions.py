@@ -136,7 +136,7 @@ class TargetState:
     objects, bounds
         The objects in the G-buffer, and the box around them.
     view
-        The camera and the tile.
+        The camera, the tile and the samples per pixel.
     decals
         The decals and the pixels of their images.
     formulas
@@ -168,7 +168,7 @@ class TargetState:
         return cls(
             tuple(scene.objects),
             bounds,
-            (tile.block(), tile.x, tile.y, tile.width, tile.height, tile.inner, depth),
+            (tile.block(), tile.x, tile.y, tile.width, tile.height, tile.inner, depth, options.samples),
             (
                 decals,
                 *(image if hasattr(image, "surface_texels") else image.pixels for image in scene.images),

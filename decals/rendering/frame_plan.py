@@ -72,7 +72,7 @@ def plan_frame(
 ) -> FramePlan:
     """Return the plan of a tile in targets of a previous state; the tile's camera must be bound.
 
-    ``depth``: the depth of objects that are not rasterised is drawn too.
+    ``depth``: the frame stays on the card, so the pixels and the depth of all objects are drawn too.
     """
     state = TargetState.of(scene, uploaded.bounds, tile, options, depth=depth)
     dirty = state.dirty(previous, tile)
@@ -90,6 +90,9 @@ def plan_frame(
     shining = options.lights, options.environment, maps, materials, relief
     light_arguments = gbuffer, paint, tile, radius, *shining
     steps += [partial(targets.light_pass.draw, rectangle, *light_arguments) for rectangle in dirty.light]
+    if depth:
+        shown, samples = targets.shown_for(options.samples), (targets.light_pass.light, gbuffer.depth)
+        steps += [partial(shown.draw, rectangle, *samples) for rectangle in dirty.light]
     return FramePlan(state, steps, dirty.work(tile))
 
 

@@ -38,7 +38,6 @@ class LightPass:
 
     def __init__(self, context: Context, size: tuple[int, int]) -> None:
         self.light = context.texture(size, "f2")
-        self.light.repeat_x = self.light.repeat_y = False  # it may be magnified
         self._context = context
         self._last: tuple[tuple[object, ...], PixelPass] | None = None
         self._pass(**light_variant(None, None))
@@ -189,4 +188,56 @@ class ResolvePass:
     def release(self) -> None:
         """Release the memory."""
         for resource in (self._array, self._framebuffer, self._target):
+            resource.release()
+
+
+def shown_program(context: Context) -> moderngl.Program:
+    """Return the program that filters samples down for frames that show the picture."""
+    return context.program(compose("screen.vert"), compose("shown.frag"))
+
+
+class ShownPixels:
+    """The pixels of a picture that stays on the card, and their depth, for frames that show it.
+
+    Parameters
+    ----------
+    context
+        Where to draw.
+    size
+        Size of the picture, in samples.
+    samples
+        Samples per pixel along each axis.
+
+    Attributes
+    ----------
+    color, depth
+        sRGB with premultiplied alpha, and the depth of the nearest sample.
+    """
+
+    def __init__(self, context: Context, size: tuple[int, int], samples: int) -> None:
+        self.samples, pixels = samples, (size[0] // samples, size[1] // samples)
+        self.color = context.texture(pixels, "f1")
+        self.depth = context.gl.texture(pixels, 1, dtype="f4")
+        self.color.repeat_x = self.color.repeat_y = False  # it may be magnified
+        self.depth.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._pass = PixelPass(context.gl, shown_program(context), [self.color, self.depth])
+
+    def draw(
+        self, rectangle: Rectangle, light: moderngl.Texture, depth: moderngl.Texture, part: Part = WHOLE
+    ) -> None:
+        """Filter a part of the pixel rows down that a rectangle of samples touches."""
+        use_textures(self._pass.program, {"light": light, "depth": depth})
+        set_uniform(self._pass.program, "samples", self.samples)
+        x, y = rectangle.x // self.samples, rectangle.y // self.samples
+        right, top = (
+            min(-(-end // self.samples), side)
+            for end, side in zip(
+                (rectangle.x + rectangle.width, rectangle.y + rectangle.height), self.color.size, strict=True
+            )
+        )
+        self._pass.run(Rectangle(x, y, right - x, top - y).rows(part))
+
+    def release(self) -> None:
+        """Release the memory."""
+        for resource in (self._pass, self.color, self.depth):
             resource.release()

@@ -29,7 +29,7 @@ from decals.rendering.drawable import can_be_moved, warmup_of
 from decals.rendering.frame_plan import FramePlan, FrameRequest, decal_source, plan_frame
 from decals.rendering.gbuffer import depth_program
 from decals.rendering.image_array import ImageArray
-from decals.rendering.light_pass import light_program, light_variant, resolve_program
+from decals.rendering.light_pass import light_program, light_variant, shown_program
 from decals.rendering.options import (
     RenderOptions,
     SceneLike,
@@ -429,7 +429,7 @@ def scene_warmup(uploads: Uploads, scene: SceneLike, options: RenderOptions) -> 
         WarmupTask(SHADERS, lambda: decal_programs(context, form())),
         WarmupTask(SHADERS, partial(light_program, context, **light)),
         WarmupTask(SHADERS, partial(depth_program, context)),
-        WarmupTask(SHADERS, partial(resolve_program, context)),
+        WarmupTask(SHADERS, partial(shown_program, context)),
     ]
     if relief:
         tasks.append(WarmupTask(SHADERS, partial(_compile_offsets, uploads, scene, options)))

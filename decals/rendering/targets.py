@@ -9,11 +9,11 @@ from decals.rendering.dirty_regions import TargetState, same_objects
 from decals.rendering.drawable import has_rest_pose
 from decals.rendering.effect import BUFFERS
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.light_pass import LightPass, ResolvePass
+from decals.rendering.light_pass import LightPass, ResolvePass, ShownPixels
 from decals.rendering.options import Size
 from decals.rendering.uploads import UploadedScene
 
-TEXTURE_KINDS = ("f4", "f4", "f2", DEPTH, "f2", "f2", "f1")
+TEXTURE_KINDS = ("f4", "f4", "f2", DEPTH, "f2", "f2")
 """Kinds of the textures of targets without buffers."""
 
 
@@ -26,6 +26,8 @@ class Targets:
         Everything that the picture in the targets depends on; None while it is incomplete.
     frame
         The frame that is being drawn; None if it is complete.
+    shown
+        The pixels of a frame that stays on the card; None before the first.
     """
 
     def __init__(self, context: Context, size: Size, *, buffers: bool) -> None:
@@ -37,7 +39,23 @@ class Targets:
         self._rest: Any = None
         self.decal_pass = DecalPass(context, size, buffers=buffers)
         self.light_pass = LightPass(context, size)
-        self.resolve = ResolvePass(context, size)
+        self.shown: ShownPixels | None = None
+        self._resolve: ResolvePass | None = None
+
+    @property
+    def resolve(self) -> ResolvePass:
+        """What reads the pixels."""
+        if self._resolve is None:
+            self._resolve = ResolvePass(self._context, self.gbuffer.size)
+        return self._resolve
+
+    def shown_for(self, samples: int) -> ShownPixels:
+        """Return the pixels of frames with so many samples along each axis; others are released."""
+        if self.shown is None or self.shown.samples != samples:
+            if self.shown is not None:
+                self.shown.release()
+            self.shown = ShownPixels(self._context, self.gbuffer.size, samples)
+        return self.shown
 
     def rest_for(self, uploaded: UploadedScene) -> Any:
         """Return the rest buffer if some objects are posed, or moved by heights, else None."""
@@ -51,12 +69,10 @@ class Targets:
     def release(self) -> None:
         """Release the memory."""
         self.state = self.frame = None
-        if self._rest is not None:
-            self._rest.release()
-        self.gbuffer.release()
-        self.decal_pass.release()
-        self.light_pass.release()
-        self.resolve.release()
+        parts = self._rest, self.gbuffer, self.decal_pass, self.light_pass, self.shown, self._resolve
+        for part in parts:
+            if part is not None:
+                part.release()
 
 
 WHOLE_SLOT, BUFFERS_SLOT = "whole", "buffers"

@@ -158,7 +158,7 @@ class WindowContext(Context):
 
 BLEND, DEPTH_TEST, CULL_FACE = 0x0BE2, 0x0B71, 0x0B44
 LESS_OR_EQUAL = 0x0203
-ONE, SOURCE_ALPHA, REST_OF_ALPHA = 1, 0x0302, 0x0303
+ONE, REST_OF_ALPHA = 1, 0x0303
 
 
 class Composite:
@@ -169,9 +169,9 @@ class Composite:
 
     def __init__(self, context: Context) -> None:
         self._context = context
-        self._arrays: dict[int, moderngl.VertexArray] = {}
+        self._array: moderngl.VertexArray | None = None
 
-    def draw(self, window: Any, viewport: tuple[int, int, int, int], targets: Targets, samples: int) -> None:
+    def draw(self, window: Any, viewport: tuple[int, int, int, int], targets: Targets) -> None:
         """Fill a viewport.
 
         Parameters
@@ -181,12 +181,12 @@ class Composite:
         viewport
             Lower left corner and size, in pixels.
         targets
-            Targets with the picture.
-        samples
-            Texels per pixel along each axis; 0 for a picture of any size that is magnified.
+            Targets with the picture; a smaller one is magnified.
         """
-        x, y, width, height = viewport
-        array, state = self._array(samples), window.GetState()
+        self._array = array = self._array or self._new_array()
+        (x, y, width, height), shown, program = viewport, targets.shown, array.program
+        assert shown is not None  # frames draw it
+        state = window.GetState()
         state.Push()
         window.GetShaderCache().ReleaseCurrentShader()
         state.vtkglEnable(DEPTH_TEST)
@@ -194,27 +194,22 @@ class Composite:
         state.vtkglDepthMask(1)
         state.vtkglDisable(CULL_FACE)
         state.vtkglEnable(BLEND)
-        state.vtkglBlendFuncSeparate(SOURCE_ALPHA, REST_OF_ALPHA, ONE, REST_OF_ALPHA)
-        use_textures(array.program, {"light": targets.light_pass.light, "depth": targets.gbuffer.depth})
-        set_uniform(array.program, "corner", (float(x), float(y)))
-        set_uniform(array.program, "size", (float(width), float(height)))
+        state.vtkglBlendFuncSeparate(ONE, REST_OF_ALPHA, ONE, REST_OF_ALPHA)
+        use_textures(program, {"color": shown.color, "depth": shown.depth})
+        set_uniform(program, "corner", (float(x), float(y)))
+        set_uniform(program, "size", (float(width), float(height)))
         array.render(vertices=3)
         state.ResetGLActiveTexture()
         state.Pop()
 
-    def _array(self, samples: int) -> moderngl.VertexArray:
-        """Return the vertex array, and with it the program, for a number of samples."""
-        if samples not in self._arrays:
-            fragment = compose("composite.frag", defines={"SAMPLES": samples})
-            program = self._context.program(compose("screen.vert"), fragment)
-            self._arrays[samples] = self._context.gl.vertex_array(program, [])
-        return self._arrays[samples]
+    def _new_array(self) -> moderngl.VertexArray:
+        program = self._context.program(compose("screen.vert"), compose("composite.frag"))
+        return self._context.gl.vertex_array(program, [])
 
     def release(self) -> None:
         """Release all resources."""
-        for array in self._arrays.values():
-            array.release()
-        self._arrays.clear()
+        if self._array is not None:
+            self._array.release()
 
 
 @cache
@@ -308,7 +303,6 @@ class FrameRenderer:
         self.drawn_fraction = 0.0
         self._composited: Targets | None = None
         self._composited_state: TargetState | None = None
-        self._composited_samples = 0
         self._warm: set[Hashable] = set()
         self._warmup_threads: dict[Hashable, WarmupThread] = {}
         self._progressive: tuple[FrameKey, ProgressiveFrame] | None = None
@@ -421,7 +415,8 @@ class FrameRenderer:
         shown = self._shown_targets
         if shown is None:
             return 0.0
-        texels = texels_of(x, y, size, shown.gbuffer.size, magnified=self._composited_samples == 0)
+        magnified = shown.gbuffer.size[0] < size[0]
+        texels = texels_of(x, y, size, shown.gbuffer.size, magnified=magnified)
         with self.context.current():
             return shown.gbuffer.read_depth(texels)
 
@@ -433,17 +428,16 @@ class FrameRenderer:
             return None
         return targets
 
-    def composite(self, window: Any, viewport: Viewport, targets: Targets, samples: int) -> None:
+    def composite(self, window: Any, viewport: Viewport, targets: Targets) -> None:
         """Put a picture into VTK's frame; see `Composite.draw`."""
         self._composited, self._composited_state = targets, targets.state
-        self._composited_samples = samples
-        self._composite.draw(window, viewport, targets, samples)
+        self._composite.draw(window, viewport, targets)
 
     def composite_again(self, window: Any, viewport: Viewport) -> None:
         """Put the shown picture into VTK's frame again, if it still exists."""
         self.drawn_fraction, shown = 0.0, self._shown_targets
         if shown is not None:
-            self._composite.draw(window, viewport, shown, self._composited_samples)
+            self._composite.draw(window, viewport, shown)
 
     def release(self) -> None:
         """Release all resources."""

@@ -627,8 +627,7 @@ class SubplotRenderer(KnownAttributes):
         self.status = FrameStatus.DRAWN
         with self._first_frame_reported(frames.is_warm(scene, options)):
             targets = frames.draw(scene, options, self.viewpoint(), wait=self.wait_for_gpu)
-        samples = 0 if self.draw_scale < 1.0 else options.options.samples  # 0: magnified
-        frames.composite(window, viewport, targets, samples)
+        frames.composite(window, viewport, targets)
 
     @contextmanager
     def _first_frame_reported(self, warm: bool) -> Iterator[None]:

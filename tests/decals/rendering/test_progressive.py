@@ -20,7 +20,8 @@ SIZE = (117, 90)
 
 
 def bits(targets: Targets) -> dict[str, bytes]:
-    gbuffer = targets.gbuffer
+    gbuffer, shown = targets.gbuffer, targets.shown
+    assert shown is not None
     named = {
         "position": gbuffer.position,
         "normal": gbuffer.normal,
@@ -28,6 +29,8 @@ def bits(targets: Targets) -> dict[str, bytes]:
         "depth": gbuffer.depth,
         "paint": targets.decal_pass.paint,
         "light": targets.light_pass.light,
+        "shown color": shown.color,
+        "shown depth": shown.depth,
     }
     return {name: texture.read() for name, texture in named.items()}
 
