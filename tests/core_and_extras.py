@@ -21,7 +21,7 @@ EXTRAS: dict[str, str] = {
         part_kernels parts thickening thickening_kernels thin_parts wall_kernels walls
         """,
     "blobtree.nodes": """
-        blends contact convolution curves deformations fields flats parameter_gradient pieces
+        blends contact convolution crossings curves deformations fields flats parameter_gradient pieces
         questions repeats rounds samples sharp solids tree_volumes volumes
         """,
     "blobtree.sampling": "*",

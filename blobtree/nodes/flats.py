@@ -16,6 +16,7 @@ from blobtree.declare.skeleton import PLATE_CELLS
 from blobtree.errors import InvalidNode
 from blobtree.formulas.skeletons import JOINT_YIELD, least_influence_at_joints
 from blobtree.lazy import Lazy
+from blobtree.nodes.crossings import meeting_edges
 from blobtree.nodes.node import Node
 from blobtree.nodes.pieces import Pieces
 from blobtree.nodes.primitives import Columns, JoinedPrimitive, Primitive, beside
@@ -273,7 +274,7 @@ def polygon_in_plane(points: Sequence[Vector]) -> Float64Array:
     if len(points) < 3:
         raise InvalidNode(f"points: expected at least three corners, got {points}; use a Segment")
     flat = _in_plane(np.array(points))
-    if crossing := _crossing(flat):
+    if crossing := meeting_edges(flat):
         raise InvalidNode(
             f"points: expected a simple polygon, got edges from corners {crossing[0]} and {crossing[1]} "
             "that meet; remove repeated corners, and split the polygon where it crosses itself"
@@ -304,26 +305,6 @@ def _cross(a: Float64Array, b: Float64Array) -> Float64Array:
     """Return the cross products of vectors in the plane."""
     result: Float64Array = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
     return result
-
-
-def _crossing(points: Float64Array) -> tuple[int, int] | None:
-    """Return the first corners of two edges of a polygon that meet where they should not, None if none do."""
-    count = len(points)
-    ends = np.roll(points, -1, axis=0)
-    for first in range(count):
-        rest = np.arange(first + 1, count)
-        a, b, c, d = points[first], ends[first], points[rest], ends[rest]
-        sides = [_cross(b - a, c - a), _cross(b - a, d - a), _cross(d - c, a - c), _cross(d - c, b - c)]
-        c_ab, d_ab, a_cd, b_cd = (np.where(np.abs(side) <= SMALLEST_SINE**2, 0.0, side) for side in sides)
-        overlap = (np.minimum(a, b) <= np.maximum(c, d)) & (np.minimum(c, d) <= np.maximum(a, b))
-        meet = (c_ab * d_ab <= 0.0) & (a_cd * b_cd <= 0.0) & overlap.all(axis=1)
-        neighbours = (rest == first + 1) | ((first == 0) & (rest == count - 1))
-        folded = (c_ab == 0.0) & (d_ab == 0.0) & (((b - a) * (d - c)).sum(axis=1) < 0.0)
-        short = (c == d).all(axis=1) | bool((a == b).all())
-        meet = np.where(neighbours, folded | short, meet)
-        if meet.any():
-            return first, int(rest[meet.argmax()])
-    return None
 
 
 def _ears(points: Float64Array) -> list[tuple[int, int, int]]:

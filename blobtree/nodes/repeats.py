@@ -7,10 +7,11 @@ from typing import Annotated
 import numpy as np
 
 from blobtree.declare.parameters import Parameter, Quantity, unit_vectors
+from blobtree.errors import InvalidNode
 from blobtree.lazy import Lazy
 from blobtree.nodes.node import Node
 from blobtree.nodes.tree import Macro, Sum, Union
-from blobtree.validation import Vector
+from blobtree.validation import LARGEST_NUMBER, LIMIT, Vector
 
 MOST_COPIES = 10_000
 """Most copies of one repeat; a repeat of repeats has more."""
@@ -52,6 +53,12 @@ class Repeat(Macro):
     count: Count
     joining: Joining = "sum"
     copies: Alternation = "alike"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        farthest = (self.count - 1) * max(map(abs, self.step))
+        if farthest > LARGEST_NUMBER:
+            raise InvalidNode(f"step: expected a shorter one, the last copy is {farthest:g} away; {LIMIT}")
 
     @Lazy
     def expanded(self) -> Node:
