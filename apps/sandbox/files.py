@@ -29,6 +29,7 @@ from decals.editing.queries import SurfacePick
 from decals.editing.recovery import recovery_path
 from decals.editing.scatter_commands import AddObject
 from decals.errors import InvalidEdit
+from decals.images.builtin import BUILTIN_IMAGES
 from decals.rendering.environment import Environment
 from decals.scenes.camera import DEFAULT_DIRECTION, UPRIGHT
 from decals.scenes.cover import fitting_camera
@@ -181,6 +182,10 @@ class SandboxFiles:
                 shown = " and a decal"
         name = image_names(session.document)[-1]
         state.show(f"added image {name}{shown or '; choose it for the selected decals'}")
+
+    def add_built_in(self, name: str) -> None:
+        """Add an image that the package generates."""
+        self._take_image(DecalImage.load(one_of("image", name, BUILTIN_IMAGES, InvalidEdit)), "")
 
     def place_image(self, key: str, place: str) -> None:
         """Add a decal at a place of the view, see `surface_at`, that shows the image of a row."""

@@ -92,9 +92,14 @@ class Row:
 
     @property
     def icon(self) -> str:
-        """Icon of the class, else of the kind."""
-        name = ICONS.get(self.type, ICONS.get(self.kind))
-        return f"mdi-{name}" if name else ""
+        """Icon of the class, else of the kind, else ""."""
+        return icon(self.type, self.kind)
+
+
+def icon(name: str, kind: str) -> str:
+    """Return the icon of a class, else of a kind of rows, else ""."""
+    known = ICONS.get(name, ICONS.get(kind))
+    return f"mdi-{known}" if known else ""
 
 
 def outline(document: Document) -> list[dict[str, Any]]:

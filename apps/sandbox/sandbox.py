@@ -11,6 +11,8 @@ from functools import partial, wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
+from PIL import Image
+
 from blobtree import Node
 from blobtree.validation import finite_number
 from decals.apps.sandbox import decal_panel
@@ -20,13 +22,14 @@ from decals.apps.sandbox.fields import Fields
 from decals.apps.sandbox.files import SandboxFiles
 from decals.apps.sandbox.folder import MAX_UPLOADS
 from decals.apps.sandbox.hover import VIEW, Hover
-from decals.apps.sandbox.outline import outline
+from decals.apps.sandbox.outline import PICTURE_SIZE, icon, outline, png_url
 from decals.editing import new_nodes
 from decals.editing.action_state import joined
 from decals.editing.outline_actions import Part
 from decals.editing.session import UndoEntry
 from decals.editing.tree_actions import FollowedNode
 from decals.errors import InvalidEdit
+from decals.images.builtin import BUILTIN_IMAGES, generate_image
 from decals.options import arguments_of
 from decals.scattering.scatter import scatter
 from decals.scenes.objects import TreeObject, bounds_of
@@ -89,7 +92,7 @@ class Sandbox:
         in another way, and replace it by its only operand; see `TreeActions`.
     go_to
         Event that goes to an entry of the history; see `Actions.go_to`.
-    show_start, new_model, open_sample, open_file, write_file, place_image, remove_light
+    show_start, new_model, open_sample, open_file, write_file, place_image, add_built_in, remove_light
         Events of files; see `SandboxFiles`.
 
     Notes
@@ -123,7 +126,10 @@ class Sandbox:
         self.new_model, self.show_start = self._event(files.new_model), files.show_start
         self.open_sample, self.open_file = self._event(files.open_sample), self._event(files.open_file)
         self.place_image, self.write_file = self._event(files.place_image), self._event(files.write)
-        self.remove_light = self._event(files.remove_light)
+        self.remove_light, self.add_built_in = (
+            self._event(files.remove_light),
+            self._event(files.add_built_in),
+        )
         self._setters: dict[str, Callable[..., None]] = {
             "display": self.display.set_option,
             "decals": partial(decal_panel.set_decal_value, self._state),
@@ -221,10 +227,15 @@ class Sandbox:
 
     @staticmethod
     def catalog() -> dict[str, Any]:
-        """Return the names of the kinds that can be added, by family, and what each is."""
+        """Return the names of the kinds that can be added, by family; what each is, and built-in images."""
+        families = new_nodes.families()
         return {
-            **new_nodes.families(),
+            **families,
             "docs": {name: first_line(kind) for name, kind in new_nodes.kinds().items()},
+            "icons": {name: icon(name, family[:-1]) for family in families for name in families[family]},
+            "images": {
+                name: png_url(Image.fromarray(generate_image(name, PICTURE_SIZE))) for name in BUILTIN_IMAGES
+            },
         }
 
     def _outline(self) -> list[dict[str, Any]]:

@@ -76,34 +76,37 @@ class _Run:
         Set once the job is to stop.
     progress
         Stage and finished fraction.
+    thread
+        The thread.
     """
 
-    def __init__(self, job: Job, after: "Sequence[_Run]", *, daemon: bool) -> None:
+    def __init__(self, job: Job, after: Sequence[threading.Thread], *, daemon: bool) -> None:
         self.label, self.number, self.progress = job.label, job.number, (job.label, 0.0)
         self.cancelled = threading.Event()
         self._completion: Completion | None = None
         self._error: Exception | None = None
-        self._thread = threading.Thread(
+        self.thread = threading.Thread(
             target=self._work, args=(job.work, tuple(after)), name=job.label, daemon=daemon
         )
-        self._thread.start()
+        self.thread.start()
 
-    def _work(self, work: Work, after: "Sequence[_Run]") -> None:
-        for one in after[: max(len(after) - MAX_ENDING, 0)]:
-            one.ended(None)
+    def _work(self, work: Work, after: Sequence[threading.Thread]) -> None:
+        for thread in after[: max(len(after) - MAX_ENDING, 0)]:
+            thread.join()
         try:
             with core_left_free(), SHORT_SWITCH_INTERVAL, reporting(self._report, self.cancelled.is_set):
                 self._completion = work(self._report, self.cancelled.is_set)
         except Exception as error:  # `result` raises it
-            self._error = error
+            if not self.cancelled.is_set():  # else nothing asks for it, and its frames would keep all arrays
+                self._error = error
 
     def _report(self, stage: str, fraction: float) -> None:
         self.progress = stage or self.label, fraction
 
     def ended(self, timeout: float | None = 0.0) -> bool:
         """Return True if the thread has ended, or ends within so many seconds; None is no limit."""
-        self._thread.join(timeout)
-        return not self._thread.is_alive()
+        self.thread.join(timeout)
+        return not self.thread.is_alive()
 
     def result(self) -> Completion | None:
         """Return the completion of the ended job, or raise its error."""
@@ -127,7 +130,7 @@ class Worker:
     def __init__(self, *, finish_at_exit: bool = False) -> None:
         self._finish_at_exit = finish_at_exit
         self._run: _Run | None = None
-        self._ending: list[_Run] = []
+        self._ending: list[threading.Thread] = []
         self._label = ""
 
     @property
@@ -143,7 +146,7 @@ class Worker:
     @property
     def stopping(self) -> bool:
         """True while the thread of a cancelled job has not ended."""
-        self._ending = [run for run in self._ending if not run.ended()]
+        self._ending = [thread for thread in self._ending if thread.is_alive()]
         return bool(self._ending)
 
     @property
@@ -169,7 +172,7 @@ class Worker:
         """Drop the job, and let its thread end."""
         if self._run is not None:
             self._run.cancelled.set()
-            self._ending.append(self._run)
+            self._ending.append(self._run.thread)
             self._run = None
 
     def poll(self, timeout: float | None = 0.0) -> Completion | None:
@@ -190,7 +193,9 @@ class Worker:
         """Cancel the job, and return True if all threads end within so many seconds."""
         self.cancel()
         last = time.monotonic() + timeout
-        return all(run.ended(max(last - time.monotonic(), 0.0)) for run in self._ending)
+        for thread in self._ending:
+            thread.join(max(last - time.monotonic(), 0.0))
+        return not self.stopping
 
 
 SWITCH_INTERVAL = 0.0005

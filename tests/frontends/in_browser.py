@@ -740,7 +740,7 @@ async def escapes(browser: Page, window: EditWindow) -> None:
 
 
 async def images(browser: Page, window: EditWindow) -> None:
-    """Images are added with a button beside the list, and replaced in their panel; undo takes both back."""
+    """Images are added with buttons beside the list, and replaced in their panel; undo takes all back."""
     document = window.document
     folder = Path(tempfile.mkdtemp())
     for name, color in (("first", "red"), ("second", "blue")):
@@ -753,7 +753,9 @@ async def images(browser: Page, window: EditWindow) -> None:
     await browser.get_by_role("button", name="first", exact=True).click()
     await browser.get_by_label("replace this image").set_input_files(folder / "second.png")
     await until(lambda: [image.source for image in document.images] == [*names, "second", "second"])
-    for _ in range(3):
+    await browser.get_by_role("button", name="add image rivet").click()
+    await until(lambda: document.images[-1].source == "rivet")
+    for _ in range(4):
         await browser.keyboard.press("Control+z")
     await until(lambda: digest(document) == before)
 

@@ -115,6 +115,7 @@ EVENTS: dict[str, list[list[Any]]] = {
     "open_file": [["../x.json", "none.json", "a\0.json"]],
     "read_file": [["../x.json", "scene.json", "mine.py"], [0, 5, -1]],
     "write_file": [["../x.py", "x.exe", "no/x.json"]],
+    "add_built_in": [["eye", "tile", "x"]],
     "place_image": [KEYS_OF_ROWS, ["view 5000/5000", "view 0/0", "view 1", "0"]],
     "hover": [
         [*KEYS_OF_ROWS, "layer 0", "view 5000/5000", "view x", "kind Box view 4000/6000", "kind x view 1/1"]

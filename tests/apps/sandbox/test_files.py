@@ -215,6 +215,16 @@ def test_dropped_files_are_added(sandbox: Sandbox, window: EditWindow, tmp_path:
     assert sandbox.values()["title"] == "all-2.json"
 
 
+def test_built_in_images_are_added(sandbox: Sandbox, window: EditWindow) -> None:
+    for name in sandbox.catalog()["images"]:
+        sandbox.add_built_in(name)
+        assert window.document.images[-1].source == name
+    before = window.document.images
+    sandbox.add_built_in("../eye")
+    assert "expected one of eye" in sandbox.status
+    assert window.document.images is before
+
+
 def test_a_picture_of_all_directions_lights_the_scene(
     sandbox: Sandbox, window: EditWindow, tmp_path: Path
 ) -> None:

@@ -1,8 +1,10 @@
 """One job at a time, told of and stopped."""
 
 import threading
+import weakref
 from typing import Any, NoReturn
 
+import numpy as np
 import pytest
 
 from blobtree import device as launch
@@ -103,6 +105,25 @@ def loops() -> None:
     """Report as a library function does whose caller passed no callback."""
     with reporting() as report:
         report("looping", 0.5)
+
+
+def test_a_cancelled_job_keeps_nothing() -> None:
+    worker, kept = Worker(), list[weakref.ref[Any]]()
+    begun, go = threading.Event(), threading.Event()
+
+    def work(tell: Any, stop: Any) -> NoReturn:
+        large = np.zeros(3)
+        kept.append(weakref.ref(large))
+        begun.set()
+        assert go.wait(LONG)
+        raise Cancelled
+
+    worker.start(Job("large", work))
+    assert begun.wait(LONG)
+    worker.cancel()
+    go.set()
+    assert worker.stop(LONG)
+    assert kept[0]() is None
 
 
 def test_what_a_job_raises_is_raised_where_it_is_asked_for() -> None:
