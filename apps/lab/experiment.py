@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import BoolArray, Float64Array
 from decals.apps.lab.errors import InvalidLesson
 from decals.editing.queries import nearest_points
+from decals.editing.slicing import SlicePlane
 from decals.field.rules import PictureRules
 from decals.model import Decals
 from decals.scenes.camera import Camera
@@ -102,6 +103,8 @@ class Experiment:
         Ends of the lesson's line, or the numbers of two decals.
     relaxed
         The relaxation of a lesson on scattering, else None.
+    plane
+        The slice, if there is one: the probe lies on it, and maps show it in place of what the camera sees.
     cache
         Values that several formulas share, with the points they hold at.
     """
@@ -115,6 +118,7 @@ class Experiment:
     in_space: bool = False
     line: tuple[Any, Any] = (0, 1)
     relaxed: Relaxed | None = None
+    plane: SlicePlane | None = None
     cache: dict[Any, Any] = field(default_factory=dict)
 
     def decal(self, number: Any) -> int:
@@ -123,10 +127,19 @@ class Experiment:
 
     # -- points -----------------------------------------------------------------------------------------
 
+    @property
+    def _off_surfaces(self) -> bool:
+        return self.in_space or self.plane is not None or not self.objects
+
+    @property
+    def _map_camera(self) -> Camera:
+        """The camera of maps: that of the lesson sees surfaces from above."""
+        return self.camera if self.plane is None else self.plane.facing(self.camera, above=not self.in_space)
+
     def points_near(self, positions: ArrayLike, **variables: Float64Array) -> Points:
         """Return the points of the surfaces that are nearest to positions; the positions in space."""
         places = np.asarray(positions, np.float64).reshape(-1, 3)
-        if self.in_space or not self.objects:
+        if self._off_surfaces:
             return Points.in_space(places, **variables)
         near = nearest_points(self.objects, places)
         exists = np.ones(len(places), np.bool_)
@@ -159,16 +172,16 @@ class Experiment:
 
     def map_points(self) -> Points:
         """Return the points that pixels of a map show, row by row from the top."""
-        return _map_points(self.objects, self.camera, self.size, self.in_space)
+        return _map_points(self.objects, self._map_camera, self.size, self._off_surfaces)
 
     def normal_derivatives(self, points: Points) -> Float64Array | None:
         """Return derivatives of the surfaces' normals by the points, float64[n, 3, 3]; None in space."""
-        return None if self.in_space or not self.objects else _normal_derivatives(self.objects, points)
+        return None if self._off_surfaces else _normal_derivatives(self.objects, points)
 
     def on_map(self, position: ArrayLike) -> tuple[float, float]:
         """Return where a position is on a map, to the right and up in model units from the middle."""
-        right, up, _ = self.camera.axes
-        offset = np.asarray(position, np.float64) - self.camera.target
+        right, up, _ = self._map_camera.axes
+        offset = np.asarray(position, np.float64) - self._map_camera.target
         return float(offset @ right), float(offset @ up)
 
 
@@ -178,7 +191,7 @@ def _map_points(objects: tuple[SceneObject, ...], camera: Camera, size: float, i
     steps = (np.arange(MAP_PIXELS) + 0.5) / MAP_PIXELS * size - size / 2
     x, y = (grid.ravel() for grid in np.meshgrid(steps, -steps))
     places = np.asarray(camera.target) + x[:, None] * right + y[:, None] * up
-    if in_space or not objects:
+    if in_space:
         return Points.in_space(places)
     eyes = (places + EYE_DISTANCE * size * back).astype(np.float32)
     rays = np.tile(-back.astype(np.float32), (len(eyes), 1))

@@ -6,7 +6,7 @@ values, so that they never block the page.
 
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 from typing import Any
 
@@ -28,6 +28,7 @@ from decals.apps.sandbox.decal_panel import set_drawing
 from decals.editing.commands import ReplaceScene, SetValues
 from decals.editing.gizmo import Ray, on_plane
 from decals.editing.queries import move_decals
+from decals.editing.slicing import SlicePlane
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.validation import number_of, whole_number
 from decals.vtk.component import show_camera
@@ -77,7 +78,7 @@ class Lab:
 
     def __init__(self, window: EditWindow, lessons: Sequence[Lesson]) -> None:
         self._window, self._lessons = window, lessons
-        titles = [lesson.settings.title for lesson in lessons]
+        titles = (lesson.settings.title for lesson in lessons)
         self._titles = [{"title": f"{i + 1}. {title}", "value": i} for i, title in enumerate(titles)]
         self._texts = [document(lesson.text) for lesson in lessons]
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="lab")
@@ -88,6 +89,7 @@ class Lab:
         self._submitted: object = None
         self._number = self._first = self._step = self._target = 0
         self.probe = self.lesson.settings.probe
+        self._plane: SlicePlane | None = None
         self._guess: float | None = None
         self._recording: Recording | None = None
         self._puzzle: Puzzle | None = None
@@ -128,11 +130,12 @@ class Lab:
             in_space=settings.space,
             line=settings.line,
             relaxed=relaxed,
+            plane=self._plane,
         )
 
     def _key(self) -> object:
         document = self._window.document
-        drawn_with = document.drawing, self.probe, self._step
+        drawn_with = document.drawing, self.probe, self._plane, self._step
         return self._number, document.objects, document.decals.version, drawn_with
 
     def values(self) -> dict[str, Any]:
@@ -259,7 +262,7 @@ class Lab:
         def started() -> None:
             if not window.actions.files.is_aside:
                 window.session.mark_saved()  # a lesson without edits needs no recovery
-            self._number, self._asked, self._asking, self.probe = number, None, False, settings.probe
+            self._number, self._asked, self._asking = number, None, False
             self._results, self._pending, self._guess = None, None, guess
             self._puzzle = puzzle
             self._first = window.document.decals.next_number - len(lesson.scene.decals)
@@ -269,7 +272,7 @@ class Lab:
             show_camera(window.plotter, lesson.scene)
             width, height = window.plotter.window_size
             window.subplot.vtk_renderer.camera.zoom(min(width / height, 1.0))  # a narrow view shows it all
-            self._mark_probe()
+            self._put_probe(settings.probe)
             window.redraw(whole=True)
 
         modes = {name: getattr(settings, name) for name in MODES}
@@ -287,9 +290,7 @@ class Lab:
         sliders, state = self.lesson.settings.sliders, self._window.actions.state
         path = sliders[whole_number("slider", number, 0, len(sliders) - 1, InvalidEdit)].path
         if path.startswith("probe."):
-            x, y, z = exchanged(self.probe, [AXES.index(path[-1])], number_of(path, raw, InvalidEdit))
-            self.probe = x, y, z
-            self._mark_probe()
+            self._put_probe(exchanged(self.probe, [AXES.index(path[-1])], number_of(path, raw, InvalidEdit)))
         elif path in MODES:
             set_drawing(state, path, raw, last=last)
         elif path in ("step", "seed") and self._recording is not None:
@@ -303,19 +304,30 @@ class Lab:
             state.run_step(command, last=last)
 
     def move_probe(self, ray: Ray) -> None:
-        """Move the probe to the pointer, along the axes of its sliders; without sliders, over the surface."""
+        """Move the probe to the pointer: on the slice, else along the axes of its sliders or the surface."""
         eye, target = self._window.camera.eye_and_target()
-        point = on_plane(self.probe, np.subtract(eye, target), ray)
+        across = np.subtract(eye, target) if self._plane is None else self._plane.normal
+        point = on_plane(self.probe, across, ray)
         if point is None:
             return
         sliders = [s for s in enumerate(self.lesson.settings.sliders) if s[1].path.startswith("probe.")]
-        for number, slider in sliders:
+        for number, slider in sliders if self._plane is None else ():
             along = float(point[AXES.index(slider.path[-1])])
             self.set_value(number, min(max(along, slider.low), slider.high))
-        if not sliders:
-            x, y, z = self.experiment().points_near(point).positions[0].tolist()
-            self.probe = x, y, z
-            self._mark_probe()
+        if not sliders or self._plane is not None:
+            self._put_probe(self.experiment().points_near(point).positions[0])
+
+    def cut(self, plane: SlicePlane | None) -> None:
+        """Take the slice of the view, and put the probe on it; without one, back where it was first."""
+        if plane != self._plane:
+            self._plane = plane
+            self._put_probe(self.probe if plane else self.lesson.settings.probe)
+
+    def _put_probe(self, place: Any) -> None:
+        """Put the probe at a place, or at the point of the slice that is nearest to it."""
+        x, y, z = np.array(place if self._plane is None else self._plane.nearest(place)).tolist()
+        self.probe = x, y, z
+        self._mark_probe()
 
     def _relax(self, recording: Recording) -> None:
         """Show the step that was asked for, or the last one that is known in time."""
@@ -354,19 +366,25 @@ class Lab:
 def measured(
     lesson: Lesson, experiment: Experiment, key: object = None, guess: float | None = None
 ) -> Results:
-    """Return values, plots and the verdict of a lesson for one state of its scene."""
-    scope = Scope.at_probe(experiment)
+    """Return values, plots and the verdict of a lesson for one state of its scene.
+
+    Plots, and the readings of the probe, are those on the slice if there is one.
+    """
+    scope, at = Scope.at_probe(replace(experiment, plane=None)), Scope.at_probe(experiment)
     plots = [
         {
             "title": plot.title,
             "note": marked(escape(plot.note)),
-            "formula": marked(escape(lesson.formula_of(plot, scope))),
-            "svg": drawn(plot, lesson, scope),
+            "formula": marked(escape(lesson.formula_of(plot, at))),
+            "svg": drawn(plot, lesson, at),
         }
         for plot in lesson.settings.plots
     ]
-    values = [{**value, "label": marked(escape(value["label"]))} for value in lesson.values(scope)]
-    rows = [(name, [shown(number) for number in numbers]) for name, numbers in readings(scope)]
+    values = [
+        {"label": marked(escape(v.label)), "text": shown(lesson.formulas[v.formula].evaluate(scope))}
+        for v in lesson.settings.values
+    ]
+    rows = [(name, [shown(number) for number in numbers]) for name, numbers in readings(at)]
     checks, asked = lesson.settings.question.checks, lesson.settings.guess
     done = [{"text": c.task, "done": lesson.holds(c.holds, scope)} for c in checks if c.task]
     compared: dict[str, Any] = {}

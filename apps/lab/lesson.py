@@ -214,13 +214,6 @@ class Lesson:
         """Return True if one of the lesson's conditions holds."""
         return bool(np.all(self.formulas[formula].evaluate(scope)))
 
-    def values(self, scope: Scope) -> list[dict[str, str]]:
-        """Return the live values: label and text of each."""
-        return [
-            {"label": value.label, "text": shown(self.formulas[value.formula].evaluate(scope))}
-            for value in self.settings.values
-        ]
-
     def verdict(self, scope: Scope) -> tuple[bool, str]:
         """Return whether the scene answers the question, and the text to say so."""
         question = self.settings.question

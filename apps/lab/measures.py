@@ -212,9 +212,10 @@ def owner(scope: Scope) -> Float64Array:
 
 @measure()
 def stretch(scope: Scope) -> Float64Array:
-    """Return by how much the image is stretched: 1 keeps shapes."""
+    """Return by how much the image is stretched along a surface: 1 keeps shapes."""
     maps = _jacobians(scope)
-    return np.where(np.isfinite(maps[:, 0, 0]), stretch_of(np.nan_to_num(maps)), np.nan)
+    known = np.isfinite(maps[:, 0, 0]) & scope.points.normals.any(axis=1)
+    return np.where(known, stretch_of(np.nan_to_num(maps)), np.nan)
 
 
 @measure()

@@ -11,6 +11,7 @@ from decals.apps.lab.lesson import Lesson
 from decals.apps.lab.symbols import ACTS, LIT
 from decals.apps.sandbox.page import PANEL_WIDTH, Page, drawer
 from decals.apps.sandbox.panels import build_controls, icon_button, named
+from decals.editing.slicing import NONE
 from decals.errors import InvalidEdit
 from decals.window import EditWindow
 
@@ -66,6 +67,7 @@ class LabPage(Page):
         self.sandbox.display.points = points
         values = {**super().values(), "in_lesson": in_lesson}
         if in_lesson:
+            self.lab.cut(self.sandbox.display.options.slice)
             self.lab.refresh()
             values |= {**self.lab.values(), "title": self.lab.lesson.settings.title, "left_open": True}
         elif self._server.state.in_lesson:
@@ -113,7 +115,8 @@ class LabPage(Page):
         self.lab.start(number, puzzle=puzzle)
 
     def _restart(self, number: int) -> None:
-        """Start a lesson from its beginning."""
+        """Start a lesson from its beginning, without a slice."""
+        self.sandbox.display.set_option("slice", NONE)
         self.sandbox.attempt(lambda: self.lab.start(number))
 
     def _set_value(self, number: int, raw: Any, last: bool = True) -> None:

@@ -151,13 +151,8 @@ def _shade(axes: _Axes, x: Float64Array, found: dict[str, BoolArray]) -> None:
         ends = np.flatnonzero(np.diff(np.concatenate([[False], acts, [False]])))
         for first, last in ends.reshape(-1, 2):
             (left, right), _ = axes.at([max(x[first] - half, x[0]), min(x[last - 1] + half, x[-1])], 0.0)
-            places = {
-                "x": f"{left:.1f}",
-                "width": f"{right - left:.1f}",
-                "y": axes.top,
-                "height": axes.size[1],
-            }
-            axes.add("rect", data_region=name, fill=ACTING, **places)
+            across = {"x": f"{left:.1f}", "width": f"{right - left:.1f}"}
+            axes.add("rect", data_region=name, fill=ACTING, y=axes.top, height=axes.size[1], **across)
 
 
 def _range(values: Float64Array, padding: float = 0.0) -> tuple[float, float]:

@@ -15,11 +15,11 @@ from decals.apps.sandbox.decal_panel import brush_values
 from decals.editing.background import Job, Worker
 from decals.editing.gizmo import AXES, Handle, Ray
 from decals.editing.slicing import CHOICES as SLICES
-from decals.editing.slicing import MOVE, NONE, TILT, TILTED, SliceDrag, SlicePlane
+from decals.editing.slicing import MOVE, NONE, TILT, TILTED, SliceDrag, SlicePlane, slice_box
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.camera import UPRIGHT, Camera
 from decals.scenes.meshes import as_polydata, meshed
-from decals.scenes.objects import SceneObject, bounds_of, same_shape
+from decals.scenes.objects import SceneObject, same_shape
 from decals.surfaces.surface import unit_rows
 from decals.validation import number_of, one_of, whole_number
 from decals.vtk.subplot import FrameStatus
@@ -28,6 +28,7 @@ from decals.window.host_plotter import pixels_of, ray_through
 from decals.window.view_modes import (
     MODES,
     OVERLAYS,
+    PREFIX,
     RESOLUTION,
     DisplayOptions,
     Shown,
@@ -151,7 +152,7 @@ class Display:
     def _box(self) -> tuple[ArrayLike, ArrayLike]:
         """Return the corners of the scene's box; those of a cube without objects."""
         objects = self._window.document.objects
-        return bounds_of(objects) if objects else (-np.ones(3), np.ones(3))
+        return slice_box(objects) if objects else (-np.ones(3), np.ones(3))
 
     def _plane_of(self, choice: str) -> SlicePlane | None:
         """Return the plane of a choice, through the middle of the scene; a tilted one stays."""
@@ -237,7 +238,7 @@ class Display:
         for title in [*plotter.scalar_bars.keys()]:
             plotter.remove_scalar_bar(title, render=False)
         self._names, self.message = [name for name, _, _ in shown], message
-        replaced = bool(shown) and options.replaces_scene
+        replaced = f"{PREFIX}mesh" in self._names
         subplot.actor.SetVisibility(not replaced)
         if replaced:  # a scene that is not drawn needs no warm-up
             subplot.status, self._window.warmup.status = FrameStatus.EMPTY, ""

@@ -1,5 +1,6 @@
 """The plane that cuts the model open: its place, its handles in the view, and their drags."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,10 +10,14 @@ from blobtree._typing import Float64Array
 from blobtree.validation import finite_vector
 from decals.editing.gizmo import AXES, Handle, Ray, along_line, nearest_on_sphere, snap_distance, snapped
 from decals.errors import InvalidEdit
-from decals.scenes.camera import Vector
+from decals.scenes.camera import Camera, Vector
+from decals.scenes.objects import Box, SceneObject, bounds_of
 
 MOVE, TILT = "slice", "tilt slice"
 """Names of the handles: one in the plane moves it along its normal, one at the end of that tilts it."""
+
+STEEP = 0.9
+"""Cosine between the normal and an axis from which on that axis is not upward in a picture of the plane."""
 
 NONE, TILTED = "none", "tilted"
 CHOICES = NONE, *AXES, TILTED
@@ -57,6 +62,24 @@ class SlicePlane:
         shift = (position - self.position) * np.array(self.normal)
         return replace(self, point=_vector(np.array(self.point) + shift))
 
+    def nearest(self, place: ArrayLike) -> Vector:
+        """Return the point of the plane that is nearest to a place, shape (3,)."""
+        position = np.asarray(place, np.float64)
+        return _vector(position - (position @ self.normal - self.position) * np.array(self.normal))
+
+    def facing(self, camera: Camera, *, above: bool) -> Camera:
+        """Return a camera that looks straight at the plane, near the target of another one.
+
+        What is upward for the other camera stays upward, save along the normal, or with ``above`` what
+        is toward it becomes upward. What is to the right for it stays there.
+        """
+        target, normal = self.nearest(camera.target), np.array(self.normal)
+        right, upward, back = camera.axes
+        first, second = (back, upward) if above else (upward, -back)
+        up = first if abs(normal @ first) < STEEP else second
+        way = -normal if np.cross(up, normal) @ right < 0.0 else normal
+        return replace(camera, position=_vector(target + way), target=target, up=_vector(up))
+
     def reach(self, low: ArrayLike, high: ArrayLike) -> tuple[float, float]:
         """Return the least and the largest position at which the plane meets a box."""
         sides = np.sort(np.stack([low, high]) * np.array(self.normal, np.float64), axis=0)
@@ -71,6 +94,13 @@ class SlicePlane:
 def _vector(array: Float64Array) -> Vector:
     x, y, z = (array + 0.0).tolist()
     return x, y, z
+
+
+def slice_box(objects: Iterable[SceneObject]) -> Box:
+    """Return the box in which a slice of objects lies; a flat one gets half its width on both sides."""
+    low, high = bounds_of(objects)
+    beside = np.where(high > low, 0.0, (high - low).max() / 2)
+    return low - beside, high + beside
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,8 @@ import pyvista as pv
 from decals.editing.document import Document
 from decals.editing.overlays import contact_lines, sample_surface
 from decals.editing.slicing import SlicePlane
+from decals.field.evaluate import evaluate
+from decals.field.walks import evaluation_options
 from decals.scenes.objects import TreeObject, bounds_of
 from decals.surfaces.surface import unit_rows
 
@@ -16,6 +18,9 @@ MODES = "traced", "polygonized", "wireframe", "normals", "curvature"
 OVERLAYS = "none", "contact lines", "owners", "stretch", "folds", "seeds"
 RESOLUTION = 96
 """Cells along the longest side of the meshes that modes and overlays use."""
+
+CUTS = 2 * RESOLUTION
+"""Cells along a side of a slice of decals."""
 
 LIFT = 0.003
 """Distance of overlays above the surface, in sizes of the scene, so that they are not hidden."""
@@ -27,7 +32,13 @@ OWNER_COLORS = np.array(
 
 NO_OWNER = (150, 150, 150)
 SHOWN_FIELD = 0.002
-"""Least field that the slice shows."""
+"""Least field of trees that the slice shows."""
+
+RIM_FIELD = 0.5
+"""Least field of an image; there is none outside."""
+
+FIELD_LOOK = {"scalars": "field", "cmap": "cividis", "clim": (0.0, 1.0), "lighting": False}
+"""How a slice shows a field."""
 
 FOLD_COLOR = "#d55e00"
 LINE_COLOR = "#111111"
@@ -54,11 +65,6 @@ class DisplayOptions:
     overlay: str = OVERLAYS[0]
     slice: SlicePlane | None = None
 
-    @property
-    def replaces_scene(self) -> bool:
-        """True if an actor stands for the scene, which is not drawn."""
-        return self.mode not in MODES[:2] or self.slice is not None
-
 
 Shown = list[tuple[str, Any, dict[str, Any]]]
 """Data sets with their names and pyvista's options."""
@@ -83,8 +89,8 @@ def shown_data(document: Document, parts: list[pv.PolyData], options: DisplayOpt
     shown: Shown = []
     message = ""
     if options.slice is not None:
-        shown += _sliced(document, mesh, options.slice, LIFT * size)
-    elif options.replaces_scene:
+        shown += _sliced(document, mesh, options.slice, size)
+    elif options.mode not in MODES[:2]:
         shown.append(_moded(document, mesh, parts, options.mode))
     if options.overlay != OVERLAYS[0]:
         overlay, message = _overlay(document, mesh, options.overlay, LIFT * size)
@@ -143,8 +149,13 @@ def _moded(document: Document, mesh: pv.PolyData, parts: list[pv.PolyData], mode
     return name, copy, {"scalars": "mean curvature", "cmap": "PuOr", "clim": (-reach, reach)}
 
 
-def _sliced(document: Document, mesh: pv.PolyData, cut: SlicePlane, lift: float) -> Shown:
-    """Return the part of the mesh behind a plane, and the fields of the trees on it with iso-lines."""
+def _sliced(document: Document, mesh: pv.PolyData, cut: SlicePlane, size: float) -> Shown:
+    """Return the part of the mesh behind a plane, and the fields of the trees on it with iso-lines.
+
+    Without trees, return the fields of the decals on the plane, through the whole scene.
+    """
+    if not any(isinstance(item, TreeObject) for item in document.objects):
+        return _decals_sliced(document, cut, size)
     clipped = mesh.clip(normal=cut.normal, origin=cut.point)
     shown: Shown = []
     if clipped.n_points:
@@ -153,14 +164,27 @@ def _sliced(document: Document, mesh: pv.PolyData, cut: SlicePlane, lift: float)
         if not isinstance(item, TreeObject):
             continue
         field: Any = item.tree.slice(cut.point, cut.normal, resolution=RESOLUTION)
-        plane = {"scalars": "field", "cmap": "cividis", "clim": (0.0, 1.0), "lighting": False}
         inside = field["plane"].clip_scalar(scalars="field", value=SHOWN_FIELD, invert=False)
-        shown.append((f"{PREFIX}plane {number}", inside, plane))
+        shown.append((f"{PREFIX}plane {number}", inside, FIELD_LOOK))
         for part, width in (("lines", 1), ("surface", 4)):
             if field[part].n_points:
-                lifted = field[part].translate(lift * np.array(cut.normal))
+                lifted = field[part].translate(LIFT * size * np.array(cut.normal))
                 shown.append((f"{PREFIX}{part} {number}", lifted, {"color": "white", "line_width": width}))
     return shown
+
+
+def _decals_sliced(document: Document, cut: SlicePlane, size: float) -> Shown:
+    """Return the outline of a plane, and its part inside decals with their field after contact."""
+    middle = cut.nearest(np.add(*bounds_of(document.objects)) / 2)
+    plane: Any = pv.Plane(
+        center=middle, direction=cut.normal, i_size=size, j_size=size, i_resolution=CUTS, j_resolution=CUTS
+    )
+    points = np.asarray(plane.points, np.float32)
+    modes = evaluation_options(document.drawing, document.decals, document.objects)
+    plane["field"] = evaluate(document.decals, points, np.zeros_like(points), **modes).field
+    inside = plane.clip_scalar(scalars="field", value=RIM_FIELD / 2, invert=False)
+    shown: Shown = [(f"{PREFIX}outline", plane.outline(), {"color": LINE_COLOR, "line_width": 2})]
+    return shown + ([(f"{PREFIX}plane", inside, FIELD_LOOK)] if inside.n_points else [])
 
 
 def _overlay(document: Document, mesh: pv.PolyData, overlay: str, lift: float) -> tuple[Shown, str]:

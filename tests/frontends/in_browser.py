@@ -1010,6 +1010,7 @@ async def lab(picture: str | None = None) -> None:
         await browser.mouse.up()
         await until(lambda: lab_page.lab.probe[0] > before[0] + 0.05 and not lab_page.lab.busy)
         await until_readings(browser, lab_page)
+        await sliced(browser, lab_page)
         symbol = browser.locator(".lesson-side abbr[data-symbol='g']").first
         assert "falloff" in str(await symbol.get_attribute("title"))
         await browser.get_by_role("button", name="lines of Python for this picture").click()
@@ -1071,10 +1072,43 @@ async def guess(browser: Page, lab_page: LabPage) -> None:
     assert await browser.locator(".scale path").count() in (1, 2)
 
 
+async def sliced(browser: Page, lab_page: LabPage) -> None:
+    """Cut the lesson open, and drag the probe and the slice with the mouse: the readings follow."""
+    await browser.get_by_role("button", name="View", exact=True).click()
+    await choose(browser, "slice", "y")
+    await browser.keyboard.press("Escape")
+    await browser.mouse.move(*(await at_rest(browser, lab_page, "probe")))  # the menu is closed
+    view = await browser.locator(PICTURE).first.bounding_box()
+    assert view is not None
+    corner = view["x"] + 20, view["y"] + view["height"] - 20
+    await browser.mouse.move(*corner)
+    await browser.mouse.down()
+    await browser.mouse.move(corner[0] + 60, corner[1] - 70, steps=4)  # turn the plate
+    await browser.mouse.up()
+    for handle in ("probe", "slice"):
+        before, (x, y) = lab_page.lab.probe, await at_rest(browser, lab_page, handle)
+        await browser.mouse.move(x, y)
+        await browser.mouse.down()
+        await browser.mouse.move(x + 10, y - 30, steps=4)
+        await browser.mouse.up()
+        await until(partial(has_moved, lab_page, before))
+        await until_readings(browser, lab_page)
+    assert np.abs(lab_page.lab.probe)[1:].min() > 0.02  # beside the middle, and above the plate
+    await browser.get_by_role("button", name="View", exact=True).click()
+    await choose(browser, "slice", "none")
+    await browser.keyboard.press("Escape")
+    await until(lambda: lab_page.lab.probe == lab_page.lab.lesson.settings.probe and not lab_page.lab.busy)
+
+
+def has_moved(lab_page: LabPage, before: tuple[float, float, float]) -> bool:
+    """Return True once the probe lies elsewhere, and its values are known."""
+    return lab_page.lab.probe != before and not lab_page.lab.busy
+
+
 async def until_readings(browser: Page, lab_page: LabPage) -> None:
     """Wait until the page shows d and f of the probe as the formulas of float64 give them."""
-    x, radius = lab_page.lab.probe[0], lab_page.lab.experiment().decals.radii[0]
-    d = np.array(abs(x) / (radius / RIM))
+    radius = lab_page.lab.experiment().decals.radii[0]
+    d = np.linalg.norm(lab_page.lab.probe) / (radius / RIM)
     expected = {"d": shown(d), "f = g(d)": shown(falloff(d))}
     names, numbers = (browser.locator(f".readings {tag}") for tag in ("th", "td"))
     async with asyncio.timeout(PATIENCE):

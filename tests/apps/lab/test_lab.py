@@ -18,6 +18,7 @@ from decals.apps.lab.lab import Lab, Results, measured
 from decals.apps.lab.lesson import LESSONS, load_lesson, load_lessons, shown
 from decals.apps.lab.measures import MEASURES
 from decals.apps.lab.plots import LEFT, TOP
+from decals.editing.slicing import SlicePlane
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.meshes import as_polydata
 from decals.scenes.objects import MeshObject
@@ -123,6 +124,27 @@ def test_the_probe_follows_the_pointer_where_its_slider_leads(lab: Lab, window: 
     assert lab.probe == (2.0, y, z)  # the end of the slider
     begin(lab, 0)
     assert wait(lab)["lab_sliders"][number_of(lab, "Probe")]["value"] == x
+
+
+def test_the_probe_lies_on_a_slice_and_tasks_stay_on_the_surface(lab: Lab) -> None:
+    begin(lab, 0)
+    before = wait(lab)
+    lab.cut(SlicePlane.across((0, 0.25, 0), (0, 1, 0)))
+    assert lab.probe == pytest.approx((0.3, 0.25, 0.0))
+    lab.move_probe(([0.2, 5.0, 0.4], [0.0, -1.0, 0.0]))
+    assert lab.probe == pytest.approx((0.2, 0.25, 0.4))
+    sliced = wait(lab)
+    s = lab.experiment().decals.influence[0]
+    expected = falloff(np.linalg.norm([0.2, 0.25, 0.4]) / s)
+    assert f">{shown(expected)}<" in sliced["lab_readings"]
+    assert sliced["lab_plots"][1]["svg"] != before["lab_plots"][1]["svg"]
+    assert sliced["lab_tasks"] == before["lab_tasks"]
+    lab.set_value(number_of(lab, "Probe"), -0.5)
+    assert lab.probe == pytest.approx((-0.5, 0.25, 0.4))
+    lab.cut(SlicePlane.across((0, 0.5, 0), (0, 1, 0)))
+    assert lab.probe == pytest.approx((-0.5, 0.5, 0.4))
+    lab.cut(None)
+    assert lab.probe == lab.lesson.settings.probe
 
 
 @pytest.mark.parametrize("number", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (0, 2, 3, 4, 5))])

@@ -11,6 +11,7 @@ from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Points, Relaxed, Scope
 from decals.apps.lab.formulas import parse
 from decals.apps.lab.measures import MEASURES
+from decals.editing.slicing import SlicePlane
 from decals.field.rules import PictureRules
 from decals.model import Decals
 from decals.record import Contact
@@ -61,6 +62,24 @@ def test_fields_before_and_after_contact_are_those_of_the_paper() -> None:
     h = (after - 0.5)[owned] / (expected[owned, 0] - 0.5)
     np.testing.assert_allclose(value("h(1, 0)", state, points)[owned], h, atol=2e-5)
     assert (value("owner", state, points)[owned] == 0).all()
+
+
+@pytest.mark.parametrize("normal", [(1, 0, 0), (0, 1, 0), (1, 1, 2)])
+def test_a_slice_has_the_fields_of_the_paper_off_the_surface(normal: Any) -> None:
+    plane = SlicePlane.across((0.35, 0.05, 0.1), normal)
+    state = experiment(plane=plane, probe=plane.nearest((0.3, 0.1, 0.2)))
+    points = state.map_points()
+    np.testing.assert_allclose(points.positions @ plane.normal, plane.position, atol=1e-6)
+    expected = fields(points.positions)
+    after = contact_field(expected)
+    inside = np.isfinite(after)
+    np.testing.assert_allclose(value("F", state, points)[inside], after[inside], atol=3e-4)
+    (own,), here = np.argmax(fields(np.array([state.probe])), axis=1), fields(np.array([state.probe]))[0]
+    assert value(f"f({own})", state) == pytest.approx(here[own], abs=2e-6)
+    assert value("F", state) == pytest.approx(contact_field(here[None])[0], abs=3e-4)
+    assert np.isnan(value("stretch", state)).all()
+    x, y = state.on_map(points.positions[0])
+    assert (x, y) == pytest.approx((-2.0 + 2.0 / 120, 2.0 - 2.0 / 120), abs=1e-6)
 
 
 def test_the_surface_of_figure_7_is_equation_5() -> None:

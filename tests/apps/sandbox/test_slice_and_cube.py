@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from decals.apps.sandbox.cube import cube_cells
 from decals.editing.gizmo import Ray, nearest_on_sphere
-from decals.editing.slicing import CHOICES, MOVE, TILT, SliceDrag, SlicePlane
+from decals.editing.slicing import CHOICES, MOVE, TILT, SliceDrag, SlicePlane, slice_box
 from decals.errors import InvalidEdit
-from decals.scenes.camera import PRESETS, UPRIGHT
+from decals.scenes.camera import PRESETS, UPRIGHT, Camera
+from decals.scenes.objects import MeshObject
 
 BOX = np.full(3, -10.0), np.full(3, 10.0)
 numbers = st.floats(-1.0, 1.0)
@@ -62,6 +63,30 @@ def test_a_tilted_plane_turns_its_normal_to_the_pointer(
     assert np.dot(tilted.normal, normal) >= np.dot(target, normal) - 1e-4  # the nearer of the two
     snapped = np.array(SliceDrag(TILT, plane, ray, 0.5).dragged(ray, BOX, snap=True).normal)
     np.testing.assert_allclose(snapped / np.abs(snapped).max(), np.round(snapped / np.abs(snapped).max()))
+
+
+@given(vectors, directions, eyes)
+def test_a_camera_faces_a_plane_with_right_on_its_right(
+    point: np.ndarray, normal: np.ndarray, eye: np.ndarray
+) -> None:
+    plane = SlicePlane.across(point, normal)
+    nearest = np.array(plane.nearest(eye))
+    assert nearest @ normal == pytest.approx(plane.position, abs=1e-9)
+    assert np.linalg.norm(np.cross(eye - nearest, normal)) < 1e-9
+    camera = Camera((0.0, 0.0, 8.0), target=tuple(eye.tolist()))
+    for above in (True, False):
+        right, up, back = plane.facing(camera, above=above).axes
+        assert abs(back @ normal) == pytest.approx(1.0, abs=1e-5)
+        assert right @ camera.axes[0] >= -1e-6
+        if abs(camera.axes[2 if above else 1] @ normal) < 0.89:
+            assert up @ camera.axes[2 if above else 1] > 0.4
+
+
+def test_a_slice_of_a_flat_object_moves_off_it() -> None:
+    plate = MeshObject("plate", [[0, 0, 1], [4, 0, 1], [0, 2, 1]], [[0, 1, 2]])
+    low, high = SlicePlane.across((1, 1, 1), (0, 0, 1)).reach(*slice_box([plate]))
+    assert (low, high) == (-1.0, 3.0)
+    assert SlicePlane.across((1, 1, 1), (1, 0, 0)).reach(*slice_box([plate])) == (0.0, 4.0)
 
 
 def test_planes_know_their_choice_and_refuse_what_is_no_direction() -> None:

@@ -6,9 +6,13 @@ import decals
 from blobtree import Point
 from decals.editing.document import Document
 from decals.editing.overlays import contact_lines, sample_surface
+from decals.editing.slicing import SlicePlane
 from decals.scenes.camera import Camera
-from decals.scenes.objects import TreeObject
+from decals.scenes.meshes import as_polydata
+from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.scene import Scene
+from decals.window.view_modes import CUTS, DisplayOptions, shown_data
+from tests.oracles.contact import RIM, falloff
 
 
 def plane(count: int = 81) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -69,3 +73,21 @@ def test_three_decals_in_one_triangle_give_three_spokes() -> None:
     bare = document([[0, 0, 0], [1.5, 0, 0]])  # the third corner has no decal
     assert len(contact_lines(bare, corners, up, face)) == 0
     assert len(contact_lines(document([[0, 0, 0]]), corners / np.float32(9), up, face)) == 0
+
+
+def test_a_slice_of_meshes_shows_the_fields_of_decals_and_leaves_the_scene() -> None:
+    vertices, _, faces = plane(5)
+    plate = MeshObject("plate", vertices, faces)
+    one = decals.Decals([[0.2, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], [0.8])
+    scene = Scene(objects=[plate], camera=Camera((0, 0, 5)), decals=one, images=["eye"])
+    options = DisplayOptions(slice=SlicePlane.across((0, 0.3, 0), (0, 1, 0)))
+    shown, message = shown_data(Document.from_scene(scene), [as_polydata([plate])], options)
+    (_, outline, _), (_, field, _) = shown  # and no mesh in place of the scene
+    assert message == ""
+    np.testing.assert_allclose(outline.bounds, (-2, 2, 0.3, 0.3, -2, 2), atol=1e-6)
+    distances = np.linalg.norm(np.asarray(field.points) - [0.2, 0, 0], axis=1)
+    inside = np.asarray(field["field"]) > 0.4  # the others lie on the edges of cells, next to the rim
+    expected = falloff(distances / (0.8 / RIM))
+    np.testing.assert_allclose(np.asarray(field["field"])[inside], expected[inside], atol=1e-5)
+    np.testing.assert_allclose(distances[~inside], 0.8, atol=4.0 / CUTS)
+    assert inside.mean() > 0.9
