@@ -26,6 +26,7 @@ class LessonPage {
         call(given.target);
       });
     on("[name=again]", "click", () => this.begin());
+    on("[name=back]", "click", () => viewer.history.go(-1));
     on("[name=check]", "click", () => this.changed((this.tried = true)));
     on("[name=share]", "click", () => share(this));
     on("[name=skip]", "click", () => this.see(null));

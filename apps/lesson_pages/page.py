@@ -329,11 +329,13 @@ def _markup(
         f'<div class="note">{text(plot.note)}</div></div>'
         for plot in _plots(lesson)
     )
-    names = ("lessons", "about", "parameters", "values", "readings", "check", "again", "needs")
+    names = ("lessons", "about", "parameters", "values", "readings", "check", "again", "needs", "later")
+    undo = f'<button type="button" name="back">{words.page["undo"]}</button>'
     body = words.bodies.get(lesson.name, lesson.text)
     return {
         **{name.upper(): html.escape(words.page[name]) for name in names},
         "KEYS": html.escape(words.page["turn" if settings.space else "keys"]),
+        "UNDO": "" if settings.space else undo,
         "LANGUAGE": words.code,
         "WAITS": "true" if guess else "false",
         "NAVIGATION": "".join(

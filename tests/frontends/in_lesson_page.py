@@ -91,6 +91,7 @@ async def answered(page: Page, attempt: Attempt) -> None:
         await slider.evaluate(SET, str(value) if isinstance(value, str) else f"{value:g}")
     await page.get_by_role("button", name="Check the answer").click()
     await settled(page)
+    assert await page.evaluate(CUT) == []  # not even where numbers are longest
     verdict = page.locator(".verdict")
     assert attempt.words in await verdict.inner_text(), await verdict.inner_text()
     assert await verdict.get_attribute("data-right") == str(attempt.right).lower()
@@ -221,6 +222,12 @@ async def played(browser: Browser, path: Path, width: int, height: int) -> None:
     pars = link.split("par=")[1].split(",")
     assert (await cells.all_inner_texts())[1::3] == [f"{float(par):g}" for par in pars]
     assert await page.evaluate("page.viewer.decals.rows[0].radius") == 0.3
+    await page.evaluate(MOVE, SOLVED)
+    await settled(page)
+    moved = await page.evaluate("page.viewer.decals.rows[0].position")
+    await press(page, "Undo")
+    await settled(page)
+    assert await page.evaluate("page.viewer.decals.rows[0].position") != moved
     assert await page.evaluate("window.pageErrors") == []
     await page.close()
 
