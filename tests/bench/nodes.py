@@ -22,7 +22,7 @@
 * widths: `width_error`, how far from the asked distance roundings begin on surfaces of random pairs of
   half-spaces and balls, over that distance, the largest of all operators whose width is a length.
 * repeats: `repeat_10000_over_visible`, the time of rays that meet 100 of 10,000 boxes in a grid, over that of
-  the same rays through these 100.
+  the same rays through these 100; both grids keep their cells, as while they are drawn.
 * fits: see `tests.bench.fitting`.
 * costs: `mixed_over_sum` is the cost per crossing cell of a tree with a clean union, solids in contact and a
   bend, over that of the pure sum of its primitives; `gradient_over_sum` is the same with a gradient blend in
@@ -60,6 +60,7 @@ from blobtree import (
 )
 from blobtree.custom import define_warp
 from blobtree.nodes.kinds import NODE_KINDS
+from blobtree.tracing.tree_cells import tracing_cells
 from tests import rounded_widths
 from tests.bench import contact, convolution_surfaces, fitting
 from tests.blobtree.derivatives import test_curvature
@@ -320,6 +321,7 @@ def repeats(_: argparse.Namespace) -> Figures:
     """Time rays down on a hundred boxes of a large grid, and of a grid of these alone."""
     brick = Box((0, 0, 0), (0.6, 0.6, 0.6), radius=0)
     grids = [Repeat(Repeat(brick, (1, 0, 0), side, "union"), (0, 1, 0), side, "union") for side in (100, 10)]
+    kept = [tracing_cells(grid) for grid in grids]
     places = np.random.default_rng(0).uniform(0.0, 9.0, (100_000, 2))
     origins = np.column_stack([places, np.full(len(places), 5.0)])
     downward = np.tile([0.0, 0.0, -1.0], (len(places), 1))
@@ -330,7 +332,7 @@ def repeats(_: argparse.Namespace) -> Figures:
             grid.raycast(origins, downward)
             seconds.append(time.perf_counter() - start)
     many, few = (statistics.median(seconds[1:]) for seconds in times)
-    return {"repeat_10000_over_visible": many / few}
+    return {"repeat_10000_over_visible": many / few, "repeat_10000_cells_mb": kept[0].nbytes / 1e6}
 
 
 GROUPS: dict[str, Callable[[argparse.Namespace], Figures]] = {
