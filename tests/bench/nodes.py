@@ -32,7 +32,6 @@
 """
 
 import argparse
-import json
 import statistics
 import subprocess
 import sys
@@ -63,6 +62,7 @@ from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.tracing.tree_cells import tracing_cells
 from tests import rounded_widths
 from tests.bench import contact, convolution_surfaces, fitting
+from tests.bench.command_line import bench_parser, show, write
 from tests.blobtree.derivatives import test_curvature
 from tests.blobtree.nodes.test_attributes import REST, rest
 from tests.blobtree.trees import points_around
@@ -355,26 +355,19 @@ GROUPS: dict[str, Callable[[argparse.Namespace], Figures]] = {
 
 def main() -> None:
     """Parse the command line and measure."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tests.bench.nodes",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = bench_parser("nodes", __doc__)
     parser.add_argument("--only", nargs="+", choices=GROUPS, help="groups of figures")
     parser.add_argument("--trees", type=int, default=200, help="number of random trees")
     parser.add_argument("--seed", type=int, default=1, help="seed of random nodes and trees")
     parser.add_argument("--against", type=Path, help="another checkout, for sum_regression")
     parser.add_argument("--quick", action="store_true", help="few samples and trees")
-    parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     options = parser.parse_args()
     figures: Figures = {}
     for group in options.only or [name for name in GROUPS if name != "fits"]:
         added = GROUPS[group](options)
         figures |= added
-        for name, number in added.items():
-            print(f"  {name:28} {number:12.4g}", flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+        show(added)
+    write(options.json, figures)
 
 
 if __name__ == "__main__":
