@@ -16,6 +16,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from copy import copy
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -248,7 +249,7 @@ def launch(
     Raises
     ------
     Cancelled
-        The work that launches the kernel was cancelled.
+        The work that launches the kernel is to stop.
     """
     if count == 0:
         return
@@ -261,11 +262,13 @@ def launch(
     slices = _slice_count(kernel, count, reported=step is not None)
     numbers = iter(range(slices))  # a free thread takes the next slice
     finished: list[float] = []  # processor time of each slice that is done
+    packed: Any = wp.launch(
+        kernel, dim=1, inputs=[0, *inputs], outputs=[*outputs], device=device, record_cmd=True
+    )
 
     def run(after_each: Callable[[], None]) -> None:
-        command: Any = wp.launch(
-            kernel, dim=1, inputs=[0, *inputs], outputs=[*outputs], device=device, record_cmd=True
-        )
+        command = copy(packed)
+        command.params = [*packed.params]  # each thread sets bounds and first index of its own
         for number in numbers:
             first, last = count * number // slices, count * (number + 1) // slices
             began = time.thread_time()
@@ -318,6 +321,18 @@ def prefaulted_array(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
     if len(pages) > MIN_PREFAULTED_PAGES:
         list(_thread_pool().map(lambda part: part.fill(0), np.array_split(pages, _thread_count())))
     return array
+
+
+def on_host(array: Any) -> NDArray[Any]:
+    """Return the numbers of an array of Warp; those of the CPU share its memory."""
+    if array.device.is_cpu:
+        shared: NDArray[Any] = array.numpy()
+        return shared
+    scalar = getattr(array.dtype, "_wp_scalar_type_", array.dtype)
+    host = prefaulted_array((*array.shape, *getattr(array.dtype, "_shape_", ())), wp.dtype_to_numpy(scalar))
+    wp.copy(wp.array(host, dtype=array.dtype, device="cpu", copy=False), array)
+    wp.synchronize_device(array.device)
+    return host
 
 
 def available_memory(device: str) -> float | None:

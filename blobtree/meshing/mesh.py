@@ -20,7 +20,7 @@ from blobtree._typing import Float32Array, IndexArray, Int32Array
 from blobtree.cells.grid import CHILDREN
 from blobtree.cells.scan import DeviceArray, arange, compact, exclusive_scan, where_negative
 from blobtree.cells.sparse_cells import SparseCells, child_grid
-from blobtree.device import demand_memory, launch, prefaulted_array
+from blobtree.device import demand_memory, launch, on_host
 from blobtree.errors import InvalidFile
 from blobtree.identity import Value
 from blobtree.meshing.bisection_kernels import bisect_unconverged
@@ -195,18 +195,8 @@ def extract_mesh(
 def download(mesh: DeviceMesh, sheet_counts: NDArray[np.uint8] | None = None) -> Mesh:
     """Return the triangles of a device as NumPy arrays."""
     arrays = [mesh.vertices, mesh.faces, mesh.normals, mesh.colors]
-    vertices, faces, normals, colors = map(_on_host, arrays)
+    vertices, faces, normals, colors = map(on_host, arrays)
     return Mesh(vertices, faces, normals, colors, sheet_counts)
-
-
-def _on_host(array: Any) -> Any:
-    """Return the vectors of a device as a NumPy array, which shares the memory of the CPU's own arrays."""
-    if array.device.is_cpu:
-        return array.numpy()
-    host = prefaulted_array((len(array), 3), np.int32 if array.dtype == wp.vec3i else np.float32)
-    wp.copy(wp.array(host, dtype=array.dtype, device="cpu", copy=False), array)
-    wp.synchronize_device(array.device)
-    return host
 
 
 class _Extraction:

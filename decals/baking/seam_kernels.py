@@ -160,6 +160,28 @@ def linearize(
                     slopes[row, k] = value
 
 
+@wp.func
+def root_of(level: wp.int32, parents: wp.array(dtype=wp.int32)) -> wp.int32:
+    """Return the first level of a component, and shorten the way to it."""
+    at = level
+    while parents[at] != at:
+        parents[at] = parents[parents[at]]
+        at = parents[at]
+    return at
+
+
+@wp.kernel
+def join_levels(first: wp.int32, columns: wp.array2d(dtype=wp.int32), parents: wp.array(dtype=wp.int32)):
+    """Write the first level of the component of each level; the levels of one run are in one component."""
+    for run in range(columns.shape[0]):
+        for k in range(1, 8):
+            one = root_of(columns[run, 0], parents)
+            other = root_of(columns[run, k], parents)
+            parents[wp.max(one, other)] = wp.min(one, other)
+    for level in range(parents.shape[0]):
+        parents[level] = parents[parents[level]]
+
+
 @wp.kernel
 def find_lowest(
     first: wp.int32,

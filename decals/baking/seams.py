@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import warp as wp
 from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from blobtree._typing import BoolArray, Float64Array, Int32Array, Int64Array, UInt8Array
 from blobtree.device import array_on, launch
@@ -25,6 +25,7 @@ from decals.baking.seam_kernels import (
     POINT_BITS,
     change_levels,
     find_closest,
+    join_levels,
     linearize,
     settle,
 )
@@ -32,8 +33,8 @@ from decals.baking.seam_system import CPU, SeamSystem
 from decals.baking.unwrapped import Unwrapped
 from decals.sorting import distinct_numbers, groups, ranges, stable_order
 
-STEP = 0.1
-"""Largest distance in texels between points of a seam."""
+STEP = 0.15
+"""Largest distance in texels between points of a seam; more lie where the texels that are mixed change."""
 
 COARSE = 4
 """The least squares begin with one of so many points, and take those that differ besides."""
@@ -56,8 +57,8 @@ SQUARES_FROM = 10.0
 RINGS = 2
 """Rings of points, linked by common texels, that are changed with the points that differ."""
 
-ATTEMPTS, SWEEPS = 20, 100
-"""Times that single corrections begin, and most rounds of them."""
+ATTEMPTS, SWEEPS = 5, 400
+"""Times that single corrections begin, and most rounds of them at first; each time has twice as many."""
 
 REPORT_SECONDS = 0.1
 """Seconds between reports."""
@@ -99,14 +100,40 @@ class Seams:
         return cls(numbers, faces, tiles, ends, corners, float(lengths.sum()))
 
     def points(self) -> tuple[Int64Array, Float64Array]:
-        """Return the seam of points along all seams, and their places on both sides, ``float64[n, 2, 2]``."""
-        texels = np.linalg.norm(self.ends[:, :, 1] - self.ends[:, :, 0], axis=2).max(axis=1, initial=0.0)
-        counts = np.ceil(texels / STEP).astype(np.int64) + 1
-        seams = np.repeat(np.arange(len(counts)), counts)
-        number = ranges(np.zeros_like(counts), counts)
-        share = (number / np.maximum(counts - 1, 1)[seams])[:, None, None]
-        begin, end = np.moveaxis(self.ends[seams], 2, 0)
-        return seams, begin * (1.0 - share) + end * share
+        """Return the seam of points along all seams, and their places on both sides, ``float64[n, 2, 2]``.
+
+        Between two of them the same texels are mixed, so the colours are smooth there.
+        """
+        begin, end = self.ends[:, :, 0].reshape(-1, 4), self.ends[:, :, 1].reshape(-1, 4)
+        numbers, shares = _crossings(begin - 0.5, end - 0.5)
+        away = np.sqrt(((end - begin) ** 2).reshape(-1, 2, 2).sum(axis=2)).max(axis=1)
+        parts = np.diff(shares, append=0.0)
+        parts[np.diff(numbers, append=len(begin)) > 0] = 0.0  # behind the last point of a seam
+        counts = np.maximum(np.ceil(parts * away[numbers] / STEP), 1.0).astype(np.int64)
+        rows = np.repeat(np.arange(len(numbers)), counts)
+        within = ranges(np.zeros_like(counts), counts) / counts[rows]
+        seams, share = numbers[rows], (shares[rows] + within * parts[rows])[:, None]
+        places = begin[seams] + (end - begin)[seams] * share
+        return seams, places.reshape(-1, 2, 2)
+
+
+def _crossings(begin: Float64Array, end: Float64Array) -> tuple[Int64Array, Float64Array]:
+    """Return rows and shares of lines ``float64[k, 4]`` where one of the coordinates is whole, and both ends.
+
+    They come row after row, from the begin to the end.
+    """
+    rows = np.arange(len(begin))
+    numbers, shares = [rows, rows], [np.zeros(len(rows)), np.ones(len(rows))]
+    for a, b in zip(begin.T, end.T, strict=True):
+        first = np.ceil(np.minimum(a, b)).astype(np.int64)
+        counts = np.floor(np.maximum(a, b)).astype(np.int64) - first + 1
+        counts[a == b] = 0
+        of = np.repeat(rows, counts)
+        numbers.append(of)
+        shares.append(np.clip((ranges(first, counts) - a[of]) / (b - a)[of], 0.0, 1.0))
+    number, share = np.concatenate(numbers), np.concatenate(shares)
+    order = np.argsort(2.0 * number + share)
+    return number[order], share[order]
 
 
 def _cut_edges(
@@ -385,7 +412,7 @@ class _Match:
         return beside[self._valid[beside]]
 
     def _linked(self, runs: Int64Array) -> tuple[Int64Array, Int32Array, Int32Array]:
-        """Return the texels of runs, their columns there, and the component of each texel.
+        """Return the texels of runs, their columns there, and the first texel of the component of each.
 
         Texels of one run are in one component.
         """
@@ -394,11 +421,9 @@ class _Match:
         number = np.empty(len(self._first), np.int32)
         number[used] = np.arange(len(used))
         columns = number[listed]
-        nodes = len(runs) + len(used)  # each run is linked to its texels
-        ends = np.minimum(np.arange(nodes + 1) * columns.shape[1], columns.size)
-        each = np.ones(columns.size, np.int8), columns.reshape(-1) + len(runs), ends
-        _, label = connected_components(csr_array(each, (nodes, nodes)), directed=False)
-        return used, columns, label[len(runs) :]
+        label = np.arange(len(used), dtype=np.int32)
+        launch(join_levels, 1, [array_on(CPU, columns, wp.int32)], [array_on(CPU, label, wp.int32)], CPU)
+        return used, columns, label
 
     def _least_squares(self, runs: Int64Array) -> None:
         """Minimise the change of texels and the weighted differences, with more weight where these stay."""
@@ -454,6 +479,6 @@ class _Match:
             counts = len(touched), len(chosen)
             changed, seen = (wp.zeros(count, dtype=wp.int32, device=CPU) for count in counts)
             inputs += [*self._runs.here, self._smooth_here, self._srgb]
-            inputs += [SWEEPS, SETTLED / 255.0, LARGEST / 255.0]
+            inputs += [SWEEPS << attempt, SETTLED / 255.0, LARGEST / 255.0]
             launch(settle, len(bounds) - 1, inputs, [levels, light, changed, seen], CPU)
             self._change(touched, levels.numpy().astype(np.float64))

@@ -19,7 +19,7 @@ from blobtree._typing import (
     Int64Array,
     UInt8Array,
 )
-from blobtree.device import array_on, known_device, launch
+from blobtree.device import array_on, known_device, launch, on_host
 from blobtree.progress import Progress
 from decals.baking.beyond import Beyond
 from decals.baking.meshes import BakeMesh
@@ -463,8 +463,7 @@ class _Page:
 
     def image(self) -> UInt8Array:
         """Return the texture, ``uint8[size, size, channels]``."""
-        texels: UInt8Array = self._image.numpy()
-        return texels.reshape(self._size, self._size, -1)
+        return on_host(self._image).reshape(self._size, self._size, -1)
 
     def texels(self, listed: Int64Array) -> UInt8Array:
         """Return some texels, ``uint8[n, channels]``."""

@@ -37,9 +37,10 @@ class EnvironmentTextures:
 class EnvironmentEffect(Effect):
     """The textures of the environment that lights a scene."""
 
-    def of(self, scene: SceneLike, drawing: Drawing) -> EnvironmentTextures:
-        """Return the textures."""
-        assert drawing.environment is not None
+    def of(self, scene: SceneLike, drawing: Drawing) -> EnvironmentTextures | None:
+        """Return the textures; None without an environment."""
+        if drawing.environment is None:
+            return None
         panorama, visible = drawing.environment.picture, drawing.environment.visible
         textures: EnvironmentTextures = self._cache.get(
             lambda: EnvironmentTextures(self._uploads.context, panorama, visible), panorama, visible
@@ -48,7 +49,8 @@ class EnvironmentEffect(Effect):
 
     def tasks(self, scene: SceneLike, drawing: Drawing) -> list[WarmupTask]:
         """Return the prefiltering, which needs no graphics, and the upload."""
-        assert drawing.environment is not None
+        if drawing.environment is None:
+            return []
         filtering = partial(prefiltered, drawing.environment.picture)
         return [
             WarmupTask(IMAGES, filtering, threaded=True),

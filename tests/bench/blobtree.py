@@ -10,6 +10,7 @@ parts of tapes and cells.
 """
 
 import argparse
+import json
 import os
 import platform
 import statistics
@@ -33,7 +34,6 @@ from blobtree.cells.sparse_cells import SparseCells, build_cells
 from blobtree.meshing.mesh import DeviceMesh, download, extract_mesh
 from blobtree.tape.tape import Tape
 from blobtree.tracing.trace import trace
-from tests.bench.command_line import bench_parser, show, write
 from tests.bench.marching_cubes import marching_cubes
 
 RUNS = 5
@@ -287,7 +287,10 @@ def _resident(field: str) -> float:
 
 def main() -> None:
     """Parse the command line, measure, print a table and write the figures."""
-    parser = bench_parser("blobtree", __doc__)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     parser.add_argument("--quick", action="store_true", help="fewer runs; ends within a minute on two cores")
     parser.add_argument("--device", default="cpu", help="a Warp device, such as cuda:0")
     parser.add_argument("--peak", action="store_true", help=argparse.SUPPRESS)
@@ -305,10 +308,12 @@ def main() -> None:
     print(f"{wp.get_device(options.device).name}, {os.cpu_count()} cores ({platform.machine()})")
     print(f"python -m {' '.join(['tests.bench.blobtree', *sys.argv[1:]])}")
     print(f"warp-lang {wp.config.version}, numpy {np.__version__}{versions}")
-    show(figures)
+    for name, number in figures.items():
+        print(f"  {name:28} {number:12.6g}")
     if options.device == "cpu":
         print(f"Other engines, quoted: {PEERS}.")
-    write(options.json, figures)
+    if options.json:
+        options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -17,12 +17,13 @@ oracles of the tests. Other parts:
     --peers                          mesh-clipped decals, projected boxes, sprites, and maps of the surface
 """
 
+import argparse
+import json
 import platform
 import sys
 from collections.abc import Mapping
 from importlib.metadata import version
-
-from tests.bench.command_line import bench_parser, write
+from pathlib import Path
 
 Figures = dict[str, float]
 
@@ -155,7 +156,8 @@ def measure_all(*, quick: bool) -> Figures:
 
 def main() -> None:
     """Parse the command line, measure and print."""
-    parser = bench_parser("decals", __doc__)
+    parser = argparse.ArgumentParser(prog="python -m tests.bench.decals", description=__doc__)
+    parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     parser.add_argument("--quick", action="store_true", help="within 60 s on two cores")
     parser.add_argument(
         "--only",
@@ -186,7 +188,8 @@ def main() -> None:
         figures = measure_peers(quick=options.quick)
     else:
         figures = measure_all(quick=options.quick)
-    write(options.json, figures)
+    if options.json:
+        options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

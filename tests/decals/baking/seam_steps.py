@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.decals.baking.glb import Array, ReadMesh, bilinear, linear
 
-SPACING = 0.2
+SPACING = 0.05
 """Distance in texels between points of a seam."""
 
 SMOOTH = 1.0

@@ -15,7 +15,7 @@ from decals.baking import layouts as layouts_module
 from decals.baking.layouts import lay_out
 from decals.baking.meshes import BakeMesh, bake_mesh
 from decals.baking.packing import pack
-from decals.baking.seams import Seams
+from decals.baking.seams import STEP, Seams
 from decals.baking.surface_colors import SurfaceColors
 from decals.baking.texture import Channels, Sheet, bake_texture
 from decals.baking.unwrapped import Unwrapped
@@ -128,6 +128,24 @@ def test_edges_of_several_faces_are_seams_between_each_and_the_next(seed: int) -
     assert np.array_equal(seams.corners // 3, np.repeat(seams.faces[..., None], 3, axis=2))
     assert np.array_equal(seams.ends, places[seams.corners[..., :2]])
     assert np.array_equal(points[seams.corners[:, 0, :2]], points[seams.corners[:, 1, :2]])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_between_points_of_seams_the_same_texels_are_mixed(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    ends = rng.uniform(1.0, 30.0, (8, 2, 2, 2))
+    ends[0] = np.round(ends[0]) + 0.5  # at the middles of texels
+    ends[1, 0, 1, 0] = ends[1, 0, 0, 0]  # along a column
+    faces = np.zeros((8, 2), np.int64)
+    numbers, places = Seams(faces[:, 0], faces, faces, ends, np.zeros((8, 2, 3), np.int64), 0.0).points()
+    for seam, (begin, end) in enumerate(np.moveaxis(ends, 2, 1)):
+        own = places[numbers == seam]
+        assert own[0] == pytest.approx(begin)
+        assert own[-1] == pytest.approx(end)
+        assert np.linalg.norm(np.diff(own, axis=0), axis=2).max() <= STEP + 1e-9
+        near, far = (own[:-1] + np.diff(own, axis=0) * share for share in (1e-3, 1.0 - 1e-3))
+        apart = np.linalg.norm(own[1:] - own[:-1], axis=2).max(axis=1) > 1e-6
+        assert np.array_equal(np.floor(near - 0.5)[apart], np.floor(far - 0.5)[apart])
 
 
 @pytest.mark.parametrize("seed", range(5))
