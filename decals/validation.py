@@ -94,6 +94,11 @@ def count_number(name: str, value: Any, low: int, high: int | None, error: type[
     return whole_number(name, as_count(value), low, high, error)
 
 
+def any_number(name: str, value: Any, error: type[ImplicitDecalsError]) -> float:
+    """Return a finite number of any size, such as a pixel or a time, as a float."""
+    return allowed_number(name, value, "a finite number", math.isfinite, error)
+
+
 def number_of(name: str, value: Any, error: type[ImplicitDecalsError]) -> float:
     """Return a finite number that a form sent, as a number or as text."""
     with suppress(ValueError):

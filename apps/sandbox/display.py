@@ -8,7 +8,6 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
 
-from blobtree.validation import finite_number
 from decals.apps.sandbox.controls import STEPS, Control, exchanged
 from decals.apps.sandbox.cube import cube_cells
 from decals.apps.sandbox.decal_panel import brush_values
@@ -21,7 +20,7 @@ from decals.scenes.camera import UPRIGHT, Camera
 from decals.scenes.meshes import as_polydata, meshed
 from decals.scenes.objects import SceneObject, same_shape
 from decals.surfaces.surface import unit_rows
-from decals.validation import number_of, one_of, whole_number
+from decals.validation import any_number, number_of, one_of, whole_number
 from decals.vtk.subplot import FrameStatus
 from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of, ray_through
@@ -331,7 +330,7 @@ class Display:
         """
         one_of("phase", phase, PHASES, InvalidEdit)
         trees, (width, height) = self._window.actions.trees, self._window.plotter.window_size
-        right, down = (min(max(finite_number("place", part, InvalidEdit), 0.0), 1.0) for part in (x, y))
+        right, down = (min(max(any_number("place", part, InvalidEdit), 0.0), 1.0) for part in (x, y))
         ray = ray_through(self._window.subplot, right * width - 0.5, (1.0 - down) * height - 0.5)
         assert ray is not None  # the place lies in the view
         if str(name) in self.points:  # the page may send anything

@@ -14,7 +14,6 @@ from typing import Any, Concatenate, ParamSpec
 from PIL import Image
 
 from blobtree import Node
-from blobtree.validation import finite_number
 from decals.apps.sandbox import decal_panel
 from decals.apps.sandbox.controls import KIND, controls_of, exchanged, kind_control, parsed, parsed_option
 from decals.apps.sandbox.display import PHASES, Display
@@ -33,7 +32,7 @@ from decals.images.builtin import BUILTIN_IMAGES, generate_image
 from decals.options import arguments_of
 from decals.scattering.scatter import scatter
 from decals.scenes.objects import TreeObject, bounds_of
-from decals.validation import one_of, whole_number
+from decals.validation import any_number, one_of, whole_number
 from decals.window import EditWindow
 from decals.window.host_plotter import show_background
 from decals.window.view_modes import DisplayOptions
@@ -530,7 +529,7 @@ class Sandbox:
             one_of("phase", phase, PHASES, InvalidEdit)
             if phase == "begin":
                 self._window.cancel_press()
-            moved, raised, ratio = (finite_number("pinch", one, InvalidEdit) for one in (right, up, factor))
+            moved, raised, ratio = (any_number("pinch", one, InvalidEdit) for one in (right, up, factor))
             self._window.begin_motion()
             ratio = min(max(ratio, 1.0 / MAX_ZOOM), MAX_ZOOM)
             shift = min(max(moved, -1.0), 1.0), min(max(raised, -1.0), 1.0)

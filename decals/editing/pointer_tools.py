@@ -6,7 +6,7 @@ from enum import Enum, auto
 import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array, Int64Array
-from blobtree.validation import describe, finite_number
+from blobtree.validation import describe
 from decals.editing.actions import KEYS, Actions
 from decals.editing.brush_settings import Brush, Stroke
 from decals.editing.commands import MoveDecals
@@ -21,7 +21,7 @@ from decals.editing.queries import (
     shortest_rotations,
 )
 from decals.errors import InvalidEdit
-from decals.validation import instance
+from decals.validation import any_number, instance
 
 Occluded = Callable[[float, float, Float32Array], bool]
 """Returns True if another object in the window hides a surface point, at a pixel."""
@@ -302,7 +302,7 @@ class PointerTools:
 
 
 def _checked_pixel(x: float, y: float) -> tuple[float, float]:
-    return finite_number("x", x, InvalidEdit), finite_number("y", y, InvalidEdit)
+    return any_number("x", x, InvalidEdit), any_number("y", y, InvalidEdit)
 
 
 class DecalDrag:

@@ -1,6 +1,5 @@
 """Commands for whole objects and many decals: scatter, relax, add and remove objects."""
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -29,7 +28,7 @@ from decals.scenes.objects import (
     same_shape,
 )
 from decals.scenes.recipe import Recipe
-from decals.validation import allowed_number, count_number, instance, one_of, whole_number
+from decals.validation import any_number, count_number, instance, one_of, whole_number
 
 SPACING = 3.0**0.5 / 1.03
 """Distance of neighbours among decals without gaps, in radii (see `covering.RADIUS_MARGIN`)."""
@@ -228,8 +227,7 @@ class RelaxDecals:
         center = point_array([finite_vector("point", self.point, InvalidEdit)])[0]
         radius = self.radius
         if radius is not None:  # no scene is larger than the largest coordinate
-            number = allowed_number("radius", radius, "a finite number", math.isfinite, InvalidEdit)
-            radius = min(number, MAX_COORDINATE)
+            radius = min(any_number("radius", radius, InvalidEdit), MAX_COORDINATE)
         decals = document.decals.decals
         if not len(decals) or not document.objects:
             return center, np.zeros(0, np.intp)

@@ -18,7 +18,6 @@ from vtkmodules.vtkRenderingCore import vtkActor
 
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.progress import displayed, reporting
-from blobtree.validation import finite_number
 from decals.errors import InvalidPoints, InvalidScene
 from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
@@ -34,7 +33,7 @@ from decals.scenes.origin import WORLD
 from decals.scenes.scene import Scene
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.surfaces.windings import MeshOrientation
-from decals.validation import count_number, member
+from decals.validation import any_number, count_number, member
 from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
 from decals.vtk.attributes import KnownAttributes
 from decals.vtk.extras import ACTORS
@@ -99,7 +98,7 @@ def depth_of(matrix: Float64Array, position: ArrayLike) -> float:
 
 def _pixel(x: float, y: float) -> tuple[int, int]:
     """Return the pixel that contains a position in the window, or raise `InvalidPoints`."""
-    return math.floor(finite_number("x", x, InvalidPoints)), math.floor(finite_number("y", y, InvalidPoints))
+    return math.floor(any_number("x", x, InvalidPoints)), math.floor(any_number("y", y, InvalidPoints))
 
 
 def _writes_depth(prop: Any) -> bool:
@@ -301,7 +300,7 @@ class SubplotRenderer(KnownAttributes):
 
     @draw_scale.setter
     def draw_scale(self, scale: float) -> None:
-        number = finite_number("draw_scale", scale, InvalidScene)
+        number = any_number("draw_scale", scale, InvalidScene)
         if not 0.0 < number <= 1.0:
             raise InvalidScene(f"draw_scale: expected a number above 0 and at most 1, got {number}")
         self._draw_scale = number
@@ -477,7 +476,7 @@ class SubplotRenderer(KnownAttributes):
 
     def covers(self, x: int, y: int) -> bool:
         """Return True if a pixel of the window is in this subplot."""
-        coordinates = (finite_number(name, value, InvalidPoints) for name, value in (("x", x), ("y", y)))
+        coordinates = (any_number(name, value, InvalidPoints) for name, value in (("x", x), ("y", y)))
         column, row = (int(np.clip(value, -1.0, MAX_COORDINATE)) for value in coordinates)
         return bool(self.vtk_renderer.IsInViewport(column, row))
 

@@ -3,10 +3,10 @@
 import math
 from typing import Any
 
-from blobtree.validation import describe, finite_number
+from blobtree.validation import describe
 from decals.editing.key_bindings import from_browser
 from decals.errors import InvalidEdit
-from decals.validation import instance
+from decals.validation import any_number, instance
 from decals.window.window import EditWindow
 
 _FOCUS = (
@@ -141,7 +141,7 @@ def press_key(
 def _checked_position(position: object) -> tuple[float, float]:
     """Return two numbers, clamped to [0, 1], or raise `InvalidEdit`."""
     try:
-        x, y = (finite_number("position", part, InvalidEdit) for part in position)  # type: ignore[attr-defined]
+        x, y = (any_number("position", part, InvalidEdit) for part in position)  # type: ignore[attr-defined]
     except (TypeError, ValueError, KeyError) as error:
         raise InvalidEdit(
             f"position: expected parts of width and height, got {describe(position)}"

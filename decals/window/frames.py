@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable, Hashable
 from enum import Enum, auto
 
-from blobtree.validation import finite_number
 from decals.errors import InvalidScene
+from decals.validation import any_number
 from decals.vtk.adapters import weak_callback
 from decals.vtk.subplot import SubplotRenderer
 
@@ -72,7 +72,7 @@ class FrameBudget:
         part
             Part of the frame that was drawn, from 0 to 1.
         """
-        scale, seconds = _positive("scale", scale), finite_number("seconds", seconds, InvalidScene)
+        scale, seconds = _positive("scale", scale), any_number("seconds", seconds, InvalidScene)
         if seconds < 0.0:
             raise InvalidScene(f"seconds: expected 0 or more, got {seconds}")
         part = _part(part)
@@ -143,7 +143,7 @@ class FrameBudget:
 
 def _positive(name: str, value: float) -> float:
     """Return a number in (0, MAX_VALUE], or raise `InvalidScene`."""
-    number = finite_number(name, value, InvalidScene)
+    number = any_number(name, value, InvalidScene)
     if not 0.0 < number <= MAX_VALUE:
         raise InvalidScene(f"{name}: expected a number above 0 and at most {MAX_VALUE:g}, got {number}")
     return number
@@ -151,7 +151,7 @@ def _positive(name: str, value: float) -> float:
 
 def _part(part: float) -> float:
     """Return a number in [0, 1], or raise `InvalidScene`."""
-    number = finite_number("part", part, InvalidScene)
+    number = any_number("part", part, InvalidScene)
     if not 0.0 <= number <= 1.0:
         raise InvalidScene(f"part: expected a number from 0 to 1, got {number}")
     return number
