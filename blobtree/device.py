@@ -249,7 +249,7 @@ def launch(
     Raises
     ------
     Cancelled
-        The work that launches the kernel is to stop.
+        The work that launches the kernel was cancelled.
     """
     if count == 0:
         return

@@ -195,7 +195,7 @@ def _has_file(folder: Path, suffixes: tuple[str, ...]) -> bool:
 
 
 def _copy_shipped(folder: Path) -> None:
-    """Copy the shipped kernels that belong into this folder of the cache; other processes may do so too."""
+    """Copy the shipped kernels that belong into this folder of the cache; other processes may too."""
     shipped = SHIPPED / wp.config.version / folder.name
     if not shipped.is_dir():
         return
@@ -313,7 +313,7 @@ def _no_operation() -> None:
 
 
 def _parse_headers() -> None:
-    """Parse Warp's headers, if none are kept, before several threads would each do so."""
+    """Parse Warp's headers, if no parsed ones are kept, before several threads would each parse them."""
     if any(_headers_folder().glob("*.pch")):
         return
     with _cache_errors(), tempfile.TemporaryDirectory() as folder, _kept_headers():

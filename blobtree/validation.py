@@ -205,7 +205,7 @@ def truth(name: str, value: object, error: type[ImplicitDecalsError]) -> bool:
 
 
 def texts(name: str, value: object) -> tuple[str, ...]:
-    """Return several texts; raise `InvalidNode` if one is empty or no text."""
+    """Return several texts; raise `InvalidNode` if an item is empty or no text."""
     found = None if isinstance(value, str) else items(value)
     if found is None or not all(isinstance(item, str) and item for item in found):
         raise InvalidNode(f"{name}: expected texts that are not empty, got {describe(value)}")

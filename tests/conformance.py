@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import blobtree
 from blobtree import Node, check_kind
-from blobtree.conformance.laws import LAWS, Case
+from blobtree.conformance.laws import LAWS, Case, Oracle
 from blobtree.conformance.samples import DRAWS, Draw, Rng, drawn_node
 from blobtree.declare.parameters import Quantity, parameters_of
 from blobtree.errors import InvalidNode
@@ -173,7 +173,7 @@ def problems_of(kind: type[Node], seed: int, samples: int, laws: tuple[str, ...]
     return [f"{law.name}: {law.detail}" for law in report.laws if law.name in laws and law.state != "holds"]
 
 
-def broken_laws(node: Node, rng: Rng, *names: str) -> list[str]:
-    """Return what a node violates of some laws."""
-    case = Case(node, exact_field, compiled=True, rng=rng)
+def broken_laws(node: Node, rng: Rng, *names: str, known: Oracle | None = exact_field) -> list[str]:
+    """Return what a node violates of some laws, by an oracle if one is known."""
+    case = Case(node, known, compiled=True, rng=rng)
     return [f"{name}: {found.text}" for name in names for found in LAWS[name](case)]

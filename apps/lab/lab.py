@@ -134,9 +134,8 @@ class Lab:
         )
 
     def _key(self) -> object:
-        document = self._window.document
-        drawn_with = document.drawing, self.probe, self._plane, self._step
-        return self._number, document.objects, document.decals.version, drawn_with
+        now, own = self._window.document, (self._number, self.probe, self._plane, self._step)
+        return *own, now.objects, now.decals.version, now.drawing
 
     def values(self) -> dict[str, Any]:
         """Return all values of the page, by their names there."""
@@ -163,8 +162,7 @@ class Lab:
             return {}
         decals, puzzle = self._window.document.decals, self._puzzle or Puzzle.of(self.lesson)
         radii = [float(f"{radius:.4g}") for radius in decals.take(np.array(self.numbers)).radii.tolist()]
-        made = Puzzle.made(radii, scores).text
-        is_own = list(puzzle.radii) == radii
+        made, is_own = Puzzle.made(radii, scores).text, list(puzzle.radii) == radii
         rows = [
             {"label": score.label, "text": shown(value), "value": value, "par": par if is_own else None}
             for score, value, par in zip(self.lesson.settings.scores, scores, puzzle.pars, strict=True)
@@ -202,23 +200,20 @@ class Lab:
         """Go on with what is under way; call this regularly."""
         if self._recording is not None and self._step != self._target:
             self._relax(self._recording)
-        if self._pending is not None and self._pending.done():
-            done, self._pending = self._pending, None
-            try:
-                self._results = done.result()
-            except ImplicitDecalsError as error:
-                self._results = Results(self._submitted, (False, str(error)))
         key = self._key()
         if self._asking and not self._editing:
             self._asked, self._asking = key, False
-        if self._pending is None and not self.waits and (self._results is None or self._results.key != key):
-            try:
-                experiment = self.experiment()
-            except InvalidLesson as error:
-                self._results = Results(key, (False, str(error)))
-                return
-            self._submitted = key
-            self._pending = self._worker.submit(measured, self.lesson, experiment, key, self._guess)
+        try:
+            if self._pending is not None and self._pending.done():
+                done, self._pending = self._pending, None
+                self._results = done.result()
+            known = self._results is not None and self._results.key == key
+            if self._pending is None and not self.waits and not known:
+                self._submitted = key
+                state = self.experiment()
+                self._pending = self._worker.submit(measured, self.lesson, state, key, self._guess)
+        except ImplicitDecalsError as error:
+            self._results = Results(self._submitted, (False, str(error)))
 
     @property
     def busy(self) -> bool:
@@ -332,10 +327,8 @@ class Lab:
     def _relax(self, recording: Recording) -> None:
         """Show the step that was asked for, or the last one that is known in time."""
         self._step = recording.advance(self._target, STEPPING_SECONDS)
-        numbers = self.numbers
-        moved = move_decals(
-            self._window.document.decals.take(np.array(numbers)), recording.points(self._step)
-        )
+        numbers, decals = self.numbers, self._window.document.decals
+        moved = move_decals(decals.take(np.array(numbers)), recording.points(self._step))
         arrays = {name: getattr(moved, name) for name in ("positions", "normals", "tangents")}
         self._window.actions.state.begin_series(("lab", "step"), "relax")
         self._window.session.do(SetValues(numbers, arrays, "relax"))
@@ -392,7 +385,6 @@ def measured(
         truth = float(np.ravel(lesson.formulas[asked.truth].evaluate(scope))[0])
         compared = {"ends": [guess, truth if np.isfinite(truth) else None]}
         compared |= {"texts": [shown(guess), shown(truth)], "why": lesson.filled(asked.why, scope)}
-    scores = tuple(
-        float(np.ravel(lesson.formulas[s.formula].evaluate(scope))[0]) for s in lesson.settings.scores
-    )
+    numbers = (lesson.formulas[score.formula].evaluate(scope) for score in lesson.settings.scores)
+    scores = tuple(float(np.ravel(number)[0]) for number in numbers)
     return Results(key, lesson.verdict(scope), values, plots, done, compared, scores, table(rows))

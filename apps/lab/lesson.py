@@ -39,6 +39,9 @@ ROUNDING = 1e-6
 PLACEHOLDER = re.compile(r"\{([^{}]+)\}")
 """A formula in a text, whose value is shown in its place."""
 
+Template = tuple[str | Formula, ...]
+"""A text with formulas in braces, in parts."""
+
 Vector = tuple[float, float, float]
 Range = tuple[float, float]
 
@@ -142,17 +145,6 @@ class Settings(Struct, forbid_unknown_fields=True, frozen=True):
 
 
 @dataclass(frozen=True, eq=False)
-class Template:
-    """A text with formulas in braces."""
-
-    parts: tuple[str | Formula, ...]
-
-    def filled(self, scope: Scope) -> str:
-        """Return the text with the values of its formulas."""
-        return "".join(p if isinstance(p, str) else shown(p.evaluate(scope)) for p in self.parts)
-
-
-@dataclass(frozen=True, eq=False)
 class Lesson:
     """A lesson.
 
@@ -208,7 +200,8 @@ class Lesson:
 
     def filled(self, text: str, scope: Scope) -> str:
         """Return one of the lesson's texts with the values of its formulas."""
-        return self.templates[text].filled(scope)
+        parts = self.templates[text]
+        return "".join(p if isinstance(p, str) else shown(p.evaluate(scope)) for p in parts)
 
     def holds(self, formula: str, scope: Scope) -> bool:
         """Return True if one of the lesson's conditions holds."""
@@ -294,12 +287,9 @@ def _parsed(source: str, path: Path) -> Lesson:
 
 def _without_files(scene: Scene) -> Scene:
     """Return a scene that names no files: what is saved of it in another folder has its images and meshes."""
-    return scene.replace(
-        images=[replace(image, source=Path(image.source).stem) for image in scene.images],
-        objects=[
-            replace(item, source=None) if isinstance(item, MeshObject) else item for item in scene.objects
-        ],
-    )
+    images = [replace(image, source=Path(image.source).stem) for image in scene.images]
+    objects = [replace(one, source=None) if isinstance(one, MeshObject) else one for one in scene.objects]
+    return scene.replace(images=images, objects=objects)
 
 
 def _check_ranges(settings: Settings) -> None:
@@ -320,8 +310,7 @@ def _check_ranges(settings: Settings) -> None:
     for i, plot in enumerate(settings.plots):
         if bool(plot.curves) == bool(plot.map):
             raise InvalidLesson(f"plots[{i}]: expected either curves or a map; give one of them")
-        ranges = {"x": plot.x, "y": plot.y, "values": plot.values}
-        for name, ends in ranges.items():
+        for name, ends in {"x": plot.x, "y": plot.y, "values": plot.values}.items():
             if ends is not None and not -np.inf < ends[0] < ends[1] < np.inf:
                 raise InvalidLesson(f"plots[{i}].{name}: expected two numbers, low < high, got {list(ends)}")
         if plot.map and (plot.x is None) != (plot.y is None):
@@ -371,7 +360,7 @@ def _texts(settings: Settings) -> Iterator[tuple[str, str]]:
 
 def _template(text: str) -> Template:
     pieces = PLACEHOLDER.split(text)
-    return Template(tuple(parse(p, MEASURES, set()) if i % 2 else p for i, p in enumerate(pieces)))
+    return tuple(parse(p, MEASURES, set()) if i % 2 else p for i, p in enumerate(pieces))
 
 
 @contextmanager

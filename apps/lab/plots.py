@@ -104,8 +104,7 @@ def _ticks(low: float, high: float) -> list[float]:
 def _mark(plot: Plot, lesson: Lesson, scope: Scope, axes: _Axes) -> None:
     """Add the marks of a plot: its own formulas at the probe."""
     for pair in plot.marks:
-        x, y = (float(np.ravel(lesson.formulas[text].evaluate(scope))[0]) for text in pair)
-        axes.cross(x, y)
+        axes.cross(*(float(np.ravel(lesson.formulas[text].evaluate(scope))[0]) for text in pair))
 
 
 # -- curves ---------------------------------------------------------------------------------------------

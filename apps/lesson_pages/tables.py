@@ -82,7 +82,7 @@ def tabulated(lesson: Lesson) -> Table:
         curve.formula: lesson.formulas[curve.formula] for plot in settings.plots for curve in plot.curves
     }
     maps = {plot.map for plot in settings.plots}
-    parts = [part for template in lesson.templates.values() for part in template.parts]
+    parts = [part for template in lesson.templates.values() for part in template]
     scalars = {part.text: part for part in parts if not isinstance(part, str)}
     scalars |= {text: part for text, part in lesson.formulas.items() if text not in {*curves, *maps}}
     if both := curves.keys() & scalars.keys():

@@ -144,9 +144,10 @@ class SandboxFiles:
         file
             A dictionary with the file's "name" and "content" (bytes).
         key
-            The place of the drop. On the row of a layer, an image shows on its decals; on that of an image,
-            it replaces that one; on a place of the view, see `surface_at`, it shows on a new decal. On
-            `LIGHT`, an image is the light, and a Radiance file everywhere but on a row.
+            The place of the drop. On the row of a layer, an image shows on the decals of the layer. On the
+            row of an image, it replaces that image. On a place of the view, see `surface_at`, it shows on a
+            new decal. On `LIGHT`, an image becomes the light. A Radiance file becomes the light everywhere
+            but on a row.
         """
         found, document = read_upload(file), self._window.document
         file_name = str(file["name"])  # type: ignore[index]  # read_upload has checked it

@@ -108,12 +108,12 @@ def read_upload(file: object) -> Scene | SceneObject | DecalImage:
 
 
 def keep_upload(file: object, folder: Path) -> Path:
-    """Write a file that a page sent into a folder, unless it is there already, and return its path.
+    """Write an uploaded file into a folder, unless the folder has it already, and return its path.
 
     Raises
     ------
     InvalidEdit
-        It is no file of a kind that is read, or the folder cannot be written.
+        The sandbox reads no files of this kind, or the folder cannot be written.
     """
     name, content = _checked(file)
     stem, suffix = plain_name(name), Path(name).suffix.lower()

@@ -375,7 +375,7 @@ def new_token() -> str:
 
 
 def page_of(text: str, status: int = 200, *, refresh: str | None = None, seconds: int = 0) -> web.Response:
-    """Return a page with a text, which opens another address after some seconds if one is given."""
+    """Return a page with a text. If an address is given, the page opens it after some seconds."""
     again = f"<meta http-equiv='refresh' content='{seconds};url={escape(refresh)}'>" if refresh else ""
     return web.Response(
         text=PAGE.format(text=escape(text), refresh=again), status=status, content_type="text/html"

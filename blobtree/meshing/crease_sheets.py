@@ -46,7 +46,7 @@ class Sheets:
 
 @wp.func
 def cell_corner(low: wp.vec3, cell: wp.float32, corner: wp.int32) -> wp.vec3:
-    """Return a corner of the cell whose lowest one is `low`."""
+    """Return a corner of the cell whose lowest corner is `low`."""
     return low + wp.vec3(float(corner & 1), float((corner >> 1) & 1), float(corner >> 2)) * cell
 
 

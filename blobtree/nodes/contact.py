@@ -259,7 +259,7 @@ class Bulge(Press):
 class RatedUnion(Pair):
     """Union of two obstacles of different stiffness, F = max(f, r(g)); for `Press`.
 
-    r keeps the surface of g, and changes its slope there by `stiffness_ratio`.
+    The rating r keeps the surface of g, and multiplies the slope of g there by `stiffness_ratio`.
 
     Examples
     --------

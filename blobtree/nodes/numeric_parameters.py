@@ -168,7 +168,7 @@ def with_numeric_values(tree: AnyNode, parameters: Sequence[NumericParameter], v
 
 
 def rebuilt(tree: AnyNode, changed: dict[Path, dict[str, Any]]) -> AnyNode:
-    """Return a tree whose nodes at these paths have other parameters, or are copies if none is given."""
+    """Return a tree whose nodes at these paths have other parameters, or are copies if no value is given."""
     above = {path[:length] for path in changed for length in range(len(path) + 1)}
     made: dict[Path, ProgramNode] = {}
     for path in sorted(above, key=len, reverse=True):

@@ -254,7 +254,7 @@ def from_sdf(
     Raises
     ------
     InvalidNode
-        Numbers are not finite, are no distances, or none is below 0.
+        Numbers are not finite, are no distances, or no number is below 0.
 
     Examples
     --------

@@ -48,8 +48,9 @@ class Warp(Placed, DeclaredNode):
       is derived from `forward`.
     * ``lipschitz()`` or ``lipschitz(q, reach)``, in place of the number `lipschitz`, returns a bound on the
       norm of the Jacobian as wp.float32: everywhere, or in the ball of radius `reach` around q.
-    * ``image_box(q, half)``, optional, returns half the size of a box about T(q) that holds what the box
-      q ± half is taken to. It saves time where `lipschitz` is far above 1 in one direction alone.
+    * ``image_box(q, half)``, optional, returns half the size of a box around T(q). That box holds the
+      images of all points of the box q ± half. It saves time where `lipschitz` is far above 1 in one
+      direction alone.
 
     Attributes
     ----------
@@ -59,8 +60,8 @@ class Warp(Placed, DeclaredNode):
         Upper bound of the norm of the Jacobian.
     motion
         Largest distance by which `forward` moves a point. In its place a class may have a class method
-        ``outer_box(lower, upper, …) -> (lower, upper)``, which takes the numbers of the formulas by name: a
-        box outside of which `forward` takes no point into the box lower, upper.
+        ``outer_box(lower, upper, …) -> (lower, upper)``, which takes the numbers of the formulas by name. It
+        returns a box that holds every point which `forward` takes into the box from lower to upper.
     trial_extent
         Half side of the cube around the origin in which samples try the claims.
 

@@ -9,7 +9,7 @@ import warp as wp
 from blobtree._typing import BoolArray, Float32Array, IndexArray, Int32Array
 from blobtree.cells.grid import BRANCHING, Grid, grid_from
 from blobtree.cells.refine_kernels import SURELY_OUTSIDE
-from blobtree.cells.sparse_cells import SparseCells, build_cells
+from blobtree.cells.sparse_cells import MIN_CULLED_TEXELS, SparseCells, build_cells
 from blobtree.device import known_device
 from blobtree.lazy import Lazy
 from blobtree.sized_cache import sized_cache
@@ -24,8 +24,17 @@ RELATIVE_TOLERANCE = 1e-5
 BLOCKS_ALONG = 64
 """Finest blocks along the longest side of a model's box."""
 
+MOST_BLOCKS_ALONG = 2048
+"""The same for a long box that holds much; a ray crosses less than `ray_kernels.MAX_BLOCKS`."""
+
+BLOCKS_PER_TEXEL = 1.0
+"""Finest blocks per texel of a long tape, if the box is flat or long: fewer hold too many primitives each."""
+
 MAX_LAYERS = 16
 """Most layers of empty blocks that a ray skips at once."""
+
+WORD = 64
+"""Bits of a word; no box has more blocks along its shortest side."""
 
 MAX_CELLS_BYTES = 1 << 22
 """Bytes of the last cells, which are kept though no drawing uses them; those of a model take 1 MB or more."""
@@ -109,18 +118,38 @@ class DeviceCells:
 
 
 def tracing_cells(
-    tree: ImplicitModel, *, device: str | None = None, blocks: int = BLOCKS_ALONG
+    tree: ImplicitModel, *, device: str | None = None, blocks: int | None = None
 ) -> TracingCells:
-    """Return the cells for rays through `tree`, with a number of finest blocks along its longest side.
+    """Return the cells for rays through `tree`.
 
-    `device` is the Warp device that builds them, by default the current one.
+    `device` is the Warp device that builds them, by default the current one. `blocks` is the number of finest
+    blocks along the longest side, by default `blocks_along`.
     """
+    if blocks is None:
+        is_long = len(tree.tape.data) >= MIN_CULLED_TEXELS
+        blocks = blocks_along(tree.tape, *tree.support) if is_long else BLOCKS_ALONG
     return _tracing_cells(tree.tape, *_corners(tree), known_device(device), blocks)
 
 
 def device_cells(tree: ImplicitModel, *, device: str | None = None) -> DeviceCells:
     """Return the cells for rays through `tree` in a device's memory."""
     return tracing_cells(tree, device=device).on(known_device(device))
+
+
+def blocks_along(tape: Tape, lower: Float32Array, upper: Float32Array) -> int:
+    """Return the number of finest blocks along the longest side of a model's box.
+
+    A long tape in a flat or long box has more than `BLOCKS_ALONG`, with as many blocks as a cube has at most.
+    """
+    extent = (upper - lower).astype(np.float64) / float((upper - lower).max())
+
+    def count(blocks: int) -> int:
+        return int(np.maximum(np.ceil(blocks * extent), 1.0).prod())
+
+    blocks, wanted = BLOCKS_ALONG, BLOCKS_PER_TEXEL * len(tape.data)
+    while blocks < MOST_BLOCKS_ALONG and count(blocks) < wanted and count(2 * blocks) <= BLOCKS_ALONG**3:
+        blocks *= 2
+    return blocks
 
 
 def cells_grid(lower: Float32Array, upper: Float32Array, blocks: int = BLOCKS_ALONG) -> Grid:
@@ -167,25 +196,26 @@ def _tracing_cells(tape: Tape, lower: Corner, upper: Corner, device: str, blocks
 def block_table(cells: SparseCells, shift: int, counts: IndexArray, model: int = 0) -> Int32Array:
     """Return `TracingCells.blocks` for the finest blocks (nx, ny, nz) of a model; tapes move by `shift`."""
     known = np.full((1, 1, 1), model, np.int32)
-    for level in cells.levels[1:]:
-        known = _refined(known, level.children.numpy())
-    x, y, z = counts
-    known = known[:x, :y, :z]
+    for number, level in enumerate(cells.levels[1:], 2):
+        x, y, z = -(-counts // BRANCHING ** (len(cells.levels) - number))
+        known = _refined(known, level.children.numpy())[:x, :y, :z]
     crossed, empty = known >= 0, known == SURELY_OUTSIDE
-    blocks = np.where(empty, EMPTY - _layers(empty), known)
+    order = np.argsort(empty.shape)[::-1]
+    layers = _layers(empty.transpose(order)).transpose(np.argsort(order))
+    blocks = np.where(empty, EMPTY - layers, known)
     blocks[crossed] = cells.leaves.spans.numpy()[known[crossed], 0] - 1 + shift
     return blocks
 
 
 def _refined(known: Int32Array, children: Int32Array) -> Int32Array:
-    """Return the entries of all children (4n, 4n, 4n) of the blocks with entries `known` (n, n, n).
+    """Return the entries of all children (4a, 4b, 4c) of the blocks with entries `known` (a, b, c).
 
     An entry is the index of a block in its level, or the reason why it has none.
     """
-    side = len(known)
+    x, y, z = known.shape
     families = children.reshape(-1, BRANCHING, BRANCHING, BRANCHING)
     below = known.repeat(BRANCHING, 0).repeat(BRANCHING, 1).repeat(BRANCHING, 2)
-    of_parents = below.reshape(side, BRANCHING, side, BRANCHING, side, BRANCHING).transpose(0, 2, 4, 1, 3, 5)
+    of_parents = below.reshape(x, BRANCHING, y, BRANCHING, z, BRANCHING).transpose(0, 2, 4, 1, 3, 5)
     of_parents[known >= 0] = families[known[known >= 0]]
     return below
 
@@ -193,10 +223,10 @@ def _refined(known: Int32Array, children: Int32Array) -> Int32Array:
 def _layers(empty: BoolArray) -> Int32Array:
     """Return the number of layers of empty blocks around each empty one (nx, ny, nz), MAX_LAYERS at most.
 
-    The blocks of a column are the bits of one word, 64 at most. Blocks beyond the grid are empty. The numbers
-    are counted as binary digits, each in words of its own.
+    The blocks of a column along the last axis are the bits of one word. Blocks beyond the grid are empty. The
+    numbers are counted as binary digits, each in words of its own.
     """
-    columns = np.ones((*empty.shape[:2], BLOCKS_ALONG), np.bool_)
+    columns = np.ones((*empty.shape[:2], WORD), np.bool_)
     columns[..., : empty.shape[2]] = empty
     words = np.packbits(columns, axis=2, bitorder="little").view("<u8")[..., 0]
     lowest, highest = np.uint64(1), np.uint64(1 << 63)

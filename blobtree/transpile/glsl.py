@@ -243,7 +243,7 @@ class _Translator:
                 return
 
     def returns(self, node: ast.stmt) -> bool:
-        """Return True for a statement after which none is reached."""
+        """Return True for a statement after which no other is reached."""
         if isinstance(node, ast.If) and (taken := self.known(node.test)) is not None:
             return any(map(self.returns, node.body if taken else node.orelse))
         return isinstance(node, ast.Return)

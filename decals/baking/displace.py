@@ -224,7 +224,7 @@ class _Edges:
     def are_long(
         self, starts: Float64Array, ends: Float64Array, *, first: float, more: float, report: Progress
     ) -> BoolArray:
-        """Return True for edges of which a part may lie in a decal, and that are longer than its limit.
+        """Return True for edges that may lie in a decal in part, and are longer than its limit.
 
         For reports: ``first`` edges in the first call, and about ``more`` in the others.
         """

@@ -105,7 +105,7 @@ def mark_free(
     begin: wp.int32,
     marks: wp.array(dtype=wp.int32),
 ):
-    """Write 1 for texels from ``begin`` on in which a face was found, and that are not filled; else 0."""
+    """Write 1 for texels from ``begin`` on that are not filled, and in which a face was found; else 0."""
     i = first + wp.tid()
     marks[i] = 0
     if found[i] >= 0 and filled[begin + i] == wp.uint8(0):

@@ -84,7 +84,7 @@ class StillCamera:
 
 
 def joined(items: tuple[Item, ...], item: Item, *, toggle: bool) -> tuple[Item, ...]:
-    """Return items with another one as the last; with `toggle`, without it if it is one of them."""
+    """Return items with another item as the last. With `toggle`, an item among them is removed."""
     others = tuple(one for one in items if one != item)
     return others if toggle and item in items else (*others, item)
 

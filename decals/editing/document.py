@@ -230,7 +230,7 @@ class Document:
     parts
         All other parts of the scene.
     family
-        The family of the document that this one is a fork of. Default: a new family.
+        The family of the document from which this fork was made. Default: a new family.
 
     Examples
     --------

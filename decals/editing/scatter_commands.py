@@ -43,7 +43,7 @@ RELAXED_DISTANCE = 1.01 * PUSHING_RADIUS
 
 
 def decals_on(document: Document, objects: Sequence[int]) -> Int64Array:
-    """Return the numbers of the decals whose nearest object is one of these, by index."""
+    """Return the numbers of the decals whose nearest object has one of these indices."""
     nearest = nearest_points(document.objects, document.decals.decals.positions)
     return document.decals.numbers[np.isin(nearest.objects, objects)]
 

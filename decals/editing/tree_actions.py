@@ -145,7 +145,7 @@ class TreeActions(WindowActions):
         return self._primitive_under(pick) if isinstance(item, TreeObject) else None
 
     def _select(self, cursor: Cursor) -> tuple[int, Path]:
-        """Select the primitive under the cursor unless one is selected, and return the selected one."""
+        """Select the primitive under the cursor if none is selected. Return the selected primitive."""
         if self._state.primitive is None:
             pick = require_pick(cursor)
             self.select_picked(*self._primitive_under(pick), pick)
@@ -299,11 +299,11 @@ class TreeActions(WindowActions):
 
     @property
     def selected_node(self) -> Node:
-        """The node that is selected; `InvalidEdit` if none is."""
+        """The selected node; `InvalidEdit` without a selection."""
         return self._selected()[2]
 
     def _selected(self) -> tuple[int, Path, Node]:
-        """Return object, path and node of the selected node; raise `InvalidEdit` if none is."""
+        """Return object, path and node of the selected node; raise `InvalidEdit` if no node is selected."""
         return self.follow_selected().find(self._state.session.document)
 
     def follow_selected(self) -> FollowedNode:

@@ -133,13 +133,13 @@ def _installed() -> tuple[Path, ...]:
 
 
 def _counts(value: Any, home: str | None) -> bool:
-    """Return whether a function or class is one of the user's own files, or of the module `home`."""
+    """Return True if a function or class is from the user's own files, or from the module `home`."""
     module = getattr(value, "__module__", None) or ""  # functions of `exec` have none
     return module == home or _is_own(module)
 
 
 def _is_own(module: str) -> bool:
-    """Return whether a module is one of the user."""
+    """Return True if a module is one of the user."""
     return _is_of_user(module, getattr(sys.modules.get(module), "__file__", None))
 
 

@@ -67,7 +67,7 @@ class Target(Protocol):
     records: Any
 
     def kernel(self, single: Any) -> Any:
-        """Return the kernel for these decals that does the same as one for a single set."""
+        """Return the kernel for these decals in place of a kernel for a single set."""
 
     def arguments(self) -> list[Any]:
         """Return the arguments of kernels that stand for the decals."""

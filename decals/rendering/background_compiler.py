@@ -252,7 +252,7 @@ def _sampled_textures(program: int) -> list[SampledTexture]:
 
 
 def _small(side: int) -> int:
-    """Return a side of a texture; a large one is replaced by 3, or by 4 if it is a power of two."""
+    """Return a side of a texture. A large side is replaced by 3, or by 4 if it is a power of two."""
     return min(side, 4 if side & (side - 1) == 0 else 3)
 
 

@@ -201,7 +201,7 @@ class Context:
             )
 
     def leave(self) -> None:
-        """Keep this standalone context for `reused`; release it if it is lost, or another one is kept."""
+        """Keep this standalone context for `reused`; release it if it is lost or another context is kept."""
         if _idle or self._lost or is_forked():
             self.release()
             return

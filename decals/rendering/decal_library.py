@@ -34,7 +34,7 @@ FUNCTIONS: dict[str, tuple[Any, ...]] = {"decals.glsl": LIBRARY_FUNCTIONS}
 
 @dataclass(frozen=True)
 class Form:
-    """What decides the GLSL of decals; everything else is in its textures and uniforms.
+    """The values on which the GLSL of decals depends. Everything else is in textures and uniforms.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
 """Effects: what extends the passes, such as relief and environments. Each registers itself in `EFFECTS`."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import moderngl
 
@@ -59,7 +59,7 @@ class Effect:
         self._cache: GpuCache[Any] = GpuCache()
 
     def of(self, scene: SceneLike, drawing: Drawing) -> Any:
-        """Return the effect's field of `UploadedScene`; None for a scene without the effect."""
+        """Return the effect's field of `UploadedScene`."""
         raise NotImplementedError
 
     def tasks(self, scene: SceneLike, drawing: Drawing) -> list[WarmupTask]:
@@ -79,7 +79,14 @@ class Effect:
         self._cache.release()
 
 
-EFFECTS: dict[str, Callable[[SceneUploads], Effect]] = {}
+class EffectKind(NamedTuple):
+    """A kind of effect: which pictures need it, and its class."""
+
+    needed: Callable[[SceneLike, Drawing], bool]
+    make: Callable[[SceneUploads], Effect]
+
+
+EFFECTS: dict[str, EffectKind] = {}
 """Kinds of effects by their fields of `UploadedScene`."""
 
 BUFFERS: dict[str, Callable[[Context, GBuffer], Any]] = {}

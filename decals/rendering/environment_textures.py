@@ -37,10 +37,9 @@ class EnvironmentTextures:
 class EnvironmentEffect(Effect):
     """The textures of the environment that lights a scene."""
 
-    def of(self, scene: SceneLike, drawing: Drawing) -> EnvironmentTextures | None:
-        """Return the textures; None without an environment."""
-        if drawing.environment is None:
-            return None
+    def of(self, scene: SceneLike, drawing: Drawing) -> EnvironmentTextures:
+        """Return the textures."""
+        assert drawing.environment is not None
         panorama, visible = drawing.environment.picture, drawing.environment.visible
         textures: EnvironmentTextures = self._cache.get(
             lambda: EnvironmentTextures(self._uploads.context, panorama, visible), panorama, visible
@@ -49,8 +48,7 @@ class EnvironmentEffect(Effect):
 
     def tasks(self, scene: SceneLike, drawing: Drawing) -> list[WarmupTask]:
         """Return the prefiltering, which needs no graphics, and the upload."""
-        if drawing.environment is None:
-            return []
+        assert drawing.environment is not None
         filtering = partial(prefiltered, drawing.environment.picture)
         return [
             WarmupTask(IMAGES, filtering, threaded=True),

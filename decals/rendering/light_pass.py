@@ -81,7 +81,7 @@ class LightPass:
         light_pass.run(rectangle.rows(part))
 
     def _pass(self, **variant: Any) -> PixelPass:
-        """Return the pass of a variant; only the last one is kept, as it holds its program."""
+        """Return the pass of a variant. Only the last pass is kept, because it holds its program."""
         key = tuple(variant.values())
         if self._last is None or self._last[0] != key:
             program = light_program(self._context, **variant)

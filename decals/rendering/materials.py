@@ -13,14 +13,7 @@ from decals.rendering.context import Context
 from decals.rendering.decal_data import DecalData
 from decals.rendering.effect import Effect, SceneUploads
 from decals.rendering.lights import Lighting
-from decals.rendering.options import (
-    Drawing,
-    SceneLike,
-    has_materials,
-    has_relief,
-    relief_ranges,
-    relief_texels,
-)
+from decals.rendering.options import Drawing, SceneLike, relief_ranges, relief_texels
 from decals.rendering.pixel_pass import Program, set_uniform
 from decals.shaders import constants
 
@@ -286,11 +279,10 @@ def map_texels(image: HasPixels, shape: tuple[int, int]) -> Iterator[Float32Arra
 class MaterialEffect(Effect):
     """The maps of a scene's images."""
 
-    def of(self, scene: SceneLike, drawing: Drawing) -> MaterialArray | None:
-        """Return the maps; None without any."""
+    def of(self, scene: SceneLike, drawing: Drawing) -> MaterialArray:
+        """Return the maps."""
         images = self._uploads.images(scene)
-        if images is None or not has_materials(scene):
-            return None
+        assert images is not None
         shape = images.height, images.width
         maps: MaterialArray = self._cache.get(
             lambda: MaterialArray(self._uploads.context, scene.images, shape), images, *scene.images
@@ -305,12 +297,10 @@ class HeightEffect(Effect):
         super().__init__(uploads)
         self._relief: tuple[ReliefArray, DecalData, int, Relief] | None = None
 
-    def of(self, scene: SceneLike, drawing: Drawing) -> Relief | None:
-        """Return the relief; None without any."""
+    def of(self, scene: SceneLike, drawing: Drawing) -> Relief:
+        """Return the relief."""
         images = self._uploads.images(scene)
-        if images is None or not has_relief(scene):
-            self._relief = None
-            return None
+        assert images is not None
         heights, widths = zip(*(image.pixels.shape[:2] for image in scene.images), strict=True)
         shape = min(max(heights), images.height), min(max(widths), images.width)  # no texel is averaged
         array = self._cache.get(

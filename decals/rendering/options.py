@@ -295,6 +295,11 @@ def has_materials(scene: SceneLike) -> bool:
     return len(scene.decals) > 0 and any(hasattr(image, "surface_texels") for image in scene.images)
 
 
+def has_walks(scene: SceneLike, drawing: Drawing) -> bool:
+    """Return True if decals of a scene are drawn in the mapping WALKED."""
+    return drawing.mapping is ImageMapping.WALKED and len(scene.decals) > 0
+
+
 def check_scene(scene: object) -> None:
     """Raise InvalidScene for a value without objects, decals and images."""
     if not is_scene_like(scene):

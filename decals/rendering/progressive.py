@@ -37,7 +37,7 @@ class ProgressiveFrame:
     """A frame in progress; the result is the same, bit for bit, as of `Renderer.draw`.
 
     Regions that are up to date in the targets at the beginning are not drawn again. If another frame is drawn
-    into the targets before this one is done, this one begins anew.
+    into the targets before this frame is done, this frame begins anew.
 
     Parameters
     ----------

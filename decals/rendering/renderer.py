@@ -222,7 +222,7 @@ class Renderer:
         *,
         slot: str = WHOLE_SLOT,
     ) -> Iterator[tuple[Tile, Targets]]:
-        """Draw tile after tile; the targets hold a tile until the next one is drawn."""
+        """Draw tile after tile. The targets hold a tile until the next tile is drawn."""
         _warn_of_plain_samples(scene, options)
         with self.context.current():
             uploaded = self._uploads.scene(scene, options)

@@ -70,7 +70,7 @@ class Uploads:
         self._drawables: GpuCache[Drawable] = GpuCache()
         self._decals: GpuCache[DecalData] = GpuCache()
         self._images: GpuCache[ImageArray] = GpuCache()
-        self._effects: dict[str, Effect] = {name: kind(self) for name, kind in EFFECTS.items()}
+        self._effects: dict[str, Effect] = {}
         self._masks: tuple[tuple[int, ...], DataTexture] | None = None
 
     def scene(self, scene: SceneLike, drawing: Drawing) -> UploadedScene:
@@ -80,16 +80,27 @@ class Uploads:
         drawables = [self.drawable(item) for item in objects]
         masks = self._masks_of(scene, objects)
         images = self.images(scene)
-        extended: dict[str, Any] = {name: effect.of(scene, drawing) for name, effect in self._effects.items()}
+        effects = self._needed(scene, drawing)
+        extended: dict[str, Any] = {name: effect.of(scene, drawing) for name, effect in effects.items()}
         return UploadedScene(drawables, self.decals(scene), images, masks, **extended)
 
     def effect_tasks(self, scene: SceneLike, drawing: Drawing) -> list[WarmupTask]:
         """Return the tasks of a warm-up that effects add."""
-        return [task for effect in self._effects.values() for task in effect.tasks(scene, drawing)]
+        effects = self._needed(scene, drawing).values()
+        return [task for effect in effects for task in effect.tasks(scene, drawing)]
 
     def ready(self, scene: SceneLike) -> bool:
         """Return True if no effect of a scene waits for a computation in a thread."""
-        return all(effect.ready(scene) for effect in self._effects.values())
+        return all(self._effect(name).ready(scene) for name in EFFECTS)
+
+    def _needed(self, scene: SceneLike, drawing: Drawing) -> dict[str, Effect]:
+        """Return the effects that a picture needs, by their fields of `UploadedScene`."""
+        return {name: self._effect(name) for name, kind in EFFECTS.items() if kind.needed(scene, drawing)}
+
+    def _effect(self, name: str) -> Effect:
+        if name not in self._effects:
+            self._effects[name] = EFFECTS[name].make(self)
+        return self._effects[name]
 
     def _masks_of(self, scene: SceneLike, objects: Sequence[object]) -> DataTexture | None:
         """Return the masks of objects of a scene; None if its decals are not limited."""

@@ -6,7 +6,6 @@ from functools import partial
 from blobtree._typing import Float32Array
 from blobtree.device import core_left_free
 from blobtree.progress import reporting
-from decals.field.mapping import ImageMapping
 from decals.field.walks import Walks, walk_rows, with_surface
 from decals.index.editor import DecalEditor
 from decals.rendering.data_texture import DataTexture
@@ -150,10 +149,8 @@ class WalkEffect(Effect):
         super().__init__(uploads)
         self._walks = WalkCache()
 
-    def of(self, scene: SceneLike, drawing: Drawing) -> DataTexture | None:
-        """Return the walks; None in other mappings, or without decals."""
-        if not self._walked(scene, drawing):
-            return None
+    def of(self, scene: SceneLike, drawing: Drawing) -> DataTexture:
+        """Return the walks."""
         walks = self._walks.get(scene)
         texture: DataTexture = self._cache.get(
             lambda: DataTexture(self._uploads.context, walks.texels), walks
@@ -162,10 +159,7 @@ class WalkEffect(Effect):
 
     def tasks(self, scene: SceneLike, drawing: Drawing) -> list[WarmupTask]:
         """Return the computation of the walks."""
-        return [WarmupTask(DECALS, partial(self.of, scene, drawing))] if self._walked(scene, drawing) else []
-
-    def _walked(self, scene: SceneLike, drawing: Drawing) -> bool:
-        return drawing.mapping is ImageMapping.WALKED and len(scene.decals) > 0
+        return [WarmupTask(DECALS, partial(self.of, scene, drawing))]
 
     def ready(self, scene: SceneLike) -> bool:
         """Return True if pictures in the mapping WALKED need not wait."""

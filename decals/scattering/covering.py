@@ -359,10 +359,10 @@ class _Growth:
         return owned.joined(*done)
 
     def _cover(self, radii: Float64Array, owned: OwnedPoints) -> None:
-        """Grow, for every bare point, the decal that must grow least to own and reach it.
+        """Grow, for every bare point, the decal that must grow least to own and reach the point.
 
         Growth counts more where the length along the surface exceeds the distance: a decal that bends over an
-        edge gains more such points with every growth.
+        edge reaches more bare points with every growth.
         """
         bare = owned[np.flatnonzero(owned.shares(radii) > 1.0 + self.speck)]
         powers = bare.powers(radii)

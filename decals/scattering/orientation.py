@@ -73,7 +73,7 @@ def tangents(positions: Float32Array, normals: Float32Array, direction: Directio
     """Return unit tangents, ``float32[n, 3]``, random or along a direction.
 
     Where the direction vanishes or is normal to the surface, the tangent is a fixed function of the normal.
-    Raise `InvalidScattering` for directions of a wrong shape or that are not finite.
+    Raise `InvalidScattering` for directions that are not finite or have a wrong shape.
     """
     wide = unit_rows(normals).astype(np.float64)
     fallback = _tangents_near_axis(wide)

@@ -352,7 +352,7 @@ class Relaxation:
                 self._anchors.set(state, moved)
 
     def _repel(self) -> None:
-        """Move every particle against its neighbours, in a new epoch if the last one is over."""
+        """Move every particle against its neighbours, in a new epoch if the last epoch is over."""
         state = self._device_state()
         if state.epoch_over:
             self._restore_density(state)

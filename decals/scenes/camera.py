@@ -232,7 +232,7 @@ class Camera:
         return replace(self, fit=Fit(self._pose, tuple(map(_triple, positions[outermost])), margin))
 
     def shows(self, points: ArrayLike, aspect: float, *, least: float = FILLED[0]) -> bool:
-        """Return True if points take a share of the picture of at least ``least``, and none is near its rim.
+        """Return True if points take at least the share ``least`` of a picture, and none is near its rim.
 
         The larger one of the shares of the width and of the height counts.
         """

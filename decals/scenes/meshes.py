@@ -34,7 +34,7 @@ def as_polydata(
     split_normals: bool = False,
     progress: Progress | None = None,
 ) -> "pv.PolyData":
-    """Return what is to be seen of objects as one mesh with normals and "RGB" colours.
+    """Return the visible surfaces of objects as one mesh with normals and "RGB" colours.
 
     Trees are polygonized.
 

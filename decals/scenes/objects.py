@@ -521,7 +521,7 @@ def unused_name(name: str, taken: Collection[str], separator: str) -> str:
 
 
 def bounds_of(objects: Iterable[SceneObject]) -> Box:
-    """Return the box around several objects; InvalidScene if there are none, or one is of another kind."""
+    """Return the box around several objects; InvalidScene without objects, or for other kinds."""
     try:
         listed = list(objects)
     except TypeError:

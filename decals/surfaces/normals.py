@@ -92,7 +92,7 @@ def split_at_creases(
 
 
 def split_at_colors(split: SplitMesh, color: BaseColor) -> SplitMesh:
-    """Split a mesh further where its base colour jumps: each vertex has one row of it and one texture.
+    """Split a mesh further where its base colour jumps, until each vertex has one colour and one texture.
 
     Vertices that no face uses are left out, unless nothing is split.
     """

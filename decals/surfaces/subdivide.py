@@ -44,7 +44,7 @@ def subdivided(
     is_long: Callable[[Float64Array, Float64Array], BoolArray],
     midpoints: Midpoints = means,
 ) -> tuple[Float64Array, Int64Array]:
-    """Halve edges until none is long.
+    """Halve edges until no edge is long.
 
     Whether an edge is halved depends on the positions of its ends alone. So copies of a vertex, such as those
     on two sides of a crease, get copies of all new vertices between them, and no crack opens.

@@ -171,7 +171,7 @@ def _read(path: Path, seconds: float) -> dict[str, MeshData]:
 
 
 def _send(answers: BinaryIO, request: dict[str, Any], header: dict[str, Any], *contents: memoryview) -> None:
-    """Send an answer with the number of its request, so that none is taken for that of another file."""
+    """Send an answer with the number of its request, so that no answer is taken for that of another file."""
     answers.write(json.dumps({**header, "number": request.get("number")}).encode() + b"\n")
     for content in contents:
         answers.write(content)

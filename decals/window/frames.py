@@ -273,7 +273,7 @@ class FrameController:
         subplot.keep_previous_frame = keep
 
     def require_whole(self) -> None:
-        """Draw a whole frame now, with all walks, unless the shown one is whole."""
+        """Draw a whole frame now, with all walks, unless the shown frame is whole."""
         subplot = self._subplot
         whole = (subplot.draw_scale, subplot.samples) == (1.0, self.samples)
         if not whole or subplot.warming_up or subplot.walking:

@@ -182,7 +182,7 @@ class SubplotCamera:
         self._usable: tuple[Projection, pv.Camera] | None = None
 
     def keep_usable(self) -> None:
-        """Go back to the last usable camera if the present one is too near, too far or not finite."""
+        """Go back to the last usable camera if the present camera is too near, too far or not finite."""
         try:
             projection = self._subplot.viewpoint()
         except InvalidScene:

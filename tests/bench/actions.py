@@ -7,8 +7,6 @@ processor time of the window's thread, which other programs do not affect. The t
 background work included.
 """
 
-import argparse
-import json
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -23,6 +21,7 @@ from decals.editing.key_bindings import CAMERA
 from decals.scenes.objects import MeshObject
 from decals.vtk.subplot import FrameStatus
 from decals.window import EditWindow
+from tests.bench.command_line import bench_parser, write
 from tests.bench.scenes import bench_scene
 from tests.bench.window import Figures, machine
 from tests.decals.window.driver import Driver
@@ -206,10 +205,7 @@ def scene_figures(model: str, count: int, only: tuple[str, ...], folder: Path) -
 
 def main() -> None:
     """Parse the command line, measure, print and write."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--json", type=Path)
+    parser = bench_parser("actions", __doc__)
     parser.add_argument("--quick", action="store_true", help="only 1,000 decals")
     parser.add_argument("--counts", default=",".join(map(str, COUNTS)))
     parser.add_argument("--models", default=",".join(MODELS))
@@ -233,8 +229,7 @@ def main() -> None:
                     block, used, whole = results.values()
                     key, over = next(iter(results)).removesuffix("_block_ms"), "over" * (block > TARGET)
                     print(f"{key:40} {block:>9.1f} {used:>9.1f} {whole:>9.1f} {over}".rstrip(), flush=True)
-                    if arguments.json:
-                        arguments.json.write_text(json.dumps(figures, indent=1))
+                    write(arguments.json, figures)
 
 
 if __name__ == "__main__":

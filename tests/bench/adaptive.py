@@ -10,10 +10,10 @@ import resource
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 from blobtree import Node, Point, Sum, polygonize
 from tests.bench.blobtree import blobs
+from tests.bench.command_line import bench_parser, show, write
 
 SCENES = ("bumps", "blobs")
 RELATIVE_ERRORS = {"bumps": 2e-4, "blobs": 5e-4}
@@ -53,14 +53,9 @@ def figures_of(name: str, relative_error: float) -> dict[str, float]:
 
 def main() -> None:
     """Parse the command line and measure."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tests.bench.adaptive",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = bench_parser("adaptive", __doc__)
     parser.add_argument("--scene", choices=SCENES, help="one scene only")
     parser.add_argument("--error", type=float, help="chord error over the model's size")
-    parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     parser.add_argument("--one", nargs=3, metavar=("SCENE", "CELLS", "ERROR"), help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
@@ -70,10 +65,8 @@ def main() -> None:
     figures: dict[str, float] = {}
     for name in [options.scene] if options.scene else SCENES:
         figures |= figures_of(name, options.error or RELATIVE_ERRORS[name])
-    for key, number in figures.items():
-        print(f"  {key:28} {number:12.6g}")
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    show(figures)
+    write(options.json, figures)
 
 
 if __name__ == "__main__":

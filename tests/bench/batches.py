@@ -3,13 +3,10 @@
 python -m tests.bench.batches [--device DEVICE] [--sets N] [--only NAME] [--json FILE] [--quick]
 """
 
-import argparse
-import json
 import statistics
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +20,7 @@ from blobtree.device import known_device
 from blobtree.tracing import Hits
 from decals import Decals
 from decals.index import DecalBatch, DecalIndex
+from tests.bench.command_line import bench_parser, write
 
 TARGETS = {"evaluate_speedup": "≥ 20 on a card"}
 
@@ -179,11 +177,10 @@ FIGURES: dict[str, Callable[[str, int, int], dict[str, float]]] = {
 
 def main() -> None:
     """Print the figures."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = bench_parser("batches", __doc__)
     parser.add_argument("--device", help="Warp device; the default one if not given")
     parser.add_argument("--sets", type=int, default=SETS)
     parser.add_argument("--only", choices=tuple(FIGURES), action="append")
-    parser.add_argument("--json", type=Path)
     parser.add_argument("--quick", action="store_true", help="a tenth of the sets")
     options = parser.parse_args()
     device = known_device(options.device)
@@ -196,8 +193,7 @@ def main() -> None:
         figures |= FIGURES[name](device, count, 1 if options.quick else 3)
     for name, value in figures.items():
         print(f"{name:<26}{value:>10.4g}   {TARGETS.get(name, '')}")
-    if options.json:
-        options.json.write_text(json.dumps(figures))
+    write(options.json, figures)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,6 @@ parts of tapes and cells.
 """
 
 import argparse
-import json
 import os
 import platform
 import statistics
@@ -34,6 +33,7 @@ from blobtree.cells.sparse_cells import SparseCells, build_cells
 from blobtree.meshing.mesh import DeviceMesh, download, extract_mesh
 from blobtree.tape.tape import Tape
 from blobtree.tracing.trace import trace
+from tests.bench.command_line import bench_parser, show, write
 from tests.bench.marching_cubes import marching_cubes
 
 RUNS = 5
@@ -287,10 +287,7 @@ def _resident(field: str) -> float:
 
 def main() -> None:
     """Parse the command line, measure, print a table and write the figures."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
+    parser = bench_parser("blobtree", __doc__)
     parser.add_argument("--quick", action="store_true", help="fewer runs; ends within a minute on two cores")
     parser.add_argument("--device", default="cpu", help="a Warp device, such as cuda:0")
     parser.add_argument("--peak", action="store_true", help=argparse.SUPPRESS)
@@ -308,12 +305,10 @@ def main() -> None:
     print(f"{wp.get_device(options.device).name}, {os.cpu_count()} cores ({platform.machine()})")
     print(f"python -m {' '.join(['tests.bench.blobtree', *sys.argv[1:]])}")
     print(f"warp-lang {wp.config.version}, numpy {np.__version__}{versions}")
-    for name, number in figures.items():
-        print(f"  {name:28} {number:12.6g}")
+    show(figures)
     if options.device == "cpu":
         print(f"Other engines, quoted: {PEERS}.")
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    write(options.json, figures)
 
 
 if __name__ == "__main__":

@@ -7,17 +7,15 @@ Exactness: union, intersection and difference of two balls, whose crease is a kn
 sizes. Cost: a bored block and a union of 1,000 balls; medians without compilation and the first run.
 """
 
-import argparse
-import json
 from functools import reduce
 from operator import and_
-from pathlib import Path
 
 import numpy as np
 import warp as wp
 
 from blobtree import Node, Point, Segment, Union, polygonize
 from tests.bench.blobtree import blobs, median_time
+from tests.bench.command_line import bench_parser, show, write
 from tests.oracles.creases import circle
 
 CENTERS, RADII = ((0.0, 0.0, 0.0), (0.8, 0.13, 0.07)), (1.0, 0.9)
@@ -72,21 +70,14 @@ def times(device: str, runs: int) -> dict[str, float]:
 
 def main() -> None:
     """Parse the command line and measure."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tests.bench.creases",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = bench_parser("creases", __doc__)
     parser.add_argument("--device", default="cpu", help="Warp device, such as cuda:0")
     parser.add_argument("--runs", type=int, default=5)
-    parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     options = parser.parse_args()
     figures = errors(options.device) | times(options.device, options.runs)
     print(f"{wp.get_device(options.device).name}, warp-lang {wp.__version__}")
-    for name, number in figures.items():
-        print(f"  {name:24} {number:12.6g}")
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    show(figures)
+    write(options.json, figures)
 
 
 if __name__ == "__main__":

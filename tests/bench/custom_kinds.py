@@ -8,11 +8,8 @@ with a custom sum, and with both. The figures are ratios of medians to the built
 rounds, of processor time on a CPU and of wall time on a graphics card, without compilation.
 """
 
-import argparse
-import json
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import warp as wp
@@ -20,6 +17,7 @@ import warp as wp
 from blobtree import Node, Sum, polygonize
 from blobtree.custom import define_operator, define_skeleton
 from tests.bench.blobtree import blobs
+from tests.bench.command_line import bench_parser, show, write
 from tests.bench.tracing import pixel_rays
 
 COUNT = 1_000
@@ -86,22 +84,15 @@ def figures(device: str, *, quick: bool) -> dict[str, float]:
 
 def main() -> None:
     """Parse the command line and measure."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tests.bench.custom_kinds",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = bench_parser("custom_kinds", __doc__)
     parser.add_argument("--device", default="cpu", help="Warp device, such as cuda:0")
     parser.add_argument("--quick", action="store_true", help="a coarser mesh and fewer rounds")
-    parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     options = parser.parse_args()
     with wp.ScopedDevice(options.device):
         results = figures(options.device, quick=options.quick)
     print(f"{wp.get_device(options.device).name}, warp-lang {wp.__version__}, {COUNT} primitives")
-    for name, number in results.items():
-        print(f"  {name:20} {number:8.2f}")
-    if options.json:
-        options.json.write_text(json.dumps(results, indent=1), encoding="utf-8")
+    show(results)
+    write(options.json, results)
 
 
 if __name__ == "__main__":

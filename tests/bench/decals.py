@@ -17,13 +17,12 @@ oracles of the tests. Other parts:
     --peers                          mesh-clipped decals, projected boxes, sprites, and maps of the surface
 """
 
-import argparse
-import json
 import platform
 import sys
 from collections.abc import Mapping
 from importlib.metadata import version
-from pathlib import Path
+
+from tests.bench.command_line import bench_parser, write
 
 Figures = dict[str, float]
 
@@ -156,8 +155,7 @@ def measure_all(*, quick: bool) -> Figures:
 
 def main() -> None:
     """Parse the command line, measure and print."""
-    parser = argparse.ArgumentParser(prog="python -m tests.bench.decals", description=__doc__)
-    parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
+    parser = bench_parser("decals", __doc__)
     parser.add_argument("--quick", action="store_true", help="within 60 s on two cores")
     parser.add_argument(
         "--only",
@@ -188,8 +186,7 @@ def main() -> None:
         figures = measure_peers(quick=options.quick)
     else:
         figures = measure_all(quick=options.quick)
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    write(options.json, figures)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ python -m tests.bench.experiments [--json FILE] [--quick] [--only overhead,kills
 The cluster is a scheduler and workers that the two commands of the page on experiments start.
 """
 
-import argparse
 import json
 import os
 import random
@@ -23,6 +22,7 @@ import numpy as np
 
 from decals.experiments import Grid, Results, Seeds, run
 from decals.experiments.workers import used_megabytes
+from tests.bench.command_line import bench_parser, write
 from tests.decals.experiments import functions
 
 TARGETS = {
@@ -179,8 +179,7 @@ def parts(folder: Path, *, quick: bool, workers: int) -> dict[str, Callable[[], 
 
 def main() -> None:
     """Print the figures."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", type=Path)
+    parser = bench_parser("experiments", __doc__)
     parser.add_argument("--quick", action="store_true", help="fewer kills, pictures and trials")
     parser.add_argument("--only", help="parts, with commas between")
     parser.add_argument("--workers", type=int, default=2, help="workers that draw pictures beside one")
@@ -192,8 +191,7 @@ def main() -> None:
             for figure, value in every[part]().items():
                 figures[figure] = value
                 print(f"{figure:<18}{np.round(value, 3):>10}   {TARGETS.get(figure, '')}", flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(figures))
+    write(options.json, figures)
 
 
 if __name__ == "__main__":

@@ -9,12 +9,9 @@ The trees are about four units wide. Samples are points of the support with thei
 parameters that the samples do not determine, such as those of primitives that a union hides, are not counted.
 """
 
-import argparse
-import json
 import multiprocessing
 import time
 from functools import partial
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +34,7 @@ from blobtree import (
     with_numeric_values,
 )
 from blobtree.declare.parameters import Quantity
+from tests.bench.command_line import bench_parser, show, write
 
 PRIMITIVES = 20
 SAMPLES = 10_000
@@ -190,21 +188,16 @@ def figures(trees: int, samples: int, seed: int = 0, processes: int = 1) -> dict
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = bench_parser("fitting", __doc__)
     parser.add_argument("--trees", type=int, default=TREES, help="number of random trees")
     parser.add_argument("--samples", type=int, default=SAMPLES, help="samples of each tree")
     parser.add_argument("--processes", type=int, default=1, help="trees at a time")
     parser.add_argument("--quick", action="store_true", help="two trees of 3,000 samples")
-    parser.add_argument("--json", type=Path, help="file for the figures")
     arguments = parser.parse_args()
     trees, samples = (2, 3000) if arguments.quick else (arguments.trees, arguments.samples)
     result = figures(trees, samples, processes=arguments.processes)
-    for name, value in result.items():
-        print(f"{name:16} {value:8.1f}")
-    if arguments.json:
-        arguments.json.write_text(json.dumps(result))
+    show(result)
+    write(arguments.json, result)
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@
 * widths: `width_error`, how far from the asked distance roundings begin on surfaces of random pairs of
   half-spaces and balls, over that distance, the largest of all operators whose width is a length.
 * repeats: `repeat_10000_over_visible`, the time of rays that meet 100 of 10,000 boxes in a grid, over that of
-  the same rays through these 100.
+  the same rays through these 100; both grids keep their cells, as while they are drawn.
 * fits: see `tests.bench.fitting`.
 * costs: `mixed_over_sum` is the cost per crossing cell of a tree with a clean union, solids in contact and a
   bend, over that of the pure sum of its primitives; `gradient_over_sum` is the same with a gradient blend in
@@ -32,7 +32,6 @@
 """
 
 import argparse
-import json
 import statistics
 import subprocess
 import sys
@@ -60,8 +59,10 @@ from blobtree import (
 )
 from blobtree.custom import define_warp
 from blobtree.nodes.kinds import NODE_KINDS
+from blobtree.tracing.tree_cells import tracing_cells
 from tests import rounded_widths
 from tests.bench import contact, convolution_surfaces, fitting
+from tests.bench.command_line import bench_parser, show, write
 from tests.blobtree.derivatives import test_curvature
 from tests.blobtree.nodes.test_attributes import REST, rest
 from tests.blobtree.trees import points_around
@@ -320,6 +321,7 @@ def repeats(_: argparse.Namespace) -> Figures:
     """Time rays down on a hundred boxes of a large grid, and of a grid of these alone."""
     brick = Box((0, 0, 0), (0.6, 0.6, 0.6), radius=0)
     grids = [Repeat(Repeat(brick, (1, 0, 0), side, "union"), (0, 1, 0), side, "union") for side in (100, 10)]
+    kept = [tracing_cells(grid) for grid in grids]
     places = np.random.default_rng(0).uniform(0.0, 9.0, (100_000, 2))
     origins = np.column_stack([places, np.full(len(places), 5.0)])
     downward = np.tile([0.0, 0.0, -1.0], (len(places), 1))
@@ -330,7 +332,7 @@ def repeats(_: argparse.Namespace) -> Figures:
             grid.raycast(origins, downward)
             seconds.append(time.perf_counter() - start)
     many, few = (statistics.median(seconds[1:]) for seconds in times)
-    return {"repeat_10000_over_visible": many / few}
+    return {"repeat_10000_over_visible": many / few, "repeat_10000_cells_mb": kept[0].nbytes / 1e6}
 
 
 GROUPS: dict[str, Callable[[argparse.Namespace], Figures]] = {
@@ -353,26 +355,19 @@ GROUPS: dict[str, Callable[[argparse.Namespace], Figures]] = {
 
 def main() -> None:
     """Parse the command line and measure."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tests.bench.nodes",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = bench_parser("nodes", __doc__)
     parser.add_argument("--only", nargs="+", choices=GROUPS, help="groups of figures")
     parser.add_argument("--trees", type=int, default=200, help="number of random trees")
     parser.add_argument("--seed", type=int, default=1, help="seed of random nodes and trees")
     parser.add_argument("--against", type=Path, help="another checkout, for sum_regression")
     parser.add_argument("--quick", action="store_true", help="few samples and trees")
-    parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     options = parser.parse_args()
     figures: Figures = {}
     for group in options.only or [name for name in GROUPS if name != "fits"]:
         added = GROUPS[group](options)
         figures |= added
-        for name, number in added.items():
-            print(f"  {name:28} {number:12.4g}", flush=True)
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+        show(added)
+    write(options.json, figures)
 
 
 if __name__ == "__main__":

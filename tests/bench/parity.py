@@ -7,12 +7,9 @@ that shares no function with the implementation and that the tests compare with 
 needs NumPy, Warp and msgspec, but no graphics and no Warp on the processor.
 """
 
-import argparse
-import json
 import sys
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,6 +22,7 @@ from decals.index.index import index_on
 from decals.model import Decals
 from decals.record import NEIGHBOR_REACH, Contact
 from tests.bench import parity_kernels as kernels
+from tests.bench.command_line import bench_parser, write
 from tests.oracles.contact import RIM, rim_distance
 from tests.oracles.parallel import Members, answer_points
 
@@ -277,18 +275,16 @@ def measure(samples: int, device: Any) -> Figures:
 
 def main() -> int:
     """Parse the command line and compare; return True if a limit is exceeded."""
-    parser = argparse.ArgumentParser(prog="python -m tests.bench.parity", description=__doc__)
+    parser = bench_parser("parity", __doc__)
     parser.add_argument("--device", default="cpu")
     parser.add_argument("--samples", type=int, default=1_000_000, help="points in every mode")
-    parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     options = parser.parse_args()
     start_warp()
     device = wp.get_device(options.device)
     print(f"python -m tests.bench.parity {' '.join(sys.argv[1:])}")
     print(f"{device.name}; numpy {np.__version__}, warp-lang {wp.__version__}", flush=True)
     figures = measure(options.samples, options.device)
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    write(options.json, figures)
     broken = {
         name: value
         for name, value in figures.items()

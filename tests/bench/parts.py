@@ -1,12 +1,10 @@
 """Benchmarks of several parts, each a module of its own with `measure(quick=…)` and `TARGETS`."""
 
-import argparse
-import json
 import platform
 from collections.abc import Sequence
 from importlib import import_module
-from pathlib import Path
 
+from tests.bench.command_line import bench_parser, write
 from tests.bench.decals import Figures, printed, versions
 
 
@@ -22,15 +20,12 @@ def measure(name: str, parts: Sequence[str], *, quick: bool) -> Figures:
 
 def run(name: str, parts: Sequence[str], description: str | None) -> int:
     """Run a benchmark of parts as the command line asks."""
-    parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--json", type=Path, help="also write the figures to this file")
+    parser = bench_parser(name, description)
     parser.add_argument("--quick", action="store_true", help="fewer cases of each part")
     parser.add_argument("--only", default=",".join(parts), help="names of parts, with commas between them")
     options = parser.parse_args()
     chosen = options.only.split(",")
     if unknown := set(chosen) - set(parts):
         parser.error(f"--only: expected names among {', '.join(parts)}, got {', '.join(sorted(unknown))}")
-    figures = measure(name, chosen, quick=options.quick)
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    write(options.json, measure(name, chosen, quick=options.quick))
     return 0

@@ -15,12 +15,9 @@ Needs playwright and Chromium, except with ``--server-only``. Frames are drawn b
 graphics card, on the processor.
 """
 
-import argparse
 import asyncio
-import json
 import time
 from collections.abc import Callable, Coroutine
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +29,7 @@ from decals.apps.sandbox.page import Page as SandboxPage
 from decals.window import EditWindow
 from decals.window.host_plotter import new_plotter
 from decals.window.view_modes import MODES
+from tests.bench.command_line import bench_parser, show, write
 from tests.decals.window.driver import Driver
 
 if TYPE_CHECKING:
@@ -255,19 +253,14 @@ def _summary(name: str, times: list[float]) -> dict[str, float]:
 
 def main() -> None:
     """Print the figures, and write them."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = bench_parser("sandbox", __doc__)
     parser.add_argument("--decals", type=int, default=1000)
     parser.add_argument("--events", type=int, default=20)
     parser.add_argument("--server-only", action="store_true", help="no browser, only the server's times")
-    parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     figures = asyncio.run(measure(options.decals, options.events, server_only=options.server_only))
-    for name, value in figures.items():
-        print(f"{name:28} {value:10.1f}")
-    if options.json is not None:
-        options.json.write_text(json.dumps(figures))
+    show(figures)
+    write(options.json, figures)
 
 
 if __name__ == "__main__":

@@ -9,8 +9,6 @@ Points of other packages have none, and take those of the closest faces; where s
 may be the other sheet, and rho is then too low.
 """
 
-import argparse
-import json
 import platform
 import statistics
 import sys
@@ -18,7 +16,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +24,7 @@ from decals.errors import InvalidInput, InvalidScattering
 from decals.scattering.neighbors import FacingTree, Spacing, ideal_spacing, spacing_of_distances
 from decals.scattering.relaxation import Relaxation
 from decals.surfaces.mesh import MeshSurface
+from tests.bench.command_line import bench_parser, write
 from tests.bench.scattering_models import MODELS, TREES, meshed, surfaces_of
 from tests.bench.scattering_packages import PACKAGES
 
@@ -166,11 +164,10 @@ def bench(
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = bench_parser("scattering", __doc__)
     parser.add_argument(
         "--quick", action="store_true", help="fewer models and 1,000 particles, within a minute"
     )
-    parser.add_argument("--json", type=Path, help="also write the figures there")
     parser.add_argument("--counts", help="numbers of particles, with commas between")
     parser.add_argument("--models", help=f"some of {', '.join(MODELS)}, with commas between")
     parser.add_argument("--device", default="cpu", help="Warp device of this package")
@@ -186,8 +183,7 @@ def main() -> None:
         f"{' '.join(sys.argv)}\n{platform.platform()}, Python {platform.python_version()}, {options.device}"
     )
     figures = bench(names, counts, device=options.device, quick=options.quick, packages=not options.alone)
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1) + "\n")
+    write(options.json, figures)
 
 
 if __name__ == "__main__":

@@ -7,8 +7,6 @@ With ``--meshes`` it needs only a few packages, and no other Warp device. Kernel
 built and copied to the device, before the clock starts.
 """
 
-import argparse
-import json
 import platform
 import statistics
 import time
@@ -19,6 +17,7 @@ import numpy as np
 import warp as wp
 
 from decals.scattering.relaxation import Relaxation
+from tests.bench.command_line import bench_parser, write
 from tests.bench.scattering_models import MODELS, surfaces_of, write_meshes
 
 SCHEDULES = (60, 100, 150)
@@ -98,13 +97,12 @@ def bench(names: list[str], count: int, device: str, meshes: Path | None) -> dic
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = bench_parser("scattering_device", __doc__)
     parser.add_argument("--device", default="cuda:0", help="Warp device")
     parser.add_argument("--count", type=int, default=100_000, help="number of particles")
     parser.add_argument("--only", help=f"some of {', '.join(MODELS)}, with commas between")
     parser.add_argument("--meshes", type=Path, metavar="PATH", help="take meshes from a file of --record")
     parser.add_argument("--record", type=Path, metavar="PATH", help="write that file in place of measuring")
-    parser.add_argument("--json", type=Path, help="also write the figures there")
     options = parser.parse_args()
     if options.record:
         write_meshes(options.record)
@@ -112,8 +110,7 @@ def main() -> None:
     print(f"{wp.get_device(options.device).name}, Warp {wp.__version__}, Python {platform.python_version()}")
     names = options.only.split(",") if options.only else list(MODELS)
     figures = bench(names, options.count, options.device, options.meshes)
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1) + "\n")
+    write(options.json, figures)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ The scene is that of `tests.bench.blobtree`, N points of influence 0.6 N^(−1/3
 one ray per pixel of a view of the whole cube. Times are medians, without uploads and compilation.
 """
 
-import argparse
 import json
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from blobtree.tracing.trace import trace_arrays
 from blobtree.tracing.tree_cells import tracing_cells
 from decals.scenes.camera import Camera
 from tests.bench.blobtree import UNIT_BOX, blobs, median_time
+from tests.bench.command_line import bench_parser, show, write
 
 COUNTS = (100, 1_000, 10_000)
 SIZE = (1600, 1200)
@@ -102,17 +102,12 @@ def record(path: Path, counts: tuple[int, ...], size: tuple[int, int]) -> None:
 
 def main() -> None:
     """Parse the command line; measure or record."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tests.bench.tracing",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = bench_parser("tracing", __doc__)
     parser.add_argument("--device", default="cpu", help="Warp device, such as cuda:0")
     parser.add_argument("--record", type=Path, metavar="PATH", help="write a recording instead of measuring")
     parser.add_argument("--size", default="x".join(map(str, SIZE)))
     parser.add_argument("--points", type=int, nargs="+", default=COUNTS)
     parser.add_argument("--runs", type=int, default=5)
-    parser.add_argument("--json", type=Path, help="also write one flat object {figure: number}")
     options = parser.parse_args()
     width, height = (int(part) for part in options.size.split("x"))
     if options.record:
@@ -121,10 +116,8 @@ def main() -> None:
     with wp.ScopedDevice(options.device):
         figures = warp_times(options.device, tuple(options.points), (width, height), options.runs)
     print(f"{wp.get_device(options.device).name}, warp-lang {wp.__version__}, {width}x{height} rays")
-    for name, number in figures.items():
-        print(f"  {name:20} {number:12.6g}")
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    show(figures)
+    write(options.json, figures)
 
 
 if __name__ == "__main__":

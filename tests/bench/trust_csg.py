@@ -6,8 +6,6 @@ Each process has a renderer of its own. Each case is printed with its pixels and
 the camera of ``scene(seed, number)``. A campaign that was interrupted goes on with ``--first``.
 """
 
-import argparse
-import json
 import multiprocessing
 import os
 import sys
@@ -17,7 +15,6 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import count, islice
-from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
@@ -29,6 +26,7 @@ from decals.rendering.options import RenderOptions
 from decals.rendering.pixel_pass import PassBackend
 from decals.rendering.renderer import Renderer
 from decals.scenes.camera import Camera
+from tests.bench.command_line import bench_parser, show, write
 from tests.blobtree.csg_trees import visible_tree
 from tests.blobtree.trees import triple
 from tests.decals.glsl.tapes import Model
@@ -188,16 +186,13 @@ def _choose(backend: str | None) -> None:
 
 def main() -> int:
     """Draw the cases that the command line asks for; the exit code is 1 if a pixel misses."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = bench_parser("trust_csg", __doc__)
     parser.add_argument("--seeds", type=int, nargs="+", default=[1])
     parser.add_argument("--trees", type=int, default=TREES, help="trees of each seed that show")
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
     parser.add_argument("--size", default="x".join(map(str, SIZE)))
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--backend", choices=[backend.value for backend in PassBackend])
-    parser.add_argument("--json", type=Path, help="also write the figures to this file")
     options = parser.parse_args()
     width, height = (int(part) for part in options.size.split("x"))
     found: list[Holes] = []
@@ -208,9 +203,8 @@ def main() -> int:
                 found += [case.holes] if case.holes.pixels else []
                 print(case, file=sys.stderr, flush=True)
     figures = figures_of(found)
-    print("\n".join(f"{key:16} {value:g}" for key, value in figures.items()))
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    show(figures)
+    write(options.json, figures)
     return int(figures["csg_holes"] + figures["csg_ray_holes"] > 0)
 
 

@@ -8,8 +8,6 @@ printed with its failures, so a campaign that was interrupted goes on with ``--f
 many files of each format were read, since their shares differ (`tests.structured.formats`).
 """
 
-import argparse
-import json
 import multiprocessing
 import os
 import re
@@ -20,8 +18,8 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import Any
 
+from tests.bench.command_line import bench_parser, write
 from tests.fuzz import Outcome, format_of, run_stage, structured_case
 
 TARGETS = {"file_faults": "0", "file_misread": "0"}
@@ -82,12 +80,11 @@ def _read(folder: Path, seed: int, bounds: tuple[int, int]) -> Outcome:
 
 def main() -> int:
     """Run the campaign that the command line asks for; the exit code is 1 after a failure."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = bench_parser("trust_files", __doc__)
     parser.add_argument("--cases", type=int, default=2000)
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
-    parser.add_argument("--json", type=Path, help="also write the figures and failures to this file")
     options = parser.parse_args()
     figures, failures = campaign(
         options.cases,
@@ -97,9 +94,7 @@ def main() -> int:
         report=lambda line: print(line, file=sys.stderr, flush=True),
     )
     print("\n".join([*(f"{key:16} {value:g}" for key, value in figures.items()), *failures]))
-    if options.json:
-        report: dict[str, Any] = {**figures, "failures": failures}
-        options.json.write_text(json.dumps(report, indent=1), encoding="utf-8")
+    write(options.json, {**figures, "failures": failures})
     return int(bool(failures))
 
 

@@ -10,8 +10,6 @@ at a limit of time; then all its parts count as lost. A tree is printed once it 
 written to the folder. With the same folder a campaign goes on, so take a new one after a change of the code.
 """
 
-import argparse
-import json
 import logging
 import os
 import sys
@@ -32,6 +30,7 @@ from decals import scatter
 from decals.errors import InvalidMesh
 from decals.experiments import Grid, run
 from decals.surfaces import ImplicitSurface
+from tests.bench.command_line import bench_parser, show, write
 from tests.thin_trees import ThinTree, decals_of_parts, has_share, is_closed, random_tree
 
 TARGETS = {
@@ -287,9 +286,7 @@ def _dented_ball(dents: int) -> Node:
 
 def main() -> int:
     """Measure the trees that the command line asks for; the exit code is 1 if a part is lost."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = bench_parser("trust_thin", __doc__)
     parser.add_argument("--trees", type=int, default=TREES)
     parser.add_argument("--first", type=int, default=0, help="number of the first tree")
     parser.add_argument("--numbers", type=int, nargs="+", help="numbers of the trees")
@@ -297,7 +294,6 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--limit", type=float, default=LIMIT, help="seconds after which a tree is ended")
     parser.add_argument("--out", type=Path, help="folder of the rows")
-    parser.add_argument("--json", type=Path, help="also write the figures to this file")
     options = parser.parse_args()
     figures = campaign(
         options.numbers or range(options.first, options.first + options.trees),
@@ -307,9 +303,8 @@ def main() -> int:
         folder=options.out,
         report=lambda line: print(line, file=sys.stderr, flush=True),
     )
-    print("\n".join(f"{key:24} {value:g}" for key, value in figures.items()))
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    show(figures)
+    write(options.json, figures)
     return int(figures["thin_parts_lost"] > 0)
 
 

@@ -5,8 +5,6 @@ frame. Wall time includes other work of the machine. Processor time of all threa
 divided by the cores is a lower bound of the time on an idle machine.
 """
 
-import argparse
-import json
 import os
 import platform
 import sys
@@ -21,6 +19,7 @@ import numpy as np
 from decals.editing import EditSession
 from decals.window import EditWindow
 from decals.window.frames import REFINE_DELAY, FrameState
+from tests.bench.command_line import bench_parser, write
 from tests.bench.opening import opening
 from tests.bench.scenes import bench_scene
 from tests.decals.window.driver import Driver
@@ -251,10 +250,7 @@ def machine() -> str:
 
 def main() -> None:
     """Parse the command line, measure, print and write."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--json", type=Path)
+    parser = bench_parser("window", __doc__)
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--size", default="1200x800")
     parser.add_argument("--count", type=int, default=1000, help="decals")
@@ -271,8 +267,7 @@ def main() -> None:
             figures |= found
             for key, value in found.items():
                 print(f"{key:32} {value:>12.4g}  {TARGETS.get(key, '')}".rstrip(), flush=True)
-            if arguments.json:
-                arguments.json.write_text(json.dumps(figures, indent=1))
+            write(arguments.json, figures)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,16 @@
 """Every class of nodes conforms: generated from the declarations, so that new classes are taken up."""
 
+import json
+from dataclasses import fields
+
 import numpy as np
 import pytest
 import warp as wp
 
+from blobtree import to_json
 from blobtree.nodes.kinds import NODE_KINDS
 from tests.conformance import NAMES, problems_of, sample
+from tests.soundness import failures_of
 
 WITHOUT_DATA = ("volume",)
 """Classes whose text leaves out their data."""
@@ -29,6 +34,22 @@ def test_many_nodes_of_a_class_conform(tag: str) -> None:
 def test_a_class_of_nodes_conforms_on_a_graphics_card(tag: str) -> None:
     with wp.ScopedDevice("cuda:0"):
         assert problems_of(NODE_KINDS[tag], seed=3, samples=4, laws=("value", "gradient")) == []
+
+
+@EVERY_CLASS
+def test_meshes_and_rays_of_a_class_are_sound(tag: str) -> None:
+    rng = np.random.default_rng(5)
+    node = sample(NODE_KINDS[tag], rng)
+    assert failures_of(node, rng) == []
+
+
+@EVERY_CLASS
+def test_files_hold_declared_fields_alone(tag: str) -> None:
+    kind = NODE_KINDS[tag]
+    node = sample(kind, np.random.default_rng(6))
+    record = json.loads(to_json(node))["nodes"][-1]
+    assert record.pop("type") == tag
+    assert set(record) <= {field.name for field in fields(kind)}
 
 
 @pytest.mark.parametrize("tag", [tag for tag in NODE_KINDS if tag not in WITHOUT_DATA])

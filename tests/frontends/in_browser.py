@@ -222,8 +222,7 @@ async def sandbox(picture: str | None = None) -> None:
             window.subplot.vtk_renderer.ResetCamera()
             window.redraw(whole=True)
             await shows(browser, plotter)
-            image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
-            image.resize((960, 600), Image.Resampling.LANCZOS).save(picture, quality=80, optimize=True)
+            await save_picture(browser, Path(picture))
         await browser.get_by_role("textbox", name="ring radius").fill("-1")
         await browser.get_by_role("textbox", name="ring radius").press("Enter")
         await until(lambda: "expected a number above 0" in sandbox_page.sandbox.status)
@@ -546,8 +545,7 @@ async def creature(picture: str | None = None) -> None:
         last = await shows(browser, plotter)
         await accessible(browser)
         if picture is not None:
-            image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
-            image.resize((960, 600), Image.Resampling.LANCZOS).save(picture, quality=80, optimize=True)
+            await save_picture(browser, Path(picture))
         entries = len(window.session.labels)
         await browser.get_by_text("Start", exact=True).click()
         await until(lambda: window.session.labels == () and not window.busy)
@@ -702,8 +700,7 @@ async def sandbox_start(picture: str | None = None) -> None:
         assert sandbox_page.sandbox.values()["pick"]["decal"] == str(number)
         await shows(browser, plotter)
         if picture is not None:
-            image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
-            image.resize((960, 600), Image.Resampling.LANCZOS).save(picture, quality=80, optimize=True)
+            await save_picture(browser, Path(picture))
         await browser.get_by_role("button", name="File", exact=True).click()
         await browser.get_by_label("file name").fill("mine.py")
         await browser.get_by_role("button", name="Write", exact=True).click()
@@ -839,8 +836,7 @@ async def panels(picture: str | None = None) -> None:
             window.subplot.vtk_renderer.ResetCamera()
             window.redraw(whole=True)
             await shows(browser, plotter)
-            image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
-            image.resize((960, 600), Image.Resampling.LANCZOS).save(picture, quality=80, optimize=True)
+            await save_picture(browser, Path(picture))
         await row("Drawing").click()
         await browser.get_by_label("background top").wait_for()
         before = await shows(browser, plotter)
@@ -996,8 +992,7 @@ async def lab(picture: str | None = None) -> None:
                 await accessible(browser)
             if picture is not None and number == 1:
                 await shows(browser, plotter)
-                image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
-                image.resize((960, 600), Image.Resampling.LANCZOS).save(picture, quality=80, optimize=True)
+                await save_picture(browser, Path(picture))
         assert all("127.0.0.1" in url or url.startswith("data:") for url in requests)
         await puzzle(browser, lab_page)
         await choose(browser, "lesson", lab_page.lab.values()["lab_titles"][0]["title"])
@@ -1010,7 +1005,7 @@ async def lab(picture: str | None = None) -> None:
         await browser.mouse.up()
         await until(lambda: lab_page.lab.probe[0] > before[0] + 0.05 and not lab_page.lab.busy)
         await until_readings(browser, lab_page)
-        await sliced(browser, lab_page)
+        await sliced(browser, lab_page, picture)
         symbol = browser.locator(".lesson-side abbr[data-symbol='g']").first
         assert "falloff" in str(await symbol.get_attribute("title"))
         await browser.get_by_role("button", name="lines of Python for this picture").click()
@@ -1072,7 +1067,7 @@ async def guess(browser: Page, lab_page: LabPage) -> None:
     assert await browser.locator(".scale path").count() in (1, 2)
 
 
-async def sliced(browser: Page, lab_page: LabPage) -> None:
+async def sliced(browser: Page, lab_page: LabPage, picture: str | None) -> None:
     """Cut the lesson open, and drag the probe and the slice with the mouse: the readings follow."""
     await browser.get_by_role("button", name="View", exact=True).click()
     await choose(browser, "slice", "y")
@@ -1094,10 +1089,18 @@ async def sliced(browser: Page, lab_page: LabPage) -> None:
         await until(partial(has_moved, lab_page, before))
         await until_readings(browser, lab_page)
     assert np.abs(lab_page.lab.probe)[1:].min() > 0.02  # beside the middle, and above the plate
+    if picture is not None:
+        await save_picture(browser, Path(picture).with_stem(f"{Path(picture).stem}-slice"))
     await browser.get_by_role("button", name="View", exact=True).click()
     await choose(browser, "slice", "none")
     await browser.keyboard.press("Escape")
     await until(lambda: lab_page.lab.probe == lab_page.lab.lesson.settings.probe and not lab_page.lab.busy)
+
+
+async def save_picture(browser: Page, path: Path) -> None:
+    """Write the window as a picture of the documentation."""
+    image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
+    image.resize((960, 600), Image.Resampling.LANCZOS).save(path, quality=80, optimize=True)
 
 
 def has_moved(lab_page: LabPage, before: tuple[float, float, float]) -> bool:

@@ -232,6 +232,39 @@ async def played(browser: Browser, path: Path, width: int, height: int) -> None:
     await page.close()
 
 
+async def typed(browser: Browser, path: Path, width: int, height: int) -> None:
+    """Take the first lesson by the keyboard alone, from the guess to the right answer and back."""
+    page = await browser.new_page(viewport={"width": width, "height": height})
+    await page.add_init_script(ERRORS)
+    await page.goto(path.as_uri())
+    await page.wait_for_function("document.getElementById('lesson').dataset.ready", timeout=PATIENCE)
+    await reach(page, "[name=guess]")
+    await page.keyboard.type("2.2")
+    await page.keyboard.press("Enter")
+    await settled(page)
+    for part, count in ((".probe", 14), ("[data-path='decals.0.radius']", 62)):
+        await reach(page, part)
+        for _ in range(count):
+            await page.keyboard.press("ArrowRight")
+        await settled(page)
+    assert await page.get_attribute(".verdict", "data-right") == "true", await page.inner_text(".tasks")
+    await reach(page, "[name=again]")
+    await page.keyboard.press("Space")
+    await page.wait_for_selector("#lesson[data-waits=true]")
+    assert await page.evaluate("window.pageErrors") == []
+    await page.close()
+
+
+async def reach(page: Page, part: str) -> None:
+    """Press Tab until a part of the page has the focus, which can be seen."""
+    for _ in range(60):
+        await page.keyboard.press("Tab")
+        if await page.evaluate("part => document.activeElement.matches(part)", part):
+            assert await page.locator(part).evaluate("e => getComputedStyle(e).outlineStyle") != "none"
+            return
+    raise AssertionError(f"no focus: {part}")
+
+
 async def taught(room: Classroom, address: str) -> None:
     """Students with phones send their numbers, and the teacher sees them in a table and a plot."""
     async with async_playwright() as player:
@@ -274,6 +307,9 @@ async def learn(name: str, numbers: set[int]) -> None:
                     path = Path(folder) / f"{lesson.name}.html"
                     await learned(browser, lesson, ANSWERS[number - 1], path)
                     await fitted(browser, lesson, path)
+                    if number == 1:
+                        for size in SIZES:
+                            await typed(browser, path, *size)
                     if lesson.settings.scores:
                         for size in SIZES:
                             await played(browser, path, *size)

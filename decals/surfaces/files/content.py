@@ -99,7 +99,7 @@ def shown(text: bytes) -> str:
 
 
 def decimal_numbers(words: Iterable[bytes]) -> Float64Array:
-    """Return words of text as numbers, also infinite ones; ValueError if one is none."""
+    """Return words of text as numbers, also infinite ones; ValueError if a word is no number."""
     words = list(words)
     _refuse_underscores(words)
     try:
@@ -119,7 +119,7 @@ def _number(word: bytes) -> float:
 
 
 def finite_numbers(words: Iterable[bytes]) -> Float64Array:
-    """Return words of text as finite numbers; ValueError if one is none."""
+    """Return words of text as finite numbers; ValueError if a word is no finite number."""
     values = decimal_numbers(words)
     if not np.isfinite(values).all():
         raise ValueError("expected finite numbers")
@@ -127,7 +127,7 @@ def finite_numbers(words: Iterable[bytes]) -> Float64Array:
 
 
 def whole_numbers(words: Iterable[bytes]) -> Int64Array:
-    """Return words of text as whole numbers of 64 bits; ValueError if one is none."""
+    """Return words of text as whole numbers of 64 bits; ValueError if a word is no whole number."""
     words = list(words)
     _refuse_underscores(words)
     try:

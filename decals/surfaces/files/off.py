@@ -117,9 +117,9 @@ def _of_lines(
 def _of_words(
     keyword: _Keyword, points: int, faces: int, lines: list[Line], *, edges: bool
 ) -> Iterator[list[Line]]:
-    """Yield lines of one vertex or face each, made of words that the lines of a file divide otherwise.
+    """Yield a line for each vertex and face of a file whose own lines end elsewhere.
 
-    The first word may be the number of edges if it did not stand beside the others.
+    The first word may be the number of edges, which usually stands beside the two other numbers.
     """
     first, _, rest = lines[0].text.strip().partition(b" ") if lines else (b"", b"", b"")
     if edges and first.isdigit():

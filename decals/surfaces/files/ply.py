@@ -163,7 +163,7 @@ def _corners(table: _Table) -> Polygons:
 
 
 def strip_triangles(corners: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the triangles, ``int64[m, 3]``, of strips; every second one is reversed."""
+    """Return the triangles, ``int64[m, 3]``, of strips; every second triangle is reversed."""
     parts = np.split(corners, np.flatnonzero(corners == STRIP_END))
     strips = [part[part != STRIP_END] for part in parts]
     windows = [

@@ -303,7 +303,7 @@ def test_a_table_has_the_values_of_balls(tmp_path: Path) -> None:
 
 def test_a_curve_in_a_text_is_refused(lessons: dict[str, Lesson]) -> None:
     lesson = lessons["7-volume-and-area"]
-    template = replace(next(iter(lesson.templates.values())), parts=(lesson.formulas["body(0)"],))
+    template = (lesson.formulas["body(0)"],)
     with pytest.raises(InvalidInput, match=r"shows 'body\(0\)' as a curve or as a number"):
         tabulated(replace(lesson, templates={"{body(0)}": template}))
 

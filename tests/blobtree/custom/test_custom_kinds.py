@@ -134,19 +134,6 @@ def test_a_small_and_a_large_model() -> None:
         assert_on_torus(mesh.vertices / scale)
 
 
-def test_maps_of_every_sort_move_a_custom_primitive() -> None:
-    points = np.random.default_rng(2).uniform(-1.5, 1.5, (300, 3))
-    for placed in (
-        UNIT_RING.translate((0.1, 0.2, 0.3)),
-        UNIT_RING.rotate((1, 2, 3), 50).scale(0.8),
-        UNIT_RING.scale((0.5, 1.0, -0.7)),
-        UNIT_RING.twist(40.0),
-        UNIT_RING.offset(0.1),
-        UNIT_RING.scale(2.0).offset(-0.1).translate((1, 0, 0)),
-    ):
-        np.testing.assert_allclose(placed(points), oracle.value(placed, points), atol=1e-5)
-
-
 def test_one_kind_many_primitives_is_one_run() -> None:
     rng = np.random.default_rng(8)
     rings = [Ring(tuple(p), (0, 0, 1), 0.1, radius=0.05) for p in rng.uniform(-1, 1, (500, 3)).tolist()]

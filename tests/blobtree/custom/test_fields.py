@@ -7,14 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import ISO, Node, Point, check_kind, from_json, polygonize, to_json
+from blobtree import Node, check_kind, from_json, to_json
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.custom import CustomField, define_field
 from blobtree.errors import InvalidDefinition, InvalidFile, InvalidNode, UntranslatableFunction
 from tests.blobtree.custom import field_kernels as kernels
 from tests.blobtree.custom_kinds import Lump, Waves
-from tests.blobtree.meshing.test_polygonize import assert_closed
-from tests.blobtree.trees import points_around
 from tests.oracles import direct_fields
 
 LUMP = Lump((0.2, 0.0, 0.1), (3.0, 2.5, 3.0), (0.1, 0.2, 0.0), 0.6, color=(1, 0, 0))
@@ -38,29 +36,8 @@ def value(node: Node, points: Float32Array | Float64Array) -> Float64Array:
 
 
 @EACH
-def test_values_and_gradients_are_those_of_float64(node: Node) -> None:
-    points = points_around(np.random.default_rng(1), node, 400)
-    np.testing.assert_allclose(node(points), value(node, points), atol=2e-6)
-    steps = 1e-5 * np.eye(3)
-    slopes = [value(node, points + step) - value(node, points - step) for step in steps]
-    np.testing.assert_allclose(node.gradient(points), np.stack(slopes, axis=1) / 2e-5, atol=2e-4)
-
-
-@EACH
 def test_all_laws_hold(node: Node) -> None:
     assert check_kind(type(node), value, sample=lambda _: node, samples=1, show=None).failed == ()
-
-
-@EACH
-def test_a_custom_field_blends_is_meshed_and_traced(node: Node) -> None:
-    tree = node.rotate((1, 0, 0), 20) + Point((1.0, 0, 0), radius=0.4)
-    mesh = polygonize(tree, resolution=30)
-    assert_closed(mesh)
-    np.testing.assert_allclose(tree(mesh.vertices), ISO, atol=1e-5)
-    eye = np.array([6.0, 5.0, 4.0])
-    hits = tree.raycast(np.tile(eye, (100, 1)), mesh.vertices[:100] - eye)
-    assert hits.hit.mean() > 0.9
-    np.testing.assert_allclose(tree(hits.positions[hits.hit]), ISO, atol=1e-3)
 
 
 @EACH

@@ -1,17 +1,15 @@
 """Custom warps: fields against float64, bounds, meshes, rays, files, and refused definitions."""
 
-import pickle
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 
-from blobtree import Point, Segment, formula, from_json, polygonize, to_json
+from blobtree import Point, Segment, formula
 from blobtree._typing import Float64Array
 from blobtree.custom import define_warp
 from blobtree.errors import InvalidDefinition, InvalidNode
-from blobtree.tracing.trace import trace
 from tests.blobtree.custom.warp_kernels import (
     Swirl,
     broken,
@@ -26,8 +24,9 @@ from tests.blobtree.custom.warp_kernels import (
 )
 from tests.blobtree.custom_kinds import SWAY_LIMITS as LIMITS
 from tests.blobtree.custom_kinds import GivenSway, Sway
-from tests.blobtree.tape.evaluations import bounds_along
+from tests.conformance import broken_laws
 from tests.oracles import blobtree as oracle
+from tests.soundness import failures_of
 
 ROD = Segment((0.2, 0, -2), (0.2, 0, 2), radius=0.3)
 TREES = {
@@ -53,30 +52,12 @@ def test_values_and_gradients_match_float64_with_derived_and_given_jacobians() -
 @pytest.mark.parametrize("name", TREES)
 def test_bounds_boxes_meshes_and_rays_agree_with_the_field(name: str) -> None:
     tree, rng = TREES[name], np.random.default_rng(1)
-    lower, upper = (corner.astype(np.float64) for corner in tree.support)
-    outside = rng.uniform(lower - 0.5, upper + 0.5, (2000, 3))
-    assert (tree(outside[((outside < lower) | (outside > upper)).any(axis=1)]) == 0.0).all()
-    points = rng.uniform(lower, upper, (200, 3)).astype(np.float32)
-    headings = rng.normal(size=(200, 3))
-    headings = (headings / np.linalg.norm(headings, axis=1, keepdims=True)).astype(np.float32)
-    reach = (10.0 ** rng.uniform(-3.0, 0.5, 200)).astype(np.float32)
-    value, rise, fall = bounds_along(tree.tape, points, headings, reach).T
-    for share in (0.1, 0.5, 1.0):
-        change = tree(points + share * reach[:, None] * headings) - value
-        assert (-fall * share * reach - 1e-5 <= change).all()
-        assert (change <= rise * share * reach + 1e-5).all()
-    mesh = polygonize(tree, resolution=32)
-    assert np.abs(tree(mesh.vertices) - 0.5).max() < 1e-5
-    starts = mesh.vertices[::50] + 5.0 * mesh.normals[::50]
-    distances = trace(tree, starts, -mesh.normals[::50])
-    assert (distances <= 5.0 + 1e-3).all()
-    assert np.abs(tree(starts - distances[:, None] * mesh.normals[::50]) - 0.5).max() < 1e-3
+    laws = ("single precision", "gradient", "interval", "Lipschitz bound", "box", "file", "pickle")
+    assert broken_laws(tree, rng, *laws, known=None) == []
+    assert failures_of(tree, rng) == []
 
 
-def test_custom_warps_survive_files_and_pickles() -> None:
-    for tree in TREES.values():
-        assert from_json(to_json(tree)) == tree
-        assert pickle.loads(pickle.dumps(tree)) == tree
+def test_the_same_definition_is_the_same_class() -> None:
     assert "Sway(width=0.4, rate=2.0)" in str(TREES["sway"])
     assert define_warp(sway, stretch=sway_stretch, box=0.5, limits=LIMITS) is Sway
 

@@ -12,9 +12,7 @@ from blobtree import (
     ControllableBlend,
     Intersection,
     LocalBlend,
-    Masked,
     Mirror,
-    Node,
     Point,
     RDifference,
     Ricci,
@@ -28,30 +26,12 @@ from blobtree import (
     SuperellipticBlend,
     SymmetricDifference,
     Union,
-    polygonize,
 )
 from blobtree.errors import InvalidNode
 from tests.blobtree.custom_kinds import Soft, Stew, Swell
 
 A, B, C, D = (Point((0.8 * x, 0.1 * x, 0.0), radius=0.7) for x in range(4))
 PAIRS = (("a", "b"), ("b", "c"))
-NODES: list[Node] = [
-    SuperellipticBlend(A, B, C, width=0.2, exponent=2.0),
-    RUnion(A, B),
-    RIntersection(A, B),
-    RDifference(A, B),
-    SmoothIntersection(A, B, width=0.2),
-    SmoothDifference(A, B, width=0.2),
-    CleanUnion(A, B),
-    ControllableBlend(A, B, left_angle=0.0, right_angle=30.0),
-    Masked(A, B),
-    Shell(A, 0.2),
-    Mirror(A, "z"),
-    SymmetricDifference(A, B),
-    LocalBlend(A, B, C),
-    BlendGraph((A, B, C), names=("a", "b", "c"), pairs=PAIRS),
-]
-EVERY_NODE = pytest.mark.parametrize("node", NODES, ids=lambda node: type(node).__name__)
 
 
 @pytest.mark.parametrize("kind", [Sum, Union, Intersection, Swell])
@@ -93,16 +73,6 @@ def test_messages_name_what_is_missing_or_unknown() -> None:
         Ricci(A, B)
     with pytest.raises(TypeError, match=r"^Sum: expected operands and nothing else; exponent unknown$"):
         Sum(A, B, exponent=2.0)
-
-
-@EVERY_NODE
-def test_meshes_lie_on_the_surface_and_in_the_support(node: Node) -> None:
-    mesh = polygonize(node, resolution=32)
-    assert len(mesh.faces) > 100
-    assert np.abs(node(mesh.vertices) - 0.5).max() < 2e-3
-    lower, upper = node.support
-    assert (mesh.vertices >= lower).all()
-    assert (mesh.vertices <= upper).all()
 
 
 @pytest.mark.parametrize("kind", [CleanUnion, RUnion, RIntersection, RDifference, SymmetricDifference])

@@ -14,18 +14,14 @@ from blobtree import (
     ConvolutionStroke,
     ConvolutionTriangle,
     Node,
-    Point,
     Sum,
     from_json,
-    polygonize,
     to_json,
 )
 from blobtree.errors import InvalidNode
 from blobtree.transpile.python import plain_python, vector
 from tests.bench.convolution_surfaces import elbow_error, even, joint_bulge, plain, surface_distances
 from tests.blobtree.trees import points_around
-from tests.oracles import blobtree as oracle
-from tests.oracles import convolution
 
 LIMB = ConvolutionSegment((0.1, 0.2, 0.3), (1.2, -0.3, 0.5), radius=0.4, end_radius=0.15)
 HOOK = ConvolutionArc((1, 0, 0), (0.2, 0.9, 0.3), (-0.9, -0.2, 0), radius=0.2)
@@ -33,14 +29,6 @@ SAIL = ConvolutionTriangle((0, 0, 0), (1.5, 0.2, 0.1), (0.3, 1.1, -0.4), radius=
 EACH = pytest.mark.parametrize("node", [LIMB, HOOK, SAIL], ids=["segment", "arc", "triangle"])
 CONVOLUTION_FIELDS = [type(node).field_kind for node in (LIMB, HOOK, SAIL)]
 FRACTIONS = st.floats(0.02, 0.98)
-
-
-@EACH
-def test_values_and_gradients_are_those_of_quadrature(node: Node) -> None:
-    points = points_around(np.random.default_rng(5), node, 300)
-    reference = convolution.evaluate(node, points)
-    np.testing.assert_allclose(node(points), reference[:, 0], rtol=1e-4, atol=1e-6)
-    np.testing.assert_allclose(node.gradient(points), reference[:, 1:], rtol=1e-4, atol=5e-5)
 
 
 @given(FRACTIONS, st.integers(0, 2**32 - 1))
@@ -179,14 +167,6 @@ def test_bounds_are_zero_away_from_the_support(node: Node) -> None:
     _, upper = node.support
     corner = upper + 0.01
     assert node.interval(corner, corner + 0.2) == (0.0, 0.0)
-
-
-def test_convolution_surfaces_blend_with_other_nodes_and_close() -> None:
-    tree = (LIMB + SAIL + HOOK + Point((0, 0, 0), radius=0.5)) - Point((0.9, 0.3, 0.2), radius=0.3)
-    mesh = polygonize(tree, resolution=40)
-    edges = np.sort(mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
-    np.testing.assert_allclose(oracle.value(tree, mesh.vertices), ISO, atol=1e-4)
 
 
 @pytest.mark.parametrize(

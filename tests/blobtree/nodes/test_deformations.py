@@ -1,6 +1,5 @@
 """Deformations: analytic shapes, oracles in float64, bounds of nested warps, files and invalid parameters."""
 
-import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -20,21 +19,15 @@ from blobtree import (
     Stretch,
     Taper,
     Twist,
-    from_json,
     polygonize,
-    to_json,
 )
-from blobtree._typing import Float64Array
 from blobtree.errors import InvalidNode
 from blobtree.nodes.places import _forward
 from blobtree.tape.codes import WARP_REGISTERS
 from blobtree.tape.model import gradients_at
-from blobtree.tape.program import postorder
-from blobtree.tracing.trace import trace
-from blobtree.tracing.tree_cells import trace_tolerance
-from tests.blobtree.tape.evaluations import bounds_along
 from tests.blobtree.trees import points_around, random_deformation, random_leaf
-from tests.oracles import blobtree as oracle
+from tests.conformance import broken_laws
+from tests.soundness import failures_of
 
 ROD = Segment((0, 0, 0), (0, 0, 4), radius=0.2)
 KNOBBED = ROD + Point((0.2, 0.1, 2), radius=0.3)
@@ -69,90 +62,23 @@ def random_nest(seed: int) -> Node:
     return node
 
 
-def marched(tree: Node, origins: Float64Array, directions: Float64Array, steps: int = 1200) -> Float64Array:
-    """Distances (n,) of the first samples inside along rays, in float64; inf if none is."""
-    reach = 2.0 * float(np.linalg.norm(tree.support[1] - tree.support[0]))
-    places = np.linspace(0.0, reach, steps)
-    samples = origins[:, None] + places[:, None] * directions[:, None]
-    inside = oracle.value(tree, samples.reshape(-1, 3)).reshape(len(origins), steps) > 0.5 + 1e-5
-    return np.where(inside.any(axis=1), places[inside.argmax(axis=1)], np.inf)
-
-
-def check_rays(tree: Node, count: int) -> int:
-    """No ray passes a sample inside, and each hit is on the surface; return the number of hits."""
-    rng = np.random.default_rng(0)
-    lower, upper = (corner.astype(np.float64) for corner in tree.support)
-    size, surface = float(np.linalg.norm(upper - lower)), rng.normal(size=(count, 3))
-    surface /= np.linalg.norm(surface, axis=1, keepdims=True)
-    origins = (0.5 * (lower + upper) + size * surface).astype(np.float32).astype(np.float64)
-    inside = points_around(rng, tree, count).astype(np.float64)
-    directions = (inside - origins) / np.linalg.norm(inside - origins, axis=1, keepdims=True)
-    seen, tolerance = trace(tree, origins, directions), trace_tolerance(tree.support)
-    assert (seen <= marched(tree, origins, directions) + 2.0 * tolerance).all()
-    hit = np.isfinite(seen)
-    points = origins[hit] + seen[hit, None] * directions[hit]
-    steepest = 1.0 + np.linalg.norm(oracle.gradient(tree, points), axis=1)
-    assert (np.abs(oracle.value(tree, points) - 0.5) <= 4.0 * tolerance * steepest + 2e-5).all()
-    return int(hit.sum())
-
-
-def check_bounds(tree: Node, seed: int) -> None:
-    """Values and gradients match the oracle; bounds along rays, intervals and the box hold."""
+def problems_of_warps(tree: Node, seed: int) -> list[str]:
+    """What a tree of warps violates of the laws of fields, and of meshes and rays."""
     rng = np.random.default_rng(seed)
-    points = points_around(rng, tree, 100)
-    field = oracle.evaluate(tree, points)
-    np.testing.assert_allclose(tree(points), field.value, atol=3e-5)
-    smooth = field.margin > 1e-3
-    expected = oracle.gradient(tree, points[smooth])
-    error = np.linalg.norm(tree.gradient(points[smooth]) - expected, axis=1)
-    assert (error <= 3e-4 * np.maximum(1.0, np.linalg.norm(expected, axis=1))).all()
-    reach = (10.0 ** rng.uniform(-3.0, 0.5, 100)).astype(np.float32)
-    headings = rng.normal(size=(100, 3))
-    headings = (headings / np.linalg.norm(headings, axis=1, keepdims=True)).astype(np.float32)
-    _, rise, fall = bounds_along(tree.tape, points, headings, reach).astype(np.float64).T
-    distance = reach * np.linspace(0.05, 1.0, 20)[:, None]
-    places = points.astype(np.float64) + headings.astype(np.float64) * distance[..., None]
-    change = oracle.value(tree, places.reshape(-1, 3)).reshape(20, 100) - field.value
-    assert (change - rise * distance).max() <= 3e-5
-    assert (-change - fall * distance).max() <= 3e-5
-    lower, upper = (corner.astype(np.float64) for corner in tree.support)
-    for _ in range(8):
-        a, b = np.sort(rng.uniform(lower, upper, (2, 3)), axis=0)
-        b = a + (b - a) * rng.uniform(0.02, 1.0)
-        smallest, largest = tree.interval(a, b)
-        values = oracle.value(tree, rng.uniform(a, b, (200, 3)))
-        assert smallest - 1e-5 <= values.min()
-        assert values.max() <= largest + 1e-5
-    outside = rng.uniform(lower - 0.5, upper + 0.5, (2000, 3))
-    outside = outside[((outside < lower) | (outside > upper)).any(axis=1)]
-    assert oracle.value(tree, outside).max() <= 1e-9
+    laws = ("value", "gradient", "interval", "Lipschitz bound", "box", "file", "pickle")
+    return broken_laws(tree, rng, *laws) + failures_of(tree, rng)
 
 
 @pytest.mark.parametrize("name", STRONG)
 def test_strong_deformations_keep_their_bounds(name: str) -> None:
-    check_bounds(STRONG[name], 0)
-    assert check_rays(STRONG[name], 100) > 20
+    assert problems_of_warps(STRONG[name], 0) == []
 
 
 @pytest.mark.parametrize(
     "seed", [*range(8), *(pytest.param(n, marks=pytest.mark.slow) for n in range(8, 60))]
 )
 def test_random_nests_keep_their_bounds(seed: int) -> None:
-    tree = random_nest(seed)
-    check_bounds(tree, seed)
-    check_rays(tree, 40)
-
-
-@pytest.mark.parametrize("name", STRONG)
-def test_meshes_of_deformed_models_are_closed_and_on_the_surface(name: str) -> None:
-    mesh = polygonize(STRONG[name], resolution=32)
-    assert np.abs(oracle.value(STRONG[name], mesh.vertices) - 0.5).max() < 1e-4
-    edges = np.sort(
-        np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1
-    )
-    _, uses = np.unique(edges, axis=0, return_counts=True)
-    assert len(mesh.faces) > 200
-    assert (uses == 2).all()
+    assert problems_of_warps(random_nest(seed), seed) == []
 
 
 def test_warps_nest_as_deep_as_there_are_registers() -> None:
@@ -229,15 +155,6 @@ def test_noise_depends_on_its_seed_alone_and_is_bounded() -> None:
 
 
 # -- files and errors -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", STRONG)
-def test_deformations_survive_files_pickles_and_text(name: str) -> None:
-    node = STRONG[name]
-    kinds = {type(part).__name__: type(part) for part in postorder(node)}
-    for copy in (from_json(to_json(node)), pickle.loads(pickle.dumps(node)), eval(repr(node), kinds)):
-        assert copy == node
-        assert hash(copy) == hash(node)
 
 
 INVALID: dict[str, tuple[Callable[[], Node], str]] = {

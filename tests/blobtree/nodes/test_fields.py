@@ -1,7 +1,5 @@
 """Direct fields: their shapes, maps, offsets, meshes, rays and files."""
 
-import json
-import pickle
 from typing import Any
 
 import numpy as np
@@ -15,24 +13,16 @@ from blobtree import (
     ConvolutionTriangle,
     FieldPrimitive,
     Gyroid,
-    Node,
     Noise,
     Point,
     Superquadric,
-    from_json,
-    polygonize,
-    to_json,
 )
 from blobtree.declare.parameters import Quantity, parameters_of
 from blobtree.errors import InvalidNode
-from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.paths import moved, primitive_at, primitive_paths, resized
 from blobtree.nodes.surgery import dominant_primitive
 from blobtree.tape.codes import FIELD, PREFIX
-from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
-from tests.blobtree.nodes.test_primitives import PLACEMENTS
 from tests.blobtree.trees import points_around
-from tests.oracles import blobtree as oracle
 
 PILLOW = Superquadric((0.1, 0.2, 0.3), (1.0, 0.5, 0.7), 0.4, 1.5, color=(1, 0, 0))
 SPONGE = Gyroid((0.1, 0.2, 0.3), (2.0, 1.5, 1.8), 1.0, 0.2, fade=0.3, color=(1, 0, 0))
@@ -45,31 +35,6 @@ EACH = pytest.mark.parametrize(
     [PILLOW, SPONGE, ROCK, LIMB, HOOK, SAIL],
     ids=["superquadric", "gyroid", "noise", "convolution segment", "convolution arc", "convolution triangle"],
 )
-
-
-@EACH
-@pytest.mark.parametrize("place", PLACEMENTS.values(), ids=PLACEMENTS)
-def test_values_and_gradients_under_every_map_are_those_of_float64(node: Node, place: Any) -> None:
-    placed = place(node)
-    points = points_around(np.random.default_rng(2), placed, 300)
-    field = oracle.evaluate(placed, points)
-    np.testing.assert_allclose(placed(points), field.value, atol=1e-5)
-    smooth = field.margin > 1e-3
-    slopes = oracle.gradient(placed, points[smooth])
-    np.testing.assert_allclose(placed.gradient(points[smooth]), slopes, rtol=1e-4, atol=1e-3)
-
-
-@EACH
-def test_meshes_are_closed_and_rays_end_on_the_surface(node: Node) -> None:
-    tree = node + Point((1.2, 0, 0), radius=0.4)
-    mesh = polygonize(tree, resolution=40)
-    assert_valid(mesh)
-    assert_closed(mesh)
-    np.testing.assert_allclose(oracle.value(tree, mesh.vertices), ISO, atol=2e-5)
-    eye = np.array([5.0, 4.0, 3.0])
-    hits = tree.raycast(np.tile(eye, (200, 1)), mesh.vertices[:200] - eye)
-    assert hits.hit.mean() > 0.9
-    np.testing.assert_allclose(oracle.value(tree, hits.positions[hits.hit]), ISO, atol=1e-3)
 
 
 def test_a_superquadric_of_exponents_one_is_an_ellipsoid() -> None:
@@ -110,16 +75,6 @@ def test_a_field_leaf_is_one_run_behind_its_map() -> None:
     np.testing.assert_allclose(tape.data[at + 1 + PREFIX, :3], PILLOW.center)
     assert tape.data[at + 1 + PREFIX + PILLOW.field_kind.parameters].tolist() == [1, 0, 0, 1]
     assert not tape.stretched
-
-
-@EACH
-def test_nodes_survive_files_pickles_and_their_own_text(node: FieldPrimitive) -> None:
-    (record,) = json.loads(to_json(node))["nodes"]
-    assert NODE_KINDS[record.pop("type")] is type(node)
-    optional = ("attributes", "weight", "falloff", "width")
-    assert list(record) == [name for name in parameters_of(type(node)) if name not in optional]
-    assert from_json(to_json(node)) == node == pickle.loads(pickle.dumps(node))
-    assert eval(repr(node), {type(node).__name__: type(node)}) == node
 
 
 @EACH

@@ -163,18 +163,10 @@ def problems(tree: Node) -> list[str]:
     rng = np.random.default_rng(4)
     points = points_around(rng, tree, 200)
     field = oracle.signed(tree, points)
-    seen = gradients_at(tree.tape, points)
-    np.testing.assert_allclose(tree(points), seen[:, 0], atol=1e-6)
-    np.testing.assert_allclose(seen[:, 0], field.value, atol=1e-4)
-    np.testing.assert_allclose(
-        colors_at(tree.tape, points)[field.value > 1e-3], field.color[field.value > 1e-3], atol=2e-2
-    )
-    smooth = field.margin > 2e-3
-    expected = oracle.gradient(tree, points[smooth])
-    length = np.maximum(1.0, np.linalg.norm(expected, axis=1))
-    error = np.linalg.norm(seen[smooth, 1:] - expected, axis=1) / length
-    assert np.quantile(error, 0.98) < 1e-3
-    return broken_laws(tree, rng, "interval", "Lipschitz bound", "box", "file", "pickle")
+    sure = field.value > 1e-3
+    np.testing.assert_allclose(colors_at(tree.tape, points)[sure], field.color[sure], atol=2e-2)
+    laws = ("value", "gradient", "interval", "Lipschitz bound", "box", "file", "pickle")
+    return broken_laws(tree, rng, *laws)
 
 
 @pytest.mark.slow_cases("a cube and a bar")

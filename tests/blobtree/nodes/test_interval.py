@@ -6,23 +6,8 @@ from numpy.typing import ArrayLike
 
 from blobtree import Point, Ricci, Segment
 from blobtree.errors import InvalidPoints
-from tests.blobtree.tree_sets import FIRST_BATCHES, Batch
 
 BALL = Point((0, 0, 0), radius=1.0)
-
-
-@FIRST_BATCHES
-def test_no_value_in_a_box_lies_outside_its_interval(batch: Batch) -> None:
-    rng = np.random.default_rng(0)
-    for tree in batch.trees:
-        lower, upper = (corner.astype(np.float64) for corner in tree.support)
-        for _ in range(8):
-            a, b = np.sort(rng.uniform(lower, upper, (2, 3)), axis=0)
-            b = a + (b - a) * rng.uniform(0.02, 1.0)
-            smallest, largest = tree.interval(a, b)
-            values = tree(rng.uniform(a, b, (200, 3)))
-            assert smallest - 1e-6 <= values.min()
-            assert values.max() <= largest + 1e-6
 
 
 def test_intervals_of_one_point_are_close_and_exact_far_away() -> None:

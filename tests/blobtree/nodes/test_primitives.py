@@ -1,7 +1,6 @@
 """Primitives beyond points, segments and cones, and what follows from declared parameters."""
 
 import inspect
-import json
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import blobtree
 from blobtree import (
     ISO,
     Arc,
@@ -32,9 +30,7 @@ from blobtree import (
     TaperedBezier,
     Torus,
     Triangle,
-    from_json,
     polygonize,
-    to_json,
 )
 from blobtree.declare.parameters import Quantity, described, parameters_of
 from blobtree.errors import InvalidNode
@@ -44,7 +40,6 @@ from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.paths import moved, resized
 from blobtree.nodes.primitives import PROFILE, Leaf, Primitive, Profile
 from blobtree.tape.instruction_set import library
-from tests.blobtree.meshing.test_polygonize import assert_closed, assert_valid
 from tests.blobtree.trees import SOLIDS, points_around
 from tests.oracles import blobtree as oracle
 from tests.oracles import shapes
@@ -68,74 +63,10 @@ SHAPES: list[Node] = [
     Polygon(((-1, -1, 0.2), (1, -1, 0.2), (1, 1, 0.2), (0, -0.2, 0.2), (-1, 1, 0.2)), radius=0.2),
 ]
 WORM = Stroke(((-1, 0, 0), (0.1, 0.8, 0.3), (0.5, 0, -0.4), (1, 0.3, 0)), (0.1, 0.3, 0.2, 0.25))
-STEEP = Stroke(((-1, 0, 0), (-0.8, 0.1, 0.1), (0.5, 0, -0.4)), (0.05, 0.4, 0.1), width=0.2)
 GROUND = HalfSpace((0.1, 0.2, 0.3), (1, 2, 2), 0.8, radius=0.2)
 SQUARE: tuple[tuple[float, float, float], ...] = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0))
 NODES = [TORUS, DISC, BOX, ELLIPSOID, *SHAPES]
 EACH = pytest.mark.parametrize("node", NODES, ids=[type(node).__name__.lower() for node in NODES])
-
-KINDS = {kind: getattr(blobtree, kind) for kind in blobtree.__all__}
-
-PLACEMENTS = {
-    "as it is": lambda node: node,
-    "moved": lambda node: node.translate((0.3, -0.2, 0.5)),
-    "turned and scaled": lambda node: node.rotate((1, 2, 3), 50).scale(0.8),
-    "mirrored": lambda node: node.scale((-1, 1, 1)),
-    "stretched": lambda node: node.rotate((3, 1, 0), 20).scale((0.5, 1.0, -0.7)),
-    "twisted": lambda node: node.twist(40.0),
-    "grown": lambda node: node.offset(0.1),
-    "shrunk and scaled": lambda node: node.scale(2.0).offset(-0.1).translate((1, 0, 0)),
-}
-
-
-FURTHER = ("moved", "turned and scaled", "shrunk and scaled")
-
-
-@EACH
-@pytest.mark.parametrize(
-    "place",
-    [
-        pytest.param(place, id=name, marks=pytest.mark.slow if name in FURTHER else ())
-        for name, place in PLACEMENTS.items()
-    ],
-)
-def test_values_and_gradients_under_every_map_are_those_of_float64(node: Node, place: Any) -> None:
-    placed = place(node)
-    points = points_around(np.random.default_rng(2), placed, 300)
-    field = oracle.evaluate(placed, points)
-    np.testing.assert_allclose(placed(points), field.value, atol=1e-5)
-    smooth = field.margin > 1e-3
-    np.testing.assert_allclose(
-        placed.gradient(points[smooth]), oracle.gradient(placed, points[smooth]), atol=5e-4
-    )
-
-
-@pytest.mark.slow_cases("arc")
-@EACH
-def test_the_visible_radius_is_the_distance_of_the_surface_from_the_skeleton(node: Node) -> None:
-    mesh = polygonize(node, resolution=40)
-    assert_valid(mesh)
-    assert_closed(mesh)
-    np.testing.assert_allclose(oracle.value(node, mesh.vertices), ISO, atol=2e-5)
-    hits = node.raycast(np.tile([[5.0, 4.0, 3.0]], (50, 1)), mesh.vertices[:50] - np.array([5.0, 4.0, 3.0]))
-    assert hits.hit.mean() > 0.9
-    np.testing.assert_allclose(oracle.value(node, hits.positions[hits.hit]), ISO, atol=1e-3)
-
-
-@pytest.mark.slow_cases("steep")
-@pytest.mark.parametrize("node", [WORM, STEEP, GROUND], ids=["stroke", "steep", "half_space"])
-def test_strokes_and_half_spaces_are_those_of_float64(node: Leaf) -> None:
-    turned = node.rotate((1, 2, 3), 50).scale(0.8)
-    for placed in (node, turned, node.scale((1, 2, 1)), node.twist(30.0), node.offset(0.15)):
-        points = points_around(np.random.default_rng(2), placed, 300)
-        field = oracle.evaluate(placed, points)
-        np.testing.assert_allclose(placed(points), field.value, atol=1e-5)
-        smooth = field.margin > 1e-3
-        expected = oracle.gradient(placed, points[smooth])
-        np.testing.assert_allclose(placed.gradient(points[smooth]), expected, atol=5e-4)
-    assert from_json(to_json(node)) == node == eval(repr(node), KINDS)
-    shifted = moved(node, (1, 2, 3))
-    assert type(shifted) is type(node)
 
 
 def test_gradients_are_exact_beside_centres_of_curvature() -> None:
@@ -345,15 +276,6 @@ def test_every_skeleton_has_a_primitive_with_a_radius_and_a_color() -> None:
         assert quantities.count(Quantity.COLOR) == 1
         assert Quantity.RADIUS in quantities
         assert Quantity.POINT in quantities
-
-
-@EACH
-def test_files_hold_the_declared_parameters(node: Node) -> None:
-    (record,) = json.loads(to_json(node))["nodes"]
-    assert NODE_KINDS[record.pop("type")] is type(node)
-    shared = {"attributes", *PROFILE}
-    assert list(record) == [name for name in parameters_of(type(node)) if name not in shared]
-    assert from_json(to_json(node)) == node == eval(repr(node), KINDS)
 
 
 def test_a_point_keeps_its_place_on_the_tape() -> None:

@@ -14,12 +14,10 @@ from blobtree import (
     Box,
     Cone,
     ConvolutionSegment,
-    ConvolutionTriangle,
     Difference,
     Disc,
     Ellipsoid,
     Falloff,
-    Gyroid,
     HalfSpace,
     Node,
     Noise,
@@ -85,14 +83,6 @@ PRIMITIVES: dict[str, tuple[Any, tuple[float, float, float]]] = {
 
 SHARED = PRIMITIVES["ring"][0](falloff="soft_object") + PRIMITIVES["stroke"][0](falloff="staircase")
 SHARED.tape  # noqa: B018  (trees of library and custom kinds then share its kernels)
-
-DIRECT: tuple[Any, ...] = (
-    Superquadric((0, 0, 0), (0.8, 0.5, 0.6), 0.5, 0.8),
-    Gyroid((0, 0, 0), (3, 3, 3), period=2.0, thickness=0.4),
-    Noise((0, 0, 0), (3, 3, 3), wavelength=1.0),
-    ConvolutionSegment((-1, 0, 0), (1, 0, 0), radius=0.4, end_radius=0.3),
-    ConvolutionTriangle((-1, 0, 0), (1, 0, 0), (0, 1, 0), radius=0.3),
-)
 
 
 @EACH_FALLOFF
@@ -202,23 +192,6 @@ def test_the_width_of_a_stroke_is_in_proportion_to_its_radius() -> None:
         start, end = np.array([[0.0, radius * ratio, 0], [2.0 + (radius + 0.2) * ratio, 0, 0]])
         assert float(grown(start)) == pytest.approx(float(grown(end)), abs=1e-6)
         assert 0.0 < float(grown(start)) < 0.01
-
-
-@pytest.mark.slow_cases("2.0")
-@pytest.mark.parametrize("weight", [2.0, -1.5])
-def test_direct_fields_have_weights(weight: float) -> None:
-    for plain in DIRECT:
-        weighted: Any = replace(plain, weight=weight)
-        points = points_around(np.random.default_rng(10), plain, 300)
-        np.testing.assert_allclose(weighted(points), weight * plain(points), atol=2e-6)
-        np.testing.assert_allclose(weighted.gradient(points), weight * plain.gradient(points), atol=1e-5)
-        other = Point((0.3, 0, 0), radius=0.9)
-        tree = other + weighted
-        np.testing.assert_allclose(tree(points), oracle.value(tree, points), atol=1e-5)
-        mesh = polygonize(tree, resolution=24)
-        assert_closed(mesh)
-        away = mesh.vertices[np.linalg.norm(tree.gradient(mesh.vertices), axis=1) > 0.5]
-        np.testing.assert_allclose(oracle.value(tree, away), ISO, atol=2e-3)
 
 
 def test_a_falloff_of_what_has_no_distance_is_refused() -> None:

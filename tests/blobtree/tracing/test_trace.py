@@ -92,31 +92,32 @@ def test_a_capsule() -> None:
 RAYS, STEPS = 40, 1500
 
 
+def checked_hits(tree: Node, origins: Float64Array, directions: Float64Array) -> int:
+    """Compare rays with dense marching in float64; return the number of hits.
+
+    They end at the first sample inside or before, and on the surface.
+    """
+    reach = 2.0 * float(np.linalg.norm(tree.support[1] - tree.support[0]))
+    places = np.linspace(0.0, reach, STEPS)
+    samples = origins[:, None] + places[:, None] * directions[:, None]
+    inside = oracle.value(tree, samples.reshape(-1, 3)).reshape(len(origins), STEPS) > 0.5 + 1e-5
+    first = np.where(inside.any(axis=1), places[inside.argmax(axis=1)], np.inf)
+    seen = cast(tree, origins, directions)
+    tolerance = trace_tolerance(tree.support)
+    assert (seen <= first + 2.0 * tolerance).all()
+    hit = np.isfinite(seen)
+    points = origins[hit] + seen[hit, None] * directions[hit]
+    steepest = 1.0 + np.linalg.norm(oracle.gradient(tree, points), axis=1)
+    # two tolerances before the surface at most, or past it at an edge that the ray crosses
+    assert (np.abs(oracle.value(tree, points) - 0.5) <= 4.0 * tolerance * steepest + 2e-5).all()
+    return int(hit.sum())
+
+
 @pytest.mark.slow_cases("0")
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3))])
 def test_no_ray_passes_through_a_random_tree_unseen(seed: int) -> None:
-    """Against dense marching in float64: never later than the first sample inside, and on the surface."""
-    rng = np.random.default_rng(seed)
-    hits = 0
-    for tree in random_trees(seed=20 + seed, count=6, depth=3):
-        origins, directions = rays_through(rng, tree, RAYS)
-        reach = 2.0 * float(np.linalg.norm(tree.support[1] - tree.support[0]))
-        places = np.linspace(0.0, reach, STEPS)
-        samples = origins[:, None] + places[:, None] * directions[:, None]
-        field = oracle.value(tree, samples.reshape(-1, 3)).reshape(RAYS, STEPS)
-        first = np.where(
-            (field > 0.5 + 1e-5).any(axis=1), places[(field > 0.5 + 1e-5).argmax(axis=1)], np.inf
-        )
-        seen = cast(tree, origins, directions)
-        tolerance = trace_tolerance(tree.support)
-        assert (seen <= first + 2.0 * tolerance).all()
-        hit = np.isfinite(seen)
-        points = origins[hit] + seen[hit, None] * directions[hit]
-        steepest = 1.0 + np.linalg.norm(oracle.gradient(tree, points), axis=1)
-        # two tolerances before the surface at most, or past it at an edge that the ray crosses
-        assert (np.abs(oracle.value(tree, points) - 0.5) <= 4.0 * tolerance * steepest + 2e-5).all()
-        hits += int(hit.sum())
-    assert hits > 25
+    rng, trees = np.random.default_rng(seed), random_trees(seed=20 + seed, count=6, depth=3)
+    assert sum(checked_hits(tree, *rays_through(rng, tree, RAYS)) for tree in trees) > 25
 
 
 @pytest.mark.slow_cases("400.0")
@@ -125,20 +126,7 @@ def test_no_ray_hits_where_only_the_bound_is_steep(degrees: float) -> None:
     """Behind nested warps bounds exceed slopes by far; each hit is on the surface all the same."""
     rod = Segment((0.3, 0, -0.5), (0.3, 0, 0.5), radius=0.3)
     tree = rod.twist(degrees).rotate((1, 0, 0), 90).twist(degrees)
-    origins, directions = rays_through(np.random.default_rng(0), tree, 400)
-    reach = 2.0 * float(np.linalg.norm(tree.support[1] - tree.support[0]))
-    places = np.linspace(0.0, reach, STEPS)
-    samples = origins[:, None] + places[:, None] * directions[:, None]
-    inside = oracle.value(tree, samples.reshape(-1, 3)).reshape(400, STEPS) > 0.5 + 1e-5
-    first = np.where(inside.any(axis=1), places[inside.argmax(axis=1)], np.inf)
-    seen = cast(tree, origins, directions)
-    tolerance = trace_tolerance(tree.support)
-    assert (seen <= first + 2.0 * tolerance).all()
-    hit = np.isfinite(seen)
-    points = origins[hit] + seen[hit, None] * directions[hit]
-    steepest = 1.0 + np.linalg.norm(oracle.gradient(tree, points), axis=1)
-    assert (np.abs(oracle.value(tree, points) - 0.5) <= 4.0 * tolerance * steepest).all()
-    assert hit.sum() > 35
+    assert checked_hits(tree, *rays_through(np.random.default_rng(0), tree, 400)) > 35
 
 
 def test_raycast_returns_position_normal_and_color() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_cdt
 
-from blobtree import ISO, Box, Node, Point
+from blobtree import ISO, Box, Node, Point, Repeat
 from blobtree._typing import Int32Array
 from blobtree.cells.refine_kernels import SURELY_INSIDE
 from blobtree.sized_cache import SizedCache
@@ -80,17 +80,21 @@ def test_pruned_tapes_hold_no_other_kinds_than_the_whole_one(tree: Node) -> None
         assert max([count for code, _, count, _ in part if code == PUSH], default=-1) < whole.registers
 
 
-@NAMES
-def test_empty_layers_match_the_chessboard_distance(name: str | int) -> None:
-    """Against SciPy's chessboard distance to the nearest block that is not empty."""
-    blocks = table(tracing_cells(TREES[name], device="cpu"))
+def assert_empty_layers(blocks: Int32Array) -> None:
+    """Try empty blocks against SciPy's chessboard distance to the nearest block that is not empty."""
     empty = blocks <= EMPTY
     layers = EMPTY - blocks[empty]
     if empty.all():
         return
     expected = distance_transform_cdt(empty, metric="chessboard")[empty] - 1
     np.testing.assert_array_equal(layers, np.minimum(expected, MAX_LAYERS))
-    assert layers.max() > 0
+
+
+@NAMES
+def test_empty_layers_match_the_chessboard_distance(name: str | int) -> None:
+    blocks = table(tracing_cells(TREES[name], device="cpu"))
+    assert_empty_layers(blocks)
+    assert blocks.min() < EMPTY
 
 
 def test_blocks_cover_the_box_of_the_tree() -> None:
@@ -100,6 +104,28 @@ def test_blocks_cover_the_box_of_the_tree() -> None:
     extent = cells.block_size * np.array(cells.counts)
     assert (cells.lower + extent >= upper - 1e-6).all()
     assert (extent - (upper - lower) <= cells.block_size * 1.001).all()
+
+
+@pytest.mark.parametrize("step", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
+def test_a_long_box_that_holds_much_has_more_blocks(step: tuple[float, float, float]) -> None:
+    row = Repeat(Box((0, 0, 0), (0.6, 0.6, 0.6), radius=0), step, 1000, "union")
+    cells = tracing_cells(row, device="cpu")
+    blocks, along = table(cells), int(np.argmax(step))
+    assert cells.counts[along] > 1000
+    assert_empty_layers(blocks)
+    places = np.random.default_rng(0).integers(0, 1000, 2000)
+    origins = places[:, None] * np.array(step) + 5.0 * np.roll(step, 1)
+    hits = row.raycast(origins, np.tile(-np.roll(step, 1), (2000, 1)))
+    np.testing.assert_allclose(hits.distances, 4.7, atol=1e-3)
+
+
+def test_a_flat_box_that_holds_much_has_as_many_blocks_as_a_cube_at_most() -> None:
+    ball = Point((0, 0, 0), radius=0.3)
+    counts = tracing_cells(Repeat(Repeat(ball, (1, 0, 0), 70), (0, 1, 0), 70), device="cpu").counts
+    assert BLOCKS_ALONG < counts[0] == counts[1]
+    assert np.prod(counts) <= BLOCKS_ALONG**3
+    few = Repeat(Repeat(ball, (1, 0, 0), 20), (0, 1, 0), 20)
+    assert tracing_cells(few, device="cpu").counts[0] == BLOCKS_ALONG
 
 
 def test_all_blocks_of_an_empty_tree_are_empty() -> None:

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from blobtree import Node
+from blobtree.conformance.samples import Rng
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.tape.model import gradients_at
 from decals.rendering.context import Context
@@ -17,17 +19,20 @@ AGREEMENT = 1e-5
 """Largest relative difference of values and gradients, absolute below 1."""
 
 
+def assert_same_in_both_languages(context: Context, node: Node, rng: Rng) -> None:
+    points = points_around(rng, node, 200)
+    smooth = oracle.signed(node, points).margin > AWAY
+    seen = read_tape(context, node, GRADIENT, points, kinds=Kinds.of(node.tape))
+    expected = gradients_at(node.tape, points)
+    assert np.abs(seen[:, 0] - expected[:, 0]).max() <= AGREEMENT
+    slopes = np.maximum(1.0, np.linalg.norm(expected[:, 1:], axis=1))
+    error = np.linalg.norm(seen[:, 1:] - expected[:, 1:], axis=1) / slopes
+    assert error[smooth].max(initial=0.0) <= AGREEMENT
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("tag", NODE_KINDS)
 def test_a_class_of_nodes_is_the_same_in_both_languages(context: Context, tag: str) -> None:
     rng = np.random.default_rng(3)
     for _ in range(3):
-        node = sample(NODE_KINDS[tag], rng)
-        points = points_around(rng, node, 200)
-        smooth = oracle.signed(node, points).margin > AWAY
-        seen = read_tape(context, node, GRADIENT, points, kinds=Kinds.of(node.tape))
-        expected = gradients_at(node.tape, points)
-        assert np.abs(seen[:, 0] - expected[:, 0]).max() <= AGREEMENT
-        slopes = np.maximum(1.0, np.linalg.norm(expected[:, 1:], axis=1))
-        error = np.linalg.norm(seen[:, 1:] - expected[:, 1:], axis=1) / slopes
-        assert error[smooth].max(initial=0.0) <= AGREEMENT
+        assert_same_in_both_languages(context, sample(NODE_KINDS[tag], rng), rng)

@@ -5,15 +5,8 @@ import pytest
 
 from blobtree import Box, Cone, Cylinder, Node, Prism
 from blobtree.tape.instruction_set import library
-from blobtree.tape.model import gradients_at
 from decals.rendering.context import Context
-from decals.rendering.tracing_shader import Kinds
-from tests.blobtree.trees import points_around
-from tests.conformance import AWAY
-from tests.decals.glsl.tapes import GRADIENT
-from tests.decals.glsl.test_conformance import AGREEMENT
-from tests.decals.glsl.test_tapes import read_tape
-from tests.oracles import blobtree as oracle
+from tests.decals.glsl.test_conformance import assert_same_in_both_languages
 
 STAR = ((0, 0, 0), (1, 0.4, 0), (2, 0, 0), (1, 1.5, 0))
 
@@ -33,12 +26,4 @@ def test_the_solids_use_every_sharp_field() -> None:
 
 @pytest.mark.parametrize("solid", SOLIDS)
 def test_fields_are_the_same_in_both_languages(context: Context, solid: Node) -> None:
-    rng = np.random.default_rng(3)
-    points = points_around(rng, solid, 200)
-    smooth = oracle.signed(solid, points).margin > AWAY
-    seen = read_tape(context, solid, GRADIENT, points, kinds=Kinds.of(solid.tape))
-    expected = gradients_at(solid.tape, points)
-    assert np.abs(seen[:, 0] - expected[:, 0]).max() <= AGREEMENT
-    slopes = np.maximum(1.0, np.linalg.norm(expected[:, 1:], axis=1))
-    error = np.linalg.norm(seen[:, 1:] - expected[:, 1:], axis=1) / slopes
-    assert error[smooth].max() <= AGREEMENT
+    assert_same_in_both_languages(context, solid, np.random.default_rng(3))

@@ -1,9 +1,13 @@
 """Whole tapes in Warp and GLSL, and pictures of them."""
 
+from itertools import cycle
+
 import numpy as np
 import pytest
 
-from blobtree import Box, Node, Point, Polyline, Segment, SolidContact, Superquadric, from_sdf
+from blobtree import Box, GradientBlend, Node, Point, Polyline, Segment, SolidContact, Superquadric, from_sdf
+from blobtree.nodes import blends as blend_kinds
+from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.tape.instruction_set import library
 from blobtree.tape.model import colors_at, gradients_at
 from blobtree.tracing.trace import trace
@@ -12,7 +16,6 @@ from decals.rendering.options import RenderOptions
 from decals.rendering.renderer import Renderer
 from decals.rendering.tracing_shader import Kinds, tracing_shader
 from decals.scenes.camera import Camera
-from tests.blobtree.nodes.test_blends import NODES as BLEND_NODES
 from tests.blobtree.nodes.test_deformations import STRONG
 from tests.blobtree.nodes.test_gradient_blends import CORE as GRADIENT_BLENDS
 from tests.blobtree.nodes.test_gradient_blends import LIBRARY as LIBRARY_GRADIENT_BLENDS
@@ -29,6 +32,7 @@ from tests.blobtree.trees import (
     points_around,
     random_trees,
 )
+from tests.conformance import sample
 from tests.decals.glsl.arguments import Array, units
 from tests.decals.glsl.functions import ALL_KINDS, run_program
 from tests.decals.glsl.tapes import (
@@ -55,6 +59,12 @@ CONTACT_TREES = random_trees(seed=36, count=6, depth=2, more=CONTACTS)
 NEGATIVE = Point((0, 0, 0), radius=1.0) + Polyline(
     ((-1, 0, 0), (0, 1, 0), (1, 0, 0)), radius=0.4, weight=-0.5
 )
+BALLS = cycle([Point((0.8 * x, 0.1 * x, 0.0), radius=0.7) for x in range(3)])
+BLEND_NODES = [
+    sample(kind, np.random.default_rng(38), lambda _: next(BALLS))
+    for kind in NODE_KINDS.values()
+    if kind.__module__ == blend_kinds.__name__ and kind is not GradientBlend
+]
 BLEND_TREES = [*BLEND_NODES, NEGATIVE, *random_trees(seed=37, count=4, depth=2, more=BLENDED)]
 LIBRARY_TREES = random_trees(seed=34, count=10, more=SHAPES)
 
@@ -219,7 +229,11 @@ MODELS = {
 @pytest.mark.slow_cases("a twist in a twist", "a volume", "random trees side by side")
 @pytest.mark.parametrize("name", MODELS)
 def test_a_traced_picture_is_what_warp_traces(renderer: Renderer, name: str) -> None:
-    tree, (width, height) = MODELS[name], (160, 120)
+    assert_traced_alike(renderer, MODELS[name])
+
+
+def assert_traced_alike(renderer: Renderer, tree: Node) -> None:
+    width, height = 160, 120
     camera = Camera.framing(tree.support, direction=(0.3, 0.5, 1.0), aspect=width / height)
     buffers = renderer.buffers(View((Model(tree),), camera), RenderOptions(size=(width, height)))
     x, y = np.meshgrid(np.arange(width) + 0.5, height - np.arange(height) - 0.5)

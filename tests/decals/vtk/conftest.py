@@ -8,6 +8,7 @@ import pyvista as pv
 
 import decals.vtk  # noqa: F401  (it registers `plotter.decals`)
 from blobtree.graphics import install_advice, missing_gl_libraries
+from tests.decals.vtk.scenes import both
 
 if TYPE_CHECKING:
 
@@ -56,3 +57,11 @@ def plotter() -> Iterator[Factory]:
     yield make
     for one in made:
         one.close()
+
+
+@pytest.fixture
+def pl(plotter: Factory) -> Plotter:
+    """Make a plotter with the scene of a tree and a mesh."""
+    made = plotter()
+    made.decals.add_scene(both(), camera=True)
+    return made

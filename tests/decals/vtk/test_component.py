@@ -17,7 +17,7 @@ from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.scene import DecalImage
 from decals.vtk.component import DecalsComponent
 from tests.decals.shapes import View
-from tests.decals.vtk.conftest import Factory
+from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import both, shot
 
 TREE = Point((0, 0, 0), radius=1.0)
@@ -152,9 +152,7 @@ WIPES = ["clear", "clear_actors"]
 
 
 @pytest.mark.parametrize("wipe", WIPES)
-def test_a_plotter_that_was_cleared_shows_what_was_added_since_alone(plotter: Factory, wipe: str) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_a_plotter_that_was_cleared_shows_what_was_added_since_alone(pl: Plotter, wipe: str) -> None:
     shot(pl)
     getattr(pl, wipe)()
     empty = shot(pl)
@@ -169,9 +167,7 @@ def test_a_plotter_that_was_cleared_shows_what_was_added_since_alone(plotter: Fa
 
 @pytest.mark.slow_cases("clear_actors")
 @pytest.mark.parametrize("wipe", WIPES)
-def test_a_cleared_plotter_takes_the_same_scene_again(plotter: Factory, wipe: str) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_a_cleared_plotter_takes_the_same_scene_again(pl: Plotter, wipe: str) -> None:
     first = shot(pl)
     getattr(pl, wipe)()
     assert (shot(pl) != first).any()
@@ -246,9 +242,7 @@ def test_an_actor_of_the_name_that_we_had_is_the_users(plotter: Factory) -> None
     assert len(pl.decals.scene.objects) == 1
 
 
-def test_a_closed_plotter_says_so(plotter: Factory) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_a_closed_plotter_says_so(pl: Plotter) -> None:
     shot(pl)
     component, subplot = pl.decals, pl.decals.subplot
     pl.close()

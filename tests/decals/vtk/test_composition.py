@@ -233,9 +233,7 @@ def test_resizing_there_and_back(plotter: Factory) -> None:
     np.testing.assert_array_equal(shot(pl), first)
 
 
-def test_a_larger_screenshot_is_drawn_larger(plotter: Factory) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_a_larger_screenshot_is_drawn_larger(pl: Plotter) -> None:
     shot(pl)
     large = np.asarray(pl.screenshot(None, return_img=True, scale=2))[..., :3].astype(int)
     assert large.shape == (240, 320, 3)
@@ -279,9 +277,7 @@ def test_moving_the_whole_scene(plotter: Factory) -> None:
 
 
 @pytest.mark.parametrize("scale", [0.5, 0.26])
-def test_a_coarse_frame_is_nearly_the_fine_one(plotter: Factory, scale: float) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_a_coarse_frame_is_nearly_the_fine_one(pl: Plotter, scale: float) -> None:
     fine = shot(pl)
     pl.decals.subplot.draw_scale = scale
     coarse = shot(pl)

@@ -13,7 +13,7 @@ from decals.rendering.options import RenderOptions
 from decals.rendering.viewpoint import Rectangle
 from decals.vtk.frame import texels_of
 from tests.decals.vtk.conftest import Factory, Plotter
-from tests.decals.vtk.scenes import both, shot
+from tests.decals.vtk.scenes import shot
 from tests.decals.vtk.test_composition import BALL, blue, lying_behind, place, with_plane
 from tests.oracles.raster import edges
 
@@ -80,10 +80,8 @@ def test_half_of_a_ball_behind_a_plane_is_picked_where_it_is_seen(plotter: Facto
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.6, 0.125])
-def test_nothing_of_ours_hides_us(plotter: Factory, scale: float) -> None:
+def test_nothing_of_ours_hides_us(pl: Plotter, scale: float) -> None:
     """At grazing angles and in coarse frames, where depths in a pixel differ much."""
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
     subplot = pl.decals.subplot
     subplot.draw_scale = scale
     shot(pl)
@@ -136,10 +134,8 @@ def test_nothing_is_hidden_where_what_was_drawn_is_forgotten(plotter: Factory) -
     assert subplot.at(80, 60) is None
 
 
-def test_a_frame_that_is_ready_but_was_not_shown_hides_nothing(plotter: Factory) -> None:
+def test_a_frame_that_is_ready_but_was_not_shown_hides_nothing(pl: Plotter) -> None:
     """What is compared is what was put into VTK's frame, not what will be."""
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
     subplot = pl.decals.subplot
     subplot.draw_scale = 0.2
     shot(pl)

@@ -122,11 +122,7 @@ def test_a_renderer_of_its_own_outlives_windows(plotter: Factory) -> None:
         np.testing.assert_array_equal(own.render(both(), RenderOptions(size=(64, 48))), first)
 
 
-def test_a_failing_scene_says_so_once_and_recovers(
-    plotter: Factory, capfd: pytest.CaptureFixture[str]
-) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_a_failing_scene_says_so_once_and_recovers(pl: Plotter, capfd: pytest.CaptureFixture[str]) -> None:
     first = shot(pl)
     bad = Picture(np.zeros((4, 4), np.uint8))
     pl.decals.scene = View(both().objects, both().camera, both().decals, (bad,))
@@ -145,9 +141,7 @@ def test_impossible_scales_are_refused(plotter: Factory, scale: float) -> None:
     assert subplot.draw_scale == 1.0
 
 
-def test_clearing_a_plotter_and_filling_it_again(plotter: Factory) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_clearing_a_plotter_and_filling_it_again(pl: Plotter) -> None:
     first = shot(pl)
     pl.decals.clear()
     assert (shot(pl) == shot(pl)[0, 0]).all()
@@ -165,9 +159,7 @@ def test_a_plotter_without_decals_has_nothing_of_ours(plotter: Factory) -> None:
     assert "decals" not in pl.renderer.actors
 
 
-def test_no_frame_leaves_an_error_of_opengl(plotter: Factory) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_no_frame_leaves_an_error_of_opengl(pl: Plotter) -> None:
     pl.decals.apply(pl.add_mesh(pv.Sphere(), show_edges=True))
     for width in (160, 170, 150):
         pl.window_size = width, 120
@@ -177,10 +169,8 @@ def test_no_frame_leaves_an_error_of_opengl(plotter: Factory) -> None:
         assert pl.decals.subplot.renderer.context.gl.error == "GL_NO_ERROR"
 
 
-def test_a_window_that_is_given_another_context_shows_the_same(plotter: Factory) -> None:
+def test_a_window_that_is_given_another_context_shows_the_same(pl: Plotter) -> None:
     """Qt makes one anew when a widget is docked elsewhere; here the window is ended and drawn again."""
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
     pl.decals.apply(pl.add_mesh(pv.Sphere(center=(0, 0, 1), radius=0.4)))
     first = shot(pl)
     for _ in range(2):

@@ -140,9 +140,7 @@ def test_the_batch_renderer_gives_the_same_pixels_under_the_same_lights(plotter:
     assert np.abs(seen - batch[..., :3])[inside].max() <= 1
 
 
-def test_lights_that_change_are_seen_and_the_studios_do_not_care(plotter: Factory) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_lights_that_change_are_seen_and_the_studios_do_not_care(pl: Plotter) -> None:
     assert pl.decals.lights is Lights.SCENE
     studio = shot(pl)
     pl.renderer.lights[1].intensity *= 2
@@ -170,9 +168,7 @@ def test_each_subplot_has_lights_of_its_own(plotter: Factory) -> None:
     assert (seen[:, :120] != seen[:, 120:]).any()
 
 
-def test_more_lights_than_there_is_room_for_are_said_once(plotter: Factory) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_more_lights_than_there_is_room_for_are_said_once(pl: Plotter) -> None:
     pl.decals.lights = "vtk"
     for _ in range(40):
         pl.add_light(pv.Light(position=(1, 1, 1), intensity=0.01))

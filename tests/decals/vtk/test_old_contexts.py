@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.decals.vtk.conftest import Factory
-from tests.decals.vtk.scenes import both, shot
+from tests.decals.vtk.conftest import Factory, Plotter
+from tests.decals.vtk.scenes import shot
 
 SCRIPT = """
 import os
@@ -55,9 +55,7 @@ def in_a_process(folder: Path, *entries: str, **environment: str) -> subprocess.
 
 
 @pytest.mark.slow
-def test_a_context_of_version_3_2_that_can_do_more(plotter: Factory, tmp_path: Path) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_a_context_of_version_3_2_that_can_do_more(pl: Plotter, tmp_path: Path) -> None:
     expected = shot(pl)
     entries = ("fragment", "compute")
     done = in_a_process(tmp_path, *entries, MESA_GL_VERSION_OVERRIDE="3.2")

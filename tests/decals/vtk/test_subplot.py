@@ -61,9 +61,7 @@ def test_a_camera_in_front_of_the_whole_scene_shows_nothing(plotter: Factory) ->
     np.testing.assert_array_equal(shot(pl), before)
 
 
-def test_one_place_in_the_window(plotter: Factory) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_one_place_in_the_window(pl: Plotter) -> None:
     subplot = pl.decals.subplot
     shot(pl)
     with subplot.current():
@@ -88,16 +86,12 @@ def test_one_place_in_the_window(plotter: Factory) -> None:
     assert subplot.at(5, 120) is None
 
 
-def test_before_the_first_frame_there_is_no_graphics(plotter: Factory) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_before_the_first_frame_there_is_no_graphics(pl: Plotter) -> None:
     with pytest.raises(NoGraphics, match="render it first"):
         pl.decals.subplot.at(80, 60)
 
 
-def test_what_did_not_change_is_not_drawn_again(plotter: Factory) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_what_did_not_change_is_not_drawn_again(pl: Plotter) -> None:
     subplot = pl.decals.subplot
     first = shot(pl)
     np.testing.assert_array_equal(shot(pl), first)
@@ -125,18 +119,14 @@ def test_what_did_not_change_is_not_drawn_again(plotter: Factory) -> None:
         lambda pl: setattr(pl, "window_size", (150, 120)),
     ],
 )
-def test_whatever_changes_is_drawn(plotter: Factory, change: Callable[[Plotter], None]) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_whatever_changes_is_drawn(pl: Plotter, change: Callable[[Plotter], None]) -> None:
     first = shot(pl)
     change(pl)
     seen = shot(pl)
     assert seen.shape != first.shape or (seen != first).any()
 
 
-def test_a_hidden_scene_takes_no_work_and_keeps_no_former_state(plotter: Factory) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_a_hidden_scene_takes_no_work_and_keeps_no_former_state(pl: Plotter) -> None:
     subplot = pl.decals.subplot
     first = shot(pl)
     subplot.actor.visibility = False
@@ -159,9 +149,7 @@ def test_a_hidden_scene_takes_no_work_and_keeps_no_former_state(plotter: Factory
     np.testing.assert_array_equal(shot(pl), first)
 
 
-def test_the_stages_renderer_may_draw_other_things_in_between(plotter: Factory) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_the_stages_renderer_may_draw_other_things_in_between(pl: Plotter) -> None:
     subplot = pl.decals.subplot
     first = shot(pl)
     other = both().replace(objects=both().objects[:1])
@@ -226,9 +214,7 @@ def test_a_frame_prepared_part_by_part_is_the_one_drawn_at_once(plotter: Factory
     assert not subplot.drawn_fraction
 
 
-def test_what_changes_while_a_frame_is_prepared_is_in_it(plotter: Factory) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_what_changes_while_a_frame_is_prepared_is_in_it(pl: Plotter) -> None:
     subplot = pl.decals.subplot
     subplot.draw_scale = 0.5
     shot(pl)
@@ -354,17 +340,13 @@ def test_what_a_stage_cannot_be_set_to_is_said_at_once(plotter: Factory, name: s
 
 @pytest.mark.ordinary_cases("place0", "place4")
 @pytest.mark.parametrize("place", [(float("nan"), 0), (0, float("inf")), ("x", 0), (0, None), ([1], 2)])
-def test_a_place_that_is_none_is_refused(plotter: Factory, place: tuple[float, float]) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_a_place_that_is_none_is_refused(pl: Plotter, place: tuple[float, float]) -> None:
     shot(pl)
     with pytest.raises(InvalidPoints, match=r"[xy]: expected a finite number"):
         pl.decals.subplot.at(*place)
 
 
-def test_places_within_a_pixel_are_that_pixel_and_far_ones_none(plotter: Factory) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_places_within_a_pixel_are_that_pixel_and_far_ones_none(pl: Plotter) -> None:
     shot(pl)
     subplot = pl.decals.subplot
     whole, part = subplot.at(80, 60), subplot.at(80.9, 60.2)
@@ -375,9 +357,7 @@ def test_places_within_a_pixel_are_that_pixel_and_far_ones_none(plotter: Factory
     assert subplot.at(-0.1, 60) is None
 
 
-def test_more_samples_than_targets_can_have_are_refused(plotter: Factory) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
+def test_more_samples_than_targets_can_have_are_refused(pl: Plotter) -> None:
     shot(pl)
     subplot = pl.decals.subplot
     with subplot.current(), pytest.raises(InvalidScene, match="take fewer a pixel"):

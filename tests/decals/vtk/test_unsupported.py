@@ -94,10 +94,8 @@ class View:
     ],
 )
 def test_views_that_draw_in_a_browser_say_what_they_leave_out(
-    plotter: Factory, name: str, words: str | None
+    pl: Plotter, name: str, words: str | None
 ) -> None:
-    pl = plotter()
-    pl.decals.add_scene(both(), camera=True)
     view = type(name, (View,), {})()
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
