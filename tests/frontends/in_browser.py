@@ -1062,7 +1062,7 @@ async def guess(browser: Page, lab_page: LabPage) -> None:
     value = (question.low + question.high) / 2
     await browser.get_by_label(question.label).fill(f"{value:g}")
     await browser.get_by_role("button", name="See", exact=True).click()
-    await browser.get_by_text(f"you guessed {shown(np.array(value))}, it is ").wait_for()
+    await browser.get_by_text(f"you guessed {shown(np.array(value))}, it is now ").wait_for()
     await browser.locator(".plot").first.wait_for()
     assert await browser.locator(".scale path").count() in (1, 2)
 
