@@ -54,7 +54,7 @@
     },
     pointerdown(event) {
       const kind = trame.state.get("placing");
-      if (kind && event.isPrimary) {
+      if (kind && event.isPrimary && !event.target.closest("button")) {
         this.leave(event);
         trame.trigger("add_at", [kind, this.place(event)]);
       } else if (event.isPrimary) event.currentTarget.fingers = event.currentTarget.placed = null;

@@ -311,18 +311,19 @@ async def hovers(browser: Page, window: EditWindow) -> None:
 
 
 async def placed(browser: Page, window: EditWindow) -> None:
-    """A kind is placed under the mouse, which shows its shape before; Escape leaves it; one undo takes it."""
+    """A kind is placed under the mouse, which shows its shape before; it can be left; one undo takes it."""
     labels, (_, at) = window.session.labels, next(Driver(window).visible())
     lines = browser.locator(".hovered line")
-    for leave in (True, False):
+    leave = browser.get_by_role("button", name="Leave", exact=True)
+    for left in (partial(browser.keyboard.press, "Escape"), leave.click, None):
         await browser.get_by_role("button", name="Add", exact=True).click()
         await browser.get_by_label("search in primitives").fill("cone")
         await browser.get_by_title("place a Cone by the mouse").click()
         await browser.get_by_text("Click where the Cone goes").wait_for()
         await point(browser, window.plotter, at)
         await until_more(lines, 12)
-        if leave:
-            await browser.keyboard.press("Escape")
+        if left:
+            await left()
             await browser.get_by_text("Click where the Cone goes").wait_for(state="detached")
         else:
             await drag(browser, window.plotter, at)
