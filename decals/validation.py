@@ -55,13 +55,13 @@ def member(
 
     With ``among``, only these members are accepted.
     """
+    if isinstance(value, kind) and value in (among or kind):
+        return value
     words = {one: one.value if isinstance(one.value, str) else one.name.lower() for one in among or kind}
     if isinstance(value, str):
         for one, word in words.items():
             if value.strip().lower() in (word, one.name.lower()):
                 return one
-    if isinstance(value, kind) and value in words:
-        return value
     choices = ", ".join(map(repr, words.values()))
     raise error(f"{name}: expected one of {choices}, got {describe(value)}")
 

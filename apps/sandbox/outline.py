@@ -90,11 +90,6 @@ class Row:
     picture: str = ""
     type: str = ""
 
-    @property
-    def icon(self) -> str:
-        """Icon of the class, else of the kind, else ""."""
-        return icon(self.type, self.kind)
-
 
 def icon(name: str, kind: str) -> str:
     """Return the icon of a class, else of a kind of rows, else ""."""
@@ -118,7 +113,7 @@ def outline(document: Document) -> list[dict[str, Any]]:
     for number, image in enumerate(document.images):
         name = Path(image.source).name
         rows.append(Row(f"image {number}", name, "image", 0, picture=picture(image)))
-    return [{**vars(row), "icon": row.icon} for row in rows]
+    return [{**vars(row), "icon": icon(row.type, row.kind)} for row in rows]
 
 
 _pictures: WeakKeyDictionary[DecalImage, dict[int, str]] = WeakKeyDictionary()

@@ -27,6 +27,9 @@ MAX_DRAWN, MAX_DRAWN_BY_PROCESSORS = 1 << 24, 1 << 22
 """Pixels that are drawn at most, by a card and by processors; larger views show them enlarged. A pixel takes
 290 bytes, of the program's own memory where processors draw."""
 
+FRAME_SECONDS = 0.045
+"""Duration of a frame while something moves, at most: a page shows it after about as long again."""
+
 CAMERA_SECONDS = 1.0 / 30.0
 """Time between two looks at a camera that may move."""
 
@@ -72,6 +75,7 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
         self._drawn_size: tuple[int, ...] = ()
         super().__init__(window.plotter, **options)
         self.server.add_protocol_to_configure(self._take_over)
+        window.frames.budget.target = FRAME_SECONDS
 
     def _take_over(self, protocol: Any) -> None:
         """Draw here what trame's own delivery would draw."""

@@ -233,12 +233,11 @@ def _layers(empty: BoolArray) -> Int32Array:
     digits = np.zeros((MAX_LAYERS.bit_length(), *words.shape), np.uint64)
     for number in range(1, MAX_LAYERS + 1):
         words = words & ((words << lowest) | lowest) & ((words >> lowest) | highest)
-        for axis in (0, 1):
-            along = np.moveaxis(words, axis, 0)
-            eroded = along.copy()
-            eroded[1:] &= along[:-1]
-            eroded[:-1] &= along[1:]
-            words = np.moveaxis(eroded, 0, axis)
+        for after, before in ((np.s_[1:], np.s_[:-1]), (np.s_[:, 1:], np.s_[:, :-1])):
+            eroded = words.copy()
+            eroded[after] &= words[before]
+            eroded[before] &= words[after]
+            words = eroded
         if not words.any():
             break
         for place, digit in enumerate(digits):
