@@ -7,6 +7,7 @@ import pytest
 
 from blobtree import Box, GradientBlend, Node, Point, Polyline, Segment, SolidContact, Superquadric, from_sdf
 from blobtree.nodes import blends as blend_kinds
+from blobtree.nodes import rounds
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.tape.instruction_set import library
 from blobtree.tape.model import colors_at, gradients_at
@@ -63,7 +64,7 @@ BALLS = cycle([Point((0.8 * x, 0.1 * x, 0.0), radius=0.7) for x in range(3)])
 BLEND_NODES = [
     sample(kind, np.random.default_rng(38), lambda _: next(BALLS))
     for kind in NODE_KINDS.values()
-    if kind.__module__ == blend_kinds.__name__ and kind is not GradientBlend
+    if kind.__module__ in (blend_kinds.__name__, rounds.__name__) and kind is not GradientBlend
 ]
 BLEND_TREES = [*BLEND_NODES, NEGATIVE, *random_trees(seed=37, count=4, depth=2, more=BLENDED)]
 LIBRARY_TREES = random_trees(seed=34, count=10, more=SHAPES)
