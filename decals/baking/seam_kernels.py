@@ -4,6 +4,8 @@
 # mypy: ignore-errors
 # (kernel code is Python only in form: its names have Warp types)
 
+from typing import Any
+
 import warp as wp
 
 from blobtree.kernels import KERNEL_OPTIONS
@@ -85,6 +87,21 @@ def mixed_weights(places: wp.array(dtype=wp.vec2d)):
     return weights
 
 
+@wp.func
+def merged(slopes: Any, texels: wp.array(dtype=wp.int32)):
+    """Return derivatives by eight texels, where those of a texel that comes twice lie at its first place."""
+    sums = slopes
+    for k in range(1, 8):
+        at = wp.int32(k)
+        for before in range(k):
+            if at == k and texels[before] == texels[k]:
+                at = before
+        if at != k:
+            sums[at] = sums[at] + sums[k]
+            sums[k] = sums[k] - sums[k]
+    return sums
+
+
 @wp.kernel
 def find_closest(
     first: wp.int32,
@@ -95,7 +112,7 @@ def find_closest(
     size: wp.int64,
     keys: wp.array2d(dtype=wp.int64),
 ):
-    """Write which point of a run is closest to each of its texels, after its distance and side."""
+    """Write for each texel of a run the closest point, as a number that has its distance and side first."""
     run = first + wp.tid()
     for k in range(8):
         texel = texels[index[run, k]]
@@ -150,14 +167,15 @@ def linearize(
             gaps[row] = seen[0] - seen[1]
             if slopes.shape[0] > 0:
                 for k in range(8):
-                    value = weights[k]
                     if srgb:
                         at = index[run, k]
-                        value = value * decoded_slope64(levels[at], light[at])
-                        value = value / decoded_slope64(seen[k / 4], mixed[k / 4])
+                        weights[k] = weights[k] * decoded_slope64(levels[at], light[at])
+                        weights[k] = weights[k] / decoded_slope64(seen[k / 4], mixed[k / 4])
                     if k >= 4:
-                        value = -value
-                    slopes[row, k] = value
+                        weights[k] = -weights[k]
+                weights = merged(weights, index[run])
+                for k in range(8):
+                    slopes[row, k] = weights[k]
 
 
 @wp.func
@@ -322,6 +340,9 @@ def settle_point(
         slopes[k] = slopes[k] / slope(sides[side], lights[side], srgb)
         if side == 1:
             slopes[k] = -slopes[k]
+    slopes = merged(slopes, columns)
+    for k in range(8):
+        level = levels[columns[k]]
         down = slopes[k] * gap > 0.0
         if (down and level > 0.0) or (not down and level < 1.0):
             power += slopes[k] * slopes[k]

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from blobtree._typing import BoolArray, Float64Array, Int32Array, Int64Array, UInt8Array
 from blobtree.device import array_on, launch
-from blobtree.errors import Cancelled
+from blobtree.progress import check_cancelled, reporting
 from decals.baking.meshes import BakeMesh
 from decals.baking.seam_kernels import (
     POINT_BITS,
@@ -37,7 +37,7 @@ STEP = 0.15
 """Largest distance in texels between points of a seam; more lie where the texels that are mixed change."""
 
 COARSE = 4
-"""The least squares begin with one of so many points, and take those that differ besides."""
+"""The least squares begin with one of so many points. Each step adds the points that still differ."""
 
 SAME_PLACE = 1e-3
 """Distance in texels up to which two corners lie at one place."""
@@ -120,7 +120,7 @@ class Seams:
 def _crossings(begin: Float64Array, end: Float64Array) -> tuple[Int64Array, Float64Array]:
     """Return rows and shares of lines ``float64[k, 4]`` where one of the coordinates is whole, and both ends.
 
-    They come row after row, from the begin to the end.
+    They are sorted by row, and in each row by share.
     """
     rows = np.arange(len(begin))
     numbers, shares = [rows, rows], [np.zeros(len(rows)), np.ones(len(rows))]
@@ -176,7 +176,7 @@ def _pairs_of_several(twins: Int64Array, begin: Int64Array, end: Int64Array) -> 
 
 
 def bilinear_texels(places: Float64Array, tiles: Int64Array, size: int) -> Int64Array:
-    """Return the four texels that are mixed at places, ``int64[n, 4]``."""
+    """Return the four texels that are mixed at places, ``int64[n, 4]``; at edges, two are the same."""
     corner = np.floor(places - 0.5)
     columns = np.clip(corner[:, :1] + [0, 1, 0, 1], 0, size - 1).astype(np.int64)
     rows = np.clip(corner[:, 1:] + [0, 0, 1, 1], 0, size - 1).astype(np.int64)
@@ -264,10 +264,10 @@ def match_seams(
     def matched(channel: int) -> UInt8Array:
         def tell(share: float) -> None:
             done[channel] = share
-            if ended.is_set():
-                raise Cancelled("cancelled")
+            check_cancelled("matching seams")
 
-        levels = _Match(texels[:, channel], runs, smooth[:, channel], srgb[channel], tell).solved()
+        with reporting(cancel=ended.is_set):  # launches look after it too
+            levels = _Match(texels[:, channel], runs, smooth[:, channel], srgb[channel], tell).solved()
         return np.rint(255.0 * levels).astype(np.uint8)
 
     with ThreadPoolExecutor() as pool:  # channels have no level in common

@@ -160,8 +160,7 @@ def test_both_sides_of_seams_agree_where_the_surface_has_no_step(tmp_path: Path,
 
     steps = seam_steps(node, colors_at)
     assert len(steps) > 500
-    assert np.quantile(steps, 0.999) <= 4.0
-    assert steps.max() <= 8.0  # single points, mostly dark ones
+    assert steps.max() <= 4.0
     assert node.texture is not None
     assert node.texture.std() > 10
 
@@ -203,6 +202,24 @@ def test_random_texels_along_a_seam_come_to_agree_and_no_others_change(seed: int
     assert changed.any()
     assert np.isin(np.flatnonzero(changed), used).all()
     assert len(used) < 0.2 * SIZE**2
+
+
+@pytest.mark.parametrize("wide", [False, True])
+def test_seams_at_edges_of_textures_mix_a_texel_twice(wide: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("decals.baking.seam_system.MAX_WIDTH", 0 if wide else 64)
+    rng = np.random.default_rng(3)
+    along = np.linspace(0.0, SIZE, 10 * SIZE)
+    places = np.stack([np.column_stack([np.full_like(along, edge), along]) for edge in (0.0, SIZE)], axis=1)
+    smoother = np.sin(np.arange(SIZE)[:, None] / 5.0 + rng.uniform(0, 6, (1, SIZE))) * 60 + 128
+    image = smoother.reshape(1, SIZE, SIZE, 1).astype(np.uint8)
+    before = image.astype(int)
+    match(image, places, np.zeros((len(places), 2), np.int64), np.ones((len(places), 1), bool), [True])
+    sides = image[0, :, [0, -1], 0].astype(int)
+    assert np.abs(sides[0] - sides[1]).max() <= 4
+    assert np.abs(before[0, :, 0, 0] - before[0, :, -1, 0]).max() > 20
+    means = before[0, :, [0, -1], 0].mean(axis=0)
+    assert np.abs(sides - means).max() < 40  # both sides meet between
+    assert np.array_equal(image[0, :, 1:-1, 0], before[0, :, 1:-1, 0])
 
 
 def test_channels_are_matched_each_by_itself_and_wide_parts_as_narrow_ones(
