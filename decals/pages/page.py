@@ -15,6 +15,7 @@ from typing import Any
 from PIL import Image
 
 from blobtree.colors import ColorLike
+from blobtree.errors import InvalidResolution
 from blobtree.files import write_atomically
 from blobtree.immutable import Immutable
 from blobtree.progress import Progress, reporting
@@ -33,7 +34,7 @@ from decals.scenes.objects import SceneObject
 from decals.scenes.pose import PosedScene
 from decals.scenes.scene import Scene
 from decals.surfaces.convert import Model
-from decals.validation import MAX_STIFFNESS, checked_path, is_unicode, one_of
+from decals.validation import MAX_STIFFNESS, checked_path, is_unicode, one_of, whole_number
 
 MODULES = (
     *("vectors", "packing", "texels", "index", "decals", "history", "camera", "link", "graphics", "painter"),
@@ -184,6 +185,8 @@ def page(
     title = _text("title", title, names or "Decals")
     alt = _text("alt", alt, f"{names} with {len(given.decals)} decals")
     truth("controls", controls, InvalidScene)
+    if resolution is not None:
+        whole_number("resolution", resolution, 1, None, InvalidResolution)
     one_of("surface", surface, SURFACES, InvalidScene)
     sky = drawing.background if background is None else as_background(background)
     with reporting(progress) as report:

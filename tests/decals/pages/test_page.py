@@ -10,12 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+import pyvista as pv
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from PIL import Image
 
 import decals
 from blobtree import Point, Segment
+from blobtree.errors import InvalidResolution
 from decals.errors import InvalidScene, TooMuchData
 from decals.index import DecalIndex
 from decals.index.index import has_nested, index_on
@@ -145,6 +147,10 @@ def test_what_pages_do_not_have_is_refused(scene: Scene, monkeypatch: pytest.Mon
         page(scene, mapping="walked")
     with pytest.raises(InvalidScene, match="expected an object to show"):
         page(scene.replace(objects=(), decals=scene.decals.replace(receivers=None)))
+    mesh = decals.cover(pv.Cube().triangulate(), count=3)
+    for resolution in (0, 2.5, "x"):
+        with pytest.raises(InvalidResolution, match="resolution: expected"):
+            page(mesh, resolution=resolution)  # type: ignore[arg-type]
     with pytest.raises(InvalidScene, match="title: expected a text"):
         page(scene, title=3)  # type: ignore[arg-type]
     monkeypatch.setattr(contents, "MAX_DECALS", 19)
