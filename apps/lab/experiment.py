@@ -104,7 +104,7 @@ class Experiment:
     relaxed
         The relaxation of a lesson on scattering, else None.
     plane
-        The slice, if there is one: the probe lies on it, and maps show it in place of what the camera sees.
+        The slice, or None. The probe lies on the slice, and maps show the slice in place of the surface.
     cache
         Values that several formulas share, with the points they hold at.
     """

@@ -361,7 +361,7 @@ def measured(
 ) -> Results:
     """Return values, plots and the verdict of a lesson for one state of its scene.
 
-    Plots, and the readings of the probe, are those on the slice if there is one.
+    With a slice, plots and readings of the probe are taken on it.
     """
     scope, at = Scope.at_probe(replace(experiment, plane=None)), Scope.at_probe(experiment)
     plots = [

@@ -349,6 +349,16 @@ def remainder(a: wp.float32, b: wp.float32) -> wp.float32:
 
 
 @wp.func
+def remainder_range(a: wp.vec2, b: wp.vec2) -> wp.vec2:
+    """Return the range of the complement over ranges of a and b; it is linear in max(a, 1) and in b."""
+    c0 = remainder(a[0], b[0])
+    c1 = remainder(a[0], b[1])
+    c2 = remainder(a[1], b[0])
+    c3 = remainder(a[1], b[1])
+    return wp.vec2(wp.min(wp.min(c0, c1), wp.min(c2, c3)), wp.max(wp.max(c0, c1), wp.max(c2, c3)))
+
+
+@wp.func
 def smooth_difference_width(total: wp.float32, b: wp.float32, width: wp.float32) -> wp.float32:
     """Return k with 1/k = 1/w + 2/s + 2/b: it vanishes with the tool, and with the solid."""
     if total <= 0.0 or b <= 0.0:
@@ -406,16 +416,13 @@ class SmoothDifference(Operator):
 
     @formula
     def interval(a: wp.vec2, b: wp.vec2, width: wp.float32) -> wp.vec2:
-        """F rises with a and c and falls with k; c is linear in max(a, 1) and in b."""
-        c0 = remainder(a[0], b[0])
-        c1 = remainder(a[0], b[1])
-        c2 = remainder(a[1], b[0])
-        c3 = remainder(a[1], b[1])
-        low = wp.min(wp.min(c0, c1), wp.min(c2, c3))
-        high = wp.max(wp.max(c0, c1), wp.max(c2, c3))
-        narrow = smooth_difference_width(a[0] + low, b[0], width)
-        wide = smooth_difference_width(a[1] + high, b[1], width)
-        return widened_range(wp.max(smooth_minimum(a[0], low, wide), 0.0), smooth_minimum(a[1], high, narrow))
+        """F rises with a and c and falls with k."""
+        c = remainder_range(a, b)
+        narrow = smooth_difference_width(a[0] + c[0], b[0], width)
+        wide = smooth_difference_width(a[1] + c[1], b[1], width)
+        return widened_range(
+            wp.max(smooth_minimum(a[0], c[0], wide), 0.0), smooth_minimum(a[1], c[1], narrow)
+        )
 
     @formula
     def keeps(a: wp.vec2, b: wp.vec2, width: wp.float32) -> wp.int32:

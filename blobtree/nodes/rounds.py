@@ -23,6 +23,7 @@ from blobtree.nodes.blends import (
     controllable_partials,
     controllable_slope,
     remainder,
+    remainder_range,
 )
 from blobtree.nodes.node import Node
 from blobtree.nodes.operator import Operator
@@ -189,14 +190,9 @@ class _ArcDifference(Operator):
 
     @formula
     def interval(a: wp.vec2, b: wp.vec2, left: wp.float32, right: wp.float32) -> wp.vec2:
-        """F rises with a and c; c is linear in max(a, 1) and in b."""
-        c0 = remainder(a[0], b[0])
-        c1 = remainder(a[0], b[1])
-        c2 = remainder(a[1], b[0])
-        c3 = remainder(a[1], b[1])
-        low = wp.min(wp.min(c0, c1), wp.min(c2, c3))
-        high = wp.max(wp.max(c0, c1), wp.max(c2, c3))
-        return widened_range(arc_cut(a[0], low, left, right)[0], arc_cut(a[1], high, left, right)[0])
+        """F rises with a and c."""
+        c = remainder_range(a, b)
+        return widened_range(arc_cut(a[0], c[0], left, right)[0], arc_cut(a[1], c[1], left, right)[0])
 
     @formula
     def keeps(a: wp.vec2, b: wp.vec2, left: wp.float32, right: wp.float32) -> wp.int32:

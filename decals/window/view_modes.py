@@ -35,7 +35,7 @@ SHOWN_FIELD = 0.002
 """Least field of trees that the slice shows."""
 
 RIM_FIELD = 0.5
-"""Least field of an image; there is none outside."""
+"""Field of a decal at the rim of its image; it is larger inside, and there is no field outside."""
 
 FIELD_LOOK = {"scalars": "field", "cmap": "cividis", "clim": (0.0, 1.0), "lighting": False}
 """How a slice shows a field."""
