@@ -25,7 +25,7 @@ import numpy as np
 import blobtree
 import decals
 from blobtree import Point, Segment, Torus
-from decals.editing.commands import MoveDecals
+from decals.editing import MoveDecals
 from decals.window import EditWindow
 from tests.decals.editing.scenes import one, scene
 

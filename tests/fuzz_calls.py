@@ -18,7 +18,7 @@ from blobtree.nodes.paths import primitive_paths
 from blobtree.progress import reporting
 from decals import editing, rendering, scattering
 from decals.editing import EditSession
-from decals.images.load import image_pixels
+from decals.images import image_pixels
 from decals.index import DecalIndex
 from decals.rendering import RenderOptions
 from decals.scenes.objects import bounds_of

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from blobtree import Point
-from decals.scattering.relaxation import Relaxation
-from decals.surfaces.implicit import ImplicitSurface
-from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.surface import Surface
+from decals import Relaxation
+from decals.surfaces import ImplicitSurface, MeshSurface, Surface
 from tests.decals.meshes import sphere
 
 DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.gpu)]

@@ -15,9 +15,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 import blobtree
-from blobtree import Box, Disc, Node, Point, Segment, Shell, Torus
+from blobtree import ISO, Box, Disc, Node, Point, Segment, Shell, Torus
 from blobtree._typing import BoolArray, Float64Array, IndexArray, Int32Array, Int64Array
-from blobtree.formulas.falloff import ISO
 from blobtree.tape.model import gradients_at
 
 PRIMITIVES = ("ball", "hair", "rod", "ring", "plate")

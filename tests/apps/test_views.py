@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from blobtree import Point
+from decals import MeshObject, TreeObject
 from decals.apps.models.shapes import torus_knot
 from decals.apps.views import View, frame, parse_view
 from decals.errors import InvalidInput
 from decals.scenes.camera import PRESETS, UPRIGHT
-from decals.scenes.objects import MeshObject, SceneObject, TreeObject
+from decals.scenes.objects import SceneObject
 
 
 def _knot(scale: float = 1.0, shift: float = 0.0) -> MeshObject:

@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from decals import MeshObject
 from decals.editing import KEYS, EditSession
 from decals.editing.key_bindings import CAMERA
-from decals.scenes.objects import MeshObject
 from decals.vtk.subplot import FrameStatus
 from decals.window import EditWindow
 from tests.bench.command_line import bench_parser, write

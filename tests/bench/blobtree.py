@@ -27,11 +27,10 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from blobtree import RIM, Mesh, Node, Point, Polygonizer, Ricci, Sum, Union
+from blobtree import RIM, Mesh, Node, Point, Polygonizer, Ricci, Sum, Tape, Union
 from blobtree.cells.grid import BRANCHING, aligned_grid
 from blobtree.cells.sparse_cells import SparseCells, build_cells
 from blobtree.meshing.mesh import DeviceMesh, download, extract_mesh
-from blobtree.tape.tape import Tape
 from blobtree.tracing.trace import trace
 from tests.bench.command_line import bench_parser, show, write
 from tests.bench.marching_cubes import marching_cubes

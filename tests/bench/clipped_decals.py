@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from decals.model import Decals
+from decals import Decals
 
 Float64Array = NDArray[np.float64]
 IndexArray = NDArray[np.intp]

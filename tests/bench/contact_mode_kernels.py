@@ -5,10 +5,11 @@
 
 import warp as wp
 
+from decals import Contact
 from decals.field.contact import add_push, contact_complement, contact_push, rim_distance
 from decals.field.elastic import bump_of, join_bumps, plane_push, pushed_along_ray, square_of_push
 from decals.field.radial import RIM_SQUARED, plane_distance, power
-from decals.record import Contact, balls_nested, field_complement
+from decals.record import balls_nested, field_complement
 
 wp.set_module_options({"enable_backward": False})
 

@@ -18,10 +18,10 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
+from decals import Contact
+from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS
+from decals.rendering import Renderer, RenderOptions
 from decals.rendering.decal_pass import DecalPass
-from decals.rendering.options import RenderOptions
-from decals.rendering.renderer import Renderer
 from tests.bench.contact_mode_kernels import places_in_sets
 from tests.bench.scenes import bench_scene
 

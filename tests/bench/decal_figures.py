@@ -8,15 +8,10 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from decals.field.mapping import ImageMapping
-from decals.index.editor import DecalEditor
-from decals.index.index import DecalIndex
-from decals.model import Decals
-from decals.record import Contact
-from decals.rendering import Renderer
+from decals import Contact, Decals, ImageMapping, Scene
+from decals.index import DecalEditor, DecalIndex
+from decals.rendering import Renderer, RenderOptions
 from decals.rendering.decal_data import DecalData
-from decals.rendering.options import RenderOptions
-from decals.scenes.scene import Scene
 from tests.bench.scenes import bench_scene
 from tests.decals.field import log_maps, test_contact, test_radial
 from tests.decals.field.kernels import slopes_of_rays

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from blobtree.formulas.falloff import RIM
+from blobtree import RIM
+from decals import Decals
+from decals.index import DecalEditor
 from decals.index.build import build_index
-from decals.index.editor import DecalEditor
 from decals.index.index import index_on
-from decals.model import Decals
 
 Figures = dict[str, float]
 COUNTS = {"100k": 100_000, "1m": 1_000_000}

@@ -19,23 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from decals import DecalImage, Decals, ImageMapping, MeshObject, Relaxation, Scene, evaluate
 from decals.apps.models.figure_14 import even_decals
 from decals.apps.models.samples import axes_of, sample
 from decals.apps.models.shapes import torus_knot
 from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
-from decals.field.evaluate import evaluate
-from decals.field.mapping import ImageMapping
-from decals.field.walks import Walks
-from decals.index.index import DecalIndex
-from decals.model import Decals
-from decals.rendering import Renderer
-from decals.rendering.options import RenderOptions
+from decals.field import Walks
+from decals.index import DecalIndex
+from decals.rendering import Renderer, RenderOptions
 from decals.scattering.neighbors import FacingTree, ideal_spacing, spacing_of_distances
-from decals.scattering.relaxation import Relaxation
-from decals.scenes.objects import MeshObject
-from decals.scenes.scene import DecalImage, Scene
-from decals.surfaces.mesh import MeshSurface
+from decals.surfaces import MeshSurface
 from tests.bench import cellular_textures, implicit_uvs
 from tests.bench.cellular_textures import Cells
 from tests.bench.clipped_decals import ClippedMesh, MeshDecals

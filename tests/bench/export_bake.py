@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 import blobtree
 import decals
 from decals.images.texels import encode_srgb
-from decals.rendering import Lighting
-from decals.rendering.context import Context
+from decals.rendering import Context, Lighting
 from tests.decals.baking.evaluated import beside_evaluated
 from tests.decals.baking.glb import ReadMesh, bilinear, linear, read_glb
 from tests.decals.baking.seam_steps import seam_steps

@@ -10,8 +10,8 @@ import numpy as np
 import pyvista as pv
 
 import decals
+from decals import Scene
 from decals.pages import page
-from decals.scenes.scene import Scene
 from tests.decals.pages.viewer_scripts import VIEWER
 from tests.frontends import in_html_page as browser
 

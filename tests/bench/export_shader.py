@@ -5,12 +5,10 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
-from decals import shader
+from decals import Contact, Scene, shader
 from decals.hosts.code import VERSIONS, code_of
-from decals.record import Contact
-from decals.rendering.context import Context
+from decals.rendering import Context
 from decals.rendering.decal_library import Form
-from decals.scenes.scene import Scene
 from tests.decals.hosts import moderngl_host, wgpu_host
 from tests.decals.hosts.agreement import equal_pixels, wrong_values
 from tests.decals.hosts.form_scenes import name_of, points_on, scene_of

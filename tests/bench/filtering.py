@@ -8,8 +8,8 @@ import pyvista as pv
 
 import decals
 from blobtree import Point
+from decals import Scene
 from decals.rendering import Renderer, RenderOptions
-from decals.scenes.scene import Scene
 from tests.decals.rendering.flat_views import FLAT, expected_picture, flat_view, peak_ratio
 
 Figures = dict[str, float]

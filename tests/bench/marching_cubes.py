@@ -14,12 +14,12 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from blobtree import ISO
 from blobtree.cells.block_kernels import Lattices, child_number, child_offset, find_block, grid_point
 from blobtree.cells.grid import BRANCHING, CHILDREN
 from blobtree.cells.scan import arange, exclusive_scan
 from blobtree.cells.sparse_cells import SparseCells, child_grid
 from blobtree.device import launch
-from blobtree.formulas.falloff import ISO
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.meshing.dual_kernels import (
     SAMPLES,

@@ -22,8 +22,7 @@ from blobtree import Mesh, Node, polygonize
 from decals import Camera, Contact, DecalImage, Decals, Scene, TreeObject, evaluate, scatter
 from decals.apps.gallery.helpers import CLAY, sample_camera
 from decals.apps.models.shapes import spheres
-from decals.rendering import Renderer
-from decals.rendering.options import RenderOptions
+from decals.rendering import Renderer, RenderOptions
 from tests.oracles import decals as oracle
 
 COUNT = 500

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from decals import Decals
 from decals.apps.models.figure_14 import even_decals
 from decals.apps.models.samples import sample
 from decals.errors import InvalidInput
-from decals.index.index import DecalIndex
-from decals.model import Decals
+from decals.index import DecalIndex
 from decals.record import NEIGHBOR_REACH
 from decals.scattering.orientation import tangents
 from tests.oracles.contact import RIM, complements, contact_complement

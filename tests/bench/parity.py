@@ -17,10 +17,9 @@ import warp as wp
 from numpy.typing import NDArray
 
 from blobtree.device import start_warp
-from decals.field.mapping import ImageMapping
+from decals import Contact, Decals, ImageMapping
 from decals.index.index import index_on
-from decals.model import Decals
-from decals.record import NEIGHBOR_REACH, Contact
+from decals.record import NEIGHBOR_REACH
 from tests.bench import parity_kernels as kernels
 from tests.bench.command_line import bench_parser, write
 from tests.oracles.contact import RIM, rim_distance

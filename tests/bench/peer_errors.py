@@ -17,11 +17,9 @@ import pyvista as pv
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from decals.field.evaluate import evaluate
-from decals.field.mapping import ImageMapping
-from decals.field.walks import Walks
-from decals.model import Decals
-from decals.surfaces.mesh import MeshSurface
+from decals import Decals, ImageMapping, evaluate
+from decals.field import Walks
+from decals.surfaces import MeshSurface
 from tests.bench import implicit_uvs
 from tests.bench.exponential_maps import ExponentialMaps
 from tests.decals.field import log_maps as analytic

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from decals.field.evaluate import evaluate
-from decals.model import Decals
+from decals import Decals, evaluate
 from tests.bench.cellular_textures import HEIGHT
 from tests.bench.clipped_decals import box_coordinates
 from tests.bench.implicit_uvs import nearest

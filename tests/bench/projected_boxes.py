@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from decals.model import Decals
+from decals import Decals
 from tests.bench.clipped_decals import MeshDecals, box_coordinates
 
 Float64Array = NDArray[np.float64]

@@ -19,17 +19,12 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.field.mapping import ImageMapping
-from decals.record import Contact
+from decals import Contact, ImageMapping, MeshObject, Scene
+from decals.rendering import Context, Renderer, RenderOptions
 from decals.rendering import context as context_module
-from decals.rendering.context import Context
 from decals.rendering.mesh import mesh_rows, split_mesh
-from decals.rendering.options import RenderOptions
 from decals.rendering.pixel_pass import CameraBuffer, PassBackend, PixelPass, pass_source
-from decals.rendering.renderer import Renderer
 from decals.rendering.viewpoint import Tile
-from decals.scenes.objects import MeshObject
-from decals.scenes.scene import Scene
 from decals.shaders import Source, compose
 
 Arrays = dict[str, NDArray[Any]]

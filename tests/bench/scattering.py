@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
+from decals import Relaxation
 from decals.errors import InvalidInput, InvalidScattering
 from decals.scattering.neighbors import FacingTree, Spacing, ideal_spacing, spacing_of_distances
-from decals.scattering.relaxation import Relaxation
-from decals.surfaces.mesh import MeshSurface
+from decals.surfaces import MeshSurface
 from tests.bench.command_line import bench_parser, write
 from tests.bench.scattering_models import MODELS, TREES, meshed, surfaces_of
 from tests.bench.scattering_packages import PACKAGES

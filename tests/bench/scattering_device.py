@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from decals.scattering.relaxation import Relaxation
+from decals import Relaxation
 from tests.bench.command_line import bench_parser, write
 from tests.bench.scattering_models import MODELS, surfaces_of, write_meshes
 

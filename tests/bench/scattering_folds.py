@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from decals import Relaxation
 from decals.model import FACING_LIMIT
 from decals.scattering.neighbors import NEIGHBOR_REACH, FacingTree
-from decals.scattering.relaxation import Relaxation
 from tests.bench.scattering_models import MODELS, surfaces_of
 
 BEND_RADIUS = 1.5

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from blobtree import Node, Point, polygonize
-from decals.surfaces.implicit import ImplicitSurface
-from decals.surfaces.mesh import MeshSurface
+from decals.surfaces import ImplicitSurface, MeshSurface
 
 
 def bumpy() -> Node:

@@ -2,13 +2,10 @@
 
 import numpy as np
 
+from decals import Camera, DecalImage, Decals, Scene, scatter
 from decals.apps.models.figure_14 import even_decals
 from decals.apps.models.samples import axes_of, sample
 from decals.apps.views import frame, parse_view
-from decals.model import Decals
-from decals.scattering.scatter import scatter
-from decals.scenes.camera import Camera
-from decals.scenes.scene import DecalImage, Scene
 
 
 def bench_scene(

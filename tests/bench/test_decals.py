@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from decals.record import Contact
+from decals import Contact
 from tests.bench import contact_modes, decal_index, decals
 from tests.bench import decal_figures as bench
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from decals.model import Decals
+from decals import Decals
 from tests.bench import decal_peers, peer_errors, peer_pictures, projected_boxes
 from tests.bench.cellular_textures import RINGS, SECTORS, Cells, cover, domes, simulate
 from tests.bench.clipped_decals import MeshDecals

@@ -11,8 +11,7 @@ import warp as wp
 from decals import Contact, DecalImage, MeshObject, Scene
 from decals.apps.models.figure_14 import even_decals
 from decals.errors import NoGraphics
-from decals.rendering.context import Context
-from decals.rendering.options import RenderOptions
+from decals.rendering import Context, RenderOptions
 from tests.bench import record, replay, tracing
 from tests.bench.scenes import in_layers
 from tests.decals.rendering.pictures import view_of

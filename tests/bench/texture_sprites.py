@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from decals.model import Decals
+from decals import Decals
 from tests.bench.clipped_decals import box_coordinates
 from tests.bench.paper_octree import LEAF_DECALS, MAX_DEPTH, Octree
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from blobtree import Sum
 from blobtree.tracing.trace import trace_arrays
 from blobtree.tracing.tree_cells import tracing_cells
-from decals.scenes.camera import Camera
+from decals import Camera
 from tests.bench.blobtree import UNIT_BOX, blobs, median_time
 from tests.bench.command_line import bench_parser, show, write
 

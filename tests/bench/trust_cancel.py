@@ -25,8 +25,8 @@ import pyvista as pv
 
 import decals
 from blobtree import Point, Progress, Sum, polygonize
+from decals import bake
 from decals.baking.atlas import unwrap
-from decals.baking.bake import bake
 from decals.baking.meshes import bake_mesh
 from decals.editing import RelaxDecals
 from decals.window import EditWindow

@@ -21,11 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree import Node
-from decals.rendering.context import Context
-from decals.rendering.options import RenderOptions
+from decals import Camera
+from decals.rendering import Context, Renderer, RenderOptions
 from decals.rendering.pixel_pass import PassBackend
-from decals.rendering.renderer import Renderer
-from decals.scenes.camera import Camera
 from tests.bench.command_line import bench_parser, show, write
 from tests.blobtree.csg_trees import visible_tree
 from tests.blobtree.trees import triple

@@ -5,8 +5,9 @@ from numpy.typing import NDArray
 
 import blobtree
 import decals
+from decals import MeshObject, TreeObject
 from decals.scenes.cover import fitting_camera
-from decals.scenes.objects import MeshObject, SceneObject, TreeObject
+from decals.scenes.objects import SceneObject
 from tests.decals.meshes import icosphere
 
 TARGETS = {"framing_faults": "0"}

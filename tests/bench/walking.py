@@ -8,8 +8,8 @@ import pyvista as pv
 
 import decals
 from decals import ImageMapping, Scene
+from decals.field import Walks
 from decals.field.walk import GRID
-from decals.field.walks import Walks
 from decals.rendering import Renderer, RenderOptions
 from tests.decals.field import unfolding
 from tests.decals.field.unfolding import Patch, rms

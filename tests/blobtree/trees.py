@@ -40,6 +40,7 @@ from blobtree import (
     Polygon,
     Polyline,
     Press,
+    Primitive,
     QuadraticBezier,
     RatedUnion,
     RDifference,
@@ -66,7 +67,7 @@ from blobtree import (
 )
 from blobtree.conformance.samples import points_around as points_around
 from blobtree.errors import InvalidNode
-from blobtree.nodes.primitives import Falling, Leaf, Primitive, Profile
+from blobtree.nodes.primitives import Falling, Leaf, Profile
 from blobtree.validation import Vector
 
 BUILT_IN_FALLOFFS = [name for name, falloff in FALLOFF_NAMES.items() if not falloff.digest]

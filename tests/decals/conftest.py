@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from decals.errors import NoGraphics
-from decals.rendering.context import Context
-from decals.rendering.renderer import Renderer
+from decals.rendering import Context, Renderer
 
 
 @pytest.fixture(scope="session")

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import decals
+from decals import Decals
 from decals.field.jacobian import folds_of, stretch_of
-from decals.model import Decals
 from tests.decals.fault_models import Arrays
 
 STRETCHED = 5.0

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from decals.surfaces.mesh import MeshSurface
+from decals.surfaces import MeshSurface
 
 
 def icosphere(level: int) -> Any:

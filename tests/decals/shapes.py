@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from decals.model import Decals
-from decals.scenes.camera import Camera, Vector
+from decals import Camera, Decals
+from decals.scenes.camera import Vector
 
 
 @dataclass(frozen=True, eq=False)

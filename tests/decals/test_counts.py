@@ -13,7 +13,7 @@ import decals
 from decals.apps.commands.bench import parse_counts
 from decals.apps.commands.options import parse_whole
 from decals.apps.experiments import contact_peers, cost, evenness
-from decals.editing.scatter_commands import ScatterDecals
+from decals.editing import ScatterDecals
 from decals.errors import ImplicitDecalsError, InvalidInput
 from decals.experiments import LatinHypercube, Seeds, Sobol
 from decals.options import options_of

@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import decals
-from blobtree import Mesh, Point, Segment, polygonize
+from blobtree import Mesh, Point, Segment, content_hash, polygonize
 from blobtree.errors import InvalidInput
 from blobtree.identity import Value
-from decals import Camera, DecalImage, DecalMaterial, Decals, MeshObject, Scene, TreeObject, content_hash
+from decals import Camera, DecalImage, DecalMaterial, Decals, MeshObject, Scene, TreeObject
 from decals.rendering import Background, Drawing, Environment, Light, Lighting
 from decals.rendering.environment import Panorama
 from decals.rendering.prefiltering import prefiltered

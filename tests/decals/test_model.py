@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from blobtree.formulas.falloff import RIM
+from blobtree import RIM
+from decals import Decals, Interaction
 from decals.errors import ImplicitDecalsError, InvalidDecals
-from decals.model import LAYER_LIMIT, MAX_COORDINATE, MIN_RADIUS, RECORD, Decals, Interaction
+from decals.model import LAYER_LIMIT, MAX_COORDINATE, MIN_RADIUS, RECORD
 
 
 def some(count: int = 5, seed: int = 0, **changes: Any) -> Any:

@@ -24,7 +24,7 @@ from blobtree.transpile.builtins import BUILTINS
 from decals import load_scene
 from decals.apps.cli import app
 from decals.experiments import Results
-from decals.rendering.options import Drawing, RenderOptions
+from decals.rendering import Drawing, RenderOptions
 from tests.decals.baking.glb import need
 from tests.docs import published
 

@@ -25,13 +25,12 @@ from playwright.async_api import CDPSession, Page, Playwright, async_playwright
 
 import decals
 from blobtree import Mirror, Point, Segment, polygonize
+from decals import Scene
 from decals.apps.gallery.environments import bodies, evening
 from decals.apps.gallery.materials import lacquer, rivets
 from decals.editing import Actions, EditSession, PointerTools
-from decals.rendering import Environment, Light
-from decals.rendering.lights import Lighting
+from decals.rendering import Environment, Light, Lighting
 from decals.scenes.objects import SceneObject
-from decals.scenes.scene import Scene
 from decals.surfaces import BaseColor, BaseTexture
 from tests.frontends.browsing import ERRORS, browser_path, firefox_path
 

@@ -16,8 +16,7 @@ import pyvista as pv
 from nbclient import NotebookClient
 from PIL import Image
 
-from decals import render
-from decals.scenes.scene import Scene
+from decals import Scene, render
 from tests.frontends import page as docs
 from tests.frontends.browsing import LOSS, PATIENCE, drag, drawn, opened, seen
 

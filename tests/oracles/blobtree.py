@@ -41,11 +41,13 @@ from blobtree import (
     Noise,
     NoiseWarp,
     Offset,
+    Operator,
     Point,
     PolarRepeat,
     Polygon,
     Polyline,
     Press,
+    Primitive,
     RatedUnion,
     Repeat,
     Ricci,
@@ -72,8 +74,7 @@ from blobtree import (
 from blobtree.declare.claims import Support
 from blobtree.declare.parameters import Quantity, parameters_of
 from blobtree.nodes.deformations import Deformation
-from blobtree.nodes.operator import Operator
-from blobtree.nodes.primitives import Leaf, Primitive, Profile
+from blobtree.nodes.primitives import Leaf, Profile
 from blobtree.nodes.tree import Macro
 from blobtree.nodes.values import parameter_values
 from tests.oracles import (

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from blobtree import Mesh, Node
+from blobtree import ISO, Mesh, Node
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array, UInt8Array
-from blobtree.formulas.falloff import ISO
 from blobtree.meshing.bisection_kernels import HALVINGS
 from blobtree.meshing.patches import EDGES, FLIPPED, KNOTTED_FACE, PATCH_COUNT, PATCH_OF_EDGE
 from blobtree.tape.evaluate_kernels import STALLED

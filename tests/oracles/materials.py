@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.rendering.lights import Light
+from decals.rendering import Light
 from decals.rendering.studio import GROUND, LAMPS, SKY
 
 Array = NDArray[np.float64]

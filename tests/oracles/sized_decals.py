@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float64Array
-from decals.model import Decals
+from decals import Decals
 
 FACING_LIMIT = -0.25
 

@@ -17,12 +17,11 @@ import pytest
 
 import blobtree
 from blobtree import Point
+from decals import DecalImage
 from decals.apps.cli import run
 from decals.apps.commands import sandbox as sandbox_module
 from decals.apps.jupyter import TOKEN
-from decals.editing import recovery_path
-from decals.editing.commands import AddImage
-from decals.scenes.scene import DecalImage
+from decals.editing import AddImage, recovery_path
 from decals.window import EditWindow
 
 Capture = pytest.CaptureFixture[str]

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import decals
+from decals import MeshObject
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.lab import Lab, Results, measured
 from decals.apps.lab.lesson import LESSONS, load_lesson, load_lessons, shown
@@ -21,7 +22,6 @@ from decals.apps.lab.plots import LEFT, TOP
 from decals.editing.slicing import SlicePlane
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.meshes import as_polydata
-from decals.scenes.objects import MeshObject
 from decals.window import EditWindow
 from tests.apps.lab.answers import ANSWERS, STEP
 from tests.decals.editing.scenes import digest

@@ -7,16 +7,13 @@ import numpy as np
 import pytest
 
 from blobtree import Point, SolidContact
+from decals import Camera, Contact, Decals, MeshObject, TreeObject
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Points, Relaxed, Scope
 from decals.apps.lab.formulas import parse
 from decals.apps.lab.measures import MEASURES
 from decals.editing.slicing import SlicePlane
 from decals.field.rules import PictureRules
-from decals.model import Decals
-from decals.record import Contact
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject, TreeObject
 from tests.oracles.contact import RIM, contact_field, falloff
 
 CORNERS = np.array([[-3, -3, 0], [3, -3, 0], [3, 3, 0], [-3, 3, 0]], np.float32)

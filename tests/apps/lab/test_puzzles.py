@@ -9,7 +9,7 @@ from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.lab import Lab
 from decals.apps.lab.lesson import LESSONS, Lesson, load_lesson
 from decals.apps.lab.puzzles import Puzzle, read_puzzle
-from decals.editing.commands import MoveDecals
+from decals.editing import MoveDecals
 from decals.window import EditWindow
 from tests.apps.lab.answers import SOLVED
 from tests.apps.lab.test_lab import lab, number_of, wait, window

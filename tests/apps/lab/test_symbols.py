@@ -6,15 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from decals import Contact, Decals, Interaction, TreeObject
 from decals.apps.lab.experiment import Scope
 from decals.apps.lab.lab import measured
 from decals.apps.lab.lesson import LESSONS, Lesson, load_lessons, shown
 from decals.apps.lab.plots import LEFT, RIGHT, SAMPLES, WIDTH, drawn
 from decals.apps.lab.symbols import DEFINITIONS, PUSHED, document, marked, readings, regions, table
 from decals.field.rules import PictureRules
-from decals.model import Decals, Interaction
-from decals.record import Contact
-from decals.scenes.objects import TreeObject
 from tests.apps.lab.test_lab import plain
 from tests.apps.lab.test_measures import BALLS, TWO, experiment
 from tests.oracles.contact import RIM, contact_field, falloff

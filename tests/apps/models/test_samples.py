@@ -11,12 +11,12 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from blobtree import polygonize
+from decals import MeshObject, TreeObject
 from decals.apps.commands.demo import nest_scene, tile_scene
 from decals.apps.gallery import spanning
 from decals.apps.models.samples import SAMPLES, axes_of, sample, sample_mesh
 from decals.apps.models.shapes import egg, rounded_box, torus_knot
 from decals.errors import InvalidInput
-from decals.scenes.objects import MeshObject, TreeObject
 from decals.surfaces.triangulate import MeshArrays
 
 

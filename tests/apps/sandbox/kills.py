@@ -23,11 +23,8 @@ import numpy as np
 
 import decals
 from blobtree import Point
-from decals.editing import recovery
-from decals.editing.actions import Actions
-from decals.editing.session import EditSession
-from decals.editing.visibility import RenameObject
-from decals.scenes.files import load_scene
+from decals import load_scene
+from decals.editing import Actions, EditSession, RenameObject, recovery
 
 PAUSE = 0.01
 """Seconds between two edits."""

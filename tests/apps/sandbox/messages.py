@@ -39,7 +39,7 @@ from unittest.mock import patch
 import numpy as np
 
 from decals.apps.memory import import_ahead, keep_memory_low, share_heap
-from decals.editing.actions import KEYS
+from decals.editing import KEYS
 from decals.window import EditWindow
 from tests.apps.sandbox.attacks import Server
 from tests.apps.sandbox.browsers import CALLS, SIZE, Browser, Connect, serve

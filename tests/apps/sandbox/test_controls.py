@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 import decals
-from blobtree import Node, Point, Polygon, Twist
+from blobtree import FALLOFF_NAMES, Node, Point, Polygon, Twist
 from blobtree.custom import define_falloff
 from blobtree.declare.parameters import parameters_of
-from blobtree.formulas.falloffs import FALLOFF_NAMES
 from decals.apps.sandbox.controls import controls_of, hex_color, parsed, parsed_option
 from decals.editing import new_nodes
 from decals.errors import InvalidEdit

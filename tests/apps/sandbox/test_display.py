@@ -14,17 +14,13 @@ import decals
 from blobtree import Point, Transform
 from blobtree.nodes.paths import node_at
 from blobtree.nodes.surgery import move_branch
+from decals import Contact, ImageMapping, MeshObject
 from decals.apps.sandbox.decal_panel import drawing_controls
 from decals.apps.sandbox.sandbox import Sandbox
-from decals.editing import MovePrimitive, RenameObject
-from decals.editing.commands import AddImage, ReplaceImage, SetDrawing, SetValues
-from decals.field.mapping import ImageMapping
-from decals.record import Contact
-from decals.rendering import Environment
-from decals.rendering.options import Background
+from decals.editing import AddImage, MovePrimitive, RenameObject, ReplaceImage, SetDrawing, SetValues
+from decals.rendering import Background, Environment
 from decals.scenes.camera import PRESETS
 from decals.scenes.meshes import as_polydata
-from decals.scenes.objects import MeshObject
 from decals.window import EditWindow
 from decals.window.host_plotter import TURN_DEGREES, pixels_of
 from decals.window.view_modes import MODES, OVERLAYS, PREFIX, example_data

@@ -16,15 +16,14 @@ from PIL import Image
 import blobtree
 import decals
 from blobtree import Point, Segment
+from decals import MeshObject, load_scene, save_scene
 from decals.apps.models.samples import SAMPLES, sample
 from decals.apps.models.scenes import empty_scene
 from decals.apps.sandbox.folder import MAX_UPLOADS, listed, plain_name, read_upload, thumbnails
 from decals.apps.sandbox.sandbox import Sandbox
-from decals.editing.commands import ScaleDecals
+from decals.editing import ScaleDecals
 from decals.errors import ImplicitDecalsError
 from decals.scenes.camera import UPRIGHT
-from decals.scenes.files import load_scene, save_scene
-from decals.scenes.objects import MeshObject
 from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of
 from decals.window.view_modes import DisplayOptions

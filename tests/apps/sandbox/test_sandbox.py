@@ -20,22 +20,15 @@ import decals
 from blobtree import Point, Segment, Torus, Twist, Union
 from blobtree.nodes.paths import node_at
 from blobtree.nodes.surgery import dominant_primitive
+from decals import Camera, MeshObject, Scene, TreeObject
 from decals.apps.sandbox.hover import outlines
 from decals.apps.sandbox.outline import outline
 from decals.apps.sandbox.sandbox import REST_SECONDS, Sandbox
 from decals.apps.sandbox.words import FOLDER, TEXTS, words
-from decals.editing import tree_actions
+from decals.editing import KEYS, Document, ReplaceScene, SetParameter, first_hit, nearest_points, tree_actions
 from decals.editing.action_state import SLOW_STEP
-from decals.editing.actions import KEYS
-from decals.editing.commands import ReplaceScene
-from decals.editing.document import Document
 from decals.editing.gizmo import on_plane
-from decals.editing.queries import first_hit, nearest_points
-from decals.editing.tree_commands import SetParameter
 from decals.errors import InvalidEdit
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject, TreeObject
-from decals.scenes.scene import Scene
 from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of, ray_through
 from tests.decals.editing.scenes import box, digest, tree_of

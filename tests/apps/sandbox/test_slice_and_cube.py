@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from decals import Camera, MeshObject
 from decals.apps.sandbox.cube import cube_cells
 from decals.editing.gizmo import Ray, nearest_on_sphere
 from decals.editing.slicing import CHOICES, MOVE, TILT, SliceDrag, SlicePlane, slice_box
 from decals.errors import InvalidEdit
-from decals.scenes.camera import PRESETS, UPRIGHT, Camera
-from decals.scenes.objects import MeshObject
+from decals.scenes.camera import PRESETS, UPRIGHT
 
 BOX = np.full(3, -10.0), np.full(3, 10.0)
 numbers = st.floats(-1.0, 1.0)

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 import decals
-from decals.editing.actions import KEYS
+from decals.editing import KEYS
 from decals.editing.brush_settings import Brush
 from decals.editing.key_bindings import format_gestures
 from decals.editing.view_actions import SIDE_KEYS

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from blobtree import Mesh, Node, Point, Polygonizer, Ricci, Sum, Union, polygonize
+from blobtree import ISO, RIM, Mesh, Node, Point, Polygonizer, Ricci, Sum, Union, polygonize
 from blobtree.cells.grid import BRANCHING, aligned_grid
 from blobtree.cells.sparse_cells import SparseCells, build_cells, split_tape
-from blobtree.formulas.falloff import ISO, RIM
 from blobtree.tape.model import values_at
 from tests.blobtree.custom_kinds import CUSTOM
 from tests.blobtree.meshing.edits import edited

@@ -6,8 +6,7 @@ import warp as wp
 from numpy.typing import NDArray
 from warp._src.context import user_modules
 
-from blobtree import ISO, Node, Point, Polygonizer, polygonize
-from blobtree.formulas.falloff import RIM
+from blobtree import ISO, RIM, Node, Point, Polygonizer, polygonize
 from blobtree.tape.instruction_set import core
 from blobtree.tape.program import postorder
 from blobtree.tracing.trace import trace

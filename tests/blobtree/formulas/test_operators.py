@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from blobtree import Difference, Ricci
 from blobtree.declare.claims import KEEP_LEFT, KEEP_NONE, KEEP_RIGHT, OperatorRow, Support
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.pieces import _Deepest
 from blobtree.nodes.rounds import _ArcDifference, _ArcIntersection, _ArcUnion
-from blobtree.nodes.tree import Difference, Ricci
 from tests.blobtree.transpile.warp_functions import call, python_function
 from tests.oracles import blends as oracle
 from tests.oracles.blobtree import Field, pressed_field, rated

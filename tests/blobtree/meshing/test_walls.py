@@ -5,11 +5,10 @@ import logging
 import numpy as np
 import pytest
 
-from blobtree import Box, Mesh, Node, Point, Segment, Shell, SmoothDifference, polygonize
+from blobtree import Box, Mesh, Node, Point, Progress, Segment, Shell, SmoothDifference, polygonize
 from blobtree.errors import InvalidResolution
 from blobtree.meshing.adaptive_mesh import AdaptiveMesh, AdaptiveMesher, OpenMesh
 from blobtree.meshing.thin_parts import polygonize_parts
-from blobtree.progress import Progress
 from tests.thin_trees import is_closed, mesh_areas, pieces
 
 BALL = Point((0, 0, 0), radius=1.0)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from blobtree import (
     ISO,
+    RIM,
     Arc,
     Box,
     Circle,
@@ -24,6 +25,7 @@ from blobtree import (
     Point,
     Polygon,
     Polyline,
+    Primitive,
     QuadraticBezier,
     Rectangle,
     Stroke,
@@ -34,11 +36,10 @@ from blobtree import (
 )
 from blobtree.declare.parameters import Quantity, described, parameters_of
 from blobtree.errors import InvalidNode
-from blobtree.formulas.falloff import RIM
 from blobtree.nodes.curves import _JoinedSegment
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.paths import moved, resized
-from blobtree.nodes.primitives import PROFILE, Leaf, Primitive, Profile
+from blobtree.nodes.primitives import PROFILE, Leaf, Profile
 from blobtree.tape.instruction_set import library
 from tests.blobtree.trees import SOLIDS, points_around
 from tests.oracles import blobtree as oracle

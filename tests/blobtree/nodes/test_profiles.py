@@ -25,6 +25,7 @@ from blobtree import (
     Point,
     Polygon,
     Polyline,
+    Primitive,
     Segment,
     Stroke,
     Sum,
@@ -45,7 +46,7 @@ from blobtree.declare.parameters import parameters_of
 from blobtree.errors import InvalidDefinition, InvalidNode
 from blobtree.formulas.skeletons import JOINT_YIELD
 from blobtree.nodes.paths import moved, resized
-from blobtree.nodes.primitives import PROFILE, Primitive
+from blobtree.nodes.primitives import PROFILE
 from blobtree.tape.instruction_set import core
 from blobtree.transpile.python import plain_python
 from tests.blobtree.custom_kinds import Ring, Staircase, Tent

@@ -6,11 +6,11 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike
 
+from blobtree import Tape
 from blobtree._typing import Float32Array
 from blobtree.conformance.bound_kernels import evaluate_bounds
 from blobtree.kernels import loaded
 from blobtree.tape.model import evaluate
-from blobtree.tape.tape import Tape
 from blobtree.validation import point_array
 from tests.blobtree.tape.evaluation_kernels import project_points
 

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 import warp as wp
 
-from blobtree import RIM, Node, Point, Segment, polygonize
+from blobtree import RIM, Node, Point, Segment, Tape, polygonize
 from blobtree.errors import InvalidNode
 from blobtree.tape.codes import OPERATORS, POP, POP_SWAPPED, PREFIX, PUSH, SKELETONS, STRETCHED, UNWARP, WARP
 from blobtree.tape.instruction_set import core
-from blobtree.tape.tape import Tape
 from tests.blobtree.trees import random_trees
 
 CODES = {tag: code for code, tag in enumerate(SKELETONS)}

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_cdt
 
-from blobtree import ISO, Box, Node, Point, Repeat
+from blobtree import ISO, Box, Node, Point, Repeat, Tape
 from blobtree._typing import Int32Array
 from blobtree.cells.refine_kernels import SURELY_INSIDE
 from blobtree.sized_cache import SizedCache
 from blobtree.tape.codes import PUSH, STRETCHED, UNWARP, WARP
 from blobtree.tape.model import values_at
-from blobtree.tape.tape import Tape
 from blobtree.tracing import tree_cells
 from blobtree.tracing.ray_kernels import EMPTY
 from blobtree.tracing.tree_cells import BLOCKS_ALONG, MAX_LAYERS, TracingCells, device_cells, tracing_cells

@@ -21,7 +21,7 @@ from decals.baking.unwrapped import Unwrapped
 from decals.errors import NoGraphics
 from decals.images.texels import encode_srgb
 from decals.rendering import Lighting
-from decals.surfaces.mesh import MeshSurface
+from decals.surfaces import MeshSurface
 from tests.decals.baking.evaluated import beside_evaluated, texel_length
 from tests.decals.baking.glb import (
     BALL,

@@ -16,9 +16,7 @@ from decals.apps.cli import run
 from decals.baking.displace import DisplacedScene
 from decals.errors import InvalidMesh, InvalidScene
 from decals.scenes.pose import PosedMesh
-from decals.surfaces import subdivide
-from decals.surfaces.implicit import ImplicitSurface
-from decals.surfaces.mesh import MeshSurface
+from decals.surfaces import ImplicitSurface, MeshSurface, subdivide
 from decals.surfaces.subdivide import subdivided
 from tests.decals.baking.glb import Array, ball_and_cube, need, read_attribute, read_glb
 from tests.decals.meshes import box, icosphere

@@ -9,12 +9,12 @@ import pytest
 import pyvista as pv
 
 import decals
+from decals import MeshObject, load_scene, save_scene
 from decals.baking.layouts import lay_out
 from decals.baking.meshes import BakeMesh, bake_mesh
 from decals.errors import InvalidMesh
 from decals.images.texels import decode_srgb
-from decals.scenes.files import load_scene, save_scene
-from decals.scenes.objects import MeshObject, as_object
+from decals.scenes.objects import as_object
 from decals.scenes.script import write_script
 from decals.surfaces import BaseColor
 from tests.decals.baking.glb import Array, need, read_glb

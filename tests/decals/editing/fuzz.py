@@ -7,6 +7,7 @@ import numpy as np
 from blobtree import Point
 from blobtree.nodes.paths import primitive_paths
 from blobtree.nodes.surgery import Join
+from decals import Camera, DecalImage, MeshObject, TreeObject
 from decals.editing import (
     AddDecals,
     AddImage,
@@ -34,9 +35,6 @@ from decals.editing import (
     SetValues,
     TurnDecals,
 )
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject, TreeObject
-from decals.scenes.scene import DecalImage
 from tests.decals.editing.scenes import TREE, box, one
 
 OBJECTS = (

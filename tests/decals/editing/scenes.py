@@ -7,12 +7,8 @@ from typing import Any
 import numpy as np
 
 from blobtree import Node, Point, Segment
+from decals import Camera, DecalImage, Decals, MeshObject, Scene, TreeObject, scatter
 from decals.editing import Document, EditSession
-from decals.model import Decals
-from decals.scattering.scatter import scatter
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject, TreeObject
-from decals.scenes.scene import DecalImage, Scene
 
 TREE = Point((0, 0, 0), radius=1.0) + Segment((0.9, 0.5, 0), (1.4, 1.3, 0), radius=0.5, color=(0.9, 0.5, 0.2))
 CARVED = TREE - Point((0, -0.9, 0.6), radius=0.5)

@@ -8,11 +8,13 @@ import pytest
 
 from blobtree import Point
 from blobtree.kernels import NotCompiled
+from decals import TreeObject
 from decals.editing import (
     Actions,
     AddObject,
     AddPrimitive,
     DeleteDecals,
+    Document,
     EditSession,
     FillBarePlaces,
     FlagNodes,
@@ -29,11 +31,10 @@ from decals.editing import (
 from decals.editing.action_state import COMPILING
 from decals.editing.background import MAX_WAITING
 from decals.editing.brush_settings import Brush
-from decals.editing.document import Document, Edit
+from decals.editing.document import Edit
 from decals.editing.scatter_commands import decals_on
 from decals.editing.steps import BUSY, LOOKS, inputs_of, step_of
 from decals.errors import InvalidEdit
-from decals.scenes.objects import TreeObject
 from tests.decals.editing.background import LONG, Held, finish, press, threaded
 from tests.decals.editing.scenes import digest, goes_back_and_forth, scene
 
@@ -352,8 +353,8 @@ def test_while_something_is_dragged_other_edits_wait() -> None:
 def test_edits_continue_while_decals_are_scattered(monkeypatch: pytest.MonkeyPatch) -> None:
     begun, go = threading.Event(), threading.Event()
     actions = threaded()
+    from decals import scatter
     from decals.editing import scatter_commands as population
-    from decals.scattering.scatter import scatter
 
     def slowly(*arguments: Any, **options: Any) -> Any:
         begun.set()

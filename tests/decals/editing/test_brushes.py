@@ -7,12 +7,19 @@ import pytest
 
 import decals
 from blobtree import Point
-from decals.editing import Actions, EditSession, PointerTools
+from decals.editing import (
+    Actions,
+    BrushDecals,
+    EditSession,
+    LockLayers,
+    PointerTools,
+    PushDecals,
+    RelaxDecals,
+    SetValues,
+)
 from decals.editing.brush_settings import Brush
-from decals.editing.brushes import CLOSEST, BrushDecals, PushDecals
-from decals.editing.commands import SetValues
-from decals.editing.scatter_commands import SPACING, RelaxDecals
-from decals.editing.visibility import LockLayers
+from decals.editing.brushes import CLOSEST
+from decals.editing.scatter_commands import SPACING
 from decals.errors import InvalidEdit
 from tests.decals.editing.scenes import digest
 

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from decals import DecalImage, MeshObject, TreeObject
 from decals.editing import (
     AddDecals,
     AddImage,
@@ -32,8 +33,6 @@ from decals.editing.queries import SurfacePoints
 from decals.editing.scatter_commands import decals_on
 from decals.errors import InvalidDecals, InvalidEdit, InvalidMesh, InvalidScene
 from decals.scattering.neighbors import FacingTree
-from decals.scenes.objects import MeshObject, TreeObject
-from decals.scenes.scene import DecalImage
 from tests.decals.editing.scenes import TREE, box, digest, one, scene
 
 CRATE = MeshObject("crate", *box((12, -1, -1), (14, 1, 1)))

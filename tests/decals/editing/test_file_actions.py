@@ -11,11 +11,11 @@ from PIL import Image
 import decals
 from blobtree import Point
 from blobtree.pyvista_views import MESH_SUFFIXES
+from decals import load_scene, save_scene
 from decals.editing import Actions, EditSession, PointerTools, ScaleDecals
 from decals.editing.background import MAX_WAITING
 from decals.editing.recovery import in_use
 from decals.errors import InvalidEdit
-from decals.scenes.files import load_scene, save_scene
 from tests.decals.editing.background import LONG, finish, hold_export, press, threaded
 from tests.decals.editing.scenes import scene
 

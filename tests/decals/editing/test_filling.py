@@ -8,12 +8,19 @@ import pytest
 
 import decals
 from blobtree import Node, Point, Segment
-from decals.editing import Actions, EditSession, FillBarePlaces, MovePrimitive, SetParameter
+from decals import evaluate
+from decals.editing import (
+    Actions,
+    DeleteDecals,
+    EditSession,
+    FillBarePlaces,
+    LockLayers,
+    MovePrimitive,
+    SetParameter,
+    SetValues,
+)
 from decals.editing.bare_watch import BareWatch
-from decals.editing.commands import DeleteDecals, SetValues
-from decals.editing.visibility import LockLayers
 from decals.errors import InvalidEdit
-from decals.field.evaluate import evaluate
 from decals.model import FACING_LIMIT
 from tests.decals.editing.scenes import digest, tree_of
 

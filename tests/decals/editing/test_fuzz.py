@@ -66,7 +66,7 @@ def test_random_commands_and_back(seed: int, count: int) -> None:
 
 
 def test_the_index_is_that_of_a_fresh_build_after_random_commands() -> None:
-    from decals.field.evaluate import evaluate
+    from decals import evaluate
 
     session = EditSession(scene())
     play(session, RandomCommands(2, session.document, scene(200).decals), 150)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import decals
 from blobtree import Point, Polyline, Segment, Transform, Twist
 from blobtree.nodes.paths import mapped, node_at, node_in_world
+from decals import TreeObject
 from decals.editing import (
     Actions,
     DragSurface,
@@ -35,7 +36,6 @@ from decals.editing.gizmo import (
     turn_about,
 )
 from decals.errors import InvalidEdit
-from decals.scenes.objects import TreeObject
 from tests.decals.editing.scenes import digest, tree_of
 
 LIMB = Segment((1, 0, 0), (2, 1, 0), radius=0.3)

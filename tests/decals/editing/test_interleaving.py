@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from decals import load_scene
 from decals.editing import Actions, EditSession
 from decals.editing.steps import BUSY
-from decals.scenes.files import load_scene
 from tests.decals.editing.background import LONG, surface_pick, threaded
 from tests.decals.editing.scenes import digest, goes_back_and_forth, scene
 

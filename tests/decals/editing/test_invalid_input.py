@@ -14,6 +14,7 @@ from blobtree.errors import InvalidNode
 from blobtree.nodes.paths import primitive_paths
 from blobtree.nodes.surgery import dominant_primitive
 from blobtree.validation import LARGEST_NUMBER, finite_number, finite_vector
+from decals import Camera, DecalImage, MeshObject, Scene, TreeObject
 from decals.editing import (
     AddDecals,
     AddImage,
@@ -46,9 +47,6 @@ from decals.editing import (
     pick,
 )
 from decals.errors import ImplicitDecalsError, InvalidEdit, InvalidImage, InvalidPoints, InvalidScene
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject, TreeObject
-from decals.scenes.scene import DecalImage, Scene
 from decals.validation import number_of, whole_number
 from tests.decals.editing.scenes import TREE, digest, one, scene
 

@@ -14,14 +14,9 @@ from blobtree.errors import InvalidNode
 from blobtree.nodes.paths import Path as TreePath
 from blobtree.nodes.paths import moved, node_at, node_in_world, with_node
 from blobtree.nodes.surgery import SOFTNESS, move_branch_into
+from decals import Camera, DecalImage, Decals, MeshObject, Scene, TreeObject, load_scene, save_scene, scatter
 from decals.editing import Actions, EditSession, MoveToObject, RemoveObject
 from decals.errors import ImplicitDecalsError, InvalidEdit, InvalidInput
-from decals.model import Decals
-from decals.scattering.scatter import scatter
-from decals.scenes.camera import Camera
-from decals.scenes.files import load_scene, save_scene
-from decals.scenes.objects import MeshObject, TreeObject
-from decals.scenes.scene import DecalImage, Scene
 from tests.decals.editing.scenes import box, digest, tree_of
 from tests.decals.editing.test_tree_commands import POINTS, quiet, trees
 from tests.oracles.blobtree import value

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from blobtree import Point, Segment
-from decals.editing import Actions, EditSession
-from decals.editing.commands import SetValues
+from decals import TreeObject
+from decals.editing import Actions, EditSession, SetValues
 from decals.editing.outline_actions import Part
 from decals.editing.tree_actions import _surface_check
 from decals.editing.visibility import RenumberLayers
 from decals.errors import InvalidEdit, InvalidInput
-from decals.scenes.objects import TreeObject
 from tests.decals.editing.scenes import digest, goes_back_and_forth, scene, tree_of
 
 

@@ -7,17 +7,21 @@ import pytest
 import pyvista as pv
 
 from blobtree import Point, Segment
-from decals.editing.document import Document
-from decals.editing.queries import ANGLES, LIFT, outline, outlines
+from decals import (
+    Camera,
+    Contact,
+    DecalImage,
+    Decals,
+    ImageMapping,
+    Interaction,
+    MeshObject,
+    Scene,
+    TreeObject,
+)
+from decals.editing import Document, outline
+from decals.editing.queries import ANGLES, LIFT, outlines
 from decals.errors import InvalidEdit
-from decals.field.mapping import ImageMapping
-from decals.model import Decals, Interaction
-from decals.record import Contact
-from decals.rendering.options import RenderOptions
-from decals.rendering.renderer import Renderer
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject, TreeObject
-from decals.scenes.scene import DecalImage, Scene
+from decals.rendering import Renderer, RenderOptions
 from tests.decals.editing.scenes import one
 
 SIZE = 300, 300

@@ -4,13 +4,11 @@ import numpy as np
 
 import decals
 from blobtree import Point
-from decals.editing.document import Document
+from decals import Camera, MeshObject, Scene, TreeObject
+from decals.editing import Document
 from decals.editing.overlays import contact_lines, sample_surface
 from decals.editing.slicing import SlicePlane
-from decals.scenes.camera import Camera
 from decals.scenes.meshes import as_polydata
-from decals.scenes.objects import MeshObject, TreeObject
-from decals.scenes.scene import Scene
 from decals.window.view_modes import CUTS, DisplayOptions, shown_data
 from tests.oracles.contact import RIM, falloff
 

@@ -6,16 +6,10 @@ import numpy as np
 import pytest
 
 from blobtree import Point
-from decals.editing import EditSession
-from decals.editing.document import Document
-from decals.editing.queries import LIFT, outline, outlines, pick
-from decals.field.evaluate import evaluate
-from decals.model import Interaction
-from decals.rendering.options import RenderOptions
-from decals.rendering.renderer import Renderer
-from decals.scenes.camera import Camera
-from decals.scenes.objects import TreeObject
-from decals.scenes.scene import DecalImage, Scene
+from decals import Camera, DecalImage, Interaction, Scene, TreeObject, evaluate
+from decals.editing import Document, EditSession, outline, pick
+from decals.editing.queries import LIFT, outlines
+from decals.rendering import Renderer, RenderOptions
 from tests.decals.editing.scenes import one, scene
 
 SIZE = 120, 90

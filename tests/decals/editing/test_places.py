@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blobtree import Point
-from decals.editing.queries import SurfacePoints, first_hit, move_decals, nearest_points, shortest_rotations
+from decals import MeshObject, TreeObject
+from decals.editing import first_hit, nearest_points
+from decals.editing.queries import SurfacePoints, move_decals, shortest_rotations
 from decals.errors import InvalidPoints
-from decals.scenes.objects import MeshObject, TreeObject
 from tests.decals.editing.scenes import box, one
 
 BALL = TreeObject("ball", Point((0, 0, 0), radius=1.0))

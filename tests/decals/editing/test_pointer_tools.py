@@ -11,15 +11,12 @@ from hypothesis import strategies as st
 from blobtree import Node, Point
 from blobtree.nodes.paths import primitive_at
 from blobtree.nodes.surgery import dominant_primitive
-from decals.editing import EditSession
-from decals.editing.actions import Actions
+from decals import Interaction
+from decals.editing import Actions, DeleteDecals, EditSession, PointerTools
 from decals.editing.brush_settings import Brush
-from decals.editing.commands import DeleteDecals
 from decals.editing.decal_actions import SCALE_STEP
-from decals.editing.pointer_tools import PointerTools
 from decals.editing.queries import inside_polygon
 from decals.editing.scatter_commands import decals_on
-from decals.model import Interaction
 from tests.decals.editing.scenes import digest, scene, tree_of
 
 SIZE = 400, 300

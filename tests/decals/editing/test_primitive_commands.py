@@ -10,7 +10,9 @@ from blobtree import ISO, Cone, Mirror, Point, Ricci, Segment
 from blobtree.errors import InvalidNode
 from blobtree.nodes.paths import node_in_world, primitive_at
 from blobtree.nodes.places import Place
+from decals import Camera, DecalImage, Scene, TreeObject, scatter
 from decals.editing import (
+    Actions,
     EditSession,
     MovePrimitive,
     PaintPrimitive,
@@ -19,13 +21,8 @@ from decals.editing import (
     SetParameter,
     TransformPrimitive,
 )
-from decals.editing.actions import Actions
 from decals.editing.followers import DragAnchor, following_weights
 from decals.errors import InvalidEdit, InvalidMesh
-from decals.scattering.scatter import scatter
-from decals.scenes.camera import Camera
-from decals.scenes.objects import TreeObject
-from decals.scenes.scene import DecalImage, Scene
 from tests.blobtree.custom_kinds import Bar
 from tests.decals.editing.scenes import digest, tree_of
 

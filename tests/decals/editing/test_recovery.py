@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
+from decals import load_scene, save_scene
 from decals.editing import Actions, EditSession, ScaleDecals, recovery_path
 from decals.errors import InvalidScene
-from decals.scenes.files import load_scene, save_scene
 from tests.decals.editing.background import finish, hold_writing, press, threaded
 from tests.decals.editing.scenes import digest, scene
 

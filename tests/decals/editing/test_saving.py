@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from decals import load_scene
 from decals.editing import ScaleDecals
 from decals.editing.steps import step_of
 from decals.errors import InvalidScene
-from decals.scenes.files import load_scene
 from tests.decals.editing.background import LONG, finish, hold_writing, press, threaded
 from tests.decals.editing.scenes import scene
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from blobtree.nodes.surgery import dominant_primitive
+from decals import DecalImage, MeshObject, load_scene
 from decals.editing import (
     AddDecals,
     DeleteDecals,
@@ -23,9 +24,6 @@ from decals.editing import (
 from decals.editing.document import NODE_BYTES
 from decals.editing.session import ENTRY_BYTES
 from decals.errors import InvalidDecals, InvalidEdit, InvalidScene
-from decals.scenes.files import load_scene
-from decals.scenes.objects import MeshObject
-from decals.scenes.scene import DecalImage
 from tests.decals.editing.scenes import digest, one, scene, tree_of
 
 

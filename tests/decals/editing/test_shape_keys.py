@@ -8,8 +8,7 @@ import pytest
 from blobtree import ISO, Point, Segment
 from blobtree.nodes.paths import node_in_world, primitive_at, primitive_paths
 from blobtree.nodes.surgery import Join, join_of
-from decals.editing import RemoveObject
-from decals.editing.actions import Actions
+from decals.editing import Actions, RemoveObject
 from decals.editing.scatter_commands import decals_on
 from tests.blobtree.custom_kinds import Bar
 from tests.decals.editing.scenes import CARVED, digest, tree_of

@@ -12,6 +12,7 @@ import decals
 from blobtree import Difference, Node, Point, Union
 from blobtree.errors import InvalidNode
 from blobtree.nodes.surgery import without_branches
+from decals import MeshObject, TreeObject
 from decals.editing import (
     Actions,
     DeleteDecals,
@@ -32,7 +33,6 @@ from decals.editing import (
 )
 from decals.editing.visibility import isolating
 from decals.errors import InvalidEdit, InvalidScene
-from decals.scenes.objects import MeshObject, TreeObject
 from decals.scenes.script import write_script
 from tests.decals.editing.scenes import box, digest, goes_back_and_forth, scene, tree_of
 

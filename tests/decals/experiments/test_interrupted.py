@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from decals import __version__
+from blobtree import __version__
 from decals.errors import InvalidInput, MissingPackage
 from decals.experiments import Grid, Results, report, run
 from decals.experiments.workers import _check_versions

@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from decals.field.evaluate import evaluate
-from decals.field.mapping import ImageMapping
-from decals.model import Decals
+from decals import Decals, ImageMapping, evaluate
 
 DECAL = 0.5
 """Radius of a large decal on the torus (1, 0.4) and on the ellipsoid."""

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
-from decals.record import NEIGHBOR_REACH, Contact
+from decals import Contact
+from decals.record import NEIGHBOR_REACH
 from tests.decals.field.kernels import contact_of_rows, rims_of_sets, uv_of_offsets
 from tests.oracles import contact as oracle
 

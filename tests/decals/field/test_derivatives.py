@@ -5,12 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from decals import Contact, Decals, Interaction, evaluate
 from decals.errors import InvalidPoints
-from decals.field.evaluate import evaluate
 from decals.field.jacobian import folds_of, stretch_of
-from decals.index.editor import DecalEditor
-from decals.model import Decals, Interaction
-from decals.record import Contact
+from decals.index import DecalEditor
 from tests.decals.field.test_evaluate import dress, even_sphere, on_sphere, unit
 from tests.oracles.contact import RIM, complements, falloff, log_factor
 from tests.oracles.decals import decals_at

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from decals.field.evaluate import evaluate
-from decals.model import Decals
-from decals.record import DEFAULT_STIFFNESS, Contact
+from decals import Contact, Decals, evaluate
+from decals.record import DEFAULT_STIFFNESS
 from tests.decals.field.test_radial import MEMBERS, clusters, pair
 from tests.oracles.contact import rim_distance
 

@@ -9,11 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from decals import Decals, ImageMapping, evaluate
 from decals.errors import InvalidDecals, InvalidDevice, InvalidImage, InvalidPoints, InvalidScene
-from decals.field.evaluate import evaluate
-from decals.field.mapping import ImageMapping
-from decals.index.index import DecalIndex
-from decals.model import Decals
+from decals.index import DecalIndex
 from decals.record import NEIGHBOR_REACH
 from tests.oracles.decals import decals_at
 

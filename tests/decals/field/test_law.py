@@ -12,9 +12,8 @@ import warp as wp
 
 import decals
 from blobtree.errors import InvalidDefinition
+from decals import define_contact, evaluate
 from decals.field.contact_mode import LAWS
-from decals.field.evaluate import evaluate
-from decals.field.law import define_contact
 from decals.rendering import Drawing, Renderer, RenderOptions
 from decals.rendering.pixel_pass import BACKEND_VARIABLE
 

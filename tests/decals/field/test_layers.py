@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from decals import Contact, Decals, Interaction, evaluate
 from decals.errors import InvalidImage
-from decals.field.evaluate import evaluate
 from decals.images.texels import decode_srgb
-from decals.model import Decals, Interaction
-from decals.record import Contact
 from tests.oracles.contact import RIM
 from tests.oracles.decals import colors_at, decals_at
 

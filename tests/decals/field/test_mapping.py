@@ -9,10 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
-from decals.field.evaluate import evaluate
-from decals.field.mapping import ImageMapping
-from decals.model import Decals
-from decals.record import Contact
+from decals import Contact, Decals, ImageMapping, evaluate
 from tests.decals.field import log_maps
 from tests.decals.field.kernels import arcs_of, coordinates_of, distances_of, turns_of
 from tests.decals.field.log_maps import DECAL, DISCS, dots, drawn_error, tangents, unit

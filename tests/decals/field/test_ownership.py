@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import warp as wp
 
+from decals import Contact, Decals
 from decals.index.index import index_on
-from decals.model import Decals
-from decals.record import Contact
 from tests.decals.field.kernels import both_ways
 
 

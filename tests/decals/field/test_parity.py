@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from decals.field.mapping import ImageMapping
-from decals.record import NEIGHBOR_REACH, Contact
+from decals import Contact, ImageMapping
+from decals.record import NEIGHBOR_REACH
 from tests.bench.parity import Chunk, limits_of, make_world, parity, worst_points
 from tests.oracles.contact import rim_distance
 from tests.oracles.decals import decals_at

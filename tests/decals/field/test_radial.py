@@ -7,11 +7,8 @@ import pytest
 import warp as wp
 from numpy.typing import NDArray
 
-from decals.field.evaluate import evaluate
-from decals.field.mapping import ImageMapping
+from decals import Contact, Decals, ImageMapping, evaluate
 from decals.index.index import index_on
-from decals.model import Decals
-from decals.record import Contact
 from tests.decals.field.kernels import rims_of_points, slopes_of_rays
 from tests.oracles.contact import RIM
 

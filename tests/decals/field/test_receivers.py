@@ -7,12 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from decals import Contact, Decals, evaluate
 from decals.errors import InvalidDecals, InvalidScene
-from decals.field.evaluate import evaluate
-from decals.index.editor import DecalEditor
-from decals.model import Decals
+from decals.index import DecalEditor
 from decals.receivers import MAX_RECEIVERS
-from decals.record import Contact
 from tests.oracles.decals import colors_at, decals_at
 
 TIE = 1e-4

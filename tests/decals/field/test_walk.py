@@ -7,16 +7,12 @@ import pytest
 import pyvista as pv
 
 from blobtree import HalfSpace, Intersection, Point
+from decals import Decals, ImageMapping, MeshObject, evaluate
 from decals.errors import InvalidMesh, InvalidScene
-from decals.field.evaluate import evaluate
-from decals.field.mapping import ImageMapping
+from decals.field import Walks
 from decals.field.walk import CELLS, GRID, NONE, NOWHERE, RELAY, RELAYS
-from decals.field.walks import Walks
-from decals.index.editor import DecalEditor
-from decals.model import Decals
-from decals.scenes.objects import MeshObject
-from decals.surfaces.implicit import ImplicitSurface
-from decals.surfaces.mesh import MeshSurface
+from decals.index import DecalEditor
+from decals.surfaces import ImplicitSurface, MeshSurface
 from decals.surfaces.topology import edge_twins
 from tests.decals.field import log_maps, unfolding
 from tests.decals.field.unfolding import Patch, rms

@@ -8,11 +8,9 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
 
-from decals.field.evaluate import evaluate
-from decals.field.mapping import ImageMapping
-from decals.field.walks import Walks
-from decals.model import Decals
-from decals.surfaces.mesh import MeshSurface
+from decals import Decals, ImageMapping, evaluate
+from decals.field import Walks
+from decals.surfaces import MeshSurface
 from tests.decals.field import log_maps
 
 Array = NDArray[np.float64]

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree.tape.codes import OPERATORS, WARPS
+from decals import ImageMapping
 from decals.field.contact import MIN_COMPLEMENT, MIN_SPAN
-from decals.field.mapping import ImageMapping
 from decals.field.ownership import owner_at
-from decals.index.index import DecalIndex
+from decals.index import DecalIndex
 from decals.model import RECORD
 from tests.blobtree.transpile.warp_functions import TypedFunction, call, element, numpy_type
 

@@ -12,7 +12,7 @@ from blobtree.formulas.falloff import FALLOFFS
 from blobtree.tape.codes import OPERATORS, SKELETONS, WARPS
 from blobtree.transpile.builtins import type_name
 from blobtree.transpile.glsl import uniforms_of
-from decals.rendering.context import Context
+from decals.rendering import Context
 from decals.rendering.data_texture import ROW_TEXELS, DataTexture
 from decals.rendering.tracing_shader import Kinds
 from tests.blobtree.transpile.warp_functions import TypedFunction

@@ -7,7 +7,7 @@ from blobtree import Node
 from blobtree.conformance.samples import Rng
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.tape.model import gradients_at
-from decals.rendering.context import Context
+from decals.rendering import Context
 from decals.rendering.tracing_shader import Kinds
 from tests.blobtree.trees import points_around
 from tests.conformance import AWAY, sample

@@ -7,7 +7,7 @@ import pytest
 
 from blobtree.transpile.glsl import translate_library
 from blobtree.transpile.python import plain_python, vector
-from decals.rendering.context import Context
+from decals.rendering import Context
 from decals.rendering.data_texture import ROW_TEXELS
 from tests.blobtree.nodes.test_convolution import CONVOLUTION_FIELDS, random_texels
 from tests.decals.glsl.functions import run_program

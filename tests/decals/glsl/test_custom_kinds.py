@@ -3,8 +3,7 @@
 import pytest
 
 from blobtree import Point
-from decals.rendering.context import Context
-from decals.rendering.renderer import Renderer
+from decals.rendering import Context, Renderer
 from decals.rendering.tracing_shader import Kinds
 from tests.blobtree.custom_kinds import CUSTOM_TREES, EVERYTHING, Brick, Carve, Path, Ring, Soft
 from tests.decals.glsl.test_tapes import assert_same_in_both_languages, assert_traced_alike

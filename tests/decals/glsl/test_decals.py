@@ -10,7 +10,7 @@ import warp as wp
 from blobtree.transpile.glsl import translate_library
 from decals.field.contact import contact_complement, contact_push, contact_uv, rim_distance
 from decals.field.mapping import tangent_coordinates, unroll
-from decals.index.index import DecalIndex
+from decals.index import DecalIndex
 from decals.index.lookup import cell_hash, cell_range
 from decals.record import field_complement
 from tests.decals.glsl.kernels import contacts, lookups, offsets

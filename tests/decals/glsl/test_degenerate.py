@@ -14,7 +14,7 @@ from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.primitives import Leaf
 from blobtree.nodes.tree import Macro
 from blobtree.tape.model import gradients_at
-from decals.rendering.context import Context
+from decals.rendering import Context
 from decals.rendering.tracing_shader import Kinds
 from tests.blobtree.csg_trees import PRIMITIVES, csg_primitive
 from tests.blobtree.trees import triple

@@ -24,7 +24,7 @@ from blobtree.tape.dispatch import (
 from blobtree.tape.instruction_set import core
 from blobtree.transpile.builtins import BUILTINS, HELPERS, Expression
 from blobtree.transpile.glsl import translate_library
-from decals.rendering.context import Context
+from decals.rendering import Context
 from decals.rendering.tracing_shader import _dispatch
 from tests.blobtree.transpile.warp_functions import TypedFunction, call, typed_functions
 from tests.decals.glsl.arguments import COUNT, arguments_of

@@ -5,7 +5,7 @@ import pytest
 
 from blobtree import Box, Cone, Cylinder, Node, Prism
 from blobtree.tape.instruction_set import library
-from decals.rendering.context import Context
+from decals.rendering import Context
 from tests.decals.glsl.test_conformance import assert_same_in_both_languages
 
 STAR = ((0, 0, 0), (1, 0.4, 0), (2, 0, 0), (1, 1.5, 0))

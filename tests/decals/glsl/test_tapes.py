@@ -12,11 +12,9 @@ from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.tape.instruction_set import library
 from blobtree.tape.model import colors_at, gradients_at
 from blobtree.tracing.trace import trace
-from decals.rendering.context import Context
-from decals.rendering.options import RenderOptions
-from decals.rendering.renderer import Renderer
+from decals import Camera
+from decals.rendering import Context, Renderer, RenderOptions
 from decals.rendering.tracing_shader import Kinds, tracing_shader
-from decals.scenes.camera import Camera
 from tests.blobtree.nodes.test_deformations import STRONG
 from tests.blobtree.nodes.test_gradient_blends import CORE as GRADIENT_BLENDS
 from tests.blobtree.nodes.test_gradient_blends import LIBRARY as LIBRARY_GRADIENT_BLENDS

@@ -4,11 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from decals.field.evaluate import evaluate
+from decals import Scene, evaluate, render
+from decals.rendering import Lighting
 from decals.rendering.decal_library import Form
-from decals.rendering.lights import Lighting
-from decals.scenes.render import render
-from decals.scenes.scene import Scene
 from tests.oracles.decals import decals_at
 
 DOUBT = 1e-4

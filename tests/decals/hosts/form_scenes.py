@@ -5,13 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from decals.model import Decals
+from decals import Camera, DecalImage, DecalMaterial, Decals, MeshObject, Scene
+from decals.rendering import Drawing
 from decals.rendering.decal_library import Form
-from decals.rendering.options import Drawing
-from decals.scenes.camera import Camera
-from decals.scenes.material import DecalMaterial
-from decals.scenes.objects import MeshObject
-from decals.scenes.scene import DecalImage, Scene
 from tests.decals.rendering.pictures import in_layers, scattered
 from tests.decals.shapes import torus
 

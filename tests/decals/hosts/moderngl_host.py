@@ -8,9 +8,8 @@ from typing import Any
 import moderngl
 import numpy as np
 
+from decals import MeshObject, Scene
 from decals.hosts import Shader, ShaderTexture
-from decals.scenes.objects import MeshObject
-from decals.scenes.scene import Scene
 from decals.surfaces.normals import vertex_normals
 
 WIDTH = 64

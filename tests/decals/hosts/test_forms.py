@@ -4,7 +4,7 @@ import pytest
 
 from decals import shader
 from decals.hosts.code import VERSIONS
-from decals.rendering.context import Context
+from decals.rendering import Context
 from decals.rendering.decal_library import Form
 from tests.decals.hosts.agreement import wrong_values
 from tests.decals.hosts.form_scenes import name_of, points_on, scene_of

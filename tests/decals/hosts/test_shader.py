@@ -12,15 +12,14 @@ import pytest
 import warp as wp
 
 import decals
-from decals.editing.document import Document
+from decals.editing import Document
 from decals.errors import InvalidScene, TooMuchData
 from decals.hosts.code import STAGES, VERSIONS, code_of
 from decals.hosts.textures import MAX_ROWS, data_size
 from decals.hosts.unsupported import UNSUPPORTED
 from decals.index import DecalEditor
-from decals.rendering.context import Context
+from decals.rendering import Context, Drawing
 from decals.rendering.decal_library import Form
-from decals.rendering.options import Drawing
 from decals.shaders import ComposeError
 from decals.shaders.isolate import declarations, prefixed, preprocessed, reachable
 from tests.decals.hosts.agreement import equal_pixels

@@ -5,8 +5,7 @@ from typing import Any
 
 import pytest
 
-from decals import shader
-from decals.record import Contact
+from decals import Contact, shader
 from decals.rendering.decal_library import Form
 from tests.decals.hosts.agreement import equal_pixels
 from tests.decals.hosts.form_scenes import name_of, scene_of

@@ -2,8 +2,7 @@
 
 import pytest
 
-from decals import shader
-from decals.record import Contact
+from decals import Contact, shader
 from decals.rendering.decal_library import Form
 from tests.decals.hosts import wgpu_host
 from tests.decals.hosts.agreement import equal_pixels

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from playwright.sync_api import Page, Route, sync_playwright
 
+from decals import Scene
 from decals.hosts import Shader
-from decals.scenes.scene import Scene
 from decals.surfaces.normals import vertex_normals
 from tests.decals.hosts.moderngl_host import linear
 from tests.frontends.browsing import browser_path

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from decals import Scene
 from decals.hosts import Shader, ShaderTexture
-from decals.scenes.scene import Scene
 from decals.surfaces.normals import vertex_normals
 from tests.decals.hosts.moderngl_host import linear
 

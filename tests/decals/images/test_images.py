@@ -9,15 +9,9 @@ from PIL import Image
 
 import decals
 from blobtree._typing import Float64Array
+from decals import load_image
 from decals.errors import InvalidImage, InvalidScene
-from decals.images import (
-    BUILTIN_IMAGES,
-    MAX_IMAGE_EDGE,
-    generate_image,
-    image_pixels,
-    load_image,
-    read_image,
-)
+from decals.images import BUILTIN_IMAGES, MAX_IMAGE_EDGE, generate_image, image_pixels, read_image
 from decals.images import load as load_module
 from decals.images.load import each_image, embedded_image, is_embedded
 from decals.images.texels import as_bytes, linear_premultiplied

@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 
-from decals.field.evaluate import evaluate
+from decals import Contact, Decals, evaluate
+from decals.index import DecalEditor
 from decals.index.change_log import MAX_DIRTY_BALLS, MAX_SIZE_RATIO, DirtyBalls, affected_balls
-from decals.index.editor import DecalEditor
-from decals.model import Decals
-from decals.record import Contact
 from tests.decals.rendering.pictures import in_layers
 
 

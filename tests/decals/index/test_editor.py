@@ -10,12 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from decals import Decals, evaluate
 from decals.errors import InvalidDecals
-from decals.field.evaluate import evaluate
+from decals.index import DecalEditor, DecalIndex
 from decals.index.change_log import ChangeLog
-from decals.index.editor import IDS, RECORDS, TABLE, DecalEditor
-from decals.index.index import DecalIndex
-from decals.model import Decals
+from decals.index.editor import IDS, RECORDS, TABLE
 from decals.record import NEIGHBOR_REACH
 
 

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from decals import Decals, Interaction
 from decals.errors import InvalidDecals
-from decals.index.editor import DecalEditor
-from decals.index.index import DecalIndex, has_nested, index_on
-from decals.model import Decals, Interaction
+from decals.index import DecalEditor, DecalIndex
+from decals.index.index import has_nested, index_on
 from decals.record import NEIGHBOR_REACH
 
 

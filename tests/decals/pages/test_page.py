@@ -18,6 +18,7 @@ from PIL import Image
 import decals
 from blobtree import Point, Segment
 from blobtree.errors import InvalidResolution
+from decals import Scene
 from decals.errors import InvalidScene, TooMuchData
 from decals.index import DecalIndex
 from decals.index.index import has_nested, index_on
@@ -28,7 +29,6 @@ from decals.pages.page import MODULES
 from decals.rendering import Environment
 from decals.rendering.decal_library import Form
 from decals.scenes.camera import REFERENCE_ASPECT
-from decals.scenes.scene import Scene
 from decals.surfaces import BaseColor, BaseTexture
 from tests.decals.pages.test_viewer_index import rows_of
 from tests.decals.pages.viewer_scripts import VIEWER, needs_node, node, run_node

@@ -12,8 +12,7 @@ import pytest
 import decals
 from blobtree import GradientBlend, Node, Point
 from decals.pages.programs import PREFIX, VERSION, mesh_program, picture_programs, tree_program
-from decals.rendering import Drawing, Environment
-from decals.rendering.lights import Lighting
+from decals.rendering import Drawing, Environment, Lighting
 from decals.rendering.tracing_shader import Kinds
 from tests.blobtree.trees import random_trees
 

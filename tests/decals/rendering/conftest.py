@@ -5,9 +5,8 @@ from contextlib import ExitStack
 
 import pytest
 
-from decals.rendering.context import Context
+from decals.rendering import Context, Renderer
 from decals.rendering.pixel_pass import COMPUTE_VERSION
-from decals.rendering.renderer import Renderer
 
 
 @pytest.fixture(scope="session")

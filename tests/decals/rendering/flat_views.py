@@ -4,10 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from decals import Camera, Decals
 from decals.images.texels import decode_srgb
-from decals.model import Decals
-from decals.rendering.lights import Lighting
-from decals.scenes.camera import Camera
+from decals.rendering import Lighting
 from tests.decals.shapes import Picture, Shape, View
 from tests.oracles.pixels import display, pixel_means
 

@@ -4,14 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from decals.field.mapping import ImageMapping
+from decals import Camera, Contact, Decals, ImageMapping, MeshObject
 from decals.images.texels import decode_srgb
-from decals.model import Decals
-from decals.record import DEFAULT_CONTACT, Contact
-from decals.rendering.options import SceneLike
-from decals.rendering.picture import Buffers
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject
+from decals.record import DEFAULT_CONTACT
+from decals.rendering import Buffers, SceneLike
 from tests.decals.shapes import Picture, Shape, View
 from tests.oracles.decals import decals_at
 

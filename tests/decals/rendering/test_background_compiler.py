@@ -14,9 +14,8 @@ import moderngl
 import pytest
 
 from decals.errors import NoGraphics
-from decals.rendering import background_compiler
+from decals.rendering import Context, background_compiler
 from decals.rendering.background_compiler import GL, BackgroundCompiler, draw_nothing, draw_state
-from decals.rendering.context import Context
 from decals.rendering.current_context import system_library
 from decals.shaders import CompileError, Source
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 import decals
 from blobtree.pyvista_views import write_polydata
-from decals.baking.displace import displace
+from decals import MeshObject, displace
 from decals.rendering import Lighting
 from decals.scenes.meshes import as_polydata
-from decals.scenes.objects import MeshObject, as_object
+from decals.scenes.objects import as_object
 from decals.surfaces import BaseColor, BaseTexture, Wrap
 from tests.oracles.base_color import base_light, linear
 from tests.oracles.raster import cast, edges

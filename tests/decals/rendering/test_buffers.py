@@ -8,7 +8,7 @@ import pytest
 
 from decals.errors import InvalidImage, TooMuchData
 from decals.images.texels import linear_premultiplied
-from decals.rendering.context import Context
+from decals.rendering import Context
 from decals.rendering.data_texture import ROW_TEXELS, DataTexture
 from decals.rendering.image_array import ImageArray, common_shape, resized
 from decals.rendering.pixel_pass import supports_compute

@@ -12,11 +12,9 @@ import moderngl
 import numpy as np
 import pytest
 
+from decals import Decals
 from decals.errors import NoGraphics
-from decals.model import Decals
-from decals.rendering import Renderer, RenderOptions
-from decals.rendering.context import Context
-from decals.rendering.lights import Lighting
+from decals.rendering import Context, Lighting, Renderer, RenderOptions
 from decals.rendering.pixel_pass import BACKEND_VARIABLE
 from decals.rendering.targets import WHOLE_SLOT
 from decals.shaders import CompileError, Source, compose

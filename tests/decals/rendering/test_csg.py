@@ -5,8 +5,8 @@ import pytest
 
 from blobtree import Box, Node
 from blobtree.custom import CustomPrimitive
-from decals.rendering.renderer import Renderer
-from decals.scenes.camera import Camera
+from decals import Camera
+from decals.rendering import Renderer
 from tests.bench.trust_csg import holes_of, scene
 from tests.blobtree.csg_trees import PRIMITIVES, csg_primitive
 from tests.blobtree.custom_kinds import Brick, RoughBrick

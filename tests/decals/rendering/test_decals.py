@@ -7,23 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from decals.field.evaluate import evaluate
-from decals.field.mapping import ImageMapping
-from decals.field.walks import Walks
-from decals.index.editor import DecalEditor
+from decals import Camera, Contact, Decals, ImageMapping, MeshObject, evaluate
+from decals.field import Walks
+from decals.index import DecalEditor
 from decals.index.index import has_nested, index_on
-from decals.model import Decals
-from decals.record import Contact
+from decals.rendering import Context, Renderer, RenderOptions
 from decals.rendering import viewpoint as tile
-from decals.rendering.context import Context
 from decals.rendering.decal_library import Form, decal_library
 from decals.rendering.decal_pass import decal_programs
-from decals.rendering.options import RenderOptions
-from decals.rendering.renderer import Renderer
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject
 from decals.shaders import compose
-from decals.surfaces.mesh import MeshSurface
+from decals.surfaces import MeshSurface
 from tests.decals.rendering.pictures import (
     SIZE,
     compare,

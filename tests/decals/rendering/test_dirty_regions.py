@@ -6,12 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blobtree._typing import Float64Array
+from decals import Camera, Scene
+from decals.rendering import Projection, RenderOptions
 from decals.rendering.dirty_regions import MAX_RECTANGLES, TargetState, ball_extents, joined, regions_of
-from decals.rendering.options import RenderOptions
 from decals.rendering.pixel_pass import GROUP
-from decals.rendering.viewpoint import TILE_MARGIN, PictureView, Projection, Rectangle, tiles
-from decals.scenes.camera import Camera
-from decals.scenes.scene import Scene
+from decals.rendering.viewpoint import TILE_MARGIN, PictureView, Rectangle, tiles
 
 SIZE = (300, 200)
 

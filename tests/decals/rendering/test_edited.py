@@ -8,15 +8,11 @@ import numpy as np
 import pytest
 
 from blobtree import Point
-from decals.index.editor import DecalEditor
-from decals.model import Interaction
+from decals import Camera, DecalImage, Interaction, MeshObject, Scene, TreeObject, scatter
+from decals.index import DecalEditor
+from decals.rendering import Renderer, RenderOptions
 from decals.rendering.decal_data import DecalData
-from decals.rendering.options import RenderOptions
-from decals.rendering.renderer import Renderer
-from decals.scattering.scatter import scatter
-from decals.scenes.camera import DEFAULT_DIRECTION, Camera
-from decals.scenes.objects import MeshObject, TreeObject
-from decals.scenes.scene import DecalImage, Scene
+from decals.scenes.camera import DEFAULT_DIRECTION
 
 
 @dataclass

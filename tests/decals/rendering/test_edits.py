@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from decals.index.editor import DecalEditor
-from decals.model import Decals
-from decals.rendering.context import Context
+from decals import Decals
+from decals.index import DecalEditor
+from decals.rendering import Context
 from decals.rendering.data_texture import DataTexture
 from decals.rendering.decal_data import DecalData
 

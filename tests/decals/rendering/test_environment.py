@@ -8,6 +8,7 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 import decals
+from decals import Camera, Scene
 from decals.errors import ImplicitDecalsError, InvalidImage, InvalidScene
 from decals.images.texels import decode_srgb, encode_srgb
 from decals.rendering import Drawing, Environment, Lighting, Renderer, RenderOptions
@@ -19,8 +20,6 @@ from decals.rendering.prefiltering import (
     panorama_cells,
     reflection_table,
 )
-from decals.scenes.camera import Camera
-from decals.scenes.scene import Scene
 from tests.decals.rendering.test_materials import LIGHTS, ball, scene_of, uniform
 from tests.oracles import environment as reference
 from tests.oracles.materials import Surface, direct, tone_mapped

@@ -14,10 +14,9 @@ from blobtree import Point
 from blobtree.transpile.python import plain_python, vector
 from decals import Camera, DecalImage, Decals, Scene, TreeObject
 from decals.field import elastic, pixel_filter
+from decals.rendering import Renderer, RenderOptions
 from decals.rendering.image_array import filled_corners
-from decals.rendering.options import RenderOptions
 from decals.rendering.pixel_pass import list_size
-from decals.rendering.renderer import Renderer
 from decals.rendering.viewpoint import largest_tile
 from tests.blobtree.transpile.warp_functions import python_function
 from tests.decals.rendering.flat_views import FLAT, expected_picture, flat_view, grey, peak_ratio, waves

@@ -6,10 +6,10 @@ import moderngl
 import numpy as np
 import pytest
 
-from decals.rendering.context import Context
+from decals import Camera
+from decals.rendering import Context, Projection, Viewpoint
 from decals.rendering.pixel_pass import CameraBuffer, attach_camera, set_uniform
-from decals.rendering.viewpoint import PictureView, Projection, Viewpoint
-from decals.scenes.camera import Camera
+from decals.rendering.viewpoint import PictureView
 from decals.shaders import compose
 from decals.shaders.compose import DIRECTORY
 

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from decals import Camera, scatter
 from decals.errors import InvalidScene
-from decals.rendering.options import RenderOptions
-from decals.rendering.renderer import Renderer
-from decals.scattering.scatter import scatter
-from decals.scenes.camera import Camera
+from decals.rendering import Renderer, RenderOptions
 from decals.surfaces.normals import vertex_normals
 from tests.decals.meshes import box
 from tests.decals.shapes import Shape, View, torus

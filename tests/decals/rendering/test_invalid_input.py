@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from decals import Decals
 from decals.errors import InvalidScene
-from decals.model import MAX_COORDINATE, MIN_RADIUS, Decals
-from decals.rendering.options import RenderOptions
-from decals.rendering.renderer import Renderer
+from decals.model import MAX_COORDINATE, MIN_RADIUS
+from decals.rendering import Renderer, RenderOptions
 from tests.decals.rendering.pictures import WHITE, scattered, view_of, wall
 from tests.decals.shapes import Picture, View, torus
 

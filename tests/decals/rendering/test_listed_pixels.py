@@ -7,14 +7,10 @@ import numpy as np
 import pytest
 
 import decals
-from decals.rendering.context import Context
-from decals.rendering.options import RenderOptions, SceneLike
+from decals import Camera, MeshObject, Scene
+from decals.rendering import Context, Renderer, RenderOptions, SceneLike
 from decals.rendering.pixel_pass import LIST_HEAD, IndirectPass
-from decals.rendering.renderer import Renderer
 from decals.rendering.viewpoint import Rectangle
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject
-from decals.scenes.scene import Scene
 from tests.decals.rendering.flat_views import flat_view
 from tests.decals.rendering.pictures import scattered
 from tests.decals.rendering.test_materials import GOLD, PLASTIC, ROUGH

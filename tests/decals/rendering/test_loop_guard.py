@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 from blobtree import Box, Node, Point, Union
+from decals import Camera
+from decals.rendering import Renderer, RenderOptions
 from decals.rendering.loop_guard import GuardedProgram, LoopGuard
-from decals.rendering.options import RenderOptions
 from decals.rendering.pixel_pass import Program
-from decals.rendering.renderer import Renderer
 from decals.rendering.tree import TreeDrawable
-from decals.scenes.camera import Camera
 from tests.bench.trust_csg import holes_of, scene
 from tests.blobtree.csg_trees import csg_primitive
 from tests.blobtree.custom_kinds import Brick

@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from decals import Decals, Interaction
 from decals.errors import TooMuchData
-from decals.index.editor import DecalEditor
-from decals.index.index import DecalIndex
-from decals.model import Decals, Interaction
+from decals.index import DecalEditor, DecalIndex
+from decals.rendering import Renderer
 from decals.rendering.decal_data import LoopLimit
-from decals.rendering.renderer import Renderer
 from tests.decals.rendering.pictures import WHITE
 from tests.decals.rendering.test_millions import PAPER, check_one_point, one_point
 from tests.decals.shapes import View

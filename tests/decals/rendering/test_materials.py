@@ -9,17 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from decals import Camera, DecalImage, DecalMaterial, Decals, MeshObject, Scene, load_scene
 from decals.errors import InvalidImage, InvalidScene
 from decals.images.texels import decode_srgb, encode_srgb
-from decals.model import Decals
-from decals.rendering.lights import Light, Lighting
-from decals.rendering.options import RenderOptions
-from decals.rendering.renderer import Renderer
-from decals.scenes.camera import Camera
-from decals.scenes.files import load_scene
-from decals.scenes.material import MAP_NAMES, DecalMaterial
-from decals.scenes.objects import MeshObject
-from decals.scenes.scene import DecalImage, Scene
+from decals.rendering import Light, Lighting, Renderer, RenderOptions
+from decals.scenes.material import MAP_NAMES
 from decals.scenes.script import write_script
 from tests.decals.rendering.pictures import scattered
 from tests.decals.shapes import torus

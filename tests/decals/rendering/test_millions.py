@@ -6,13 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from decals import Camera, Contact, Decals
 from decals.errors import TooMuchData
-from decals.model import Decals
-from decals.record import Contact
-from decals.rendering.options import RenderOptions
-from decals.rendering.picture import Buffers
-from decals.rendering.renderer import Renderer
-from decals.scenes.camera import Camera
+from decals.rendering import Buffers, Renderer, RenderOptions
 from tests.decals.shapes import Shape, View, torus
 from tests.oracles.decals import decals_at
 

@@ -5,14 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from decals import Camera, Contact, ImageMapping
 from decals.errors import ImplicitDecalsError, InvalidPoints, InvalidScene
-from decals.field.mapping import ImageMapping
-from decals.record import Contact
-from decals.rendering import Background
-from decals.rendering.lights import Light, Lighting
-from decals.rendering.options import TRANSPARENT, Drawing, RenderOptions
-from decals.rendering.renderer import Renderer
-from decals.scenes.camera import Camera
+from decals.rendering import TRANSPARENT, Background, Drawing, Light, Lighting, Renderer, RenderOptions
 from tests.decals.editing.scenes import one, scene
 
 SIZE = (16, 12)

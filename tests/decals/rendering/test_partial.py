@@ -6,18 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from decals.field.mapping import ImageMapping
-from decals.index import change_log
-from decals.index.editor import DecalEditor
-from decals.model import Decals, Interaction
-from decals.record import Contact
-from decals.rendering.lights import Light, Lighting
-from decals.rendering.options import RenderOptions
-from decals.rendering.renderer import Renderer
-from decals.rendering.viewpoint import Projection
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject, TreeObject
-from decals.scenes.scene import DecalImage
+from decals import Camera, Contact, DecalImage, Decals, ImageMapping, Interaction, MeshObject, TreeObject
+from decals.index import DecalEditor, change_log
+from decals.rendering import Light, Lighting, Projection, Renderer, RenderOptions
 from tests.decals.rendering.test_progressive import bits
 from tests.decals.vtk.scenes import both
 

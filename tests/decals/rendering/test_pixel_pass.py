@@ -7,14 +7,10 @@ import sys
 import numpy as np
 import pytest
 
+from decals import ImageMapping
 from decals.errors import NoGraphics
-from decals.field.mapping import ImageMapping
-from decals.rendering import pixel_pass
-from decals.rendering.context import Context
-from decals.rendering.options import RenderOptions
-from decals.rendering.picture import Buffers
+from decals.rendering import Buffers, Context, Renderer, RenderOptions, pixel_pass
 from decals.rendering.pixel_pass import BACKEND_VARIABLE, COMPUTE_VERSION, PassBackend, measure
-from decals.rendering.renderer import Renderer
 from tests.decals.rendering.pictures import SIZE, compare, scattered, view_of
 from tests.decals.shapes import torus
 

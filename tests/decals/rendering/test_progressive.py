@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from decals.rendering.options import RenderOptions
+from decals.rendering import Renderer, RenderOptions
 from decals.rendering.progressive import MAX_UNITS, UNITS, ProgressiveFrame
-from decals.rendering.renderer import Renderer
 from decals.rendering.targets import TEXTURE_KINDS, Targets
 from decals.rendering.viewpoint import Part
 from tests.decals.vtk.scenes import both

@@ -5,14 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from decals.index.editor import DecalEditor
-from decals.model import Decals
-from decals.rendering.lights import Lighting
-from decals.rendering.options import RenderOptions
-from decals.rendering.renderer import Renderer
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject
-from decals.scenes.scene import DecalImage, Scene
+from decals import Camera, DecalImage, Decals, MeshObject, Scene
+from decals.index import DecalEditor
+from decals.rendering import Lighting, Renderer, RenderOptions
 from tests.decals.rendering.pictures import WHITE, in_layers, plain_colors, scattered
 from tests.decals.shapes import torus
 from tests.oracles.decals import colors_at, decals_at

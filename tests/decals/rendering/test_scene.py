@@ -8,18 +8,11 @@ import pytest
 import decals
 from blobtree import Point, Segment, polygonize
 from blobtree.tracing.trace import trace
+from decals import Camera, DecalImage, Decals, ImageMapping, MeshObject, Scene, TreeObject, scatter
 from decals.errors import InvalidScene
-from decals.field.mapping import ImageMapping
-from decals.model import Decals
-from decals.rendering import STUDIO, TRANSPARENT, Renderer
+from decals.rendering import STUDIO, TRANSPARENT, Context, Projection, Renderer, RenderOptions
 from decals.rendering import viewpoint as tile
-from decals.rendering.context import Context
-from decals.rendering.options import RenderOptions
-from decals.rendering.viewpoint import Projection
-from decals.scattering.scatter import scatter
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject, SceneObject, TreeObject
-from decals.scenes.scene import DecalImage, Scene
+from decals.scenes.objects import SceneObject
 from tests.decals.rendering.pictures import compare
 from tests.decals.shapes import torus
 from tests.oracles.raster import edges

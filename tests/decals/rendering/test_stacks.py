@@ -5,13 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from decals import Camera, Contact, Decals, ImageMapping
 from decals.errors import TooMuchData
-from decals.field.mapping import ImageMapping
-from decals.model import Decals
-from decals.record import Contact
-from decals.rendering.options import RenderOptions
-from decals.rendering.renderer import Renderer
-from decals.scenes.camera import Camera
+from decals.rendering import Renderer, RenderOptions
 from tests.decals.rendering.pictures import WHITE, compare, plain_colors, quarters, wall
 from tests.decals.shapes import View, torus
 from tests.oracles.decals import colors_at

@@ -9,15 +9,12 @@ from blobtree import Box, Cylinder, Node, Point, Segment, Torus
 from blobtree.sized_cache import SizedCache
 from blobtree.tracing import tree_cells
 from blobtree.tracing.tree_cells import TracingCells, tracing_cells
-from decals.rendering.options import RenderOptions
-from decals.rendering.picture import Buffers
+from decals import Camera, MeshObject, TreeObject
+from decals.rendering import Buffers, Projection, Renderer, RenderOptions, Viewpoint
 from decals.rendering.pixel_pass import PassBackend
-from decals.rendering.renderer import Renderer
 from decals.rendering.tracing_shader import Kinds, tracing_shader
 from decals.rendering.tree import covered_rectangle
-from decals.rendering.viewpoint import PictureView, Projection, Viewpoint, tiles
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject, TreeObject
+from decals.rendering.viewpoint import PictureView, tiles
 from tests.blobtree.trees import random_trees
 from tests.decals.shapes import View, torus
 from tests.oracles.raster import edges

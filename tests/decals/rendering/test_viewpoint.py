@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from decals import Camera
 from decals.errors import InvalidScene
-from decals.rendering.viewpoint import Projection, Viewpoint
-from decals.scenes.camera import Camera
+from decals.rendering import Projection, Viewpoint
 
 SIZE = (160, 120)
 BOX = ((-2.0, -1.0, -1.0), (1.0, 2.0, 1.0))

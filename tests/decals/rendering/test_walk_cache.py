@@ -8,16 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from decals.editing import EditSession
-from decals.editing.commands import MoveDecals
-from decals.field import walks
-from decals.field.walks import Walks
-from decals.model import Decals
+from decals import Camera, Decals, MeshObject, Scene
+from decals.editing import EditSession, MoveDecals
+from decals.field import Walks, walks
 from decals.rendering import walk_cache
 from decals.rendering.walk_cache import WalkCache
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject
-from decals.scenes.scene import Scene
 from tests.decals.editing.scenes import box
 
 

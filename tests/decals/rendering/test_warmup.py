@@ -6,18 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from decals.field.mapping import ImageMapping
-from decals.index.editor import DecalEditor
-from decals.model import Decals
-from decals.record import Contact
-from decals.rendering.context import Context
-from decals.rendering.lights import Lighting
-from decals.rendering.options import RenderOptions
+from decals import Contact, Decals, ImageMapping, Scene
+from decals.index import DecalEditor
+from decals.rendering import Context, Lighting, Renderer, RenderOptions
 from decals.rendering.pixel_pass import COMPUTE_VERSION
 from decals.rendering.progressive import DRAWING
-from decals.rendering.renderer import Renderer
 from decals.rendering.warmup import WarmupTask, with_status
-from decals.scenes.scene import Scene
 from tests.decals.vtk.scenes import both
 
 SIZE = (40, 30)

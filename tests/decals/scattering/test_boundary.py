@@ -11,16 +11,15 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from blobtree._typing import Float32Array, Float64Array
+from decals import Relaxation, scatter
 from decals.model import FACING_LIMIT
+from decals.scattering import Creases
 from decals.scattering.boundary import Boundary
 from decals.scattering.boundary_kernels import PLANES_PER_POINT
-from decals.scattering.creases import Creases
-from decals.scattering.relaxation import Relaxation
 from decals.scattering.repulsion import CORE, CUTOFF, DAMPING, MAX_MOVE, Law
 from decals.scattering.repulsion_kernels import CLOSEST, ISOTROPY, MAX_RING_DEVIATION, MIRROR_DEPTH
-from decals.scattering.scatter import scatter
 from decals.scattering.search_kernels import MirrorPlanes
-from decals.surfaces.mesh import MeshSurface
+from decals.surfaces import MeshSurface
 from tests.decals.meshes import box, plane, sphere
 from tests.decals.scattering.evaluation import device_particles, evaluate
 from tests.oracles.repulsion import moves as expected_moves

@@ -2,11 +2,10 @@ import numpy as np
 import pytest
 
 from blobtree._typing import Float32Array, FloatArray
+from decals import Relaxation, scatter
 from decals.errors import InvalidScattering
-from decals.scattering.creases import Creases
-from decals.scattering.relaxation import Relaxation
-from decals.scattering.scatter import scatter
-from decals.surfaces.mesh import MeshSurface
+from decals.scattering import Creases
+from decals.surfaces import MeshSurface
 from tests.decals.meshes import box, plane, sphere
 
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from blobtree import Point, Segment
+from decals import Relaxation
 from decals.errors import InvalidScattering
-from decals.scattering.relaxation import Relaxation
-from decals.surfaces.implicit import ImplicitSurface
-from decals.surfaces.mesh import MeshSurface
+from decals.surfaces import ImplicitSurface, MeshSurface
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.sized_decals import covered, nearest_facing
 

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from decals import Relaxation
 from decals.errors import InvalidScattering
-from decals.scattering.density import vertex_density
+from decals.scattering import vertex_density
 from decals.scattering.domain import Density, Mask
-from decals.scattering.relaxation import Relaxation
-from decals.surfaces.mesh import MeshSurface
+from decals.surfaces import MeshSurface
 from tests.decals.meshes import plane, sphere
 from tests.oracles.sized_decals import nearest_facing
 

@@ -9,18 +9,22 @@ import pytest
 
 from blobtree import Point
 from blobtree._typing import Float32Array, Float64Array
+from decals import Relaxation, Sizing, scatter
 from decals.errors import ImplicitDecalsError, InvalidDevice, InvalidMesh, InvalidPoints, InvalidScattering
-from decals.scattering.creases import Creases
-from decals.scattering.density import PaintedImage, vertex_density
-from decals.scattering.image_projections import Cylindrical, Planar, Spherical, TextureCoordinates
-from decals.scattering.orientation import gradient_of
-from decals.scattering.relaxation import Relaxation
-from decals.scattering.remesh import remeshed_points
-from decals.scattering.scatter import scatter
-from decals.scattering.sizing import Sizing
-from decals.scattering.variation import ImageChoice, Jitter
-from decals.surfaces.implicit import ImplicitSurface
-from decals.surfaces.mesh import MeshSurface
+from decals.scattering import (
+    Creases,
+    Cylindrical,
+    ImageChoice,
+    Jitter,
+    PaintedImage,
+    Planar,
+    Spherical,
+    TextureCoordinates,
+    gradient_of,
+    remeshed_points,
+    vertex_density,
+)
+from decals.surfaces import ImplicitSurface, MeshSurface
 from tests.decals.meshes import plane, sphere
 
 NAN = float("nan")

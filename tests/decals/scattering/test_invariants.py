@@ -10,11 +10,9 @@ from hypothesis import strategies as st
 
 from blobtree import Point, Segment
 from blobtree._typing import Float32Array
+from decals import Relaxation
 from decals.scattering.neighbors import FacingTree
-from decals.scattering.relaxation import Relaxation
-from decals.surfaces.implicit import ImplicitSurface
-from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.surface import Surface
+from decals.surfaces import ImplicitSurface, MeshSurface, Surface
 from tests.decals.meshes import box, plane, sphere, star
 from tests.oracles.triangles import closest_points
 

@@ -10,17 +10,17 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array
 from blobtree.device import launch
+from decals import Relaxation
 from decals.model import FACING_LIMIT
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.neighbors import FacingTree, NearestFacing, NeighborQuery, index_array
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.polish import polish
-from decals.scattering.relaxation import Relaxation
 from decals.scattering.relocation import crowded_particles, relocate
 from decals.scattering.repulsion import CORE, CUTOFF, Law
 from decals.scattering.repulsion_kernels import CLOSEST
 from decals.scattering.search_kernels import Candidates, ChoiceRule, move_to_best
-from decals.surfaces.mesh import MeshSurface
+from decals.surfaces import MeshSurface
 from decals.surfaces.surface import unit_rows
 from tests.decals.meshes import box, plane, sphere, star
 from tests.decals.scattering.evaluation import device_particles

@@ -6,11 +6,10 @@ import pytest
 from PIL import Image
 
 from blobtree._typing import Float32Array
+from decals import Relaxation
 from decals.errors import InvalidImage, InvalidScattering
-from decals.scattering.density import PaintedImage
-from decals.scattering.image_projections import Cylindrical, Planar, Spherical, TextureCoordinates
-from decals.scattering.relaxation import Relaxation
-from decals.surfaces.mesh import MeshSurface
+from decals.scattering import Cylindrical, PaintedImage, Planar, Spherical, TextureCoordinates
+from decals.surfaces import MeshSurface
 from tests.decals.meshes import box, plane, sphere
 
 SQUARE = Planar((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from decals import Relaxation
 from decals.errors import InvalidScattering
-from decals.scattering.density import region_mask
-from decals.scattering.relaxation import Relaxation
+from decals.scattering import region_mask
 from tests.decals.meshes import box, sphere
 
 

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from decals import Relaxation
 from decals.errors import InvalidScattering
-from decals.scattering.relaxation import Relaxation
-from decals.surfaces.mesh import MeshSurface
+from decals.surfaces import MeshSurface
 from tests.decals.meshes import box, plane, sphere, star
 from tests.oracles.sized_decals import nearest_facing, rho
 

@@ -3,10 +3,10 @@ import sys
 import numpy as np
 import pytest
 
+from decals import scatter
 from decals.errors import InvalidScattering
-from decals.scattering.remesh import remeshed_points
-from decals.scattering.scatter import scatter
-from decals.surfaces.mesh import MeshSurface
+from decals.scattering import remeshed_points
+from decals.surfaces import MeshSurface
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.sized_decals import nearest_facing
 

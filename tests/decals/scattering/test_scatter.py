@@ -9,15 +9,10 @@ from scipy.spatial import SphericalVoronoi
 
 from blobtree import Point, PolarRepeat, Repeat, Segment
 from blobtree.kernels import COMPILING
+from decals import Decals, Sizing, scatter
 from decals.errors import InvalidScattering
-from decals.model import Decals
-from decals.scattering.orientation import Orientation
-from decals.scattering.scatter import scatter
-from decals.scattering.sizing import Sizing
-from decals.scattering.variation import ImageChoice
-from decals.surfaces.implicit import ImplicitSurface
-from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.surface import Surface
+from decals.scattering import ImageChoice, Orientation
+from decals.surfaces import ImplicitSurface, MeshSurface, Surface
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.sized_decals import covered, rho
 from tests.oracles.triangles import closest_points

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from decals import Relaxation
 from decals.errors import InvalidScattering
 from decals.scattering.domain import Domain, apportion
-from decals.scattering.relaxation import Relaxation
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.sized_decals import rho
 

@@ -7,11 +7,12 @@ from scipy.spatial import cKDTree
 
 from blobtree import Point, Torus
 from blobtree._typing import Float32Array, Float64Array, Int64Array
+from decals import Relaxation
+from decals.scattering import Orientation, gradient_of
 from decals.scattering.covering import RADIUS_MARGIN, covering_radii
 from decals.scattering.domain import OrientedPoints
 from decals.scattering.neighbors import FacingTree
-from decals.scattering.orientation import Orientation, gradient_of, tangents
-from decals.scattering.relaxation import Relaxation
+from decals.scattering.orientation import tangents
 from decals.scattering.sizing import delaunay_radii, touching_radii
 from decals.surfaces import ImplicitSurface
 from tests.decals.meshes import plane

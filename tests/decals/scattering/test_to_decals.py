@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from decals import Relaxation, Sizing
 from decals.errors import InvalidScattering
+from decals.scattering import ImageChoice, Jitter
 from decals.scattering.orientation import max_curvatures
-from decals.scattering.relaxation import Relaxation
-from decals.scattering.sizing import Sizing
-from decals.scattering.variation import ImageChoice, Jitter, image_shares, ranked_images
+from decals.scattering.variation import image_shares, ranked_images
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.sized_decals import covered
 

@@ -8,9 +8,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
+from decals import Camera
 from decals.errors import InvalidScene
 from decals.rendering.viewpoint import Bounds
-from decals.scenes.camera import MIN_NEAR_OVER_FAR, Camera, Vector
+from decals.scenes.camera import MIN_NEAR_OVER_FAR, Vector
 
 coordinate = st.floats(-100, 100)
 vector = st.tuples(coordinate, coordinate, coordinate)

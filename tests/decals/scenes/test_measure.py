@@ -9,8 +9,8 @@ import pytest
 
 import decals
 from blobtree import Point
+from decals import measure
 from decals.errors import InvalidScene
-from decals.scenes.measure import measure
 from decals.surfaces import MeshSurface
 from tests.decals.distortion import random_points
 from tests.decals.fault_models import FAULT_MODELS

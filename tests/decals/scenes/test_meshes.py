@@ -3,8 +3,9 @@
 import numpy as np
 
 from blobtree import Point
+from decals import MeshObject, TreeObject
 from decals.scenes.meshes import MeshedTree, as_polydata, meshed
-from decals.scenes.objects import MeshObject, SceneObject, TreeObject
+from decals.scenes.objects import SceneObject
 
 
 def test_trees_become_meshes_with_their_colours_names_and_surface() -> None:

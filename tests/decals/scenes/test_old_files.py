@@ -7,7 +7,7 @@ import pytest
 
 import blobtree
 import decals
-from decals.model import Interaction
+from decals import Interaction
 
 TREE = {
     "format": "blobtree",

@@ -10,8 +10,8 @@ import blobtree
 import decals
 from decals import Camera, Contact, Scene, cover, render, render_batch
 from decals.errors import InvalidScene
+from decals.rendering import Context
 from decals.rendering import context as context_module
-from decals.rendering.context import Context
 
 TREE = blobtree.Point((0, 0, 0), radius=1.0)
 SIZE = (60, 40)

@@ -12,15 +12,24 @@ from numpy.typing import NDArray
 
 import blobtree
 from blobtree import Node, Point, Segment
+from decals import (
+    Camera,
+    DecalImage,
+    DecalMaterial,
+    Decals,
+    MeshObject,
+    Scene,
+    TreeObject,
+    load_model,
+    load_scene,
+    pose,
+    save_scene,
+)
 from decals.errors import ImplicitDecalsError, InvalidImage, InvalidMesh, InvalidScene
 from decals.images import generate_image
-from decals.model import Decals
-from decals.scenes.camera import Camera
-from decals.scenes.files import from_json, is_scene, load_model, load_scene, save_scene, to_json
-from decals.scenes.material import DecalMaterial
-from decals.scenes.objects import MeshObject, TreeObject, bounds_of
-from decals.scenes.pose import PosedMesh, PosedScene, pose
-from decals.scenes.scene import DecalImage, Scene
+from decals.scenes.files import from_json, is_scene, to_json
+from decals.scenes.objects import bounds_of
+from decals.scenes.pose import PosedMesh, PosedScene
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32) * np.float32(0.1)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32)

@@ -10,13 +10,10 @@ import pytest
 
 import decals
 from blobtree import BlendGraph, Node, Point, Polyline, from_sdf
+from decals import Camera, DecalImage, DecalMaterial, MeshObject, Scene, TreeObject
 from decals.errors import InvalidScene
 from decals.model import COLUMNS
 from decals.rendering import Drawing
-from decals.scenes.camera import Camera
-from decals.scenes.material import DecalMaterial
-from decals.scenes.objects import MeshObject, TreeObject
-from decals.scenes.scene import DecalImage, Scene
 from decals.scenes.script import write_script
 from tests.blobtree.custom_kinds import Ring
 from tests.decals.editing.scenes import box

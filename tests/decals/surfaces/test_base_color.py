@@ -13,8 +13,9 @@ from PIL import Image
 
 import blobtree
 import decals
+from decals import MeshObject
 from decals.errors import InvalidMesh
-from decals.scenes.objects import MeshObject, as_object, displaced
+from decals.scenes.objects import as_object, displaced
 from decals.scenes.script import write_script
 from decals.surfaces import BaseColor, BaseTexture, Wrap, linear_colors
 from decals.surfaces.base_color import CLAY

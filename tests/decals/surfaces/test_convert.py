@@ -15,9 +15,9 @@ import decals
 from blobtree import Point, polygonize
 from decals.errors import ImplicitDecalsError, InvalidInput, InvalidMesh, InvalidScene
 from decals.scenes.objects import as_object, as_objects
-from decals.surfaces.convert import as_shape, as_surface
+from decals.surfaces import MeshSurface, as_surface
+from decals.surfaces.convert import as_shape
 from decals.surfaces.files.ply import strip_triangles
-from decals.surfaces.mesh import MeshSurface
 
 CORNERS = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 TRIANGLES = [[0, 1, 2], [0, 2, 3]]

@@ -11,8 +11,9 @@ import trimesh
 from numpy.typing import NDArray
 from PIL import Image
 
+from decals import MeshObject
 from decals.images.texels import decode_srgb
-from decals.scenes.objects import MeshObject, as_object
+from decals.scenes.objects import as_object
 from decals.surfaces import BaseColor, Wrap
 from decals.surfaces.base_color import CLAY
 from decals.surfaces.mesh_file import read_mesh_data

@@ -6,8 +6,8 @@ import pytest
 
 from blobtree import ISO, Disc, Intersection, Node, Point, Segment, Union
 from decals.errors import InvalidMesh, InvalidPoints
-from decals.surfaces.implicit import ImplicitSurface, project_without_mesh
-from decals.surfaces.surface import Surface
+from decals.surfaces import ImplicitSurface, Surface
+from decals.surfaces.implicit import project_without_mesh
 
 
 def directions(count: int, seed: int = 0) -> Any:

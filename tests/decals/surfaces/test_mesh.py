@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from decals.errors import InvalidMesh, InvalidPoints
-from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.surface import Surface
+from decals.surfaces import MeshSurface, Surface
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.triangles import closest_points, first_hits
 

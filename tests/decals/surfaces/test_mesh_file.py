@@ -6,7 +6,8 @@ import pytest
 import pyvista as pv
 
 from decals.errors import InvalidMesh
-from decals.surfaces.mesh_file import dataset_triangles, read_dataset, read_mesh
+from decals.surfaces import read_mesh
+from decals.surfaces.mesh_file import dataset_triangles, read_dataset
 from decals.surfaces.triangulate import polygon_triangles
 
 HEADER = """ply

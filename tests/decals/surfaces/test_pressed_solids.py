@@ -3,8 +3,8 @@
 import numpy as np
 
 from blobtree import ISO, Point, SolidContact
-from decals.scattering.scatter import scatter
-from decals.surfaces.implicit import ImplicitSurface
+from decals import scatter
+from decals.surfaces import ImplicitSurface
 
 BALLS = (Point((-0.8, 0, 0), radius=1.0), Point((0.8, 0, 0), radius=1.0))
 

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 import decals
 from decals.scattering.domain import Domain
-from decals.surfaces.mesh import MeshSurface
+from decals.surfaces import MeshSurface
 from decals.surfaces.topology import components, welded
 from tests.decals.fault_models import FAULT_MODELS, Arrays, joined
 from tests.decals.meshes import box, icosphere

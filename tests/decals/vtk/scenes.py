@@ -6,10 +6,8 @@ import numpy as np
 import pyvista as pv
 
 from blobtree import Point, Segment
-from decals.scattering.scatter import scatter
-from decals.scenes.camera import Camera
-from decals.scenes.objects import MeshObject, TreeObject, as_object
-from decals.scenes.scene import DecalImage, Scene
+from decals import Camera, DecalImage, MeshObject, Scene, TreeObject, scatter
+from decals.scenes.objects import as_object
 from tests.decals.shapes import torus
 
 TREE = Segment((-0.8, 0, 0), (0.5, 0, 0), radius=0.4, color=(0.8, 0.2, 0.1)) + Point(

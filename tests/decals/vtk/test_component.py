@@ -10,12 +10,10 @@ import pytest
 import pyvista as pv
 
 from blobtree import Point
+from decals import NO_IMAGE, DecalImage, Decals, MeshObject, TreeObject
 from decals.errors import InvalidDecals, InvalidImage, InvalidScene, NoGraphics
-from decals.index.editor import DecalEditor
-from decals.model import NO_IMAGE, Decals
-from decals.scenes.objects import MeshObject, TreeObject
-from decals.scenes.scene import DecalImage
-from decals.vtk.component import DecalsComponent
+from decals.index import DecalEditor
+from decals.vtk import DecalsComponent
 from tests.decals.shapes import View
 from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import both, shot

@@ -8,9 +8,8 @@ import pyvista as pv
 from scipy.ndimage import binary_erosion
 
 from blobtree import Point
-from decals.rendering import Buffers
-from decals.rendering.options import RenderOptions
-from decals.scenes.objects import TreeObject
+from decals import TreeObject
+from decals.rendering import Buffers, RenderOptions
 from decals.vtk import SubplotRenderer
 from decals.vtk import proxy_actor as anchor
 from tests.decals.vtk.conftest import Factory, Plotter

@@ -17,9 +17,8 @@ import pytest
 import pyvista as pv
 from PIL import Image
 
-from decals import Decals
+from decals import Decals, Scene
 from decals.baking import box_atlas
-from decals.scenes.scene import Scene
 from decals.vtk import exports
 from tests.decals.baking.glb import Array, ball_and_cube, bilinear, expected_colors, linear, need
 from tests.decals.vtk.conftest import Factory, Plotter

@@ -9,7 +9,7 @@ import pyvista as pv
 from hypothesis import given
 from hypothesis import strategies as st
 
-from decals.rendering.options import RenderOptions
+from decals.rendering import RenderOptions
 from decals.rendering.viewpoint import Rectangle
 from decals.vtk.frame import texels_of
 from tests.decals.vtk.conftest import Factory, Plotter

@@ -8,15 +8,10 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from decals.editing.document import Document
+from decals import Camera, Contact, Decals, ImageMapping, Scene
+from decals.editing import Document
 from decals.errors import InvalidScene
-from decals.field.mapping import ImageMapping
-from decals.model import Decals
-from decals.record import Contact
-from decals.rendering import Buffers
-from decals.rendering.options import Drawing, RenderOptions
-from decals.scenes.camera import Camera
-from decals.scenes.scene import Scene
+from decals.rendering import Buffers, Drawing, RenderOptions
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.vtk import injection
 from tests.decals.rendering.pictures import in_layers, scattered

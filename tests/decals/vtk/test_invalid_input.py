@@ -7,8 +7,16 @@ import numpy as np
 import pytest
 
 import decals
-from decals.editing import Document, EditSession, PointerTools, first_hit, nearest_points, outline, pick
-from decals.editing.actions import Actions
+from decals.editing import (
+    Actions,
+    Document,
+    EditSession,
+    PointerTools,
+    first_hit,
+    nearest_points,
+    outline,
+    pick,
+)
 from decals.errors import ImplicitDecalsError
 from decals.window import EditWindow, FrameBudget, browser_keys, press_key
 from tests.decals.editing.scenes import one, scene

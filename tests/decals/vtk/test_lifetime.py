@@ -14,8 +14,7 @@ import pytest
 import pyvista as pv
 
 from decals.errors import InvalidScene
-from decals.rendering import Renderer
-from decals.rendering.options import RenderOptions
+from decals.rendering import Renderer, RenderOptions
 from tests.decals.shapes import Picture, View
 from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import both, shot

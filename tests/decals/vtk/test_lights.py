@@ -8,8 +8,7 @@ import pyvista as pv
 from scipy.ndimage import binary_erosion
 
 from decals.errors import InvalidImage, InvalidScene
-from decals.rendering import TRANSPARENT, Environment
-from decals.rendering.options import RenderOptions
+from decals.rendering import TRANSPARENT, Environment, RenderOptions
 from decals.vtk import Lights
 from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import both, shot

@@ -11,9 +11,9 @@ from vtkmodules.vtkRenderingCore import (
 )
 
 from blobtree import Point
+from decals import scatter
 from decals.errors import InvalidScene
-from decals.scattering.scatter import scatter
-from decals.vtk.subplot import PickResult
+from decals.vtk import PickResult
 from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import shot
 from tests.decals.vtk.test_composition import BALL, lying_behind, place

@@ -5,7 +5,8 @@ import pytest
 
 from blobtree import Point, Segment
 from blobtree.tracing.tree_cells import BLOCKS_ALONG
-from decals.scenes.objects import MeshObject, TreeObject, bounds_of
+from decals import MeshObject, TreeObject
+from decals.scenes.objects import bounds_of
 from decals.vtk.proxy_actor import box_around
 from tests.decals.shapes import torus
 

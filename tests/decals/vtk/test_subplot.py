@@ -10,14 +10,11 @@ import pytest
 import pyvista as pv
 
 from blobtree import Point
+from decals import Contact, ImageMapping, TreeObject
 from decals.errors import InvalidPoints, InvalidScene, NoGraphics
-from decals.field.mapping import ImageMapping
-from decals.index.editor import DecalEditor
-from decals.record import Contact
-from decals.rendering import TRANSPARENT, Drawing
-from decals.rendering.options import RenderOptions
-from decals.scenes.objects import TreeObject
-from decals.vtk.subplot import SubplotRenderer
+from decals.index import DecalEditor
+from decals.rendering import TRANSPARENT, Drawing, RenderOptions
+from decals.vtk import SubplotRenderer
 from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import both, mesh_object, shot
 from tests.oracles.raster import edges

@@ -11,10 +11,8 @@ import pyvista as pv
 from scipy.ndimage import binary_dilation
 
 from blobtree import Point
-from decals.model import Decals
-from decals.rendering.options import RenderOptions
-from decals.scattering.scatter import scatter
-from decals.scenes.objects import TreeObject
+from decals import Decals, TreeObject, scatter
+from decals.rendering import RenderOptions
 from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import shot
 

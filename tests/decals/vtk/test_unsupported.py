@@ -6,7 +6,8 @@ from collections.abc import Callable
 import pytest
 import pyvista as pv
 
-from decals.vtk.adapters import Lights, unsupported_modes
+from decals.vtk import Lights
+from decals.vtk.adapters import unsupported_modes
 from decals.vtk.exports import CLIENTS
 from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import both, shot

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from decals.rendering.options import RenderOptions
+from decals.rendering import RenderOptions
 from decals.window import EditWindow
 from tests.decals.editing.scenes import digest
 

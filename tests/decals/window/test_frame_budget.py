@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from decals.window.frames import SCALES, TARGET_SECONDS, FrameBudget
+from decals.window import FrameBudget
+from decals.window.frames import SCALES, TARGET_SECONDS
 
 
 def settled(fixed: Any, each: Any, frames: Any = 12) -> Any:

@@ -8,12 +8,9 @@ import pytest
 import pyvista as pv
 
 from blobtree import Point
+from decals import Scene, TreeObject, cover, load_scene
 from decals.editing.scatter_commands import decals_on
 from decals.errors import InvalidScene
-from decals.scenes.cover import cover
-from decals.scenes.files import load_scene
-from decals.scenes.objects import TreeObject
-from decals.scenes.scene import Scene
 from decals.window import EditWindow
 from tests.decals.editing.scenes import scene
 from tests.decals.vtk.conftest import Factory, plotter

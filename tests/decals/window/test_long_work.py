@@ -10,11 +10,11 @@ import pytest
 
 from blobtree.kernels import COMPILING
 from blobtree.progress import displayed, reporting
-from decals.editing.commands import ScaleDecals
+from decals import load_scene
+from decals.editing import ScaleDecals
 from decals.editing.decal_actions import FIRST_DECAL_COUNT
 from decals.editing.scatter_commands import decals_on
 from decals.errors import InvalidEdit, InvalidScene
-from decals.scenes.files import load_scene
 from decals.vtk.window_title import WindowTitle
 from decals.window import EditWindow
 from tests.decals.editing.scenes import scene

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from decals import load_scene
 from decals.apps.models.samples import sample_mesh
-from decals.scenes.files import load_scene
 from tests.display import display, run_module
 
 __all__ = ["display"]

@@ -11,9 +11,9 @@ import pyvista as pv
 
 import decals
 from blobtree import Point
-from decals import render
+from decals import edit, render
 from decals.errors import InvalidScene, NoGraphics
-from decals.window import EditWindow, edit
+from decals.window import EditWindow
 from tests.decals.editing.scenes import scene
 
 SIZES = [(0, 90), (-5, 10), (120,), None, 120, (10**9, 5), ("a", "b"), (float("nan"), 5)]

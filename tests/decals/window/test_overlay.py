@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from decals.editing.actions import KEYS
-from decals.scenes.scene import Scene
+from decals import Scene
+from decals.editing import KEYS
 from tests.decals.editing.scenes import scene
 
 LONG = "expected an existing folder for the scene, found none at 'a/folder/that/is/not/there'; make it first"

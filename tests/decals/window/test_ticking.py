@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from decals import Contact, ImageMapping
 from decals.editing.scatter_commands import decals_on
-from decals.field.mapping import ImageMapping
-from decals.field.walks import Walks
-from decals.record import Contact
+from decals.field import Walks
 from decals.window import EditWindow
 from decals.window.frames import FrameState
 from tests.decals.editing.scenes import scene

@@ -5,11 +5,9 @@ from typing import Any
 
 import pytest
 
+from decals import Contact, ImageMapping, edit, load_scene
 from decals.editing import ScaleDecals, recovery_path
-from decals.field.mapping import ImageMapping
-from decals.record import Contact
-from decals.scenes.files import load_scene
-from decals.window import EditWindow, edit
+from decals.window import EditWindow
 from tests.decals.editing.scenes import scene
 
 

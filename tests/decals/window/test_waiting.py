@@ -11,17 +11,16 @@ import numpy as np
 import pytest
 
 from blobtree import Point
+from decals import TreeObject
 from decals.editing import AddObject, EditSession, ScaleDecals
 from decals.errors import TooMuchData
+from decals.rendering import Context, RenderOptions
 from decals.rendering.background_compiler import GL, BackgroundCompiler
-from decals.rendering.context import Context
 from decals.rendering.current_context import system_library
 from decals.rendering.decal_library import decal_library
-from decals.rendering.options import RenderOptions
 from decals.rendering.pixel_pass import compile_program
 from decals.rendering.progressive import DRAWING
 from decals.rendering.warmup import with_status
-from decals.scenes.objects import TreeObject
 from decals.shaders import CompileError
 from decals.vtk.frame import SPARE_SLOT
 from decals.window import EditWindow

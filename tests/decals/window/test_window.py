@@ -11,15 +11,11 @@ import pyvista as pv
 from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
 
 from blobtree.nodes.paths import node_in_world
+from decals import Camera, Contact, DecalImage, ImageMapping, Scene, load_scene
+from decals.editing import RemoveObject, ScaleDecals
 from decals.editing.brush_settings import Brush
-from decals.editing.commands import ScaleDecals
-from decals.editing.scatter_commands import RemoveObject, decals_on
+from decals.editing.scatter_commands import decals_on
 from decals.errors import InvalidEdit
-from decals.field.mapping import ImageMapping
-from decals.record import Contact
-from decals.scenes.camera import Camera
-from decals.scenes.files import load_scene
-from decals.scenes.scene import DecalImage, Scene
 from decals.window import EditWindow, press_key
 from decals.window.host_plotter import pixels_of
 from decals.window.overlay import OUTLINE_COLOR
