@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import pytest
 
 import blobtree.kernels as kernels
-from blobtree import FALLOFF_NAMES
 from blobtree.custom.definition import CUSTOM_KINDS
+from blobtree.declare.falloff import FALLOFF_NAMES  # that of the package loads the library
 from blobtree.graphics import missing_gl_libraries
 
 gc.disable()  # until all tests are collected: a fifth of the time would be spent on looking for garbage
