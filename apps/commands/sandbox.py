@@ -92,7 +92,7 @@ def sandbox(
     desktop
         Show the page in a window of its own. Needs pywebview.
     lab
-        Open the contact lab: nine lessons on decals and solids in contact.
+        Open the contact lab: lessons on decals and solids in contact.
     lessons
         A folder of other lessons for the lab.
     classroom

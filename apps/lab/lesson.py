@@ -234,19 +234,24 @@ def shown(value: Any) -> str:
 
 
 def load_lessons(folder: Path) -> list[Lesson]:
-    """Return the lessons of a folder, in the order of their names.
+    """Return the lessons of a folder, in the order of their names; numbers in names count as numbers.
 
     Raises
     ------
     InvalidLesson
         The folder has no lesson, or one that cannot be used; the message names the file and the field.
     """
-    paths = sorted(folder.glob("*.md")) if folder.is_dir() else []
+    paths = sorted(folder.glob("*.md"), key=_order) if folder.is_dir() else []
     if not paths:
         raise InvalidLesson(
             f"expected a folder with lessons (*.md), found none in {str(folder)!r}; check the path"
         )
     return [load_lesson(path) for path in paths]
+
+
+def _order(path: Path) -> list[str | int]:
+    """Return the words and numbers of a name in turn."""
+    return [int(part) if part.isdecimal() else part for part in re.split(r"(\d+)", path.stem)]
 
 
 def load_lesson(path: Path) -> Lesson:

@@ -418,6 +418,15 @@ def test_malformed_lessons_say_what_is_wrong(tmp_path: Path, old: str, new: str,
     assert "lesson.md" in str(error.value)
 
 
+def test_lessons_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    for name in ("1-one-decal.json", "target.png"):
+        (tmp_path / name).write_bytes((LESSONS / name).read_bytes())
+    names = ["1-a", "2-b", "02-c", "10-a2", "10-a11", "more"]
+    for name in names:
+        (tmp_path / f"{name}.md").write_text(LESSON, encoding="utf-8")
+    assert [lesson.name for lesson in load_lessons(tmp_path)] == names
+
+
 def test_a_folder_without_lessons_is_refused(tmp_path: Path) -> None:
     for folder in (tmp_path, tmp_path / "missing"):
         with pytest.raises(InvalidLesson, match="expected a folder with lessons"):
