@@ -1,6 +1,6 @@
 """``implicit-decals export``: a scene as a file of another program, and a check of such files."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -27,6 +27,26 @@ from decals.surfaces.mesh_file import read_objects
 MESHES, GRIDS = tuple(FORMATS), tuple(GRID_FORMATS)
 """Ends of the names of files with meshes, and of files with values on a grid."""
 
+
+def _named(suffixes: Iterable[str]) -> str:
+    return ", ".join(suffix.removeprefix(".") for suffix in suffixes)
+
+
+OUTPUT = (
+    f"The file. Meshes are {_named(MESHES)}; a page in the browser is html; "
+    f"the field of a BlobTree is {_named(GRIDS)}."
+)
+COLORS = (
+    "Where the colours are. Default: a texture in files that end in "
+    f"{_named(end for end in MESHES if 'texture' in FORMATS[end].colors[:1])}, else vertices."
+)
+INSTANCES = (
+    "Write the decals as copies of a square, for programs with decals of their own "
+    f"({_named(end for end in MESHES if FORMATS[end].instances)})."
+)
+DISTANCE = (
+    f"Write signed distances in place of the field, below 0 inside, and print their error ({_named(GRIDS)})."
+)
 LABELS = {
     "vertices": "vertices",
     "faces": "faces",
@@ -48,15 +68,19 @@ def export(
     scene: str,
     /,
     *,
-    output: Annotated[Path | None, Parameter(name=("--output", "-o"), show_default=False)] = None,
+    output: Annotated[
+        Path | None, Parameter(name=("--output", "-o"), show_default=False, help=OUTPUT)
+    ] = None,
     check: Annotated[bool, Parameter(negative=())] = False,
-    colors: Annotated[Literal["texture", "vertices", "none"] | None, Parameter(show_default=False)] = None,
+    colors: Annotated[
+        Literal["texture", "vertices", "none"] | None, Parameter(show_default=False, help=COLORS)
+    ] = None,
     attributes: Annotated[
         list[Literal["owner", "uv", "field", "stretch"]] | None,
         Parameter(name=("--attribute", "--attributes"), negative=(), show_default=False),
     ] = None,
-    instances: Annotated[bool, Parameter(negative=())] = False,
-    distance: Annotated[bool, Parameter(negative=())] = False,
+    instances: Annotated[bool, Parameter(negative=(), help=INSTANCES)] = False,
+    distance: Annotated[bool, Parameter(negative=(), help=DISTANCE)] = False,
     unit: Annotated[
         Literal["micron", "millimeter", "centimeter", "inch", "foot", "meter"] | None,
         Parameter(show_default=False),
@@ -76,20 +100,10 @@ def export(
     scene
         A saved scene. Models that render takes are written without decals. With --check alone, a mesh file
         that can be read.
-    output
-        The file: glb, gltf, obj, ply, stl, vtp, 3mf or usdz; html for a page in the browser; for the field of
-        a BlobTree vti, nrrd, npz or npy.
     check
         Print whether the mesh of each object is closed and sound.
-    colors
-        Where the colours are. Default: a texture in glb, gltf, obj and usdz files, else vertices.
     attributes
         Value at the vertices besides the colours. Can be repeated.
-    instances
-        Write the decals as copies of a square, for programs with decals of their own (glb, gltf).
-    distance
-        Write signed distances in place of the field, below 0 inside, and print their error (vti, nrrd, npz,
-        npy).
     unit
         Unit of the scene's lengths, for formats that have one.
     up

@@ -96,11 +96,11 @@ def export(
         A scene; or a model as `decals.cover` takes it, a list of such models, or the path of a model or a
         scene.
     path : str or path
-        The file, which ends in glb, gltf, obj, ply, stl, vtp, 3mf or usdz; its folder must exist. Textures of
+        The file; its folder must exist. Its suffix, such as glb or ply, is a format of that table. Textures of
         OBJ and PLY files lie beside it, under its name.
     colors : str, optional
-        ``"texture"`` (needs the extra ``bake``), ``"vertices"`` or ``"none"``. Default: a texture in GLB,
-        glTF, OBJ and USDZ files, else colours at the vertices, where the format has them.
+        ``"texture"`` (needs the extra ``bake``), ``"vertices"`` or ``"none"``. Default: what that table
+        names first.
     attributes : str or sequence of str
         Values at the vertices besides the colours: ``"owner"``, ``"uv"`` and ``"field"`` as `decals.evaluate`
         returns them, and ``"stretch"``, the ratio of the largest to the smallest stretch of the image. They

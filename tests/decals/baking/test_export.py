@@ -1,6 +1,7 @@
 """Exported files, read back by this package, trimesh and VTK: surfaces and colours are those of the scene."""
 
 import json
+import re
 import subprocess
 import sys
 import zipfile
@@ -16,7 +17,7 @@ import blobtree
 import decals
 from blobtree import Point
 from decals import MeshObject, Scene
-from decals.baking import usd
+from decals.baking import formats, usd
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.images.texels import decode_srgb, encode_srgb
 from decals.surfaces import BaseColor, check_mesh, read_mesh
@@ -34,6 +35,8 @@ from tests.decals.baking.glb import Array, ball_and_cube, need, read_attribute, 
 from tests.decals.meshes import icosphere
 
 RESOLUTION = 20
+
+PAGE = Path(__file__).parents[3] / "docs" / "exporting.md"
 
 MANY_SEEDS = [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 25))]
 """Seeds of random scenes."""
@@ -69,6 +72,16 @@ def expected(seed: int) -> ReadBack:
         for (vertices, faces, *_), color in zip(surfaces(scene), colors, strict=True)
     ]
     return ReadBack(*map(np.concatenate, zip(*parts, strict=True))).ordered
+
+
+def test_the_table_of_the_docs_has_all_formats_and_their_colours() -> None:
+    rows = re.findall(r"^\| (`\..+?) \| (.+?) \|", PAGE.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    listed = {
+        suffix: colors.replace("–", "")
+        for names, colors in rows
+        for suffix in re.findall(r"`(.+?)`", names.partition("(")[0])
+    }
+    assert listed == {suffix: ", ".join(each.colors) for suffix, each in formats.FORMATS.items()}
 
 
 @pytest.mark.parametrize(
