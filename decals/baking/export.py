@@ -96,8 +96,8 @@ def export(
         A scene; or a model as `decals.cover` takes it, a list of such models, or the path of a model or a
         scene.
     path : str or path
-        The file; its folder must exist. Its suffix, such as glb or ply, is a format of that table. Textures of
-        OBJ and PLY files lie beside it, under its name.
+        The file; its folder must exist. Its suffix, such as glb or ply, is a format of that table. Textures
+        of OBJ and PLY files lie beside it, under its name.
     colors : str, optional
         ``"texture"`` (needs the extra ``bake``), ``"vertices"`` or ``"none"``. Default: what that table
         names first.
