@@ -1,10 +1,11 @@
 """Writers that cannot write: an exception of ours, the old file as it was, nothing left behind."""
 
 import os
+import sys
 
 import pytest
 
-from tests.writers import WRITERS, cases, failure, failure_on_full_disk
+from tests.writers import WRITERS, cases, failure, failure_in_short_files, failure_on_full_disk
 
 ORDINARY = {"plain.ply", "tree.json", "picture.png", "surface.ply", "scene.json", "script.py", "table.csv"}
 
@@ -16,6 +17,14 @@ ORDINARY = {"plain.ply", "tree.json", "picture.png", "surface.ply", "scene.json"
 )
 def test_a_writer_that_cannot_write_says_so(name: str, fault: str) -> None:
     assert not failure(name, fault)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="sets the largest size of a file")
+@pytest.mark.parametrize(
+    "name", sorted({*ORDINARY, "picture.jpg", "surface.obj", "surface.stl", "surface.vtp"})
+)
+def test_a_file_without_room_leaves_the_old_one(name: str) -> None:
+    assert not failure_in_short_files(name)
 
 
 @pytest.mark.slow

@@ -272,6 +272,36 @@ def failure_on_full_disk(name: str) -> str:
         return "" if content(folder) == before else f"left behind: {sorted(content(folder))}"
 
 
+@contextmanager
+def short_files(limit: int) -> Iterator[None]:
+    """Let no file grow beyond a number of bytes, as if the disk were full by then."""
+    import resource  # Unix alone has it
+
+    most = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, most))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+
+
+def failure_in_short_files(name: str) -> str:
+    """Let a writer replace its own file without room for all of it; return what is wrong, or nothing."""
+    with tempfile.TemporaryDirectory() as text:
+        folder = Path(text)
+        path = folder / name
+        WRITERS[name](path)
+        before, size = content(folder), path.stat().st_size
+        for limit in {0, 1, 100, 4096, size // 2, size - 1} & set(range(size)):
+            with short_files(limit):
+                seen = outcome(WRITERS[name], path)
+            if seen != "refused":
+                return f"{limit} bytes: {seen}"
+            if content(folder) != before:
+                return f"{limit} bytes: torn, or left behind: {sorted(content(folder))}"
+        return ""
+
+
 def main() -> int:
     """Try everything, print what is wrong, and return the exit code."""
     wrong = 0

@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -15,20 +14,13 @@ from blobtree.errors import InvalidFile
 from blobtree.io import RECORD_OF_KIND
 from blobtree.nodes.kinds import NODE_KINDS
 from tests.blobtree.custom_kinds import Ring, Soft
-from tests.blobtree.trees import KINDS, random_trees, trees
+from tests.blobtree.trees import KINDS, random_trees
 
 BALL = {"type": "point", "center": [0, 0, 0], "radius": 1, "color": [1, 1, 1]}
 
 
 def document(*nodes: Any, **changes: Any) -> str:
     return json.dumps({"format": "blobtree", "version": 1, "nodes": nodes} | changes)
-
-
-@given(trees())
-@settings(max_examples=100, deadline=None)
-def test_a_tree_comes_back_equal(tree: Node) -> None:
-    assert from_json(to_json(tree)) == tree
-    assert to_json(from_json(to_json(tree))) == to_json(tree)
 
 
 def test_a_file_comes_back_equal(tmp_path: Path) -> None:
@@ -221,48 +213,3 @@ def test_a_missing_file_and_a_folder_are_an_os_error(tmp_path: Path) -> None:
         load(tmp_path)
     with pytest.raises(FileNotFoundError):
         save(Point((0, 0, 0), radius=1.0), tmp_path / "none" / "tree.json")
-
-
-# -- atomic ---------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("moment", ["fsync", "replace"])
-def test_a_failure_while_saving_leaves_the_old_file(
-    moment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def fail(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    path = tmp_path / "tree.json"
-    old = Point((0, 0, 0), radius=1.0)
-    save(old, path)
-    if moment == "fsync":
-        monkeypatch.setattr(os, "fsync", fail)
-    else:
-        monkeypatch.setattr(Path, "replace", fail)
-    with pytest.raises(OSError, match="No space left"):
-        save(old.scale(2.0), path)
-    monkeypatch.undo()
-    assert load(path) == old
-    assert [entry.name for entry in tmp_path.iterdir()] == ["tree.json"]
-
-
-def test_a_failure_while_writing_a_new_file_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def stop(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(os, "fsync", stop)
-    with pytest.raises(KeyboardInterrupt):
-        save(Point((0, 0, 0), radius=1.0), tmp_path / "tree.json")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_saved_file_may_be_read_by_whoever_may_read_other_new_files(tmp_path: Path) -> None:
-    save(Point((0, 0, 0), radius=1.0), tmp_path / "tree.json")
-    (tmp_path / "other").write_text("")
-    assert (tmp_path / "tree.json").stat().st_mode == (tmp_path / "other").stat().st_mode
-    (tmp_path / "tree.json").chmod(0o640)
-    save(Point((0, 0, 0), radius=2.0), tmp_path / "tree.json")
-    assert (tmp_path / "tree.json").stat().st_mode & 0o777 == 0o640

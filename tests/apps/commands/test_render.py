@@ -167,15 +167,3 @@ def test_a_fraction_is_refused_as_a_count(bad: Callable[..., str], number: str) 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="needs a folder that root cannot write to")
 def test_a_folder_that_cannot_be_written(bad: Callable[..., str]) -> None:
     assert "cannot be written" in bad("render", "ball.ply", "-o", "/proc/a.png")
-
-
-def test_failed_writes_keep_the_old_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (folder / "a.png").write_bytes(b"old")
-
-    def full(_: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("os.fsync", full)
-    assert run([*small("knot"), "-o", "a.png"]) == 2
-    assert (folder / "a.png").read_bytes() == b"old"
-    assert [path.name for path in folder.iterdir()] == ["a.png"]

@@ -20,10 +20,8 @@ from blobtree import (
     Point,
     Prism,
     fit,
-    from_json,
     numeric_parameters,
     polygonize,
-    to_json,
 )
 from blobtree.errors import InvalidNode
 from blobtree.tape.poses import maps_to_rest
@@ -120,12 +118,6 @@ def test_blends_read_the_field() -> None:
     tower = BLOCK + Point((0, 0, 0.6), radius=0.4)
     assert tower([[0, 0, 1.02]])[0] > Point((0, 0, 0.6), radius=0.4)([[0, 0, 1.02]])[0]
     assert_closed(polygonize(tower, resolution=32, creases=True))
-
-
-def test_files_keep_the_solids() -> None:
-    tree = BLOCK | Prism(SQUARE, 0.7, radius=0.1) | Cone((0, 0, 0), (1, 0, 0), radius=0.2, end_radius=0)
-    assert from_json(to_json(tree)) == tree
-    assert eval(repr(BLOCK)) == BLOCK
 
 
 def test_a_fit_leaves_edges_sharp() -> None:

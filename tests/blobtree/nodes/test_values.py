@@ -103,24 +103,20 @@ def test_a_pickle_is_read_by_a_process_whose_strings_hash_otherwise() -> None:
 
 
 @given(trees())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=100, deadline=None)
 def test_text_pickle_and_file_give_the_tree_back(tree: Node) -> None:
     for again in (eval(repr(tree), NAMES), pickle.loads(pickle.dumps(tree)), from_json(to_json(tree))):
         assert again is not tree
         assert again == tree
         assert hash(again) == hash(tree)
         assert repr(again) == repr(tree)
+        assert to_json(again) == to_json(tree)
 
 
 @given(trees(), trees())
 @settings(max_examples=60, deadline=None)
 def test_trees_are_equal_where_their_texts_are(first: Node, second: Node) -> None:
     assert (first == second) == (repr(first) == repr(second))
-
-
-def test_trees_with_every_kind_of_node_come_back() -> None:
-    for tree in random_trees(seed=7, count=40):
-        assert eval(repr(tree), NAMES) == pickle.loads(pickle.dumps(tree)) == tree
 
 
 def test_one_changed_number_anywhere_makes_another_tree() -> None:

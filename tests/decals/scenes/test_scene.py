@@ -229,21 +229,6 @@ def test_samples_are_named_and_fetched_again(tmp_path: Path) -> None:
         load_scene(tmp_path / "scene.json")
 
 
-def test_a_failing_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "scene.json"
-    save_scene(_scene(), path)
-    before = path.read_bytes()
-
-    def full(_: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("os.fsync", full)
-    with pytest.raises(InvalidScene, match="No space left"):
-        save_scene(_scene().replace(decals=Decals.empty()), path)
-    assert path.read_bytes() == before
-    assert [file.name for file in tmp_path.iterdir()] == ["scene.json"]
-
-
 def test_saving_into_no_folder(tmp_path: Path) -> None:
     with pytest.raises(InvalidScene, match="make it first"):
         save_scene(_scene(), tmp_path / "nowhere" / "scene.json")
