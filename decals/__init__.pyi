@@ -20,10 +20,10 @@ from .baking.displace import displace
 from .baking.export import export
 from .errors import ImplicitDecalsError
 from .field.batch import evaluate_batch
-from .field.contact_mode import ContactLaw
 from .field.evaluate import evaluate
 from .field.law import define_contact
 from .field.mapping import ImageMapping
+from .field.rules import ContactLaw
 from .hosts.shader import shader
 from .identity import content_hash
 from .images import load_image

@@ -9,7 +9,7 @@ from enum import Enum, IntEnum
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -350,9 +350,11 @@ def member_array(name: str, values: Any, count: int, kind: type[IntEnum], defaul
 
 def color_values(name: str, values: Any, error: type[ImplicitDecalsError]) -> Any:
     """Return one colour, or colours, with three numbers for each name; other values as they are."""
+    values = _items(values)
+    if values is None or isinstance(values, np.ndarray):
+        return values
     if is_named(values):
         return color_rgb(name, values, error)
-    values = _items(values)
     if isinstance(values, list | tuple):
         return [color_rgb(name, one, error) if is_named(one) else one for one in values]
     return values
@@ -398,3 +400,25 @@ def row_selection(rows: ArrayLike) -> NDArray[Any]:
     """Return indices or a mask as an array; an empty list selects no row."""
     array = np.asarray(rows)
     return array.astype(np.intp) if array.size == 0 else array
+
+
+class KnownAttributes:
+    """Base of classes with settings: an attribute that the class does not declare cannot be set.
+
+    Public attributes are annotated in the class, or are properties. `_elsewhere` is the name of the attribute
+    that has other settings.
+    """
+
+    _elsewhere = ""
+
+    if not TYPE_CHECKING:  # else mypy accepts all names
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            kind = type(self)
+            if not (name.startswith("_") or name in kind.__annotations__ or hasattr(kind, name)):
+                settings = ", ".join(key for key in dir(kind) if getattr(getattr(kind, key), "fset", None))
+                message = f"expected one of the settings {settings}, got {name!r}"
+                if self._elsewhere and hasattr(type(getattr(self, self._elsewhere)), name):
+                    message += f"; set `{self._elsewhere}.{name}` instead"
+                raise InvalidScene(message)
+            super().__setattr__(name, value)

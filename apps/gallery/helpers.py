@@ -13,7 +13,7 @@ from decals import Camera, DecalImage, Decals, ImageMapping, MeshObject, Scene
 from decals.apps.gallery import SIDE
 from decals.apps.models.samples import axes_of, sample
 from decals.apps.views import frame, parse_view
-from decals.field.contact_mode import AnyContact
+from decals.field.rules import AnyContact
 from decals.rendering import Environment, Picture, Renderer
 from decals.rendering.options import RenderOptions
 from decals.scenes.pose import PosedScene

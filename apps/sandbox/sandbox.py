@@ -160,7 +160,7 @@ class Sandbox:
         window, state = self._window, self._state
         document, session = window.document, window.session
         return {
-            "title": window.actions.files.title,
+            "title": window.session.title_of(window.actions.files.path),
             "status": self.status,
             "refused": bool(state.refusal),
             "fields": self._fields.values(

@@ -8,8 +8,8 @@ from blobtree.validation import truth
 from decals.baking.export import TEXTURE, VERTICES, export
 from decals.baking.layouts import AUTO
 from decals.errors import InvalidScene
-from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.field.rules import AnyContact
 from decals.rendering.options import SceneLike
 from decals.scenes.objects import SceneObject
 from decals.surfaces.convert import Model

@@ -19,9 +19,9 @@ from decals.baking.fine_trees import middles_on
 from decals.baking.plain_files import as_polydata
 from decals.baking.surface_colors import options_on
 from decals.errors import InvalidMesh, InvalidScene
-from decals.field.contact_mode import AnyContact
 from decals.field.evaluate import evaluate
 from decals.field.mapping import ImageMapping
+from decals.field.rules import AnyContact
 from decals.model import Decals
 from decals.scenes.cover import as_scene
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject

@@ -28,8 +28,8 @@ from decals.baking.surface_colors import ATTRIBUTES, BLOCK, SurfaceColors
 from decals.baking.texture import Channels, bake_texture
 from decals.baking.unwrapped import Unwrapped
 from decals.errors import InvalidScene
-from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.field.rules import AnyContact
 from decals.images.load import HasPixels
 from decals.index.editor import DecalEditor
 from decals.model import Decals

@@ -12,14 +12,14 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, Int64Array
 from blobtree.kernels import NotCompiled, without_compiling
 from blobtree.nodes.paths import Path
-from decals.editing.background import BackgroundJobs
+from decals.editing.background import BackgroundJobs, Busy
 from decals.editing.brush_settings import BrushSettings
 from decals.editing.commands import SetDrawing
 from decals.editing.document import Document, Edit
+from decals.editing.inputs import inputs_of
 from decals.editing.prompts import PromptLine
 from decals.editing.queries import SurfacePick, on_shown_surfaces
-from decals.editing.session import Command, EditSession
-from decals.editing.steps import Busy, Step, inputs_of, step_of, takes_long
+from decals.editing.session import Command, EditSession, Step, step_of, takes_long
 from decals.editing.tree_commands import same_structure
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.objects import Paths, SceneObject

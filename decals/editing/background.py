@@ -20,10 +20,27 @@ from blobtree.device import core_left_free
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.validation import describe
 from decals.editing.carrying import CarriedEdit
-from decals.editing.session import Command, EditSession, SaveJob, UndoEntry
-from decals.editing.steps import Busy, Inputs, Step, step_of
+from decals.editing.inputs import Inputs
+from decals.editing.session import Command, EditSession, SaveJob, Step, UndoEntry, step_of
 from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.scenes.camera import Camera
+
+BUSY = "another edit is running; wait for it, or press Escape to cancel it"
+
+
+class Busy(InvalidEdit):
+    """The request has to wait for another edit.
+
+    Attributes
+    ----------
+    label
+        What the request does, in a few words.
+    """
+
+    def __init__(self, label: str) -> None:
+        super().__init__(BUSY)
+        self.label = label
+
 
 Completion = Callable[[], "Job | None"]
 """Applies the result of a job, in the thread of the window. It may return a job to run next."""

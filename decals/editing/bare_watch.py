@@ -30,13 +30,15 @@ class BareWatch:
     ----------
     places
         Number of the places; 0 while they are being counted.
+    busy
+        True while places are being counted.
     """
 
     def __init__(self, session: EditSession) -> None:
         self._session, self._worker = session, Worker()
         self._seen: object = None
         self._offer: FillBarePlaces | None = None
-        self.places = 0
+        self.places, self.busy = 0, False
 
     @property
     def offer(self) -> FillBarePlaces | None:
@@ -47,10 +49,10 @@ class BareWatch:
         """Return the offer, else the command that fills all bare places of the object that `pick` returns."""
         return self.offer or FillBarePlaces((pick(),))
 
-    @property
-    def busy(self) -> bool:
-        """True while places are being counted."""
-        return self._worker.busy
+    def forget(self) -> None:
+        """Stop counting, and forget the count."""
+        self._worker.cancel()
+        self._seen, self.places, self.busy, self._offer = None, 0, False, None
 
     def update(self, *, resting: bool) -> bool:
         """Begin to count after an edit, or take the count; return True if it changed.
@@ -58,12 +60,11 @@ class BareWatch:
         Parameters
         ----------
         resting
-            False while a drag or another edit goes on, whose result is counted after it.
+            False while another edit goes on, whose result is counted after it.
         """
         session, before = self._session, self.places
         if self._seen is not session.position or session.stroke_open:
-            self._worker.cancel()
-            self._seen, self.places, self._offer = None, 0, None
+            self.forget()
         if resting and not session.stroke_open and self._seen is None:
             self._seen = session.position
             if session.next_undo is not None:
@@ -74,6 +75,7 @@ class BareWatch:
             complete = None
         if complete is not None:
             complete()
+        self.busy = self._worker.busy
         return self.places != before
 
     def _begin(self, edit: Edit) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from decals.editing.document import Document, Edit
-from decals.editing.steps import COLUMNS
+from decals.editing.inputs import COLUMNS
 from decals.errors import InvalidEdit
 
 

@@ -22,8 +22,16 @@ from decals.scenes.scene import DecalImage, Scene
 from decals.surfaces.surface import unit_rows
 from decals.validation import called, color_values, instance, whole_number
 
+MAX_IMMEDIATE_DECALS = 500
+"""Commands for more decals than this run in the background."""
+
 DUPLICATE_OFFSET = 1.0
 """Distance between a decal and its duplicate, in radii."""
+
+
+def are_many(numbers: ArrayLike) -> bool:
+    """Return True if an edit of these decals belongs in the background."""
+    return np.size(numbers) > MAX_IMMEDIATE_DECALS
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +79,11 @@ class DecalCommand:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "numbers", as_numbers(self.numbers))
+
+    @property
+    def long(self) -> bool:
+        """True if the command belongs in the background."""
+        return are_many(self.numbers)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,11 +11,11 @@ from blobtree.progress import Progress
 from decals.editing.action_state import ActionState, Cursor, WindowActions, require_pick
 from decals.editing.commands import AddDecals, MapValues, OrderDecals, ScaleDecals, TurnDecals
 from decals.editing.document import Document
+from decals.editing.inputs import inputs_of
 from decals.editing.key_bindings import Group
 from decals.editing.queries import mean_normal, nearest_points
 from decals.editing.scatter_commands import RelaxDecals, ScatterDecals
 from decals.editing.session import Command, EditSession
-from decals.editing.steps import inputs_of
 from decals.errors import InvalidEdit
 from decals.model import LAYER_LIMIT, NO_IMAGE, Decals, Interaction
 from decals.scattering.orientation import tangents

@@ -6,13 +6,13 @@ An edit holds the state of a document before and after, so that undo is exact.
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Int64Array
-from blobtree.lazy import Lazy
 from decals.errors import InvalidEdit, InvalidMesh, InvalidScene
 from decals.index.editor import DecalEditor
 from decals.index.rows import as_numbers
@@ -158,7 +158,7 @@ class Edit:
         """Objects before the edit, then those after it; none if they stay."""
         return *(self.parts_before.objects or ()), *(self.parts_after.objects or ())
 
-    @Lazy
+    @cached_property
     def held_bytes(self) -> int:
         """Approximate memory that undo alone needs: decals, and objects and images that were replaced."""
         states = [*vars(self.before.decals).values(), *vars(self.after.decals).values()]
@@ -282,6 +282,11 @@ class Document:
         """Layers whose decals no command changes, ascending."""
         layers: tuple[int, ...] = self._parts.locked_layers
         return layers
+
+    @property
+    def has_locks(self) -> bool:
+        """True if a layer, or an object or a part of one, is locked."""
+        return bool(self.locked_layers) or any(item.locked for item in self.objects)
 
     @property
     def layer_names(self) -> dict[int, str]:

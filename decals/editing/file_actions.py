@@ -22,7 +22,7 @@ from decals.editing.formats import (
 from decals.editing.key_bindings import Group
 from decals.editing.prompts import Question, TextPrompt
 from decals.editing.recovery import RecoveryFile, numbered_paths
-from decals.editing.session import Command
+from decals.editing.session import UNTITLED, Command
 from decals.errors import InvalidEdit
 from decals.images.builtin import BUILTIN_IMAGES, is_builtin
 from decals.rendering.options import Size
@@ -31,9 +31,6 @@ from decals.scenes.camera import Camera
 from decals.scenes.files import load_scene
 from decals.scenes.scene import DecalImage, Scene
 from decals.validation import member
-
-UNTITLED = "untitled"
-"""Title of a scene without a file."""
 
 NOTHING = object()
 """Mark that no changes were discarded."""
@@ -90,12 +87,6 @@ class FileActions(WindowActions):
         recovery = RecoveryFile(state.session, state.background, lambda: self.camera(), state.end_stroke)
         recovery.belong_to(path)
         return recovery
-
-    @property
-    def title(self) -> str:
-        """Name of the file, with a star in front if there are unsaved changes."""
-        name = UNTITLED if self.path is None else Path(self.path).name
-        return f"*{name}" if self._state.session.modified else name
 
     # -- saving -----------------------------------------------------------------------------------------
 
@@ -356,14 +347,16 @@ class FileActions(WindowActions):
         )
         return False
 
-    def update(self, *, dragging: bool = False) -> None:
-        """Close the window once a save has ended, and keep the recovery file; call this regularly."""
+    def update(self) -> None:
+        """Close the window once a save has ended, and keep the recovery file.
+
+        Call this regularly, but not in a drag.
+        """
         if self._closing and not self._state.background.saving:
             self._closing = False
             if not self._state.session.modified:
                 self.leave()
-        if not dragging:
-            self.recovery.update()
+        self.recovery.update()
 
     def finish(self) -> None:
         """Keep unsaved changes in the recovery file, unless they were discarded; call this at the end."""

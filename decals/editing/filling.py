@@ -8,8 +8,8 @@ import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from decals.editing.document import Document, Edit
+from decals.editing.inputs import columns_of, shapes_of
 from decals.editing.scatter_commands import object_indices
-from decals.editing.steps import columns_of, shapes_of
 from decals.errors import InvalidEdit
 from decals.field.evaluate import evaluate
 from decals.field.mapping import IMAGE_RADIUS_SQUARED

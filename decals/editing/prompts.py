@@ -111,11 +111,17 @@ class PromptLine:
     ----------
     show
         Shows a message to the user.
+
+    Attributes
+    ----------
+    text
+        What the window shows; empty without a prompt.
     """
 
     def __init__(self, show: Callable[[str], None]) -> None:
         self._show = show
         self._prompt: Prompt | None = None
+        self.text = ""
 
     @property
     def open(self) -> bool:
@@ -127,19 +133,14 @@ class PromptLine:
         """True while a question is open."""
         return isinstance(self._prompt, Question)
 
-    @property
-    def text(self) -> str:
-        """What the window shows; empty without a prompt."""
-        return "" if self._prompt is None else self._prompt.line
-
     def begin(self, prompt: Prompt) -> None:
         """Open a prompt in place of the present one."""
-        self._prompt = prompt
+        self._prompt, self.text = prompt, prompt.line
         self._show("")
 
     def close(self) -> None:
         """Close the prompt."""
-        self._prompt = None
+        self._prompt, self.text = None, ""
 
     def key(self, name: str, text: str) -> None:
         """Send a key to the open prompt; an error becomes the message, and the prompt stays."""
@@ -152,5 +153,8 @@ class PromptLine:
         except ImplicitDecalsError as error:
             self._show(str(error))
             return
-        if done and self._prompt is prompt:  # else the answer opened another one
+        if self._prompt is not prompt:  # the answer opened another one
+            return
+        self.text = prompt.line
+        if done:
             self.close()

@@ -11,10 +11,10 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, 
 from blobtree.validation import describe, finite_vector, point_array
 from decals.editing.document import Document
 from decals.errors import InvalidEdit, InvalidPoints, InvalidScene
-from decals.field.contact_mode import AnyContact, contact_mode
 from decals.field.evaluate import Samples, evaluate
 from decals.field.extras import WALKS
 from decals.field.mapping import ImageMapping
+from decals.field.rules import AnyContact, contact_mode
 from decals.model import Decals
 from decals.record import DEFAULT_CONTACT
 from decals.scattering.decal_normals import mean_normals
@@ -415,7 +415,8 @@ def outlines(
     decals = document.decals.take(numbers)
     if not len(decals):
         return np.zeros((0, angles + 1, 3), np.float32)
-    walks = WALKS["for"](mapping, document.decals, document.objects, only=numbers) if WALKS else None
+    walked = WALKS and mapping is ImageMapping.WALKED
+    walks = WALKS["for"](mapping, document.decals, document.objects, only=numbers) if walked else None
     own_walks = None if walks is None else walks.take(numbers)
     alone = {"mapping": mapping, "walks": own_walks}
     rims = _rim_points(document, decals, angles, alone)

@@ -11,8 +11,8 @@ from blobtree._typing import Float32Array, IndexArray, Int64Array
 from blobtree.progress import Progress
 from blobtree.validation import describe, finite_vector, point_array
 from decals.editing.document import Document, Edit
+from decals.editing.inputs import columns_of, shapes_of
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points
-from decals.editing.steps import columns_of, shapes_of
 from decals.errors import InvalidEdit
 from decals.model import MAX_COORDINATE, Decals
 from decals.scattering.appearance import Appearance

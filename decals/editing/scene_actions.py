@@ -5,10 +5,9 @@ from collections.abc import Callable
 from blobtree.nodes.paths import Path
 from decals.editing.action_state import ActionState, Cursor, joined
 from decals.editing.brush_settings import Brush
-from decals.editing.commands import DeleteDecals, DuplicateDecals
+from decals.editing.commands import DeleteDecals, DuplicateDecals, are_many
 from decals.editing.key_bindings import Group
 from decals.editing.session import EditSession, UndoEntry
-from decals.editing.steps import are_many
 from decals.editing.tree_actions import TreeActions
 from decals.errors import InvalidEdit
 from decals.field.mapping import ImageMapping

@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Protocol
 
 from blobtree.progress import Progress
@@ -26,6 +27,9 @@ MAX_SURFACES = 8
 MAX_HISTORY_BYTES = 1 << 28
 """Memory of the entries of a session, about; beyond it the oldest ones are forgotten, but never the last."""
 
+UNTITLED = "untitled"
+"""Title of a scene without a file."""
+
 ENTRY_BYTES = 4096
 """Memory of an entry beside what its edit holds, at most."""
 
@@ -41,6 +45,28 @@ class Command(Protocol):
     def compute(self, document: Document) -> Edit:
         """Return the edit; the document stays as it is."""
         ...
+
+
+Step = Callable[["EditSession"], str]
+"""Edits a session, and returns a message for the user (empty for none)."""
+
+
+def step_of(command: Command) -> Step:
+    """Return the step that carries out a command."""
+
+    def step(session: "EditSession") -> str:
+        session.do(command)
+        return command.label
+
+    return step
+
+
+def takes_long(command: Command) -> bool:
+    """Return True if a command says that it belongs in the background by its attribute ``long``.
+
+    Commands for many decals, which query surfaces at many points, or build surfaces, are long.
+    """
+    return bool(getattr(command, "long", False))
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +208,7 @@ class EditSession:
         if not known or isinstance(command, type):
             raise InvalidEdit(f"expected a command such as ScaleDecals([7], 1.5), got {describe(command)}")
         edit = command.compute(self.document)
-        if not getattr(command, "ignores_locks", False):
+        if self.document.has_locks and not getattr(command, "ignores_locks", False):
             check_locks(self.document, edit)
         if edit.empty:
             return edit
@@ -393,6 +419,11 @@ class EditSession:
         """True if there are edits since the last save."""
         stroke = self._history.stroke
         return (stroke is not None and not stroke.edit.empty) or self.position is not self._saved
+
+    def title_of(self, path: str | os.PathLike[str] | None) -> str:
+        """Return the name of the session's file, with a star in front if there are unsaved changes."""
+        name = UNTITLED if path is None else Path(path).name
+        return f"*{name}" if self.modified else name
 
     def save(self, path: str | os.PathLike[str], *, camera: Camera | None = None) -> None:
         """Write the scene to a file, completely or not at all; see `decals.save_scene`.

@@ -19,12 +19,12 @@ from decals.editing.action_state import Cursor, WindowActions, joined, require_p
 from decals.editing.decal_actions import TINTS
 from decals.editing.document import Document
 from decals.editing.gizmo import Handle, HandleDrag, Ray, handles_of, moved_point, snap_distance
+from decals.editing.inputs import usual_inputs
 from decals.editing.key_bindings import Group
 from decals.editing.new_nodes import alternatives, checked_kind, exchanged_node, new_node, node_above
 from decals.editing.queries import SurfacePick, first_hit, nearest_points
 from decals.editing.scatter_commands import AddObject, RemoveObject
-from decals.editing.session import EditSession
-from decals.editing.steps import Step, usual_inputs
+from decals.editing.session import EditSession, Step
 from decals.editing.tree_commands import (
     AddPrimitive,
     DragSurface,

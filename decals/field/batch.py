@@ -12,7 +12,6 @@ from blobtree._typing import Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.device import known_device
 from blobtree.validation import axis_count, describe, items
 from decals.errors import InvalidDevice, InvalidPoints, InvalidScene
-from decals.field.contact_mode import AnyContact
 from decals.field.evaluate import (
     Samples,
     checked_truths,
@@ -36,7 +35,7 @@ from decals.field.points import (
     rows_on,
 )
 from decals.field.query import Neighbors, Query, Target, image_count
-from decals.field.rules import PictureRules
+from decals.field.rules import AnyContact, PictureRules
 from decals.field.sampling_kernels import sample_images, sample_points
 from decals.field.walks import Walks
 from decals.images.load import AnyImage

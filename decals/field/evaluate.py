@@ -11,13 +11,12 @@ from blobtree._typing import Float32Array, Float64Array, Int32Array
 from blobtree.device import array_on, known_device, launch
 from blobtree.validation import describe, truth
 from decals.errors import InvalidDecals, InvalidScene
-from decals.field.contact_mode import AnyContact, with_law
 from decals.field.extras import ANSWERS
 from decals.field.image_texels import MaterialSamples, UploadedImages
 from decals.field.mapping import ImageMapping
 from decals.field.points import checked_rows, checked_turns, device_of, placed, rows_on
 from decals.field.query import Neighbors, Query, SingleTarget, image_count, rows_of, zeros
-from decals.field.rules import PictureRules
+from decals.field.rules import AnyContact, PictureRules, with_law
 from decals.field.sampling_kernels import sample_images
 from decals.images.load import AnyImage
 from decals.index.editor import RECORDS, DecalEditor

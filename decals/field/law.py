@@ -25,8 +25,8 @@ from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.transpile.specialize import rebind, referenced_values, warp_function
 from decals.errors import InvalidScene
 from decals.field.contact import contact_push, push_of, rim_distance
-from decals.field.contact_mode import LAWS, ContactLaw
 from decals.field.radial import RIM_SQUARED
+from decals.field.rules import LAWS, ContactLaw
 from decals.record import NEIGHBOR_REACH, RIM_RADIUS, Contact, field_complement
 from decals.validation import member
 

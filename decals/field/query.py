@@ -9,8 +9,8 @@ import warp as wp
 
 from blobtree._typing import BoolArray, Float32Array, Int32Array, Int64Array
 from blobtree.device import launch
-from decals.field.contact_mode import AnyContact, with_law
 from decals.field.image_texels import UploadedImages
+from decals.field.rules import AnyContact, with_law
 from decals.field.sampling_kernels import sample_images, sample_points
 from decals.index.editor import DecalEditor
 from decals.index.index import index_on

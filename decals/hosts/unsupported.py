@@ -4,8 +4,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from decals.errors import InvalidScene
-from decals.field.contact_mode import ContactLaw
 from decals.field.mapping import ImageMapping
+from decals.field.rules import ContactLaw
 from decals.rendering.options import Drawing, SceneLike
 
 

@@ -7,10 +7,10 @@ from typing import Any
 
 from blobtree.formulas.falloff import RIM
 from blobtree.transpile.glsl import translate_library
-from decals.field.contact_mode import AnyContact, with_law
 from decals.field.mapping import in_image, tangent_coordinates, unroll_step
 from decals.field.ownership import contact_at, owner_at, owner_below, single_layer_at, uv_at
 from decals.field.receivers import opacity_at
+from decals.field.rules import AnyContact, with_law
 from decals.index.lookup import next_number_below
 from decals.record import NEIGHBOR_REACH, OPAQUE_ALPHA, Contact
 

@@ -1,14 +1,13 @@
 """Effects: what extends the passes, such as relief and environments. Each registers itself in `EFFECTS`."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import moderngl
 
-from decals.rendering.context import Context
+from decals.rendering.context import Context, GpuCache
 from decals.rendering.decal_data import DecalData
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.gpu_cache import GpuCache
 from decals.rendering.image_array import ImageArray
 from decals.rendering.options import Drawing, SceneLike
 from decals.rendering.pixel_pass import Program
@@ -79,15 +78,8 @@ class Effect:
         self._cache.release()
 
 
-class EffectKind(NamedTuple):
-    """A kind of effect: which pictures need it, and its class."""
-
-    needed: Callable[[SceneLike, Drawing], bool]
-    make: Callable[[SceneUploads], Effect]
-
-
-EFFECTS: dict[str, EffectKind] = {}
-"""Kinds of effects by their fields of `UploadedScene`."""
+EFFECTS: dict[str, type[Effect]] = {}
+"""Classes of effects by their fields of `UploadedScene`, which are the names of `needed_effects`."""
 
 BUFFERS: dict[str, Callable[[Context, GBuffer], Any]] = {}
 """Buffers beside the G-buffer, by name; ``"rest"``: places at rest of objects that are posed or moved."""

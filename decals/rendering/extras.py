@@ -5,9 +5,8 @@ The first class that fits an object draws it. Effects may be left out.
 
 from blobtree.lazy import if_present
 from decals.rendering.drawable import register
-from decals.rendering.effect import BUFFERS, EFFECTS, EffectKind
+from decals.rendering.effect import BUFFERS, EFFECTS
 from decals.rendering.mesh import ColoredMesh, MeshDrawable
-from decals.rendering.options import has_materials, has_relief, has_walks
 from decals.rendering.tree import TreeDrawable, TreeHolder
 
 with if_present():
@@ -27,9 +26,9 @@ with if_present():
     from decals.rendering.walk_cache import WalkEffect
 
     EFFECTS |= {
-        "materials": EffectKind(lambda scene, _: has_materials(scene), MaterialEffect),
-        "relief": EffectKind(lambda scene, _: has_relief(scene), HeightEffect),
-        "walks": EffectKind(has_walks, WalkEffect),
-        "environment": EffectKind(lambda _, drawing: drawing.environment is not None, EnvironmentEffect),
+        "materials": MaterialEffect,
+        "relief": HeightEffect,
+        "walks": WalkEffect,
+        "environment": EnvironmentEffect,
     }
     register(TreeHolder, OffsetTreeDrawable, OffsetTreeDrawable.warmup)

@@ -10,9 +10,8 @@ from blobtree._typing import Float32Array, Float64Array
 from blobtree.colors import ColorLike, Rgba, color_rgba
 from blobtree.validation import describe
 from decals.errors import InvalidScene
-from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
-from decals.field.rules import PictureRules
+from decals.field.rules import AnyContact, PictureRules
 from decals.images.load import AnyImage, HasPixels
 from decals.index.editor import DecalEditor
 from decals.model import Decals
@@ -295,9 +294,15 @@ def has_materials(scene: SceneLike) -> bool:
     return len(scene.decals) > 0 and any(hasattr(image, "surface_texels") for image in scene.images)
 
 
-def has_walks(scene: SceneLike, drawing: Drawing) -> bool:
-    """Return True if decals of a scene are drawn in the mapping WALKED."""
-    return drawing.mapping is ImageMapping.WALKED and len(scene.decals) > 0
+def needed_effects(scene: SceneLike, drawing: Drawing) -> list[str]:
+    """Return the names of the effects that a picture needs."""
+    needed = {
+        "materials": has_materials(scene),
+        "relief": has_relief(scene),
+        "walks": drawing.walked and len(scene.decals) > 0,
+        "environment": drawing.environment is not None,
+    }
+    return [name for name, is_needed in needed.items() if is_needed]
 
 
 def check_scene(scene: object) -> None:

@@ -9,12 +9,11 @@ import numpy as np
 
 from decals.index.editor import DecalEditor
 from decals.receivers import object_mask
-from decals.rendering.context import Context
+from decals.rendering.context import Context, GpuCache
 from decals.rendering.data_texture import DataTexture
 from decals.rendering.decal_data import DecalData
 from decals.rendering.drawable import Drawable, can_be_moved, drawable_for
 from decals.rendering.effect import EFFECTS, DecalTexture, Effect, LightTextures, ReliefEffect
-from decals.rendering.gpu_cache import GpuCache
 from decals.rendering.image_array import ImageArray
 from decals.rendering.options import (
     Drawing,
@@ -22,6 +21,7 @@ from decals.rendering.options import (
     check_scene,
     drawn_objects,
     is_limited,
+    needed_effects,
     relief_lookups,
 )
 from decals.rendering.viewpoint import Bounds
@@ -95,11 +95,11 @@ class Uploads:
 
     def _needed(self, scene: SceneLike, drawing: Drawing) -> dict[str, Effect]:
         """Return the effects that a picture needs, by their fields of `UploadedScene`."""
-        return {name: self._effect(name) for name, kind in EFFECTS.items() if kind.needed(scene, drawing)}
+        return {name: self._effect(name) for name in needed_effects(scene, drawing) if name in EFFECTS}
 
     def _effect(self, name: str) -> Effect:
         if name not in self._effects:
-            self._effects[name] = EFFECTS[name].make(self)
+            self._effects[name] = EFFECTS[name](self)
         return self._effects[name]
 
     def _masks_of(self, scene: SceneLike, objects: Sequence[object]) -> DataTexture | None:

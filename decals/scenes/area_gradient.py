@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float64Array
 from blobtree.progress import Progress
 from decals.errors import InvalidScene
-from decals.field.contact_mode import AnyContact, ContactLaw, contact_mode
 from decals.field.mapping import ImageMapping
+from decals.field.rules import AnyContact, ContactLaw, contact_mode
 from decals.model import Decals
 from decals.record import Contact
 from decals.scenes.outlines import STEP, LineKind, SurfaceLine, outlines

@@ -7,8 +7,8 @@ from msgspec import Struct
 from msgspec.structs import asdict
 
 from decals.errors import ImplicitDecalsError, InvalidScene
-from decals.field.contact_mode import LAWS, ContactLaw
 from decals.field.mapping import ImageMapping
+from decals.field.rules import LAWS, ContactLaw
 from decals.images.load import embedded_image, is_embedded, opaque
 from decals.record import DEFAULT_STIFFNESS, Contact
 from decals.rendering.environment import Environment

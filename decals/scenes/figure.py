@@ -16,8 +16,8 @@ from blobtree.files import replacing, write_atomically
 from blobtree.progress import Progress, reporting
 from blobtree.validation import describe, finite_number, items, truth
 from decals.errors import InvalidScene
-from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.field.rules import AnyContact
 from decals.scenes.camera import Camera
 from decals.scenes.objects import MeshObject, SceneObject, bounds_of
 from decals.scenes.outlines import STEP, LineKind, chains, outlines

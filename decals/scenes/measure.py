@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
 from blobtree.progress import Progress, reporting
 from decals.errors import InvalidScene
-from decals.field.contact_mode import AnyContact
 from decals.field.evaluate import Samples, evaluate
 from decals.field.jacobian import folds_of, normal_derivatives_of_triangles, stretch_of
 from decals.field.mapping import IMAGE_RADIUS_SQUARED, ImageMapping
+from decals.field.rules import AnyContact
 from decals.field.walks import evaluation_options
 from decals.model import Decals, Interaction
 from decals.scattering.center_normals import Centers

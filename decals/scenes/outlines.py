@@ -17,9 +17,9 @@ import numpy as np
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
 from blobtree.progress import Progress, reporting
 from decals.errors import InvalidScene
-from decals.field.contact_mode import AnyContact
 from decals.field.evaluate import evaluate
 from decals.field.mapping import IMAGE_RADIUS_SQUARED, ImageMapping
+from decals.field.rules import AnyContact
 from decals.field.walks import evaluation_options
 from decals.model import Decals, Interaction
 from decals.scenes.objects import MeshObject, SceneObject, TreeObject

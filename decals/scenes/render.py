@@ -13,8 +13,8 @@ from blobtree.identity import content_hash
 from blobtree.progress import reporting
 from blobtree.validation import items
 from decals.errors import InvalidScene
-from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.field.rules import AnyContact
 from decals.images.load import AnyImage
 from decals.rendering.environment import Environment, as_environment
 from decals.rendering.lights import Lighting

@@ -16,8 +16,8 @@ from blobtree.colors import ColorLike
 from blobtree.graphics import opens_window, vtk_warnings_hidden
 from blobtree.validation import describe
 from decals.errors import InvalidScene, NoGraphics
-from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.field.rules import AnyContact
 from decals.images.load import DEFAULT_IMAGE, AnyImage
 from decals.model import NO_IMAGE, Decals
 from decals.rendering import Environment, SceneLike
@@ -29,9 +29,8 @@ from decals.surfaces.base_color import BaseColor, BaseTexture
 from decals.surfaces.convert import Model, as_shape
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.surfaces.windings import MeshOrientation
-from decals.validation import instance
+from decals.validation import KnownAttributes, instance
 from decals.vtk.adapters import Lights
-from decals.vtk.attributes import KnownAttributes
 from decals.vtk.extras import ACTORS
 from decals.vtk.frame import WindowContext
 from decals.vtk.subplot import PickResult, SubplotRenderer

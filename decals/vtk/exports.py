@@ -104,7 +104,7 @@ def _sources(subplot: Any) -> Iterator[tuple[SceneLike, Any, Float64Array]]:
     """Yield each scene of a subplot to bake, the actor that shows it, and the matrix to the world."""
     if subplot.scene is not None and drawn_objects(subplot.scene):
         yield subplot.scene, subplot.actor, np.eye(4)
-    for injection in subplot.applied:
+    for injection in subplot.applied.injections:
         found = injection.as_scene() if injection.actor.GetVisibility() else None
         if found is not None:
             scene, world = found

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
@@ -286,8 +285,10 @@ class InjectedDecals:
 
     Attributes
     ----------
+    injections
+        The actors with decals.
     in_frame
-        True while VTK draws a frame of the subplot.
+        True while VTK draws a frame of the subplot that has some.
     refusal
         Message about a mapping that cannot be drawn.
     """
@@ -296,7 +297,7 @@ class InjectedDecals:
 
     def __init__(self, subplot: InjectionTarget) -> None:
         self._subplot = subplot
-        self._injections: list[Injection] = []
+        self.injections: list[Injection] = []
         self._units: list[int] = []
         self.in_frame = False
 
@@ -313,7 +314,7 @@ class InjectedDecals:
         if self._subplot.drawing.walked:
             raise InvalidScene(NOT_WALKED)
         self._release(self._of(actor))
-        self._injections.append(
+        self.injections.append(
             Injection(
                 self._subplot,
                 actor,
@@ -324,17 +325,9 @@ class InjectedDecals:
             )
         )
 
-    def __iter__(self) -> Iterator[Injection]:
-        """Return an iterator over the actors with decals."""
-        return iter(self._injections)
-
-    def refuse(self, mapping: ImageMapping) -> bool:
-        """Return True if there are actors that cannot be drawn in a mapping."""
-        return mapping is ImageMapping.WALKED and bool(self._injections)
-
     def check_mapping(self, mapping: ImageMapping) -> None:
         """Raise InvalidScene if there are actors that cannot be drawn in a mapping."""
-        if self.refuse(mapping):
+        if mapping is ImageMapping.WALKED and self.injections:
             raise InvalidScene(NOT_WALKED)
 
     def remove(self, actor: Any) -> None:
@@ -354,11 +347,11 @@ class InjectedDecals:
         self._release(injections)
 
     def _of(self, actor: Any) -> list[Injection]:
-        return [item for item in self._injections if item.actor is actor]
+        return [item for item in self.injections if item.actor is actor]
 
     def clear(self) -> None:
         """Remove the decals from all actors."""
-        self._release(self._injections)
+        self._release(self.injections)
 
     def _release(self, injections: list[Injection]) -> None:
         if not injections:
@@ -366,7 +359,7 @@ class InjectedDecals:
         with self._subplot.current_if_present():
             for injection in injections:
                 injection.release()
-        self._injections = [item for item in self._injections if item not in injections]
+        self.injections = [item for item in self.injections if item not in injections]
 
     def texture_units(self) -> list[int]:
         """Return the texture units of an injected shader, reserved until the end of the frame."""
@@ -381,10 +374,9 @@ class InjectedDecals:
     def begin_frame(self) -> None:
         """Update meshes and shaders before VTK draws a frame."""
         self.in_frame = True
-        if self._injections:
-            with self._subplot.current():
-                for injection in self._injections:
-                    injection.begin_frame()
+        with self._subplot.current():
+            for injection in self.injections:
+                injection.begin_frame()
 
     def end_frame(self) -> None:
         """Release the texture units after VTK has drawn a frame."""
@@ -392,5 +384,5 @@ class InjectedDecals:
         for unit in self._units:
             self._manager.Free(unit)
         self._units = []
-        for injection in self._injections:
+        for injection in self.injections:
             injection.end_frame()

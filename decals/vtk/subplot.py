@@ -19,8 +19,8 @@ from vtkmodules.vtkRenderingCore import vtkActor
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.progress import displayed, reporting
 from decals.errors import InvalidPoints, InvalidScene
-from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.field.rules import AnyContact
 from decals.images.load import AnyImage
 from decals.receivers import label_names
 from decals.rendering import Environment, Renderer, RenderOptions, SceneLike, Size
@@ -33,9 +33,8 @@ from decals.scenes.origin import WORLD
 from decals.scenes.scene import Scene
 from decals.surfaces.normals import CREASE_ANGLE
 from decals.surfaces.windings import MeshOrientation
-from decals.validation import any_number, count_number, member
+from decals.validation import KnownAttributes, any_number, count_number, member
 from decals.vtk.adapters import Lights, unsupported_modes, vtk_lighting, vtk_projection, weak_callback
-from decals.vtk.attributes import KnownAttributes
 from decals.vtk.extras import ACTORS
 from decals.vtk.frame import FrameKey, FrameOptions, FrameRenderer, WindowContext
 from decals.vtk.proxy_actor import ProxyActor, box_around
@@ -571,7 +570,8 @@ class SubplotRenderer(KnownAttributes):
             if self._enclose_objects(box_around):  # an edited document may change with every frame
                 self._widen_clipping_range()
             self._warn_of_unsupported()
-        self.applied.begin_frame()
+        if self.applied.injections:
+            self.applied.begin_frame()
 
     def _widen_clipping_range(self) -> None:
         """Reset the camera's near and far planes if an edit has moved objects beyond them."""
@@ -584,7 +584,8 @@ class SubplotRenderer(KnownAttributes):
             self.vtk_renderer.ResetCameraClippingRange()
 
     def _end_frame(self) -> None:
-        self.applied.end_frame()
+        if self.applied.injections:
+            self.applied.end_frame()
         if self._frames is not None and not self._proxy_actor.visible:  # frames that are drawn do it
             with self._frames.context.current():
                 self._frames.renderer.sweep()
@@ -595,7 +596,7 @@ class SubplotRenderer(KnownAttributes):
         picking = getattr(getattr(self.plotter, "picking", None), "_picker_in_use", False)
         if picking and self._enclosed:
             messages = [*messages, PICKERS]
-        if self.applied.refuse(self.mapping):  # an edited document has changed its own
+        if self.drawing.walked and self.applied.injections:  # an edited document has changed its own
             messages = [*messages, self.applied.refusal]
         for message in messages:
             if message not in self._warned:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from blobtree.progress import in_notebook
 from decals.editing.session import EditSession
-from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.field.rules import AnyContact
 from decals.scenes.cover import as_scene
 from decals.scenes.files import load_scene
 from decals.scenes.objects import SceneObject

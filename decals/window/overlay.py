@@ -16,8 +16,8 @@ from blobtree.nodes.paths import Path, node_in_world
 from decals.editing.actions import KEYS, Actions
 from decals.editing.document import Document
 from decals.editing.queries import ANGLES, outlines
-from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.field.rules import AnyContact
 from decals.scenes.objects import TreeObject, bounds_of
 from decals.vtk.adapters import weak_callback
 

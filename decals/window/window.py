@@ -21,8 +21,8 @@ from decals.editing.document import Document
 from decals.editing.pointer_tools import PointerTools
 from decals.editing.session import EditSession
 from decals.errors import InvalidEdit, InvalidScene
-from decals.field.contact_mode import AnyContact
 from decals.field.mapping import ImageMapping
+from decals.field.rules import AnyContact
 from decals.scenes.scene import Scene
 from decals.validation import count_number
 from decals.vtk.adapters import weak_callback
@@ -246,18 +246,13 @@ class EditWindow:
         if not whole or self.frames.outdated:
             self.frames.choose_for_edit()
         self.plotter.render()
-        if self.busy:
-            self._ticker.wake()
+        self._ticker.wake()
 
     def begin_motion(self) -> None:
         """Draw the next frames at a quality that is in time for a moving camera."""
         self.camera.keep_usable()
         self.frames.choose_for_motion()
-        self._wake_if_coarse()
-
-    def _wake_if_coarse(self) -> None:
-        if self.frames.state is FrameState.COARSE:
-            self._ticker.wake()
+        self._ticker.wake()
 
     def cancel_press(self) -> None:
         """Forget a press of the button: revert what its drag has changed, and let the camera stop."""
@@ -283,13 +278,14 @@ class EditWindow:
         self.overlay.outline(self.document, *outlined, self.subplot.contact, self.subplot.shown_mapping)
         self.actions.help_pages = self.overlay.show_help(self.actions.help_page)
         self.overlay.show_status(self._status())
-        self._host.set_title(self.actions.files.title)
+        self._host.set_title(self.session.title_of(self.actions.files.path))
 
     def _status(self) -> str:
         state = self.actions.state
         hint = HELP_HINT if self.document.objects else EMPTY_HINT
         progress = self.warmup.status, self._work, self.background.progress
-        bare = f"{BARE_HINT}: {self.actions.bare.places}" if self.actions.bare.offer else ""
+        places = self.actions.bare.places
+        bare = f"{BARE_HINT}: {places}" if places and self.actions.bare.offer else ""
         parts = (state.prompt.text or hint, bare, *progress, state.message)
         return "   ".join(filter(None, parts))
 
@@ -319,12 +315,18 @@ class EditWindow:
             self._show_status()
         else:
             self.frames.refine_when_due()
-        self.actions.files.update(dragging=dragging)
-        if self.actions.bare.update(resting=not dragging and not self.background.busy_editing):
-            self._show_status()
+        bare = self.actions.bare
+        if not dragging:
+            self.actions.files.update()
+            if bare.update(resting=not self.background.busy_editing):
+                self._show_status()
+        elif bare.busy or bare.places:
+            bare.forget()
 
     def in_other_subplot(self, x: int, y: int) -> bool:
         """Return True if a pixel is in a subplot of the same plotter that another window edits."""
+        if self.subplot.covers(x, y):
+            return False
         subplots = self.plotter.decals.subplots
         return any(edits_at(subplot, x, y) for subplot in subplots if subplot is not self.subplot)
 

@@ -676,7 +676,10 @@ async def sandbox_start(picture: str | None = None) -> None:
         await shows(browser, plotter)
         await asyncio.sleep(AUTOSAVE_SECONDS + 1.0)
         assert [*folder.iterdir()] == [folder / "older.json"]  # the sample has no edits to recover
-        assert await browser.title() == f"{window.actions.files.title} \N{EN DASH} sandbox"
+        assert (
+            await browser.title()
+            == f"{window.session.title_of(window.actions.files.path)} \N{EN DASH} sandbox"
+        )
         middle = plotter.window_size[0] // 2, plotter.window_size[1] // 2
         path = [(middle[0] + x, middle[1]) for x in (0, 10, 30)]
         for brush in ("erase", "scatter", "push"):

@@ -51,7 +51,7 @@ def edit_for_ever(path: Path, report: int) -> None:
         if number % 40 == 0:
             actions.perform("save", lambda: None)
         actions.state.background.poll()
-        actions.files.update(dragging=False)
+        actions.files.update()
         time.sleep(PAUSE)
 
 

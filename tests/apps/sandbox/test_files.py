@@ -108,7 +108,7 @@ def test_a_scene_of_a_sample_is_opened_and_recovered(
     content = (tmp_path / "saved.json").read_bytes() if name == "saved" else b""
     sandbox.upload({"name": "again.json", "content": content})
     finish(window)
-    assert window.actions.files.title == ("again.json" if content else "*lost.json")
+    assert window.session.title_of(window.actions.files.path) == ("again.json" if content else "*lost.json")
 
 
 def test_a_sample_stands_upright(

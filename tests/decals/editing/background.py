@@ -7,7 +7,7 @@ import pytest
 
 from decals.editing import Actions, EditSession
 from decals.editing.queries import SurfacePick
-from decals.editing.steps import step_of
+from decals.editing.session import step_of
 from tests.decals.editing.scenes import scene
 
 LONG = 30.0

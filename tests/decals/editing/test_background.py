@@ -29,11 +29,12 @@ from decals.editing import (
     TurnDecals,
 )
 from decals.editing.action_state import COMPILING
-from decals.editing.background import MAX_WAITING
+from decals.editing.background import BUSY, MAX_WAITING
 from decals.editing.brush_settings import Brush
 from decals.editing.document import Edit
+from decals.editing.inputs import LOOKS, inputs_of
 from decals.editing.scatter_commands import decals_on
-from decals.editing.steps import BUSY, LOOKS, inputs_of, step_of
+from decals.editing.session import step_of
 from decals.errors import InvalidEdit
 from tests.decals.editing.background import LONG, Held, finish, press, threaded
 from tests.decals.editing.scenes import digest, goes_back_and_forth, scene

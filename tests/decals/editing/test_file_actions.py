@@ -47,7 +47,7 @@ def test_save_as_changes_the_file(typist: Typist, tmp_path: Path) -> None:
     typist.key("s", ctrl=True, shift=True)
     typist.enter(f"{tmp_path}/other.json")
     assert typist.actions.files.path == tmp_path / "other.json"
-    assert typist.actions.files.title == "other.json"
+    assert typist.actions.files.path == tmp_path / "other.json"
     assert load_scene(tmp_path / "other.json").decals.radii[1] == 2 * scene().decals.radii[1]
     assert not (tmp_path / "scene.json").exists()
 
@@ -220,8 +220,8 @@ def test_a_new_scene_never_replaces_a_file_of_another_window(tmp_path: Path) -> 
     first.state.session.do(ScaleDecals([1], 2.0))
     for actions in (first, second, first, second):
         press(actions, "save")
-    assert first.files.title == "scene.json"
-    assert second.files.title == "scene-2.json"
+    assert first.files.path == tmp_path / "scene.json"
+    assert second.files.path == tmp_path / "scene-2.json"
     radii = [load_scene(tmp_path / name).decals.radii[1] for name in ("scene.json", "scene-2.json")]
     assert radii[0] == pytest.approx(2 * radii[1])
 
@@ -234,7 +234,7 @@ def test_a_scene_that_is_set_aside_keeps_its_file_and_its_unsaved_changes(tmp_pa
     radius = session.document.decals[1].radii[0]
     files.set_aside()
     files.set_aside()
-    assert (files.path, files.title) == (None, "*untitled")
+    assert (files.path, session.modified) == (None, True)
     session.do(ScaleDecals([1], 3.0))
     files.update()
     files.recovery.keep()
@@ -264,7 +264,7 @@ def test_opening_another_scene_begins_anew_and_keeps_unsaved_changes(tmp_path: P
     scaled = session.document.decals[1].radii[0]
     files.open(lambda *_: load_scene(tmp_path / "other.json"), tmp_path / "other.json")
     assert len(session.document.decals) == 3
-    assert (session.labels, session.modified, files.title) == ((), False, "other.json")
+    assert (session.labels, session.modified, files.path) == ((), False, tmp_path / "other.json")
     assert [camera.position for camera in shown] == [other.camera.position]
     assert load_scene(tmp_path / "scene.recovery.json").decals.radii[1] == scaled
     files.open(lambda *_: scene(), tmp_path / "scene.json")

@@ -8,7 +8,7 @@ import pytest
 
 from decals.editing import EditSession
 from decals.editing.background import BackgroundJobs
-from decals.editing.steps import step_of
+from decals.editing.session import step_of
 from decals.errors import ImplicitDecalsError
 from tests.decals.editing.fuzz import RandomCommands
 from tests.decals.editing.scenes import digest, goes_back_and_forth, scene

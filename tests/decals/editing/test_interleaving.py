@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from decals import load_scene
 from decals.editing import Actions, EditSession
-from decals.editing.steps import BUSY
+from decals.editing.background import BUSY
 from tests.decals.editing.background import LONG, surface_pick, threaded
 from tests.decals.editing.scenes import digest, goes_back_and_forth, scene
 

@@ -57,16 +57,6 @@ def test_the_file_is_not_written_with_every_edit(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("at_once")
-def test_a_drag_is_not_disturbed(tmp_path: Path) -> None:
-    actions = edited(tmp_path / "scene.json")
-    session = actions.state.session
-    session.begin_stroke("a drag")
-    actions.files.update(dragging=True)
-    assert session.stroke_open
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.usefixtures("at_once")
 def test_repeated_keys_are_kept_too(tmp_path: Path) -> None:
     path = tmp_path / "scene.json"
     actions = edited(path)

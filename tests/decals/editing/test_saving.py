@@ -9,7 +9,7 @@ import pytest
 
 from decals import load_scene
 from decals.editing import ScaleDecals
-from decals.editing.steps import step_of
+from decals.editing.session import step_of
 from decals.errors import InvalidScene
 from tests.decals.editing.background import LONG, finish, hold_writing, press, threaded
 from tests.decals.editing.scenes import scene

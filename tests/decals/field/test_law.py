@@ -13,7 +13,7 @@ import warp as wp
 import decals
 from blobtree.errors import InvalidDefinition
 from decals import define_contact, evaluate
-from decals.field.contact_mode import LAWS
+from decals.field.rules import LAWS
 from decals.rendering import Drawing, Renderer, RenderOptions
 from decals.rendering.pixel_pass import BACKEND_VARIABLE
 

@@ -65,7 +65,7 @@ def subplot_with(
     actor = pl.add_mesh(mesh, **look)
     pl.decals.add(decals, images=["scale"])
     subplot = pl.decals.subplot
-    subplot.applied._injections.append(
+    subplot.applied.injections.append(
         injection.Injection(subplot, actor, crease_angle=crease_angle, paint=paint)
     )
     pl.camera_position = [(2.0, -2.6, 2.4), (0, 0, 0), (0, 0, 1)]
@@ -338,7 +338,7 @@ def test_decals_stay_if_another_actor_shows_the_same_mesh(
             pl.add_mesh(mesh, style="wireframe", color="red", lighting=False)
         pl.decals.add(decals, images=["scale"])
         subplot = pl.decals.subplot
-        subplot.applied._injections.append(injection.Injection(subplot, actor, paint=OWNER))
+        subplot.applied.injections.append(injection.Injection(subplot, actor, paint=OWNER))
         x, y, z = center
         pl.camera_position = [(x + 40.0, y - 50.0, z + 30.0), center, (0, 0, 1)]
         pl.reset_camera_clipping_range()

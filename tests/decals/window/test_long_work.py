@@ -56,7 +56,7 @@ def test_escape_stops_what_goes_on_in_the_background(driver: Driver) -> None:
 def test_everything_is_scaled_in_the_background_and_seen_with_the_next_tick(
     driver: Driver, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("decals.editing.steps.MAX_IMMEDIATE_DECALS", 5)
+    monkeypatch.setattr("decals.editing.commands.MAX_IMMEDIATE_DECALS", 5)
     monkeypatch.setattr("decals.editing.session.MAX_REPLAYED_DECALS", 5)
     first, state = driver.shot(), driver.state
     driver.key("a", ctrl=True)
@@ -78,7 +78,7 @@ def test_everything_is_scaled_in_the_background_and_seen_with_the_next_tick(
 def test_a_drag_of_many_follows_the_pointer_in_the_background(
     driver: Driver, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("decals.editing.steps.MAX_IMMEDIATE_DECALS", 5)
+    monkeypatch.setattr("decals.editing.commands.MAX_IMMEDIATE_DECALS", 5)
     monkeypatch.setattr("decals.editing.session.MAX_REPLAYED_DECALS", 5)
     number, at = next(driver.visible())
     driver.click(at)

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from decals import Contact, ImageMapping, edit, load_scene
@@ -115,6 +116,23 @@ def test_ticks_keep_the_recovery_file(opened: Any, tmp_path: Path, monkeypatch: 
     assert not driver.window.busy
 
 
+def test_a_drag_is_not_disturbed(opened: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("decals.editing.recovery.AUTOSAVE_SECONDS", 0.0)
+    driver = opened(path=tmp_path / "scene.json")
+    _, at = next(driver.visible())
+    driver.click(at)
+    driver.event("LeftButtonPressEvent", at)
+    driver.event("MouseMoveEvent", np.add(at, 12))
+    driver.window.tick()
+    driver.finish()
+    assert driver.session.stroke_open
+    assert list(tmp_path.iterdir()) == []
+    driver.event("LeftButtonReleaseEvent", np.add(at, 12))
+    driver.window.tick()
+    driver.finish()
+    assert recovery_path(tmp_path / "scene.json").exists()
+
+
 def test_the_title_names_the_file_and_marks_changes(opened: Any, tmp_path: Path) -> None:
     driver = opened(path=tmp_path / "scene.json")
 
@@ -127,6 +145,7 @@ def test_the_title_names_the_file_and_marks_changes(opened: Any, tmp_path: Path)
     assert title() == "*scene.json - Implicit Decals"
     driver.press("s", ctrl=True)
     assert title() == "scene.json - Implicit Decals"
+    assert "untitled - " in str(opened().plotter.render_window.GetWindowName())
 
 
 def test_changes_after_a_discard_count_again(left: list[bool], opened: Any, tmp_path: Path) -> None:

@@ -1,71 +1,14 @@
-"""Edits of a window as steps: whether they take long, and what they read of a document.
-
-A step that takes long belongs in the background. A command reads a part of the document. While only other
-parts change, its result stays valid.
-"""
+"""What edits in a thread read of a document: while only other parts change, their results stay valid."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from decals.editing.commands import DecalCommand
 from decals.editing.document import Document
-from decals.editing.session import Command, EditSession
-from decals.errors import InvalidEdit
 from decals.model import Decals
 from decals.scenes.objects import SceneObject, TreeObject
-
-MAX_IMMEDIATE_DECALS = 500
-"""Commands for more decals than this run in the background."""
-
-BUSY = "another edit is running; wait for it, or press Escape to cancel it"
-
-
-class Busy(InvalidEdit):
-    """The request has to wait for another edit.
-
-    Attributes
-    ----------
-    label
-        What the request does, in a few words.
-    """
-
-    def __init__(self, label: str) -> None:
-        super().__init__(BUSY)
-        self.label = label
-
-
-Step = Callable[[EditSession], str]
-"""Edits a session, and returns a message for the user (empty for none)."""
-
-
-def are_many(numbers: ArrayLike) -> bool:
-    """Return True if an edit of these decals belongs in the background."""
-    return np.size(numbers) > MAX_IMMEDIATE_DECALS
-
-
-def takes_long(command: Command) -> bool:
-    """Return True if a command belongs in the background: it is `long`, or edits many decals.
-
-    Commands that query surfaces at many points, or build surfaces, are long.
-    """
-    if isinstance(command, DecalCommand):
-        return are_many(command.numbers)
-    return bool(getattr(command, "long", False))
-
-
-def step_of(command: Command) -> Step:
-    """Return the step that carries out a command."""
-
-    def step(session: EditSession) -> str:
-        session.do(command)
-        return command.label
-
-    return step
-
 
 Inputs = Callable[[Document], object]
 """Returns what a command reads, as a value that is equal for states between which its result stays valid."""
