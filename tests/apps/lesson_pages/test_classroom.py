@@ -28,6 +28,12 @@ from tests.apps.sandbox.test_sessions import PROGRAM, TOKEN
 STUDENTS = 40
 
 
+@pytest.fixture(autouse=True)
+def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let processes of sessions write their files into a folder of the test."""
+    monkeypatch.chdir(tmp_path)
+
+
 def serve(check: Callable[[Classroom, str], Awaitable[None]]) -> Sessions:
     """Serve a class to a check, then end it."""
     return asyncio.run(served(check))
