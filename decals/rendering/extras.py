@@ -4,9 +4,10 @@ The first class that fits an object draws it. Effects may be left out.
 """
 
 from blobtree.lazy import if_present
+from decals.rendering.computed_mesh import mesh_drawable, mesh_warmup
 from decals.rendering.drawable import register
 from decals.rendering.effect import BUFFERS, EFFECTS
-from decals.rendering.mesh import ColoredMesh, MeshDrawable
+from decals.rendering.mesh import ColoredMesh
 from decals.rendering.tree import TreeDrawable, TreeHolder
 
 with if_present():
@@ -17,7 +18,7 @@ with if_present():
 
     BUFFERS["rest"] = RestBuffer
     register(PosedColoredMesh, PosedMeshDrawable, PosedMeshDrawable.warmup)
-register(ColoredMesh, MeshDrawable, MeshDrawable.warmup)
+register(ColoredMesh, mesh_drawable, mesh_warmup)
 register(TreeHolder, TreeDrawable, TreeDrawable.warmup)
 with if_present():
     from decals.rendering.environment_textures import EnvironmentEffect

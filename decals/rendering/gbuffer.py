@@ -1,6 +1,7 @@
 """The G-buffer: the visible surface at every pixel, which all kinds of objects write."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -19,6 +20,9 @@ from decals.rendering.pixel_pass import (
 )
 from decals.rendering.viewpoint import WHOLE, Part, Rectangle, Tile
 from decals.shaders import compose
+
+NO_FACE = 0xFFFFFFFF
+"""Entry of a pixel without a face."""
 
 
 class GBuffer:
@@ -47,6 +51,7 @@ class GBuffer:
         self._screen = context.gl.vertex_array(self._depth_program, [])
         self._clear_program = _clear_program(context) if context.backend is PassBackend.COMPUTE else None
         self._gl = context.gl
+        self._faces: list[moderngl.Texture] = []
 
     def use(self, width: int, height: int, part: Part = WHOLE) -> None:
         """Restrict the next draws to these rows of the lower left part of this size."""
@@ -59,12 +64,13 @@ class GBuffer:
         self._gl.enable_only(moderngl.DEPTH_TEST)
         self._gl.depth_func = "<"
 
-    def clear(self, width: int, height: int, part: Part = WHOLE) -> None:
-        """Clear these rows of the lower left part of this size."""
+    def clear(self, width: int, height: int, part: Part = WHOLE, *, depth: bool = True) -> None:
+        """Clear these rows of the lower left part of this size; the depth may be left out."""
         rows = Rectangle(0, 0, width, height).rows(part)
         if self.clear_by_compute((self.position, self.normal, self.color), rows):
-            self._bind(self._depth_framebuffer, width, height, part)
-            self._depth_framebuffer.clear(depth=1.0)
+            if depth:
+                self._bind(self._depth_framebuffer, width, height, part)
+                self._depth_framebuffer.clear(depth=1.0)
         else:
             self.use(width, height, part)  # first: it ends scissors of other passes
             self._framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
@@ -78,6 +84,19 @@ class GBuffer:
         run_pixels(self._clear_program, rectangle)
         self._gl.memory_barrier()
         return True
+
+    def bind_surface(self, first_unit: int = 0) -> None:
+        """Bind position, normal and color to image units, for compute shaders; positions can be read."""
+        for unit, texture in enumerate((self.position, self.normal, self.color), first_unit):
+            texture.bind_to_image(unit, read=texture is self.position, write=True)
+
+    def bind_faces(self) -> None:
+        """Bind depths and numbers of nearest faces to image units 0 and 1: ``shaders/face_rows.glsl``."""
+        if not self._faces:
+            empty = np.full(self.size, NO_FACE, np.uint32).tobytes()
+            self._faces = [self._gl.texture(self.size, 1, empty, dtype="u4") for _ in range(2)]
+        for unit, texture in enumerate(self._faces):
+            texture.bind_to_image(unit, read=True, write=True)
 
     def complete_depth(self, width: int, height: int, part: Part = WHOLE) -> None:
         """Write the depth of surface that was not rasterised, in the lower left part of this size.
@@ -108,16 +127,10 @@ class GBuffer:
 
     def release(self) -> None:
         """Release the memory."""
+        textures = self.position, self.normal, self.color, self.depth, *self._faces
         framebuffers = self._framebuffer, self._depth_framebuffer
-        for resource in (
-            self._screen,
-            *framebuffers,
-            self.guard,
-            self.position,
-            self.normal,
-            self.color,
-            self.depth,
-        ):
+        resources: tuple[Any, ...] = self._screen, *framebuffers, self.guard, *textures
+        for resource in resources:
             resource.release()
 
 

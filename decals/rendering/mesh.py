@@ -1,5 +1,6 @@
 """Triangle meshes in the G-buffer: rasterised, with normals that are smooth up to the crease angle."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -11,7 +12,7 @@ from blobtree._typing import Float32Array, Int32Array
 from decals.rendering.base_textures import WHITE_TEXTURE, SharedTexture, shared_texture
 from decals.rendering.context import Context
 from decals.rendering.gbuffer import GBuffer
-from decals.rendering.pixel_pass import attach_camera, set_uniform
+from decals.rendering.pixel_pass import Program, attach_camera, set_uniform
 from decals.rendering.viewpoint import WHOLE, Bounds, Part, Tile
 from decals.rendering.warmup import SHADERS, WarmupPlan, WarmupTask
 from decals.shaders import compose
@@ -40,8 +41,8 @@ class ColoredMesh(Protocol):
     def color(self) -> ArrayLike | BaseColor: ...  # noqa: D102
 
 
-class MeshDrawable:
-    """A mesh's vertices and faces on the GPU."""
+class MeshFaces:
+    """A mesh's vertices, faces and textures on the GPU."""
 
     def __init__(self, context: Context, mesh: ColoredMesh, split: SplitMesh | None = None) -> None:
         split = split or split_mesh(mesh)
@@ -52,13 +53,42 @@ class MeshDrawable:
             faces, self._textures = _by_texture(context, faces, base)
         self._faces = len(faces)
         self._bounds = rows[:, :3].min(axis=0), rows[:, :3].max(axis=0)
-        self._program = mesh_program(context, mesh)
         self._vertices = context.gl.buffer(rows.tobytes())
         self._row_length = rows.shape[1]
         self._indices = context.gl.buffer(faces.tobytes())
-        names = ["vertex_position", "vertex_normal", "vertex_color" if base is None else "vertex_light"]
-        names += ["vertex_coordinates"] * bool(self._textures)
-        layout = [(self._vertices, "3f 3f 3f 2f" if self._textures else "3f 3f 3f", *names)]
+
+    @property
+    def bounds(self) -> Bounds:
+        """Box around the vertices."""
+        return self._bounds
+
+    def _ranges(self, part: Part) -> Iterator[tuple[int, int, SharedTexture | None]]:
+        """Yield the faces of a part: number of the first, number after the last, and their texture."""
+        first, last = part.of(self._faces)
+        for faces in self._textures or [_TexturedFaces(0, self._faces, None)]:
+            start, end = max(first, faces.first), min(last, faces.last)
+            if end > start:
+                yield start, end, faces.image
+
+    def release(self) -> None:
+        """Release the memory."""
+        self._vertices.release()
+        self._indices.release()
+        for faces in self._textures:
+            if faces.image is not None:
+                faces.image.release()
+
+
+class MeshDrawable(MeshFaces):
+    """A mesh that is rasterised."""
+
+    def __init__(self, context: Context, mesh: ColoredMesh, split: SplitMesh | None = None) -> None:
+        super().__init__(context, mesh, split)
+        self._program = mesh_program(context, mesh)
+        variant = mesh_variant(mesh)
+        names = ["vertex_position", "vertex_normal", "vertex_color" if variant == "plain" else "vertex_light"]
+        names += ["vertex_coordinates"] * (variant == "textured")
+        layout = [(self._vertices, "3f 3f 3f 2f" if variant == "textured" else "3f 3f 3f", *names)]
         self._array = context.gl.vertex_array(self._program, layout, self._indices)
 
     @staticmethod
@@ -69,36 +99,30 @@ class MeshDrawable:
         )
 
     @property
-    def bounds(self) -> Bounds:
-        """Box around the vertices."""
-        return self._bounds
-
-    @property
     def rasterised(self) -> bool:
-        """True: meshes use the depth test."""
+        """True: the depth test is used."""
         return True
 
     def draw(self, object_id: int, tile: Tile, gbuffer: GBuffer, part: Part = WHOLE) -> None:
         """Rasterise the faces, or a part of them, both sides."""
         gbuffer.use(tile.width, tile.height)
         set_uniform(self._program, "object_id", object_id)
-        first, last = part.of(self._faces)
-        if not self._textures and last > first:
+        for first, last, image in self._ranges(part):
+            use_base_texture(self._program, image)
             self._array.render(first=3 * first, vertices=3 * (last - first))
-        for part_faces in self._textures:
-            start, end = max(first, part_faces.first), min(last, part_faces.last)
-            if end > start:
-                part_faces.image.texture.use(0)
-                set_uniform(self._program, "base_texture", 0)
-                set_uniform(self._program, "mirrored", part_faces.image.mirrored)
-                self._array.render(first=3 * start, vertices=3 * (end - start))
 
     def release(self) -> None:
         """Release the memory."""
-        for resource in (self._array, self._vertices, self._indices):
-            resource.release()
-        for part_faces in self._textures:
-            part_faces.image.release()
+        self._array.release()
+        super().release()
+
+
+def use_base_texture(program: Program, image: SharedTexture | None) -> None:
+    """Bind a texture, if there is one, to the first unit, for ``shaders/base_texture.glsl``."""
+    if image is not None:
+        image.texture.use(0)
+        set_uniform(program, "base_texture", 0)
+        set_uniform(program, "mirrored", image.mirrored)
 
 
 def mesh_variant(mesh: ColoredMesh) -> str:
@@ -120,11 +144,11 @@ def mesh_program(context: Context, mesh: ColoredMesh) -> moderngl.Program:
 
 @dataclass(frozen=True)
 class _TexturedFaces:
-    """Faces from the first to before the last one, and their texture."""
+    """Faces from the first to before the last one, and their texture if they have one."""
 
     first: int
     last: int
-    image: SharedTexture
+    image: SharedTexture | None
 
 
 def _by_texture(

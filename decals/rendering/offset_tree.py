@@ -29,8 +29,8 @@ from decals.rendering.gbuffer import GBuffer
 from decals.rendering.pixel_pass import GROUP, PassBackend, PixelPass, Program, attach_camera, set_uniform
 from decals.rendering.rest_buffer import RestBuffer
 from decals.rendering.tracing_shader import Kinds, many_kinds, tracing_slots
-from decals.rendering.tree import TreeDrawable, covered_rectangle, draw_box
-from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile
+from decals.rendering.tree import TreeDrawable, draw_box
+from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile, covered_rectangle
 from decals.shaders import Source, compose
 
 SHELL_CELLS = 48

@@ -6,7 +6,6 @@ import moderngl
 import numpy as np
 
 from blobtree import Node
-from blobtree._typing import Float64Array
 from blobtree.tracing.tree_cells import TracingCells, tracing_cells
 from decals.rendering.context import Context
 from decals.rendering.data_texture import DataTexture
@@ -14,15 +13,12 @@ from decals.rendering.gbuffer import GBuffer
 from decals.rendering.loop_guard import GuardedProgram, is_guarded
 from decals.rendering.pixel_pass import GROUP, PassBackend, Program, attach_camera, draw, set_uniform
 from decals.rendering.tracing_shader import Kinds, tracing_shader
-from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile
+from decals.rendering.viewpoint import WHOLE, Bounds, Part, Rectangle, Tile, covered_rectangle
 from decals.rendering.warmup import SHADERS, SHAPES, WarmupPlan, WarmupTask
 from decals.shaders import Source, compose
 
 BOX_VERTICES = 36
 """Vertices of the triangles in ``box.vert``."""
-
-POSITION_UNIT, NORMAL_UNIT, COLOR_UNIT = range(3)
-"""Image units of ``trace.comp``."""
 
 
 @runtime_checkable
@@ -105,9 +101,7 @@ class TreeDrawable:
             return
         assert isinstance(program, moderngl.ComputeShader)
         set_uniform(program, "rectangle", (rows.x, rows.y, rows.width, rows.height))
-        gbuffer.position.bind_to_image(POSITION_UNIT, read=True, write=True)
-        gbuffer.normal.bind_to_image(NORMAL_UNIT, read=False, write=True)
-        gbuffer.color.bind_to_image(COLOR_UNIT, read=False, write=True)
+        gbuffer.bind_surface()
         self._gl.memory_barrier()
         program.run(-(-rows.width // GROUP), -(-rows.height // GROUP))
         self._gl.memory_barrier()
@@ -154,19 +148,3 @@ def tracing_uniforms(cells: TracingCells) -> dict[str, object]:
         "tolerance": cells.tolerance,
         "tape_start": cells.start,
     }
-
-
-def covered_rectangle(bounds: Bounds, tile: Tile) -> Rectangle:
-    """Return the samples of a tile, counted from its own corner, that a box may cover."""
-    size = np.array([tile.width, tile.height])
-    choices = np.indices((2, 2, 2)).reshape(3, 8).T == 1
-    corners = np.where(choices, *np.asarray(bounds, np.float64)[::-1])
-    clip = np.column_stack([corners, np.ones(8)]) @ tile.matrix().T
-    low, high = np.zeros(2), size.astype(np.float64)
-    if (clip[:, 3] > 0.0).all():  # a box that reaches behind the eye may cover any sample
-        positions: Float64Array = (0.5 * clip[:, :2] / clip[:, 3:] + 0.5) * size
-        low = np.clip(np.floor(positions.min(axis=0)) - 1.0, 0.0, size)
-        high = np.clip(np.ceil(positions.max(axis=0)) + 1.0, 0.0, size)
-    x, y = (int(corner) for corner in low)
-    width, height = (int(length) for length in high - low)
-    return Rectangle(x, y, width, height)

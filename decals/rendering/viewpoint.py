@@ -262,6 +262,22 @@ class Tile:
         return rows.tobytes()
 
 
+def covered_rectangle(bounds: Bounds, tile: Tile) -> Rectangle:
+    """Return the samples of a tile, counted from its own corner, that a box may cover."""
+    size = np.array([tile.width, tile.height])
+    choices = np.indices((2, 2, 2)).reshape(3, 8).T == 1
+    corners = np.where(choices, *np.asarray(bounds, np.float64)[::-1])
+    clip = np.column_stack([corners, np.ones(8)]) @ tile.matrix().T
+    low, high = np.zeros(2), size.astype(np.float64)
+    if (clip[:, 3] > 0.0).all():  # a box that reaches behind the eye may cover any sample
+        positions: Float64Array = (0.5 * clip[:, :2] / clip[:, 3:] + 0.5) * size
+        low = np.clip(np.floor(positions.min(axis=0)) - 1.0, 0.0, size)
+        high = np.clip(np.ceil(positions.max(axis=0)) + 1.0, 0.0, size)
+    x, y = (int(corner) for corner in low)
+    width, height = (int(length) for length in high - low)
+    return Rectangle(x, y, width, height)
+
+
 def tiles(view: PictureView, samples: int, *, limit: int = MAX_TILE) -> Iterator[Tile]:
     """Divide a picture with ``samples`` along each axis of a pixel; no tile divides a pixel."""
     width, height = view.size

@@ -64,8 +64,8 @@ def record(path: Path, counts: tuple[int, ...], size: tuple[int, int]) -> None:
     """Write the shaders, textures and uniforms of the scenes, and distances traced by Warp."""
     from decals.rendering.pixel_pass import GROUP, PassBackend  # `warp_times` needs no OpenGL
     from decals.rendering.tracing_shader import Kinds, tracing_shader
-    from decals.rendering.tree import covered_rectangle, tracing_uniforms
-    from decals.rendering.viewpoint import PictureView
+    from decals.rendering.tree import tracing_uniforms
+    from decals.rendering.viewpoint import PictureView, covered_rectangle
     from decals.shaders import compose
 
     tile = PictureView.of(camera_of(size), size, UNIT_BOX).whole()

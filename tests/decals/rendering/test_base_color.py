@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import decals
 from blobtree.pyvista_views import write_polydata
 from decals import MeshObject, displace
-from decals.rendering import Lighting
+from decals.rendering import Context, Lighting, Renderer, RenderOptions
 from decals.scenes.meshes import as_polydata
 from decals.scenes.objects import as_object
 from decals.surfaces import BaseColor, BaseTexture, Wrap
@@ -38,11 +38,12 @@ def camera() -> decals.Camera:
     return decals.Camera((0.3, -0.4, 1.6), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 42.0)
 
 
-def picture(item: Any) -> NDArray[np.float64]:
+def picture(item: Any, backend: str = "fragment") -> NDArray[np.float64]:
     """Return the unlit picture of an object in linear light."""
     scene = decals.Scene(objects=(item,), camera=camera())
-    shown = decals.render(scene, size=SIZE, samples=1, lights=Lighting(()))
-    return linear(np.asarray(shown)[..., :3])
+    with Context.standalone(backend=backend) as context, Renderer(context) as renderer:
+        shown = renderer.render(scene, RenderOptions(SIZE, samples=1, lights=Lighting(())))
+    return linear(shown[..., :3])
 
 
 def assert_picture(
@@ -55,10 +56,11 @@ def assert_picture(
     _, face, weights = cast(item.vertices, item.faces, rays.origin, rays.directions(x, y).reshape(-1, 3))
     seen = (face >= 0) & ~edges(face.reshape(height, width)).reshape(-1)
     assert seen.sum() > 300
-    drawn = picture(item).reshape(-1, 3)[seen]
     right = light_of(face[seen], weights[seen])
-    errors = np.abs(255.0 * (encoded(drawn) - encoded(right)))
-    assert errors.max() < 2.0, errors.max()  # of 255: bytes, half floats, and weights of eight bits
+    for backend in ("fragment", "compute"):
+        drawn = picture(item, backend).reshape(-1, 3)[seen]
+        errors = np.abs(255.0 * (encoded(drawn) - encoded(right)))
+        assert errors.max() < 2.0, errors.max()  # of 255: bytes, half floats, and weights of eight bits
 
 
 def encoded(light: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -13,9 +13,9 @@ from decals import Camera, MeshObject, TreeObject
 from decals.rendering import Buffers, Projection, Renderer, RenderOptions, Viewpoint
 from decals.rendering.pixel_pass import PassBackend
 from decals.rendering.tracing_shader import Kinds, tracing_shader
-from decals.rendering.tree import covered_rectangle
-from decals.rendering.viewpoint import PictureView, tiles
+from decals.rendering.viewpoint import PictureView, covered_rectangle, tiles
 from tests.blobtree.trees import random_trees
+from tests.decals.rendering.pictures import assert_same_surfaces
 from tests.decals.shapes import View, torus
 from tests.oracles.raster import edges
 
@@ -64,7 +64,7 @@ def test_both_entry_points_give_the_same_buffers(
     view = framed(objects()[::-1] if backwards else objects(), direction)
     first, second = (drawing.buffers(view, RenderOptions(size=SIZE)) for drawing in (fragment, compute))
     assert set(np.unique(first.object_id)) == {-1, 0, 1, 2, 3}
-    assert_same(first, second)
+    assert_same_surfaces(first, second)
 
 
 def test_nearer_objects_hide_farther_ones(compute: Renderer) -> None:
@@ -142,7 +142,9 @@ def test_depth_is_whole_where_it_is_asked_for(
             targets = drawing.draw(view, RenderOptions(size=SIZE, samples=1), viewpoint=viewpoint)
             depth.append(np.frombuffer(targets.gbuffer.depth.read(), np.float32).reshape(SIZE[::-1]))
     assert 0.1 < (depth[0] == 1.0).mean() < 0.9
-    np.testing.assert_allclose(depth[1], depth[0], rtol=0, atol=1e-6)
+    apart = np.abs(depth[1] - depth[0])
+    assert (apart > 1e-6).mean() < 1e-3  # a rasteriser moves corners by up to 1/256 of a pixel
+    assert apart.max() < 1e-4
 
 
 def test_a_tree_out_of_sight_changes_nothing(fragment: Renderer, compute: Renderer) -> None:
@@ -175,7 +177,7 @@ def test_tiles_and_odd_sizes(fragment: Renderer, compute: Renderer) -> None:
         parts = tiled.buffers(view, RenderOptions(size=(53, 37)))
     sure = ~edges(whole.object_id)
     np.testing.assert_array_equal(parts.object_id[sure], whole.object_id[sure])
-    assert_same(whole, fragment.buffers(view, RenderOptions(size=(53, 37))))
+    assert_same_surfaces(whole, fragment.buffers(view, RenderOptions(size=(53, 37))))
 
 
 @pytest.mark.parametrize("seed", range(3))
