@@ -23,7 +23,7 @@ layout(std430, binding = 3) buffer FaceShares {
 const uint MAX_SHARE_GROUPS = 65535u;  // that every driver runs
 const float COVER = 0.002;  // pixels beyond its edges that a face covers, so that rounding leaves no gaps
 const float FAR_COVER = 1e-6;  // the same for corners far outside of the picture, relative to their distance
-const float FEW_PIXELS = 64.0;  // that one invocation draws
+const float FEW_PIXELS = 256.0;  // that one invocation draws
 const float SHARE_PIXELS = 2048.0;
 const float MAX_SHARES = 256.0;
 
