@@ -20,11 +20,15 @@ from decals.baking.reproduction import MAX_SCENE
 Capture = pytest.CaptureFixture[str]
 
 
+@pytest.fixture(scope="module")
+def covered() -> decals.Scene:
+    return decals.cover(Point((0, 0, 0), radius=1.0), count=5, seed=2)
+
+
 @pytest.fixture
-def saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    decals.cover(Point((0, 0, 0), radius=1.0), count=5, seed=2).save("scene.json")
-    return tmp_path
+def saved(covered: decals.Scene, folder: Path) -> Path:
+    covered.save("scene.json")
+    return folder
 
 
 def test_a_scene_is_made_again(saved: Path, capsys: Capture) -> None:
