@@ -162,7 +162,7 @@ def passes(size: tuple[int, int], count: int) -> Figures:
     return figures | {"pass_default_over_paper": ratios[DEFAULT_CONTACT]}
 
 
-def measure(*, quick: bool, graphics: bool = True) -> Figures:
+def measure(*, quick: bool) -> Figures:
     """Measure all modes; with `quick`, from fewer rays and smaller pictures."""
     rays = 100_000 if quick else 1_000_000
     figures: Figures = {"folds_default": folds(DEFAULT_CONTACT, rays)}
@@ -178,6 +178,4 @@ def measure(*, quick: bool, graphics: bool = True) -> Figures:
     default = DEFAULT_CONTACT.name.lower()
     figures["stretch_p95_over_paper"] = figures[f"stretch_p95_{default}"] / figures["stretch_p95_product"]
     figures["jump_worst"] = figures[f"jump_{default}"]
-    if graphics:
-        figures |= passes((400, 300) if quick else (1600, 1200), 10_000)
-    return figures
+    return figures | passes((400, 300) if quick else (1600, 1200), 10_000)

@@ -17,10 +17,13 @@ oracles of the tests. Other parts:
     --peers                          mesh-clipped decals, projected boxes, sprites, and maps of the surface
 """
 
+import argparse
 import platform
 import sys
 from collections.abc import Mapping
+from importlib import import_module
 from importlib.metadata import version
+from inspect import signature
 
 from tests.bench.command_line import bench_parser, write
 
@@ -74,67 +77,38 @@ def printed(figures: Figures, targets: Mapping[str, str], machine: str, *, width
     return figures
 
 
-def measure_index(device: str) -> Figures:
-    """Measure the index on a device, and print the figures."""
+PARTS = {
+    "index": "decal_index.measure",
+    "million": "decal_figures.million",
+    "faults": "decal_faults.measure",
+    "pixels": "decal_pixels.measure",
+    "contact": "contact_modes.measure",
+    "filter": "filtering.measure",
+    "walk": "walking.measure",
+    "octree": "paper_octree.measure",
+    "methods": "paper_methods.measure",
+}
+"""Functions that measure parts, with those options of the command line that they name."""
+
+WITHOUT_GRAPHICS = ("index", "faults")
+
+
+def measure_part(part: str, options: argparse.Namespace) -> Figures:
+    """Measure one part, and print its figures."""
     import warp as wp
 
     from blobtree.device import start_warp
-    from tests.bench import decal_index
 
     start_warp()
-    machine = f"{wp.get_device(device).name}; numpy {version('numpy')}, warp {wp.__version__}"
-    return printed(decal_index.measure(device), decal_index.TARGETS, machine)
-
-
-def measure_million(*, quick: bool) -> Figures:
-    """Render a million decals, and print the figures."""
-    from tests.bench import decal_figures
-
-    return printed(decal_figures.million((320, 240) if quick else (800, 600)), {}, graphics())
-
-
-def measure_faults(seed: int, *, quick: bool) -> Figures:
-    """Measure the faults of covered models, and print the figures."""
-    from tests.bench import decal_faults
-
-    figures = decal_faults.measure(seed, quick=quick)
-    return printed(figures, decal_faults.TARGETS, versions("numpy", "warp-lang"))
-
-
-def measure_pixels(seed: int, *, quick: bool) -> Figures:
-    """Count pixels of covered models without an image, and print the figures."""
-    from tests.bench import decal_pixels
-
-    return printed(decal_pixels.measure(seed, quick=quick), decal_pixels.TARGETS, graphics())
-
-
-def measure_contact(*, quick: bool) -> Figures:
-    """Compare the contact modes, and print the figures."""
-    from tests.bench import contact_modes
-
-    return printed(contact_modes.measure(quick=quick), contact_modes.TARGETS, graphics())
-
-
-def measure_filter(*, quick: bool) -> Figures:
-    """Compare one filtered sample a pixel with many, and print the figures."""
-    from tests.bench import filtering
-
-    return printed(filtering.measure(quick=quick), filtering.TARGETS, graphics())
-
-
-def measure_walk(*, quick: bool) -> Figures:
-    """Measure the walked image mapping, and print the figures."""
-    from tests.bench import walking
-
-    return printed(walking.measure(quick=quick), walking.TARGETS, graphics())
-
-
-def measure_paper(part: str, *, quick: bool) -> Figures:
-    """Measure the paper's octree, or its three methods of drawing, and print the figures."""
-    from tests.bench import paper_methods, paper_octree
-
-    measure = paper_octree.measure if part == "octree" else paper_methods.measure
-    return printed(measure(quick=quick), {}, graphics(), width=36)
+    name, _, function = PARTS[part].partition(".")
+    module = import_module(f"tests.bench.{name}")
+    measure = getattr(module, function)
+    figures: Figures = measure(**{name: getattr(options, name) for name in signature(measure).parameters})
+    if part in WITHOUT_GRAPHICS:
+        machine = f"{wp.get_device(options.device).name}; {versions('numpy', 'warp-lang')}"
+    else:
+        machine = graphics()
+    return printed(figures, getattr(module, "TARGETS", {}), machine, width=36)
 
 
 def measure_peers(*, quick: bool) -> Figures:
@@ -157,31 +131,13 @@ def main() -> None:
     """Parse the command line, measure and print."""
     parser = bench_parser("decals", __doc__)
     parser.add_argument("--quick", action="store_true", help="within 60 s on two cores")
-    parser.add_argument(
-        "--only",
-        choices=["index", "million", "faults", "pixels", "contact", "filter", "walk", "octree", "methods"],
-        help="measure one part",
-    )
+    parser.add_argument("--only", choices=PARTS, help="measure one part")
     parser.add_argument("--peers", action="store_true", help="measure other methods")
     parser.add_argument("--seed", type=int, default=1, help="seed of --only faults and --only pixels")
     parser.add_argument("--device", default="cpu", help="Warp device of --only index")
     options = parser.parse_args()
-    if options.only == "million":
-        figures = measure_million(quick=options.quick)
-    elif options.only == "faults":
-        figures = measure_faults(options.seed, quick=options.quick)
-    elif options.only == "pixels":
-        figures = measure_pixels(options.seed, quick=options.quick)
-    elif options.only == "contact":
-        figures = measure_contact(quick=options.quick)
-    elif options.only == "filter":
-        figures = measure_filter(quick=options.quick)
-    elif options.only == "walk":
-        figures = measure_walk(quick=options.quick)
-    elif options.only in ("octree", "methods"):
-        figures = measure_paper(options.only, quick=options.quick)
-    elif options.only:
-        figures = measure_index(options.device)
+    if options.only:
+        figures = measure_part(options.only, options)
     elif options.peers:
         figures = measure_peers(quick=options.quick)
     else:
