@@ -15,6 +15,7 @@ from decals.rendering.decal_data import DecalData
 from tests.bench.scenes import bench_scene
 from tests.decals.field import log_maps, test_contact, test_radial
 from tests.decals.field.kernels import slopes_of_rays
+from tests.vectors import unit
 
 RUNS = 3
 FOLD_SLACK = 0.0
@@ -105,7 +106,7 @@ def folds(rays: int) -> Figures:
         owners = np.where(
             decals.radii[owners] > 0.05, owners, owners // test_radial.MEMBERS * test_radial.MEMBERS
         )
-        directions = test_radial.unit(rng.normal(size=(rays // 2, 3)) * [1, 1, 0 if flat else 1])
+        directions = unit(rng.normal(size=(rays // 2, 3)) * [1, 1, 0 if flat else 1])
         inputs: list[Any] = [
             wp.array(owners, dtype=wp.int32, device="cpu"),
             wp.array(directions, dtype=wp.vec3, device="cpu"),

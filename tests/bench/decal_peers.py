@@ -57,6 +57,7 @@ from tests.bench.texture_sprites import Sprites, shown_by_all
 from tests.bench.tile_trees import TileTree
 from tests.decals.field import log_maps as analytic
 from tests.decals.field import unfolding
+from tests.vectors import unit
 
 COUNT = 1_000
 LOG_MAPS = 20
@@ -303,7 +304,7 @@ def edited_ring() -> str:
     """Move a cell of a texture on the torus, and return what that changes."""
 
     def on_torus(points: Float64Array) -> tuple[Float64Array, Float64Array]:
-        return torus_field(points), analytic.unit(analytic.torus_gradient(points))
+        return torus_field(points), unit(analytic.torus_gradient(points))
 
     size = float(np.sqrt(CELL_AREA * 4 * np.pi**2 * 0.4 / (np.pi * RING_CELLS)))
     start = Cells.at(analytic.torus_points(np.random.default_rng(0), FIRST_CELLS), on_torus, size)
@@ -391,7 +392,7 @@ def measure_at_vertices(item: MeshObject, decals: Decals) -> Row:
 def measure_exponential_maps(item: MeshObject, decals: Decals, count: int) -> Row:
     """Measure discrete exponential maps of the mesh, each decal at its nearest vertex."""
     vertices = item.vertices.astype(np.float64)
-    normals = analytic.unit(vertex_normals(item))
+    normals = unit(vertex_normals(item))
     setup, maps = timed(lambda: ExponentialMaps.of(vertices, item.faces, normals))
     centers = [int(np.linalg.norm(item.vertices - p, axis=1).argmin()) for p in decals.positions[:count]]
     begin = time.perf_counter()

@@ -25,6 +25,7 @@ from tests.bench.exponential_maps import ExponentialMaps
 from tests.decals.field import log_maps as analytic
 from tests.decals.field import unfolding
 from tests.decals.shapes import torus
+from tests.vectors import unit
 
 Float64Array = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -47,7 +48,7 @@ class SmoothMesh:
 
     def normals(self, points: Float64Array) -> Float64Array:
         """Return unit normals of the smooth surface."""
-        normals: Float64Array = analytic.unit(self.gradient(points))
+        normals: Float64Array = unit(self.gradient(points))
         return normals
 
     def discs(
@@ -89,7 +90,7 @@ def torus_mesh(*, rows: int = 316) -> SmoothMesh:
 def ellipsoid_mesh(*, level: int = 6) -> SmoothMesh:
     """Return an ellipsoid of axes 1, 0.7 and 0.45 with 82,000 faces."""
     ball = pv.Icosphere(nsub=level)
-    vertices = analytic.unit(np.asarray(ball.points, np.float64)) * analytic.AXES
+    vertices = unit(np.asarray(ball.points, np.float64)) * analytic.AXES
     faces = ball.regular_faces.astype(np.intp)
     return SmoothMesh(vertices, faces, analytic.ellipsoid_gradient, ellipsoid_field)
 

@@ -12,7 +12,8 @@ from tests.bench.clipped_decals import box_coordinates
 from tests.bench.implicit_uvs import nearest
 from tests.bench.peer_errors import SmoothMesh, exponential_map, frame_at, torus_field, torus_mesh
 from tests.bench.projected_boxes import opacity
-from tests.decals.field.log_maps import torus_gradient, unit
+from tests.decals.field.log_maps import torus_gradient
+from tests.vectors import unit
 
 Float64Array = NDArray[np.float64]
 Method = Callable[[SmoothMesh, int, Float64Array, Float64Array], tuple[Float64Array, Float64Array]]

@@ -16,6 +16,7 @@ from tests.bench.texture_sprites import Sprites, shown_by_all
 from tests.bench.tile_trees import TileTree
 from tests.decals.field import log_maps
 from tests.decals.shapes import torus
+from tests.vectors import unit
 
 TORUS = peer_errors.torus_mesh(rows=120)
 """A torus mesh of 14,400 faces."""
@@ -192,7 +193,7 @@ def sprites_on_a_torus(count: int, radius: float) -> tuple[Decals, Any, Any]:
     """Return decals and points on the torus of the tests, with the normals of the points."""
     rng = np.random.default_rng(8)
     points = log_maps.torus_points(rng, count + 3_000)
-    normals = log_maps.unit(log_maps.torus_gradient(points))
+    normals = unit(log_maps.torus_gradient(points))
     radii = rng.uniform(0.5, 1, count) * radius
     decals = Decals(points[:count], normals[:count], rng.normal(size=(count, 3)), radii)
     return decals, points[count:], normals[count:]
@@ -229,7 +230,7 @@ def test_a_full_leaf_loses_a_sprite_below() -> None:
 
 def test_a_ball_needs_six_tiles() -> None:
     rng = np.random.default_rng(3)
-    normals = log_maps.unit(rng.normal(size=(20_000, 3)))
+    normals = unit(rng.normal(size=(20_000, 3)))
     tree = TileTree.of(2 * normals, normals)
     assert (tree.voxels, len(tree.width), tree.reads) == (1, 6, 1)
     assert tree.cosine.min() == pytest.approx(3**-0.5, abs=0.02)
@@ -239,7 +240,7 @@ def test_a_ball_needs_six_tiles() -> None:
 def test_tiles_show_one_sheet_each() -> None:
     """Samples of a torus in the same texel are neighbours, and two level sheets are told apart."""
     points = log_maps.torus_points(np.random.default_rng(4), 30_000)
-    tree = TileTree.of(points, log_maps.unit(log_maps.torus_gradient(points)))
+    tree = TileTree.of(points, unit(log_maps.torus_gradient(points)))
     texel = (tree.place * tree.width[tree.tile, None] / 0.05).astype(int)
     order = np.lexsort([texel[:, 1], texel[:, 0], tree.tile])
     same = (np.diff(np.column_stack([tree.tile, texel])[order], axis=0) == 0).all(axis=1)
@@ -282,7 +283,7 @@ def test_cells_divide_until_they_cover_a_ball() -> None:
     np.testing.assert_allclose((cells.normals * cells.tangents).sum(axis=1), 0, atol=1e-9)
     gaps = np.linalg.norm(cells.positions[:, None] - cells.positions, axis=2) + 9 * np.eye(len(cells))
     assert gaps.min() > 1.2 * CELL
-    away = log_maps.unit(np.random.default_rng(0).normal(size=(5_000, 3)))
+    away = unit(np.random.default_rng(0).normal(size=(5_000, 3)))
     holes = np.linalg.norm(away[:, None] - cells.positions, axis=2).min(axis=1)
     assert holes.max() < 2 * CELL
     assert 0.7 < len(cells) * CELL**2 / 4 < 1.1

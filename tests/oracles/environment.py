@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.vectors import unit
+
 Array = NDArray[np.float64]
 
 
@@ -48,8 +50,7 @@ def reflected(
     light, radiance = light[above], cells.reshape(-1, 3)[above]
     solid = np.repeat(areas(len(cells)), 2 * len(cells))[above]
     alpha, seen, lit = roughness**2, max(float(normal @ eye), 1e-3), light @ normal
-    halfway = light + eye
-    halfway /= np.linalg.norm(halfway, axis=1, keepdims=True)
+    halfway = unit(light + eye)
     specular = ggx(halfway @ normal, alpha) * shadowing(lit, seen, alpha) / (4 * lit * seen)
     base = 0.04 + (albedo - 0.04) * metallic
     fresnel = base + (1 - base) * ((1 - np.maximum(halfway @ eye, 0)) ** 5)[:, None]
@@ -65,8 +66,7 @@ def reflected_parts(seen: float, roughness: float, steps: int) -> tuple[float, f
     polar, turn = np.meshgrid(turns * np.pi / 2, turns * np.pi, indexing="ij")
     light = np.stack([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], axis=-1)
     eye, alpha = np.array([np.sqrt(1 - seen**2), 0, seen]), roughness**2
-    halfway = light + eye
-    halfway /= np.linalg.norm(halfway, axis=-1, keepdims=True)
+    halfway = unit(light + eye)
     part = ggx(halfway[..., 2], alpha) * shadowing(light[..., 2], seen, alpha) / (4 * seen)
     part *= np.sin(polar) * (np.pi / steps) ** 2
     fresnel = (1 - np.clip(halfway @ eye, 0, 1)) ** 5

@@ -25,6 +25,7 @@ from blobtree import (
     TaperedBezier,
     Triangle,
 )
+from tests.vectors import unit
 
 Floats = NDArray[np.float64]
 Curve = Callable[[Floats], Floats]
@@ -174,8 +175,7 @@ def bezier(controls: ArrayLike) -> Curve:
 def _arc(node: Arc) -> Curve:
     """The arc by rotation of its start about its centre, found by least squares."""
     points = np.array([node.start, node.through, node.end])
-    normal = np.cross(points[1] - points[0], points[2] - points[0])
-    normal /= np.linalg.norm(normal)
+    normal = unit(np.cross(points[1] - points[0], points[2] - points[0]))
     rows = np.vstack([2.0 * (points[1:] - points[0]), normal])
     squares = (points**2).sum(axis=1)
     center = np.linalg.solve(rows, np.append(squares[1:] - squares[0], normal @ points[0]))
@@ -246,8 +246,7 @@ def near_focus(node: object, q: Floats, step: float = 1e-4) -> NDArray[np.bool_]
 def _from_rectangle(q: Floats, node: Rectangle) -> Floats:
     axis = np.array(node.axis) / np.linalg.norm(node.axis)
     side = np.array(node.side) / np.linalg.norm(node.side)
-    first = side - (side @ axis) * axis
-    first /= np.linalg.norm(first)
+    first = unit(side - (side @ axis) * axis)
     second = np.cross(axis, first)
     w = q - np.array(node.center)
     beyond = [np.maximum(np.abs(w @ first) - 0.5 * node.length, 0.0)]

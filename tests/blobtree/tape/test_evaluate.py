@@ -14,6 +14,7 @@ from tests.blobtree.tape.evaluations import bounds_along, bounds_at
 from tests.blobtree.tree_sets import BUILT_IN_TREES, EVERY_BATCH, FIRST_BATCHES, POINTS, Batch
 from tests.blobtree.trees import KINDS, points_around
 from tests.oracles import blobtree as oracle
+from tests.vectors import random_units
 
 AWAY = 1e-3
 """Field values between a point and the nearest kink of min, max or difference."""
@@ -133,8 +134,7 @@ def test_no_gradient_inside_a_ball_is_longer_than_its_bound(batch: Batch) -> Non
         if any(skeleton.own_influence_near for skeleton in skeletons):
             continue
         reach = (10.0 ** rng.uniform(-3.0, 0.5, POINTS)).astype(np.float32)
-        direction = rng.normal(size=(POINTS, 3))
-        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        direction = random_units(rng, POINTS)
         other = (points + 0.999 * (reach * rng.uniform(0.0, 1.0, POINTS))[:, None] * direction).astype(
             np.float32
         )
@@ -150,8 +150,7 @@ def test_no_field_rises_or_falls_faster_along_a_ray_than_its_bounds(batch: Batch
     for tree, _ in batch.cases:
         starts = points_around(rng, tree, BALLS)
         reach = (10.0 ** rng.uniform(-3.0, 0.5, BALLS)).astype(np.float32)
-        headings = rng.normal(size=(BALLS, 3))
-        headings = (headings / np.linalg.norm(headings, axis=1, keepdims=True)).astype(np.float32)
+        headings = random_units(rng, BALLS).astype(np.float32)
         value, rise, fall = bounds_along(tree.tape, starts, headings, reach).astype(np.float64).T
         np.testing.assert_array_equal(value.astype(np.float32), values_at(tree.tape, starts))
         distance = reach * np.linspace(0.1, 1.0, IN_BALL)[:, None]
@@ -174,8 +173,7 @@ def test_along_a_ray_bounds_tend_to_the_slope() -> None:
     tree = Point((0, 0, 0), radius=1.0) + Segment((0.5, 0, 0), (1, 1, 0), radius=0.5)
     rng = np.random.default_rng(2)
     points = points_around(rng, tree, 500)
-    headings = rng.normal(size=(500, 3))
-    headings /= np.linalg.norm(headings, axis=1, keepdims=True)
+    headings = random_units(rng, 500)
     along = (tree.gradient(points) * headings).sum(axis=1)
     _, rise, _ = bounds_along(tree.tape, points, headings, 1e-4).T
     np.testing.assert_allclose(rise, along, atol=2e-3)

@@ -13,21 +13,18 @@ from blobtree.tracing.tree_cells import trace_tolerance
 from tests.blobtree.transpile.warp_functions import call
 from tests.blobtree.trees import random_trees
 from tests.oracles import blobtree as oracle
+from tests.vectors import random_units, unit
 
 
 def cast(tree: Node, origins: ArrayLike, directions: ArrayLike) -> Float32Array:
     return trace(tree, origins, directions)
 
 
-def unit(vectors: Float64Array) -> Float64Array:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
-
-
 def rays_through(rng: np.random.Generator, tree: Node, count: int) -> tuple[Float64Array, Float64Array]:
     """Origins around the tree's box, in float32's numbers, and directions toward places in it."""
     lower, upper = (corner.astype(np.float64) for corner in tree.support)
     centre, size = 0.5 * (lower + upper), np.linalg.norm(upper - lower)
-    origins = (centre + size * unit(rng.normal(size=(count, 3)))).astype(np.float32).astype(np.float64)
+    origins = (centre + size * random_units(rng, count)).astype(np.float32).astype(np.float64)
     return origins, unit(rng.uniform(lower, upper, (count, 3)) - origins)
 
 
@@ -264,7 +261,7 @@ def test_invalid_rays_are_refused() -> None:
 
 def test_box_intervals() -> None:
     rng = np.random.default_rng(3)
-    origins, directions = rng.uniform(-3, 3, (1000, 3)), unit(rng.normal(size=(1000, 3)))
+    origins, directions = rng.uniform(-3, 3, (1000, 3)), random_units(rng, 1000)
     directions[::5, 0] = 0.0
     lower, upper = np.array([-1.0, -0.5, 0.0]), np.array([1.0, 2.0, 0.5])
     span = call(box_interval, origin=origins, direction=directions, lower=lower, upper=upper)
@@ -280,7 +277,7 @@ def test_box_intervals() -> None:
 def test_exit_distances() -> None:
     rng = np.random.default_rng(4)
     lower, upper = np.array([-1.0, -0.5, 0.0]), np.array([1.0, 2.0, 0.5])
-    origins, directions = rng.uniform(lower, upper, (1000, 3)), unit(rng.normal(size=(1000, 3)))
+    origins, directions = rng.uniform(lower, upper, (1000, 3)), random_units(rng, 1000)
     directions[::5, 0] = 0.0
     directions[1::50] = [0.0, -1.0, 0.0]
     inverse = call(reciprocal, direction=directions)

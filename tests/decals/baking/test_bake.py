@@ -37,6 +37,7 @@ from tests.decals.baking.glb import (
     read_json,
 )
 from tests.oracles.materials import tilted
+from tests.vectors import unit
 
 SIZE = 256
 
@@ -154,8 +155,7 @@ def test_textures_of_the_default_size_have_evaluated_colours(tmp_path: Path) -> 
 
 def neighborhoods(points: Array, normals: Array, reach: float) -> Array:
     """Each point, then a grid of points of its tangent plane up to a distance along each axis."""
-    across = np.cross(normals, np.where(np.abs(normals[:, :1]) < 0.8, [[1.0, 0, 0]], [[0, 1.0, 0]]))
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    across = unit(np.cross(normals, np.where(np.abs(normals[:, :1]) < 0.8, [[1.0, 0, 0]], [[0, 1.0, 0]])))
     frame = np.stack([across, np.cross(normals, across)], axis=1)
     steps = reach * np.stack(np.meshgrid(*[np.linspace(-1, 1, 7)] * 2), axis=-1).reshape(-1, 2)
     around: Array = points[:, None] + np.concatenate([np.zeros((1, 2)), steps]) @ frame
@@ -439,8 +439,7 @@ def test_materials_at_points_are_the_reference_shaders() -> None:
     decal = scene.decals
     rng = np.random.default_rng(4)
     owners = rng.integers(0, len(decal), 60)
-    normals = decal.normals[owners] + rng.normal(0, 0.2, (60, 3))
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = unit(decal.normals[owners] + rng.normal(0, 0.2, (60, 3)))
     points = decal.positions[owners] + 0.2 * decal.radii[owners, None] * decal.tangents[owners]
     samples = decals.evaluate(decal, points, normals, images=scene.images, materials=True)
     assert samples.materials is not None

@@ -8,14 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from decals import Decals, ImageMapping, evaluate
+from tests.vectors import random_units, unit
 
 DECAL = 0.5
 """Radius of a large decal on the torus (1, 0.4) and on the ellipsoid."""
 AXES = np.array([1.0, 0.7, 0.45])
-
-
-def unit(v: NDArray[Any]) -> Any:
-    return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
 def dots(a: Any, b: Any) -> Any:
@@ -69,7 +66,7 @@ def ellipsoid_gradient(x: Any) -> Any:
 
 
 def ellipsoid_points(rng: np.random.Generator, n: int) -> Any:
-    d = unit(rng.normal(size=(n, 3)))
+    d = random_units(rng, n)
     return d / np.linalg.norm(d / AXES, axis=1, keepdims=True)
 
 

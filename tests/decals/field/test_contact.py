@@ -13,6 +13,7 @@ from decals import Contact
 from decals.record import NEIGHBOR_REACH
 from tests.decals.field.kernels import contact_of_rows, rims_of_sets, uv_of_offsets
 from tests.oracles import contact as oracle
+from tests.vectors import random_units
 
 ERROR_LIMIT = 2e-5
 """Largest accepted error of r, in rim radii."""
@@ -99,17 +100,12 @@ def test_the_two_forms_of_the_oracle_agree() -> None:
 # -- a million points where float32 hurts -----------------------------------------------------------
 
 
-def directions(rng: np.random.Generator, *shape: Any) -> Any:
-    v = rng.normal(size=(*shape, 3))
-    return v / np.linalg.norm(v, axis=-1, keepdims=True)
-
-
 def at_distances(
     rng: np.random.Generator, distance: NDArray[Any], influence: NDArray[Any], scale: float = 1.0
 ) -> Any:
     """Points, centres [m, k, 3] at the relative distances [m, k] asked for, and sizes."""
     points = rng.normal(size=(len(distance), 3)) * scale
-    centres = points[:, None] + directions(rng, *distance.shape) * (distance * influence)[..., None]
+    centres = points[:, None] + random_units(rng, *distance.shape) * (distance * influence)[..., None]
     return points, centres, influence
 
 

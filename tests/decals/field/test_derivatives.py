@@ -9,9 +9,10 @@ from decals import Contact, Decals, Interaction, evaluate
 from decals.errors import InvalidPoints
 from decals.field.jacobian import folds_of, stretch_of
 from decals.index import DecalEditor
-from tests.decals.field.test_evaluate import dress, even_sphere, on_sphere, unit
+from tests.decals.field.test_evaluate import dress, even_sphere, on_sphere
 from tests.oracles.contact import RIM, complements, falloff, log_factor
 from tests.oracles.decals import decals_at
+from tests.vectors import unit
 
 UP: list[float] = [0.0, 0.0, 1.0]
 

@@ -14,6 +14,7 @@ from decals.errors import InvalidDecals, InvalidDevice, InvalidImage, InvalidPoi
 from decals.index import DecalIndex
 from decals.record import NEIGHBOR_REACH
 from tests.oracles.decals import decals_at
+from tests.vectors import random_units, unit
 
 TIE = 1e-4
 """Relative distance to a tie within which float32 may choose the other owner."""
@@ -25,10 +26,6 @@ ROUNDING_ERROR = 1e-5
 """Of uv and field against the same equations without those neighbours."""
 
 
-def unit(v: NDArray[Any]) -> Any:
-    return v / np.linalg.norm(v, axis=-1, keepdims=True)
-
-
 def dress(
     rng: np.random.Generator, positions: NDArray[Any], normals: NDArray[Any], radii: NDArray[Any], **more: Any
 ) -> Any:
@@ -36,7 +33,7 @@ def dress(
 
 
 def on_sphere(rng: np.random.Generator, count: int) -> Any:
-    n = unit(rng.normal(size=(count, 3)))
+    n = random_units(rng, count)
     return n, n
 
 
@@ -83,7 +80,7 @@ def nested(rng: np.random.Generator) -> Any:
 
 def scattered_in_space(rng: np.random.Generator) -> Any:
     decals = dress(rng, rng.random((300, 3)), rng.normal(size=(300, 3)), rng.uniform(0.05, 0.3, 300))
-    return decals, rng.random((3000, 3)), unit(rng.normal(size=(3000, 3)))
+    return decals, rng.random((3000, 3)), random_units(rng, 3000)
 
 
 def small_model(rng: np.random.Generator) -> Any:

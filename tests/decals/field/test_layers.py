@@ -4,21 +4,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from decals import Contact, Decals, Interaction, evaluate
 from decals.errors import InvalidImage
 from decals.images.texels import decode_srgb
 from tests.oracles.contact import RIM
 from tests.oracles.decals import colors_at, decals_at
+from tests.vectors import random_units, unit
 
 TIE = 1e-4
 CUT_ERROR = 1e-4
 MODES = list(Contact)
-
-
-def unit(v: NDArray[Any]) -> Any:
-    return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
 def mixed(
@@ -30,7 +26,7 @@ def mixed(
     images: int = 3,
 ) -> Any:
     """Decals of all kinds on the unit sphere, and points there."""
-    positions = unit(rng.normal(size=(count, 3)))
+    positions = random_units(rng, count)
     decals = Decals(
         positions,
         positions,
@@ -43,7 +39,7 @@ def mixed(
         tints=rng.random((count, 3)),
         opacities=rng.random(count),
     )
-    points = np.float32(unit(rng.normal(size=(1500, 3))))
+    points = np.float32(random_units(rng, 1500))
     return decals, points
 
 

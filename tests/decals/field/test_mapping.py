@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from decals import Contact, Decals, ImageMapping, evaluate
 from tests.decals.field import log_maps
 from tests.decals.field.kernels import arcs_of, coordinates_of, distances_of, turns_of
-from tests.decals.field.log_maps import DECAL, DISCS, dots, drawn_error, tangents, unit
+from tests.decals.field.log_maps import DECAL, DISCS, dots, drawn_error, tangents
+from tests.vectors import unit
 
 
 def on_cpu(dtype: Any, *arrays: ArrayLike) -> list[Any]:

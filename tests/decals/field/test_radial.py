@@ -11,6 +11,7 @@ from decals import Contact, Decals, ImageMapping, evaluate
 from decals.index.index import index_on
 from tests.decals.field.kernels import rims_of_points, slopes_of_rays
 from tests.oracles.contact import RIM
+from tests.vectors import random_units, unit
 
 LEAST = 0.21
 CELLS = [Contact.RADIAL, Contact.ELASTIC]
@@ -18,10 +19,6 @@ ERROR_LIMIT = 2e-5
 """Largest accepted error of r, in rim radii."""
 SETS = 2000
 MEMBERS = 9
-
-
-def unit(v: NDArray[Any]) -> Any:
-    return v / np.linalg.norm(v, axis=-1, keepdims=True)
 
 
 def clusters(rng: np.random.Generator, *, ratio: float = 20.0, flat: bool = False) -> Any:
@@ -112,9 +109,7 @@ def test_a_hundred_thousand_points_against_float64(rounds: int) -> None:
         which = np.where(decals.radii[which] > 0.05, which, which // MEMBERS * MEMBERS)
         count = len(which)
         far = np.where(rng.random(count) < 0.2, 10.0 ** rng.uniform(-6, 0, count), rng.uniform(0, 1.1, count))
-        points = (
-            decals.positions[which] + unit(rng.normal(size=(count, 3))) * (far * decals.radii[which])[:, None]
-        )
+        points = decals.positions[which] + random_units(rng, count) * (far * decals.radii[which])[:, None]
         points = points.astype(np.float32)
         before = [wp.array(points, dtype=wp.vec3, device="cpu"), int(Contact.RADIAL)]
         after = [

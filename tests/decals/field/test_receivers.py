@@ -12,6 +12,7 @@ from decals.errors import InvalidDecals, InvalidScene
 from decals.index import DecalEditor
 from decals.receivers import MAX_RECEIVERS
 from tests.oracles.decals import colors_at, decals_at
+from tests.vectors import random_units, unit
 
 TIE = 1e-4
 
@@ -19,8 +20,7 @@ TIE = 1e-4
 def mixed(seed: int, count: int = 60, *, layered: bool = True) -> tuple[Decals, np.ndarray, np.ndarray]:
     """Decals of all receivers and fades around a ball, and points on it with tilted normals."""
     rng = np.random.default_rng(seed)
-    centres = rng.normal(size=(count, 3))
-    centres /= np.linalg.norm(centres, axis=1, keepdims=True)
+    centres = random_units(rng, count)
     arrays: dict[str, Any] = {
         "positions": centres,
         "normals": centres + 0.3 * rng.normal(size=(count, 3)),
@@ -36,10 +36,8 @@ def mixed(seed: int, count: int = 60, *, layered: bool = True) -> tuple[Decals, 
         "fade_angles": np.where(rng.random(count) < 0.5, rng.uniform(20, 180, count), 0),
         "fade_depths": np.where(rng.random(count) < 0.5, rng.uniform(0.05, 1, count), 0),
     }
-    points = rng.normal(size=(800, 3))
-    points /= np.linalg.norm(points, axis=1, keepdims=True)
-    normals = points + 0.5 * rng.normal(size=points.shape)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    points = random_units(rng, 800)
+    normals = unit(points + 0.5 * rng.normal(size=points.shape))
     return Decals(**arrays), points.astype(np.float32), normals.astype(np.float32)
 
 

@@ -16,6 +16,7 @@ from decals.surfaces import ImplicitSurface, MeshSurface
 from decals.surfaces.topology import edge_twins
 from tests.decals.field import log_maps, unfolding
 from tests.decals.field.unfolding import Patch, rms
+from tests.vectors import unit
 
 
 @pytest.mark.parametrize("degrees", [-90, 20, 60, 90, 120])
@@ -104,11 +105,11 @@ def ball() -> MeshSurface:
 
 def test_decals_that_the_corrected_mapping_draws_correctly_get_no_relays() -> None:
     rng = np.random.default_rng(0)
-    centres = log_maps.unit(rng.normal(size=(50, 3)))
+    centres = unit(rng.normal(size=(50, 3)))
     decals = Decals(centres, centres, log_maps.tangents(rng, centres), np.full(50, 0.2))
     walks = Walks.over(decals, [ball()])
     assert len(walks.texels) == len(walks) == 50
-    points = log_maps.unit(rng.normal(size=(500, 3)))
+    points = unit(rng.normal(size=(500, 3)))
     walked = evaluate(decals, points, points, mapping="walked", walks=walks, device="cpu")
     assert walked.uv == pytest.approx(evaluate(decals, points, points, device="cpu").uv, abs=1e-6)
 

@@ -12,6 +12,7 @@ from decals import Decals, ImageMapping, evaluate
 from decals.field import Walks
 from decals.surfaces import MeshSurface
 from tests.decals.field import log_maps
+from tests.vectors import unit
 
 Array = NDArray[np.float64]
 
@@ -133,7 +134,7 @@ def tip(sides: int, slope: float, distance: float, count: int = 4000) -> Patch:
     edges = np.stack([np.sin(slope) * np.cos(turn), np.sin(slope) * np.sin(turn)], axis=1)
     edges = np.column_stack([edges, np.full(sides + 1, -np.cos(slope))])
     angle = np.arccos(edges[0] @ edges[1])
-    normals = log_maps.unit(np.cross(edges[:-1], edges[1:]))
+    normals = unit(np.cross(edges[:-1], edges[1:]))
     half = 0.5 * sides * angle
     away, length = rng.uniform(-half, half, count), rng.uniform(0.0, 1.2, count)
     kept = length * np.sin(half - np.abs(away)) > 0.02
@@ -142,7 +143,7 @@ def tip(sides: int, slope: float, distance: float, count: int = 4000) -> Patch:
     within = (away + 0.5 * angle) % angle
     across = np.cross(normals, edges[:-1])
     ways = np.cos(within)[:, None] * edges[face] + np.sin(within)[:, None] * across[face]
-    down = log_maps.unit(edges[0] + edges[1])
+    down = unit(edges[0] + edges[1])
     i = np.arange(1, sides + 1)
     return Patch(
         np.vstack([np.zeros(3), 3.0 * edges[:-1]]),
@@ -236,7 +237,7 @@ def cylinder_rim(depth: float, count: int = 3000, sides: int = 128) -> Patch:
         return result
 
     low = least(length, np.full(len(disc), -1.5), np.full(len(disc), 1.5))
-    over = length(low)[:, None] * log_maps.unit(np.stack([low, np.full(len(disc), depth)], axis=1))
+    over = length(low)[:, None] * unit(np.stack([low, np.full(len(disc), depth)], axis=1))
     ends = np.column_stack([disc, np.zeros(len(disc))])
     return Patch(
         vertices,
@@ -265,13 +266,13 @@ def bumpy_gradient(x: Array) -> Array:
         ],
         axis=1,
     )
-    result: Array = log_maps.unit(x) - BUMPS * WAVES * wave
+    result: Array = unit(x) - BUMPS * WAVES * wave
     return result
 
 
 def on_bumps(directions: Array) -> Array:
     """Points of the bumpy sphere in these directions."""
-    ways: Array = log_maps.unit(directions)
+    ways: Array = unit(directions)
     radius = np.ones((len(ways), 1))
     for _ in range(20):
         x = radius * ways
@@ -286,7 +287,7 @@ def bumpy(seed: int, radius: float, *, level: int = 5, count: int = 1500) -> Pat
     rng = np.random.default_rng(seed)
     ball = pv.Icosphere(nsub=level)
     centre = on_bumps(rng.normal(size=(1, 3)))
-    normal: Array = log_maps.unit(bumpy_gradient(centre))
+    normal: Array = unit(bumpy_gradient(centre))
     tangent: Array = log_maps.tangents(rng, normal)
     log: Array = log_maps.offsets(rng, count, radius)
     length = np.linalg.norm(log, axis=1, keepdims=True)
@@ -299,6 +300,6 @@ def bumpy(seed: int, radius: float, *, level: int = 5, count: int = 1500) -> Pat
         normal[0],
         tangent[0],
         points,
-        log_maps.unit(bumpy_gradient(points)),
+        unit(bumpy_gradient(points)),
         log,
     )

@@ -14,6 +14,7 @@ from decals.index import DecalIndex
 from decals.index.lookup import cell_hash, cell_range
 from decals.record import field_complement
 from tests.decals.glsl.kernels import contacts, lookups, offsets
+from tests.vectors import random_units, unit
 
 AGREEMENT = 1e-5
 WIDTH = 4096
@@ -55,11 +56,11 @@ def through_glsl(context: Any) -> Callable[..., np.ndarray]:
             if "index_mask" in program:
                 program["index_mask"] = index.mask
         made = [program, gl.texture((WIDTH, height(count)), 4, dtype="f4")]
-        for unit, (name, values) in enumerate(images.items()):
+        for place, (name, values) in enumerate(images.items()):
             if name in program:
                 made.append(texture(gl, values))
-                made[-1].use(unit)
-                program[name] = unit
+                made[-1].use(place)
+                program[name] = place
         target = gl.framebuffer([made[1]])
         target.use()
         vertices = gl.vertex_array(program, [])
@@ -140,10 +141,8 @@ def test_contact(through_glsl: Any) -> None:
 def test_mapping(through_glsl: Any) -> None:
     rng = np.random.default_rng(1)
     n = 100_000
-    n_p = rng.normal(size=(n, 3))
-    n_p /= np.linalg.norm(n_p, axis=1, keepdims=True)
-    n_q = n_p + 10.0 ** rng.uniform(-9, 1, (n, 1)) * rng.normal(size=(n, 3))
-    n_q /= np.linalg.norm(n_q, axis=1, keepdims=True)
+    n_p = random_units(rng, n)
+    n_q = unit(n_p + 10.0 ** rng.uniform(-9, 1, (n, 1)) * rng.normal(size=(n, 3)))
     keep = (n_p * n_q).sum(axis=1) > -0.9  # beyond, float32 hardly tells the axis
     w = rng.uniform(-1, 1, (n, 3))
     inputs = [a[keep] for a in (rows(w), rows(n_p), rows(n_q))]

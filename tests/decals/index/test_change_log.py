@@ -7,12 +7,12 @@ from decals import Contact, Decals, evaluate
 from decals.index import DecalEditor
 from decals.index.change_log import MAX_DIRTY_BALLS, MAX_SIZE_RATIO, DirtyBalls, affected_balls
 from tests.decals.rendering.pictures import in_layers
+from tests.vectors import random_units, unit
 
 
 def random_decals(rng: np.random.Generator, count: int = 300) -> Decals:
     """Decals of sizes up to eight times each other on a ball, crowded enough to push."""
-    normals = rng.normal(size=(count, 3))
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = random_units(rng, count)
     radii = np.exp(rng.uniform(np.log(0.04), np.log(0.32), count))
     return Decals(normals, normals, rng.normal(size=(count, 3)), radii, spill=rng.random(count) < 0.2)
 
@@ -29,8 +29,7 @@ def test_what_a_change_cannot_reach_stays_and_not_much_more(contact: Contact, la
     rng = np.random.default_rng(5)
     decals = random_decals(rng)
     editor = DecalEditor(in_layers(decals, 1) if layered else decals)
-    points = rng.normal(size=(6_000, 3)).astype(np.float32)
-    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    points = unit(rng.normal(size=(6_000, 3)).astype(np.float32))
     before, changed, reached = field(editor, points, contact), 0, 0
     for step in range(40):
         version, number = editor.version, int(rng.choice(editor.numbers))
@@ -106,16 +105,14 @@ def test_small_decals_cut_no_ray_whose_rim_they_do_not_reach(shift: float) -> No
     rng, changed = np.random.default_rng(8), 0
     for step in range(60):
         small = 1.0 / rng.uniform(2.0, MAX_SIZE_RATIO)
-        ways = rng.normal(size=(1, 3)) + np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]])
-        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+        ways = unit(rng.normal(size=(1, 3)) + np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]]))
         distances = np.array([[0.0], [1.0 + rng.uniform(-3.5, 3.5) * small]])
         normal = np.array([[0.0, 0.0, 1.0]])
         decals = Decals(
             shift + distances * ways, normal.repeat(2, 0), [[1, 0, 0]] * 2, [1.0, small], spill=[True, True]
         )
         editor = DecalEditor(decals)
-        rays = ways[1] + rng.normal(size=(2000, 3)) * small * np.exp(rng.uniform(-6.0, 1.5, (2000, 1)))
-        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        rays = unit(ways[1] + rng.normal(size=(2000, 3)) * small * np.exp(rng.uniform(-6.0, 1.5, (2000, 1))))
         points = (decals.positions[0] + rng.uniform(0.05, 1.0, (2000, 1)) * rays).astype(np.float32)
 
         def seen(editor: DecalEditor = editor, points: np.ndarray = points) -> np.ndarray:
@@ -132,7 +129,7 @@ def test_small_decals_cut_no_ray_whose_rim_they_do_not_reach(shift: float) -> No
         reach = affected_balls(touched, Contact.PRODUCT, 0.0)
         assert reach is not None
         offsets = points.astype(np.float64) - decals.positions[0]
-        rims = decals.positions[0] + offsets / np.linalg.norm(offsets, axis=1, keepdims=True)
+        rims = decals.positions[0] + unit(offsets)
         near = [
             (np.linalg.norm(places[:, None] - reach[:, :3], axis=2) < reach[:, 3]).any(axis=1)
             for places in (points.astype(np.float64), rims)

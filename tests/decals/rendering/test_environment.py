@@ -23,6 +23,7 @@ from decals.rendering.prefiltering import (
 from tests.decals.rendering.test_materials import LIGHTS, ball, scene_of, uniform
 from tests.oracles import environment as reference
 from tests.oracles.materials import Surface, direct, tone_mapped
+from tests.vectors import unit
 
 SIZE = (64, 48)
 
@@ -94,8 +95,9 @@ def split_sum(
 ) -> np.ndarray:
     """Reflected light, from exact means in the lobes, and from the table between its entries."""
     alpha, seen = roughness**2, max(float(normal @ eye), 1e-3)
-    axis = normal + (2 * (normal @ eye) * normal - eye - normal) * (1 - alpha) * (np.sqrt(1 - alpha) + alpha)
-    axis /= np.linalg.norm(axis)
+    axis = unit(
+        normal + (2 * (normal @ eye) * normal - eye - normal) * (1 - alpha) * (np.sqrt(1 - alpha) + alpha)
+    )
     level = np.log2(1 + alpha * (2.0 ** (len(GRID_ROWS) - 1) - 1))
     below = min(int(level), len(GRID_ROWS) - 2)
     near, far = (reference.lobe_mean(cells, axis, level_alpha(below + i)) for i in (0, 1))
@@ -210,8 +212,7 @@ def test_a_visible_environment_is_the_background(renderer: Renderer, environment
     picture = renderer.render(empty, RenderOptions(size=SIZE, samples=1, environment=shown))
     assert (picture[..., 3] == 255).all()
     x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, SIZE[1] - np.arange(SIZE[1]) - 0.5)
-    rays = camera.rays(*SIZE).directions(x, y)
-    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    rays = unit(camera.rays(*SIZE).directions(x, y))
     rows = np.arccos(rays[..., 1]) / np.pi * 64 - 0.5
     columns = (0.5 + np.arctan2(rays[..., 0], -rays[..., 2]) / (2 * np.pi)) * 128 - 0.5
     padded = np.pad(sky(), ((0, 0), (1, 1), (0, 0)), "wrap")

@@ -18,6 +18,7 @@ from decals.scenes.script import write_script
 from tests.decals.rendering.pictures import scattered
 from tests.decals.shapes import torus
 from tests.oracles import materials as reference
+from tests.vectors import unit
 
 SIZE = (96, 72)
 COLOR = 0.5, 0.4, 0.3
@@ -72,8 +73,7 @@ def expected(scene: Scene, position: np.ndarray, normal: np.ndarray, lights: Any
     eye = np.array(scene.camera.position)
     toward_eye = (eye - position) / np.linalg.norm(eye - position, axis=1, keepdims=True)
     back = eye / np.linalg.norm(eye)
-    right = np.cross([0, 0, 1], back)
-    right /= np.linalg.norm(right)
+    right = unit(np.cross([0, 0, 1], back))
     camera = np.stack([right, np.cross(back, right), back], 1)
     albedo = np.tile(decode_srgb(np.array(COLOR)), (count, 1))
     left, part = 1.0, 0.0
@@ -102,8 +102,7 @@ def expected(scene: Scene, position: np.ndarray, normal: np.ndarray, lights: Any
         albedo += weight * decode_srgb(scene.images[i].pixels[0, 0, :3] / 255)
         left -= weight
     bent: Any = sums["normal"] / np.linalg.norm(sums["normal"], axis=1, keepdims=True)
-    bent = bent - np.minimum((bent * toward_eye).sum(axis=1) - 1e-3, 0)[:, None] * toward_eye
-    bent /= np.linalg.norm(bent, axis=1, keepdims=True)
+    bent = unit(bent - np.minimum((bent * toward_eye).sum(axis=1) - 1e-3, 0)[:, None] * toward_eye)
     levels = {name: np.full(count, sums[name] / part) for name in ("roughness", "metallic", "occlusion")}
     emission = np.broadcast_to(sums["emission"] / part, (count, 3))
     base: Any = albedo

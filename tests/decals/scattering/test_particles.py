@@ -10,15 +10,11 @@ from decals.scattering.repulsion_kernels import CLOSEST, ISOTROPY, MAX_RING_DEVI
 from tests.decals.scattering.evaluation import device_particles, evaluate
 from tests.oracles.repulsion import moves as expected_moves
 from tests.oracles.repulsion import ring_energy, rings, total_energy
+from tests.vectors import unit
 
 SPACING = 0.3
 
 DEVICES = ["cpu", pytest.param("cuda:0", marks=pytest.mark.gpu)]
-
-
-def unit(vectors: Float64Array) -> Float64Array:
-    units: Float64Array = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-    return units
 
 
 def sphere_points(count: int, seed: int, radius: float = 1.0) -> tuple[Float32Array, Float32Array]:

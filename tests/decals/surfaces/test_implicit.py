@@ -8,11 +8,7 @@ from blobtree import ISO, Disc, Intersection, Node, Point, Segment, Union
 from decals.errors import InvalidMesh, InvalidPoints
 from decals.surfaces import ImplicitSurface, Surface
 from decals.surfaces.implicit import project_without_mesh
-
-
-def directions(count: int, seed: int = 0) -> Any:
-    vectors = np.random.default_rng(seed).normal(size=(count, 3))
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+from tests.vectors import random_units
 
 
 def ball(radius: float = 1.0, center: Any = (0.0, 0.0, 0.0)) -> Any:
@@ -40,7 +36,7 @@ def test_sphere_area_bounds_samples_and_normals(radius: float) -> None:
 
 @pytest.mark.parametrize("factor", [0.3, 0.5, 0.99, 1.01, 1.5, 2.1, 5.0, 40.0])
 def test_projection_reaches_the_sphere_from_near_and_far(factor: float) -> None:
-    ways = directions(300)
+    ways = random_units(np.random.default_rng(0), 300)
     positions, normals = ball(center=(3, 0, 0)).project(factor * ways + [3, 0, 0])
     assert np.allclose(np.linalg.norm(positions - [3, 0, 0], axis=1), 1, atol=1e-4)
     assert np.allclose(normals, ways, atol=0.15)  # from afar, as near as a cell of the coarse mesh
@@ -83,14 +79,14 @@ def test_samples_of_a_blend_lie_on_it_with_the_normal_of_the_field() -> None:
 
 
 def test_rays_meet_the_sphere() -> None:
-    ways = directions(200)
+    ways = random_units(np.random.default_rng(0), 200)
     assert np.allclose(ball(2.0).raycast(6 * ways, -5 * ways), 4.0, atol=1e-3)
     assert np.isinf(ball().raycast([[0, 0, 3], [0, 0, 3]], [[0, 0, 1], [0, 0, 0]])).all()
     assert ball().raycast(np.zeros((0, 3)), np.zeros((0, 3))).shape == (0,)
 
 
 def test_it_contains_its_inside() -> None:
-    ways = directions(200)
+    ways = random_units(np.random.default_rng(0), 200)
     surface = ball(center=(0, 5, 0))
     assert surface.contains(0.99 * ways + [0, 5, 0]).all()
     assert not surface.contains(1.01 * ways + [0, 5, 0]).any()

@@ -10,11 +10,7 @@ from decals.errors import InvalidMesh, InvalidPoints
 from decals.surfaces import MeshSurface, Surface
 from tests.decals.meshes import box, plane, sphere
 from tests.oracles.triangles import closest_points, first_hits
-
-
-def directions(count: int, seed: int = 0) -> Any:
-    vectors = np.random.default_rng(seed).normal(size=(count, 3))
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+from tests.vectors import random_units
 
 
 def triangle_soup(seed: int, count: int = 30) -> Any:
@@ -79,7 +75,8 @@ def test_normals_follow_the_winding_of_the_faces() -> None:
 def test_rays_hit_the_first_triangle(seed: int) -> None:
     vertices, faces = triangle_soup(seed)
     soup = MeshSurface(vertices, faces)
-    origins, ways = directions(300, seed) * 3, directions(300, seed + 50)
+    origins = 3.0 * random_units(np.random.default_rng(seed), 300)
+    ways = random_units(np.random.default_rng(seed + 50), 300)
     expected = first_hits(origins.astype(np.float32), ways, vertices, faces)
     found = soup.raycast(origins, 7.0 * ways)
     assert (np.isfinite(found) == np.isfinite(expected)).mean() > 0.99
@@ -89,7 +86,7 @@ def test_rays_hit_the_first_triangle(seed: int) -> None:
 
 
 def test_rays_toward_a_sphere_know_its_size() -> None:
-    ways = directions(500)
+    ways = random_units(np.random.default_rng(0), 500)
     distances = sphere(2.0, center=(5, 0, 0)).raycast(ways * 7 + [5, 0, 0], -ways)
     assert np.allclose(distances, 5.0, atol=0.02)
     assert np.isinf(sphere().raycast([[0, 0, 3], [0, 0, 3]], [[0, 0, 1], [0, 0, 0]])).all()
@@ -100,7 +97,7 @@ def test_a_closed_mesh_contains_its_inside_however_it_winds(turned: bool) -> Non
     ball = sphere(center=(3, 0, 0))
     if turned:
         ball = MeshSurface(ball.vertices, ball.faces[:, ::-1])
-    ways = directions(1000)
+    ways = random_units(np.random.default_rng(0), 1000)
     center = [3, 0, 0]
     assert ball.closed
     assert ball.contains(center + 0.98 * ways).all()
