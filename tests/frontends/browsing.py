@@ -5,12 +5,14 @@ import io
 import shutil
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyvista as pv
 from PIL import Image
-from playwright.async_api import ConsoleMessage, Page, async_playwright
+from playwright.async_api import ConsoleMessage, Page, async_playwright, expect
 
 from decals.apps.sandbox.guard import Guard
 
@@ -18,6 +20,7 @@ NAMES = ("chromium", "chromium-browser", "google-chrome")
 SIZE = (500, 380)
 PATIENCE = 120
 """Seconds: the first frame compiles shaders."""
+expect.set_options(timeout=1000 * PATIENCE)
 PICTURE = "canvas, img.image-display-area"
 """Where trame's views show what they get."""
 ABOVE = "svg, .brush { visibility: hidden !important }"
@@ -138,3 +141,21 @@ async def drag(page: Page, plotter: pv.Plotter, *places: tuple[int, int]) -> Non
     await page.mouse.down()
     await point(page, plotter, *places[1:])
     await page.mouse.up()
+
+
+async def pull(page: Page, start: tuple[float, float], by: tuple[float, float], *, steps: int = 5) -> None:
+    """A drag of the mouse from a place of the page by some pixels, in several steps."""
+    await page.mouse.move(*start)
+    await page.mouse.down()
+    await page.mouse.move(start[0] + by[0], start[1] + by[1], steps=steps)
+    await page.mouse.up()
+
+
+async def violations(page: Page) -> list[dict[str, Any]]:
+    """What axe-core finds in a page; axe-playwright-python brings its script."""
+    found = find_spec("axe_playwright_python")
+    assert found is not None, "pip install axe-playwright-python"
+    assert found.origin is not None
+    await page.evaluate((Path(found.origin).parent / "axe.min.js").read_text(encoding="utf-8"))
+    listed: list[dict[str, Any]] = await page.evaluate("axe.run().then(result => result.violations)")
+    return listed

@@ -9,17 +9,19 @@ import io
 import re
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
 from functools import partial
-from importlib.util import find_spec
+from itertools import count
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
+from urllib.parse import urlsplit
 
 import numpy as np
 import pyvista as pv
 from PIL import Image
-from playwright.async_api import Locator, Page
+from playwright.async_api import Page, expect
 from trame.app import get_server
 from trame.ui.vuetify3 import VAppLayout
 from trame_pyvista.widgets import PyVistaRCAView, PyVistaRemoteView
@@ -48,10 +50,12 @@ from tests.frontends.browsing import (
     drawn,
     opened,
     point,
+    pull,
     seen,
     served,
     shows,
     until,
+    violations,
 )
 from tests.oracles.contact import RIM, falloff
 
@@ -64,6 +68,39 @@ SCROLLED_TWICE = """() => {
 """Classes of areas that scroll inside others."""
 
 BLOB = Point((0, 0, 0), radius=1.0) + Point((1.2, 0.4, 0), radius=0.6)
+EMPTY = empty_scene(["scale"], UPRIGHT["y"])
+WIDE = 1280, 800
+"""Size of a laptop's window."""
+NUMBERS = count()
+"""Of servers, which trame finds by their names."""
+
+
+@asynccontextmanager
+async def sandboxed(
+    scene: decals.Scene,
+    file: Path | None = None,
+    *,
+    size: tuple[int, int] = WIDE,
+    touch: bool = False,
+    kind: Any = SandboxPage,
+    **options: Any,
+) -> AsyncIterator[tuple[Page, Any, EditWindow]]:
+    """A page of the sandbox in a browser, with its window, on a scene; its files lie beside `file`."""
+    server = get_server(f"sandbox {next(NUMBERS)}", client_type="vue3")
+    if file is not None:
+        options["folder"] = file.parent
+    with EditWindow(scene, path=file, plotter=pv.Plotter(off_screen=True)) as window:
+        window.show()
+        sandbox_page = kind(server, window, **options)
+        async with served(server, size=size, guard=sandbox_page.guard, touch=touch) as browser:
+            yield browser, sandbox_page, window
+
+
+async def show_all(browser: Page, window: EditWindow) -> None:
+    """Let the view hold all of the scene, and wait until the browser shows that."""
+    window.subplot.vtk_renderer.ResetCamera()
+    window.redraw(whole=True)
+    await shows(browser, window.plotter)
 
 
 async def page(picture: str | None = None) -> None:
@@ -170,19 +207,14 @@ async def streamed() -> None:
 
 async def sandbox(picture: str | None = None) -> None:
     """A user of the sandbox builds, changes and undoes a model, and sees each step."""
-    plotter = pv.Plotter(off_screen=True)
-    server = get_server("sandbox", client_type="vue3")
-    window = EditWindow(decals.cover(BLOB, count=60, images=["tile"]), plotter=plotter)
-    window.show()
-    sandbox_page = SandboxPage(server, window)
-    state = digest(window.document)
     requests: list[str] = []
 
     def normal() -> Any:
         plane = sandbox_page.sandbox.display.options.slice
         return plane and plane.normal
 
-    async with served(server, size=(1280, 800), guard=sandbox_page.guard) as browser:
+    async with sandboxed(decals.cover(BLOB, count=60, images=["tile"])) as (browser, sandbox_page, window):
+        plotter, state = window.plotter, digest(window.document)
         browser.on("request", lambda request: requests.append(request.url))
         first = await shows(browser, plotter)
         await browser.get_by_text("Point").nth(1).click()
@@ -201,9 +233,9 @@ async def sandbox(picture: str | None = None) -> None:
         await browser.get_by_role("button", name="Add", exact=True).click()
         await browser.get_by_label("search in primitives").fill("TORUS:")
         kinds = browser.locator(".v-overlay--active .v-list-item-title")
-        await until_count(kinds, 1)
+        await expect(kinds).to_have_count(1)
         await kinds.get_by_text("Torus", exact=True).hover()
-        await until_count(browser.locator(".hovered line"), 12)
+        await expect(browser.locator(".hovered line")).to_have_count(12)
         ghost = np.array(sandbox_page.sandbox.values()["hovered"]["lines"])
         await kinds.get_by_text("Torus", exact=True).click()
         await until(lambda: window.session.labels[-1:] == ("add Torus",))
@@ -219,16 +251,12 @@ async def sandbox(picture: str | None = None) -> None:
             "set ring_radius", exact=True
         ).first.wait_for()  # the field has its value back
         if picture is not None:
-            window.subplot.vtk_renderer.ResetCamera()
-            window.redraw(whole=True)
-            await shows(browser, plotter)
+            await show_all(browser, window)
             await save_picture(browser, Path(picture))
         await browser.get_by_role("textbox", name="ring radius").fill("-1")
         await browser.get_by_role("textbox", name="ring radius").press("Enter")
         await until(lambda: "expected a number above 0" in sandbox_page.sandbox.status)
-        async with asyncio.timeout(PATIENCE):
-            while await browser.get_by_role("textbox", name="ring radius").input_value() != "0.6":
-                await asyncio.sleep(0.1)
+        await expect(browser.get_by_role("textbox", name="ring radius")).to_have_value("0.6")
         await browser.locator(".cube polygon").filter(has_text=re.compile("^right view")).click()
         await until(lambda: np.allclose(plotter.camera.direction, (-1, 0, 0), atol=1e-6))
         await browser.get_by_role("button", name="View", exact=True).click()
@@ -236,18 +264,10 @@ async def sandbox(picture: str | None = None) -> None:
         await browser.keyboard.press("Escape")
         await until(lambda: normal() is not None)
         before = normal()
-        box = await at_rest(browser, sandbox_page, "tilt slice")
-        await browser.mouse.move(*box)
-        await browser.mouse.down()
-        await browser.mouse.move(box[0] + 32, box[1] - 28)
-        await browser.mouse.up()
+        await pull(browser, await at_rest(browser, sandbox_page, "tilt slice"), (32, -28), steps=1)
         await until(lambda: not np.allclose(normal(), before))
         cut = sandbox_page.sandbox.display.options.slice
-        box = await at_rest(browser, sandbox_page, "slice")
-        await browser.mouse.move(*box)
-        await browser.mouse.down()
-        await browser.mouse.move(box[0] + 20, box[1] - 20)
-        await browser.mouse.up()
+        await pull(browser, await at_rest(browser, sandbox_page, "slice"), (20, -20), steps=1)
         await until(lambda: sandbox_page.sandbox.display.options.slice != cut)
         assert np.allclose(normal(), cut.normal if cut else 0.0)
         distance = plotter.camera.distance
@@ -257,7 +277,6 @@ async def sandbox(picture: str | None = None) -> None:
         await until(lambda: digest(window.document) == state)
         await until(lambda: window.session.undone_labels == (*slid, "add Torus", "set ring_radius"))
         assert all("127.0.0.1" in url for url in requests)
-    window.close()
 
 
 async def clicks(browser: Page, window: EditWindow) -> None:
@@ -292,18 +311,18 @@ async def hovers(browser: Page, window: EditWindow) -> None:
     await point(browser, window.plotter, (4, 4))
     await lit.first.wait_for(state="detached")
     await browser.get_by_text("Point").nth(1).hover()
-    await until_count(browser.locator(".hovered line"), 12)
+    await expect(browser.locator(".hovered line")).to_have_count(12)
     await browser.get_by_text("layer 0").hover()
     await browser.locator(".hovered circle").first.wait_for()
     await browser.get_by_text("Point").nth(0).click()
     await until(lambda: state.nodes == ((0, (0,)),))
     rows = browser.locator("[data-roving] .v-list-item--active")
-    await until_count(rows, 1)
+    await expect(rows).to_have_count(1)
     await browser.keyboard.down("Shift")
     await drag(browser, window.plotter, there)
     await browser.keyboard.up("Shift")
     await until(lambda: state.nodes == ((0, (0,)), (0, (1,))))
-    await until_count(rows, 2)
+    await expect(rows).to_have_count(2)
     await browser.keyboard.down("Control")
     await drag(browser, window.plotter, at)
     await browser.keyboard.up("Control")
@@ -313,7 +332,6 @@ async def hovers(browser: Page, window: EditWindow) -> None:
 async def placed(browser: Page, window: EditWindow) -> None:
     """A kind is placed under the mouse, which shows its shape before; it can be left; one undo takes it."""
     labels, (_, at) = window.session.labels, next(Driver(window).visible())
-    lines = browser.locator(".hovered line")
     leave = browser.get_by_role("button", name="Leave", exact=True)
     for left in (partial(browser.keyboard.press, "Escape"), leave.click, None):
         await browser.get_by_role("button", name="Add", exact=True).click()
@@ -321,7 +339,7 @@ async def placed(browser: Page, window: EditWindow) -> None:
         await browser.get_by_title("place a Cone by the mouse").click()
         await browser.get_by_text("Click where the Cone goes").wait_for()
         await point(browser, window.plotter, at)
-        await until_more(lines, 12)
+        await expect(browser.locator(".hovered line").nth(12)).to_be_attached()
         if left:
             await left()
             await browser.get_by_text("Click where the Cone goes").wait_for(state="detached")
@@ -332,20 +350,6 @@ async def placed(browser: Page, window: EditWindow) -> None:
     await browser.keyboard.press("Control+z")
     await until(lambda: window.session.labels == labels)
     await browser.get_by_text("Torus", exact=True).first.click()
-
-
-async def until_more(found: Any, count: int) -> None:
-    """Wait until more elements than so many are found."""
-    async with asyncio.timeout(PATIENCE):
-        while await found.count() <= count:
-            await asyncio.sleep(0.05)
-
-
-async def until_count(found: Any, count: int) -> None:
-    """Wait until so many elements are found."""
-    async with asyncio.timeout(PATIENCE):
-        while await found.count() != count:
-            await asyncio.sleep(0.05)
 
 
 async def fingers(browser: Page, *places: Sequence[tuple[float, float]]) -> None:
@@ -378,28 +382,21 @@ async def touch(picture: str | None = None) -> None:
 
 async def on_device(name: str, size: tuple[int, int], picture: str | None = None) -> None:
     """What a user does with fingers on a screen of a size."""
-    plotter = pv.Plotter(off_screen=True)
-    server = get_server(name, client_type="vue3")
-    folder = Path(tempfile.mkdtemp())
+    file = Path(tempfile.mkdtemp()) / "a-scene-with-a-long-name.json"
     scene = decals.cover(BLOB, count=60, images=["tile"])
-    window = EditWindow(scene, path=folder / "a-scene-with-a-long-name.json", plotter=plotter)
-    window.show()
-    sandbox_page = SandboxPage(server, window, folder=folder)
-    async with served(server, size=size, guard=sandbox_page.guard, touch=True) as browser:
-        await shows(browser, plotter)
+    async with sandboxed(scene, file, size=size, touch=True) as (browser, _, window):
+        await shows(browser, window.plotter)
         await reachable(browser)
         await by_fingers(browser, window)
         if picture is not None:
-            window.subplot.vtk_renderer.ResetCamera()
-            window.redraw(whole=True)
-            await shows(browser, plotter)
+            await show_all(browser, window)
             image = Image.open(io.BytesIO(await browser.screenshot())).convert("RGB")
             image.save(picture, quality=80, optimize=True)
         for side, row in (("left", "Point"), ("right", "Scattering")):
             shown = browser.get_by_role("button", name=row, exact=True).first
             if name == "phone":
                 await browser.get_by_label(f"{side} panel").first.tap()
-            await at_place(shown)
+            await browser.wait_for_function(REACHED, arg=await shown.element_handle())  # panels slide
             if side == "left":
                 await shown.tap()
                 await until(lambda: window.actions.state.primitive == (0, (0,)))
@@ -410,11 +407,10 @@ async def on_device(name: str, size: tuple[int, int], picture: str | None = None
         await browser.get_by_role("button", name="undo").first.tap()
         await until(lambda: window.session.undone_labels == ("remove a primitive",))
         await browser.get_by_role("button", name=re.compile("^save")).first.tap()
-        await until((folder / "a-scene-with-a-long-name.json").exists)
+        await until(file.exists)
         await browser.get_by_role("button", name=re.compile("^show this help")).tap()
         await browser.get_by_text("Page up", exact=True).wait_for()
         await accessible(browser)
-    window.close()
 
 
 async def reachable(browser: Page) -> None:
@@ -425,13 +421,6 @@ async def reachable(browser: Page) -> None:
     assert await browser.evaluate("document.documentElement.scrollWidth <= innerWidth")
     cut = "name => name.scrollHeight > name.clientHeight + 1 || name.scrollWidth > name.clientWidth"
     assert not await browser.locator(".toolbar h1").evaluate(cut)
-
-
-async def at_place(found: Any) -> None:
-    """Wait until a finger reaches an element: panels slide."""
-    async with asyncio.timeout(PATIENCE):
-        while not await found.evaluate(REACHED):
-            await asyncio.sleep(0.05)
 
 
 async def by_fingers(browser: Page, window: EditWindow) -> None:
@@ -483,13 +472,9 @@ async def by_keys(browser: Page) -> None:
 
 async def creature(picture: str | None = None) -> None:
     """From an empty start a user builds a creature, covers, brushes, undoes, saves and loads it."""
-    folder = Path(tempfile.mkdtemp())
-    plotter = pv.Plotter(off_screen=True)
-    server = get_server("creature", client_type="vue3")
-    window = EditWindow(empty_scene(["scale"], UPRIGHT["y"]), path=folder / "scene.json", plotter=plotter)
-    window.show()
-    sandbox_page = SandboxPage(server, window, folder=folder, start=True)
-    async with served(server, size=(1280, 800), guard=sandbox_page.guard) as browser:
+    file = Path(tempfile.mkdtemp()) / "scene.json"
+    async with sandboxed(EMPTY, file, start=True) as (browser, sandbox_page, window):
+        plotter = window.plotter
         user = Builder(browser, window)
         await accessible(browser)
         await browser.get_by_label("New model").click()
@@ -518,9 +503,7 @@ async def creature(picture: str | None = None) -> None:
         await until(lambda: window.actions.state.primitive == (0, ()))
         await browser.keyboard.press("Escape")
         await until(lambda: window.actions.state.primitive is None)
-        window.subplot.vtk_renderer.ResetCamera()
-        window.redraw(whole=True)
-        await shows(browser, plotter)
+        await show_all(browser, window)
         middle = plotter.window_size[0] // 2, plotter.window_size[1] // 2
         await point(browser, plotter, middle)
         await browser.keyboard.press("g")
@@ -556,18 +539,12 @@ async def creature(picture: str | None = None) -> None:
         await browser.keyboard.press("Control+s")
         sandbox_page.sandbox.perform("save")
         await until(lambda: not window.background.busy and not window.session.modified)
-    window.close()
-    file = Path(str(window.actions.files.path))
-    fresh = pv.Plotter(off_screen=True, window_size=plotter.window_size)
-    with EditWindow(decals.load_scene(file), plotter=fresh) as loaded:
-        loaded.show()
-        guard = SandboxPage(get_server("again", client_type="vue3"), loaded, folder=folder).guard
-        async with served(get_server("again"), size=(1280, 800), guard=guard) as browser:
-            async with asyncio.timeout(PATIENCE):  # the first picture may come before the page has its layout
-                while (again := await shows(browser, fresh)).shape != last.shape:
-                    await asyncio.sleep(0.1)
-            assert np.abs(again - last).mean() < 0.5
-    fresh.close()
+        file = Path(str(window.actions.files.path))
+    async with sandboxed(decals.load_scene(file), file) as (browser, _, loaded):
+        async with asyncio.timeout(PATIENCE):  # the first picture may come before the page has its layout
+            while (again := await shows(browser, loaded.plotter)).shape != last.shape:
+                await asyncio.sleep(0.1)
+        assert np.abs(again - last).mean() < 0.5
 
 
 async def outline_rows(browser: Page) -> None:
@@ -642,16 +619,10 @@ def around(at: tuple[int, int], reach: int) -> list[tuple[int, int]]:
 
 
 async def accessible(browser: Page) -> None:
-    """Make sure that axe-core finds nothing serious in the page; axe-playwright-python brings its script."""
-    found = find_spec("axe_playwright_python")
-    assert found is not None, "pip install axe-playwright-python"
-    assert found.origin is not None
-    script = (Path(found.origin).parent / "axe.min.js").read_text(encoding="utf-8")
-    await browser.evaluate(script)
-    violations = await browser.evaluate("axe.run().then(result => result.violations)")
+    """Make sure that axe-core finds nothing serious in the page."""
     serious = [
         (one["id"], one["impact"], [node["html"][:160] for node in one["nodes"]][:4])
-        for one in violations
+        for one in await violations(browser)
         if one["impact"] in ("serious", "critical")
     ]
     assert not serious, serious
@@ -660,14 +631,10 @@ async def accessible(browser: Page) -> None:
 async def sandbox_start(picture: str | None = None) -> None:
     """From the start page a user opens a sample, brushes and clicks decals, drops an image and saves."""
     folder = Path(tempfile.mkdtemp())
-    plotter = pv.Plotter(off_screen=True)
-    server = get_server("start", client_type="vue3")
-    window = EditWindow(empty_scene(["scale"], UPRIGHT["y"]), path=folder / "scene.json", plotter=plotter)
-    window.show()
-    decals.save_scene(empty_scene(["scale"], UPRIGHT["y"]), folder / "older.json")
-    titles = ["First lesson", "Second lesson"]
-    sandbox_page = SandboxPage(server, window, folder=folder, start=True, lessons=titles)
-    async with served(server, size=(1280, 800), guard=sandbox_page.guard) as browser:
+    decals.save_scene(EMPTY, folder / "older.json")
+    page = sandboxed(EMPTY, folder / "scene.json", start=True, lessons=["First lesson", "Second lesson"])
+    async with page as (browser, sandbox_page, window):
+        plotter = window.plotter
         headings = await browser.locator(".v-dialog h2").all_inner_texts()
         assert headings == ["Lessons", "New model, or a sample", "Files in this folder"]
         await browser.get_by_role("button", name="Second lesson").wait_for()
@@ -720,7 +687,6 @@ async def sandbox_start(picture: str | None = None) -> None:
         Image.new("RGB", (8, 8), "red").save(folder / "dot.png")
         await browser.get_by_label("open from this computer").set_input_files(str(folder / "dot.png"))
         await until(lambda: len(window.document.images) == 2)
-    window.close()
 
 
 async def escapes(browser: Page, window: EditWindow) -> None:
@@ -781,12 +747,6 @@ FOLLOWS = """(labels) => {
 
 async def panels(picture: str | None = None) -> None:
     """A user renames and drags rows, drops images, and sets material, scattering and drawing."""
-    plotter = pv.Plotter(off_screen=True)
-    server = get_server("panels", client_type="vue3")
-    window = EditWindow(decals.cover(BLOB, count=40, images=["tile", "scale"]), plotter=plotter)
-    window.show()
-    document, state = window.document, digest(window.document)
-    sandbox_page = SandboxPage(server, window)
 
     def row(label: str) -> Any:
         return browser.get_by_role("button", name=label, exact=True)
@@ -801,7 +761,9 @@ async def panels(picture: str | None = None) -> None:
     async def done(label: str) -> None:
         await until(lambda: window.session.labels[-1:] == (label,) and not window.background.busy)
 
-    async with served(server, size=(1280, 800), guard=sandbox_page.guard) as browser:
+    scene = decals.cover(BLOB, count=40, images=["tile", "scale"])
+    async with sandboxed(scene) as (browser, sandbox_page, window):
+        document, state, plotter = window.document, digest(window.document), window.plotter
         await rename("Point", "body")
         await rename("layer 0", "armour")
         await rename("model 1", "snail")
@@ -837,9 +799,7 @@ async def panels(picture: str | None = None) -> None:
         await done("scatter")
         assert len(document.decals) == 90
         if picture is not None:
-            window.subplot.vtk_renderer.ResetCamera()
-            window.redraw(whole=True)
-            await shows(browser, plotter)
+            await show_all(browser, window)
             await save_picture(browser, Path(picture))
         await row("Drawing").click()
         await browser.get_by_label("background top").wait_for()
@@ -883,69 +843,52 @@ async def panels(picture: str | None = None) -> None:
         await browser.get_by_text("Start", exact=True).click()
         await until(lambda: digest(document) == state)
         assert sandbox_page.sandbox.values()["done"] == []
-    window.close()
 
 
 async def fields() -> None:
     """What is typed in a field is taken or dropped, and never becomes another edit."""
-    plotter = pv.Plotter(off_screen=True)
-    server = get_server("fields", client_type="vue3")
-    folder = Path(tempfile.mkdtemp())  # gets the recovery file
-    window = EditWindow(scene(), path=folder / "fields.json", plotter=plotter)
-    window.show()
-    sandbox_page = SandboxPage(server, window, folder=folder)
-    keys = window.actions.state
-    async with served(server, size=(1280, 800), guard=sandbox_page.guard) as browser:
+    file = Path(tempfile.mkdtemp()) / "fields.json"  # its folder gets the recovery file
+    async with sandboxed(scene(), file) as (browser, _, window):
+        keys = window.actions.state
         assert await browser.title() == "fields.json \N{EN DASH} sandbox"
         await browser.get_by_text("Point", exact=True).first.click()
         field = browser.locator("input[aria-label='radius']").first
         view = browser.locator("[role=application]")
-
-        async def shown(text: str) -> None:
-            async with asyncio.timeout(PATIENCE):
-                while await field.input_value() != text:
-                    await asyncio.sleep(0.05)
-
-        await shown("1")
+        await expect(field).to_have_value("1")
         await field.press("End")
         await browser.keyboard.type("55")
         await browser.keyboard.press("Control+z")
-        await shown("1")
+        await expect(field).to_have_value("1")
         await view.hover(position={"x": 300, "y": 200})
         await view.hover(position={"x": 320, "y": 220})
         await browser.keyboard.type("1x")  # X evens decals out in the view
-        await shown("11x")
+        await expect(field).to_have_value("11x")
         await browser.keyboard.press("Escape")
-        await shown("1")
+        await expect(field).to_have_value("1")
         for text in ("-5", "abc"):
             await field.fill(text)
             await field.press("Enter")
             await browser.get_by_role("alert").filter(has_text="radius: expected").wait_for()
             assert await field.get_attribute("aria-invalid") == "true"
-            await shown("1")
+            await expect(field).to_have_value("1")
         await field.fill("0.8")
         await browser.get_by_text("Point", exact=True).nth(1).click()
         await until(lambda: keys.primitive == (0, (1,)) and not window.background.busy_editing)
         assert window.session.labels == ("set radius",)
-        await shown("0.5")
+        await expect(field).to_have_value("0.5")
         await field.fill("0.4")
         await browser.get_by_role("button", name="undo").first.click()
         await until(lambda: window.session.undone_labels == ("set radius",))
-        await shown("0.5")
+        await expect(field).to_have_value("0.5")
         await browser.keyboard.press("Escape")  # the focus is on the button
         await until(lambda: keys.primitive is None)
-    window.close()
 
 
 async def filled() -> None:
     """A pull bares a part of the skin: the page counts the places, and one click fills them."""
-    plotter = pv.Plotter(off_screen=True)
-    server = get_server("filled", client_type="vue3")
-    window = EditWindow(decals.cover(BLOB, count=60, images=["tile", "scale"]), plotter=plotter)
-    window.show()
-    sandbox_page = SandboxPage(server, window)
+    scene = decals.cover(BLOB, count=60, images=["tile", "scale"])
     button = re.compile(r"^Fill \d+ bare places?$")
-    async with served(server, size=(1280, 800), guard=sandbox_page.guard) as browser:
+    async with sandboxed(scene) as (browser, _, window):
         await browser.get_by_text("Point", exact=True).nth(1).click()
         field = browser.get_by_role("textbox", name="center 1", exact=True)
         await field.fill("2.1")
@@ -957,23 +900,17 @@ async def filled() -> None:
         await until(lambda: window.session.labels[-1:] == ("fill bare places",) and not window.busy)
         assert decals.measure(window.document.scene).coverage > 0.9999
         await browser.get_by_role("button", name=button).wait_for(state="detached")
-        await shows(browser, plotter)
+        await shows(browser, window.plotter)
         await browser.get_by_label("undo").first.click()
         await until(lambda: digest(window.document) == pulled)
         await browser.get_by_role("button", name=button).wait_for()
-    window.close()
 
 
 async def lab(picture: str | None = None) -> None:
     """A student answers each lesson's question wrong, then right."""
-    plotter = pv.Plotter(off_screen=True)
-    server = get_server("lab", client_type="vue3")
     empty = decals.Scene(objects=(), camera=decals.Camera((0, 0, 8)))
-    window = EditWindow(empty, plotter=plotter)
-    window.show()
-    lab_page = LabPage(server, window, load_lessons(LESSONS))
     requests: list[str] = []
-    async with served(server, size=(1280, 800), guard=lab_page.guard) as browser:
+    async with sandboxed(empty, lessons=load_lessons(LESSONS), kind=LabPage) as (browser, lab_page, window):
         browser.on("request", lambda request: requests.append(request.url))
         for number, attempts in enumerate(ANSWERS):
             await choose(browser, "lesson", lab_page.lab.values()["lab_titles"][number]["title"])
@@ -995,18 +932,15 @@ async def lab(picture: str | None = None) -> None:
             if number == 0:
                 await accessible(browser)
             if picture is not None and number == 1:
-                await shows(browser, plotter)
+                await shows(browser, window.plotter)
                 await save_picture(browser, Path(picture))
         assert all("127.0.0.1" in url or url.startswith("data:") for url in requests)
         await puzzle(browser, lab_page)
         await choose(browser, "lesson", lab_page.lab.values()["lab_titles"][0]["title"])
         await until(partial(shows_lesson, lab_page, 0))
         await guess(browser, lab_page)
-        before, (x, y) = lab_page.lab.probe, await at_rest(browser, lab_page, "probe")
-        await browser.mouse.move(x, y)
-        await browser.mouse.down()
-        await browser.mouse.move(x + 40, y, steps=4)
-        await browser.mouse.up()
+        before = lab_page.lab.probe
+        await pull(browser, await at_rest(browser, lab_page, "probe"), (40, 0))
         await until(lambda: lab_page.lab.probe[0] > before[0] + 0.05 and not lab_page.lab.busy)
         await until_readings(browser, lab_page)
         await sliced(browser, lab_page, picture)
@@ -1022,10 +956,10 @@ async def lab(picture: str | None = None) -> None:
         await browser.get_by_text("Text of the lesson").click()
         for place in (".lesson-side abbr", ".readings abbr", ".formula abbr", ".plot tspan"):
             await browser.locator(f"{place}[data-symbol='g']").first.hover()
-            await until_width(browser.locator("[data-region='g']").first, "0.5", "opacity")
-            await until_width(curve, "5px")
+            await expect(browser.locator("[data-region='g']").first).to_have_css("opacity", "0.5")
+            await expect(curve).to_have_css("stroke-width", "5px")
             await browser.get_by_role("button", name="Check the answer").hover()
-            await until_width(curve, "2px")
+            await expect(curve).to_have_css("stroke-width", "2px")
         await browser.set_viewport_size({"width": 820, "height": 1180})  # a tablet
         parts = [browser.locator(part) for part in (".lesson-side", "[role=application]", ".plots")]
         async with asyncio.timeout(PATIENCE):
@@ -1041,7 +975,6 @@ async def lab(picture: str | None = None) -> None:
         await browser.get_by_role("button", name="open in the sandbox").click()
         await until(lambda: not lab_page.sandbox.in_lesson)
         assert len(window.document.decals.numbers) == 1
-    window.close()
 
 
 async def puzzle(browser: Page, lab_page: LabPage) -> None:
@@ -1080,16 +1013,10 @@ async def sliced(browser: Page, lab_page: LabPage, picture: str | None) -> None:
     view = await browser.locator(PICTURE).first.bounding_box()
     assert view is not None
     corner = view["x"] + 20, view["y"] + view["height"] - 20
-    await browser.mouse.move(*corner)
-    await browser.mouse.down()
-    await browser.mouse.move(corner[0] + 60, corner[1] - 70, steps=4)  # turn the plate
-    await browser.mouse.up()
+    await pull(browser, corner, (60, -70))  # turn the plate
     for handle in ("probe", "slice"):
-        before, (x, y) = lab_page.lab.probe, await at_rest(browser, lab_page, handle)
-        await browser.mouse.move(x, y)
-        await browser.mouse.down()
-        await browser.mouse.move(x + 10, y - 30, steps=4)
-        await browser.mouse.up()
+        before = lab_page.lab.probe
+        await pull(browser, await at_rest(browser, lab_page, handle), (10, -30))
         await until(partial(has_moved, lab_page, before))
         await until_readings(browser, lab_page)
     assert np.abs(lab_page.lab.probe)[1:].min() > 0.02  # beside the middle, and above the plate
@@ -1123,13 +1050,6 @@ async def until_readings(browser: Page, lab_page: LabPage) -> None:
             texts = dict(zip(await names.all_inner_texts(), await numbers.all_inner_texts(), strict=False))
             if expected.items() <= texts.items():
                 return
-            await asyncio.sleep(0.1)
-
-
-async def until_width(line: Locator, width: str, of: str = "strokeWidth") -> None:
-    """Wait until a line has a width."""
-    async with asyncio.timeout(PATIENCE):
-        while await line.evaluate(f"path => getComputedStyle(path).{of}") != width:
             await asyncio.sleep(0.1)
 
 
@@ -1194,7 +1114,7 @@ async def ended() -> None:
     """Done saves the scene and ends the server of a notebook at once; the page opens when it comes back."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scene.json"
-        decals.save_scene(empty_scene(["scale"], UPRIGHT["y"]), file)
+        decals.save_scene(EMPTY, file)
         with notebook._served(file) as (process, url):
             async with opened(url, ends=True) as browser:
                 assert "token" not in browser.url
@@ -1210,14 +1130,12 @@ async def ended() -> None:
 
 async def shared() -> None:
     """A browser that watches can ask for control while the driver chooses a scene, and drives then."""
-    window = EditWindow(empty_scene(["scale"], UPRIGHT["y"]), plotter=pv.Plotter(off_screen=True))
-    window.show()
-    server = get_server("shared", client_type="vue3")
-    guard = SandboxPage(server, window, folder=Path(tempfile.mkdtemp()), start=True, shared=True).guard
-    size = (1280, 800)
-    async with served(server, size=size, guard=guard) as driver:
+    page = sandboxed(EMPTY, folder=Path(tempfile.mkdtemp()), start=True, shared=True)
+    async with page as (driver, sandbox_page, window):
         await driver.get_by_label("New model").wait_for()
-        async with opened(guard.url(server.port), size=size) as watcher:
+        port = urlsplit(driver.url).port
+        assert port is not None
+        async with opened(sandbox_page.guard.url(port), size=WIDE) as watcher:
             await watcher.get_by_role("button", name="Ask for control").click()
             assert not await watcher.get_by_label("New model").is_visible()
             await driver.keyboard.press("Escape")
@@ -1227,7 +1145,6 @@ async def shared() -> None:
             await until(lambda: len(window.document.objects) == 1)
             await driver.get_by_role("button", name="Torus", exact=True).wait_for()
             await driver.get_by_role("button", name="Ask for control").wait_for()
-    window.close()
 
 
 def main() -> None:

@@ -14,7 +14,6 @@ import tempfile
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +31,7 @@ from decals.editing import Actions, EditSession, PointerTools
 from decals.rendering import Environment, Light, Lighting
 from decals.scenes.objects import SceneObject
 from decals.surfaces import BaseColor, BaseTexture
-from tests.frontends.browsing import ERRORS, browser_path, firefox_path
+from tests.frontends.browsing import ERRORS, browser_path, firefox_path, pull, violations
 
 SIZE = 400, 300
 TOLERANCE = 2
@@ -343,7 +342,7 @@ async def used(scene: Scene, browser: str, **options: Any) -> None:
         assert box is not None
         middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
         held = np.subtract(before["decals"][number]["position"], await hit(page, 0, 0))
-        await drag(page, middle, (middle[0] + 40, middle[1] - 30))
+        await pull(page, middle, (40, -30))
         dragged = (await state(page))["decals"][number]
         place = await hit(page, 80 / box["width"], 60 / box["height"])
         assert np.linalg.norm(np.subtract(dragged["position"], place)) < 1.5 * np.linalg.norm(held) + 0.02
@@ -641,7 +640,7 @@ async def dragged_alike(scene: Scene, browser: str, **options: Any) -> None:
         tools = PointerTools(actions, lambda x, y: (rays.origin, rays.directions(x, y)))
         for path in PATHS:
             (x, y), (to_x, to_y) = (((1 + a) * width / 2, (1 + b) * height / 2) for a, b in path)
-            await drag(page, *((box["x"] + a, box["y"] + height - b) for a, b in ((x, y), (to_x, to_y))))
+            await pull(page, (box["x"] + x, box["y"] + height - y), (to_x - x, y - to_y))
             number = (await state(page))["selected"]
             tools.press(x, y)
             tools.release(x, y)
@@ -715,14 +714,6 @@ async def hit(page: Page, x: float, y: float) -> Any:
     return await page.evaluate("([x, y]) => viewer.pick(x, y).surface.position", [x, y])
 
 
-async def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> None:
-    """Drag the mouse in several steps."""
-    await page.mouse.move(*start)
-    await page.mouse.down()
-    await page.mouse.move(*end, steps=5)
-    await page.mouse.up()
-
-
 SAVED = """() => new Promise((resolve) => {
   const make = URL.createObjectURL;
   URL.createObjectURL = (blob) => {
@@ -755,12 +746,7 @@ def with_rows(scene: Scene, rows: list[Any]) -> Scene:
 
 async def accessible(page: Page) -> None:
     """Make sure that axe-core finds nothing in the page."""
-    found = find_spec("axe_playwright_python")
-    assert found is not None, "pip install axe-playwright-python"
-    assert found.origin is not None
-    await page.evaluate((Path(found.origin).parent / "axe.min.js").read_text(encoding="utf-8"))
-    violations = await page.evaluate("axe.run().then(result => result.violations)")
-    assert violations == [], [item["id"] for item in violations]
+    assert [item["id"] for item in await violations(page)] == []
 
 
 CHECKS = {
