@@ -80,15 +80,14 @@ def _distances(decals: Decals, points: NDArray[np.float64]) -> NDArray[np.float6
 def _over(item: MeshObject | TreeObject, points: NDArray[np.float32], radius: float, *, image: int) -> Decals:
     """Return decals at the nearest points of a surface, above the scales."""
     positions, normals = item.surface.project(points)
-    count = len(positions)
     return Decals(
-        positions=positions,
-        normals=normals,
+        positions,
+        normals,
         tangents=np.cross([0.0, 1.0, 0.0], normals),
-        radii=np.full(count, radius, np.float32),
-        images=np.full(count, image, np.int32),
-        interactions=np.full(count, Interaction.OVERLAP, np.int32),
-        tints=np.tile(np.array(_IVORY if image == NO_IMAGE else (1, 1, 1), np.float32), (count, 1)),
+        radii=radius,
+        images=image,
+        interactions=Interaction.OVERLAP,
+        tints=_IVORY if image == NO_IMAGE else None,
     )
 
 

@@ -113,13 +113,9 @@ def sample_camera(name: str) -> Camera:
 
 def flat_decals(positions: ArrayLike, radius: ArrayLike, *, tangent: ArrayLike = (1.0, 0.0, 0.0)) -> Decals:
     """Return decals whose normals are the z axis; one radius stands for all."""
-    count = len(np.asarray(positions))
-    return Decals(
-        positions=np.asarray(positions, np.float32),
-        normals=np.tile(np.array([0, 0, 1], np.float32), (count, 1)),
-        tangents=np.tile(np.array(tangent, np.float32), (count, 1)),
-        radii=np.full(count, radius, np.float32),
-    )
+    places = np.asarray(positions, np.float32)
+    normals, tangents = (np.tile(np.array(one, np.float32), (len(places), 1)) for one in ((0, 0, 1), tangent))
+    return Decals(places, normals, tangents, np.asarray(radius, np.float32))
 
 
 def single_decal(
@@ -131,13 +127,15 @@ def single_decal(
     image: int = 0,
 ) -> Decals:
     """Return one decal."""
-    return Decals(
-        positions=np.array([position], np.float32),
-        normals=np.array([normal], np.float32),
-        tangents=np.array([tangent], np.float32),
-        radii=np.array([radius], np.float32),
-        images=np.array([image], np.int32),
-    )
+    place, up, along = (np.array([one], np.float32) for one in (position, normal, tangent))
+    return Decals(place, up, along, radius, images=image)
+
+
+def disc(edge: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return x, y and the distance from the centre at the pixels of a map; the rim lies at distance 1."""
+    step = (np.arange(edge) + 0.5) / edge * 2 - 1
+    x, y = np.meshgrid(step, -step, indexing="xy")
+    return x, y, np.hypot(x, y)
 
 
 def checker_image(squares: int = 8, *, edge: int = 256) -> DecalImage:

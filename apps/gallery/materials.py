@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from blobtree import Point, Segment
 from decals import DecalMaterial, cover
-from decals.apps.gallery.helpers import Panel, main
+from decals.apps.gallery.helpers import Panel, disc, main
 
 EDGE = 192
 """Pixels along each side of the maps."""
@@ -35,7 +35,7 @@ def panels() -> Sequence[Panel]:
 
 def rivets() -> DecalMaterial:
     """Return a domed rivet of gold in steel with fine grooves."""
-    _, _, r = _disc()
+    _, _, r = disc(EDGE)
     head = r < 0.55
     heights = np.where(head, 0.8 * np.sqrt(np.maximum(0.36 - r**2, 0)), 0.012 * np.cos(40 * r))
     color = np.where(head[..., None], (0.92, 0.72, 0.35), (0.56, 0.58, 0.62))
@@ -44,7 +44,7 @@ def rivets() -> DecalMaterial:
 
 def lacquer() -> DecalMaterial:
     """Return a scale with a ridge, red and smooth."""
-    x, y, r = _disc()
+    x, y, r = disc(EDGE)
     heights = 0.5 * np.sqrt(np.maximum(1.05 - r**2, 0)) + 0.12 * np.exp(-((y / 0.12) ** 2)) * (1 - x)
     shade = (0.55 + 0.45 * np.clip(1 - r, 0, 1))[..., None]
     return _material("lacquer", shade * (0.75, 0.10, 0.08), heights, roughness=0.18, metallic=0.0)
@@ -52,20 +52,13 @@ def lacquer() -> DecalMaterial:
 
 def lamps() -> DecalMaterial:
     """Return rough stone around a lamp that glows."""
-    x, y, r = _disc()
+    x, y, r = disc(EDGE)
     lamp = r < 0.28
     grain = 0.015 * np.sin(31 * x + 7 * np.sin(19 * y)) * np.sin(27 * y + 5 * np.sin(23 * x))
     heights = np.where(lamp, 0.2, grain + 0.25 * np.exp(-(((r - 0.45) / 0.12) ** 2)))
     color = np.where(lamp[..., None], (0.2, 0.15, 0.1), np.clip(0.45 + 9 * grain, 0, 1)[..., None])
     glow = np.where(lamp[..., None], np.array([1.0, 0.62, 0.2]) * np.clip(1.2 - 2 * r, 0, 1)[..., None], 0.0)
     return _material("lamps", color, heights, roughness=np.where(lamp, 0.3, 0.9), metallic=0.0, emission=glow)
-
-
-def _disc() -> tuple[Heights, Heights, Heights]:
-    """Return x, y and the distance from the centre at the pixels of a map; the rim lies at distance 1."""
-    step = (np.arange(EDGE) + 0.5) / EDGE * 2 - 1
-    x, y = np.meshgrid(step, -step, indexing="xy")
-    return x, y, np.hypot(x, y)
 
 
 def _material(name: str, color: Heights, heights: Heights, **maps: Any) -> DecalMaterial:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from blobtree import Point, Segment
 from decals import DecalMaterial, Scene, cover, displace
-from decals.apps.gallery.helpers import Panel, camera_at, main
+from decals.apps.gallery.helpers import Panel, camera_at, disc, main
 
 EDGE = 96
 """Pixels along each side of the maps."""
@@ -41,7 +41,7 @@ def scenes() -> Sequence[Scene]:
 
 def scales() -> DecalMaterial:
     """Return a keeled scale whose tip stands up."""
-    x, y, r = _disc()
+    x, y, r = disc(EDGE)
     slope = np.clip(0.5 + 0.6 * x, 0, 1) * np.clip((1 - r) / 0.25, 0, 1) ** 0.5
     heights = slope + 0.25 * np.exp(-((y / 0.15) ** 2)) * np.clip(1 - r, 0, 1)
     shade = (0.4 + 0.6 * np.clip(heights, 0, 1))[..., None]
@@ -50,7 +50,7 @@ def scales() -> DecalMaterial:
 
 def thorns() -> DecalMaterial:
     """Return a thorn in a ring of skin."""
-    _, _, r = _disc()
+    _, _, r = disc(EDGE)
     thorn = np.clip(1 - r / 0.55, 0, 1) ** 1.6
     ring = 0.08 * np.exp(-(((r - 0.68) / 0.12) ** 2))
     color = np.where((r < 0.55)[..., None], (0.86, 0.80, 0.66), (0.42, 0.24, 0.18))
@@ -59,19 +59,12 @@ def thorns() -> DecalMaterial:
 
 def pebbles() -> DecalMaterial:
     """Return a round stone in mortar."""
-    x, y, r = _disc()
+    x, y, r = disc(EDGE)
     grain = np.sin(9 * x + 3 * np.sin(7 * y)) * np.sin(8 * y + 2 * np.sin(11 * x))
     heights = np.sqrt(np.clip(1 - (r / 0.9) ** 2, 0, 1)) * (1 + 0.04 * grain)
     stone = (0.55 + 0.05 * grain + 0.12 * x)[..., None] * (1.0, 0.96, 0.9)
     color = np.where((r < 0.9)[..., None], stone, (0.24, 0.21, 0.19))
     return _material("pebbles", color, heights, relief=0.5, roughness=0.8)
-
-
-def _disc() -> tuple[Heights, Heights, Heights]:
-    """Return x, y and the distance from the centre at the pixels of a map; the rim lies at distance 1."""
-    step = (np.arange(EDGE) + 0.5) / EDGE * 2 - 1
-    x, y = np.meshgrid(step, -step, indexing="xy")
-    return x, y, np.hypot(x, y)
 
 
 def _material(

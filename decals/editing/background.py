@@ -142,13 +142,18 @@ class Worker:
     ----------
     finish_at_exit
         If True, Python waits for the thread before it exits.
+
+    Attributes
+    ----------
+    label
+        Label of the last job.
     """
 
     def __init__(self, *, finish_at_exit: bool = False) -> None:
         self._finish_at_exit = finish_at_exit
         self._run: _Run | None = None
         self._ending: list[threading.Thread] = []
-        self._label = ""
+        self.label = ""
 
     @property
     def number(self) -> int | None:
@@ -167,20 +172,15 @@ class Worker:
         return bool(self._ending)
 
     @property
-    def label(self) -> str:
-        """Label of the last job."""
-        return self._label
-
-    @property
     def progress(self) -> tuple[str, float]:
         """Present stage, in plain words, and its finished fraction from 0 to 1."""
-        return (self._label, 0.0) if self._run is None else self._run.progress
+        return (self.label, 0.0) if self._run is None else self._run.progress
 
     def start(self, job: Job) -> bool:
         """Start a job and return True, or return False while another one runs."""
         if self.busy:
             return False
-        self._label = job.label
+        self.label = job.label
         after = self._ending if self.stopping else ()
         self._run = _Run(job, after, daemon=not self._finish_at_exit)
         return True
@@ -341,6 +341,11 @@ class BackgroundJobs:
         Shows why a job failed.
     threaded
         If False, everything runs at once, in the caller's thread. If True, the owner calls `poll` regularly.
+
+    Attributes
+    ----------
+    following
+        True until all steps of `edit_latest` are adopted.
     """
 
     def __init__(
@@ -359,7 +364,7 @@ class BackgroundJobs:
         self._latest: _Request | None = None
         self._next_files: dict[Worker, list[Job]] = {self._saves: [], self._exports: []}
         self._waiting: list[_Waiting] = []
-        self._computing = self._following = False
+        self._computing = self.following = False
         self._when_idle: list[Callable[[], None]] = []
 
     # -- edits ------------------------------------------------------------------------------------------
@@ -443,11 +448,11 @@ class BackgroundJobs:
         """
         if not self.threaded:
             self.edit(label, step)
-        elif self._following and self._edits.busy:
+        elif self.following and self._edits.busy:
             self._latest = _Request(label, step)
         else:
             self.require_idle(label)
-            self._following = True
+            self.following = True
             self.edit(label, step)
 
     def prepare(self, label: str, call: Callable[[], object]) -> None:
@@ -467,13 +472,13 @@ class BackgroundJobs:
 
         If it is called later, its errors become the message.
         """
-        if not self._when_idle and not self._following:
+        if not self._when_idle and not self.following:
             call()
         else:
             self._when_idle.append(call)
 
     def _call_waiting(self) -> None:
-        while self._when_idle and not self._following:
+        while self._when_idle and not self.following:
             try:
                 self._when_idle.pop(0)()
             except ImplicitDecalsError as error:
@@ -513,7 +518,7 @@ class BackgroundJobs:
         A result for a state that had the same inputs is carried over. A step that fails on an outdated fork
         is repeated too: it may succeed on the next one.
         """
-        fork, following = self._session.fork(), self._following
+        fork, following = self._session.fork(), self.following
         entries, inputs = len(fork.labels), request.inputs
         message, seen = "", None
         failure: Exception | None = None
@@ -534,7 +539,7 @@ class BackgroundJobs:
             if failure is None and self._session.adopt(fork):
                 self._adopted(message, request.done)
                 return None
-            if not self._following:
+            if not self.following:
                 self._end_stroke()
             carried = None
             if failure is None and inputs is not None and len(fork.labels) == entries + 1:
@@ -640,11 +645,6 @@ class BackgroundJobs:
         return self._edits.busy
 
     @property
-    def following(self) -> bool:
-        """True until all steps of `edit_latest` are adopted."""
-        return self._following
-
-    @property
     def waiting(self) -> int:
         """Number of requests and files that follow the running jobs."""
         return len(self._waiting) + sum(map(len, self._next_files.values()))
@@ -670,7 +670,7 @@ class BackgroundJobs:
             self._complete(worker, timeout, partial(self._start_next_file, worker))
             for worker in self._next_files
         ]
-        if dragging and not self._following:
+        if dragging and not self.following:
             return any(ended)
         for one in self._waiting:  # before the edit changes what is selected
             one.outdated |= one.context() != one.seen
@@ -702,7 +702,7 @@ class BackgroundJobs:
     def _start_next_edit(self) -> None:
         """Start the latest queued step, or run the callbacks that wait for an empty queue, then requests."""
         request, self._latest = self._latest, None
-        self._computing = self._following = False
+        self._computing = self.following = False
         if request is not None:
             self.edit_latest(request.label, request.step)
         self._call_waiting()
@@ -769,10 +769,10 @@ class BackgroundJobs:
     def revert_drag(self) -> None:
         """Drop the steps of `edit_latest` that are not adopted, and revert the open stroke."""
         self._latest = None
-        if self._following:
+        if self.following:
             self._edits.cancel()
         self._session.cancel_stroke()
-        if self._following:
+        if self.following:
             self._start_next_edit()
 
     def close(self) -> None:

@@ -1,7 +1,6 @@
 """Brushes for decals: scatter, push, erase and relax within a radius around a surface point."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -11,7 +10,7 @@ from blobtree._typing import Float32Array, Float64Array, Int64Array
 from blobtree.validation import LARGEST_NUMBER, SMALLEST_NUMBER, describe, finite_number, finite_vector
 from decals.editing.brush_settings import Brush, BrushSettings
 from decals.editing.commands import DeleteDecals, SetValues
-from decals.editing.document import Document, Edit
+from decals.editing.document import Document, Edit, EditCommand
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points
 from decals.editing.scatter_commands import SPACING, RelaxDecals
 from decals.editing.session import Command
@@ -55,8 +54,7 @@ def positive_number(name: str, value: float) -> float:
     return number
 
 
-@dataclass(frozen=True, eq=False)
-class BrushDecals:
+class BrushDecals(EditCommand):
     """Add decals in a disc on the surface, by dart throwing: none closer to another than their spacing.
 
     Decals that lie there count too, so a second touch at the same place adds almost none.
@@ -162,8 +160,7 @@ class BrushDecals:
         return SurfacePoints(points.positions[kept], points.normals[kept], points.objects[kept])
 
 
-@dataclass(frozen=True, eq=False)
-class PushDecals:
+class PushDecals(EditCommand):
     """Push the decals around a point; those farther away yield less, and those outside the brush stay.
 
     A decal at distance d of the point moves by the offset times (1 − (d/r)²)³, the paper's kernel (eq. 2), so

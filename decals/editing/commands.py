@@ -1,7 +1,7 @@
 """Commands for decals, images and the camera; each is an immutable value that computes an `Edit`."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import Float32Array, Int64Array
 from blobtree.validation import describe, finite_number, finite_vector, point_array, truth
-from decals.editing.document import Document, Edit, SceneParts
+from decals.editing.document import Document, Edit, EditCommand, SceneParts
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points, shortest_rotations
 from decals.errors import InvalidEdit
 from decals.images.load import AnyImage
@@ -34,8 +34,7 @@ def are_many(numbers: ArrayLike) -> bool:
     return np.size(numbers) > MAX_IMMEDIATE_DECALS
 
 
-@dataclass(frozen=True, eq=False)
-class AddDecals:
+class AddDecals(EditCommand):
     """Add decals on top of their layers, under new numbers.
 
     Parameters
@@ -62,8 +61,7 @@ class AddDecals:
         return document.compute_addition(self.decals)
 
 
-@dataclass(frozen=True, eq=False)
-class DecalCommand:
+class DecalCommand(EditCommand):
     """Base of commands for some decals.
 
     Parameters
@@ -75,6 +73,7 @@ class DecalCommand:
     numbers: ArrayLike
 
     def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
         inherit_descriptions(cls)
 
     def __post_init__(self) -> None:
@@ -86,7 +85,6 @@ class DecalCommand:
         return are_many(self.numbers)
 
 
-@dataclass(frozen=True, eq=False)
 class DeleteDecals(DecalCommand):
     """Delete decals; their numbers are not given to other decals.
 
@@ -108,7 +106,6 @@ class DeleteDecals(DecalCommand):
         return document.compute_deletion(self.numbers)
 
 
-@dataclass(frozen=True, eq=False)
 class SetValues(DecalCommand):
     """Set values of decals, such as image, tint, opacity, layer, interaction or radius.
 
@@ -147,7 +144,6 @@ class SetValues(DecalCommand):
         return document.compute_replacement(self.numbers, before.replace(**arrays))
 
 
-@dataclass(frozen=True, eq=False)
 class MapValues(DecalCommand):
     """Set one value of decals to a function of the decals, such as half their opacity.
 
@@ -183,7 +179,6 @@ class MapValues(DecalCommand):
         return SetValues(self.numbers, values, self.label).compute(document)
 
 
-@dataclass(frozen=True, eq=False)
 class ScaleDecals(DecalCommand):
     """Multiply the radii of decals.
 
@@ -216,7 +211,6 @@ class ScaleDecals(DecalCommand):
         return document.compute_replacement(self.numbers, before.replace(radii=radii))
 
 
-@dataclass(frozen=True, eq=False)
 class TurnDecals(DecalCommand):
     """Turn decals about their normals.
 
@@ -248,7 +242,6 @@ class TurnDecals(DecalCommand):
         return document.compute_replacement(self.numbers, before.replace(tangents=tangents))
 
 
-@dataclass(frozen=True, eq=False)
 class MoveDecals(DecalCommand):
     """Move decals over the surfaces, also from one object to another.
 
@@ -289,7 +282,6 @@ class MoveDecals(DecalCommand):
         return document.compute_replacement(self.numbers, Decals.concatenate([first, others]))
 
 
-@dataclass(frozen=True, eq=False)
 class OrderDecals(DecalCommand):
     """Draw decals over, or under, all others of their layer and interaction.
 
@@ -364,7 +356,6 @@ class OrderDecals(DecalCommand):
         return np.concatenate(new), np.concatenate(old)
 
 
-@dataclass(frozen=True, eq=False)
 class DuplicateDecals(DecalCommand):
     """Add copies of decals, beside them along the u axes of their images.
 
@@ -389,8 +380,7 @@ class DuplicateDecals(DecalCommand):
         return document.compute_addition(move_decals(before, nearest_points(document.objects, targets)))
 
 
-@dataclass(frozen=True, eq=False)
-class ReplaceScene:
+class ReplaceScene(EditCommand):
     """Replace all objects, decals and images, the camera and the drawing by those of another scene.
 
     Parameters
@@ -428,8 +418,7 @@ class ReplaceScene:
         return document.compute_deletion(document.decals.numbers).then(addition)
 
 
-@dataclass(frozen=True, eq=False)
-class AddImage:
+class AddImage(EditCommand):
     """Add an image, as the last one.
 
     Parameters
@@ -457,8 +446,7 @@ class AddImage:
         return document.compute_parts(images=(*document.images, DecalImage.load(self.image, name=name)))
 
 
-@dataclass(frozen=True, eq=False)
-class ReplaceImage:
+class ReplaceImage(EditCommand):
     """Replace an image; decals that show it show the new one.
 
     Parameters
@@ -493,8 +481,7 @@ class ReplaceImage:
         return document.compute_parts(images=tuple(images))
 
 
-@dataclass(frozen=True, eq=False)
-class RemoveImage:
+class RemoveImage(EditCommand):
     """Remove an image. Decals that showed it show their tint; the index of later images decreases by one.
 
     Parameters
@@ -528,8 +515,7 @@ class RemoveImage:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class SetCamera:
+class SetCamera(EditCommand):
     """Replace the camera of the scene.
 
     Parameters
@@ -557,8 +543,7 @@ class SetCamera:
         return document.compute_parts(camera=self.camera)
 
 
-@dataclass(frozen=True, eq=False)
-class SetDrawing:
+class SetDrawing(EditCommand):
     """Replace how the scene is drawn: contact mode, mapping, samples, background.
 
     Parameters

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, Self, dataclass_transform
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -211,6 +211,14 @@ def _parts_bytes(parts: SceneParts, known: set[int]) -> dict[int, int]:
 
 ANY_POINT, ANY_DIRECTION = np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32)
 """A query of a surface that is made only so that its lazy structures are built."""
+
+
+@dataclass_transform(frozen_default=True, eq_default=False)
+class EditCommand:
+    """Base of the commands of this package: values whose parameters are the annotations of their class."""
+
+    def __init_subclass__(cls) -> None:
+        dataclass(frozen=True, eq=False)(cls)
 
 
 class ForkFamily:

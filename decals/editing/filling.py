@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
-from decals.editing.document import Document, Edit
+from decals.editing.document import Document, Edit, EditCommand
 from decals.editing.inputs import columns_of, shapes_of
 from decals.editing.scatter_commands import object_indices
 from decals.errors import InvalidEdit
@@ -296,8 +296,7 @@ class OpenedBy:
         return result
 
 
-@dataclass(frozen=True, eq=False)
-class FillBarePlaces:
+class FillBarePlaces(EditCommand):
     """Cover bare places of objects with new decals like those around them; no other decal moves.
 
     A new decal has the usual radius of the decals around it, or less in a narrow place. Image, layer,

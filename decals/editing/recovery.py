@@ -98,6 +98,13 @@ class RecoveryFile:
         Returns the camera to store; None for the document's.
     end_stroke
         Ends the open stroke.
+
+    Attributes
+    ----------
+    path
+        Path of the recovery file; None if the scene has no file.
+    exists
+        True while the session has a recovery file.
     """
 
     def __init__(
@@ -110,29 +117,19 @@ class RecoveryFile:
         self._session, self._background = session, background
         self._camera, self._end_stroke = camera, end_stroke
         self._scene_path: Path | None = None
-        self._path: Path | None = None
+        self.path: Path | None = None
         self._lock: FileLock | None = None
-        self._exists = False
+        self.exists = False
         self._written: object = None
         self._changed_at: float | None = None
         self._written_at = -math.inf
         self._wait = AUTOSAVE_SECONDS
 
-    @property
-    def path(self) -> Path | None:
-        """Path of the recovery file; None if the scene has no file."""
-        return self._path
-
-    @property
-    def exists(self) -> bool:
-        """True while there is a recovery file of this session."""
-        return self._exists
-
     def belong_to(self, scene_path: str | PathLike[str] | None) -> None:
         """Remove the recovery file, and keep the next one beside this scene file."""
         self.remove()
         self._scene_path = None if scene_path is None else Path(scene_path)
-        self._path = None if scene_path is None else recovery_path(scene_path)
+        self.path = None if scene_path is None else recovery_path(scene_path)
 
     def _candidates(self) -> Iterator[Path]:
         """Yield the paths of the recovery files of all windows."""
@@ -145,10 +142,10 @@ class RecoveryFile:
         try:
             self._lock = FileLock.acquire(_lock_path(path))
         except OSError:  # nor can the recovery file be written there
-            self._path = path
+            self.path = path
             return True
         if self._lock is not None:
-            self._path = path
+            self.path = path
         return self._lock is not None
 
     def _acquire_new(self) -> None:
@@ -174,7 +171,7 @@ class RecoveryFile:
         InvalidScene
             The file cannot be read.
         """
-        if self._scene_path is None or self._exists:
+        if self._scene_path is None or self.exists:
             return ""
         path = next((path for path in self._candidates() if is_file(path) and self._acquire(path)), None)
         if path is None:
@@ -188,7 +185,7 @@ class RecoveryFile:
                 f"could not read the unsaved changes in {str(path)!r} ({error}); move or delete this file"
             ) from error
         self._session.do(ReplaceScene(scene, "recover unsaved changes"))
-        self._exists, self._written = True, self._session.position
+        self.exists, self._written = True, self._session.position
         return (
             f"recovered unsaved changes of {when:%Y-%m-%d %H:%M} from {path.name}; "
             "Ctrl + S keeps them, Ctrl + Z goes back to the saved scene"
@@ -201,7 +198,7 @@ class RecoveryFile:
             return False
         session = self._session
         return (
-            self._exists
+            self.exists
             if not session.modified
             else session.stroke_open or session.position is not self._written
         )
@@ -229,7 +226,7 @@ class RecoveryFile:
             self._wait = max(AUTOSAVE_SECONDS, (time.monotonic() - now) / MAX_WRITING_SHARE)
 
         self._acquire_new()
-        self._written, self._exists, self._changed_at = self._session.position, True, None
+        self._written, self.exists, self._changed_at = self._session.position, True, None
         self._written_at = now
         self._background.write_copy(self.path, self._camera(), written)
 
@@ -239,17 +236,17 @@ class RecoveryFile:
             return None
         self._acquire_new()
         self._session.begin_save(self.path, camera=self._camera()).write()
-        self._exists = True
+        self.exists = True
         return self.path
 
     def remove(self) -> None:
         """Remove the file, if this session wrote or recovered it."""
         path = self.path
-        if self._exists and path is not None:
+        if self.exists and path is not None:
             with suppress(OSError):
                 path.unlink(missing_ok=True)
         self.release()
-        self._exists, self._written, self._changed_at = False, None, None
+        self.exists, self._written, self._changed_at = False, None, None
 
     def release(self) -> None:
         """Leave the recovery file to the next window."""

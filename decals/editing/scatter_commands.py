@@ -1,7 +1,7 @@
 """Commands for whole objects and many decals: scatter, relax, add and remove objects."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float32Array, IndexArray, Int64Array
 from blobtree.progress import Progress
 from blobtree.validation import describe, finite_vector, point_array
-from decals.editing.document import Document, Edit
+from decals.editing.document import Document, Edit, EditCommand
 from decals.editing.inputs import columns_of, shapes_of
 from decals.editing.queries import SurfacePoints, move_decals, nearest_points
 from decals.errors import InvalidEdit
@@ -55,8 +55,7 @@ def object_indices(objects: object) -> tuple[int, ...]:
     return tuple(objects)
 
 
-@dataclass(frozen=True, eq=False)
-class ReplaceDecals:
+class ReplaceDecals(EditCommand):
     """Delete the decals on some objects, and add others.
 
     Parameters
@@ -99,8 +98,7 @@ class ReplaceDecals:
         return edit if self.recipe is None else edit.then(document.compute_parts(recipes=(self.recipe,)))
 
 
-@dataclass(frozen=True, eq=False)
-class ScatterDecals:
+class ScatterDecals(EditCommand):
     """Distribute decals evenly over some objects, in place of the decals that lie there.
 
     Parameters
@@ -187,8 +185,7 @@ class ScatterDecals:
         return self.compute_command(document.objects, len(document.images)).compute(document)
 
 
-@dataclass(frozen=True, eq=False)
-class RelaxDecals:
+class RelaxDecals(EditCommand):
     """Even out the decals around a point; all others stay where they are.
 
     Only decals with the draw order of the nearest one take part.
@@ -263,8 +260,7 @@ class RelaxDecals:
         return document.compute_replacement(numbers[rows[moved]], move_decals(decals[rows[moved]], points))
 
 
-@dataclass(frozen=True, eq=False)
-class AddObject:
+class AddObject(EditCommand):
     """Add a mesh or a BlobTree, as the last object; the decals stay where they are.
 
     Parameters
@@ -300,8 +296,7 @@ class AddObject:
         return document.compute_parts(objects=objects)
 
 
-@dataclass(frozen=True, eq=False)
-class MoveObject:
+class MoveObject(EditCommand):
     """Give an object another place in the order of the objects.
 
     Parameters
@@ -337,8 +332,7 @@ class MoveObject:
         return document.compute_parts(objects=tuple(objects))
 
 
-@dataclass(frozen=True, eq=False)
-class RemoveObject:
+class RemoveObject(EditCommand):
     """Remove an object and the decals on it; the index of later objects decreases by one.
 
     Parameters

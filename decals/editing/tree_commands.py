@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -32,7 +32,7 @@ from blobtree.nodes.paths import (
 from blobtree.nodes.places import Place
 from blobtree.nodes.surgery import Join
 from blobtree.validation import affine_matrix, describe, finite_number, finite_vector, truth
-from decals.editing.document import Document, Edit
+from decals.editing.document import Document, Edit, EditCommand
 from decals.editing.followers import FIELD_TOLERANCE, followers
 from decals.editing.queries import move_decals, nearest_points
 from decals.errors import InvalidEdit
@@ -58,8 +58,7 @@ NEWTON_STEPS, DRAG_TOLERANCE = 6, 1e-5
 """Newton steps at each of its points, and the error of the field there that is left."""
 
 
-@dataclass(frozen=True, eq=False)
-class PrimitiveCommand:
+class PrimitiveCommand(EditCommand):
     """Base of commands for a primitive of a BlobTree, or a branch.
 
     Parameters
@@ -75,6 +74,7 @@ class PrimitiveCommand:
     path: Path
 
     def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
         inherit_descriptions(cls)
 
     def tree(self, document: Document) -> Node:
@@ -124,7 +124,6 @@ class PrimitiveCommand:
         return with_tree(item, with_node(item.tree, self.path, node))
 
 
-@dataclass(frozen=True, eq=False)
 class MovePrimitive(PrimitiveCommand):
     """Move a primitive, or a branch; decals follow the surface.
 
@@ -159,7 +158,6 @@ class MovePrimitive(PrimitiveCommand):
         return self.compute_exchange(document, node, offset, quick=self.quick)
 
 
-@dataclass(frozen=True, eq=False)
 class TransformPrimitive(PrimitiveCommand):
     """Map a primitive, or a branch, by an affine map of the world; decals follow the surface.
 
@@ -195,7 +193,6 @@ class TransformPrimitive(PrimitiveCommand):
         return self.compute_exchange(document, node, matrix, quick=self.quick)
 
 
-@dataclass(frozen=True, eq=False)
 class DragSurface(PrimitiveCommand):
     """Drag a point of the surface: lengths of a primitive, or a branch, follow; decals stay on the surface.
 
@@ -264,7 +261,6 @@ def _through(tree: Node, parameters: Sequence[NumericParameter], point: Float64A
     return tree
 
 
-@dataclass(frozen=True, eq=False)
 class ResizePrimitive(PrimitiveCommand):
     """Multiply the radii of a primitive; decals stay on the surface.
 
@@ -298,7 +294,6 @@ class ResizePrimitive(PrimitiveCommand):
         return command.compute_exchange(document, resized(primitive_at(tree, self.path), factor))
 
 
-@dataclass(frozen=True, eq=False)
 class SetParameter(PrimitiveCommand):
     """Set one parameter of a node; decals stay on the surface.
 
@@ -352,7 +347,6 @@ class SetParameter(PrimitiveCommand):
         return changed
 
 
-@dataclass(frozen=True, eq=False)
 class PaintPrimitive(PrimitiveCommand):
     """Set the colour of a primitive.
 
@@ -408,7 +402,6 @@ def compute_restructured(document: Document, number: int, tree: Node) -> Edit:
     return edit.then(document.compute_deletion(after.numbers[removed])) if removed.any() else edit
 
 
-@dataclass(frozen=True, eq=False)
 class StructureCommand(PrimitiveCommand):
     """Base of commands that change the structure of a tree."""
 
@@ -431,7 +424,6 @@ class StructureCommand(PrimitiveCommand):
         return None if path is None else (self.object, path)
 
 
-@dataclass(frozen=True, eq=False)
 class AddPrimitive(StructureCommand):
     """Join a new primitive, or branch, to a node of a tree.
 
@@ -469,7 +461,6 @@ class AddPrimitive(StructureCommand):
         return surgery.add_node(tree, self.path, self.node, join)
 
 
-@dataclass(frozen=True, eq=False)
 class ReplaceNode(StructureCommand):
     """Put another node at a path, such as the same operands under another operator, or a warp of the node.
 
@@ -501,7 +492,6 @@ class ReplaceNode(StructureCommand):
         return with_node(tree, self.path, self.node), tuple(self.path)
 
 
-@dataclass(frozen=True, eq=False)
 class RemovePrimitive(StructureCommand):
     """Remove a primitive, or branch, but not the last one; decals without a surface below them go too.
 
@@ -524,7 +514,6 @@ class RemovePrimitive(StructureCommand):
         return surgery.remove_branch(tree, self.path), None
 
 
-@dataclass(frozen=True, eq=False)
 class DuplicatePrimitive(StructureCommand):
     """Add a displaced copy of a primitive, or branch, joined in the same way.
 
@@ -557,7 +546,6 @@ class DuplicatePrimitive(StructureCommand):
         return surgery.duplicate_branch(tree, self.path, offset)
 
 
-@dataclass(frozen=True, eq=False)
 class MirrorPrimitive(StructureCommand):
     """Add the mirror image of a primitive, or branch, beyond a plane of the world, joined in the same way.
 
@@ -586,7 +574,6 @@ class MirrorPrimitive(StructureCommand):
         return surgery.mirror_branch(tree, self.path, whole_number("axis", self.axis, 0, 2, InvalidEdit))
 
 
-@dataclass(frozen=True, eq=False)
 class MoveBranch(StructureCommand):
     """Move a primitive, or branch, to another place in its tree; it stays where it is in the world.
 
@@ -616,7 +603,6 @@ class MoveBranch(StructureCommand):
         return surgery.move_branch(tree, self.path, self.target)
 
 
-@dataclass(frozen=True, eq=False)
 class MoveToObject(PrimitiveCommand):
     """Move a primitive, or branch, into the tree of another object; it stays where it is in the world.
 
@@ -713,7 +699,6 @@ def compute_settled(document: Document, objects: tuple[SceneObject, ...]) -> Edi
     return edit.then(document.compute_deletion(numbers[outside & (gaps > decals.radii)]))
 
 
-@dataclass(frozen=True, eq=False)
 class GroupOperands(StructureCommand):
     """Put operands of a combination under a combination of the same kind; the shape stays.
 
@@ -746,7 +731,6 @@ class GroupOperands(StructureCommand):
         return surgery.group_operands(tree, self.path, self.steps)
 
 
-@dataclass(frozen=True, eq=False)
 class JoinPrimitive(StructureCommand):
     """Join a primitive, or branch, to its siblings in another way; the siblings stay joined as they are.
 

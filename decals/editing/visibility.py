@@ -1,7 +1,7 @@
 """Commands that hide, lock and name parts of a scene."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from blobtree.nodes.paths import Path, node_at
 from blobtree.validation import describe
-from decals.editing.document import DecalStates, Document, Edit
+from decals.editing.document import DecalStates, Document, Edit, EditCommand
 from decals.editing.queries import move_decals, nearest_points
 from decals.errors import InvalidEdit
 from decals.index.rows import as_numbers
@@ -20,8 +20,7 @@ FOLLOW_DISTANCE = 0.02
 """Decals that were hidden go back to the surface if it is farther away than this, in their radii."""
 
 
-@dataclass(frozen=True, eq=False)
-class FlagNodes:
+class FlagNodes(EditCommand):
     """Hide, show, lock or unlock nodes of objects; the decals on them stay where they are.
 
     Parameters
@@ -77,8 +76,7 @@ def isolating(document: Document, number: int, path: Path) -> FlagNodes:
     return FlagNodes({**hidden, number: tuple(siblings)}, label="isolate")
 
 
-@dataclass(frozen=True, eq=False)
-class HideDecals:
+class HideDecals(EditCommand):
     """Hide decals: they are neither drawn nor edited, and neighbours take their place.
 
     Parameters
@@ -109,8 +107,7 @@ class HideDecals:
         return document.compute_deletion(numbers, hidden=hidden) if len(numbers) else Edit()
 
 
-@dataclass(frozen=True, eq=False)
-class ShowDecals:
+class ShowDecals(EditCommand):
     """Show hidden decals again, at their old places; where the surface moved away, on it.
 
     Parameters
@@ -158,8 +155,7 @@ class ShowDecals:
         return document.compute_replacement(numbers, decals, hidden=rest)
 
 
-@dataclass(frozen=True, eq=False)
-class LockLayers:
+class LockLayers(EditCommand):
     """Set the layers whose decals no command changes.
 
     Parameters
@@ -188,8 +184,7 @@ class LockLayers:
         return document.compute_parts(locked_layers=as_layers("layers", self.layers, InvalidEdit))
 
 
-@dataclass(frozen=True, eq=False)
-class RenumberLayers:
+class RenumberLayers(EditCommand):
     """Give layers other numbers, which changes the order in which they are drawn; flags and names go along.
 
     Parameters
@@ -254,8 +249,7 @@ class Renaming:
         return f"rename to {describe(self.name)}" if str(self.name) else "remove a name"
 
 
-@dataclass(frozen=True, eq=False)
-class RenameObject(Renaming):
+class RenameObject(Renaming, EditCommand):
     """Give an object another name.
 
     Parameters
@@ -287,8 +281,7 @@ class RenameObject(Renaming):
         return document.compute_parts(objects=objects)
 
 
-@dataclass(frozen=True, eq=False)
-class RenameNode(Renaming):
+class RenameNode(Renaming, EditCommand):
     """Give a node of a BlobTree a name, which it keeps while the tree is edited.
 
     Parameters
@@ -327,8 +320,7 @@ class RenameNode(Renaming):
         return Edit() if names == item.names else document.compute_parts(objects=objects)
 
 
-@dataclass(frozen=True, eq=False)
-class RenameLayer(Renaming):
+class RenameLayer(Renaming, EditCommand):
     """Give a layer of decals a name.
 
     Parameters

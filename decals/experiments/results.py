@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from blobtree.validation import describe
-from decals.errors import InvalidInput, MissingPackage
+from decals.errors import InvalidInput
 from decals.experiments.outcome import COLUMNS, Row
 from decals.experiments.store import described, rows_in
+from decals.validation import optional_package
 
 
 class Results:
@@ -21,6 +22,15 @@ class Results:
     ----------
     folder : path
         Folder of the results.
+
+    Attributes
+    ----------
+    name : str
+        Name of the function.
+    function : str
+        Digest of the function.
+    parameters : list of str
+        Names of the parameters.
 
     Raises
     ------
@@ -36,7 +46,8 @@ class Results:
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.folder = Path(folder).resolve()
-        self._about = described(self.folder)
+        about = described(self.folder)
+        self.name, self.function, self.parameters = about["name"], about["function"], about["parameters"]
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -58,26 +69,11 @@ class Results:
     def _is_current(self, row: Row) -> bool:
         return bool(row.get("function") == self.function)
 
-    @property
-    def parameters(self) -> list[str]:
-        """Names of the parameters."""
-        return list(self._about["parameters"])
-
     @cached_property
     def measures(self) -> list[str]:
         """Names of what the function returned."""
         names = dict.fromkeys(name for row in self.rows for name in row)
         return [name for name in names if name not in (*self.parameters, *COLUMNS)]
-
-    @property
-    def name(self) -> str:
-        """Name of the function."""
-        return str(self._about["name"])
-
-    @property
-    def function(self) -> str:
-        """Digest of the function."""
-        return str(self._about["function"])
 
     @property
     def numbers(self) -> list[str]:
@@ -99,11 +95,8 @@ class Results:
         MissingPackage
             Pandas is not installed.
         """
-        try:
-            import pandas as pd
-        except ImportError as error:
-            raise MissingPackage("pandas is not installed; install implicit-decals[experiments]") from error
-        return pd.DataFrame(self.rows, columns=self._columns)
+        pandas = optional_package("pandas", "experiments")
+        return pandas.DataFrame(self.rows, columns=self._columns)
 
     def to_polars(self) -> Any:
         """Return the rows as a `polars.DataFrame`.
@@ -113,12 +106,11 @@ class Results:
         MissingPackage
             Polars is not installed.
         """
-        try:
-            import polars as pl
-        except ImportError as error:
-            raise MissingPackage("polars is not installed; install it by `pip install polars`") from error
+        polars = optional_package("polars", "experiments")
         columns = {name: [row.get(name) for row in self.rows] for name in self._columns}
-        return pl.DataFrame({name: pl.Series(name, values, strict=False) for name, values in columns.items()})
+        return polars.DataFrame(
+            {name: polars.Series(name, values, strict=False) for name, values in columns.items()}
+        )
 
     @property
     def _columns(self) -> list[str]:

@@ -1,7 +1,7 @@
 """Objects as a scene file has them: meshes by reference or in full, trees as BlobTree documents."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -284,7 +284,7 @@ Whole = Annotated[int, Meta(ge=-(2**31), le=2**31 - 1)]
 
 _INTERACTIONS = {kind.name.lower(): kind for kind in Interaction}
 _OLD_NAMES = {"contact": Interaction.PUSH}
-"""Names in files of earlier versions."""
+"""Names of interactions in files of earlier versions."""
 
 
 class DecalRecord(Struct, forbid_unknown_fields=True):
@@ -305,47 +305,40 @@ class DecalRecord(Struct, forbid_unknown_fields=True):
     fade_depth: float | UnsetType = UNSET
 
 
+_ARRAYS: dict[str, tuple[str, Any]] = {
+    "position": ("positions", UNSET),
+    "normal": ("normals", UNSET),
+    "tangent": ("tangents", UNSET),
+    "radius": ("radii", UNSET),
+    "image": ("images", UNSET),
+    "spill": ("spill", UNSET),
+    "interaction": ("interactions", "push"),
+    "layer": ("layers", 0),
+    "tint": ("tints", (1.0, 1.0, 1.0)),
+    "opacity": ("opacities", 1.0),
+    "receivers": ("receivers", ""),
+    "fade_angle": ("fade_angles", 0.0),
+    "fade_depth": ("fade_depths", 0.0),
+}
+"""Array of `Decals` for each field of a record, and the value that a file leaves out."""
+
+
 def records_of(decals: Decals) -> Iterator[DecalRecord]:
     """Describe decals, in their order."""
-    columns = (
-        _rows(decimals(decals.positions)),
-        _rows(decimals(decals.normals)),
-        _rows(decimals(decals.tangents)),
-        decimals(decals.radii).tolist(),
-        decals.images.tolist(),
-        decals.spill.tolist(),
-        _unless_default(decals.interactions, Interaction.PUSH, list(_INTERACTIONS)),
-        _unless_default(decals.layers, 0),
-        _unless_default(decimals(decals.tints), 1.0),
-        _unless_default(decimals(decals.opacities), 1.0),
-        _unless_default(decals.receivers, ""),
-        _unless_default(decimals(decals.fade_angles), 0.0),
-        _unless_default(decimals(decals.fade_depths), 0.0),
-    )
+    columns = (_values(decals, array, default) for array, default in _ARRAYS.values())
     return (DecalRecord(*values) for values in zip(*columns, strict=True))
 
 
-def _unless_default(
-    array: NDArray[Any], default: float | str, names: Sequence[str] | None = None
-) -> Iterator[Any]:
-    """Give each row's value, or its name, as JSON has it; UNSET where it is the default throughout."""
-    usual = (array == default).all(axis=tuple(range(1, array.ndim)))
-    for value, omit in zip(array.tolist(), usual.tolist(), strict=True):
-        known = value if names is None else names[value]
-        yield UNSET if omit else tuple(known) if isinstance(known, list) else known
-
-
-def _given(value: Any, default: Any) -> Any:
-    """Give the default for what a file leaves out."""
-    return default if value is UNSET else value
-
-
-def _whole(values: Iterable[int]) -> NDArray[np.int32]:
-    return np.array(list(values), np.int32)
-
-
-def _rows(array: NDArray[np.float64]) -> list[Any]:
-    return [tuple(row) for row in array.tolist()]
+def _values(decals: Decals, array: str, default: Any) -> Iterator[Any]:
+    """Yield the value of each decal as JSON has it; UNSET for the default."""
+    values = getattr(decals, array)
+    if array == "interactions":
+        values = np.array(list(_INTERACTIONS))[values]
+    elif values.dtype == np.float32:
+        values = decimals(values)
+    for value in values.tolist():
+        known = tuple(value) if isinstance(value, list) else value
+        yield UNSET if known == default else known
 
 
 def decimals(array: NDArray[np.float32]) -> NDArray[np.float64]:
@@ -364,26 +357,21 @@ def decals_of(records: list[DecalRecord]) -> Decals:
     """
     if not records:
         return Decals.empty()
-    with np.errstate(over="ignore"):  # what overflows float32 is refused as infinite
-        return _checked_decals(records)
-
-
-def _checked_decals(records: list[DecalRecord]) -> Decals:
+    arrays = {array: _column(records, name, default) for name, (array, default) in _ARRAYS.items()}
     try:
-        return Decals(
-            positions=np.array([record.position for record in records], np.float32),
-            normals=np.array([record.normal for record in records], np.float32),
-            tangents=np.array([record.tangent for record in records], np.float32),
-            radii=np.array([record.radius for record in records], np.float32),
-            images=_whole(record.image for record in records),
-            spill=np.array([record.spill for record in records], np.bool_),
-            interactions=_whole((_INTERACTIONS | _OLD_NAMES)[_given(r.interaction, "push")] for r in records),
-            layers=_whole(_given(record.layer, 0) for record in records),
-            tints=np.array([_given(record.tint, (1.0, 1.0, 1.0)) for record in records], np.float32),
-            opacities=np.array([_given(record.opacity, 1.0) for record in records], np.float32),
-            receivers=[_given(record.receivers, "") for record in records],
-            fade_angles=np.array([_given(record.fade_angle, 0.0) for record in records], np.float32),
-            fade_depths=np.array([_given(record.fade_depth, 0.0) for record in records], np.float32),
-        )
+        return Decals(**arrays)
     except ImplicitDecalsError as error:
         raise InvalidScene(f"decals: {error}") from error
+
+
+def _column(records: list[DecalRecord], name: str, default: Any) -> Any:
+    """Return a field of all records, numbers in float32; what overflows it is refused as infinite."""
+    given = (getattr(record, name) for record in records)
+    values = [default if value is UNSET else value for value in given]
+    if name == "interaction":
+        known = _INTERACTIONS | _OLD_NAMES
+        values = [known[value] for value in values]
+    if name == "receivers":
+        return values
+    with np.errstate(over="ignore"):
+        return np.array(values, np.float32 if isinstance(values[0], float | tuple) else None)

@@ -68,6 +68,10 @@ class Overlay:
 
     Attributes
     ----------
+    status
+        Text at the bottom.
+    lines
+        The drawn outlines.
     moving
         True while a slider of a page moves: outlines, which take longer than a frame, follow at its end.
     """
@@ -77,7 +81,7 @@ class Overlay:
         self._draw_scale = draw_scale
         self._renderer: Any = plotter.renderer
         self.moving = False
-        self._lines = pv.PolyData()
+        self.lines = pv.PolyData()
         self._outlined: tuple[object, ...] = ()
         self._actor = plotter.add_mesh(
             pv.Line((0, 0, 0), (0, 0, 0)),
@@ -89,12 +93,12 @@ class Overlay:
             render=False,
             name="decals-selection",
         )
-        self._actor.mapper.dataset = self._lines
+        self._actor.mapper.dataset = self.lines
         self._actor.use_bounds = False
         self._actor.ForceTranslucentOn()  # so that it writes no depth and occludes nothing
         self._tag = self._renderer.AddObserver("StartEvent", weak_callback(self._lift))
         self.shows_status = True  # else a page around the plotter shows it
-        self._text, self._help_lines = "", KEYS.help_lines()
+        self.status, self._help_lines = "", KEYS.help_lines()
         self._status: Any = plotter.add_text(
             "", position=(TEXT_MARGIN, 10), font_size=9, color="black", render=False, name="decals-status"
         )
@@ -139,7 +143,7 @@ class Overlay:
                 if isinstance(item, TreeObject)
                 for edge in box_edges(*node_in_world(item.tree, path).bounds)
             ]
-        self._lines.copy_from(_polylines(lines))
+        self.lines.copy_from(_polylines(lines))
         self._actor.SetVisibility(bool(lines))
 
     def _lift(self) -> None:
@@ -156,7 +160,7 @@ class Overlay:
 
     def show_status(self, text: str) -> None:
         """Show a text at the bottom, in several lines if it is too long."""
-        self._text = text
+        self.status = text
         if not self.shows_status:
             return
         self._status.SetInput(text)
@@ -209,19 +213,9 @@ class Overlay:
             self._plotter.remove_actor(actor, render=False)
 
     @property
-    def status(self) -> str:
-        """Text at the bottom."""
-        return self._text
-
-    @property
     def help_visible(self) -> bool:
         """True while the help is visible."""
         return bool(self._help.GetVisibility())
-
-    @property
-    def lines(self) -> pv.PolyData:
-        """The drawn outlines."""
-        return self._lines
 
 
 def box_edges(low: ArrayLike, high: ArrayLike) -> list[Float32Array]:
@@ -268,6 +262,8 @@ class PrimitiveHandle:
 
     Attributes
     ----------
+    widget
+        VTK's widget; None while no primitive is selected.
     dragging
         True during a drag.
     visible
@@ -282,7 +278,7 @@ class PrimitiveHandle:
         click: Callable[[], None] = lambda: None,
     ) -> None:
         self._renderer, self._actions, self._redraw, self._click = renderer, actions, redraw, click
-        self._widget: Any = None
+        self.widget: Any = None
         self._released: Any = None
         self._primitive: tuple[int, Path] | None = None
         self._drag_start: Float64Array = np.zeros(3)
@@ -298,9 +294,9 @@ class PrimitiveHandle:
         if primitive is None:
             return
         center = self._actions.trees.handle_position
-        if self._widget is None:
-            self._widget, self._primitive = self._new_widget(center), primitive
-        self._widget.SetCenter(*center.tolist())
+        if self.widget is None:
+            self.widget, self._primitive = self._new_widget(center), primitive
+        self.widget.SetCenter(*center.tolist())
 
     def _new_widget(self, center: Float32Array) -> Any:
         low, high = bounds_of(self._actions.state.session.document.objects)
@@ -322,33 +318,28 @@ class PrimitiveHandle:
 
     def begin(self) -> None:
         """Begin a drag."""
-        self.dragging, self._drag_start = True, np.array(self._widget.GetCenter())
+        self.dragging, self._drag_start = True, np.array(self.widget.GetCenter())
         self._actions.trees.begin_drag()
 
     def move(self) -> None:
         """Drag the primitive to the ball."""
-        self._actions.trees.drag(np.array(self._widget.GetCenter()) - self._drag_start)
+        self._actions.trees.drag(np.array(self.widget.GetCenter()) - self._drag_start)
         self._redraw(False)
 
     def end(self) -> None:
         """End the drag."""
-        moved = (np.array(self._widget.GetCenter()) != self._drag_start).any()
+        moved = (np.array(self.widget.GetCenter()) != self._drag_start).any()
         self._actions.trees.end_drag()
         self.dragging = False
         if not moved:
             self._click()
         self._redraw(True)
 
-    @property
-    def widget(self) -> Any:
-        """VTK's widget; None while no primitive is selected."""
-        return self._widget
-
     def release(self) -> None:
         """Remove the ball; VTK may be in the middle of one of its events, so it is kept for a while."""
-        if self._widget is not None:
-            self._released = self._widget
-            self._widget.RemoveAllObservers()
+        if self.widget is not None:
+            self._released = self.widget
+            self.widget.RemoveAllObservers()
             if self._renderer.GetRenderWindow() is not None:  # else the plotter was closed before
-                self._widget.Off()
-            self._widget = self._primitive = None
+                self.widget.Off()
+            self.widget = self._primitive = None
