@@ -1,9 +1,11 @@
 """Output files: checked before the long work, written atomically after it."""
 
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from rich.console import Console
+from rich.table import Table
 
 from blobtree.files import is_folder, is_read_only, is_too_long, make_folder
 from decals.errors import InvalidInput
@@ -48,6 +50,14 @@ def _check_writable(folder: Path) -> None:
     except OSError as error:
         reason = f"the output folder {str(folder)!r} cannot be written ({error.strerror}); choose another"
         raise InvalidInput(reason) from error
+
+
+def print_names(titles: Mapping[str, str]) -> None:
+    """Print names, each with its title."""
+    table = Table("", "", show_header=False, box=None, padding=(0, 2, 0, 0))
+    for name, title in titles.items():
+        table.add_row(name, title)
+    Console().print(table)
 
 
 def print_path(path: Path) -> None:

@@ -5,13 +5,11 @@ from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
-from rich.console import Console
-from rich.table import Table
 
 from blobtree.files import make_folder
 from decals.apps import gallery as examples
 from decals.apps.commands.options import Whole, check_count
-from decals.apps.output import PICTURE_SUFFIXES, check_output, print_path
+from decals.apps.output import PICTURE_SUFFIXES, check_output, print_names, print_path
 from decals.errors import InvalidInput
 
 FOLDER = Path("gallery")
@@ -54,16 +52,8 @@ def gallery(
     elif output is not None:
         raise InvalidInput("--output: expected the name of an example, or --all; add one of them")
     else:
-        _list_examples()
-
-
-def _list_examples() -> None:
-    """Print the name and the title of each example."""
-    table = Table("", "", show_header=False, box=None, padding=(0, 2, 0, 0))
-    for name in examples.EXAMPLES:
-        note = " (downloads its meshes on first use)" if name in examples.DOWNLOADED else ""
-        table.add_row(name, examples.title(name) + note)
-    Console().print(table)
+        notes = dict.fromkeys(examples.DOWNLOADED, " (downloads its meshes on first use)")
+        print_names({each: examples.title(each) + notes.get(each, "") for each in examples.EXAMPLES})
 
 
 def _draw(pictures: dict[str, Path], side: int) -> None:

@@ -15,6 +15,7 @@ from rich.text import Text
 
 from decals.apps import experiments as shipped
 from decals.apps.models.loading import import_module_or_file
+from decals.apps.output import print_names
 from decals.errors import InvalidInput
 from decals.experiments import Design, run
 from decals.experiments.outcome import COLUMNS, Row
@@ -60,7 +61,7 @@ def sweep(
         List the shipped experiments.
     """
     if list_:
-        _list_shipped()
+        print_names({name: shipped.title(name) for name in shipped.SHIPPED})
         return 0
     if experiment is None:
         raise InvalidInput("expected a Python file or the name of a shipped experiment; --list shows these")
@@ -79,14 +80,6 @@ def sweep(
     for error, count in errors.most_common(LATEST):
         console.print(Text(f"{count} trial{'s' * (count > 1)}: {error}"), soft_wrap=True)
     return 1 if results.failed else 0
-
-
-def _list_shipped() -> None:
-    """Print the name and the title of each shipped experiment."""
-    table = Table("", "", show_header=False, box=None, padding=(0, 2, 0, 0))
-    for name in shipped.SHIPPED:
-        table.add_row(name, shipped.title(name))
-    Console().print(table)
 
 
 def experiment_of(experiment: str, chosen: str) -> tuple[Callable[..., Any], Design]:
