@@ -51,11 +51,13 @@ from .nodes.numeric_parameters import (
     with_numeric_values,
 )
 from .nodes.operator import Operator
+from .nodes.outlines import Outline
 from .nodes.parameter_gradient import ParameterGradient
 from .nodes.primitives import Box, Cone, Disc, Point, Primitive, Segment, Torus
+from .nodes.profiles import Extrude, Prism, Revolve
 from .nodes.repeats import PolarRepeat, Repeat
 from .nodes.rounds import RoundDifference, RoundIntersection, RoundUnion
-from .nodes.sharp import Frustum, Prism
+from .nodes.sharp import Frustum
 from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
 from .nodes.tree import Difference, Intersection, Offset, Ricci, Sum, Transform, Twist, Union
 from .nodes.tree_volumes import sample
@@ -94,6 +96,7 @@ __all__ = [
     "Difference",
     "Disc",
     "Ellipsoid",
+    "Extrude",
     "Falloff",
     "FieldPrimitive",
     "Fit",
@@ -114,6 +117,7 @@ __all__ = [
     "NumericParameter",
     "Offset",
     "Operator",
+    "Outline",
     "ParameterGradient",
     "Point",
     "PolarRepeat",
@@ -131,6 +135,7 @@ __all__ = [
     "RatedUnion",
     "Rectangle",
     "Repeat",
+    "Revolve",
     "Ricci",
     "RoundDifference",
     "RoundIntersection",

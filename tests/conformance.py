@@ -36,6 +36,9 @@ ATTEMPTS = 60
 NAMES = {name: getattr(blobtree, name) for name in blobtree.__all__}
 
 
+PENTAGON = np.column_stack([np.cos(np.arange(5) * 0.4 * np.pi), np.sin(np.arange(5) * 0.4 * np.pi)])
+
+
 def _corners(rng: Rng) -> tuple[tuple[float, float, float], ...]:
     angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, 6))
     flat = rng.uniform(0.3, 0.9, 6)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
@@ -48,6 +51,29 @@ def _polygon(rng: Rng, _: Operand) -> Node:
 
 def _prism(rng: Rng, _: Operand) -> Node:
     return blobtree.Prism(_corners(rng), float(rng.uniform(0.3, 0.9)), radius=float(rng.choice([0.0, 0.2])))
+
+
+def _outline(rng: Rng) -> blobtree.Outline:
+    """An outline beside an axis, or one that touches it, with a hole; its corners may be rounded."""
+    left, right = float(rng.choice([0.0, 0.2])), float(rng.uniform(0.9, 1.2))
+    corners = [(left, -0.5), (right, -0.4), (0.9 * right, 0.4), (left, 0.5)]
+    bulges = [0.0, float(rng.uniform(-0.3, 0.6)), 0.0, 0.0]
+    hole = blobtree.Outline.spline(rng.uniform(0.95, 1.05, (5, 1)) * PENTAGON)
+    return blobtree.Outline.arcs(corners, bulges) + hole.scale(0.15).translate((0.55, 0.0))
+
+
+def _extrude(rng: Rng, _: Operand) -> Node:
+    warps: Any = {"top_scale": float(rng.uniform(0.5, 1.5)), "top_turn": float(rng.uniform(-60.0, 60.0))}
+    chosen = {name: value for name, value in warps.items() if rng.random() < 0.5}
+    origin, radius = triple(rng.uniform(-0.3, 0.3, 3)), float(rng.choice([0.0, 0.2]))
+    return blobtree.Extrude(
+        _outline(rng), float(rng.uniform(0.3, 0.9)), origin=origin, radius=radius, **chosen
+    )
+
+
+def _revolve(rng: Rng, _: Operand) -> Node:
+    angle, radius = float(rng.choice([360.0, rng.uniform(20.0, 350.0)])), float(rng.choice([0.0, 0.2]))
+    return blobtree.Revolve(_outline(rng), angle, origin=triple(rng.uniform(-0.3, 0.3, 3)), radius=radius)
 
 
 def _contact(rng: Rng, operand: Operand) -> Node:
@@ -100,6 +126,8 @@ SPECIAL: dict[str, Callable[[Rng, Operand], Node]] = {
     "polar_repeat": _polar_repeat,
     "polygon": _polygon,
     "prism": _prism,
+    "extrude": _extrude,
+    "revolve": _revolve,
     "contact": _contact,
     "blend_graph": _graph,
     "volume": _volume,

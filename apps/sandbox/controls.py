@@ -50,7 +50,7 @@ class Control:
         Name of the parameter.
     kind
         "number" (a slider and a field), "field" (a number alone), "vector" and "list" (fields), "color",
-        "choice", "choices" (any number of them), "switch" or "text" (shown only).
+        "choice", "choices" (any number of them), "switch", "path" (a field for a text), or "text" (shown).
     value
         The present value: a number, numbers, "#rrggbb", or text.
     doc
@@ -122,6 +122,8 @@ def _control(parameter: Parameter, value: Any, size: float) -> Control:
         return Control(parameter.name, "choice", _falloff_name(value), doc, choices=names, curve=curve)
     if quantity is Quantity.CHOICE:
         return Control.choice(parameter.name, value, parameter.choices, doc)
+    if quantity is Quantity.OUTLINE:
+        return Control(parameter.name, "path", value.path, doc)
     if quantity in NUMBERS and not isinstance(value, tuple):
         low, high = _ends(parameter, value, size)
         step = 1.0 if parameter.whole else (high - low) / STEPS
@@ -218,6 +220,8 @@ def parsed(node: Node, name: str, raw: Any) -> Any:
         return None
     if parameter.quantity in (Quantity.COLOR, Quantity.FALLOFF, Quantity.CHOICE):
         return raw
+    if parameter.quantity is Quantity.OUTLINE:
+        return parameter.check(raw)
 
     def numbers(part: Any) -> Any:
         if isinstance(part, list | tuple):

@@ -144,6 +144,13 @@ def build_controls(source: str, event: Any, identifiers: str, *, key: str = "c.n
             raw_attrs=named("c.label"),
             update_modelValue=(event, f"[{identifiers}, $event, true]"),
         )
+        vuetify3.VTextarea(
+            v_if="c.kind === 'path'",
+            model_value=("c.value",),
+            rows=3,
+            raw_attrs=named("c.label"),
+            change=(event, f"[{identifiers}, $event.target.value, true]"),
+        )
         html.Div(CURVE, v_if="c.curve")
         html.Div(HELP, v_if="c.word", classes="text-caption help")
         vuetify3.VSwitch(

@@ -80,6 +80,8 @@ class Quantity(Enum):
     """Texts that are not empty, any number of them."""
     SAMPLES = "samples"
     """Numbers at the points of a grid."""
+    OUTLINE = "outline"
+    """A shape in a plane by the lines and curves around it."""
     COLOR = "color"
     """Red, green and blue (3,) from 0 to 1."""
     ATTRIBUTES = "attributes"

@@ -1,4 +1,4 @@
-"""Edges of a polygon that meet where they should not: a sweep along its corners (Shamos & Hoey 1976).
+"""Edges of polygons that meet where they should not: a sweep along their corners (Shamos & Hoey 1976).
 
 Corners are visited from left to right. `status` holds the edges at the current corner from below to above.
 Two edges that meet are neighbours in it before they do, unless two others meet earlier. So it is enough to
@@ -6,6 +6,7 @@ try neighbours, and n corners take time in proportion to n log n.
 """
 
 from bisect import bisect_left
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -13,29 +14,31 @@ import numpy as np
 from blobtree._typing import Float64Array
 
 TOUCH = 1e-12
-"""Cross product of vectors, in units of the polygon's size, up to which three points are on a line."""
+"""Cross product of vectors, in units of the polygons' size, up to which three points are on a line."""
 
 Corner = list[float]
 
 
-def meeting_edges(points: Float64Array) -> tuple[int, int] | None:
-    """Return the first corners of two edges of a polygon that meet where they should not, None if none do.
+def meeting_edges(points: Float64Array, counts: Sequence[int] = ()) -> tuple[int, int] | None:
+    """Return the first corners of two edges of polygons that meet where they should not, None if none do.
 
-    `points` are its corners (n, 2), in units of its size. Edges that share a corner meet if that corner is
-    repeated, or if one runs back along the other.
+    `points` are the corners (n, 2) in units of the size: of one polygon, or of several with `counts` of
+    corners. Edges that share a corner meet if that corner is repeated, or if one runs back along the other.
     """
     corners: list[Corner] = points.tolist()
-    count = len(corners)
+    loops = np.split(np.arange(len(corners)), np.cumsum(counts)[:-1])
+    after = np.concatenate([np.roll(loop, -1) for loop in loops]).tolist()
+    before = np.concatenate([np.roll(loop, 1) for loop in loops]).tolist()
     order = np.lexsort((points[:, 1], points[:, 0])).tolist()
     rank = {corner: place for place, corner in enumerate(order)}
     for first, second in pairwise(order):
         if corners[first] == corners[second]:
             return min(first, second), max(first, second)
-    for first in range(count):
-        a, b, c = (corners[(first + step) % count] for step in range(3))
+    for first, second in enumerate(after):
+        a, b, c = (corners[corner] for corner in (first, second, after[second]))
         if _side(a, b, c) == 0.0 and (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) < 0.0:
-            return min(first, (first + 1) % count), max(first, (first + 1) % count)
-    ends = [sorted((first, (first + 1) % count), key=rank.__getitem__) for first in range(count)]
+            return min(first, second), max(first, second)
+    ends = [sorted(edge, key=rank.__getitem__) for edge in enumerate(after)]
     status: list[int] = []
 
     def meeting(place: int) -> tuple[int, int] | None:
@@ -43,7 +46,7 @@ def meeting_edges(points: Float64Array) -> tuple[int, int] | None:
         if not 0 < place < len(status):
             return None
         pair = min(status[place - 1 : place + 1]), max(status[place - 1 : place + 1])
-        apart = 1 < pair[1] - pair[0] < count - 1
+        apart = after[pair[0]] != pair[1] and after[pair[1]] != pair[0]
         return pair if apart and _meet(*(corners[end] for edge in pair for end in ends[edge])) else None
 
     for corner in order:
@@ -53,7 +56,7 @@ def meeting_edges(points: Float64Array) -> tuple[int, int] | None:
             start, end = (corners[place] for place in ends[edge])
             return _cross(start, end, p) <= 0.0
 
-        edges = [(corner - 1) % count, corner]
+        edges = [before[corner], corner]
         for edge in edges:
             if ends[edge][1] == corner:
                 place = _place(status, edge, bisect_left(status, True, key=is_above))

@@ -13,6 +13,7 @@ with if_present():
     import blobtree.nodes.deformations
     import blobtree.nodes.fields
     import blobtree.nodes.flats
+    import blobtree.nodes.profiles
     import blobtree.nodes.repeats
     import blobtree.nodes.rounds
     import blobtree.nodes.sharp

@@ -213,7 +213,7 @@ def _natural(parameter: Parameter, turn: int, center: Float64Array, size: float,
     """Return a value of the parameter that has this turn among those of its quantity."""
     match parameter.quantity:
         case Quantity.POINT:
-            alone = parameter.name in ("center", "point", "corner")
+            alone = parameter.name in ("center", "point", "corner", "origin")
             return tuple((center if alone else center + size * PLACES[turn % len(PLACES)]).tolist())
         case Quantity.POINTS:
             lift = np.array((0.0, 0.0, 0.2 * turn))
@@ -231,6 +231,9 @@ def _natural(parameter: Parameter, turn: int, center: Float64Array, size: float,
             return int(number) if parameter.whole else number
         case Quantity.FACTORS | Quantity.DISTANCES:
             return (NATURAL["height"],) if parameter.name == "height" else ()
+        case Quantity.OUTLINE:
+            half = 0.5 * size  # a rectangle with a round side, beside the axis of a turn
+            return f"M0 {-half}H{half}A{half} {half} 0 0 1 {half} {half}H0Z"
         case Quantity.NAMES:
             return _letters(operands)
         case Quantity.CHOICE:

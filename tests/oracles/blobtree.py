@@ -29,6 +29,7 @@ from blobtree import (
     Difference,
     Disc,
     Ellipsoid,
+    Extrude,
     GradientBlend,
     Gyroid,
     HalfSpace,
@@ -126,6 +127,8 @@ def signed(node: Node, points: ArrayLike) -> Field:
             end = np.array(point) - node.extent * np.array(normal) / np.linalg.norm(normal)
             same: Any = {name: getattr(node, name) for name in ("falloff", "width", "weight", "color")}
             return signed(Cylinder(point, tuple(end), node.extent, radius=0.0, **same), q)
+        case Extrude() if sharp.is_warped(node):
+            return signed(sharp.written_out(node), q)
         case Primitive() if node.profiled:
             return _profiled(node, q)
         case Ellipsoid(semi_axes=axes, width=width):
@@ -281,7 +284,7 @@ def grown(node: Node, distance: float) -> Node:
     if isinstance(node, Profile) and node.weight < 0.0:
         distance = -distance
     match node:
-        case Leaf() if sharp.is_sharp(node):
+        case Leaf() if sharp.is_sharp(node) or sharp.is_warped(node):
             return cast(Node, sharp.grown(node, distance))
         case Operator(operands=(solid, tool)) if node.operator.support is Support.LEFT:
             return replace(node, operands=(grown(solid, distance), grown(tool, -distance)))

@@ -6,11 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blobtree import Box, Cone, Cylinder, Frustum, Prism
+from blobtree import Box, Cone, Cylinder, Extrude, Frustum, Node, Outline, Prism, Revolve
 
 Floats = NDArray[np.float64]
 
-KINDS = (Box, Cone, Cylinder, Frustum, Prism)
+KINDS = (Box, Cone, Cylinder, Frustum)
+
+ALWAYS = (Prism, Frustum, Extrude, Revolve)
+"""Kinds whose field is that of a signed distance with every radius."""
 
 
 STENCIL = 5e-3
@@ -19,9 +22,22 @@ STENCIL = 5e-3
 
 def is_sharp(node: Any) -> bool:
     """True for a solid whose field is that of its signed distance."""
-    if isinstance(node, Prism | Frustum):
-        return True
+    if isinstance(node, ALWAYS):
+        return not is_warped(node)
     return isinstance(node, KINDS) and min(node.radius, getattr(node, "end_radius", node.radius)) == 0.0
+
+
+def is_warped(node: Any) -> bool:
+    """True for an extrusion under a taper or a twist."""
+    return isinstance(node, Extrude) and (node.top_scale != 1.0 or node.top_turn != 0.0)
+
+
+def written_out(node: Extrude) -> Node:
+    """An extrusion under a taper or a twist as a straight one under these warps."""
+    straight = replace(node, top_scale=1.0, top_turn=0.0, origin=(0.0, 0.0, 0.0))
+    object.__setattr__(straight, "growth", getattr(node, "growth", 0.0))
+    tapered = straight if node.top_scale == 1.0 else straight.taper(node.top_scale, (0.0, node.height))
+    return tapered.twist(node.top_turn / node.height).translate(node.origin)
 
 
 def grown(node: Any, distance: float) -> Any:
@@ -46,19 +62,68 @@ def mean_radius(node: Any) -> float:
     match node:
         case Cone():
             return float(max(node.radius, node.end_radius))
-        case Prism() | Frustum() if node.radius > 0.0:
+        case Prism() | Frustum() | Extrude() | Revolve() if node.radius > 0.0:
             return float(node.radius)
+        case Extrude():
+            return min(0.5 * node.height, mean_of(node.outline))
+        case Revolve():
+            return mean_of(node.outline)
         case Box():
             return 0.5 * min(node.size)
         case Prism():
-            corners = in_plane(node)[0]
-            sides = np.roll(corners, -1, axis=0) - corners
-            area = 0.5 * np.abs((corners[:, 0] * sides[:, 1] - corners[:, 1] * sides[:, 0]).sum())
-            return min(0.5 * node.height, float(2.0 * area / np.linalg.norm(sides, axis=1).sum()))
+            return min(0.5 * node.height, mean_of(Outline.polygon(in_plane(node)[0])))
     corners = profile(node)
     x = np.linspace(0.0, corners[2, 1], 200_001)
     axis = np.column_stack([np.zeros_like(x), x])
-    return float(-outline(axis, corners, closed=False).min())
+    return float(-outline(axis, corners, off_axis).min())
+
+
+def mean_of(shape: Outline) -> float:
+    """Twice the area of an outline over its length."""
+    area, length = 0.0, 0.0
+    for corners in loops_of(shape):
+        x, y = corners.T
+        area += 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
+        length += float(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1).sum())
+    return 2.0 * area / length
+
+
+def loops_of(shape: Outline) -> list[Floats]:
+    """The corners of the polygons of an outline."""
+    return [loop.points for loop in shape.loops]
+
+
+def flat_distance(p: Floats, shape: Outline, counted: Any = None) -> Floats:
+    """The signed distance (n,) of points (n, 2) from an outline, or from those of its sides that count."""
+    each = [outline(p, corners, counted) for corners in loops_of(shape)]
+    inside = np.logical_xor.reduce([distances < 0.0 for distances in each])
+    nearest = np.min(np.abs(each), axis=0)
+    return np.asarray(np.where(inside, -nearest, nearest))
+
+
+def revolution(node: Revolve, q: Floats) -> Floats:
+    """The signed distance of an outline that turns: the least of those from its side and from both ends."""
+    w = q - np.array(node.origin)
+    r, z, angle = np.hypot(w[:, 0], w[:, 1]), w[:, 2], np.radians(node.angle)
+    azimuth = np.mod(np.arctan2(w[:, 1], w[:, 0]), 2.0 * np.pi)
+
+    def in_plane_at(turn: Floats) -> tuple[Floats, Floats]:
+        return np.column_stack([r * np.cos(turn), z]), r * np.abs(np.sin(turn))
+
+    past_end, before_start = azimuth - angle, 2.0 * np.pi - azimuth
+    gap = np.where(azimuth <= angle, 0.0, np.minimum(np.abs(past_end), before_start))
+    p, away = in_plane_at(gap)
+    nearest = np.hypot(flat_distance(p, node.outline, off_axis), away)
+    inside = (flat_distance(np.column_stack([r, z]), node.outline) < 0.0) & (azimuth <= angle)
+    for turn in () if node.angle == 360.0 else (azimuth, past_end):
+        p, away = in_plane_at(turn)
+        nearest = np.minimum(nearest, np.hypot(np.maximum(flat_distance(p, node.outline), 0.0), away))
+    return np.where(inside, -nearest, nearest)
+
+
+def off_axis(a: Floats, b: Floats) -> bool:
+    """True for an edge that does not lie on the axis of a turn."""
+    return bool(max(a[0], b[0]) > 1e-12)
 
 
 def distance(node: Any, q: Floats) -> Floats:
@@ -73,11 +138,17 @@ def distance(node: Any, q: Floats) -> Floats:
             corners, height = in_plane(node, q)[1:]
             flat = outline(corners, in_plane(node)[0])
             return extended(np.stack([flat, np.abs(height - 0.5 * node.height) - 0.5 * node.height]))
+        case Extrude():
+            w = q - np.array(node.origin)
+            ends = np.abs(w[:, 2] - 0.5 * node.height) - 0.5 * node.height
+            return extended(np.stack([flat_distance(w[:, :2], node.outline), ends]))
+        case Revolve():
+            return revolution(node, q)
     axis = np.subtract(node.end, node.start)
     unit = axis / np.linalg.norm(axis)
     along = (q - np.array(node.start)) @ unit
     across = np.linalg.norm(q - np.array(node.start) - along[:, None] * unit, axis=1)
-    return outline(np.column_stack([across, along]), profile(node), closed=False)
+    return outline(np.column_stack([across, along]), profile(node), off_axis)
 
 
 def extended(beyond: Floats) -> Floats:
@@ -113,14 +184,14 @@ def profile(node: Any) -> Floats:
     return np.array([(0.0, 0.0), (first, 0.0), (last, length), (0.0, length)])
 
 
-def outline(p: Floats, corners: Floats, closed: bool = True) -> Floats:
-    """The signed distance (n,) of points (n, 2) from a polygon; its last side counts if it is closed."""
+def outline(p: Floats, corners: Floats, counted: Any = None) -> Floats:
+    """The signed distance (n,) of points (n, 2) from a polygon, or from those of its sides that count."""
     count, inside = len(corners), np.zeros(len(p), bool)
     nearest = np.full(len(p), np.inf)
     for i in range(count):
         a, b = corners[i], corners[(i + 1) % count]
         way, w = b - a, p - a
-        if (closed or i < count - 1) and way.any():
+        if way.any() and (counted is None or counted(a, b)):
             t = np.clip(w @ way / (way @ way), 0.0, 1.0)
             nearest = np.minimum(nearest, np.linalg.norm(w - t[:, None] * way, axis=1))
         crosses = (a[1] > p[:, 1]) != (b[1] > p[:, 1])

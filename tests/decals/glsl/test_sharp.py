@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blobtree import Box, Cone, Cylinder, Node, Prism
+from blobtree import Box, Cone, Cylinder, Extrude, Node, Outline, Prism, Revolve
 from blobtree.tape.instruction_set import library
 from decals.rendering import Context
 from tests.decals.glsl.test_conformance import assert_same_in_both_languages
@@ -16,6 +16,9 @@ SOLIDS: list[Node] = [
     Cylinder((0, 0, 0), (1, 2, 0.5), 0.6, radius=0),
     Cone((0, 0, 0), (1, 2, 0.5), radius=0.5, end_radius=0),
     Prism(STAR, 0.7),
+    Extrude(Outline.text("B&"), 0.3, top_turn=20.0),
+    Revolve("M0 0H1L.5 1H0Z"),
+    Revolve("M.5 0H1V1Z", 200.0),
 ]
 
 

@@ -1,0 +1,207 @@
+"""Outlines: areas, rasters of text and drawings, holes, values and refusals."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFilter, ImageFont
+
+from blobtree import Extrude, Outline, from_json, to_json
+from blobtree.errors import ImplicitDecalsError, InvalidFile, InvalidNode, MissingFile
+
+FONT = Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf")
+PIXELS = 600
+"""Pixels of a unit of length."""
+
+SQUARE = "M0 0H1V1H0Z"
+
+
+def shown(outline: Outline, width: int, height: int, top: float) -> NDArray[np.bool_]:
+    """Which centres of pixels an extrusion of an outline holds, whose upper left corner is at (0, top)."""
+    x, y = np.meshgrid((np.arange(width) + 0.5) / PIXELS, top - (np.arange(height) + 0.5) / PIXELS)
+    points = np.stack([x, y, np.full_like(x, 0.5)], axis=-1).reshape(-1, 3)
+    return (Extrude(outline, 1.0)(points) > 0.5).reshape(height, width)
+
+
+def assert_same_picture(outline: Outline, picture: Image.Image, top: float) -> None:
+    """An outline and a picture of coverage agree but in pixels beside an edge, and so do their areas."""
+    found = shown(outline, *picture.size, top)
+    eroded, dilated = (
+        np.asarray(picture.filter(kind(3))) for kind in (ImageFilter.MinFilter, ImageFilter.MaxFilter)
+    )
+    assert found[eroded == 255].all()
+    assert not found[dilated == 0].any()
+    area = float(np.asarray(picture, np.float64).sum()) / 255.0
+    assert found.sum() == pytest.approx(area, rel=3e-3)
+    assert outline.area * PIXELS**2 == pytest.approx(area, rel=3e-3)
+
+
+@pytest.mark.parametrize("letters", ["A", "g", "&", "8", "\u00e4", "%"])
+def test_letters_are_those_of_a_rasteriser(letters: str) -> None:
+    font = ImageFont.truetype(str(FONT), PIXELS, layout_engine=ImageFont.Layout.BASIC)
+    picture = Image.new("L", (PIXELS, 2 * PIXELS))
+    ImageDraw.Draw(picture).text((0, PIXELS), letters, fill=255, font=font, anchor="ls")
+    assert_same_picture(Outline.text(letters), picture, top=1.0)
+
+
+def test_lines_and_letters_stand_side_by_side() -> None:
+    font = ImageFont.truetype(str(FONT), PIXELS, layout_engine=ImageFont.Layout.BASIC)
+    wide, narrow = (Outline.text(text, size=2.0).bounds for text in ("II", "I"))
+    assert wide[1][0] - narrow[1][0] == pytest.approx(2.0 * font.getlength("I") / PIXELS, abs=4e-3)
+    above, below = Outline.text("I").bounds, Outline.text("\nI").bounds
+    assert above[0][1] - below[0][1] == pytest.approx(sum(font.getmetrics()) / PIXELS, abs=4e-3)
+
+
+def test_a_drawing_is_that_of_a_rasteriser() -> None:
+    drawing = """<svg xmlns="http://www.w3.org/2000/svg">
+      <rect x="0.1" y="0.1" width="0.5" height="0.3"/>
+      <ellipse cx="1.2" cy="0.4" rx="0.4" ry="0.2" style="fill:red"/>
+      <g transform="translate(0.1,0.8) rotate(90)" fill="none">
+        <path d="M0 0h.6l-.3.4z" fill="blue" transform="scale(1 -1) matrix(0 -1 1 0 0 0) scale(-1 1)"/>
+        <rect width="0.2" height="1"/>
+      </g>
+      <defs><circle r="1"/></defs>
+      <path d="M1 1 A.3 .3 0 1 1 1.3 1.3 L1 1.3 Z m.1.1v.1h.1v-.1Z"/>
+    </svg>"""
+    much = 8
+    picture = Image.new("L", (2 * PIXELS * much, 2 * PIXELS * much))
+    draw, one = ImageDraw.Draw(picture), PIXELS * much
+    draw.rectangle((0.1 * one, 0.1 * one, 0.6 * one - 1, 0.4 * one - 1), fill=255)
+    draw.ellipse((0.8 * one, 0.2 * one, 1.6 * one - 1, 0.6 * one - 1), fill=255)
+    draw.polygon([(0.1 * one, 0.8 * one), (0.7 * one, 0.8 * one), (0.4 * one, 1.2 * one)], fill=255)
+    draw.pieslice((one, 0.7 * one, 1.6 * one - 1, 1.3 * one - 1), 180, 90, fill=255)
+    draw.rectangle((one, one, 1.3 * one - 1, 1.3 * one - 1), fill=255)
+    draw.rectangle((1.1 * one, 1.1 * one, 1.2 * one - 1, 1.2 * one - 1), fill=0)
+    coverage = picture.resize((2 * PIXELS, 2 * PIXELS), Image.Resampling.BOX)
+    assert_same_picture(Outline.svg(drawing), coverage, top=0.0)
+
+
+def test_a_file_is_its_text(tmp_path: Path) -> None:
+    text = f'<svg><path d="{SQUARE}"/></svg>'
+    (tmp_path / "square.svg").write_text(text)
+    assert Outline.svg(tmp_path / "square.svg") == Outline.svg(text)
+    assert Outline.svg(text).bounds == ((0.0, -1.0), (1.0, 0.0))
+
+
+def test_rules_of_filling() -> None:
+    nested = '<svg><path d="M0 0H4V4H0ZM1 1H3V3H1Z"/></svg>'
+    assert Outline.svg(nested).area == 16.0
+    assert Outline.svg(nested, rule="evenodd").area == 12.0
+    opposite = '<svg><path d="M0 0H4V4H0ZM1 1V3H3V1Z"/></svg>'
+    assert Outline.svg(opposite).area == 12.0
+
+
+@pytest.mark.parametrize(
+    ("outline", "area"),
+    [
+        (Outline.polygon([(0, 0), (0, 2), (1, 0)]), 1.0),
+        (Outline.arcs([(-3, 0), (3, 0)], 1), 9.0 * np.pi),
+        (Outline.arcs([(0, 0), (1, 0), (1, 1), (0, 1)], [0, -1, 0, 0]), 1.0 - np.pi / 8.0),
+        (Outline("M0 0A2 1 30 1 1 .1 0Z"), 2.0 * np.pi),
+        (Outline("M1 0C1 1 0 1 0 0ZM5 0Q6 2 7 0Z"), 0.6 + 4.0 / 3.0),
+        (Outline(SQUARE).scale(2.0) + Outline(SQUARE).translate((0.5, 0.5)), 3.0),
+    ],
+)
+def test_areas(outline: Outline, area: float) -> None:
+    tolerance = 2e-3 if outline.path.startswith("M0 0A") else 3e-4
+    assert outline.area == pytest.approx(area, rel=tolerance)
+
+
+@given(st.floats(0.01, 6.0), st.floats(-40.0, 40.0), st.floats(0.02, 50.0))
+def test_arcs_lie_on_circles(bulge: float, place: float, size: float) -> None:
+    start, end = np.array([place, -place]), np.array([place + size, -place])
+    (loop,) = Outline.arcs([start, end], [bulge, 0.0]).loops
+    radius = 0.25 * size * (bulge + 1.0 / bulge)
+    middle = 0.5 * (start + end) + np.array([0.0, radius - 0.5 * size * bulge])
+    assert np.linalg.norm(loop.points - middle, axis=1) == pytest.approx(radius, rel=1e-6)
+    assert loop.corners.sum() <= 2
+
+
+def test_a_spline_passes_its_points_smoothly() -> None:
+    angles = np.array([0.0, 0.7, 1.9, 3.0, 4.4, 5.5])
+    points = np.column_stack([2.0 * np.cos(angles), np.sin(angles)])
+    (loop,) = Outline.spline(points).loops
+    assert not loop.corners.any()
+    apart = np.linalg.norm(loop.points[:, None] - points, axis=-1).min(axis=0)
+    assert apart.max() < 1e-12
+
+
+def test_outlines_are_values() -> None:
+    one, other = Outline(SQUARE), Outline(SQUARE)
+    assert one == other
+    assert hash(one) == hash(other)
+    assert eval(repr(one)) == one
+    solid = Extrude(SQUARE, 1.0)
+    assert solid.outline == one
+    assert from_json(to_json(solid)) == solid
+
+
+def test_the_shape_lies_on_the_left() -> None:
+    outer, hole = (Outline("M0 0V3H3V0Z") + Outline("M1 1H2V2H1Z")).loops
+    assert outer.points.tolist() == [[3, 0], [3, 3], [0, 3], [0, 0]]
+    assert hole.points.tolist() == [[1, 2], [2, 2], [2, 1], [1, 1]]
+    assert outer.corners.all()
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Outline(""), "expected a shape with an area"),
+        (lambda: Outline("M0 0L1 1"), "expected a shape with an area"),
+        (lambda: Outline("a square"), "expected SVG path data"),
+        (lambda: Outline(7), "expected SVG path data"),  # type: ignore[arg-type]
+        (lambda: Outline("L0 0"), "path: expected one without errors, got ValueError"),
+        (lambda: Outline("M0 0A1 1 0"), "path: expected one without errors, got"),
+        (lambda: Outline("M0 0H1e999V1Z"), "expected finite coordinates"),
+        (lambda: Outline("M0 0L2 2V0L0 2Z"), r"got edges that meet near \("),
+        (lambda: Outline("M0 0H2V2H0ZM1 1H3V3H1Z"), "unite shapes that overlap"),
+        (lambda: Outline("M0 0H2V2H0ZM0 0L1 .5 .5 1Z"), "neither cross nor touch"),
+        (lambda: Outline.polygon([(0, 0, 0), (1, 0, 0), (0, 1, 0)]), "points: expected points of two finite"),
+        (lambda: Outline.polygon([(0, 0), (np.nan, 0), (0, 1)]), "points: expected points of two finite"),
+        (lambda: Outline.polygon("square"), "points: expected points of two finite"),
+        (lambda: Outline.polygon([]), "points: expected points of two finite"),
+        (lambda: Outline.polygon(np.random.default_rng(1).random((60_000, 2))), "at most 50,000 corners"),
+        (lambda: Outline.arcs([(0, 0), (1, 0)], [1, 1, 1]), "bulges: expected a finite number, or one for"),
+        (lambda: Outline.spline([(0, 0), (0, 0), (1, 1)]), "each other than the one before"),
+        (lambda: Outline.svg("<svg><path"), "drawing: expected one without errors, got ParseError"),
+        (lambda: Outline.svg("<svg/>"), "expected a shape with an area"),
+        (lambda: Outline.svg(3), "drawing: expected a file or the text"),  # type: ignore[arg-type]
+        (lambda: Outline.svg("<svg/>", rule="all"), "rule: expected 'nonzero' or 'evenodd'"),
+        (lambda: Outline.text(" "), "expected a shape with an area"),
+        (lambda: Outline.text("\U0001f9ff"), "expected characters of the font"),
+        (lambda: Outline.text("a", size=-1), "size: expected a number above 0"),
+        (lambda: Outline.text("a", font=__file__), "font: expected one without errors, got TTLibError"),
+        (lambda: Outline.text(3), "text: expected a text"),  # type: ignore[arg-type]
+        (lambda: Outline(SQUARE).scale(0), "factor: expected a number above 0"),
+        (lambda: Outline(SQUARE).translate((1, 2, 3)), "offset: expected points of two finite numbers"),
+    ],
+)
+def test_wrong_outlines_are_refused(make: Callable[[], Any], message: str) -> None:
+    with pytest.raises(InvalidNode, match=message):
+        make()
+
+
+def test_missing_and_damaged_files_are_refused() -> None:
+    with pytest.raises(MissingFile, match=r"none\.svg"):
+        Outline.svg("none.svg")
+    with pytest.raises(MissingFile, match=r"none\.ttf"):
+        Outline.text("a", font="none.ttf")
+    with pytest.raises(InvalidFile, match="outline"):
+        from_json(to_json(Extrude(SQUARE, 1.0)).replace(b"V1", b"L"))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_damaged_fonts_raise_errors_of_ours(seed: int, tmp_path: Path) -> None:
+    rng, damaged = np.random.default_rng(seed), bytearray(FONT.read_bytes())
+    for place in rng.integers(0, 4000 if seed % 2 else len(damaged), 50):
+        damaged[place] = rng.integers(0, 256)
+    (tmp_path / "damaged.ttf").write_bytes(damaged)
+    with suppress(ImplicitDecalsError):
+        Outline.text("Ag", font=tmp_path / "damaged.ttf")
