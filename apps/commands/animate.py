@@ -11,10 +11,9 @@ from decals import MeshObject, Scene, pose, turntable
 from decals import animate as write_animation
 from decals.apps.commands.options import (
     MAX_SAMPLES,
-    ContactName,
     Inputs,
-    MappingName,
     OptionalWhole,
+    Rules,
     UpAxis,
     check_count,
     parse_size,
@@ -30,6 +29,7 @@ from decals.apps.models.samples import axes_of
 from decals.apps.output import check_animation, print_path
 from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
+from decals.rendering import Drawing
 from decals.scenes.animation import MAX_FRAMES, VIDEO_SUFFIXES
 from decals.scenes.camera import UPRIGHT
 from decals.scenes.pose import PosedScene
@@ -59,8 +59,7 @@ def animate(
     up: UpAxis = None,
     size: str = "800x600",
     samples: OptionalWhole = None,
-    contact: ContactName = None,
-    mapping: MappingName = None,
+    rules: Rules = Rules(),
     seed: OptionalWhole = None,
     inputs: Inputs = Inputs(),
 ) -> None:
@@ -97,10 +96,6 @@ def animate(
         Width and height of the pictures in pixels.
     samples
         Samples per pixel along each axis. Default: that of a saved scene, or 2.
-    contact
-        Contact mode, as for render.
-    mapping
-        Image mapping, as for render.
     seed
         Seed of the random numbers of decals.
     """
@@ -114,6 +109,7 @@ def animate(
         check_count("--frames", frames, 1, MAX_FRAMES)
     count = frames or (len(meshes) if meshes else DEFAULT_FRAMES)
     check_animation(output, VIDEO_SUFFIXES)
+    Drawing().overridden(**rules.given())  # checked before anything slow
     with preparing(inputs.define) as progress:
         function = _pose_function(poses) if poses is not None else None
         loaded = load_models(model, trust=inputs.trust, table=inputs.table, images=image)
@@ -130,8 +126,7 @@ def animate(
         whole = turns if turns is not None else float(function is None)
         cameras = turntable(scene, count, turns=whole)
         posed = cameras if function is None else _posed(cameras, function, rigid=rigid)
-        options = {"contact": contact, "mapping": mapping}
-        drawn = (replace(item, drawing=item.drawing.overridden(**options)) for item in posed)
+        drawn = (replace(item, drawing=item.drawing.overridden(**rules.given())) for item in posed)
         write_animation(drawn, output, size=pixels, rate=rate, samples=samples, count=count)
     print_path(output)
 

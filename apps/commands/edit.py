@@ -5,14 +5,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from decals.apps.commands.opening import check_options, opened, report_unsaved
-from decals.apps.commands.options import (
-    ContactName,
-    Inputs,
-    MappingName,
-    Start,
-    Stiffness,
-    parse_size,
-)
+from decals.apps.commands.options import Inputs, Rules, Start, parse_size
 from decals.apps.memory import import_ahead, keep_memory_low, share_heap
 from decals.apps.models.loading import import_definitions
 from decals.errors import InvalidInput
@@ -26,14 +19,13 @@ def edit(
     *,
     start: Start = Start(),
     size: str = "1200x800",
-    contact: ContactName = None,
-    stiffness: Stiffness = None,
-    mapping: MappingName = None,
+    rules: Rules = Rules(),
     inputs: Inputs = Inputs(),
 ) -> None:
     """Open models or a scene in an editor window.
 
-    Press h in the window for a list of keys.
+    Press h in the window for a list of keys. Contact mode, stiffness and image mapping are those at the
+    beginning: P, Shift + P and U change them in the window, and a saved scene keeps them.
 
     Parameters
     ----------
@@ -42,29 +34,17 @@ def edit(
         which N adds a ball.
     size
         Width and height of the window in pixels.
-    contact
-        Contact mode at the beginning, as for render. P changes it in the window; a saved scene keeps it.
-    stiffness
-        Stiffness of elastic contact at the beginning, likewise. Shift + P changes it.
-    mapping
-        Image mapping at the beginning, likewise. U changes it in the window.
     """
     share_heap()
     pixels = parse_size(size)
     check_options(start)
-    if stiffness is not None:
-        stiffness_number(stiffness, InvalidInput)
+    if rules.stiffness is not None:
+        stiffness_number(rules.stiffness, InvalidInput)
     EditWindow.require_screen()
     import_definitions(inputs.define)
     opening = opened(model, start, inputs, pixels)
     window = EditWindow(
-        opening.scene,
-        path=opening.path,
-        size=pixels,
-        recover=opening.recover,
-        contact=contact,
-        stiffness=stiffness,
-        mapping=mapping,
+        opening.scene, path=opening.path, size=pixels, recover=opening.recover, **rules.given()
     )
     opening.add_images(window)
     try:

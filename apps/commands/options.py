@@ -69,15 +69,6 @@ UpAxis = Annotated[
 ]
 """An optional upward axis on the command line."""
 
-ContactName = Annotated[Literal["product", "min", "radial", "elastic"] | None, Parameter(show_default=False)]
-"""An optional contact mode on the command line."""
-
-Stiffness = Annotated[float | None, Parameter(show_default=False)]
-"""An optional stiffness on the command line."""
-
-MappingName = Annotated[Literal["corrected", "chord", "walked"] | None, Parameter(show_default=False)]
-"""An optional image mapping on the command line."""
-
 CreaseAngle = Annotated[
     float | None,
     Parameter(
@@ -108,16 +99,22 @@ class Rules:
     Parameters
     ----------
     contact
-        Contact mode: product, min, radial or elastic. Default: that of the scene, as for the next two.
+        Contact mode: elastic (compresses images at contact lines; never folds one), product (equation 5 of
+        the paper), min (only the strongest push counts), or radial (scales images along rays). Default: that
+        of the scene, as for the next two, or elastic.
     stiffness
-        Stiffness of elastic contact, from 1 to 64.
+        Stiffness of elastic contact, from 1 to 64: how close to contact lines images are compressed.
+        Default: that of the scene, or 2.
     mapping
-        Image mapping: corrected, chord or walked.
+        Image mapping: corrected for the curvature of the surface, chord (the paper's projection), or walked
+        along the shortest path, for edges and corners. Default: that of the scene, or corrected.
     """
 
-    contact: ContactName = None
-    stiffness: Stiffness = None
-    mapping: MappingName = None
+    contact: Annotated[
+        Literal["product", "min", "radial", "elastic"] | None, Parameter(show_default=False)
+    ] = None
+    stiffness: Annotated[float | None, Parameter(show_default=False)] = None
+    mapping: Annotated[Literal["corrected", "chord", "walked"] | None, Parameter(show_default=False)] = None
 
     def given(self) -> dict[str, Any]:
         """Return the rules that are given."""

@@ -11,13 +11,11 @@ from decals import Scene, save_scene
 from decals.apps.commands.options import (
     MAX_SAMPLES,
     TILE,
-    ContactName,
     CreaseAngle,
     Inputs,
-    MappingName,
     OptionalWhole,
+    Rules,
     Seed,
-    Stiffness,
     UpAxis,
     check_count,
     given,
@@ -46,10 +44,8 @@ def render(
     up: UpAxis = None,
     size: str = "1200x900",
     samples: OptionalWhole = None,
-    contact: ContactName = None,
-    stiffness: Stiffness = None,
+    rules: Rules = Rules(),
     filtered: Annotated[bool | None, Parameter(negative=(), show_default=False)] = None,
-    mapping: MappingName = None,
     environment: str | None = None,
     environment_rotation: float | None = None,
     environment_strength: float | None = None,
@@ -83,19 +79,9 @@ def render(
         Width and height of the picture in pixels.
     samples
         Samples per pixel along each axis: 1 is fast, 2 smooth, 4 fine. Default: that of a saved scene, or 2.
-    contact
-        Contact mode: elastic (compresses images at contact lines; never folds one), product (equation 5 of
-        the paper), min (only the strongest push counts), or radial (scales images along rays). Default: that
-        of a saved scene, as for all options of drawing, or elastic.
-    stiffness
-        Stiffness of elastic contact, from 1 to 64: how close to contact lines images are compressed.
-        Default: that of a saved scene, or 2.
     filtered
         Average images, rims and contact lines over each sample, so that one sample a pixel
         shows decals smoothly.
-    mapping
-        Image mapping: corrected for the curvature of the surface, chord (the paper's projection), or walked
-        along the shortest path, for edges and corners. Default: that of a saved scene, or corrected.
     environment
         Equirectangular picture of all directions as light, in place of the studio light: a Radiance file
         (hdr), or any picture. Its upward axis is the camera's.
@@ -112,13 +98,7 @@ def render(
     view = parse_view(camera, axes_of(model[0]) if up is None else UPRIGHT[up])
     if samples is not None:
         check_count("--samples", samples, 1, MAX_SAMPLES)
-    options: dict[str, Any] = {
-        "samples": samples,
-        "contact": contact,
-        "stiffness": stiffness,
-        "mapping": mapping,
-        "filtered": filtered,
-    }
+    options: dict[str, Any] = {"samples": samples, "filtered": filtered, **rules.given()}
     changes = given(rotation=environment_rotation, strength=environment_strength, visible=environment_visible)
     if environment is not None:
         options["environment"] = Environment(environment, **changes)

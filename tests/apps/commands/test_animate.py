@@ -194,6 +194,7 @@ def test_the_command_turns_and_poses(vtk_display: None, folder: Path, capsys: Ca
         (["-o", "a.avi"], ".gif or .mp4"),
         (["-o", "nowhere/a"], "could not make the output folder"),
         (["-o", "a", "--frames", "0"], "--frames"),
+        (["-o", "a", "--stiffness", "0"], "stiffness"),
         (["-o", "a", "--poses", "none.py"], "--poses: expected a Python file"),
         (["-o", "a", "--poses", "empty.py"], "expected a function pose(t)"),
         (["-o", "a", "--poses", "empty.py", "--meshes", "ball.ply"], "got both"),
