@@ -59,7 +59,6 @@ LONG_FILES = (
     "blobtree/test_files.py",
     "decals/editing/test_commands.py",
     "blobtree/transpile/test_derivative.py",
-    "decals/surfaces/test_pressed_solids.py",
     "apps/sandbox/test_display.py",
     "decals/vtk/test_component.py",
     "apps/test_gallery.py",

@@ -10,7 +10,7 @@ import warp as wp
 from blobtree import to_json
 from blobtree.nodes.kinds import NODE_KINDS
 from tests.conformance import NAMES, problems_of, sample
-from tests.soundness import failures_of
+from tests.soundness import failures_of, random_tree
 
 WITHOUT_DATA = ("volume",)
 """Classes whose text leaves out their data."""
@@ -56,3 +56,15 @@ def test_files_hold_declared_fields_alone(tag: str) -> None:
 def test_the_text_of_a_node_makes_it_again(tag: str) -> None:
     node = sample(NODE_KINDS[tag], np.random.default_rng(4))
     assert eval(repr(node), NAMES) == node
+
+
+# -- random trees --------------------------------------------------------------------------------------
+
+
+@pytest.mark.ordinary_cases("11-4")
+@pytest.mark.parametrize(("seed", "count"), [(11, 4), *((seed, 10) for seed in range(8))])
+def test_random_trees_of_all_nodes_are_sound(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    trees = [random_tree(rng) for _ in range(count)]
+    found = {repr(tree): failures_of(tree, rng) for tree in trees}
+    assert {text: failures for text, failures in found.items() if failures} == {}

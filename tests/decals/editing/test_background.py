@@ -1,5 +1,6 @@
 """Long edits beside the window: what they come to is what they would have come to at once."""
 
+import sys
 import threading
 from typing import Any
 
@@ -29,7 +30,7 @@ from decals.editing import (
     TurnDecals,
 )
 from decals.editing.action_state import COMPILING
-from decals.editing.background import BUSY, MAX_WAITING
+from decals.editing.background import BUSY, MAX_WAITING, SWITCH_INTERVAL, ShortSwitchInterval
 from decals.editing.brush_settings import Brush
 from decals.editing.document import Edit
 from decals.editing.inputs import LOOKS, inputs_of
@@ -614,3 +615,39 @@ def test_a_result_that_cannot_be_carried_over_is_computed_again() -> None:
     finish(actions)
     assert command.runs == 2
     assert session.document.decals[7].radii[0] == pytest.approx(6 * radius)
+
+
+# -- the switch interval -------------------------------------------------------------------------------
+
+
+def test_turns_are_short_inside_and_as_before_outside() -> None:
+    before = sys.getswitchinterval()
+    shortest_rotations = ShortSwitchInterval()
+    inside, leave = threading.Event(), threading.Event()
+
+    def work() -> None:
+        with shortest_rotations:
+            inside.set()
+            leave.wait()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    inside.wait()
+    with pytest.raises(KeyError), shortest_rotations:
+        raise KeyError
+    assert sys.getswitchinterval() == pytest.approx(min(SWITCH_INTERVAL, before), rel=0.05), (
+        "the thread is still inside"
+    )
+    leave.set()
+    thread.join()
+    assert sys.getswitchinterval() == pytest.approx(before, rel=0.05)
+
+
+def test_turns_that_are_shorter_already_stay() -> None:
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(SWITCH_INTERVAL / 10)
+    try:
+        with ShortSwitchInterval():
+            assert sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL / 10, rel=0.05)
+    finally:
+        sys.setswitchinterval(before)

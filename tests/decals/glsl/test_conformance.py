@@ -1,11 +1,12 @@
-"""Every class of nodes in Warp and GLSL: generated from the declarations, as `tests.conformance`."""
+"""Every class of nodes in Warp and GLSL, as `tests.conformance`, and every field of sharp solids."""
 
 import numpy as np
 import pytest
 
-from blobtree import Node
+from blobtree import Box, Cone, Cylinder, Extrude, Node, Outline, Prism, Revolve
 from blobtree.conformance.samples import Rng
 from blobtree.nodes.kinds import NODE_KINDS
+from blobtree.tape.instruction_set import library
 from blobtree.tape.model import gradients_at
 from decals.rendering import Context
 from decals.rendering.tracing_shader import Kinds
@@ -36,3 +37,30 @@ def test_a_class_of_nodes_is_the_same_in_both_languages(context: Context, tag: s
     rng = np.random.default_rng(3)
     for _ in range(3):
         assert_same_in_both_languages(context, sample(NODE_KINDS[tag], rng), rng)
+
+
+# -- sharp solids --------------------------------------------------------------------------------------
+
+
+STAR = ((0, 0, 0), (1, 0.4, 0), (2, 0, 0), (1, 1.5, 0))
+
+
+SOLIDS: list[Node] = [
+    Box((0.1, 0.2, 0.3), (2, 1, 1), radius=0),
+    Cylinder((0, 0, 0), (1, 2, 0.5), 0.6, radius=0),
+    Cone((0, 0, 0), (1, 2, 0.5), radius=0.5, end_radius=0),
+    Prism(STAR, 0.7),
+    Extrude(Outline.text("B&"), 0.3, top_turn=20.0),
+    Revolve("M0 0H1L.5 1H0Z"),
+    Revolve("M.5 0H1V1Z", 200.0),
+]
+
+
+def test_the_solids_use_every_sharp_field() -> None:
+    used = {library().fields[code].name for solid in SOLIDS for code in solid.tape.fields}
+    assert used == {field.name for field in library().fields if field.name.startswith("sharp_")}
+
+
+@pytest.mark.parametrize("solid", SOLIDS)
+def test_fields_are_the_same_in_both_languages(context: Context, solid: Node) -> None:
+    assert_same_in_both_languages(context, solid, np.random.default_rng(3))

@@ -15,6 +15,7 @@ from blobtree.tracing.trace import trace
 from decals import Camera
 from decals.rendering import Context, Renderer, RenderOptions
 from decals.rendering.tracing_shader import Kinds, tracing_shader
+from tests.blobtree.custom_kinds import CUSTOM_TREES, EVERYTHING, Brick, Carve, Path, Ring, Soft
 from tests.blobtree.nodes.test_deformations import STRONG
 from tests.blobtree.nodes.test_gradient_blends import CORE as GRADIENT_BLENDS
 from tests.blobtree.nodes.test_gradient_blends import LIBRARY as LIBRARY_GRADIENT_BLENDS
@@ -101,7 +102,7 @@ def test_whole_tapes_are_the_same_in_both_languages(context: Context, start: int
 def test_direct_fields_are_the_same_in_both_languages(context: Context) -> None:
     kinds = kinds_of(FIELD_TREES)
     others = [field.name for code, field in enumerate(library().fields) if code not in kinds.fields]
-    assert all(name.startswith("sharp_") for name in others)  # those are in test_sharp
+    assert all(name.startswith("sharp_") for name in others)  # those are in test_conformance
     # Bounds of arcs depend on where the kernel ends, a square root of a difference that is near 0.
     assert_same_in_both_languages(context, FIELD_TREES, kinds, bounds_agreement=1e-4)
 
@@ -145,6 +146,21 @@ def test_other_falloffs_are_the_same_in_both_languages(context: Context, more: M
     kinds = kinds_of(trees)
     assert kinds.falloffs == tuple(range(len(library().falloffs)))
     assert_same_in_both_languages(context, trees, kinds)
+
+
+def test_own_kinds_are_the_same_in_both_languages(context: Context) -> None:
+    instruction_set = EVERYTHING.tape.instruction_set
+    all_kinds = Kinds(
+        tuple(range(len(instruction_set.skeletons))),
+        tuple(range(len(instruction_set.operators))),
+        6,
+        stretched=True,
+        warps=(0,),
+        warp_registers=4,
+        instruction_set=instruction_set,
+    )
+    trees = [tree for tree in CUSTOM_TREES if tree.tape.instruction_set is instruction_set]
+    assert_same_in_both_languages(context, trees[:20], all_kinds, 6)
 
 
 def kinds_of(trees: list[Node]) -> Kinds:
@@ -203,7 +219,16 @@ def assert_same_in_both_languages(
 
 
 BAR = Box((0, 0, 0), (0.5, 0.3, 3), radius=0.2)
+RING = Ring((0, 0, 0), (0.2, 0, 1), 0.8, radius=0.25, color=(0.9, 0.3, 0.1))
 MODELS = {
+    "one ring": RING,
+    "a brick, stretched": Brick((0, 0, 0), (1, 1, 0.4), radius=0.2).scale((1, 0.6, 1.5)),
+    "a ring in a soft blend, carved by a path": Carve(
+        (
+            Soft((RING, Point((0.8, 0, 0), radius=0.5)), 2.0),
+            Path((-2, -0.8, 0), (0, -0.8, 0), (0, -0.8, 2), radius=0.2),
+        )
+    ),
     "a volume": VOLUME + Point((0.8, 0, 0), radius=0.4),
     "a superquadric": Superquadric((0, 0, 0), (1, 0.6, 0.8), 0.4, 0.6).rotate((1, 2, 3), 30)
     + Point((1, 0, 0), radius=0.5),

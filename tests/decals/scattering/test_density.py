@@ -1,4 +1,4 @@
-"""Density and masks."""
+"""Density, masks, and regions of a mesh as masks."""
 
 from typing import Any
 
@@ -7,10 +7,10 @@ import pytest
 
 from decals import Relaxation
 from decals.errors import InvalidScattering
-from decals.scattering import vertex_density
+from decals.scattering import region_mask, vertex_density
 from decals.scattering.domain import Density, Mask
 from decals.surfaces import MeshSurface
-from tests.decals.meshes import plane, sphere
+from tests.decals.meshes import box, plane, sphere
 from tests.oracles.sized_decals import nearest_facing
 
 
@@ -123,3 +123,30 @@ def test_mask() -> None:
 def test_invalid_density_and_mask_values_raise(options: dict[str, Any], message: str) -> None:
     with pytest.raises(InvalidScattering, match=message):
         Relaxation([plane()], count=5, **options)
+
+
+# -- regions -------------------------------------------------------------------------------------------
+
+
+def test_region_masks_of_faces_and_vertices() -> None:
+    ball = sphere()
+    middles = ball.vertices[ball.faces].mean(axis=1)
+    relaxation = Relaxation(ball, count=200, mask=region_mask(ball, middles[:, 2] > 0.2), iterations=30)
+    relaxation.run()
+    assert (middles[ball.locate(relaxation.positions)[0], 2] > 0.2).all()
+    # a zone of the unit ball is 2 pi times its height
+    assert relaxation.domain.area == pytest.approx(2 * np.pi * 0.8, rel=0.05)
+    mask = region_mask(ball, ball.vertices[:, 2] > 0.0)
+    points, _ = ball.sample(4000, seed=1)
+    certain = np.abs(points[:, 2]) > 0.1
+    assert np.array_equal(mask(points)[certain], points[certain, 2] > 0)
+
+
+@pytest.mark.parametrize(
+    "wrong", [None, "x", [True], np.zeros(5), [[True]], 2.0 * np.ones(12), np.full(12, np.nan)]
+)
+def test_invalid_flags_raise(wrong: Any) -> None:
+    with pytest.raises(InvalidScattering, match="flags: expected"):
+        region_mask(box(), wrong)
+    with pytest.raises(InvalidScattering, match="surface: expected a MeshSurface"):
+        region_mask(wrong, [True])

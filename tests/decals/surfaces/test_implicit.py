@@ -4,7 +4,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import ISO, Disc, Intersection, Node, Point, Segment, Union
+from blobtree import ISO, Disc, Intersection, Node, Point, Segment, SolidContact, Union
+from decals import scatter
 from decals.errors import InvalidMesh, InvalidPoints
 from decals.surfaces import ImplicitSurface, Surface
 from decals.surfaces.implicit import project_without_mesh
@@ -157,3 +158,26 @@ def test_points_beside_a_bent_tree_of_small_parts_reach_it(degrees: float) -> No
     positions, normals = surface.project(points)
     np.testing.assert_allclose(tree(positions), ISO, atol=1e-4)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-5)
+
+
+# -- solids in contact ---------------------------------------------------------------------------------
+
+
+BALLS = (Point((-0.8, 0, 0), radius=1.0), Point((0.8, 0, 0), radius=1.0))
+
+
+def test_decals_cover_the_outside_of_a_contact_and_all_of_a_solid() -> None:
+    model = SolidContact(BALLS, height=0.06)
+    for tree, touching in ((model, False), (model.solids()[0], True)):
+        surface = ImplicitSurface(tree)
+        decals = scatter(surface, count=120, seed=1)
+        assert len(decals) == 120
+        np.testing.assert_allclose(tree(decals.positions), ISO, atol=1e-4)
+        in_contact = np.hypot(*decals.positions[np.abs(decals.positions[:, 0]) < 0.01, 1:].T) < 0.5
+        assert in_contact.any() == touching
+
+
+def test_rays_hit_the_contact_surface_of_a_single_solid() -> None:
+    left = SolidContact(BALLS).solids()[0]
+    distances = ImplicitSurface(left).raycast([[3.0, 0.1, 0.0]], [[-1.0, 0.0, 0.0]])
+    np.testing.assert_allclose(distances, 3.0, atol=1e-4)
