@@ -14,7 +14,7 @@ from decals.apps.commands.options import (
     Inputs,
     OptionalWhole,
     Rules,
-    UpAxis,
+    Scattered,
     check_count,
     parse_size,
 )
@@ -53,14 +53,11 @@ def animate(
         list[str] | None, Parameter(negative=(), show_default=False, consume_multiple=True)
     ] = None,
     rigid: Annotated[bool, Parameter(negative=())] = False,
-    decals: OptionalWhole = None,
-    image: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
+    scattered: Scattered = Scattered(),
     camera: str | None = None,
-    up: UpAxis = None,
     size: str = "800x600",
     samples: OptionalWhole = None,
     rules: Rules = Rules(),
-    seed: OptionalWhole = None,
     inputs: Inputs = Inputs(),
 ) -> None:
     """Draw a turntable, or a scene in a sequence of poses.
@@ -86,21 +83,15 @@ def animate(
         Mesh files, one for each frame: the vertices of the scene's only mesh, in its order.
     rigid
         Keep the shapes of decals in poses; they then turn with the nearest triangle.
-    decals
-        Number of decals on models. Default: 500.
-    image
-        Image of the decals, as for render. Can be repeated.
     camera
         View of the first frame, as for render.
     size
         Width and height of the pictures in pixels.
     samples
         Samples per pixel along each axis. Default: that of a saved scene, or 2.
-    seed
-        Seed of the random numbers of decals.
     """
     pixels = parse_size(size)
-    view = parse_view(camera, axes_of(model[0]) if up is None else UPRIGHT[up])
+    view = parse_view(camera, axes_of(model[0]) if scattered.up is None else UPRIGHT[scattered.up])
     if samples is not None:
         check_count("--samples", samples, 1, MAX_SAMPLES)
     if poses is not None and meshes:
@@ -112,15 +103,14 @@ def animate(
     Drawing().overridden(**rules.given())  # checked before anything slow
     with preparing(inputs.define) as progress:
         function = _pose_function(poses) if poses is not None else None
-        loaded = load_models(model, trust=inputs.trust, table=inputs.table, images=image)
+        loaded = load_models(model, trust=inputs.trust, table=inputs.table, images=scattered.image)
         if isinstance(loaded, Scene):
-            refuse_scattering(decals, image, seed, inputs.table)
+            refuse_scattering(scattered, inputs.table)
             scene = loaded
-            if camera is not None or up is not None:
+            if camera is not None or scattered.up is not None:
                 scene = scene.replace(camera=frame(scene.objects, view, pixels))
         else:
-            scattering = ScatterOptions.from_arguments(decals, image, seed)
-            scene = scattering.scene(loaded, view, pixels, progress)
+            scene = ScatterOptions.of(scattered).scene(loaded, view, pixels, progress)
         if meshes:
             function = _mesh_function(scene, meshes)
         whole = turns if turns is not None else float(function is None)

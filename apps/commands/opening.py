@@ -85,7 +85,7 @@ def opened(model: list[str] | None, start: Start, inputs: Inputs, pixels: tuple[
                 else:
                     path = path or new_file(Path(), f"{Path(model[0]).stem}-decals", recover=True)
             else:
-                options = ScatterOptions.from_arguments(start.decals, start.image, start.seed)
+                options = ScatterOptions.of(start)
                 where = parse_view(None, axes_of(model[0]) if start.up is None else UPRIGHT[start.up])
                 scene = options.scene(loaded, where, pixels, progress)
                 path = path or new_file(Path(), f"{Path(model[0]).stem}-decals", recover=True)

@@ -199,7 +199,32 @@ class Surfaces:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Start:
+class Scattered:
+    """Options of the decals that are scattered over models.
+
+    Parameters
+    ----------
+    decals
+        Number of decals. Default: 500.
+    image
+        Image of the decals: eye, rivet, rock, scale, spatter or tile, optionally with a colour
+        (scale#b0413e), or a picture file. Can be repeated: each decal then takes one at random. Default:
+        scale.
+    up, seed
+        See `UpAxis` and `Seed`.
+    """
+
+    decals: OptionalWhole = None
+    image: Annotated[
+        list[str] | None, Parameter(name=("--image", "--images"), negative=(), show_default=False)
+    ] = None
+    up: UpAxis = None
+    seed: Seed = None
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Start(Scattered):
     """Options of what `edit` and `sandbox` open with.
 
     Parameters
@@ -216,12 +241,6 @@ class Start:
         or scene.json.
     """
 
-    decals: OptionalWhole = None
-    image: Annotated[
-        list[str] | None, Parameter(name=("--image", "--images"), negative=(), show_default=False)
-    ] = None
-    up: UpAxis = None
-    seed: Seed = None
     save: Path | None = None
 
 

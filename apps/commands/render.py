@@ -15,8 +15,7 @@ from decals.apps.commands.options import (
     Inputs,
     OptionalWhole,
     Rules,
-    Seed,
-    UpAxis,
+    Scattered,
     check_count,
     given,
     parse_size,
@@ -38,10 +37,8 @@ def render(
     /,
     *,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    decals: OptionalWhole = None,
-    image: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
+    scattered: Scattered = Scattered(),
     camera: str | None = None,
-    up: UpAxis = None,
     size: str = "1200x900",
     samples: OptionalWhole = None,
     rules: Rules = Rules(),
@@ -50,7 +47,6 @@ def render(
     environment_rotation: float | None = None,
     environment_strength: float | None = None,
     environment_visible: Annotated[bool | None, Parameter(negative=(), show_default=False)] = None,
-    seed: Seed = None,
     save: Path | None = None,
     crease_angle: CreaseAngle = None,
     inputs: Inputs = Inputs(),
@@ -66,12 +62,6 @@ def render(
         spheres), or one saved scene.
     output
         The picture: png, jpg, webp or tif.
-    decals
-        Number of decals. Default: 500.
-    image
-        Image of the decals: eye, rivet, rock, scale, spatter or tile, optionally with a colour
-        (scale#b0413e), or a picture file. Can be repeated: each decal then takes one at random. Default:
-        scale.
     camera
         View: three-quarter, front, back, left, right, top, bottom, or a direction x,y,z toward the camera.
         Default: three-quarter.
@@ -95,7 +85,7 @@ def render(
         Also write the scene to this JSON file, which render and edit can open.
     """
     pixels = parse_size(size)
-    view = parse_view(camera, axes_of(model[0]) if up is None else UPRIGHT[up])
+    view = parse_view(camera, axes_of(model[0]) if scattered.up is None else UPRIGHT[scattered.up])
     if samples is not None:
         check_count("--samples", samples, 1, MAX_SAMPLES)
     options: dict[str, Any] = {"samples": samples, "filtered": filtered, **rules.given()}
@@ -109,18 +99,18 @@ def render(
     with ExitStack() as stack:
         progress = stack.enter_context(preparing(inputs.define))
         loaded = load_models(
-            model, trust=inputs.trust, crease_angle=crease_angle, table=inputs.table, images=image
+            model, trust=inputs.trust, crease_angle=crease_angle, table=inputs.table, images=scattered.image
         )
         if isinstance(loaded, Scene):
-            refuse_scattering(decals, image, seed, inputs.table)
+            refuse_scattering(scattered, inputs.table)
         drawing = (loaded.drawing if isinstance(loaded, Scene) else Drawing()).overridden(**options)
         if changes and environment is None:
             drawing = drawing.overridden(environment=_changed(drawing.environment, changes))
-        scattering = ScatterOptions.from_arguments(decals, image, seed)
+        scattering = ScatterOptions.of(scattered)
         # The renderer comes first: without graphics the command fails before the long work.
         renderer = stack.enter_context(Renderer(max_tile=TILE))
         scene = loaded if isinstance(loaded, Scene) else scattering.scene(loaded, view, pixels, progress)
-        if isinstance(loaded, Scene) and (camera is not None or up is not None):
+        if isinstance(loaded, Scene) and (camera is not None or scattered.up is not None):
             scene = scene.replace(camera=frame(scene.objects, view, pixels))
         if environment is not None:
             drawing = drawing.overridden(environment=_changed(drawing.environment, {"up": scene.camera.up}))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from blobtree import Progress
 from decals import DecalImage, Scene, scatter
-from decals.apps.commands.options import DEFAULT_IMAGES, MAX_DECALS, MAX_SEED, check_count
+from decals.apps.commands.options import DEFAULT_IMAGES, MAX_DECALS, MAX_SEED, Scattered, check_count
 from decals.apps.commands.progress_bars import PREPARING
 from decals.apps.views import Size, View, frame
 from decals.errors import InvalidInput
@@ -16,14 +16,12 @@ from decals.scenes.recipe import Recipe
 DEFAULT_COUNT = 500
 
 
-def refuse_scattering(
-    count: int | None, images: Sequence[str] | None, seed: int | None, table: Path | None
-) -> None:
+def refuse_scattering(given: Scattered, table: Path | None) -> None:
     """Raise InvalidInput for options of scattered decals, where a scene or a table has its own decals.
 
     Decals of a table take images.
     """
-    if count is not None or seed is not None or (images and table is None):
+    if given.decals is not None or given.seed is not None or (given.image and table is None):
         raise InvalidInput(
             "a saved scene or table has its own decals; leave out --decals, --seed, and --image of a scene"
         )
@@ -38,14 +36,12 @@ class ScatterOptions:
     seed: int
 
     @classmethod
-    def from_arguments(
-        cls, count: int | None, images: Sequence[str] | None, seed: int | None
-    ) -> "ScatterOptions":
-        """Check the arguments, fill in the defaults and read the images."""
-        count, seed = DEFAULT_COUNT if count is None else count, seed or 0
+    def of(cls, given: Scattered) -> "ScatterOptions":
+        """Check the options of a command, fill in the defaults and read the images."""
+        count, seed = DEFAULT_COUNT if given.decals is None else given.decals, given.seed or 0
         check_count("--decals", count, 0, MAX_DECALS)
         check_count("--seed", seed, 0, MAX_SEED)
-        return cls(count, tuple(DecalImage.load(source) for source in images or DEFAULT_IMAGES), seed)
+        return cls(count, tuple(DecalImage.load(source) for source in given.image or DEFAULT_IMAGES), seed)
 
     def scene(self, objects: Sequence[SceneObject], view: View, size: Size, progress: Progress) -> Scene:
         """Return a scene of the objects covered with decals, and a camera that shows them."""
