@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from blobtree._typing import Float64Array
 from blobtree.declare.parameters import CHECKS, Parameter, Quantity
 from blobtree.errors import ImplicitDecalsError, InvalidNode, UnusableFile
+from blobtree.identity import content_hash
 from blobtree.lazy import Lazy
 from blobtree.nodes.crossings import meeting_edges
 from blobtree.nodes.drawings import filled_shapes
@@ -241,6 +242,11 @@ class Outline(msgspec.Struct, frozen=True, dict=True):
         return self._of([[curve + way for curve in loop] for loop in self._curves])
 
     @property
+    def content_hash(self) -> str:
+        """Content hash of the path data."""
+        return content_hash(self.path)
+
+    @property
     def area(self) -> float:
         """The area of the shape, without its holes."""
         return float(sum(_area(loop.points) for loop in self.loops))
@@ -289,6 +295,7 @@ class _Pen:
     def __init__(self) -> None:
         self.loops: list[list[Curve]] = []
         self._place: Plane = (0.0, 0.0)
+        self._left = MOST_CORNERS
 
     def moveTo(self, point: Plane) -> None:  # noqa: N802  (names of the pen protocol)
         """Begin a loop."""
@@ -297,6 +304,9 @@ class _Pen:
 
     def curveTo(self, *points: Plane) -> None:  # noqa: N802
         """Add a curve by its further control points."""
+        if self._left == 0:
+            raise InvalidNode(f"path: expected at most {MOST_CORNERS:,} lines, got more; simplify it")
+        self._left -= 1
         self.loops[-1].append(np.array([self._place, *points], np.float64))
         self._place = points[-1]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import blobtree
-from blobtree import Node
+from blobtree import Node, Outline
 from blobtree.declare.parameters import Quantity, fields_of, parameters_of
 from blobtree.files import replacing, write_atomically
 from blobtree.nodes.values import left_out
@@ -204,6 +204,8 @@ class _Script:
             value = getattr(node, field.name)
             if not left_out(field, value):
                 text = repr(value) if field.name in declared else self._operands(value)
+                if isinstance(value, Outline):
+                    text = f"blobtree.{text}"
                 values.append(f"{field.name}={text}")
         if getattr(blobtree, kind.__name__, None) is kind:
             return f"blobtree.{kind.__name__}({', '.join(values)})"

@@ -23,6 +23,8 @@
   half-spaces and balls, over that distance, the largest of all operators whose width is a length.
 * repeats: `repeat_10000_over_visible`, the time of rays that meet 100 of 10,000 boxes in a grid, over that of
   the same rays through these 100; both grids keep their cells, as while they are drawn.
+* outlines: `outline_ns_4` and `outline_ns_4096`, times of a point of solids over stars of 4 and 4,096 edges,
+  and `text_ns`, that of the extruded text "Implicit & Decals" of `text_edges` edges.
 * fits: see `tests.bench.fitting`.
 * costs: `mixed_over_sum` is the cost per crossing cell of a tree with a clean union, solids in contact and a
   bend, over that of the pure sum of its primitives; `gradient_over_sum` is the same with a gradient blend in
@@ -47,8 +49,10 @@ from numpy.typing import NDArray
 from blobtree import (
     Box,
     CleanUnion,
+    Extrude,
     GradientBlend,
     Node,
+    Outline,
     Point,
     Repeat,
     Segment,
@@ -339,6 +343,33 @@ def repeats(_: argparse.Namespace) -> Figures:
     return {"repeat_10000_over_visible": many / few, "repeat_10000_cells_mb": kept[0].nbytes / 1e6}
 
 
+def outlines(_: argparse.Namespace) -> Figures:
+    """Time points around extrusions of few and of many edges."""
+
+    def star(count: int) -> Outline:
+        angles = np.arange(count) * 2.0 * np.pi / count
+        rays = 1.0 + 0.2 * np.sin(9.0 * angles)
+        return Outline.polygon(rays[:, None] * np.column_stack([np.cos(angles), np.sin(angles)]))
+
+    def nanoseconds(outline: Outline) -> float:
+        solid = Extrude(outline, 0.3)
+        points = np.random.default_rng(0).uniform(*solid.support, (200_000, 3))
+        times: list[float] = []
+        for _round in range(4):
+            start = time.perf_counter()
+            solid(points)
+            times.append(time.perf_counter() - start)
+        return 1e9 * min(times[1:]) / len(points)
+
+    text = Outline.text("Implicit & Decals")
+    return {
+        "outline_ns_4": nanoseconds(star(4)),
+        "outline_ns_4096": nanoseconds(star(4096)),
+        "text_edges": sum(len(loop.points) for loop in text.loops),
+        "text_ns": nanoseconds(text),
+    }
+
+
 GROUPS: dict[str, Callable[[argparse.Namespace], Figures]] = {
     "conformance": conformance,
     "bounds": bounds,
@@ -352,6 +383,7 @@ GROUPS: dict[str, Callable[[argparse.Namespace], Figures]] = {
     "edges": edges,
     "widths": widths,
     "repeats": repeats,
+    "outlines": outlines,
     "costs": costs,
     "fits": fits,
 }

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
-from blobtree import Extrude, Outline, from_json, to_json
+from blobtree import Extrude, Outline, content_hash, from_json, to_json
 from blobtree.errors import ImplicitDecalsError, InvalidFile, InvalidNode, MissingFile
 
 FONT = Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf")
@@ -141,6 +141,8 @@ def test_outlines_are_values() -> None:
     solid = Extrude(SQUARE, 1.0)
     assert solid.outline == one
     assert from_json(to_json(solid)) == solid
+    assert content_hash(solid) == content_hash(Extrude(other, 1.0))
+    assert content_hash(solid) != content_hash(Extrude(one.scale(2.0), 1.0))
 
 
 def test_the_shape_lies_on_the_left() -> None:
@@ -167,7 +169,8 @@ def test_the_shape_lies_on_the_left() -> None:
         (lambda: Outline.polygon([(0, 0), (np.nan, 0), (0, 1)]), "points: expected points of two finite"),
         (lambda: Outline.polygon("square"), "points: expected points of two finite"),
         (lambda: Outline.polygon([]), "points: expected points of two finite"),
-        (lambda: Outline.polygon(np.random.default_rng(1).random((60_000, 2))), "at most 50,000 corners"),
+        (lambda: Outline.polygon(np.random.default_rng(1).random((60_000, 2))), "at most 50,000 lines"),
+        (lambda: Outline("M0 0" + "C0 9 9 9 9 0S0 -9 0 0" * 2000), "at most 50,000 corners"),
         (lambda: Outline.arcs([(0, 0), (1, 0)], [1, 1, 1]), "bulges: expected a finite number, or one for"),
         (lambda: Outline.spline([(0, 0), (0, 0), (1, 1)]), "each other than the one before"),
         (lambda: Outline.svg("<svg><path"), "drawing: expected one without errors, got ParseError"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import decals
-from blobtree import BlendGraph, Node, Point, Polyline, from_sdf
+from blobtree import BlendGraph, Extrude, Node, Outline, Point, Polyline, from_sdf
 from decals import Camera, DecalImage, DecalMaterial, MeshObject, Scene, TreeObject
 from decals.errors import InvalidScene
 from decals.model import COLUMNS
@@ -62,6 +62,7 @@ def test_the_script_gives_the_same_scene(count: int, tmp_path: Path) -> None:
         BlendGraph((BALL, shared), names=("a", "b"), pairs=(("a", "b"),)),
         (shared + shared.twist(20.0)) - Polyline(((0, 0, 0), (1, 0, 0.1)), radius=0.1),
         Ring((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, radius=0.3),
+        Extrude(Outline.text("'Ab'"), 0.3),
     ]
     vertices, faces = box((-1, -4, -1), (1, -2, 1))
     given = decals_at_random(count)
