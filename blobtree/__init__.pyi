@@ -31,6 +31,8 @@ from .nodes.blends import (
     SmoothIntersection,
     SuperellipticBlend,
     SymmetricDifference,
+    Transition,
+    Unmasked,
 )
 from .nodes.contact import Bulge, ContactSurface, Press, RatedUnion, SolidContact
 from .nodes.convolution import (
@@ -157,9 +159,11 @@ __all__ = [
     "TaperedBezier",
     "Torus",
     "Transform",
+    "Transition",
     "Triangle",
     "Twist",
     "Union",
+    "Unmasked",
     "Volume",
     "Warp",
     "__version__",

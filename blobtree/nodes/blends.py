@@ -783,6 +783,43 @@ class Masked(Operator):
         return KEEP_BOTH
 
 
+class Unmasked(Operator):
+    """First operand without what `Masked` keeps: none of it within the second operand, all where that is 0.
+
+    Examples
+    --------
+    >>> from blobtree import Point, Unmasked
+    >>> a, mask = Point((0, 0, 0), radius=1.0), Point((1, 0, 0), radius=1.0)
+    >>> Unmasked(a, mask)([[0.5, 0, 0], [-1.0, 0, 0]]).astype(float).round(3).tolist()
+    [0.0, 0.5]
+    """
+
+    tag = "unmasked"
+    like = "difference"
+    monotone = True
+
+    @formula
+    def partials(a: wp.float32, b: wp.float32) -> wp.vec3:
+        """F = a (1 − s(2b)), s as in `Masked`."""
+        t = wp.min(2.0 * b, 1.0)
+        shown = (1.0 - t) * (1.0 - t) * (1.0 + 2.0 * t)
+        return wp.vec3(a * shown, shown, -12.0 * a * t * (1.0 - t))
+
+    @formula
+    def slope(rise: wp.vec2, most: wp.vec2) -> wp.float32:
+        """|F'| ≤ |a'| + 3 a |b'|."""
+        return wp.max(rise[0], 0.0) + 3.0 * most[0] * wp.max(rise[1], 0.0)
+
+    @formula
+    def keeps(a: wp.vec2, b: wp.vec2) -> wp.int32:
+        """Return a alone where b is absent, and nothing inside the surface of b."""
+        if a[1] <= 0.0 or b[0] >= 0.5:
+            return KEEP_NONE
+        if b[1] <= 0.0:
+            return KEEP_LEFT
+        return KEEP_BOTH
+
+
 # -- macros ---------------------------------------------------------------------------------------------
 
 
@@ -887,6 +924,36 @@ class LocalBlend(Macro):
         """Return the union plus the masked intersection."""
         both = (self.first, self.second)
         return Sum(Union(both), Masked(Intersection(both), self.region))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Transition(Macro):
+    """Node that is `inside` within a region and `outside` where the region's field is 0.
+
+    F = (1 − s(2h)) f + s(2h) g, where h is the region's field and s(t) = 3t² − 2t³ up to t = 1. Two blends
+    of the same operands give a blend whose width varies in space; the region may be any field.
+
+    Examples
+    --------
+    >>> from blobtree import Point, RoundUnion, Transition
+    >>> a, b = Point((0, 0, 0), radius=1.0), Point((1.5, 0, 0), radius=1.0)
+    >>> region = Point((0.75, 0, 0.7), radius=0.4)
+    >>> model = Transition(RoundUnion(a, b, width=0.1), RoundUnion(a, b, width=0.6), region)
+    >>> above, below = [[0.75, 0, 0.7]], [[0.75, 0, -0.7]]
+    >>> bool(model(above) == model.inside(above)), bool(model(below) == model.outside(below))
+    (True, True)
+    """
+
+    file_tag = "transition"
+
+    outside: Node
+    inside: Node
+    region: Node
+
+    @Lazy
+    def expanded(self) -> Node:
+        """Return the sum of both parts."""
+        return Sum(Unmasked(self.outside, self.region), Masked(self.inside, self.region))
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)

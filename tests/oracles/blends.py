@@ -129,6 +129,11 @@ def masked(a: Floats, b: Floats) -> Floats:
     return shown
 
 
+def unmasked(a: Floats, b: Floats) -> Floats:
+    shown: Floats = a * (1.0 - smoothstep(2.0 * b))
+    return shown
+
+
 def opening(towards_a: Floats, towards_b: Floats, start_angle: float, full_angle: float) -> Floats:
     """tan(π/4 − θ) from gradients (n, 3): the angle by its cosine, faded where one is far shorter."""
     lengths = np.linalg.norm(towards_a, axis=1), np.linalg.norm(towards_b, axis=1)
@@ -173,6 +178,7 @@ VALUES: dict[str, Callable[..., Floats]] = {
     "arc_intersection": arc_intersection,
     "arc_difference": arc_difference,
     "masked": masked,
+    "unmasked": unmasked,
     "deepest": deepest,
     "gradient_blend": opened,
 }

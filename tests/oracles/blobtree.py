@@ -68,8 +68,10 @@ from blobtree import (
     TaperedBezier,
     Torus,
     Transform,
+    Transition,
     Twist,
     Union,
+    Unmasked,
     Volume,
 )
 from blobtree.declare.claims import Support
@@ -359,6 +361,8 @@ def written_out(node: Node) -> Node:
             return Sum([ConvolutionSegment(*p, radius=r[0], end_radius=r[1], **same) for p, r in ends])
         case LocalBlend(first=a, second=b, region=region):
             return Sum(Union(a, b), Masked(Intersection(a, b), region))
+        case Transition(outside=outside, inside=inside, region=region):
+            return Sum(Unmasked(outside, region), Masked(inside, region))
         case BlendGraph(operands=operands, names=names, pairs=pairs):
             return Union([Sum([operands[i] for i in group]) for group in blends.cliques(names, pairs)])
     raise TypeError(type(node))

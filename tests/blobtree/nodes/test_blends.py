@@ -13,10 +13,12 @@ from blobtree import (
     Intersection,
     LocalBlend,
     Mirror,
+    Noise,
     Point,
     RDifference,
     Ricci,
     RIntersection,
+    RoundUnion,
     RUnion,
     Segment,
     Shell,
@@ -25,10 +27,13 @@ from blobtree import (
     Sum,
     SuperellipticBlend,
     SymmetricDifference,
+    Transition,
     Union,
 )
 from blobtree.errors import InvalidNode
 from tests.blobtree.custom_kinds import Soft, Stew, Swell
+from tests.blobtree.tracing.test_trace import checked_hits, rays_through
+from tests.blobtree.trees import random_trees
 
 A, B, C, D = (Point((0.8 * x, 0.1 * x, 0.0), radius=0.7) for x in range(4))
 PAIRS = (("a", "b"), ("b", "c"))
@@ -149,6 +154,29 @@ def test_a_local_blend_is_a_sum_inside_its_region_and_a_union_where_that_ends() 
     assert inside.sum() > 20
     np.testing.assert_allclose(local(points[inside]), (A + B)(points[inside]), atol=1e-6)
     np.testing.assert_allclose(local(points[outside]), (A | B)(points[outside]), atol=1e-6)
+
+
+def test_a_transition_is_each_node_where_its_part_of_the_region_is() -> None:
+    region = Point((0.4, 0.0, 0.8), radius=0.4)
+    narrow, wide = RoundUnion(A, B, width=0.02), RoundUnion(A, B, width=0.6)
+    model = Transition(narrow, wide, region)
+    points = np.random.default_rng(1).uniform(-1, 2, (4000, 3))
+    share = region(points)
+    for node, part in ((wide, share >= 0.5), (narrow, share == 0.0)):
+        assert part.sum() > 20
+        np.testing.assert_allclose(model(points[part]), node(points[part]), atol=1e-6)
+    t = np.minimum(2.0 * share.astype(np.float64), 1.0)
+    mixed = narrow(points) + (3.0 * t**2 - 2.0 * t**3) * (wide(points) - narrow(points))
+    np.testing.assert_allclose(model(points), mixed, atol=2e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_rays_lose_no_surface_of_a_transition(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    first, second = random_trees(60 + seed, 2, depth=2)
+    region = (Point((0.2, 0, 0), radius=0.6), Noise((0, 0, 0), (3, 3, 3), wavelength=1.0), Union(A, B))[seed]
+    model = Transition(first, second, region)
+    assert checked_hits(model, *rays_through(rng, model, 300)) > 10
 
 
 def test_a_mirror_adds_the_image_and_a_node_below_it_changes_both() -> None:
