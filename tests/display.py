@@ -3,7 +3,6 @@
 import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Iterator
 from itertools import count
 
@@ -39,17 +38,3 @@ def display() -> Iterator[str]:
     finally:
         process.terminate()
         process.wait(30)
-
-
-def run_module(module: str, *arguments: str, **environment: str) -> str:
-    """Run a module of the tests as a program, and return its output."""
-    done = subprocess.run(
-        [sys.executable, "-m", module, *arguments],
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout

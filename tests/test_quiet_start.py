@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+from tests.programs import output_of
+
 SCRIPTS = {
     "values": "from blobtree import Point; Point((0, 0, 0), radius=1.0).gradient([[0.0, 0.0, 0.0]])",
     "mesh": "from blobtree import Point, polygonize; polygonize(Point((0, 0, 0), radius=1.0), resolution=8)",
@@ -58,5 +60,4 @@ gc.disable()
 from decals import render
 print(gc.isenabled())
 """
-    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert run.stdout.splitlines() == ["True []", "False", "True True"]
+    assert output_of(script).splitlines() == ["True []", "False", "True True"]

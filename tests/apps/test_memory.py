@@ -1,11 +1,11 @@
 """Memory of long sessions."""
 
-import subprocess
 import sys
 
 import pytest
 
 from decals.apps import memory
+from tests.programs import output_of
 
 PIECES = """
 import sys, time
@@ -31,8 +31,7 @@ print(before - after, before - resident())
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems have another allocator")
 @pytest.mark.parametrize(("seconds", "returned"), [(0.05, True), (100.0, False)])
 def test_a_session_returns_the_gaps_of_its_heap(seconds: float, returned: bool) -> None:
-    command = [sys.executable, "-c", PIECES, str(seconds)]
-    at_once, later = map(float, subprocess.check_output(command, text=True).split())
+    at_once, later = map(float, output_of(PIECES, str(seconds)).split())
     assert (later > 40.0) == returned
     assert at_once < 40.0 or returned
 
@@ -62,8 +61,7 @@ library.fflush(output)
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems have another allocator")
 @pytest.mark.parametrize("kind", ["shared", "several"])
 def test_all_threads_share_a_heap(kind: str) -> None:
-    report = subprocess.check_output([sys.executable, "-c", HEAPS, kind], text=True)
-    assert (report.count("<heap nr=") == 1) == (kind == "shared")
+    assert (output_of(HEAPS, kind).count("<heap nr=") == 1) == (kind == "shared")
 
 
 AHEAD = """
@@ -83,7 +81,7 @@ print(hasattr(importlib.import_module(FIRST_USED), "evaluate_sensitivities"))
 
 @pytest.mark.slow
 def test_kernels_of_the_first_drag_are_imported_ahead() -> None:
-    assert subprocess.check_output([sys.executable, "-c", AHEAD], text=True) == "True\n"
+    assert output_of(AHEAD) == "True\n"
 
 
 FAULTS = """
@@ -153,9 +151,7 @@ def test_another_c_library_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> Non
 
 @pytest.mark.skipif(memory._glibc() is None, reason="the options are those of glibc")
 def test_work_takes_its_memory_from_the_system_once() -> None:
-    resting, working, after, returned = map(
-        int, subprocess.check_output([sys.executable, "-c", FAULTS], text=True).split()
-    )
+    resting, working, after, returned = map(int, output_of(FAULTS).split())
     assert working < 0.1 * resting  # page faults; large pages take fewer in all
     assert after > 0.5 * resting
     assert returned > 3000

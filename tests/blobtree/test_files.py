@@ -16,6 +16,7 @@ import pytest
 
 import blobtree
 from blobtree.files import PREFIX, exists, is_file, is_folder, is_too_long, replacing, write_atomically
+from tests.programs import output_of
 
 posix = pytest.mark.skipif(os.name != "posix", reason="permissions and signals of POSIX")
 
@@ -97,17 +98,11 @@ def test_an_error_names_the_path(tmp_path: Path, name: str, reason: str) -> None
 
 
 def test_temporary_files_of_ended_processes_are_removed(tmp_path: Path) -> None:
-    child = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "import os, sys\nfrom blobtree.files import replacing\n"
-            "with replacing(sys.argv[1]) as temporary:\n    temporary.write_bytes(b'half')\n    os._exit(0)",
-            str(tmp_path / "a.txt"),
-        ],
-        check=True,
+    output_of(
+        "import os, sys\nfrom blobtree.files import replacing\n"
+        "with replacing(sys.argv[1]) as temporary:\n    temporary.write_bytes(b'half')\n    os._exit(0)",
+        str(tmp_path / "a.txt"),
     )
-    assert child.returncode == 0
     (left,) = files_of(tmp_path)
     assert left.startswith(PREFIX)
     foreign = tmp_path / f"{PREFIX}00000000-1-0123456789ab.txt"

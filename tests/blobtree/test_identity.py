@@ -2,8 +2,6 @@
 
 import copy
 import pickle
-import subprocess
-import sys
 import zlib
 from collections import OrderedDict
 from dataclasses import dataclass, field, replace
@@ -33,6 +31,7 @@ from blobtree.errors import InvalidInput, InvalidNode, UnusableFile
 from blobtree.nodes.samples import Samples
 from tests.blobtree.custom_kinds import EVERYTHING
 from tests.blobtree.trees import random_trees, trees
+from tests.programs import output_of
 
 BALL = Point((0, 0, 0), radius=1.0)
 
@@ -243,16 +242,9 @@ print(*(tree.content_hash for tree in random_trees(5, 40)), content_hash({"b": {
 @pytest.mark.parametrize(("seed", "processor"), [("0", "Haswell"), ("1", "Prescott")])
 def test_hashes_are_those_of_any_process(seed: str, processor: str) -> None:
     own = [tree.content_hash for tree in random_trees(5, 40)]
-    environment = {
-        "PYTHONHASHSEED": seed,
-        "PATH": "",
-        "HOME": str(Path.home()),
-        "OPENBLAS_CORETYPE": processor,
-    }
-    run = subprocess.run(
-        [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, check=True
-    )
-    assert run.stdout.split() == [*own, content_hash({"a": "é", "b": {1.5, "x", 3}})]
+    environment = {"PYTHONHASHSEED": seed, "OPENBLAS_CORETYPE": processor}
+    printed = output_of(SCRIPT, env={**environment, "PATH": "", "HOME": str(Path.home())}).split()
+    assert printed == [*own, content_hash({"a": "é", "b": {1.5, "x", 3}})]
 
 
 def test_hashes_are_those_of_any_machine() -> None:

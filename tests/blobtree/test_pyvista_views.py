@@ -1,6 +1,5 @@
 """Trees as pyvista objects: meshes with normals and colours, slices whose lines lie on their levels."""
 
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import pyvista as pv
 from blobtree import Node, Point, polygonize
 from blobtree.errors import InvalidFile, InvalidNode, InvalidPoints, InvalidResolution, MissingPackage
 from tests.blobtree.trees import random_trees
+from tests.programs import output_of
 
 A = Point((0, 0, 0), radius=1.0, color=(1, 0.5, 0))
 B = Point((0.8, 0.13, 0.07), radius=0.9)
@@ -19,7 +19,7 @@ B = Point((0.8, 0.13, 0.07), radius=0.9)
 
 def test_the_package_does_not_import_pyvista() -> None:
     program = "import sys, blobtree; assert not {'pyvista', 'vtkmodules', 'moderngl'} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", program], check=True)
+    output_of(program)
 
 
 def test_without_pyvista_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,8 +2,6 @@
 
 import copy
 import pickle
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
@@ -28,6 +26,7 @@ from decals.scenes.files import from_json, to_json
 from decals.scenes.objects import flagged
 from decals.surfaces import BaseColor, BaseTexture, MeshSurface
 from tests.blobtree.trees import random_trees, trees
+from tests.programs import output_of
 
 TREE = Point((0, 0, 0), radius=1.0) + Segment((0, 0, 0), (2, 0, 0), radius=0.25)
 CORNERS, FACES = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
@@ -363,16 +362,9 @@ print(*(content_hash(make()) for make in VALUES.values()))
 @pytest.mark.slow_cases("7-Haswell")
 @pytest.mark.parametrize(("seed", "processor"), [("0", "Prescott"), ("7", "Haswell")])
 def test_hashes_are_those_of_any_process(seed: str, processor: str) -> None:
-    environment = {
-        "PYTHONHASHSEED": seed,
-        "PATH": "",
-        "HOME": str(Path.home()),
-        "OPENBLAS_CORETYPE": processor,
-    }
-    run = subprocess.run(
-        [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, check=True
-    )
-    assert run.stdout.split() == [content_hash(make()) for make in VALUES.values()]
+    environment = {"PYTHONHASHSEED": seed, "OPENBLAS_CORETYPE": processor}
+    printed = output_of(SCRIPT, env={**environment, "PATH": "", "HOME": str(Path.home())}).split()
+    assert printed == [content_hash(make()) for make in VALUES.values()]
 
 
 def test_dask_takes_the_content_hash(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """The public names of the package: a list that changes only on purpose."""
 
-import subprocess
-import sys
 from dataclasses import fields, is_dataclass
 from importlib import import_module
 
@@ -10,6 +8,7 @@ import pytest
 import decals
 from decals.editing import GroupOperands, RemovePrimitive
 from decals.options import described
+from tests.programs import output_of
 
 PACKAGES = [
     "editing", "errors", "experiments", "field", "hosts", "images", "index", "pages", "rendering",
@@ -81,8 +80,7 @@ def test_public_functions_are_no_packages() -> None:
 def test_importing_the_errors_loads_nothing_heavy() -> None:
     heavy = {"warp", "pyvista", "moderngl", "vtk"}
     code = f"import sys, decals.errors; print(sorted({heavy} & sys.modules.keys()))"
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert ran.stdout.strip() == "[]"
+    assert output_of(code).strip() == "[]"
 
 
 def test_docstrings_of_commands_describe_all_parameters() -> None:

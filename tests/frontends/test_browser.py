@@ -9,7 +9,8 @@ from importlib.util import find_spec
 import pytest
 
 from blobtree.graphics import install_advice, missing_gl_libraries
-from tests.display import display, run_module
+from tests.display import display
+from tests.programs import run_module
 
 __all__ = ["display"]
 

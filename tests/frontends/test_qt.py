@@ -4,7 +4,8 @@ from importlib.util import find_spec
 
 import pytest
 
-from tests.display import display, run_module
+from tests.display import display
+from tests.programs import run_module
 
 __all__ = ["display"]
 CHECKS = ("pixels", "docked", "background", "user", "again", "page")

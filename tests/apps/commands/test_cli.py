@@ -15,6 +15,7 @@ from decals.apps import cli
 from decals.apps.cli import run
 from decals.apps.commands import scatter_options
 from tests.apps.commands.pictures import small
+from tests.programs import run_python
 
 Capture = pytest.CaptureFixture[str]
 
@@ -25,14 +26,8 @@ def test_version(capsys: Capture) -> None:
 
 
 def test_the_package_runs_as_the_command() -> None:
-    ran = [
-        subprocess.run([*command, "--help"], capture_output=True, text=True, check=True).stdout
-        for command in (
-            [sys.executable, "-m", "decals"],
-            [sys.executable, "-m", "decals.apps.cli"],
-            [sys.executable, "-c", "from decals.apps.cli import main; main()"],
-        )
-    ]
+    programs = ("-m", "decals"), ("-m", "decals.apps.cli"), ("-c", "from decals.apps.cli import main; main()")
+    ran = [run_python(*program, "--help") for program in programs]
     assert "Usage: implicit-decals" in ran[0]
     assert ran[0] == ran[1] == ran[2]
 

@@ -1,8 +1,6 @@
 """What a definition gives; files and other processes."""
 
 import pickle
-import subprocess
-import sys
 from pathlib import Path as File
 from typing import Any
 
@@ -25,6 +23,7 @@ from blobtree.transpile.python import plain_python
 from tests.blobtree import custom_kinds, kernels
 from tests.blobtree.custom_kinds import CUSTOM_TREES, SOFTEST, Carve, Mean, Ring, Soft, Swell, Tent
 from tests.blobtree.transpile.warp_functions import python_function
+from tests.programs import output_of
 
 PUBLIC = {name: getattr(blobtree, name) for name in blobtree.__all__}
 
@@ -198,11 +197,11 @@ def test_another_process_imports_the_definition_or_says_that_it_cannot(
     import dots  # type: ignore[import-not-found]
 
     tree = dots.Dot((1, 2, 3), radius=0.5) + BALL
-    command = [sys.executable, "-c", READ, pickle.dumps(tree).hex()]
-    there = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=True).stdout
+    pickled = pickle.dumps(tree).hex()
+    there = output_of(READ, pickled, cwd=tmp_path)
     assert there.splitlines()[1].strip() == "Dot(place=(1.0, 2.0, 3.0), radius=0.5, color=(0.8, 0.8, 0.8))"
     (tmp_path / "dots.py").unlink()
-    gone = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=True).stdout
+    gone = output_of(READ, pickled, cwd=tmp_path)
     assert gone.startswith("UnknownKind")
     assert "'dot': its module 'dots' cannot be imported" in gone
 

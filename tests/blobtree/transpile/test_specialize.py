@@ -1,7 +1,6 @@
 """Choices by a code: what they compute, and that compiled kernels are found again."""
 
 import inspect
-import subprocess
 import sys
 from types import FunctionType
 from typing import Any
@@ -15,6 +14,7 @@ from blobtree.tape import dispatch
 from blobtree.tape.dispatch import core_tables
 from blobtree.transpile.specialize import rebind, referenced_values, row_choice
 from tests.blobtree.transpile.kernels import choose, chosen
+from tests.programs import output_of
 
 
 def test_a_choice_by_a_code_calls_the_function_of_the_row() -> None:
@@ -80,8 +80,7 @@ print([wp.get_module(name).hash_module().hex() for name in measured])
 
 def test_the_key_of_a_kernel_does_not_depend_on_earlier_compilations() -> None:
     def keys(*loaded: str) -> str:
-        command = [sys.executable, "-c", KEY, *loaded]
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()[-1]
+        return output_of(KEY, *loaded).splitlines()[-1]
 
     evaluation = "blobtree.tape.evaluate_kernels"
     assert keys() == keys(evaluation) == keys("blobtree.cells.refine_kernels", evaluation)

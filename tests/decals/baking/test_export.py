@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 import zipfile
 from functools import cache
 from pathlib import Path
@@ -33,6 +31,7 @@ from tests.decals.baking.exported import (
 )
 from tests.decals.baking.glb import Array, ball_and_cube, need, read_attribute, read_json
 from tests.decals.meshes import icosphere
+from tests.programs import output_of
 
 RESOLUTION = 20
 
@@ -432,9 +431,7 @@ print([name for name in sys.modules if name.startswith("pxr.")])
 def test_openusd_is_imported_in_a_process_of_its_own(tmp_path: Path) -> None:
     """Its loading can wait for a thread that waits for it, so that neither ends."""
     pytest.importorskip("pxr", reason="usd-core is not installed; it is in the extra `usd`")
-    command = [sys.executable, "-c", ALONE, str(tmp_path / "a.usdz")]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
-    assert done.stdout == "[]\n", done.stderr
+    assert output_of(ALONE, str(tmp_path / "a.usdz")) == "[]\n"
 
 
 def test_a_fault_of_openusd_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

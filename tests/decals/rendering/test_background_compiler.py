@@ -2,8 +2,6 @@
 
 import ctypes
 import os
-import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,6 +16,7 @@ from decals.rendering import Context, background_compiler
 from decals.rendering.background_compiler import GL, BackgroundCompiler, draw_nothing, draw_state
 from decals.rendering.current_context import system_library
 from decals.shaders import CompileError, Source
+from tests.programs import output_of
 
 CURRENT_PROGRAM = 0x8B8D
 VERTEX = Source.named("v", "#version 330 core\nvoid main() { gl_Position = vec4(0.0); }\n\n")
@@ -222,14 +221,8 @@ with EditWindow(scene(), off_screen=True, size=(160, 120)) as window:
 @pytest.mark.slow
 def test_the_driver_finds_in_its_cache_what_the_thread_has_compiled(tmp_path: Path) -> None:
     """Programs that the thread draws first add nothing to the cache when the window draws them."""
-    run = subprocess.run(
-        [sys.executable, "-c", COMPILED],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, "MESA_SHADER_CACHE_DIR": str(tmp_path)},
-    )
-    software, thread, window = run.stdout.split()[-3:]
+    environment = {**os.environ, "MESA_SHADER_CACHE_DIR": str(tmp_path)}
+    software, thread, window = output_of(COMPILED, env=environment).split()[-3:]
     if software == "False":
         pytest.skip("this driver is not Mesa's software rasteriser, whose cache is looked at")
     assert int(thread) > 0

@@ -1,7 +1,6 @@
 """Contexts: what they cannot do they say; they nest; programs are compiled once."""
 
 import gc
-import subprocess
 import sys
 import weakref
 from concurrent.futures import ThreadPoolExecutor
@@ -21,6 +20,7 @@ from decals.shaders import CompileError, Source, compose
 from decals.surfaces.normals import vertex_normals
 from tests.decals.rendering.pictures import view_of
 from tests.decals.shapes import torus
+from tests.programs import output_of
 
 
 def usable(context: Context) -> bool:
@@ -247,8 +247,7 @@ with Renderer() as second, second.context.current():
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="contexts are made by EGL on Linux alone")
 def test_a_context_is_not_used_again_after_the_end_of_its_display() -> None:
-    done = subprocess.run([sys.executable, "-c", LOST], capture_output=True, text=True, check=False)
-    assert done.stdout.strip() == "False b'abcd'", done.stderr
+    assert output_of(LOST).strip() == "False b'abcd'"
 
 
 CALLER = """
@@ -281,5 +280,4 @@ print("still current")
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="contexts are kept on Linux alone")
 def test_the_context_of_the_caller_stays_current() -> None:
     """Around a picture, and around contexts and renderers that are made, used and released."""
-    done = subprocess.run([sys.executable, "-c", CALLER], capture_output=True, text=True, check=False)
-    assert done.stdout.strip() == "still current", done.stderr
+    assert output_of(CALLER).strip() == "still current"

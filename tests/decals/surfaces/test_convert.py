@@ -1,7 +1,5 @@
 """Models of every kind that has a shape become surfaces and objects; all others are refused in one line."""
 
-import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,6 +16,7 @@ from decals.scenes.objects import as_object, as_objects
 from decals.surfaces import MeshSurface, as_surface
 from decals.surfaces.convert import as_shape
 from decals.surfaces.files.ply import strip_triangles
+from tests.programs import output_of
 
 CORNERS = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
 TRIANGLES = [[0, 1, 2], [0, 2, 3]]
@@ -251,5 +250,4 @@ from decals.surfaces.convert import as_surface
 as_surface(([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]))
 print({"pyvista", "vtkmodules"} & sys.modules.keys())
 """
-    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert ran.stdout.strip() == "set()", ran.stdout
+    assert output_of(program).strip() == "set()"

@@ -4,7 +4,6 @@ import json
 import multiprocessing
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -19,6 +18,7 @@ from blobtree.progress import reporting
 from decals.errors import InvalidMesh
 from decals.surfaces import read_mesh, vtk_process
 from decals.surfaces.vtk_process import _process
+from tests.programs import output_of
 
 DAMAGED = Path(__file__).with_name("damaged")
 """Files that crash or hang the process which reads them by pyvista 0.49 with VTK 9.6."""
@@ -64,7 +64,7 @@ answers = io.FileIO(os.open({str(sphere.with_name("answer"))!r}, os.O_WRONLY | o
 request = {{"path": os.fsencode({str(sphere)!r}).hex(), "seconds": 60.0, "bytes": 1 << 30}}
 vtk_child._answer_in_fork(request, answers)
 """
-    subprocess.run([sys.executable, "-c", program], check=True)
+    output_of(program)
     header = json.loads(sphere.with_name("answer").read_bytes().splitlines()[0])
     vertices, faces = read_mesh(sphere)
     assert header["arrays"]["vertices"][1:] == [len(vertices), 3]
@@ -84,8 +84,7 @@ vtk_child._read(pathlib.Path({str(sphere.with_suffix(".vtu"))!r}), 60.0)
 print(len(set(sys.modules) - loaded))
 """
     pv.read(sphere).cast_to_unstructured_grid().save(sphere.with_suffix(".vtu"))
-    answer = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
-    assert (int(answer.stdout) == 0) == (folder == "usable")
+    assert (int(output_of(program)) == 0) == (folder == "usable")
 
 
 def test_an_answer_to_a_former_request_is_not_taken(sphere: Path, tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 import ctypes
 import gc
-import subprocess
 import sys
 import warnings
 import weakref
@@ -18,6 +17,7 @@ from decals.rendering import Renderer, RenderOptions
 from tests.decals.shapes import Picture, View
 from tests.decals.vtk.conftest import Factory, Plotter
 from tests.decals.vtk.scenes import both, shot
+from tests.programs import output_of
 
 STATUS = Path("/proc/self/statm")
 PAGE = 4096
@@ -103,8 +103,7 @@ def test_memory_stays_flat(plotter: Factory) -> None:
     plotter()
     if not (STATUS.exists() and hasattr(ctypes.CDLL(None), "mallinfo2")):
         pytest.skip("this system does not say what the process holds")
-    run = subprocess.run([sys.executable, "-c", GROWN], capture_output=True, text=True, check=True)
-    values = np.array(run.stdout.split()[-6:], float)
+    values = np.array(output_of(GROWN).split()[-6:], float)
     (pages, allocated, blocks), vtks = values[:3], values[3:]
     assert pages < vtks[0] + 60_000
     assert allocated < vtks[1] + 10_000

@@ -1,7 +1,6 @@
 """Scenes in notebooks and viewers, and how pyvista finds us."""
 
 import os
-import subprocess
 import sys
 import tomllib
 from io import BytesIO
@@ -20,6 +19,7 @@ from decals.vtk import component as viewer
 from tests.decals.vtk.conftest import Factory
 from tests.decals.vtk.scenes import both
 from tests.display import display
+from tests.programs import output_of
 
 __all__ = ["display"]
 
@@ -92,14 +92,12 @@ def test_pyvista_finds_us_by_itself(plotter: Factory) -> None:
         "pl = pv.Plotter(off_screen=True)\n"
         "print(type(pl.decals).__name__, pl.decals is pl.decals)\n"
     )
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert ran.stdout.split() == ["DecalsComponent", "True"], ran.stderr
+    assert output_of(code).split() == ["DecalsComponent", "True"]
 
 
 def test_importing_decals_brings_no_vtk() -> None:
     code = "import sys, decals; print(sorted({'vtkmodules', 'pyvista', 'moderngl'} & sys.modules.keys()))"
-    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert ran.stdout.strip() == "[]"
+    assert output_of(code).strip() == "[]"
 
 
 REFINED = """
@@ -126,6 +124,4 @@ decals.show(both(), window_size=(80, 60))
 
 def test_a_window_shows_one_sample_first(display: str) -> None:
     environment = os.environ | {"DISPLAY": display, "PYTHONPATH": os.pathsep.join(sys.path)}
-    command = [sys.executable, "-c", REFINED]
-    ran = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=False)
-    assert ran.stdout == "one sample, then all\n", ran.stderr
+    assert output_of(REFINED, env=environment) == "one sample, then all\n"

@@ -10,7 +10,8 @@ import pytest
 
 from decals import load_scene
 from decals.apps.models.samples import sample_mesh
-from tests.display import display, run_module
+from tests.display import display
+from tests.programs import run_module
 
 __all__ = ["display"]
 SAYS = "the first picture came back"

@@ -1,7 +1,6 @@
 """Windows that open and close, keep nothing, and refuse what they cannot show."""
 
 import os
-import subprocess
 import sys
 from typing import Any
 
@@ -15,6 +14,7 @@ from decals import edit, render
 from decals.errors import InvalidScene, NoGraphics
 from decals.window import EditWindow
 from tests.decals.editing.scenes import scene
+from tests.programs import output_of
 
 SIZES = [(0, 90), (-5, 10), (120,), None, 120, (10**9, 5), ("a", "b"), (float("nan"), 5)]
 
@@ -104,9 +104,6 @@ def test_opening_and_closing_keeps_no_memory(warm: Any, rounds: Any) -> None:
     The first is the least of five chunks: allocators and drivers take memory in steps of many megabytes, more
     often on a busy machine. What each window keeps is in every chunk.
     """
-    run = subprocess.run(
-        [sys.executable, "-c", MEMORY, str(warm), str(rounds)], capture_output=True, text=True, check=True
-    )
-    each, together = map(float, run.stdout.split()[-2:])
+    each, together = map(float, output_of(MEMORY, str(warm), str(rounds), timeout=3600).split()[-2:])
     assert each < (1.0 if rounds < 50 else 0.1)
     assert together < 60.0
