@@ -13,14 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from decals.record import Contact
+from decals import Contact, Scene
 from decals.rendering import Context, Renderer, RenderOptions
 from decals.rendering.frame_plan import plan_frame
 from decals.rendering.options import viewpoint_of
 from decals.rendering.pixel_pass import PassBackend
 from decals.rendering.targets import WHOLE_SLOT
 from decals.rendering.viewpoint import WHOLE, PictureView
-from decals.scenes.scene import Scene
 from tests.bench.scenes import bench_scene
 
 WARM_UP = 3

@@ -4,12 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from decals.rendering import computed_mesh
-from decals.rendering.options import RenderOptions
-from decals.rendering.picture import Buffers
-from decals.rendering.renderer import Renderer
-from decals.rendering.viewpoint import Projection, Viewpoint
-from decals.scenes.camera import Camera
+from decals import Camera
+from decals.rendering import Buffers, Projection, Renderer, RenderOptions, Viewpoint, computed_mesh
 from tests.decals.rendering.pictures import assert_same_surfaces
 from tests.decals.shapes import Shape, View, torus
 from tests.oracles.raster import edges

@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 import pyvista as pv
 
-from blobtree.errors import Cancelled
 from blobtree.progress import reporting
-from decals.errors import InvalidMesh
+from decals.errors import Cancelled, InvalidMesh
 from decals.surfaces import read_mesh, vtk_process
 from decals.surfaces.vtk_process import _process
 from tests.programs import output_of
