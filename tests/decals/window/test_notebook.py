@@ -9,8 +9,7 @@ import pytest
 import decals
 from blobtree import Point
 from decals.errors import InvalidScene
-from decals.window import notebook
-from decals.window import window as window_module
+from decals.window import notebook, opening
 
 SCENE = decals.Scene(objects=[Point((0, 0, 0), radius=1.0)], camera=decals.Camera((0, 0, 5)))
 
@@ -28,7 +27,7 @@ def test_an_interrupt_of_the_kernel_returns_the_scene(
         pages.append(browser.open(url, timeout=20).read())
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(window_module, "in_notebook", lambda: True)
+    monkeypatch.setattr(opening, "in_notebook", lambda: True)
     monkeypatch.setattr(notebook, "_display", interrupted)
     edited = SCENE.edit(path=tmp_path / "mine.json")
     assert b"<html" in pages[0]
