@@ -17,7 +17,7 @@ from blobtree.validation import describe, items
 from decals.errors import InvalidDecals, InvalidRow
 from decals.images.texels import decode_srgb
 from decals.options import Values
-from decals.receivers import codes_of, receiver_array
+from decals.receivers import TEXT, codes_of, receiver_array
 from decals.validation import (
     bool_array,
     check_range,
@@ -222,11 +222,12 @@ class Decals(Value):
             "opacities": unit_interval("opacities", one_or_each(self.opacities, count), (count,)).astype(
                 np.float32
             ),
-            "receivers": receiver_array("receivers", self.receivers, count),
+            "receivers": np.zeros(count, TEXT)
+            if self.receivers is None
+            else receiver_array("receivers", self.receivers, count),
             "fade_angles": _fades("fade_angles", self.fade_angles, count, *FADE_ANGLES),
             "fade_depths": _fades("fade_depths", self.fade_depths, count, *FADE_DEPTHS),
         }
-        codes_of(arrays["receivers"], [""])  # raises for too many different ones
         for name, array in arrays.items():
             array.flags.writeable = False
             object.__setattr__(self, name, array)

@@ -50,7 +50,9 @@ def receiver_array(name: str, values: Any, count: int) -> NDArray[Any]:
             f"{name}: expected one text, or one for each of {count} decals, got {describe(values)}"
         )
     texts = {row: ", ".join(label_names(name, row, InvalidDecals)) for row in set(map(_text, rows))}
-    return np.array([texts[row] for row in rows], TEXT)
+    receivers = np.array([texts[row] for row in rows], TEXT)
+    codes_of(receivers, [""])  # raises for too many different ones
+    return receivers
 
 
 def _text(row: object) -> str:

@@ -362,6 +362,8 @@ def color_values(name: str, values: Any, error: type[ImplicitDecalsError]) -> An
 
 def color_array(name: str, values: Any, count: int) -> Float64Array:
     """Return sRGB colours as a new array ``[count, 3]``; one stands for all rows, None is white."""
+    if values is None:
+        return np.ones((count, 3))
     numbers = color_values(name, values, InvalidDecals)
     channels = list(numbers) if isinstance(numbers, list | tuple) or np.ndim(numbers) == 1 else []
     single = len(channels) == 3 and all(isinstance(one, int | float | np.number) for one in channels)

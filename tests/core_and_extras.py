@@ -46,7 +46,7 @@ EXTRAS: dict[str, str] = {
         """,
     "decals.scattering": """
         bare_places center_normals covering creases deform density gap_filling
-        image_projections owned_points polish relocation remesh trial_points
+        image_projections owned_points polish relocation remesh
         """,
     "decals.scenes": """
         animation area_gradient figure gaps measure outlines pose reproduction

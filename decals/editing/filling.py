@@ -18,11 +18,11 @@ from decals.model import Decals
 from decals.receivers import labels_of, surface_mask, takes_named_only
 from decals.rendering.options import Drawing
 from decals.scattering.bare_places import filling_points, grown_radii, places_of
+from decals.scattering.covering import random_points_around
 from decals.scattering.decal_normals import mean_normals
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.neighbors import FacingTree
 from decals.scattering.orientation import tangents
-from decals.scattering.trial_points import random_points_around
 from decals.scenes.objects import SceneObject, same_shape
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.surface import row_blocks

@@ -167,8 +167,10 @@ class Domain:
             return np.ones(len(positions))
         return _values_at("density", self._density, positions)
 
-    def boundary(self, spacing: float) -> Boundary:
-        """Return the open boundaries of the surfaces, for particles about a spacing apart."""
+    def boundary(self, spacing: float) -> Boundary | None:
+        """Return the open boundaries for particles about a spacing apart; None without an open mesh."""
+        if not any(isinstance(surface, MeshSurface) and not surface.closed for surface in self.surfaces):
+            return None
         octave = int(np.round(np.log2(max(spacing, 1e-30))))
         if octave not in self._boundaries:
             self._boundaries[octave] = Boundary(self.surfaces, 2.0**octave, self.device)

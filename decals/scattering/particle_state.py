@@ -11,7 +11,7 @@ from blobtree.kernels import loaded
 from decals.model import FACING_LIMIT
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.projection import spans_of
-from decals.scattering.repulsion import CUTOFF, SKIN, Law, Repulsion, particle_struct
+from decals.scattering.repulsion import CUTOFF, SKIN, Law, Repulsion, no_mirror_planes, particle_struct
 from decals.scattering.repulsion_kernels import StepTerms
 from decals.scattering.search_kernels import MirrorPlanes, Particles
 from decals.scattering.step_kernels import (
@@ -163,6 +163,8 @@ class ParticleState:
         Particles that may not move need none: they may lie on the boundary itself.
         """
         boundary = self.domain.boundary(self.spacing)
+        if boundary is None:
+            return no_mirror_planes(self.device)
         return boundary.mirror_planes(points, surface_ids, enabled, reach=CUTOFF)
 
     def begin_epoch(self, law: Law) -> None:

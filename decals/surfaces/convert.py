@@ -133,7 +133,7 @@ def as_surface(
     if is_surface(own := getattr(model, "surface", None)):
         return own
     shape = as_shape(model, name=name, error=error)
-    return ImplicitSurface(shape) if isinstance(shape, Node) else MeshSurface(*shape.arrays)
+    return ImplicitSurface(shape) if isinstance(shape, Node) else MeshSurface(shape.vertices, shape.faces)
 
 
 def is_model(value: object) -> bool:

@@ -43,13 +43,13 @@ from decals.validation import as_path
 if TYPE_CHECKING:  # its import takes longer than ours, and meshes of arrays do without
     import pyvista as pv
 
-_POLYGON_READERS: dict[str, Callable[[Path], tuple[Float64Array, Polygons, Paint]]] = {
+_POLYGON_READERS: dict[str, Callable[[Path], tuple[Float64Array, Polygons, Paint | None]]] = {
     ".obj": read_obj,
     ".off": read_off,
     ".ply": read_ply,
     ".stl": read_stl,
 }
-"""Our own readers of polygons, by suffix: they return points, polygons and their colours."""
+"""Our own readers of polygons, by suffix: they return points, polygons and their colours, if any."""
 
 
 def _read_usd(path: Path) -> dict[str, MeshData]:
@@ -144,6 +144,8 @@ def read_mesh_data(path: str | PathLike[str]) -> MeshData:
     if suffix in _POLYGON_READERS:
         points, polygons, paint = _POLYGON_READERS[suffix](path)
         vertices, faces, triangles = traced_triangles(points, polygons, name=str(path))
+        if paint is None:
+            return MeshData(vertices, faces)
         color = checked_color(lambda: paint(triangles), str(path), len(vertices), len(faces))
         return MeshData(vertices, faces, color)
     if can_isolate():

@@ -17,10 +17,6 @@ MAX_TEXELS = 1 << 27
 """Most pixels of all textures of a file."""
 
 
-def unpainted(_: Triangulation) -> None:
-    """Return no colour: a `Paint` of formats without colours."""
-
-
 class TextureFiles:
     """Texture files in the folder of a model, each read when it is first used; a fault becomes a note."""
 

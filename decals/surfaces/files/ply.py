@@ -31,6 +31,9 @@ _CORNERS = ("vertex_indices", "vertex_index")
 _SINGLE = frozenset({"x", "y", "z", *_CORNERS})
 """Properties that an element must not have twice."""
 
+_UNPAINTED = frozenset({"x", "y", "z", "nx", "ny", "nz"})
+"""Properties that say nothing of colours."""
+
 _PLACES = ("texcoord", "texcoords")
 """Lists of faces with the texture coordinates of their corners."""
 
@@ -74,7 +77,7 @@ class _Element:
     properties: tuple[_Property, ...]
 
 
-def read_ply(path: Path) -> tuple[Float64Array, Polygons, Paint]:
+def read_ply(path: Path) -> tuple[Float64Array, Polygons, Paint | None]:
     """Read the vertices and faces of a PLY file, ASCII or binary, of any polygon size, and their colours.
 
     Triangle strips (elements ``tristrips``) are divided into triangles.
@@ -91,7 +94,7 @@ def read_ply(path: Path) -> tuple[Float64Array, Polygons, Paint]:
         raise refusal(path, "PLY", error) from error
 
 
-def _read(content: bytes, path: Path) -> tuple[Float64Array, Polygons, Paint]:
+def _read(content: bytes, path: Path) -> tuple[Float64Array, Polygons, Paint | None]:
     order, elements, body = _header(content)
     tables = list(zip(_tables(order, elements, body), elements, strict=True))
     vertices = [(table, element) for table, element in tables if table.name == "vertex"]
@@ -106,12 +109,11 @@ def _read(content: bytes, path: Path) -> tuple[Float64Array, Polygons, Paint]:
     ]
     if not parts:
         raise ValueError("it has no faces")
-    paint = PlyColors(
-        path,
-        _TEXTURE_FILE.findall(content[: len(content) - len(body)].decode("utf-8", "replace")),
-        _typed(*vertices[0]),
-        parts,
-    )
+    textures = _TEXTURE_FILE.findall(content[: len(content) - len(body)].decode("utf-8", "replace"))
+    columns = _typed(*vertices[0])
+    named = columns.keys() | {name for part in parts for name in part.columns}
+    painted = textures or named - _UNPAINTED or any(part.places is not None for part in parts)
+    paint = PlyColors(path, textures, columns, parts) if painted else None
     return points, Polygons.joined([part.polygons for part in parts]), paint
 
 

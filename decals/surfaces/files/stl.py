@@ -18,7 +18,6 @@ from decals.surfaces.files.content import (
     text_lines,
     without_mark,
 )
-from decals.surfaces.files.paint import Paint, unpainted
 from decals.surfaces.triangulate import Polygons
 
 _logger = logging.getLogger(__name__)
@@ -47,7 +46,7 @@ _PART = re.compile(rb"(?<!\S)(solid|facet|outer|vertex)(?!\S)", re.IGNORECASE)
 """Words of a solid, which remarks behind the last one do not have."""
 
 
-def read_stl(path: Path) -> tuple[Float64Array, Polygons, Paint]:
+def read_stl(path: Path) -> tuple[Float64Array, Polygons, None]:
     """Read the facets of an STL file; equal corners become one vertex. Colours are left out with a warning.
 
     Raises
@@ -62,7 +61,7 @@ def read_stl(path: Path) -> tuple[Float64Array, Polygons, Paint]:
         raise refusal(path, "STL", error) from error
     if b"COLOR=" in content[:_HEADER]:
         _logger.warning("%s: left out the colours of facets; save them as PLY, GLB or 3MF", path)
-    return *_merged(corners), unpainted
+    return *_merged(corners), None
 
 
 def _is_text(content: bytes) -> bool:
