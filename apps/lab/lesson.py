@@ -167,8 +167,8 @@ class Lesson:
     --------
     >>> from decals.apps.lab.lesson import LESSONS, load_lessons
     >>> lessons = load_lessons(LESSONS)
-    >>> len(lessons), lessons[0].settings.title
-    (9, 'One decal')
+    >>> lessons[0].settings.title
+    'One decal'
     """
 
     settings: Settings
