@@ -97,6 +97,7 @@ def drag_files() -> set[str]:
     scene = decals.cover(Point((0, 0, 0), radius=1.0), count=60, images=["scale"])
     with EditWindow(decals.editing.EditSession(scene), off_screen=True, size=(240, 180)) as window:
         window.show()
+        window.frames.budget.target = 60.0  # of one size on slow machines too: a new one compiles again
         interactor = window.plotter.iren.interactor
 
         def send(name: str, x: int, y: int) -> None:
