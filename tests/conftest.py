@@ -4,12 +4,15 @@ import gc
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import settings
 
 import blobtree.kernels as kernels
 from blobtree.custom.definition import CUSTOM_KINDS
 from blobtree.declare.falloff import FALLOFF_NAMES  # that of the package loads the library
 from blobtree.graphics import missing_gl_libraries
 
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 gc.disable()  # until all tests are collected: a fifth of the time would be spent on looking for garbage
 
 LONG_FILES = (

@@ -67,7 +67,7 @@ def same(first: Any, second: Any) -> bool:
 
 
 @given(PLAIN, PLAIN)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_plain_values_have_equal_hashes_if_they_are_equal(first: Any, second: Any) -> None:
     assert content_hash(first) == content_hash(copy.deepcopy(first))
     assert (content_hash(first) == content_hash(second)) == same(first, second)
@@ -156,7 +156,7 @@ def short_stick(q: wp.vec3, half: wp.float32) -> wp.vec3:
 
 
 @given(trees(), trees())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_trees_have_equal_hashes_if_they_are_equal(first: Node, second: Node) -> None:
     for again in (from_json(to_json(first)), pickle.loads(pickle.dumps(first))):
         assert again == first
@@ -180,7 +180,7 @@ def test_a_kind_is_its_functions() -> None:
 
 
 @given(trees(), st.randoms(use_true_random=False))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_another_number_of_a_tree_gives_another_hash(tree: Node, random: Any) -> None:
     chosen = [random.choice(numeric_parameters(tree))]
     value = numeric_values(tree, chosen)

@@ -187,14 +187,14 @@ def test_bytes_that_are_no_text(content: bytes) -> None:
 
 
 @given(st.binary(max_size=200) | st.text(max_size=200))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_rubbish_is_an_invalid_file_and_nothing_else(rubbish: bytes | str) -> None:
     with pytest.raises(InvalidFile):
         from_json(rubbish)
 
 
 @given(st.data())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_a_damaged_file_is_a_tree_or_an_invalid_file(data: st.DataObject) -> None:
     text = bytearray(document(BALL, {**BALL, "radius": 2}, {"type": "sum", "operands": [0, 1]}), "ascii")
     for _ in range(data.draw(st.integers(1, 3))):

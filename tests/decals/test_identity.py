@@ -134,7 +134,7 @@ def test_a_scene_is_equal_after_a_file(seed: int, tmp_path: Path) -> None:
 
 
 @given(trees(), st.integers(0, 2**30), st.integers(0, 12))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_any_tree_and_decals_are_equal_after_a_file(tree: Any, seed: int, count: int) -> None:
     first = Scene(
         objects=[TreeObject("ball", tree), TreeObject("corner", TREE, origin=(0, 0, 0))],

@@ -201,7 +201,7 @@ def test_limits_are_accepted() -> None:
 vectors = hnp.arrays(np.float64, (4, 3), elements=st.floats(-1e300, 1e300))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(normals=vectors, tangents=vectors)
 def test_any_directions_make_an_orthonormal_frame_or_a_clear_error(
     normals: NDArray[Any], tangents: Any

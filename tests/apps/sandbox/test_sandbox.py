@@ -584,7 +584,7 @@ def test_random_events_leave_a_scene_that_undo_restores(window: EditWindow) -> N
         st.tuples(st.just("unwrap")),
     )
 
-    @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True)
+    @settings(max_examples=8, suppress_health_check=[HealthCheck.too_slow], derandomize=True)
     @given(st.lists(events, min_size=1, max_size=5))
     def run(chosen: list[Any]) -> None:
         for name, *arguments in chosen:

@@ -64,7 +64,7 @@ def test_many_random_edits() -> None:
 
 
 @given(trees(max_leaves=6), trees(max_leaves=6))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_any_tree_may_follow_any_other(first: Node, second: Node) -> None:
     polygonizer = Polygonizer(first, resolution=24)
     lower, upper = second.support

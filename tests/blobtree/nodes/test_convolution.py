@@ -32,7 +32,7 @@ FRACTIONS = st.floats(0.02, 0.98)
 
 
 @given(FRACTIONS, st.integers(0, 2**32 - 1))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_parts_of_a_segment_add_up_to_it(t: float, seed: int) -> None:
     middle = tuple((1 - t) * np.array(LIMB.start) + t * np.array(LIMB.end))
     radius = (1 - t) * LIMB.radius + t * LIMB.end_radius
@@ -44,7 +44,7 @@ def test_parts_of_a_segment_add_up_to_it(t: float, seed: int) -> None:
 
 
 @given(FRACTIONS, st.integers(0, 2**32 - 1))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_parts_of_a_triangle_add_up_to_it(t: float, seed: int) -> None:
     middle = tuple((1 - t) * np.array(SAIL.b) + t * np.array(SAIL.c))
     parts = ConvolutionTriangle(SAIL.a, SAIL.b, middle, radius=SAIL.radius) + ConvolutionTriangle(
@@ -97,7 +97,7 @@ def test_an_elbow_is_as_thick_as_a_straight_segment_away_from_its_joint() -> Non
 
 
 @given(st.floats(-4.0, 4.0), st.integers(0, 2**32 - 1))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_shapes_do_not_depend_on_scale(exponent: float, seed: int) -> None:
     scale = 10.0**exponent
     start, end = scale * np.array(LIMB.start), scale * np.array(LIMB.end)

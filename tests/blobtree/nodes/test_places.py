@@ -42,7 +42,7 @@ def test_the_world_shows_the_middle_of_a_node_where_its_place_says(tree: Node, p
 
 
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3), st.floats(-400, 400))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_twist_is_undone_anywhere(x: float, y: float, z: float, degrees: float) -> None:
     place, angle = Place(BALL.twist(degrees), (0,)), np.radians(degrees) * z
     world = np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, z

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blobtree import Box, Node, Point, PolarRepeat, Repeat, Sum, from_json, to_json
@@ -17,7 +17,6 @@ BRICK = Box((0.1, 0.0, 0.0), (0.6, 0.3, 0.4), radius=0)
 coordinates = st.floats(-3.0, 3.0)
 
 
-@settings(deadline=None)  # the first call loads kernels
 @given(
     st.sampled_from([BALL, BRICK]),
     st.integers(1, 5),

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from blobtree import (
@@ -77,7 +77,6 @@ def test_edges_of_cuts_are_those_of_solids() -> None:
 lengths = st.floats(0.05, 3.0)
 
 
-@settings(deadline=None)  # the first call loads kernels
 @given(st.tuples(lengths, lengths, lengths), st.lists(st.floats(-4.0, 4.0), min_size=3, max_size=3))
 def test_a_field_is_a_falloff_of_the_distance(size: Any, place: list[float]) -> None:
     box = Box((0.1, -0.2, 0.3), size, radius=0)
@@ -88,7 +87,6 @@ def test_a_field_is_a_falloff_of_the_distance(size: Any, place: list[float]) -> 
     assert (value > 0.5) == inside or abs(value - 0.5) < 1e-5
 
 
-@settings(deadline=None)  # the first call loads kernels
 @given(
     st.sampled_from([BLOCK, Prism(SQUARE, 0.7), Frustum((0, 0, 0), (0, 0, 1), 0.8, 0.2)]),
     st.floats(-0.15, 0.3),

@@ -68,7 +68,7 @@ def test_operands_may_come_from_any_iterable() -> None:
 
 
 @given(trees())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_nodes_are_values(tree: Node) -> None:
     names: dict[str, Any] = {name: getattr(blobtree, name) for name in blobtree.__all__}
     again = eval(repr(tree), names)

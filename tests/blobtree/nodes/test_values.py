@@ -103,7 +103,7 @@ def test_a_pickle_is_read_by_a_process_whose_strings_hash_otherwise() -> None:
 
 
 @given(trees())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_text_pickle_and_file_give_the_tree_back(tree: Node) -> None:
     for again in (eval(repr(tree), NAMES), pickle.loads(pickle.dumps(tree)), from_json(to_json(tree))):
         assert again is not tree
@@ -114,7 +114,7 @@ def test_text_pickle_and_file_give_the_tree_back(tree: Node) -> None:
 
 
 @given(trees(), trees())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_trees_are_equal_where_their_texts_are(first: Node, second: Node) -> None:
     assert (first == second) == (repr(first) == repr(second))
 

@@ -51,13 +51,13 @@ def test_a_balanced_tree_needs_no_more_registers_than_levels(depth: int) -> None
 
 
 @given(trees(max_leaves=20))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_registers_stay_below_the_logarithm_of_the_leaves(tree: Node) -> None:
     assert registers_needed(compile_program(tree)) <= math.log2(max(leaves(tree), 1)) + 1e-9
 
 
 @given(trees(max_leaves=20))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_each_register_is_written_before_it_is_read_and_read_once(tree: Node) -> None:
     full: set[int] = set()
     primitives = 0

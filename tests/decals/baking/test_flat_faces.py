@@ -31,7 +31,7 @@ def ball_with_flat_faces(seed: int, count: int, near: float) -> tuple[Any, Any]:
 
 
 @given(st.integers(0, 10**6), st.integers(1, 60), st.sampled_from([0.5, 0.1, 1e-2, 1e-6, 0.0]))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_closed_mesh_stays_closed_without_its_flat_faces(seed: int, count: int, near: float) -> None:
     vertices, faces = ball_with_flat_faces(seed, count, near)
     before = check_mesh(vertices, faces)

@@ -47,7 +47,7 @@ directions = vectors.filter(lambda v: bool(np.linalg.norm(v) > 0.1))
 
 
 @given(vectors, directions, vectors, directions)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_line_comes_closest_to_a_ray_there(origin: Any, axis: Any, start: Any, toward: Any) -> None:
     found = along_line(origin, axis, (start, toward))
     line, ray = axis / np.linalg.norm(axis), toward / np.linalg.norm(toward)
@@ -60,7 +60,7 @@ def test_a_line_comes_closest_to_a_ray_there(origin: Any, axis: Any, start: Any,
 
 
 @given(vectors, directions, vectors, directions)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_ray_meets_a_plane_there(point: Any, normal: Any, start: Any, toward: Any) -> None:
     met = on_plane(point, normal, (start, toward))
     unit = normal / np.linalg.norm(normal)
@@ -73,7 +73,7 @@ def test_a_ray_meets_a_plane_there(point: Any, normal: Any, start: Any, toward: 
 
 
 @given(vectors, st.integers(0, 2), st.floats(-170.0, 170.0))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_turns_and_angles_agree(center: Any, axis: int, degrees: float) -> None:
     matrix = turn_about(center, axis, degrees)
     np.testing.assert_allclose(matrix[:3, :3] @ center + matrix[:3, 3], center, atol=1e-9)

@@ -98,14 +98,14 @@ class ThreadedAndDirect:
 RANDOM_OPERATIONS = given(operations=st.lists(OPERATIONS, max_size=14), few=st.sampled_from([0, 5, 500]))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @RANDOM_OPERATIONS
 def test_whatever_comes_between_nothing_is_lost(tmp_path_factory: Any, operations: Any, few: Any) -> None:
     check_operations(tmp_path_factory, operations, few)
 
 
 @pytest.mark.slow
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @RANDOM_OPERATIONS
 def test_whatever_comes_between_many_times_nothing_is_lost(
     tmp_path_factory: Any, operations: Any, few: Any

@@ -135,9 +135,7 @@ def session() -> Any:
 
 
 EACH_COMMAND = pytest.mark.parametrize("name", COMMANDS)
-ANY_NUMBER = settings(
-    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow], deadline=None
-)
+ANY_NUMBER = settings(suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
 
 
 @pytest.mark.filterwarnings("ignore:overflow")

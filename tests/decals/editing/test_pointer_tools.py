@@ -535,7 +535,7 @@ def test_boxes_and_lassos_select_what_is_seen_in_them(brush: Brush) -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 9), st.integers(0, 9)), min_size=3, max_size=8))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_points_in_polygons_by_crossings(corners: list[tuple[int, int]]) -> None:
     points = np.random.default_rng(len(corners)).uniform(-1, 10, (20, 2))
     inside = inside_polygon(points, corners)

@@ -134,7 +134,7 @@ trees = st.recursive(
     max_leaves=6,
 )
 POINTS = np.random.default_rng(0).uniform(-2, 2, (400, 3)).astype(np.float32)
-quiet = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+quiet = settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow])
 
 
 @quiet

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from decals.errors import InvalidInput
@@ -48,7 +48,6 @@ def test_a_parameter_of_a_box_may_have_any_name(kind: type[Sobol]) -> None:
 
 
 @pytest.mark.parametrize("kind", [Sobol, LatinHypercube])
-@settings(deadline=None)
 @given(count=st.integers(1, 40), seed=st.integers(0, 9))
 def test_boxes_are_filled_within_their_ranges(kind: type[Sobol], count: int, seed: int) -> None:
     design = kind(count, seed, x=(-1.5, 2.0), n=(3, 7), r=(1e-3, 10.0, "log"))

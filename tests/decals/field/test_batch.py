@@ -74,7 +74,7 @@ IMAGES = [np.random.default_rng(5).integers(0, 256, (4, 5, 4)).astype(np.uint8)]
 
 
 @given(SETS, st.integers(0, 100), st.sampled_from(list(Contact)), st.sampled_from(["chord", "corrected"]))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_shared_points_give_the_loop(sets: list[Decals], seed: int, contact: Contact, mapping: str) -> None:
     points, normals = places(seed, 80)
     options: dict[str, Any] = {"contact": contact, "mapping": mapping, "images": IMAGES, "on": "hull"}
@@ -86,7 +86,7 @@ def test_shared_points_give_the_loop(sets: list[Decals], seed: int, contact: Con
 
 
 @given(SETS, st.integers(0, 100), st.lists(st.sampled_from([0, 1, 2, 60]), min_size=6, max_size=6))
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 def test_ragged_points_give_the_loop(sets: list[Decals], seed: int, counts: list[int]) -> None:
     pairs = [places(seed + number, count) for number, count in enumerate(counts[: len(sets)])]
     options: dict[str, Any] = {"jacobian": True, "neighbors": True, "images": IMAGES, "stiffness": 3.0}
@@ -160,7 +160,7 @@ def test_chunks_give_the_same_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @given(SETS)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_indices_are_those_of_each_set_alone(sets: list[Decals]) -> None:
     joined = Decals.concatenate(sets)
     starts = starts_of([len(part) for part in sets])

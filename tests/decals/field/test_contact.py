@@ -39,7 +39,7 @@ anywhere = st.floats(0.0, 1.0, width=32)
 PUSHING = st.sampled_from([Contact.PRODUCT, Contact.MIN])
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(owner=inside, others=st.lists(st.floats(0.5, 1.0, width=32), max_size=6), contact=PUSHING)
 def test_where_no_pair_of_fields_exceeds_one_nothing_changes(
     owner: float, others: Any, contact: Contact
@@ -48,13 +48,13 @@ def test_where_no_pair_of_fields_exceeds_one_nothing_changes(
     assert complement_of([owner, *far], contact)[0] == np.float32(owner)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(others=st.lists(st.floats(2.0**-60, 1.0, width=32), max_size=6), contact=PUSHING)
 def test_the_centre_stays_in_place(others: Any, contact: Contact) -> None:
     assert complement_of([0.0, *others], contact)[0] == 0.0
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(owner=inside, others=st.lists(anywhere, max_size=6), place=st.integers(0, 6), contact=PUSHING)
 def test_equal_fields_meet_at_the_rim(owner: float, others: Any, place: Any, contact: Contact) -> None:
     rest = [max(x, owner) for x in others]
@@ -62,7 +62,7 @@ def test_equal_fields_meet_at_the_rim(owner: float, others: Any, place: Any, con
     assert complement_of(e, contact)[0] == pytest.approx(0.5, abs=1e-6)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     owner=st.floats(2.0**-20, 0.5, width=32),
     others=st.lists(st.tuples(anywhere, st.floats(-1, 1)), min_size=1, max_size=6),
@@ -81,7 +81,7 @@ def test_small_changes_of_the_fields_change_little(
     assert change <= 4 / owner * step + 1e-6
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(owner=inside, others=st.lists(anywhere, max_size=6))
 def test_agrees_with_the_equation_as_written(owner: float, others: Any) -> None:
     e = np.array([owner, *(max(x, owner) for x in others)], np.float32).astype(np.float64)

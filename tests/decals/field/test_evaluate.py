@@ -250,7 +250,7 @@ triple = st.tuples(component, component, component)
 direction = triple.filter(lambda v: np.linalg.norm(v) > 0.01)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     centres=st.lists(triple, min_size=1, max_size=6),
     normal=direction,

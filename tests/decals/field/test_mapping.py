@@ -114,7 +114,7 @@ def test_an_image_ends_at_its_radius_along_the_surface(name: str, radius: float)
 # -- across edges ----------------------------------------------------------------------------------------
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     angle=st.floats(0.01, 3.1),
     concave=st.booleans(),
@@ -191,7 +191,7 @@ def test_a_footprint_is_that_of_the_image_rolled_out(name: str, radius: float, s
     assert error.mean() < 0.4 * projected.mean()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(n_p=direction, n_q=direction, aside=direction, opposed=st.booleans(), size=st.floats(0, 1e-3))
 def test_footprints_stay_as_large_whatever_the_normals(
     n_p: NDArray[Any], n_q: NDArray[Any], aside: Any, opposed: bool, size: Any
@@ -210,7 +210,7 @@ def test_footprints_stay_as_large_whatever_the_normals(
 share = st.floats(0, 1, width=32)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(chord=share, pushed=share, stretch=st.floats(1, 1.625, width=32))
 def test_distance_in_the_image(chord: Any, pushed: Any, stretch: Any) -> None:
     rim, length = chord + pushed * (1 - chord), chord * stretch
@@ -240,7 +240,7 @@ def test_lines_of_contact_stay_in_place(contact: Contact) -> None:
             assert np.linalg.norm(seen.uv - 0.5, axis=1) == pytest.approx(np.full(41, 0.5), abs=1e-4)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(steps=st.lists(st.tuples(share, share, share), min_size=2, max_size=20))
 def test_nothing_folds_where_the_arc_grows_no_slower_than_the_chord(
     steps: list[tuple[float, float, float]],
@@ -294,7 +294,7 @@ def on_surface(name: str, disc: Any, log: Any) -> Any:
 # -- hostile ----------------------------------------------------------------------------------------
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(w=vector, n_p=direction, n_q=direction, opposed=st.booleans(), noise=vector, size=st.floats(0, 1e-3))
 def test_finite_and_bounded(
     w: NDArray[Any], n_p: NDArray[Any], n_q: NDArray[Any], opposed: bool, noise: Any, size: Any

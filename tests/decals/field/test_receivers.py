@@ -75,7 +75,7 @@ def test_decals_act_where_they_may(contact: Contact, labels: Any) -> None:
         assert close[sure & (inside | (seen.owner < 0))].mean() > (0.98 if layered else 0.999)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     angle=st.floats(1, 180),
     depth=st.one_of(st.just(0.0), st.floats(1e-3, 3)),

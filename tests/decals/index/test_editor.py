@@ -75,7 +75,7 @@ EDITS = st.lists(
 )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(count=st.integers(0, 30), seed=st.integers(0, 2**32), edits=EDITS)
 def test_any_edits_look_like_a_fresh_build(count: int, seed: int, edits: Any) -> None:
     rng = np.random.default_rng(seed)
@@ -205,7 +205,7 @@ def test_refuses_what_is_no_decal_and_stays_as_it_was() -> None:
     check(editor, np.zeros((1, 3), np.float32))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32), count=st.integers(0, 300), steps=st.integers(1, 6))
 def test_many_at_once_look_like_a_fresh_build(seed: int, count: int, steps: int) -> None:
     """Insert and delete few or many decals: columns and look-ups follow."""

@@ -118,7 +118,7 @@ triple = st.tuples(coordinate, coordinate, coordinate)
 size = st.floats(2.0**-20, 2.0**20, width=32)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(decals=st.lists(st.tuples(triple, size), max_size=8), seed=st.integers(0, 2**32 - 1))
 def test_misses_nothing_of_any_few_decals(decals: Any, seed: int) -> None:
     positions = np.array([p for p, _ in decals], np.float32).reshape(-1, 3)

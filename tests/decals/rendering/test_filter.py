@@ -107,7 +107,7 @@ def test_two_layers_whose_rims_meet_in_grazing_pixels(
 SLOPES = st.tuples(*[st.floats(-1, 1)] * 2).filter(lambda a: max(map(abs, a)) > 1e-3)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(st.floats(-1, 1), SLOPES), min_size=1, max_size=3))
 def test_parts_of_a_pixel_inside_lines_are_exact(lines: list[tuple[float, tuple[float, float]]]) -> None:
     directions = [np.array(along) / np.hypot(*along) for _, along in lines]

@@ -263,14 +263,14 @@ RANDOM_STRIPS = given(
 )
 
 
-@settings(max_examples=2, deadline=None)
+@settings(max_examples=2)
 @RANDOM_STRIPS
 def test_random_strips_and_fans_keep_the_invariants(number: int, count: int, scale: float) -> None:
     check_strip_and_fan(number, count, scale)
 
 
 @pytest.mark.slow
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @RANDOM_STRIPS
 def test_many_random_strips_and_fans_keep_the_invariants(number: int, count: int, scale: float) -> None:
     check_strip_and_fan(number, count, scale)

@@ -93,7 +93,7 @@ RANDOM_SURFACES = given(
 )
 
 
-@settings(max_examples=2, deadline=None)
+@settings(max_examples=2)
 @RANDOM_SURFACES
 def test_random_surfaces_keep_the_invariants(
     number: int, count: int, fixed: int, parts: int, flat: bool
@@ -102,7 +102,7 @@ def test_random_surfaces_keep_the_invariants(
 
 
 @pytest.mark.slow
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @RANDOM_SURFACES
 def test_many_random_surfaces_keep_the_invariants(
     number: int, count: int, fixed: int, parts: int, flat: bool

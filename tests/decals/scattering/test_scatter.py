@@ -244,14 +244,14 @@ def test_invalid_arguments_raise(options: dict[str, Any], message: str) -> None:
 RANDOM_TRIANGLES = given(number=st.integers(0, 10_000), count=st.integers(0, 40), triangles=st.integers(1, 6))
 
 
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=3)
 @RANDOM_TRIANGLES
 def test_random_triangles_get_the_exact_count(number: int, count: int, triangles: int) -> None:
     check_random_triangles(number, count, triangles)
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @RANDOM_TRIANGLES
 def test_many_random_triangles_get_the_exact_count(number: int, count: int, triangles: int) -> None:
     check_random_triangles(number, count, triangles)

@@ -171,7 +171,7 @@ def test_no_points_give_no_answers() -> None:
     assert plane().raycast(none, none).shape == plane().contains(none).shape == (0,)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 10_000), st.floats(1e-3, 1e3), st.floats(-100, 100))
 def test_samples_lie_on_the_surface_at_any_scale_and_place(seed: int, scale: float, shift: Any) -> None:
     vertices, faces = triangle_soup(seed, count=5)

@@ -57,7 +57,7 @@ def test_smooth_meshes_stay_bit_for_bit(angle: float) -> None:
     np.testing.assert_array_equal(split.normals, vertex_normals(shape.vertices, shape.faces))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1), angle=st.floats(0.0, 180.0), keep=st.floats(0.3, 1.0))
 def test_groups_are_those_of_a_search(seed: int, angle: float, keep: float) -> None:
     rng = np.random.default_rng(seed)

@@ -34,7 +34,7 @@ def mobius(sides: int = 24) -> Arrays:
     return np.array(rows), np.array(faces)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 0.45), soup=st.booleans())
 def test_mixed_winding_is_turned_back(seed: int, share: float, soup: bool) -> None:
     rng = np.random.default_rng(seed)
