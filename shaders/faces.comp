@@ -17,6 +17,7 @@ uniform bool naming;
 layout(std430, binding = 3) buffer FaceShares {
     uint share_groups[3];  // that draw the list
     uint share_count;
+    uint spare_taken;      // shares beside one for each listed face
     ivec3 shares[];        // face, number of the share, number of shares
 };
 
@@ -40,16 +41,16 @@ void draw_pixel(ivec2 texel, float depth, int face) {
 }
 
 #ifndef SHARES
-// Return false if the list is full.
-bool list_shares(int face, float pixels) {
-    uint total = uint(min(ceil(pixels / SHARE_PIXELS), MAX_SHARES));
-    uint first = atomicAdd(share_count, total);
-    uint end = min(first + total, uint(shares.length()));
-    for (uint number = first; number < end; ++number) {
-        shares[number] = ivec3(face, number - first, total);
+void list_shares(int face, float pixels) {
+    uint spare = uint(min(ceil(pixels / SHARE_PIXELS), MAX_SHARES)) - 1u;
+    if (spare > 0u && atomicAdd(spare_taken, spare) + spare > uint(SPARE_SHARES)) {
+        spare = 0u;
     }
-    atomicMax(share_groups[0], min(end, MAX_SHARE_GROUPS));
-    return end == first + total;
+    uint total = spare + 1u, first = atomicAdd(share_count, total);
+    for (uint number = 0u; number < total; ++number) {
+        shares[first + number] = ivec3(face, number, total);
+    }
+    atomicMax(share_groups[0], min(first + total, MAX_SHARE_GROUPS));
 }
 #endif
 
@@ -101,7 +102,8 @@ void draw_face(int face) {
     }
 #ifndef SHARES
     float pixels = sides.x * sides.y;
-    if (pixels > FEW_PIXELS && list_shares(face, pixels)) {
+    if (pixels > FEW_PIXELS) {
+        list_shares(face, pixels);
         return;
     }
 #endif
@@ -138,8 +140,7 @@ void draw_face(int face) {
 
 void main() {
 #ifdef SHARES
-    uint end = min(share_count, uint(shares.length()));
-    for (uint number = gl_WorkGroupID.x; number < end; number += gl_NumWorkGroups.x) {
+    for (uint number = gl_WorkGroupID.x; number < share_count; number += gl_NumWorkGroups.x) {
         share = shares[number].y;
         share_total = shares[number].z;
         draw_face(shares[number].x);

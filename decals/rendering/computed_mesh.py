@@ -9,15 +9,24 @@ from collections.abc import Callable
 from functools import partial
 
 import moderngl
+import numpy as np
 
 from decals.rendering.context import Context
 from decals.rendering.drawable import Drawable
 from decals.rendering.gbuffer import NO_FACE, GBuffer
-from decals.rendering.mesh import ColoredMesh, MeshDrawable, MeshFaces, mesh_variant, use_base_texture
-from decals.rendering.pixel_pass import GROUP, LIST_HEAD, PassBackend, attach_camera, set_uniform
+from decals.rendering.mesh import (
+    ColoredMesh,
+    MeshDrawable,
+    MeshFaces,
+    mesh_variant,
+    split_mesh,
+    use_base_texture,
+)
+from decals.rendering.pixel_pass import GROUP, PassBackend, attach_camera, set_uniform
 from decals.rendering.viewpoint import WHOLE, Part, Tile, covered_rectangle
 from decals.rendering.warmup import SHADERS, WarmupPlan, WarmupTask
 from decals.shaders import compose
+from decals.surfaces.normals import SplitMesh
 
 FACE_GROUP = 128
 """Faces that invocations of one group look at together."""
@@ -26,7 +35,13 @@ MAX_GROUPS = 65_535
 """Groups that every driver starts at once."""
 
 SPARE_SHARES = 1 << 16
-"""Room in the list of shares beside one for each face; faces that do not fit are drawn at once."""
+"""Shares of large faces beside one for each face; once these are taken, a face is one share."""
+
+SHARES_HEAD = np.array([0, 1, 1, 0, 0, 0, 0, 0], np.uint32).tobytes()
+"""Numbers before an empty list: groups that draw it (three axes), length, spare shares taken, padding."""
+
+MIN_BLOCK_BYTES = 1 << 27
+"""Size of storage buffers that shaders can read, on drivers that do not state it."""
 
 ROWS_BINDING, FACES_BINDING, SHARES_BINDING = 1, 2, 3
 """Binding points of the storage buffers in ``shaders/face_rows.glsl`` and ``shaders/faces.comp``."""
@@ -41,13 +56,13 @@ ROW_LENGTHS = {"plain": 9, "base": 9, "textured": 11}
 class ComputedMeshDrawable(MeshFaces):
     """A mesh that compute shaders draw."""
 
-    def __init__(self, context: Context, mesh: ColoredMesh) -> None:
-        super().__init__(context, mesh)
+    def __init__(self, context: Context, mesh: ColoredMesh, split: SplitMesh) -> None:
+        super().__init__(context, mesh, split)
         self._gl = context.gl
         self._finder, self._shares, self._surface = (
             make() for make in face_programs(context, mesh_variant(mesh))
         )
-        self._list = context.gl.buffer(reserve=LIST_HEAD.nbytes + 16 * (self._faces + SPARE_SHARES))
+        self._list = context.gl.buffer(reserve=list_bytes(self._faces))
 
     @property
     def rasterised(self) -> bool:
@@ -72,18 +87,22 @@ class ComputedMeshDrawable(MeshFaces):
         for program in (self._finder, self._shares):
             set_uniform(program, "tile_size", (tile.width, tile.height))
             set_uniform(program, "row_range", (rectangle.y, rectangle.y + rectangle.height))
-        for first, last, image in self._ranges(WHOLE):
-            self._find_faces(first, last)
-            use_base_texture(self._surface, image)
-            self._surface.run(-(-rectangle.width // GROUP), -(-rectangle.height // GROUP))
-            self._gl.memory_barrier()
+        try:
+            for first, last, image in self._ranges(WHOLE):
+                self._find_faces(first, last)
+                use_base_texture(self._surface, image)
+                self._surface.run(-(-rectangle.width // GROUP), -(-rectangle.height // GROUP))
+                self._gl.memory_barrier()
+        except BaseException:
+            gbuffer.forget_faces()
+            raise
 
     def _find_faces(self, first: int, last: int) -> None:
         """Write the numbers of the nearest of these faces, after their depths."""
         set_uniform(self._finder, "first_face", first)
         set_uniform(self._finder, "end_face", last)
         for naming in (False, True):
-            self._list.write(LIST_HEAD.tobytes())
+            self._list.write(SHARES_HEAD)
             set_uniform(self._finder, "naming", naming)
             set_uniform(self._shares, "naming", naming)
             self._gl.memory_barrier()
@@ -108,6 +127,7 @@ def face_program(
         "NO_FACE": f"{NO_FACE}u",
         "ROW_LENGTH": ROW_LENGTHS[variant],
         "SHARES": shares,
+        "SPARE_SHARES": SPARE_SHARES,
         "BASE": variant != "plain",
         "TEXTURED": variant == "textured",
     }
@@ -125,9 +145,19 @@ def is_computed(context: Context) -> bool:
     return context.backend is PassBackend.COMPUTE
 
 
+def list_bytes(faces: int) -> int:
+    """Return the size of the list of shares for a number of faces."""
+    return len(SHARES_HEAD) + 16 * (faces + SPARE_SHARES)
+
+
 def mesh_drawable(context: Context, mesh: ColoredMesh) -> Drawable:
-    """Return the drawable of a mesh for the context's backend."""
-    return ComputedMeshDrawable(context, mesh) if is_computed(context) else MeshDrawable(context, mesh)
+    """Return the drawable of a mesh for the backend; one too large for storage buffers is rasterised."""
+    split = split_mesh(mesh)
+    limit = context.gl.info.get("GL_MAX_SHADER_STORAGE_BLOCK_SIZE", MIN_BLOCK_BYTES)
+    bytes_of_rows = 4 * ROW_LENGTHS[mesh_variant(mesh)] * len(split.rows)
+    if is_computed(context) and max(bytes_of_rows, list_bytes(len(split.faces))) <= limit:
+        return ComputedMeshDrawable(context, mesh, split)
+    return MeshDrawable(context, mesh, split)
 
 
 def mesh_warmup(context: Context, mesh: ColoredMesh) -> WarmupPlan:

@@ -98,6 +98,11 @@ class GBuffer:
         for unit, texture in enumerate(self._faces):
             texture.bind_to_image(unit, read=True, write=True)
 
+    def forget_faces(self) -> None:
+        """Release depths and numbers of faces that an interrupted drawing left behind."""
+        while self._faces:
+            self._faces.pop().release()
+
     def complete_depth(self, width: int, height: int, part: Part = WHOLE) -> None:
         """Write the depth of surface that was not rasterised, in the lower left part of this size.
 

@@ -6,6 +6,8 @@ from numpy.typing import NDArray
 
 from decals import Camera
 from decals.rendering import Buffers, Projection, Renderer, RenderOptions, Viewpoint, computed_mesh
+from decals.rendering.computed_mesh import ComputedMeshDrawable, mesh_drawable
+from decals.rendering.mesh import MeshDrawable
 from tests.decals.rendering.pictures import assert_same_surfaces
 from tests.decals.shapes import Shape, View, torus
 from tests.oracles.raster import edges
@@ -92,13 +94,39 @@ def test_closed_meshes_have_no_holes(compute: Renderer, rows: int) -> None:
     assert ((buffers.object_id >= 0) & (face < 0)).mean() < 1e-3
 
 
-def test_faces_beyond_the_list_are_drawn_at_once(compute: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_faces_without_spare_shares_are_one_share(compute: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = drawn(compute, CAMERA, soup(3, 30.0))
-    monkeypatch.setattr(computed_mesh, "SPARE_SHARES", 3 - 60)
+    monkeypatch.setattr(computed_mesh, "SPARE_SHARES", 3)
     full = drawn(compute, CAMERA, soup(3, 30.0))
     assert (whole.object_id >= 0).mean() > 0.5
     np.testing.assert_array_equal(full.position, whole.position)
     np.testing.assert_array_equal(full.object_id, whole.object_id)
+
+
+def test_an_interrupted_drawing_leaves_nothing_behind(
+    compute: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = drawn(compute, CAMERA, torus())
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(computed_mesh, "use_base_texture", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            drawn(compute, CAMERA, soup(3, 30.0))
+    np.testing.assert_array_equal(drawn(compute, CAMERA, torus()).position, before.position)
+
+
+def test_a_mesh_beyond_the_drivers_buffers_is_rasterised(
+    compute: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with compute.context.current():
+        for limit, kind in ((1 << 30, ComputedMeshDrawable), (1000, MeshDrawable)):
+            monkeypatch.setitem(compute.context.gl.info, "GL_MAX_SHADER_STORAGE_BLOCK_SIZE", limit)
+            drawable = mesh_drawable(compute.context, torus())
+            assert type(drawable) is kind
+            drawable.release()
 
 
 def test_flat_and_turned_away_faces_are_harmless(compute: Renderer) -> None:
