@@ -158,9 +158,10 @@ def least_size(cells: SparseCells, least: float) -> float:
 class PartCells(AdaptiveCells):
     """Adaptive cells that are small where parts are thin."""
 
-    def __init__(self, tree: BlockTree, tolerance: float, least: float, walls: Walls | None) -> None:
+    def __init__(self, first: "FirstCells", tolerance: float, least: float) -> None:
+        tree, walls = first.blocks, first.walls
         super().__init__(tree, tolerance)
-        self._least, self._walls = least, walls
+        self._least, self._walls, self._support = least, walls, first.support
         self.unresolved: list[ThinPart] = []
         """Parts for whose cells there is no room."""
         self._in_walls = np.empty(0, bool)
@@ -202,6 +203,12 @@ class PartCells(AdaptiveCells):
             kept = self._in_walls[blocks] | ~np.isin(_size_keys(needed), self._dropped)
             self.replace(blocks[kept], largest > needed[kept])
 
+    def _outside(self, grid: Grid, first: int) -> BoolArray:
+        """Return True for blocks without surface: bounds of warps are loose beyond the support."""
+        side, (lower, upper) = 4 * grid.cell_size, self._support
+        corners = grid.origin + self.tree.coordinates[first:] * side
+        return np.asarray(((corners > upper) | (corners + side < lower)).any(axis=1))
+
     def _needed(self, first: int) -> Float32Array:
         """Return the sizes of cells that the blocks of the finest level need, from number `first` on."""
         tree, count = self.tree, len(self.tree)
@@ -209,6 +216,7 @@ class PartCells(AdaptiveCells):
             return np.empty(0, np.float32)
         grid = tree.grid(int(tree.levels[first]))
         needed = needed_sizes(tree.cells, grid, tree.level_arrays(), first, count, self._least)
+        needed[self._outside(grid, first)] = np.inf
         of_walls = np.full_like(needed, np.inf) if self._walls is None else self._walls.needed(first)
         self._in_walls = np.append(self._in_walls[:first], of_walls < needed)
         return np.minimum(needed, of_walls)
@@ -330,6 +338,8 @@ class FirstCells:
     blocks: BlockTree
     walls: Walls | None
     """None for a tree without operators that leave walls."""
+    support: tuple[Float32Array, Float32Array]
+    """Lower and upper corner of the tree's support."""
 
 
 def first_cells(
@@ -343,7 +353,7 @@ def _sampled(tree: ImplicitModel, grid: Grid, device: str | None, report: Progre
     """Return cells of a grid, and the walls that they show."""
     blocks = BlockTree(build_cells(sized_tape(tree), grid, device=device, report=report))
     walls = Walls(tree, blocks, _least_cell(tree)) if has_walls(tree._program) else None
-    return FirstCells(blocks, walls)
+    return FirstCells(blocks, walls, tree.support)
 
 
 def _least_cell(tree: ImplicitModel) -> float:
@@ -415,7 +425,7 @@ def _closed_mesh(
     InvalidResolution
         The mesh does not close.
     """
-    parts = PartCells(first.blocks, 0.0, smallest, first.walls)
+    parts = PartCells(first, 0.0, smallest)
     parts.divide_gaps()
     mesher = AdaptiveMesher(parts, creases)
     mesh = mesher.mesh(report, MAX_PART_REPAIRS, MAX_REPAIR_GROWTH, MAX_REPAIRED_LEAVES)
