@@ -278,6 +278,15 @@ def call_table() -> Calls:
             },
         ),
         "content_hash": (blobtree.content_hash, {"value": tree}),
+        "Outline": (blobtree.Outline, {"path": "M0 0H4V3H0Z"}),
+        "Outline.polygon": (blobtree.Outline.polygon, {"points": [(0, 0), (2, 0), (0, 1)]}),
+        "Outline.arcs": (blobtree.Outline.arcs, {"points": [(0, 0), (2, 0)], "bulges": 1.0}),
+        "Outline.spline": (blobtree.Outline.spline, {"points": [(1, 0), (0, 1), (-1, 0)]}),
+        "Outline.svg": (
+            blobtree.Outline.svg,
+            {"drawing": '<svg><rect width="2" height="1"/></svg>', "rule": "evenodd"},
+        ),
+        "Outline.text": (blobtree.Outline.text, {"text": "ab", "size": 2.0}),
         "reproduce": (decals.reproduce, {"scene": covered}),
         "save_html": (
             decals.save_html,
