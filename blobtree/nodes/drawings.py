@@ -36,30 +36,34 @@ NOT_DRAWN = frozenset(
 )
 """Elements whose contents are no shapes at their place."""
 
+INHERITED = {"fill": "black", "fill-rule": "nonzero", "visibility": "visible"}
+"""Properties that elements inherit, as drawings begin."""
+
 CALL = re.compile(r"(\w+)\s*\(([^)]*)\)")
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 Sizes = Callable[[str], float]
 
 
-def filled_shapes(drawing: str | Path) -> Iterator[tuple[str, Float64Array]]:
-    """Yield the path data and the map (2, 3) of each filled shape in a file, or in the text of one."""
-    text = drawing if isinstance(drawing, str) and drawing.lstrip().startswith("<") else None
-    root = ElementTree.fromstring(text) if text else ElementTree.parse(drawing).getroot()
-    pending = [(root, np.eye(3), True)]
+def filled_shapes(drawing: str | Path) -> Iterator[tuple[str, Float64Array, str]]:
+    """Yield path data, the map (2, 3) and the rule of each filled shape in a file, or in the text of one."""
+    text = drawing.lstrip("\ufeff \t\r\n") if isinstance(drawing, str) else ""
+    root = ElementTree.fromstring(text) if text.startswith("<") else ElementTree.parse(drawing).getroot()
+    pending = [(root, np.eye(3), INHERITED)]
     for _ in range(MOST_ELEMENTS):
         if not pending:
             return
-        element, above, filled = pending.pop()
+        element, above, look = pending.pop()
         tag = element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
         style = {**element.attrib, **_declarations(element.get("style", ""))}
         if tag in NOT_DRAWN or style.get("display") == "none":
             continue
         matrix = above @ _matrix(element.get("transform", ""))
-        filled = style.get("fill", "" if filled else "none") != "none"
-        if filled and tag in SHAPES:
-            yield SHAPES[tag](element), matrix[:2]
-        pending += [(child, matrix, filled) for child in reversed(element)]
+        look = look | {name: style[name] for name in look if style.get(name, "inherit") != "inherit"}
+        seen = look["fill"] != "none" and look["visibility"] == "visible"
+        if seen and tag in SHAPES:
+            yield SHAPES[tag](element), matrix[:2], look["fill-rule"]
+        pending += [(child, matrix, look) for child in reversed(element)]
     raise InvalidNode(f"drawing: expected at most {MOST_ELEMENTS:,} elements, got more; simplify it")
 
 
@@ -75,7 +79,12 @@ def _matrix(text: str) -> Float64Array:
     for name, arguments in CALL.findall(text):
         if name not in MAPS:
             raise InvalidNode(f"transform: expected {', '.join(MAPS)}, got {name}")
-        matrix = matrix @ MAPS[name](*map(float, NUMBER.findall(arguments)))
+        try:
+            matrix = matrix @ MAPS[name](*map(float, NUMBER.findall(arguments)))
+        except TypeError:
+            raise InvalidNode(
+                f"transform: expected as many numbers as SVG gives {name}, got ({arguments})"
+            ) from None
     return matrix
 
 
@@ -105,7 +114,18 @@ MAPS: dict[str, Callable[..., Float64Array]] = {
 
 def _sizes(element: ElementTree.Element) -> Sizes:
     """Return a function of the lengths of an element by their names, 0 for those that it leaves out."""
-    return lambda name: float(element.get(name, "0").removesuffix("px"))
+
+    def size(name: str) -> float:
+        text = element.get(name, "0")
+        try:
+            return float(text.removesuffix("px"))
+        except ValueError:
+            raise InvalidNode(
+                f"drawing: cannot read {name}={text!r} of a {element.tag.rpartition('}')[2]}; "
+                "use numbers without units"
+            ) from None
+
+    return size
 
 
 def _rectangle(element: ElementTree.Element) -> str:

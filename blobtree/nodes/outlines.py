@@ -9,6 +9,7 @@ only the loops stay that bound what is filled.
 
 import cmath
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from itertools import pairwise
@@ -40,6 +41,9 @@ CORNER = math.radians(12.0)
 
 STRAIGHT = 1e-6
 """Angle between two straight lines from which they meet in a corner."""
+
+LEAST_BULGE = 1e-9
+"""Bulge below which an arc is a line."""
 
 SHORTEST = 1e-9
 """Length, over the size, up to which a line is a point, and a loop a line."""
@@ -108,14 +112,17 @@ class Outline(msgspec.Struct, frozen=True, dict=True):
         >>> Outline.polygon([(0, 0), (2, 0), (0, 1)]).area
         1.0
         """
-        return cls.arcs(points, 0.0)
+        corners = _plane_points(points)
+        if len(corners) < 3:
+            raise InvalidNode(f"points: expected at least three, got {len(corners)}")
+        return cls.arcs(corners, 0.0)
 
     @classmethod
     def arcs(cls, points: ArrayLike, bulges: ArrayLike) -> Self:
         """Return straight lines and arcs of circles from point to point (n, 2), and back to the first.
 
-        `bulges` has the tangent of a quarter of each arc's angle: 0 is a straight line, 1 half a circle to
-        the right of the way, −1 one to the left. A number holds for all.
+        In `bulges`, 0 is a line, 1 half a circle to the right of the way, −1 one to the left: it has the
+        tangent of a quarter of each arc's angle. A number holds for all.
 
         Examples
         --------
@@ -136,7 +143,7 @@ class Outline(msgspec.Struct, frozen=True, dict=True):
             )
         parts = [f"M{_text(corners[0])}"]
         for start, end, bulge in zip(corners, np.roll(corners, -1, axis=0), tangents.tolist(), strict=True):
-            if bulge == 0.0:
+            if abs(bulge) < LEAST_BULGE:
                 parts.append(f"L{_text(end)}")
                 continue
             radius = 0.25 * np.linalg.norm(end - start) * abs(bulge + 1.0 / bulge)
@@ -161,19 +168,22 @@ class Outline(msgspec.Struct, frozen=True, dict=True):
         closed = np.vstack([through, through[:1]])
         lengths = np.linalg.norm(np.diff(closed, axis=0), axis=1)
         if lengths.min() == 0.0:
-            raise InvalidNode("points: expected each other than the one before, got two that are equal")
+            raise InvalidNode(
+                "points: two neighbours are equal (the first and last are neighbours too); remove one"
+            )
         places = np.concatenate([[0.0], np.cumsum(lengths)])
         slopes = CubicSpline(places, closed, bc_type="periodic")(places, 1) * (1.0 / 3.0)
         curves = zip(closed, slopes, closed[1:], slopes[1:], lengths, strict=False)
         return cls._of([[np.array([a, a + h * u, b - h * v, b]) for a, u, b, v, h in curves]])
 
     @classmethod
-    def svg(cls, drawing: str | Path, *, rule: str = "nonzero") -> Self:
-        """Return all filled shapes of an SVG drawing: a file, or its text. Its y axis is turned upward.
+    def svg(cls, drawing: str | Path, *, rule: str | None = None) -> Self:
+        """Return all filled shapes of an SVG file, or of a string with its contents, with y turned upward.
 
         Lengths are those of the file, whatever its size on a page is. Transforms count. Strokes, clips,
-        texts, style sheets and copies (`use`) are left out. `rule` says what nested loops fill, as in SVG:
-        `"nonzero"`, or `"evenodd"`.
+        texts, style sheets and copies (`use`) are left out. Each shape is filled by its `fill-rule`. A `rule`
+        fills all of them as one shape instead: `"nonzero"`, or `"evenodd"`, by which shapes inside others
+        are holes.
 
         Examples
         --------
@@ -182,24 +192,33 @@ class Outline(msgspec.Struct, frozen=True, dict=True):
         >>> round(Outline.svg(eye, rule="evenodd").area, 2)
         10.57
         """
-        if rule not in ("nonzero", "evenodd"):
-            raise InvalidNode(f"rule: expected 'nonzero' or 'evenodd', got {describe(rule)}")
+        if rule is not None and not (isinstance(rule, str) and rule in ("nonzero", "evenodd")):
+            raise InvalidNode(f"rule: expected 'nonzero', 'evenodd' or None, got {describe(rule)}")
         if not isinstance(drawing, str | Path):
             raise InvalidNode(f"drawing: expected a file or the text of one, got {describe(drawing)}")
         shapes = _read(lambda: list(filled_shapes(drawing)), "drawing", drawing)
-        upright = [
-            [(curve @ matrix[:, :2].T + matrix[:, 2]) * (1.0, -1.0) for curve in loop]
-            for path, matrix in shapes
-            for loop in _loops_of(path)
+        filled = [
+            (
+                [
+                    [(curve @ matrix[:, :2].T + matrix[:, 2]) * (1.0, -1.0) for curve in loop]
+                    for loop in loops
+                ],
+                own,
+            )
+            for path, matrix, own in shapes
+            for loops in [_loops_of(path)]
         ]
-        return cls._of(_filling(upright) if rule == "nonzero" else upright)
+        if rule:
+            filled = [([loop for loops, _ in filled for loop in loops], rule)]
+        return cls._of(_filling(filled))
 
     @classmethod
     def text(cls, text: str, *, size: float = 1.0, font: str | Path | None = None) -> Self:
         """Return a text in a TrueType or OpenType font, by default DejaVu Sans; it starts at the origin.
 
         `size` is the size of the font in model units: capitals are about 0.7 of it high. Lines are as far
-        apart as the font says. Letters stand side by side, without kerning and ligatures.
+        apart as the font says, and a tab is four spaces. Letters stand side by side, without kerning and
+        ligatures; letters that touch are refused.
 
         Examples
         --------
@@ -211,10 +230,12 @@ class Outline(msgspec.Struct, frozen=True, dict=True):
             raise InvalidNode(f"text: expected a text, got {describe(text)}")
         scale = positive_number("size", size)
         letters = _loops_of(_read(partial(_letters, text, font or _default_font()), "font", font))
-        return cls._of(_filling([[curve * scale for curve in loop] for loop in letters]))
+        return cls._of(_filling([([[curve * scale for curve in loop] for loop in letters], "nonzero")]))
 
     def __add__(self, other: Self) -> Self:
         """Return the loops of both; those inside others are holes."""
+        if not isinstance(other, Outline):
+            return NotImplemented
         return type(self)(f"{self.path} {other.path}")
 
     def scale(self, factor: float) -> Self:
@@ -396,15 +417,14 @@ def _letters(text: str, file: str | Path) -> str:
     from fontTools.pens.transformPen import TransformPen
     from fontTools.ttLib import TTFont
 
+    lines = text.replace("\t", "    ").splitlines()
     with TTFont(file, fontNumber=0) as font:
         letters, names = font.getGlyphSet(), font.getBestCmap() or {}
-        if missing := sorted({letter for letter in text if letter != "\n" and ord(letter) not in names}):
-            raise InvalidNode(
-                f"text: expected characters of the font, got {missing[0]!r}; choose another font"
-            )
+        if missing := sorted({letter for letter in "".join(lines) if ord(letter) not in names}):
+            raise InvalidNode(f"text: the font has no {missing[0]!r}; choose another font")
         pen, unit, leading = SVGPathPen(letters), 1.0 / font["head"].unitsPerEm, font["hhea"]
         drop = unit * (leading.ascent - leading.descent + leading.lineGap)
-        for number, line in enumerate(text.split("\n")):
+        for number, line in enumerate(lines):
             x = 0.0
             for letter in (letters[names[ord(character)]] for character in line):
                 letter.draw(TransformPen(pen, (unit, 0.0, 0.0, unit, x, -number * drop)))
@@ -438,7 +458,7 @@ def _polygons(loops: Sequence[Sequence[Curve]]) -> list[Loop | None]:
     """Return the polygon of each loop, None for one without an area."""
     everything = [curve for loop in loops for curve in loop]
     if not everything:
-        return []
+        return [None] * len(loops)
     points = np.concatenate(everything)
     if not np.abs(points).max() <= LARGEST_NUMBER:
         raise InvalidNode(f"outline: expected finite coordinates, got others; {LIMIT}")
@@ -539,17 +559,28 @@ def _directed(loop: Loop, *, hole: bool) -> Loop:
     return Loop(np.roll(points, -first, axis=0), np.roll(corners, -first))
 
 
-def _filling(loops: Sequence[Sequence[Curve]]) -> list[Sequence[Curve]]:
-    """Return the loops that bound what the rule "nonzero" fills."""
-    known = [(loop, polygon.points) for loop, polygon in zip(loops, _polygons(loops), strict=True) if polygon]
+def _filling(shapes: Iterable[tuple[Sequence[Sequence[Curve]], str]]) -> list[Sequence[Curve]]:
+    """Return the loops that bound what shapes, each of loops and a rule of SVG, fill together."""
+    owned = [(loop, (number, rule)) for number, (loops, rule) in enumerate(shapes) for loop in loops]
+    polygons = _polygons([loop for loop, _ in owned])
+    known = [(*own, polygon.points) for own, polygon in zip(owned, polygons, strict=True) if polygon]
     if not known:
         raise InvalidNode("outline: expected a shape with an area, got none")
-    ways = [math.copysign(1.0, _area(points)) for _, points in known]
-    outside = [sum(ways[outer] for outer in around) for around in _inside_others([p for _, p in known])]
+    points = [points for *_, points in known]
+    _check_apart(points)
+    ways = [1 if _area(polygon) > 0.0 else -1 for polygon in points]
+
+    def filled(around: Iterable[int]) -> bool:
+        """Return True if a shape fills the places that are inside these loops alone."""
+        windings: Counter[tuple[int, str]] = Counter()
+        for loop in around:
+            windings[known[loop][1]] += ways[loop]
+        return any(count % 2 if rule == "evenodd" else count for (_, rule), count in windings.items())
+
     return [
-        loop
-        for (loop, _), way, before in zip(known, ways, outside, strict=True)
-        if (before == 0.0) != (before + way == 0.0)
+        known[number][0]
+        for number, around in enumerate(_inside_others(points))
+        if filled(around) != filled([*around, number])
     ]
 
 

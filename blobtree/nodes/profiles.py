@@ -43,6 +43,24 @@ FAR = wp.constant(1.0e18)
 
 WHOLE_TURN = 360.0
 
+MUCH_THINNER = 0.25
+"""Width of thin parts over the mean radius, at most: meshes have smaller cells for such parts."""
+
+PARALLEL = np.cos(np.radians(3.0))
+"""Cosine of the angle between both sides of a thin part, at least: others are tips of corners."""
+
+LEAST_SHARE = 0.005
+"""Share of an outline's length that thin parts have, at least."""
+
+THINNEST = 0.1
+"""Share of their length that may be thinner than their width."""
+
+MOST_SAMPLES = 2000
+"""Most places along an outline at which its thickness is measured."""
+
+MOST_PAIRS = 20_000_000
+"""Most pairs of such a place and an edge."""
+
 
 @wp.func
 def box_squared(p: wp.vec2, box: wp.vec4) -> wp.float32:
@@ -374,6 +392,13 @@ class _Profile(SharpSolid):
     outline: Section
     origin: Vector = par.point("where the outline's origin lies")
 
+    @classmethod
+    def inradii(cls, leaves: Sequence[Any]) -> Float64Array:
+        """Return the radii of the solids, or of parts that are much thinner."""
+        radii = super().inradii(leaves)
+        thin = np.array([thin_width(leaf.outline) + leaf.offset for leaf in leaves])
+        return np.where((thin > 0.0) & (thin < MUCH_THINNER * radii), thin, radii)
+
 
 class _Extrusion(_Profile):
     """An outline, drawn along the normal of its plane."""
@@ -522,6 +547,46 @@ def _mean_radius(outline: Outline) -> float:
     return float(2.0 * outline.area / sum(lengths))
 
 
+def _mean_distance(outline: Outline) -> float:
+    """Return the x of the centroid of an outline."""
+    (x, y), (to_x, to_y) = (
+        np.concatenate([np.roll(loop.points, -step, axis=0) for loop in outline.loops]).T for step in (0, 1)
+    )
+    return float(((x * to_y - to_x * y) * (x + to_x)).sum() / (6.0 * outline.area))
+
+
+@lru_cache(maxsize=64)
+def thin_width(outline: Outline) -> float:
+    """Return the width of an outline's thin parts, infinity if it has none.
+
+    It is measured at even distances along the outline: inward, to the next edge.
+    """
+    starts = np.concatenate([loop.points for loop in outline.loops])
+    ways = np.concatenate([np.roll(loop.points, -1, axis=0) - loop.points for loop in outline.loops])
+    lengths = np.linalg.norm(ways, axis=1)
+    units = ways / lengths[:, None]
+    ends = np.cumsum(lengths)
+    count = min(MOST_SAMPLES, MOST_PAIRS // len(ways))
+    along = (np.arange(count) + 0.5) / count * ends[-1]
+    edges = np.minimum(np.searchsorted(ends, along), len(ways) - 1)
+    places = starts[edges] + (along - ends[edges] + lengths[edges])[:, None] * units[edges]
+    nearest = SHORTEST * np.ptp(starts, axis=0).max()
+
+    def width(place: Float64Array, unit: Float64Array) -> float:
+        """Return the distance of the next edge on the left of a place, infinity if it is not parallel."""
+        x, y = (starts - place).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            rates = -1.0 / (ways @ unit)
+            distances, shares = (x * ways[:, 1] - y * ways[:, 0]) * rates, (x * unit[0] + y * unit[1]) * rates
+        distances[~((shares >= 0.0) & (shares <= 1.0) & (distances > nearest))] = np.inf
+        edge = distances.argmin()
+        return float(distances[edge]) if units[edge] @ unit < -PARALLEL else np.inf
+
+    widths = np.array([width(*sample) for sample in zip(places, units[edges], strict=True)])
+    thin = widths[widths < MUCH_THINNER * _mean_radius(outline)]
+    return float(np.quantile(thin, THINNEST)) if len(thin) > LEAST_SHARE * count else np.inf
+
+
 def _polygon_frame(points: Float64Array) -> tuple[Float64Array, Float64Array]:
     """Return unit vectors (2, 3) in the plane of corners (n, 3), counter-clockwise; and the corners there."""
     w = points - points[0]
@@ -643,7 +708,8 @@ class Revolve(Pieces):
 
     The outline's x is the distance from the axis, and its y is z. With `radius` 0 all edges are sharp. With a
     larger one, the solid also holds all points within `radius` of the sharp one. A width grows with the
-    radius, or with the mean radius of a sharp solid: twice the area of the outline over its length.
+    radius, or with the mean radius of a sharp solid: twice the area of the outline over its length,
+    and at most the length of the turn at the outline's centroid.
 
     Raises
     ------
@@ -678,6 +744,8 @@ class Revolve(Pieces):
     def expanded(self) -> Node:
         """Return the direct field of the solid."""
         mean = self.radius or _mean_radius(self.outline)
+        if self.angle < WHOLE_TURN and not self.radius:
+            mean = min(mean, np.radians(self.angle) * _mean_distance(self.outline))
         return _Revolution(
             self.outline, self.origin, self.angle, offset=self.radius, mean=mean, **self.shared
         )

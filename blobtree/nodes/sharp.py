@@ -161,7 +161,7 @@ class SharpSolid(Profile, FieldPrimitive):
     def grown(self, distance: float) -> Self:
         """Return this solid with its surface moved along the normals."""
         larger: Self = replace(self, offset=self.offset + distance)
-        if larger.inradii([larger])[0] <= 0.0:
+        if larger.mean + larger.offset <= 0.0:
             raise InvalidNode(
                 f"offset: {distance:g} leaves nothing of a solid whose mean radius is {self.mean:g}"
             )

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from blobtree import Extrude, Node, Outline, Prism, Revolve, polygonize
 from blobtree.errors import InvalidNode
+from blobtree.nodes.profiles import thin_width
 from tests.blobtree.meshing.test_polygonize import assert_closed
 from tests.oracles import blobtree as oracle
 from tests.oracles import sharp
@@ -80,6 +81,49 @@ def test_volumes(solid: Node, volume: float) -> None:
     mesh = polygonize(solid, resolution=96, creases=True)
     assert_closed(mesh)
     assert volume_of(mesh) == pytest.approx(volume, rel=NEAR_VOLUME)
+
+
+STRIP = Outline("M0 0H1V1H0Z") + Outline("M1.2 0H1.22V1H1.2Z")
+
+
+@pytest.mark.parametrize(
+    ("solid", "volume"),
+    [
+        (Extrude(STRIP, 0.3), 0.3 * STRIP.area),
+        (Extrude("M0 0H1V.49H3V.51H1V1H0Z", 0.3), 0.3 * 1.04),
+        (Revolve(STRIP), np.pi * (1.0 + 1.22**2 - 1.2**2)),
+    ],
+)
+def test_meshes_have_thin_parts(solid: Node, volume: float) -> None:
+    mesh = polygonize(solid, creases=True)
+    assert_closed(mesh)
+    assert volume_of(mesh) == pytest.approx(volume, rel=NEAR_VOLUME)
+
+
+@pytest.mark.parametrize("angle", [1.0, 4.0, 10.0])
+def test_meshes_of_thin_wedges_lack_only_their_tips(angle: float) -> None:
+    mesh = polygonize(Revolve("M0 0H1V1H0Z", angle), creases=True)
+    assert volume_of(mesh) == pytest.approx(0.5 * np.radians(angle), rel=0.06)
+
+
+@pytest.mark.parametrize(
+    ("outline", "width"),
+    [
+        (STRIP, 0.02),
+        (RING + Outline.arcs([(-1.02, 0), (1.02, 0)], 1) + Outline.arcs([(-1.04, 0), (1.04, 0)], 1), 0.02),
+        (Outline("M0 0H1V1H0Z"), np.inf),
+        (Outline("M0 0H2V.2Z"), np.inf),
+        (Outline.text("Sharp & Exit"), np.inf),
+    ],
+)
+def test_thin_parts_are_measured_without_tips_of_corners(outline: Outline, width: float) -> None:
+    assert thin_width(outline) == pytest.approx(width, rel=0.01)
+
+
+def test_a_thin_part_may_go_in_an_offset() -> None:
+    solid = Extrude(STRIP, 0.3).offset(-0.02)
+    assert (solid([(1.21, 0.5, 0.15), (0.5, 0.5, 0.15)]) > 0.5).tolist() == [False, True]
+    assert volume_of(polygonize(solid, creases=True)) == pytest.approx(0.96**2 * 0.26, rel=NEAR_VOLUME)
 
 
 def test_a_tapered_top_is_the_scaled_outline() -> None:

@@ -21,6 +21,8 @@ PIXELS = 600
 """Pixels of a unit of length."""
 
 SQUARE = "M0 0H1V1H0Z"
+OVERLAPPING = '<svg><circle r="2"/><rect x="0" y="-.2" width="5" height=".4"/></svg>'
+RECTANGLE = '<svg xmlns="http://www.w3.org/2000/svg"><rect width="{}" height="1"/></svg>'
 
 
 def shown(outline: Outline, width: int, height: int, top: float) -> NDArray[np.bool_]:
@@ -56,6 +58,7 @@ def test_lines_and_letters_stand_side_by_side() -> None:
     wide, narrow = (Outline.text(text, size=2.0).bounds for text in ("II", "I"))
     assert wide[1][0] - narrow[1][0] == pytest.approx(2.0 * font.getlength("I") / PIXELS, abs=4e-3)
     above, below = Outline.text("I").bounds, Outline.text("\nI").bounds
+    assert Outline.text("a\tb\r\nc") == Outline.text("a    b\nc")
     assert above[0][1] - below[0][1] == pytest.approx(sum(font.getmetrics()) / PIXELS, abs=4e-3)
 
 
@@ -87,6 +90,7 @@ def test_a_file_is_its_text(tmp_path: Path) -> None:
     text = f'<svg><path d="{SQUARE}"/></svg>'
     (tmp_path / "square.svg").write_text(text)
     assert Outline.svg(tmp_path / "square.svg") == Outline.svg(text)
+    assert Outline.svg("\ufeff\r\n" + text) == Outline.svg(text)
     assert Outline.svg(text).bounds == ((0.0, -1.0), (1.0, 0.0))
 
 
@@ -96,6 +100,25 @@ def test_rules_of_filling() -> None:
     assert Outline.svg(nested, rule="evenodd").area == 12.0
     opposite = '<svg><path d="M0 0H4V4H0ZM1 1V3H3V1Z"/></svg>'
     assert Outline.svg(opposite).area == 12.0
+    two_shapes = opposite.replace("ZM", 'Z"/><path d="M')
+    assert Outline.svg(two_shapes).area == 16.0
+    assert Outline.svg(two_shapes, rule="nonzero").area == 12.0
+
+
+@pytest.mark.parametrize(
+    ("shapes", "area"),
+    [
+        ('<path fill-rule="evenodd" d="{}"/>', 12.0),
+        ('<g style="fill-rule: evenodd"><path d="{}"/></g>', 12.0),
+        ('<g fill-rule="evenodd"><g><path fill-rule="inherit" d="{}"/></g></g>', 12.0),
+        ('<g fill-rule="evenodd"><path fill-rule="nonzero" d="{}"/></g>', 16.0),
+        ('<path fill-rule="evenodd" d="{}"/><rect x="1.5" y="1.5" width="1" height="1"/>', 13.0),
+        ('<g visibility="hidden"><path d="{}"/><rect width="1" height="1" visibility="visible"/></g>', 1.0),
+        ('<path d="{}"/><circle r="9" visibility="hidden"/><circle/><path d="M0 0Z"/>', 16.0),
+    ],
+)
+def test_shapes_are_filled_as_the_file_says(shapes: str, area: float) -> None:
+    assert Outline.svg(f"<svg>{shapes.format('M0 0H4V4H0ZM1 1H3V3H1Z')}</svg>").area == area
 
 
 @pytest.mark.parametrize(
@@ -103,6 +126,7 @@ def test_rules_of_filling() -> None:
     [
         (Outline.polygon([(0, 0), (0, 2), (1, 0)]), 1.0),
         (Outline.arcs([(-3, 0), (3, 0)], 1), 9.0 * np.pi),
+        (Outline.arcs([(0, 0), (1, 0), (0, 1)], [1e-200, -1e-200, 0.0]), 0.5),
         (Outline.arcs([(0, 0), (1, 0), (1, 1), (0, 1)], [0, -1, 0, 0]), 1.0 - np.pi / 8.0),
         (Outline("M0 0A2 1 30 1 1 .1 0Z"), 2.0 * np.pi),
         (Outline("M1 0C1 1 0 1 0 0ZM5 0Q6 2 7 0Z"), 0.6 + 4.0 / 3.0),
@@ -172,13 +196,25 @@ def test_the_shape_lies_on_the_left() -> None:
         (lambda: Outline.polygon(np.random.default_rng(1).random((60_000, 2))), "at most 50,000 lines"),
         (lambda: Outline("M0 0" + "C0 9 9 9 9 0S0 -9 0 0" * 2000), "at most 50,000 corners"),
         (lambda: Outline.arcs([(0, 0), (1, 0)], [1, 1, 1]), "bulges: expected a finite number, or one for"),
-        (lambda: Outline.spline([(0, 0), (0, 0), (1, 1)]), "each other than the one before"),
+        (lambda: Outline.spline([(0, 0), (0, 0), (1, 1)]), "two neighbours are equal"),
+        (lambda: Outline.spline([(0, 0), (1, 1), (0, 0)]), "the first and last are neighbours too"),
+        (lambda: Outline.polygon([(0, 0), (1, 1)]), "points: expected at least three, got 2"),
         (lambda: Outline.svg("<svg><path"), "drawing: expected one without errors, got ParseError"),
         (lambda: Outline.svg("<svg/>"), "expected a shape with an area"),
         (lambda: Outline.svg(3), "drawing: expected a file or the text"),  # type: ignore[arg-type]
-        (lambda: Outline.svg("<svg/>", rule="all"), "rule: expected 'nonzero' or 'evenodd'"),
+        (lambda: Outline.svg("<svg/>", rule="all"), "rule: expected 'nonzero', 'evenodd' or None"),
+        (lambda: Outline.svg("<svg/>", rule=np.zeros(2)), "rule: expected 'nonzero', 'evenodd' or None"),  # type: ignore[arg-type]
+        (lambda: Outline.svg("<svg><circle/></svg>"), "expected a shape with an area"),
+        (lambda: Outline.svg('<svg><path d="M0 0Z"/></svg>'), "expected a shape with an area"),
+        (lambda: Outline.svg(OVERLAPPING), "unite shapes that overlap"),
+        (
+            lambda: Outline.svg(RECTANGLE.format("1mm")),
+            "cannot read width='1mm' of a rect; use numbers without",
+        ),
+        (lambda: Outline.svg(RECTANGLE.format("50%")), "cannot read width='50%' of a rect"),
+        (lambda: Outline.svg('<svg transform="scale()"/>'), "as many numbers as SVG gives scale"),
         (lambda: Outline.text(" "), "expected a shape with an area"),
-        (lambda: Outline.text("\U0001f9ff"), "expected characters of the font"),
+        (lambda: Outline.text("\U0001f9ff"), "the font has no '.*'; choose another font"),
         (lambda: Outline.text("a", size=-1), "size: expected a number above 0"),
         (lambda: Outline.text("a", font=__file__), "font: expected one without errors, got TTLibError"),
         (lambda: Outline.text(3), "text: expected a text"),  # type: ignore[arg-type]
@@ -189,6 +225,12 @@ def test_the_shape_lies_on_the_left() -> None:
 def test_wrong_outlines_are_refused(make: Callable[[], Any], message: str) -> None:
     with pytest.raises(InvalidNode, match=message):
         make()
+
+
+@pytest.mark.parametrize("other", [SQUARE, None])
+def test_only_outlines_are_added_to_outlines(other: Any) -> None:
+    with pytest.raises(TypeError, match="unsupported operand"):
+        Outline(SQUARE) + other
 
 
 def test_missing_and_damaged_files_are_refused() -> None:
