@@ -226,7 +226,7 @@ def test_results_are_made_again(folder: Path, capsys: Capture) -> None:
     assert "the function 'experiment'" in capsys.readouterr().out
     assert run(["reproduce", "results", "--experiment", "squares.py"]) == 0
     assert "equal bit for bit" in capsys.readouterr().out
-    Path("squares.py").write_text(SQUARES.replace("**2", "**3"))
+    Path("squares.py").write_text(SQUARES.replace("**2", "**3 * 1.0"))
     assert run(["reproduce", "results", "--experiment", "squares.py"]) == 3
     assert "it has changed since" in capsys.readouterr().out
 
