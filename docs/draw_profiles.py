@@ -3,14 +3,10 @@
 ``python docs/draw_profiles.py`` writes docs/images/profiles.png.
 """
 
-from pathlib import Path
-
-import pyvista as pv
-from PIL import Image
+from pictures import DOCS, draw_row
 
 from blobtree import Extrude, Outline, Revolve
 
-SIDE = 320
 COLORS = ("#c8553d", "#4d9078", "#e0a030", "#5b6c8f")
 VIEW = [(1.6, -3.4, 2.6), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
 LOGO = Outline.arcs([(-1, 0), (1, 0)], 1) + Outline.text("&", size=1.8).translate((-0.7, -0.65))
@@ -24,21 +20,6 @@ SOLIDS = (
 )
 
 
-def draw(path: Path) -> None:
-    """Write the picture."""
-    plotter = pv.Plotter(
-        shape=(1, len(SOLIDS)), off_screen=True, window_size=(len(SOLIDS) * SIDE, SIDE), border=False
-    )
-    plotter.set_background("white")
-    for column, (solid, color) in enumerate(zip(SOLIDS, COLORS, strict=True)):
-        plotter.subplot(0, column)
-        plotter.add_mesh(solid.to_pyvista(resolution=150, split_normals=True), color=color)
-        plotter.camera_position = VIEW
-        plotter.camera.zoom(0.9)
-    pixels = plotter.screenshot(return_img=True)
-    plotter.close()
-    Image.fromarray(pixels).quantize(128).save(path, optimize=True)
-
-
 if __name__ == "__main__":
-    draw(Path(__file__).parent / "images" / "profiles.png")
+    surfaces = [solid.to_pyvista(resolution=150, split_normals=True) for solid in SOLIDS]
+    draw_row(DOCS / "images" / "profiles.png", surfaces, [{"color": color} for color in COLORS], VIEW)

@@ -34,6 +34,23 @@ def run_code(text: str) -> dict[str, Any]:
         return runpy.run_path(str(script))
 
 
+def draw_row(
+    path: Path, surfaces: Sequence[pv.PolyData], options: Sequence[dict[str, Any]], view: Any, side: int = 320
+) -> None:
+    """Write a PNG picture of surfaces side by side, each with its options of `add_mesh`, from one view."""
+    size = len(surfaces) * side, side
+    plotter = pv.Plotter(shape=(1, len(surfaces)), off_screen=True, window_size=size, border=False)
+    plotter.set_background("white")
+    for column, (surface, looks) in enumerate(zip(surfaces, options, strict=True)):
+        plotter.subplot(0, column)
+        plotter.add_mesh(surface, **looks)
+        plotter.camera_position = view
+        plotter.camera.zoom(0.9)
+    pixels = plotter.screenshot(return_img=True)
+    plotter.close()
+    Image.fromarray(pixels).quantize(128).save(path, optimize=True)
+
+
 def draw_trees(
     path: Path,
     trees: Sequence[Node],
