@@ -10,7 +10,7 @@ only the loops stay that bound what is filled.
 import cmath
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -46,10 +46,10 @@ LEAST_BULGE = 1e-9
 """Bulge below which an arc is a line."""
 
 SHORTEST = 1e-9
-"""Length, over the size, up to which a line is a point, and a loop a line."""
+"""Length over the size up to which a line counts as a point, and a loop as a line."""
 
 ARC_PIECE = math.pi / 8.0
-"""Angle of an arc which a cubic curve shows to 7e-8 of its radius."""
+"""Largest angle of an arc that becomes one cubic curve; they differ by 7e-8 of the radius."""
 
 MOST_CORNERS = 50_000
 """Most corners of an outline's polygons."""
@@ -311,7 +311,7 @@ class Outline(msgspec.Struct, frozen=True, dict=True):
 
 
 class _Pen:
-    """A pen, as fontTools calls one, that keeps the curves of all loops."""
+    """A pen of fontTools that keeps the curves of all loops."""
 
     def __init__(self) -> None:
         self.loops: list[list[Curve]] = []
@@ -380,7 +380,7 @@ class _Pen:
 
 
 def _read(read: Callable[[], Any], name: str, file: object = None) -> Any:
-    """Return what a function reads; raise errors of ours for what it cannot."""
+    """Return the result of a reader; its errors become errors of ours."""
     try:
         return read()
     except ImplicitDecalsError:
@@ -529,26 +529,18 @@ def _check_apart(polygons: Sequence[Float64Array]) -> None:
         )
 
 
-def _inside_others(polygons: Sequence[Float64Array]) -> list[list[int]]:
-    """Return for each polygon the others around it, if they neither cross nor touch."""
-    lower = np.array([polygon.min(axis=0) for polygon in polygons])
-    upper = np.array([polygon.max(axis=0) for polygon in polygons])
-
-    def around(inner: int) -> list[int]:
-        x, y = point = polygons[inner][0]
-        near = ((lower <= point) & (point <= upper)).all(axis=1)
-        near[inner] = False
-        return [int(outer) for outer in near.nonzero()[0] if _holds(polygons[outer], x, y)]
-
-    return [around(inner) for inner in range(len(polygons))]
-
-
-def _holds(polygon: Float64Array, x: float, y: float) -> bool:
-    """Return True if a point lies in a polygon."""
-    after = np.roll(polygon, -1, axis=0)
-    crosses = (polygon[:, 1] > y) != (after[:, 1] > y)
-    a, b = polygon[crosses], after[crosses]
-    return bool(np.count_nonzero(a[:, 0] + (y - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0]) > x) % 2)
+def _inside_others(polygons: Sequence[Float64Array]) -> Iterator[list[int]]:
+    """Yield for each polygon the others around it, if they neither cross nor touch."""
+    begin = np.concatenate(polygons)
+    end = np.concatenate([np.roll(polygon, -1, axis=0) for polygon in polygons])
+    owners = np.repeat(np.arange(len(polygons)), list(map(len, polygons)))
+    for inner, polygon in enumerate(polygons):
+        x, y = polygon[0]
+        level = np.flatnonzero((begin[:, 1] > y) != (end[:, 1] > y))
+        (ax, ay), (bx, by) = begin[level].T, end[level].T
+        beyond = owners[level[ax + (y - ay) / (by - ay) * (bx - ax) > x]]
+        outer = np.flatnonzero(np.bincount(beyond, minlength=1) % 2)
+        yield outer[outer != inner].tolist()
 
 
 def _directed(loop: Loop, *, hole: bool) -> Loop:
@@ -560,7 +552,7 @@ def _directed(loop: Loop, *, hole: bool) -> Loop:
 
 
 def _filling(shapes: Iterable[tuple[Sequence[Sequence[Curve]], str]]) -> list[Sequence[Curve]]:
-    """Return the loops that bound what shapes, each of loops and a rule of SVG, fill together."""
+    """Return the loops around the filled area of shapes, each a list of loops and a fill rule of SVG."""
     owned = [(loop, (number, rule)) for number, (loops, rule) in enumerate(shapes) for loop in loops]
     polygons = _polygons([loop for loop, _ in owned])
     known = [(*own, polygon.points) for own, polygon in zip(owned, polygons, strict=True) if polygon]

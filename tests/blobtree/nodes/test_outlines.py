@@ -94,6 +94,11 @@ def test_a_file_is_its_text(tmp_path: Path) -> None:
     assert Outline.svg(text).bounds == ((0.0, -1.0), (1.0, 0.0))
 
 
+def test_many_nested_loops_are_holes_in_turn() -> None:
+    squares = [f"M{-i} {-i}h{2 * i}v{2 * i}h{-2 * i}Z" for i in range(1, 1001)]
+    assert Outline("".join(squares)).area == sum(4.0 * (-1) ** i * i**2 for i in range(1, 1001))
+
+
 def test_rules_of_filling() -> None:
     nested = '<svg><path d="M0 0H4V4H0ZM1 1H3V3H1Z"/></svg>'
     assert Outline.svg(nested).area == 16.0
