@@ -928,7 +928,7 @@ class LocalBlend(Macro):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Transition(Macro):
-    """Node that is `inside` within a region and `outside` where the region's field is 0.
+    """`inside` within a region, `outside` beyond its influence, and a smooth change between them.
 
     F = (1 − s(2h)) f + s(2h) g, where h is the region's field and s(t) = 3t² − 2t³ up to t = 1. Two blends
     of the same operands give a blend whose width varies in space; the region may be any field.

@@ -34,10 +34,10 @@ NOT_DRAWN = frozenset(
         "use",
     }
 )
-"""Elements whose contents are no shapes at their place."""
+"""Elements whose contents are not drawn at their place."""
 
 INHERITED = {"fill": "black", "fill-rule": "nonzero", "visibility": "visible"}
-"""Properties that elements inherit, as drawings begin."""
+"""Properties that elements inherit, with their values at the root."""
 
 CALL = re.compile(r"(\w+)\s*\(([^)]*)\)")
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")

@@ -50,10 +50,10 @@ PARALLEL = np.cos(np.radians(3.0))
 """Cosine of the angle between both sides of a thin part, at least: others are tips of corners."""
 
 LEAST_SHARE = 0.005
-"""Share of an outline's length that thin parts have, at least."""
+"""Least share of an outline's length that counts as a thin part."""
 
 THINNEST = 0.1
-"""Share of their length that may be thinner than their width."""
+"""Share of the thin places that may be thinner than the width of thin parts."""
 
 MOST_SAMPLES = 2000
 """Most places along an outline at which its thickness is measured."""
@@ -72,7 +72,7 @@ def box_squared(p: wp.vec2, box: wp.vec4) -> wp.float32:
 
 @wp.func
 def edge_foot(p: wp.vec2, edge: wp.vec4, low: wp.float32, high: wp.float32) -> wp.vec3:
-    """Return the way to p from the closest point of an edge, whose parameter ends at low and high, and it."""
+    """Return the way to p from an edge's closest point, and the parameter (low to high) of that point."""
     w = wp.vec2(p[0] - edge[0], p[1] - edge[1])
     way = wp.vec2(edge[2], edge[3])
     t = wp.clamp(wp.dot(w, way) / wp.dot(way, way), low, high)
@@ -94,7 +94,7 @@ def nearest_in_box(
 
 @wp.func
 def nearest_edge(p: wp.vec2, tape: Texels, first: wp.int32) -> wp.int32:
-    """Return the nearest edge: the way down through nearer boxes finds a near one, the heap the nearest.
+    """Return the nearest edge. A way down through nearer boxes finds a near one, then all boxes are tried.
 
     tape[first] = (number of leaves of the heap, number of edges, ·, ·).
     """

@@ -35,7 +35,7 @@ MAX_GROUPS = 65_535
 """Groups that every driver starts at once."""
 
 SPARE_SHARES = 1 << 16
-"""Shares of large faces beside one for each face; once these are taken, a face is one share."""
+"""Shares of large faces beside one for each face. Once they are taken, a further face is one share."""
 
 SHARES_HEAD = np.array([0, 1, 1, 0, 0, 0, 0, 0], np.uint32).tobytes()
 """Numbers before an empty list: groups that draw it (three axes), length, spare shares taken, padding."""
@@ -135,7 +135,7 @@ def face_program(
 
 
 def face_programs(context: Context, variant: str) -> list[Callable[[], moderngl.ComputeShader]]:
-    """Return what makes the programs that find faces, draw shares of large ones, and compute surfaces."""
+    """Return functions that make the programs: for nearest faces, shares of large faces, and surfaces."""
     make = partial(face_program, context, variant)
     return [partial(make, "faces.comp"), partial(make, "faces.comp", shares=True), partial(make, "mesh.comp")]
 
@@ -161,7 +161,7 @@ def mesh_drawable(context: Context, mesh: ColoredMesh) -> Drawable:
 
 
 def mesh_warmup(context: Context, mesh: ColoredMesh) -> WarmupPlan:
-    """Return the slow first-time work of such a drawable."""
+    """Return the slow first-time work of a mesh's drawable."""
     if not is_computed(context):
         return MeshDrawable.warmup(context, mesh)
     variant = mesh_variant(mesh)

@@ -110,8 +110,8 @@ def _surface_steps(
     """Return the steps that draw all objects into the G-buffer; heights of decals move trees."""
     gbuffer, rest = targets.gbuffer, targets.rest_for(uploaded)
     objects = sorted(enumerate(uploaded.drawables), key=lambda item: not item[1].rasterised)
-    tested = depth or rest is not None or any(drawable.rasterised for drawable in uploaded.drawables)
-    steps: list[Step] = [partial(gbuffer.clear, tile.width, tile.height, depth=tested)]
+    needs_depth = depth or rest is not None or any(drawable.rasterised for drawable in uploaded.drawables)
+    steps: list[Step] = [partial(gbuffer.clear, tile.width, tile.height, depth=needs_depth)]
     if rest is not None:
         steps.append(partial(rest.clear, tile.width, tile.height))
     for number, drawable in objects:

@@ -118,7 +118,7 @@ class MeshDrawable(MeshFaces):
 
 
 def use_base_texture(program: Program, image: SharedTexture | None) -> None:
-    """Bind a texture, if there is one, to the first unit, for ``shaders/base_texture.glsl``."""
+    """Bind a mesh's texture to the first unit (``shaders/base_texture.glsl``); without one, do nothing."""
     if image is not None:
         image.texture.use(0)
         set_uniform(program, "base_texture", 0)
