@@ -132,7 +132,11 @@ void draw_face(int face) {
 #endif
         vec3 pixel = vec3(vec2(texel) + 0.5 - middle, 1.0);
         float depth = clamp(dot(depths, pixel), nearest, farthest);
-        if (all(greaterThanEqual(pixel * edges, least)) && abs(depth) <= 1.0) {
+        vec3 inside = pixel * edges;
+        if (volume < 0.0 && farthest <= 1.0 && min(inside.x, min(inside.y, inside.z)) < 0.0) {
+            depth = farthest;  // beside a silhouette the front face is seen, not the back face behind the same edge
+        }
+        if (all(greaterThanEqual(inside, least)) && abs(depth) <= 1.0) {
             draw_pixel(texel, 0.5 * depth + 0.5, face);
         }
     }

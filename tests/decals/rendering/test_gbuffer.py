@@ -128,11 +128,11 @@ def test_both_sides_are_lit(renderer: Renderer) -> None:
     assert pixels[0][0] > 100
 
 
-def test_silhouettes_are_not_speckled(renderer: Renderer) -> None:
+def test_silhouettes_are_not_speckled(drawer: Renderer) -> None:
     """Smooth normals of a coarse mesh look away from the eye at its edge: no pixel there may go dark."""
     shape = replace(torus(1, 0.4, 10, 5), crease_angle=180.0)
     view = look((shape,))
-    buffers = renderer.buffers(view, RenderOptions(size=SIZE))
+    buffers = drawer.buffers(view, RenderOptions(size=SIZE))
     toward = np.array(view.camera.position) - buffers.position
     toward /= np.linalg.norm(toward, axis=-1, keepdims=True)
     away = (buffers.object_id == 0) & (np.einsum("hwi,hwi->hw", buffers.normal, toward) < -0.02)
