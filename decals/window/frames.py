@@ -12,7 +12,7 @@ from decals.validation import any_number
 from decals.vtk.adapters import weak_callback
 from decals.vtk.subplot import SubplotRenderer
 
-SLICE_SECONDS = 0.04
+SLICE_SECONDS = 0.02
 """Time for which the window computes or draws before it handles input again."""
 
 STATUS_INTERVAL = 0.1
