@@ -19,7 +19,7 @@ SEPARATIONS: list[Callable[..., Any]] = []
 """Functions that part close pairs of a state after the last step."""
 
 FILLINGS: list[Callable[..., Any]] = []
-"""Functions particles → particles after the last step."""
+"""Functions that move particles of a state beside gaps after the last step."""
 
 CARRIERS: list[Callable[..., Any]] = []
 """Functions particles → particles when surfaces deform."""

@@ -7,7 +7,8 @@ import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from decals.scattering.domain import Domain, OrientedPoints
-from decals.scattering.neighbors import FacingTree, NearestFacing
+from decals.scattering.neighbors import FacingTree, NearestFacing, NeighborQuery
+from decals.scattering.particle_state import ParticleState
 
 SAMPLES_PER_PARTICLE = 24
 """Samples for each particle among which gaps are looked for."""
@@ -15,6 +16,9 @@ SAMPLES_PER_PARTICLE = 24
 WIDE_GAP = 0.74
 """Distance from the nearest particle, in spacings, from which a sample lies in a wide gap. In a hexagonal
 tiling no point is farther than 0.577."""
+
+GAP_REACH = 1.5
+"""Largest distance of a sample from its nearest particle, in spacings; farther ones lie on scraps."""
 
 EVEN = 1.1
 """Largest ratio of spacings at which the density counts as even."""
@@ -49,10 +53,8 @@ Aim: TypeAlias = Callable[[OrientedPoints], OrientedPoints]
 """A function of centres, with the normals of their surfaces, to these with the normals of decals there."""
 
 
-def fill_gaps(
-    domain: Domain, points: OrientedPoints, movable: BoolArray, sizes: Float32Array, least: float
-) -> OrientedPoints:
-    """Return particles, those beside wide gaps moved; gaps remain along lips and ragged boundaries.
+def fill_gaps(state: ParticleState, least: float) -> None:
+    """Move particles beside wide gaps; gaps remain along lips and ragged boundaries.
 
     A particle beside a wide gap moves toward the centre of the least ball around the samples nearest to it.
     It stays if another particle would be nearer than before, and nearer than `least`. Where the density is
@@ -60,37 +62,32 @@ def fill_gaps(
 
     Parameters
     ----------
-    domain
-        The surfaces.
-    points
-        The particles, sorted by surface.
-    movable
-        True for particles that may move, ``bool[n]``.
-    sizes
-        Spacing at each particle, ``float32[n]``.
+    state
+        The particles.
     least
         Least distance of particles, in spacings.
     """
+    sizes = state.host_sizes
     if sizes.max() > EVEN * sizes.min():
-        return points
-    counts = np.bincount(points.surface_ids, minlength=len(domain.surfaces))
-    samples = domain.sample(SAMPLES_PER_PARTICLE * counts, stream=_SAMPLE_STREAM)
+        return
+    counts = np.bincount(state.surface_ids, minlength=len(state.domain.surfaces))
+    samples = state.domain.sample(SAMPLES_PER_PARTICLE * counts, stream=_SAMPLE_STREAM)
+    query = NeighborQuery(state, GAP_REACH)
     for _ in range(ROUNDS):
-        tree = FacingTree(points.positions, points.normals)
-        distances, indices = tree.nearest(samples.positions, samples.normals)
-        gaps, owners = distances[:, 0], indices[:, 0]
-        in_gap = (owners >= 0) & (gaps > WIDE_GAP * sizes[owners]) & movable[owners]
+        gaps, owners = query.owners(samples.positions, samples.normals)
+        in_gap = (owners >= 0) & (gaps > WIDE_GAP) & state.movable[owners]
         found, counts = np.unique(owners[in_gap], return_counts=True)
         rows = found[counts >= MIN_SAMPLES]
         if len(rows) == 0:
             break
-        moved = _moved(domain, points, rows, samples.positions, owners)
-        keep = _far_enough(tree, points, moved, rows, sizes, least)
-        rows, moved = rows[keep], moved[np.flatnonzero(keep)]
-        if len(rows) == 0:
+        points = state.points()
+        moved = _moved(state.domain, points, rows, samples.positions, owners)
+        tree = FacingTree(points.positions, points.normals)
+        keep = np.flatnonzero(_far_enough(tree, points, moved, rows, sizes, least))
+        if len(keep) == 0:
             break
-        points = _replaced(points, rows, moved)
-    return points
+        state.move_to(rows[keep], moved.positions[keep], moved.normals[keep])
+        query.refresh()
 
 
 def center_outsized(

@@ -19,6 +19,7 @@ from decals.scattering.search_kernels import (
     Particles,
     mark_local_maxima,
     nearest_distances,
+    nearest_particles,
     ring_distances,
 )
 from decals.surfaces.surface import Scalars, tangent_axes, vectors
@@ -93,6 +94,20 @@ class NeighborQuery:
         inputs = [self._search(), self._state.particles, own, points, mirrors]
         launch(ring_distances, len(own), inputs, [nearest, rings], device=self._state.device)
         return nearest, rings
+
+    def owners(self, positions: Float32Array, normals: Float32Array) -> tuple[Float32Array, Int64Array]:
+        """Return distance and index of the particle nearest to each point; -1 for none within the reach.
+
+        All spacings count as the typical one of the state.
+        """
+        state = self._state
+        points = particle_struct(vectors(positions, state.device), vectors(normals, state.device))
+        distances = self._empty(len(positions))
+        owners: Any = wp.empty(len(positions), dtype=wp.int32, device=state.device)
+        search = neighbor_search(self._grid, self._reach * state.spacing, varied=False)
+        inputs = [search, state.particles, points]
+        launch(nearest_particles, len(positions), inputs, [distances, owners], device=state.device)
+        return distances.numpy() / np.float32(state.spacing), owners.numpy().astype(np.int64)
 
     def nearest_of(self, rows: Int64Array) -> Float32Array:
         """Return `nearest` for some particles of the state, ``float32[k]``."""

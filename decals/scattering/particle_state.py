@@ -23,13 +23,16 @@ from decals.scattering.step_kernels import (
 )
 from decals.surfaces.surface import Scalars, Vectors, vectors
 
-MAX_LIST_AGE = 12
-"""Steps after which an epoch ends in any case."""
+MAX_AGE = 12
+"""Steps after which an epoch ends in any case: the law changes along the schedule."""
+
+MAX_DRIFT = 0.5 * SKIN
+"""Sum of the lengths of typical moves, in spacings, after which neighbours are listed anew."""
 
 IGNORED_FASTEST = 0.02
-"""Share of the particles, the fastest, whose moves do not end an epoch."""
+"""Share of the particles, the fastest, whose moves do not count."""
 
-MAX_LIST_AGE_ON_GPU = 4
+MAX_AGE_ON_GPU = 4
 """Steps after which an epoch ends on a GPU, once particles are calm: to list neighbours costs less there than
 to measure how far they moved."""
 
@@ -83,7 +86,7 @@ class ParticleState:
         self._proposed_energy, self._accepted_energy = self._single(wp.float64), self._single(wp.float64)
         self._rejected = self._single(wp.int32)
         self._repulsion = Repulsion(self.count, device=self.device)
-        self._law = Law(0.0, 0.0)
+        self._law = Law(0.0)
         self._steps = self._age = 0
         self._drift = 0.0
         self._listed = False
@@ -116,19 +119,14 @@ class ParticleState:
         return float(self._accepted_energy.numpy()[0])
 
     @property
-    def lists(self) -> Any:
-        """Neighbours of each particle, a `NeighborLists` struct."""
-        return self._repulsion.lists
-
-    @property
     def epoch_over(self) -> bool:
         """True if a new epoch must begin before the next step."""
         if not self._listed:
             return True
         if not wp.get_device(self.device).is_cpu:
-            max_age = 1 + self._steps * MAX_LIST_AGE_ON_GPU // STEPS_UNTIL_CALM
-            return self._age >= min(MAX_LIST_AGE_ON_GPU, max_age)
-        return self._age >= MAX_LIST_AGE or self._drift >= 0.5 * SKIN
+            max_age = 1 + self._steps * MAX_AGE_ON_GPU // STEPS_UNTIL_CALM
+            return self._age >= min(MAX_AGE_ON_GPU, max_age)
+        return self._age >= MAX_AGE or self._drift >= MAX_DRIFT
 
     def points(self) -> OrientedPoints:
         """Copy the particles to the host."""
@@ -168,16 +166,15 @@ class ParticleState:
         return boundary.mirror_planes(points, surface_ids, enabled, reach=CUTOFF)
 
     def begin_epoch(self, law: Law) -> None:
-        """Begin an epoch: list neighbours, set the law, and evaluate the energy."""
-        self._law, self._listed = law, True
-        self._age, self._drift = 0, 0.0
-        self.epoch += 1
-        self._repulsion.list_neighbors(
-            self.particles,
-            spacing=self.spacing,
-            varied=self.varied,
-            mirrors=self.mirror_planes(self.particles, self.device_surface_ids, self.device_movable),
+        """Begin an epoch: list neighbours if they moved far, set the law, and evaluate the energy."""
+        if not self._listed or self._drift >= MAX_DRIFT or not wp.get_device(self.device).is_cpu:
+            self._repulsion.list_neighbors(self.particles, spacing=self.spacing, varied=self.varied)
+            self._drift = 0.0
+        self._repulsion.mirrors = self.mirror_planes(
+            self.particles, self.device_surface_ids, self.device_movable
         )
+        self._law, self._listed, self._age = law, True, 0
+        self.epoch += 1
         if law.ring_weight:
             self._repulsion.set_mean_ring(self.particles)
         self._evaluate(self._current, self._accepted_energy)

@@ -236,7 +236,7 @@ class Relaxation:
 
     @property
     def epoch(self) -> int:
-        """Number of times that neighbour lists, spacings and the law of repulsion were updated."""
+        """Number of times that spacings and the law of repulsion were updated."""
         return 0 if self._state is None else self._state.epoch
 
     @property
@@ -319,19 +319,10 @@ class Relaxation:
             self._restore_density(state)
             for separate in SEPARATIONS:
                 separate(state, rounds=rounds, seed=self._seed, close=close, sizes_at=self.sizes_at)
+            for fill in FILLINGS if rounds else ():
+                fill(state, CLOSE_DISTANCE)
             self._anchors.set(state, np.arange(self.count))
             self._points = None
-            if rounds:
-                self._fill_gaps()
-
-    def _fill_gaps(self) -> None:
-        """Move particles beside wide gaps, and begin again with the others' state."""
-        before = self.points
-        points, sizes = before, self.sizes_at(before.positions)
-        for fill in FILLINGS:
-            points = fill(self.domain, points, ~self._fixed, sizes, CLOSE_DISTANCE)
-        if points is not before:
-            self._restart(points)
 
     def _advance(self) -> None:
         self.steps += 1

@@ -43,9 +43,6 @@ SEARCH_WIDENING = 1.5
 GRID_CELLS = (16, 128)
 """Fewest and most cells of the hash grid along each axis."""
 
-EXPONENTS = (2.0, 3.0)
-"""Exponent of the soft law at the first and the last step."""
-
 STIFFNESS = 1000.0
 """Stiffness of the spring at the last step."""
 
@@ -77,20 +74,17 @@ class Law:
 
     Attributes
     ----------
-    exponent
-        Power p of the soft law x^-p.
     stiffness
         Stiffness of the spring between particles that are too close.
     ring_weight
         Weight of the ring term, which penalises deviations of the mean distance to six neighbours.
     """
 
-    exponent: float
     stiffness: float
     ring_weight: float = 0.0
 
 
-LOCAL_LAW = Law(EXPONENTS[1], STIFFNESS)
+LOCAL_LAW = Law(STIFFNESS)
 """Law for a few particles among others at rest, without ring term, since rings are cut off there."""
 
 
@@ -100,13 +94,8 @@ def law_at(progress: float, progress_since_deformation: float) -> Law:
     `progress_since_deformation` controls the ring term: before particles are nearly at rest it would fix
     the defects of their arrangement.
     """
-    first, last = EXPONENTS
     hardness, ring_share = np.interp((progress, progress_since_deformation), HARDENING, (0.0, 1.0))
-    return Law(
-        first + (last - first) * min(progress, 1.0),
-        STIFFNESS * float(hardness),
-        RING_WEIGHT * float(ring_share),
-    )
+    return Law(STIFFNESS * float(hardness), RING_WEIGHT * float(ring_share))
 
 
 class Repulsion:
@@ -133,16 +122,10 @@ class Repulsion:
         self._rings.sixth_distances = wp.zeros(count, dtype=wp.float32, device=device)
         self._rings.total = wp.zeros(1, dtype=wp.float32, device=device)
         self._grid = make_grid(count, device)
-        self._mirrors = no_mirror_planes(device)
+        self.mirrors = no_mirror_planes(device)
+        """Planes behind which particles have images."""
 
-    def list_neighbors(
-        self,
-        particles: Particles,
-        *,
-        spacing: float,
-        varied: bool,
-        mirrors: MirrorPlanes,
-    ) -> None:
+    def list_neighbors(self, particles: Particles, *, spacing: float, varied: bool) -> None:
         """List the neighbours of all particles.
 
         Parameters
@@ -153,10 +136,7 @@ class Repulsion:
             A typical spacing, in model units.
         varied
             True unless all spacings are the same.
-        mirrors
-            Planes behind which particles have images, or `no_mirror_planes`.
         """
-        self._mirrors = mirrors
         self._grid.build(particles.positions, (CUTOFF + SKIN) * spacing)
         search = neighbor_search(self._grid, CUTOFF + SKIN, varied=varied)
         launch(list_neighbors, self._count, [search, particles], [self.lists], device=self._device)
@@ -170,17 +150,17 @@ class Repulsion:
         """Write the move of each particle within its tangent plane, and its energies."""
         if law.ring_weight:
             self._measure_rings(particles)
-        inputs = [particles, self.lists, self._rings, _energy_law(law), self._mirrors]
+        inputs = [particles, self.lists, self._rings, _energy_law(law), self.mirrors]
         launch(repel, self._count, inputs, [out], device=self._device)
 
     def _measure_rings(self, particles: Particles) -> None:
-        inputs = [particles, self.lists, CUTOFF, self._mirrors]
+        inputs = [particles, self.lists, CUTOFF, self.mirrors]
         launch(measure_rings, self._count, inputs, [self._rings], device=self._device)
 
 
 def _energy_law(law: Law) -> EnergyLaw:
     parameters: Any = EnergyLaw()
-    parameters.cutoff, parameters.exponent, parameters.core = CUTOFF, law.exponent, CORE
+    parameters.cutoff, parameters.core = CUTOFF, CORE
     parameters.stiffness, parameters.ring_weight = law.stiffness, law.ring_weight
     parameters.damping, parameters.max_move = DAMPING, MAX_MOVE
     struct: EnergyLaw = parameters

@@ -2,7 +2,7 @@
 
 The energy has three terms (the family began with Witkin and Heckbert 1994):
 
-* a soft power law x^-p of the distance x of two neighbours, in spacings, which spreads them evenly;
+* a soft law x^-2 of the distance x of two neighbours, in spacings, which spreads them evenly;
 * a stiff spring ½ k (core − x)² where x < core, which parts pairs that are too close;
 * a ring term for each particle: the deviation of its mean distance to the six nearest neighbours from the
   mean of all particles, under Tukey's biweight.
@@ -31,6 +31,9 @@ wp.set_module_options(KERNEL_OPTIONS)
 
 CLOSEST = 0.6
 """Least distance that the energy is evaluated at, in spacings; below it the energy continues linearly."""
+
+COINCIDENT = 1.0e-6
+"""Distance of two particles, in spacings, up to which no direction between them is known."""
 
 MIRROR_DEPTH = 0.25
 """Distance from a mirror plane, in spacings, up to which the image of a neighbour counts less."""
@@ -73,8 +76,6 @@ class EnergyLaw:
 
     cutoff: wp.float32
     """Distance beyond which particles do not repel each other."""
-    exponent: wp.float32
-    """Power p of the soft law x^-p."""
     core: wp.float32
     """Distance below which the spring pushes."""
     stiffness: wp.float32
@@ -103,6 +104,7 @@ class StepTerms:
 class Partner:
     """A neighbour, or an image of a particle behind a mirror plane."""
 
+    index: wp.int32
     position: wp.vec3
     weight: wp.float32
     fallback_direction: wp.vec3
@@ -113,26 +115,26 @@ class Partner:
 
 @wp.struct
 class PairTerms:
-    """Soft law and spring at one distance."""
+    """Energy of a pair at one distance, with its derivatives."""
 
     value: wp.float32
     slope: wp.float32
     """Negative derivative of the value."""
     curvature: wp.float32
-    """Second derivative of value and spring."""
-    penetration: wp.float32
-    """Core less distance, at least 0."""
+    """Second derivative, without that of the cutoff."""
 
 
 @wp.struct
 class NewtonSystem:
-    """Force and curvature of the energy in coordinates of the tangent plane."""
+    """Force and curvature in coordinates of the tangent plane, and energies as in `StepTerms`."""
 
     fx: wp.float32
     fy: wp.float32
     hxx: wp.float32
     hxy: wp.float32
     hyy: wp.float32
+    energy: wp.float32
+    pair_energy: wp.float64
 
 
 @wp.func
@@ -149,14 +151,6 @@ def any_tangent(normal: wp.vec3) -> wp.vec3:
     if wp.abs(normal[0]) > 0.6:
         axis = wp.vec3(0.0, 1.0, 0.0)
     return wp.normalize(axis - normal * wp.dot(axis, normal))
-
-
-@wp.func
-def separation(offset: wp.vec3, fallback_direction: wp.vec3, closest: wp.float32) -> wp.vec3:
-    """Return the offset of two particles, stretched to at least the closest distance."""
-    if wp.length_sq(offset) > 1.0e-12 * closest * closest:
-        return offset * wp.max(1.0, closest / wp.length(offset))
-    return fallback_direction * closest
 
 
 @wp.func
@@ -184,48 +178,47 @@ def ring_cost(deviation: wp.float32) -> wp.float32:
 
 
 @wp.func
-def pair_terms(x: wp.float32, law: EnergyLaw) -> PairTerms:
-    """Return the soft law x^-p with its derivatives, and the penetration of the core."""
+def pair_terms(distance: wp.float32, law: EnergyLaw) -> PairTerms:
+    """Return soft law and spring at a distance, along their tangent below the closest distance."""
     terms = PairTerms()
-    terms.value = wp.pow(x, -law.exponent)
-    terms.slope = law.exponent * terms.value / x
-    terms.curvature = (law.exponent + 1.0) * terms.slope / x
-    terms.penetration = wp.max(law.core - x, 0.0)
-    if terms.penetration > 0.0:
+    x = wp.max(distance, CLOSEST)
+    inverse = 1.0 / (x * x)
+    end = 1.0 / (law.cutoff * law.cutoff)
+    end_slope = 2.0 * end / law.cutoff
+    penetration = wp.max(law.core - x, 0.0)
+    terms.slope = 2.0 * x * inverse * inverse - end_slope + law.stiffness * penetration
+    terms.value = (
+        inverse - end + end_slope * (x - law.cutoff) + 0.5 * law.stiffness * penetration * penetration
+    )
+    terms.value += (x - distance) * terms.slope
+    terms.curvature = 6.0 * inverse * inverse
+    if penetration > 0.0:
         terms.curvature += law.stiffness
     return terms
 
 
 @wp.func
-def partner_at(
+def image_of(
     i: wp.int32,
     j: wp.int32,
-    image: wp.int32,
+    w: wp.int32,
     list_weight: wp.float32,
-    tangent: wp.vec3,
     particles: Particles,
     mirrors: MirrorPlanes,
 ) -> Partner:
-    """Return particle j as seen from i: itself (image 0), or its image behind one of i's mirror planes."""
+    """Return the image of particle j behind mirror plane w of particle i."""
     partner = Partner()
-    partner.position = particles.positions[j]
-    partner.weight = list_weight
-    partner.fallback_direction = tangent
+    normal = mirrors.normals[w]
+    q = particles.positions[j]
+    partner.index = j
+    partner.position = mirrored(q, mirrors.points[w], normal)
+    partner.weight = list_weight * image_weight(
+        q, j == i, mirrors.points[w], normal, MIRROR_DEPTH * particles.sizes[i]
+    )
+    partner.fallback_direction = normal
     partner.mirror_factor = 1.0
-    if image > 0:
-        w = mirrors.per_point * i + image - 1
-        normal = mirrors.normals[w]
-        partner.weight *= image_weight(
-            partner.position, j == i, mirrors.points[w], normal, MIRROR_DEPTH * particles.sizes[i]
-        )
-        partner.position = mirrored(partner.position, mirrors.points[w], normal)
-        partner.fallback_direction = normal
-        if j == i:
-            partner.mirror_factor = 2.0
-    elif j == i:
-        partner.weight = 0.0
-    if j < i:
-        partner.fallback_direction = -partner.fallback_direction
+    if j == i:
+        partner.mirror_factor = 2.0
     return partner
 
 
@@ -265,6 +258,58 @@ def with_ring_terms(
 
 
 @wp.func
+def with_partner(
+    system: NewtonSystem,
+    partner: Partner,
+    i: wp.int32,
+    u: wp.vec3,
+    v: wp.vec3,
+    mean_ring: wp.float32,
+    particles: Particles,
+    rings: Rings,
+    law: EnergyLaw,
+) -> NewtonSystem:
+    """Add the force, curvature and energy of a pair."""
+    j = partner.index
+    size = particles.sizes[i]
+    pair_size = 0.5 * (size + particles.sizes[j])
+    offset = particles.positions[i] - partner.position
+    square = wp.length_sq(offset)
+    if partner.weight > 0.0 and square < law.cutoff * law.cutoff * pair_size * pair_size:
+        length = wp.sqrt(square)
+        distance = length / pair_size
+        direction = offset / length
+        if distance < COINCIDENT:
+            direction = partner.fallback_direction
+            if j < i:
+                direction = -direction
+        terms = pair_terms(distance, law)
+
+        # force and curvature along the line of the pair
+        push = partner.weight * (pair_size / size) * terms.slope
+        bend = partner.weight * terms.curvature
+        if law.ring_weight > 0.0 and partner.weight >= 1.0:
+            both = with_ring_terms(
+                wp.vec2(push, bend), i, j, distance, pair_size, mean_ring, particles, rings, law
+            )
+            push = both[0]
+            bend = both[1]
+        bend *= partner.mirror_factor
+        ax = wp.dot(direction, u)
+        ay = wp.dot(direction, v)
+        system.fx += push * ax
+        system.fy += push * ay
+        system.hxx += bend * ax * ax
+        system.hxy += bend * ax * ay
+        system.hyy += bend * ay * ay
+
+        energy = partner.weight * terms.value
+        system.energy += energy
+        system.pair_energy += wp.float64(0.5 * pair_size * pair_size * energy)
+    return system
+
+
+@wp.func
 def newton_move(system: NewtonSystem, u: wp.vec3, v: wp.vec3, size: wp.float32, law: EnergyLaw) -> wp.vec3:
     """Solve for the damped Newton step in the tangent plane of u and v, at most the longest move."""
     extra = ISOTROPY * (system.hxx + system.hyy)
@@ -286,24 +331,37 @@ def newton_move(system: NewtonSystem, u: wp.vec3, v: wp.vec3, size: wp.float32, 
 def list_neighbors(
     first: wp.int32, search: NeighborSearch, particles: Particles, lists: NeighborLists
 ) -> None:
-    """List the neighbours of each particle that face the same way, in the order of the grid."""
+    """List the neighbours of each particle that face the same way, the nearest first, of equals by the grid.
+
+    In this order, processors predict well which neighbours are nearer than some limit.
+    """
     i = first + wp.tid()
     p = particles.positions[i]
     n = particles.normals[i]
     size = particles.sizes[i]
-    count = int(0)
+    start = i * lists.capacity
+    end = int(start)
     j = int(0)
     query = wp.hash_grid_query(search.grid, p, search.reach * search.widening * size)
     while wp.hash_grid_query_next(query, j):
-        if j != i and count < lists.capacity:
+        if j != i and end < start + lists.capacity:
             limit = search.reach * 0.5 * (size + particles.sizes[j])
-            if wp.length_sq(p - particles.positions[j]) < limit * limit:
+            square = wp.length_sq(p - particles.positions[j])
+            if square < limit * limit:
                 weight = facing_weight(wp.dot(n, particles.normals[j]), search.facing_limit)
                 if weight > 0.0:
-                    lists.indices[i * lists.capacity + count] = j
-                    lists.weights[i * lists.capacity + count] = weight
-                    count += 1
-    lists.counts[i] = count
+                    k = int(end)
+                    while k > start and lists.weights[k - 1] > square:  # square distances until all are known
+                        lists.indices[k] = lists.indices[k - 1]
+                        lists.weights[k] = lists.weights[k - 1]
+                        k -= 1
+                    lists.indices[k] = j
+                    lists.weights[k] = square
+                    end += 1
+    lists.counts[i] = end - start
+    for k in range(start, end):
+        cosine = wp.dot(n, particles.normals[lists.indices[k]])
+        lists.weights[k] = facing_weight(cosine, search.facing_limit)
 
 
 @wp.kernel
@@ -359,7 +417,7 @@ def repel(
 
     The energy of a pair at distance x, in the mean of its two spacings, is
 
-        E(x) = x^-p − c^-p + p c^(-p-1) (x − c) + ½ k max(core − x, 0)²,    x < c (the cutoff),
+        E(x) = x^-2 − c^-2 + 2 c^-3 (x − c) + ½ k max(core − x, 0)²,    x < c (the cutoff),
 
     so value and slope of the soft law vanish at the cutoff. Below `CLOSEST` E continues along its tangent.
     The curvature across the line of a pair is negative and left out.
@@ -373,65 +431,28 @@ def repel(
     particle and its own image half the energy counts, and a move parts it twice as far.
     """
     i = first + wp.tid()
-    p = particles.positions[i]
     u = any_tangent(particles.normals[i])
     v = wp.cross(particles.normals[i], u)
     size = particles.sizes[i]
-    system = NewtonSystem()
-    energy = float(0.0)
-    pair_energy = wp.float64(0.0)
-    cutoff_value = wp.pow(law.cutoff, -law.exponent)
-    cutoff_slope = law.exponent * cutoff_value / law.cutoff
     mean_ring = rings.total[0] / wp.float32(particles.positions.shape[0])
-    for k in range(lists.counts[i] + 1):
-        # after its neighbours the particle itself, for its own images
-        j = int(i)
-        list_weight = float(1.0)
-        if k < lists.counts[i]:
-            j = lists.indices[i * lists.capacity + k]
-            list_weight = lists.weights[i * lists.capacity + k]
-        pair_size = 0.5 * (size + particles.sizes[j])
-        for image in range(mirrors.per_point + 1):
-            partner = partner_at(i, j, image, list_weight, u, particles, mirrors)
-            offset = p - partner.position
-            reach_squared = law.cutoff * law.cutoff * pair_size * pair_size
-            if partner.weight > 0.0 and wp.length_sq(offset) < reach_squared:
-                # the distance, and the law at it
-                away = separation(offset, partner.fallback_direction, CLOSEST * pair_size) / pair_size
-                x = wp.length(away)
-                distance = wp.length(offset) / pair_size
-                terms = pair_terms(x, law)
-                slope = terms.slope - cutoff_slope + law.stiffness * terms.penetration
-
-                # force and curvature along the line of the pair
-                push = partner.weight * (pair_size / size) * slope
-                bend = partner.weight * terms.curvature
-                if law.ring_weight > 0.0 and partner.weight >= 1.0:
-                    both = with_ring_terms(
-                        wp.vec2(push, bend), i, j, distance, pair_size, mean_ring, particles, rings, law
-                    )
-                    push = both[0]
-                    bend = both[1]
-                bend *= partner.mirror_factor
-                ax = wp.dot(away, u) / x
-                ay = wp.dot(away, v) / x
-                system.fx += push * ax
-                system.fy += push * ay
-                system.hxx += bend * ax * ax
-                system.hxy += bend * ax * ay
-                system.hyy += bend * ay * ay
-
-                # the energy, along its tangent where particles are nearer than the closest distance
-                part = (
-                    terms.value
-                    - cutoff_value
-                    + cutoff_slope * (x - law.cutoff)
-                    + 0.5 * law.stiffness * terms.penetration * terms.penetration
-                )
-                part = partner.weight * (part + wp.max(x - distance, 0.0) * slope)
-                energy += part
-                pair_energy += wp.float64(0.5 * pair_size * pair_size * part)
-    pair_energy += wp.float64(size * size * law.ring_weight * ring_cost(mean_ring - rings.means[i]))
-    out.energies[i] = energy
-    out.pair_energies[i] = pair_energy
+    start = i * lists.capacity
+    end = start + lists.counts[i]
+    system = NewtonSystem()
+    for k in range(start, end):
+        partner = Partner()
+        partner.index = lists.indices[k]
+        partner.position = particles.positions[partner.index]
+        partner.weight = lists.weights[k]
+        partner.fallback_direction = u
+        partner.mirror_factor = 1.0
+        system = with_partner(system, partner, i, u, v, mean_ring, particles, rings, law)
+    for w in range(mirrors.per_point * i, mirrors.per_point * (i + 1)):
+        own = image_of(i, i, w, 1.0, particles, mirrors)
+        system = with_partner(system, own, i, u, v, mean_ring, particles, rings, law)
+        for k in range(start, end):
+            image = image_of(i, lists.indices[k], w, lists.weights[k], particles, mirrors)
+            system = with_partner(system, image, i, u, v, mean_ring, particles, rings, law)
+    ring_energy = size * size * law.ring_weight * ring_cost(mean_ring - rings.means[i])
+    out.energies[i] = system.energy
+    out.pair_energies[i] = system.pair_energy + wp.float64(ring_energy)
     out.moves[i] = newton_move(system, u, v, size, law)

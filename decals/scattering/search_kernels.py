@@ -136,6 +136,35 @@ def nearest_distances(
 
 
 @wp.kernel
+def nearest_particles(
+    first: wp.int32,
+    search: NeighborSearch,
+    particles: Particles,
+    points: Particles,
+    distances: wp.array(dtype=wp.float32),
+    owners: wp.array(dtype=wp.int32),
+) -> None:
+    """Find the particle nearest to each point that faces the same way, and its distance in model units.
+
+    The reach of the search is in model units too. Without such a particle the owner is -1.
+    """
+    k = first + wp.tid()
+    p = points.positions[k]
+    n = points.normals[k]
+    least = float(search.reach * search.reach)
+    owner = int(-1)
+    j = int(0)
+    query = wp.hash_grid_query(search.grid, p, search.reach)
+    while wp.hash_grid_query_next(query, j):
+        square = wp.length_sq(p - particles.positions[j])
+        if square < least and wp.dot(n, particles.normals[j]) > search.facing_limit:
+            least = square
+            owner = j
+    distances[k] = wp.sqrt(least)
+    owners[k] = owner
+
+
+@wp.kernel
 def ring_distances(
     first: wp.int32,
     search: NeighborSearch,

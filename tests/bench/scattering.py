@@ -6,7 +6,8 @@ Packages that are not installed are listed as absent. All are measured by distan
 the same way and lie within two ideal spacings of the number that the package returned. Other packages
 sample the mesh, or a fine mesh of the tree; this package samples the tree itself. Our particles have normals.
 Points of other packages have none, and take those of the closest faces; where sheets of a mesh cross, this
-may be the other sheet, and rho is then too low.
+may be the other sheet, and rho is then too low. "mean" is the mean distance to the nearest point over the
+ideal spacing.
 """
 
 import platform
@@ -22,7 +23,7 @@ import numpy as np
 
 from decals import Relaxation
 from decals.errors import InvalidInput, InvalidScattering
-from decals.scattering.neighbors import FacingTree, Spacing, ideal_spacing, spacing_of_distances
+from decals.scattering.neighbors import Spacing, ideal_spacing, spacing_of_points
 from decals.surfaces import MeshSurface
 from tests.bench.command_line import bench_parser, write
 from tests.bench.scattering_models import MODELS, TREES, meshed, surfaces_of
@@ -50,6 +51,8 @@ class Figures:
     count: int
     spacing: Spacing
     seconds: float
+    processor: float
+    """Processor time of all threads, in seconds, which other work on the machine changes little."""
 
 
 @cache
@@ -69,18 +72,18 @@ def joined(meshes: list[MeshSurface]) -> Any:
 def measure(surface: MeshSurface, points: Any) -> Spacing:
     """Measure points without normals on a mesh whose sheets do not cross."""
     positions, normals = surface.project(points)
-    distances, _ = FacingTree(positions, normals).nearest(positions, normals, count=6, skip_self=True)
-    return spacing_of_distances(distances, ideal_spacing(surface.area, len(positions)))
+    spacing = ideal_spacing(surface.area, len(positions))
+    return spacing_of_points(positions, normals, np.full(len(positions), spacing), spacing)
 
 
 def timed(work: Callable[[], Any], repeats: int) -> Any:
-    """Return the last result and the median time of a piece of work."""
+    """Return the last result and the median times of a piece of work: of the clock, and of processors."""
     seconds = []
     for _ in range(repeats):
-        start = time.perf_counter()
+        start = time.perf_counter(), time.process_time()
         result = work()
-        seconds.append(time.perf_counter() - start)
-    return result, statistics.median(seconds)
+        seconds.append((time.perf_counter() - start[0], time.process_time() - start[1]))
+    return result, *map(statistics.median, zip(*seconds, strict=True))
 
 
 def ours(
@@ -93,22 +96,23 @@ def ours(
         relaxation.run(until=until)
         return relaxation
 
-    relaxation, seconds = timed(work, repeats)
-    return Figures(relaxation.count, relaxation.statistics(), seconds)
+    relaxation, *times = timed(work, repeats)
+    return Figures(relaxation.count, relaxation.statistics(), *times)
 
 
 def theirs(sampler: Callable[..., Any], meshes: Any, count: int, repeats: int) -> Figures:
     """Run a package."""
     vertices, faces = joined(meshes)
-    points, seconds = timed(lambda: sampler(vertices, faces, count), repeats)
-    return Figures(len(points), measure(MeshSurface(vertices, faces), points), seconds)
+    points, *times = timed(lambda: sampler(vertices, faces, count), repeats)
+    return Figures(len(points), measure(MeshSurface(vertices, faces), points), *times)
 
 
 def show(name: str, figures: Figures) -> None:
     spacing = figures.spacing
     print(
-        f"  {name:38s} {figures.count:7d} {spacing.rho:7.3f} {100 * spacing.cv:7.2f} {100 * spacing.cv6:7.2f}"
-        f" {100 * spacing.ringed:7.1f} {figures.seconds:9.3f}",
+        f"  {name:38s} {figures.count:7d} {spacing.rho:7.3f} {spacing.mean / spacing.ideal:7.3f}"
+        f" {spacing.bond_order:7.3f} {100 * spacing.cv:7.2f} {100 * spacing.cv6:7.2f}"
+        f" {100 * spacing.ringed:8.1f} {figures.seconds:9.3f} {figures.processor:9.3f}",
         flush=True,
     )
 
@@ -129,7 +133,10 @@ def bench(
             except InvalidInput as error:
                 print(f"{name}: absent ({error})")
                 continue
-            print(f"{name}, {count}\n  {'':38s}   count     rho   cv %  cv6 %  ringed %   seconds")
+            print(
+                f"{name}, {count}\n  {'':38s}   count     rho    mean    bond    cv %   cv6 %"
+                "  ringed %   seconds processor"
+            )
             ours(surfaces, min(count, 200), 2, 1, device)  # compile kernels
             own = [ours(surfaces, count, length, repeats, device) for length in SCHEDULES]
             for length, row in zip(SCHEDULES, own, strict=True):
@@ -146,7 +153,9 @@ def bench(
                 f"rho_{name}_{count}": last.spacing.rho,
                 f"cv_{name}_{count}": last.spacing.cv,
                 f"cv6_{name}_{count}": last.spacing.cv6,
+                f"bond_{name}_{count}": last.spacing.bond_order,
                 f"s_{name}_{count}": last.seconds,
+                f"cpu_{name}_{count}": last.processor,
             }
             if others:
                 most = max(row.spacing.rho for row in others)

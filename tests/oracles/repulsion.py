@@ -17,13 +17,12 @@ def facing_weight(cosine: float, limit: float) -> float:
     return t * t * (3.0 - 2.0 * t)
 
 
-def pair_energy(x: float, exponent: float, cutoff: float, core: float, stiffness: float) -> float:
-    """x^-p, less its tangent at the cutoff, and a spring within the core."""
+def pair_energy(x: float, cutoff: float, core: float, stiffness: float) -> float:
+    """x^-2, less its tangent at the cutoff, and a spring within the core."""
     spring: float = 0.5 * stiffness * max(core - x, 0.0) ** 2
     if x >= cutoff:
         return spring
-    slope: float = exponent * cutoff ** (-exponent - 1)
-    return float(spring + (x**-exponent - cutoff**-exponent + slope * (x - cutoff)))
+    return float(spring + (x**-2 - cutoff**-2 + 2 * cutoff**-3 * (x - cutoff)))
 
 
 def total_energy(
@@ -32,7 +31,6 @@ def total_energy(
     sizes: Float64Array,
     *,
     cutoff: float,
-    exponent: float,
     core: float,
     stiffness: float,
     facing_limit: float,
@@ -49,9 +47,7 @@ def total_energy(
         for j in np.flatnonzero(distances < cutoff * pairs):
             x = distances[j] / pairs[j]
             kept = max(x, closest)
-            values = [
-                pair_energy(kept + k * 1e-5 * kept, exponent, cutoff, core, stiffness) for k in (-1, 0, 1)
-            ]
+            values = [pair_energy(kept + k * 1e-5 * kept, cutoff, core, stiffness) for k in (-1, 0, 1)]
             slope = (values[2] - values[0]) / (2e-5 * kept)
             energy = values[1] - (kept - x) * slope
             total += facing_weight(guides[i] @ guides[i + 1 + j], facing_limit) * pairs[j] ** 2 * energy
@@ -163,7 +159,6 @@ def moves(
     sizes: Float64Array,
     *,
     cutoff: float,
-    exponent: float,
     core: float,
     stiffness: float,
     facing_limit: float,
@@ -205,9 +200,9 @@ def moves(
             weight = facing_weight(n @ normals[j], facing_limit)
             x = max(np.linalg.norm(p - q) / pair, closest)
             step = 1e-5 * x
-            values = [pair_energy(x + k * step, exponent, cutoff, core, stiffness) for k in (-1, 0, 1)]
+            values = [pair_energy(x + k * step, cutoff, core, stiffness) for k in (-1, 0, 1)]
             slope = (values[2] - values[0]) / (2 * step)
-            curvature_factor = exponent * (exponent + 1) * x ** (-exponent - 2) + stiffness * (x < core)
+            curvature_factor = 6 * x**-4 + stiffness * (x < core)
             away = (p - q) / np.linalg.norm(p - q)
             away -= (away @ n) * n
             scale = pair / sizes[i]

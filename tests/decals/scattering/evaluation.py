@@ -7,7 +7,7 @@ import warp as wp
 from numpy.typing import ArrayLike
 
 from blobtree._typing import Float32Array, Float64Array
-from decals.scattering.repulsion import Law, Repulsion, no_mirror_planes, particle_struct
+from decals.scattering.repulsion import Law, Repulsion, particle_struct
 from decals.scattering.repulsion_kernels import StepTerms
 
 
@@ -31,8 +31,9 @@ def evaluate(
     out.pair_energies = wp.zeros(count, dtype=wp.float64, device=device)
     repulsion = Repulsion(count, device=device)
     spacing = float(np.median(particles.sizes.numpy()))
-    planes = no_mirror_planes(device) if mirrors is None else mirrors
-    repulsion.list_neighbors(particles, spacing=spacing, varied=varied, mirrors=planes)
+    if mirrors is not None:
+        repulsion.mirrors = mirrors
+    repulsion.list_neighbors(particles, spacing=spacing, varied=varied)
     repulsion.set_mean_ring(particles)
     repulsion.evaluate(particles, law, out)
     return out.moves.numpy(), out.energies.numpy(), out.pair_energies.numpy()

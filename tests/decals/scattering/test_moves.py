@@ -17,13 +17,13 @@ from decals.scattering.neighbors import FacingTree, NearestFacing, NeighborQuery
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.polish import polish
 from decals.scattering.relocation import crowded_particles, relocate
-from decals.scattering.repulsion import CORE, CUTOFF, Law
+from decals.scattering.repulsion import CORE, CUTOFF, Law, law_at
 from decals.scattering.repulsion_kernels import CLOSEST
 from decals.scattering.search_kernels import Candidates, ChoiceRule, move_to_best
 from decals.surfaces import MeshSurface
 from decals.surfaces.surface import unit_rows
 from tests.decals.meshes import box, plane, sphere, star
-from tests.decals.scattering.evaluation import device_particles
+from tests.decals.scattering.evaluation import device_particles, evaluate
 from tests.oracles.repulsion import rings, total_energy
 from tests.oracles.sized_decals import nearest_facing
 
@@ -40,7 +40,7 @@ def state_in_a_row(movable: ArrayLike) -> ParticleState:
     domain = Domain([plane(100.0)], seed=0)
     points = row_of([0.0, 0.01, 1.0, 2.0, 3.0, 4.0, 5.0])
     state = ParticleState(domain, points, np.asarray(movable), np.ones(7, np.float32))
-    state.begin_epoch(Law(3.0, 0.0))
+    state.begin_epoch(Law(0.0))
     return state
 
 
@@ -93,6 +93,35 @@ def test_energy_never_rises_within_an_epoch(surface: Callable[[], MeshSurface]) 
     assert (np.diff(energies)[same] < 0).any()
 
 
+def test_lists_kept_over_epochs_hold_all_neighbors() -> None:
+    relaxation = Relaxation([sphere()], count=400)
+    while relaxation.steps < 80:
+        relaxation.step()
+    sizes = np.full(400, relaxation.spacing)
+    particles = device_particles(relaxation.positions, relaxation.normals, sizes, "cpu")
+    expected = evaluate(particles, law_at(0.5, 0.5), varied=False, device="cpu")[1]
+    assert np.allclose(relaxation.energies, expected, rtol=1e-3)
+
+
+def test_owners_are_the_nearest_facing_particles() -> None:
+    relaxation = Relaxation([star()], count=300, iterations=30)
+    relaxation.run()
+    positions, normals, spacing = relaxation.positions, relaxation.normals, relaxation.spacing
+    state = ParticleState(relaxation.domain, relaxation.points, np.ones(300, bool), np.full(300, spacing))
+    samples = relaxation.domain.sample(np.array([5000]), stream=3)
+    reach = 0.6
+    gaps, owners = NeighborQuery(state, reach).owners(samples.positions, samples.normals)
+    expected, indices = (
+        rows[:, 0] for rows in FacingTree(positions, normals).nearest(samples.positions, samples.normals)
+    )
+    near = expected < 0.999 * reach * spacing
+    far = expected > 1.001 * reach * spacing
+    assert np.allclose(gaps[near] * spacing, expected[near], rtol=1e-4)
+    assert (owners == indices)[near].mean() > 0.999  # two may be equally near
+    assert far.any()
+    assert (owners[far] == -1).all()
+
+
 def test_step_that_raises_the_energy_is_rejected() -> None:
     count = 121
     state = ParticleState(
@@ -101,11 +130,11 @@ def test_step_that_raises_the_energy_is_rejected() -> None:
         np.ones(count, bool),
         np.full(count, 0.3, np.float32),
     )
-    law = Law(3.0, 300.0)
+    law = Law(300.0)
     state.begin_epoch(law)
     guides = state.points().normals
     rule: dict[str, Any] = {"cutoff": CUTOFF, "core": CORE, "facing_limit": FACING_LIMIT, "closest": CLOSEST}
-    rule |= {"exponent": law.exponent, "stiffness": law.stiffness}
+    rule["stiffness"] = law.stiffness
     energies, stayed = [], 0
     for _ in range(12):
         before = state.points().positions
