@@ -331,7 +331,8 @@ class Display:
         one_of("phase", phase, PHASES, InvalidEdit)
         trees, (width, height) = self._window.actions.trees, self._window.plotter.window_size
         right, down = (min(max(any_number("place", part, InvalidEdit), 0.0), 1.0) for part in (x, y))
-        ray = ray_through(self._window.subplot, right * width - 0.5, (1.0 - down) * height - 0.5)
+        at = right * width - 0.5, (1.0 - down) * height - 0.5
+        ray = ray_through(self._window.subplot, *at)
         assert ray is not None  # the place lies in the view
         if str(name) in self.points:  # the page may send anything
             self.points[name][1](ray)
@@ -343,7 +344,8 @@ class Display:
                 self._slice_drag = SliceDrag(name, plane, ray, self._gizmo_length(plane.point))
                 return
             middle = trees.handles(1.0)
-            trees.begin_handle_drag(name, ray, self._gizmo_length(middle[0].position) if middle else 1.0)
+            length = self._gizmo_length(middle[0].position) if middle else 1.0
+            self._window.tools.press_handle(name, *at, length)
             return
         if self._slice_drag is not None:
             if plane is not None:
@@ -352,9 +354,7 @@ class Display:
             if phase == "end":
                 self._slice_drag = None
             return
-        trees.drag_handle(ray, snap=snap)
-        if phase == "end":
-            trees.end_drag()
+        self._window.tools.drag_handle(*at, snap=snap, last=phase == "end")
 
     def add_bookmark(self) -> None:
         """Keep the present camera."""

@@ -66,7 +66,7 @@ FRAMES = "iframe", "frame", "embed", "object"
 
 PAGE = (
     "<!doctype html><html lang='en'><meta charset='utf-8'><title>Sandbox</title>{refresh}"
-    "<meta name='color-scheme' content='light dark'>"
+    "<link rel='icon' href='data:,'><meta name='color-scheme' content='light dark'>"
     "<body style='font: 16px sans-serif; margin: 4em'><p role='status'>{text}</p></body></html>"
 )
 

@@ -88,6 +88,7 @@ class PointerTools:
         self.selection_line: list[tuple[float, float]] = []
         self._press, self._press_position, self._last_click = Press.UP, (0.0, 0.0), (-np.inf, -np.inf)
         self._drag: DecalDrag | SurfaceDrag | None = None
+        self._handle_press: tuple[float, float] | None = None
         self._brush: Stroke | None = None
         self._brush_start: object = None
         self.actions.forget_press = self.forget_press
@@ -119,6 +120,28 @@ class PointerTools:
     def click_through(self, x: float, y: float) -> None:
         """Click again on the surface behind the handle of the selected node."""
         self.actions.perform("select_further", lambda: self._behind(x, y))
+
+    def press_handle(self, name: str, x: float, y: float, length: float) -> None:
+        """Press a handle of the selected node, whose axes have a length in model units."""
+        ray = self._ray(*_checked_pixel(x, y))
+        if ray is not None:
+            self.actions.trees.begin_handle_drag(name, ray, length)
+            self._handle_press = x, y
+
+    def drag_handle(self, x: float, y: float, *, snap: bool, last: bool) -> None:
+        """Drag the pressed handle to a pixel; if it is released where it was pressed, click through it."""
+        ray, start = self._ray(*_checked_pixel(x, y)), self._handle_press
+        if start is not None and np.hypot(x - start[0], y - start[1]) <= CLICK_DISTANCE:
+            if last:
+                self._handle_press = None
+                self.actions.trees.end_drag()
+                self.click_through(x, y)
+            return
+        self._handle_press = None
+        if ray is not None:
+            self.actions.trees.drag_handle(ray, snap=snap)
+        if last:
+            self.actions.trees.end_drag()
 
     def key(
         self, name: str, x: float, y: float, *, ctrl: bool = False, shift: bool = False, text: str = ""

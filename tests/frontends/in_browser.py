@@ -637,8 +637,11 @@ async def sandbox_start(picture: str | None = None) -> None:
         plotter = window.plotter
         headings = await browser.locator(".v-dialog h2").all_inner_texts()
         assert headings == ["Lessons", "New model, or a sample", "Files in this folder"]
-        await browser.get_by_role("button", name="Second lesson").wait_for()
-        await browser.get_by_label("sample creature").click()
+        await browser.get_by_role("button", name="Second lesson").focus()
+        for _ in range(2):  # over the new model
+            await browser.keyboard.press("Tab")
+        await expect(browser.get_by_label("sample creature")).to_be_focused()
+        await browser.keyboard.press("Enter")
         await until(lambda: len(window.document.decals) == 500)
         await shows(browser, plotter)
         await asyncio.sleep(AUTOSAVE_SECONDS + 1.0)

@@ -309,6 +309,12 @@ def test_handles_move_turn_and_scale_the_selected_node(window: EditWindow) -> No
     assert larger.radius == pytest.approx(1.2, abs=0.03)
     sandbox.perform("undo")
     assert digest(window.document) == before
+    assert window.session.undone_labels == ("scale",)
+    for phase, by in (("begin", 0.0), ("move", 0.01), ("end", 0.01)):
+        sandbox.drag_handle("move", phase, x + by, y)
+    assert window.session.undone_labels == ("scale",)  # a click on a handle is one on the node behind it
+    assert window.actions.state.primitive == (0, ())
+    sandbox.select("0/1")
     sandbox.drag_handle({}, "begin", 0.5, 0.5)  # type: ignore[arg-type]
     sandbox.drag_handle("spin", "begin", 0.5, 0.5)
     assert "handle: expected one of the selected node, move" in sandbox.status
