@@ -43,6 +43,7 @@ from .nodes.convolution import (
 )
 from .nodes.curves import Arc, Circle, CubicBezier, Polyline, QuadraticBezier, Stroke, TaperedBezier
 from .nodes.deformations import Bend, CurveWarp, LimitedTwist, NoiseWarp, Shear, Stretch, Taper
+from .nodes.expressions import Expression
 from .nodes.fields import BoxedField, FieldPrimitive, Gyroid, Noise, Superquadric
 from .nodes.flats import Polygon, Rectangle, Triangle
 from .nodes.node import Node
@@ -98,6 +99,7 @@ __all__ = [
     "Difference",
     "Disc",
     "Ellipsoid",
+    "Expression",
     "Extrude",
     "Falloff",
     "FieldPrimitive",

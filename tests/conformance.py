@@ -20,6 +20,7 @@ from blobtree.conformance.samples import DRAWS, Draw, Rng, drawn_node
 from blobtree.declare.parameters import Quantity, parameters_of
 from blobtree.errors import InvalidNode
 from blobtree.nodes.primitives import Falling, Leaf
+from tests.blobtree.expressions import program
 from tests.blobtree.trees import BUILT_IN_FALLOFFS, random_leaf, random_profile, triple
 from tests.oracles import blobtree as oracle
 
@@ -95,6 +96,10 @@ def _volume(rng: Rng, _: Operand) -> Node:
     return blobtree.from_sdf(distance, (-1.5, -1.5, -1.5), (1.5, 1.5, 1.5), spacing=0.3, width=0.4)
 
 
+def _expression(rng: Rng, _: Operand) -> Node:
+    return blobtree.Expression(program(rng, 6), triple(rng.uniform(-0.3, 0.3, 3)), (2.0, 2.0, 2.0))
+
+
 def _repeat(rng: Rng, operand: Operand) -> Node:
     step, count = triple(rng.uniform(-0.8, 0.8, 3)), int(rng.integers(1, 4))
     joining, copies = str(rng.choice(["sum", "union"])), str(rng.choice(["alike", "mirrored"]))
@@ -126,6 +131,7 @@ SPECIAL: dict[str, Callable[[Rng, Operand], Node]] = {
     "polar_repeat": _polar_repeat,
     "polygon": _polygon,
     "prism": _prism,
+    "expression": _expression,
     "extrude": _extrude,
     "revolve": _revolve,
     "contact": _contact,

@@ -21,8 +21,9 @@ EXTRAS: dict[str, str] = {
         part_kernels parts thickening thickening_kernels thin_parts wall_kernels walls
         """,
     "blobtree.nodes": """
-        blends contact convolution crossings curves deformations drawings fields flats outlines
-        parameter_gradient pieces profiles questions repeats rounds samples sharp solids tree_volumes volumes
+        blends clauses contact convolution crossings curves deformations drawings expressions fields flats
+        outlines parameter_gradient pieces profiles questions repeats rounds samples sharp solids
+        tree_volumes volumes
         """,
     "blobtree.sampling": "*",
     "blobtree.tape": "attributes directed directed_along grown operands part_sizes poses rest_kernels",

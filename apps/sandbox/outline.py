@@ -46,6 +46,7 @@ ICONS = {
     "Circle": "circle-outline",
     "Cone": "cone",
     "Cylinder": "cylinder",
+    "Expression": "function-variant",
     "Extrude": "format-text",
     "Mirror": "flip-horizontal",
     "Polygon": "vector-polygon",

@@ -82,6 +82,8 @@ class Quantity(Enum):
     """Numbers at the points of a grid."""
     OUTLINE = "outline"
     """A shape in a plane by the lines and curves around it."""
+    CLAUSES = "clauses"
+    """Texts of the clauses of an expression; no edit changes them."""
     COLOR = "color"
     """Red, green and blue (3,) from 0 to 1."""
     ATTRIBUTES = "attributes"

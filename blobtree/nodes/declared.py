@@ -36,6 +36,8 @@ class DeclaredNode(Node, metaclass=CustomKind):
     """Methods of a class that belong to the meaning of its formulas."""
     custom_tags: ClassVar[tuple[str, ...]] = ()
     """Tags of users' kinds in files: that of today, then those of older files."""
+    in_library: ClassVar[bool] = True
+    """False for a kind of this package whose trees get kernels of their own, so that others stay small."""
     has_init: ClassVar[bool] = False
     """True if the base has the constructor."""
     _formulas: ClassVar[dict[str, Formula]] = {}
@@ -59,7 +61,7 @@ class DeclaredNode(Node, metaclass=CustomKind):
         if own:
             row = cls._declaration(tag).row()
             setattr(cls, cls.row_name, row)
-            if not getattr(row, "gradients", False):
+            if cls.in_library and not getattr(row, "gradients", False):
                 LIBRARY_ROWS.append(row)
         elif not cls._formulas.keys() & {*cls.needed}:
             raise InvalidDefinition(

@@ -11,6 +11,7 @@ with if_present():
     import blobtree.nodes.convolution
     import blobtree.nodes.curves
     import blobtree.nodes.deformations
+    import blobtree.nodes.expressions
     import blobtree.nodes.fields
     import blobtree.nodes.flats
     import blobtree.nodes.profiles

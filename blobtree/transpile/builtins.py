@@ -16,6 +16,9 @@ class Expression(NamedTuple):
 PAIR = "mat2x4"
 """GLSL type of a vector of eight floats: it has no such vector, but two of four."""
 
+REGISTERS = "float[32]"
+"""GLSL type of a vector of 32 floats, whose elements any number may index."""
+
 _TYPES: dict[object, str] = {
     float: "float",
     int: "int",
@@ -31,6 +34,7 @@ _TYPES: dict[object, str] = {
     wp.vec3i: "ivec3",
     wp.vec4i: "ivec4",
     wp.types.vector(length=8, dtype=wp.float32): PAIR,
+    wp.types.vector(length=32, dtype=wp.float32): REGISTERS,
 }
 _ARRAYS: dict[object, str] = {wp.vec4: "sampler2D", wp.int32: "isampler2D", wp.vec4i: "ivec4_sampler"}
 

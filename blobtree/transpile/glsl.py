@@ -22,6 +22,7 @@ from blobtree.transpile.builtins import (
     CASTS,
     HELPERS,
     PAIR,
+    REGISTERS,
     RESERVED_WORDS,
     Expression,
     type_name,
@@ -42,6 +43,7 @@ _COMPONENTS = {
     "ivec3": "int",
     "ivec4": "int",
     PAIR: "float",
+    REGISTERS: "float",
 }
 _SAMPLED = {"sampler2D": ("vec4", ""), "isampler2D": ("int", ".x"), "ivec4_sampler": ("ivec4", "")}
 _RESULT = "returned_"
@@ -518,7 +520,8 @@ class _Translator:
         constructor = CASTS[callee] if isinstance(callee, str) else type_name(callee)
         if constructor is not None:
             codes = ", ".join(self.expression(argument).code for argument in node.args)
-            return Expression(f"{constructor}({codes or '0.0'})", constructor)
+            zeros = ", ".join(["0.0"] * 32) if constructor == REGISTERS else "0.0"
+            return Expression(f"{constructor}({codes or zeros})", constructor)
         if isinstance(callee, wp.Function) and callee.is_builtin():
             if callee.key not in BUILTINS:
                 raise self.refusal(node, f"wp.{callee.key} has no equivalent in GLSL")

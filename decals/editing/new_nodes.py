@@ -234,6 +234,8 @@ def _natural(parameter: Parameter, turn: int, center: Float64Array, size: float,
         case Quantity.OUTLINE:
             half = 0.5 * size  # a rectangle with a round side, beside the axis of a turn
             return f"M0 {-half}H{half}A{half} {half} 0 0 1 {half} {half}H0Z"
+        case Quantity.CLAUSES:
+            return f"x var-x\ny var-y\nz var-z\nf hypot x y\nd hypot f z\nr const {0.4 * size}\nv sub d r"
         case Quantity.NAMES:
             return _letters(operands)
         case Quantity.CHOICE:

@@ -29,6 +29,7 @@ from blobtree import (
     Difference,
     Disc,
     Ellipsoid,
+    Expression,
     Extrude,
     GradientBlend,
     Gyroid,
@@ -86,6 +87,7 @@ from tests.oracles import (
     custom_kinds,
     deformations,
     direct_fields,
+    expressions,
     falloffs,
     shapes,
     sharp,
@@ -129,6 +131,9 @@ def signed(node: Node, points: ArrayLike) -> Field:
             end = np.array(point) - node.extent * np.array(normal) / np.linalg.norm(normal)
             same: Any = {name: getattr(node, name) for name in ("falloff", "width", "weight", "color")}
             return signed(Cylinder(point, tuple(end), node.extent, radius=0.0, **same), q)
+        case Expression(size=size, width=width):
+            (d, margin), mean = expressions.distances(node, q), 0.25 * min(size)
+            return _falling(1.0 + d / mean, mean, width, node, margin / mean)
         case Extrude() if sharp.is_warped(node):
             return signed(sharp.written_out(node), q)
         case Primitive() if node.profiled:

@@ -1,0 +1,192 @@
+"""Expressions: values and intervals of all operations beside NumPy, trees of parts, meshes, and refusals."""
+
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from blobtree import Expression, Node, from_json, polygonize, to_json
+from blobtree.errors import InvalidNode
+from blobtree.nodes import clauses, expressions
+from blobtree.tape.program import postorder
+from blobtree.transpile.python import plain_python, vector
+from tests.blobtree.expressions import letters, program
+from tests.oracles import blobtree as oracle
+from tests.oracles.expressions import VALUES, values
+
+Floats = NDArray[np.float64]
+BOX: Any = ((0.0, 0.0, 0.0), (2.0, 2.0, 2.0))
+ROW, RANGE = (
+    plain_python(cast(Any, function.func)) for function in (expressions.clause_row, expressions.clause_range)
+)
+CONSTANT_SECOND = ("mod", "compare", "pow", "nth-root")
+JUMPS = ("floor", "ceil", "round", "mod", "compare")
+
+
+def parts_of(node: Node) -> list[Node]:
+    """The distinct parts of an expression."""
+    nodes: Any = postorder(cast(Any, node), below=lambda item: item.program_children)
+    return [item for item in nodes if not item.program_children]
+
+
+def operands_of(operation: str, rng: np.random.Generator) -> list[Floats]:
+    """Ranges (2, 2) of both operands that the operation is defined on."""
+    center, radius = rng.uniform(-2.0, 2.0, 2), 10.0 ** rng.uniform(-3.0, 0.0, 2)
+    if operation == "pow":
+        center[0], radius[1] = abs(center[0]), 0.0
+    if operation in ("nth-root", "mod", "compare"):
+        center[1], radius[1] = rng.integers(1, 5), 0.0
+    return [np.array([c - r, c + r]) for c, r in zip(center, radius, strict=True)]
+
+
+@pytest.mark.parametrize("operation", VALUES)
+def test_values_and_ranges_of_operations(operation: str) -> None:
+    rng = np.random.default_rng(5)
+    code = clauses.CODES[operation]
+    with np.errstate(all="ignore"):
+        for _ in range(100):
+            a, b = operands_of(operation, rng)
+            if operation == "pow" and rng.random() < 0.5:
+                b = b + 0.25 - b % 0.25
+            count = clauses.ARITIES[operation]
+            x, y = rng.uniform(*a, 40), rng.uniform(*b, 40)
+            exact = VALUES[operation](*(x, y)[:count])
+            found = np.array([ROW(code, *pair) for pair in zip(x, y, strict=True)])
+            sane = np.isfinite(exact) & (np.abs(exact) < 1e6)
+            if operation == "pow":
+                sane &= x > 0.0
+            np.testing.assert_allclose(found[sane, 0], exact[sane], rtol=1e-6, atol=1e-6)
+            slopes = 1.0, (0.5 if count == 2 and operation not in CONSTANT_SECOND else 0.0)
+            low, high, slope = RANGE(code, vector(*a, slopes[0]), vector(*b, slopes[1]))
+            assert low <= exact[sane].min(initial=np.inf) + 1e-6 * (1.0 + abs(low))
+            assert high >= exact[sane].max(initial=-np.inf) - 1e-6 * (1.0 + abs(high))
+            steepest = np.abs(found[:, 1:]) @ slopes
+            assert (steepest[sane] <= slope * (1.0 + 1e-6)).all()
+            if operation in JUMPS:
+                order = np.argsort(x)
+                steps = np.abs(np.diff(exact[order])) / np.diff(x[order])
+                assert (steps <= slope * (1.0 + 1e-6)).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_fields_and_gradients_are_those_of_the_oracle(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    node = Expression(program(rng, 12), *BOX, width=0.7)
+    points = rng.uniform(-1.2, 1.2, (300, 3)).astype(np.float32).astype(np.float64)
+    field = oracle.evaluate(node, points)
+    np.testing.assert_allclose(node(points), field.value, atol=2e-5)
+    smooth = field.margin > 1e-2
+    exact = oracle.gradient(node, points[smooth])
+    tolerance = 1e-3 * (1.0 + np.abs(exact).max(initial=0.0))
+    np.testing.assert_allclose(node.gradient(points[smooth]), exact, atol=tolerance)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_boxes_bound_the_field(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    node = Expression(program(rng, 12), *BOX)
+    for _ in range(20):
+        center, half = rng.uniform(-1.0, 1.0, 3), 10.0 ** rng.uniform(-2.0, -0.3)
+        low, high = node.interval(center - half, center + half)
+        field = node(rng.uniform(center - half, center + half, (200, 3)))
+        assert low <= field.min() + 1e-6
+        assert high >= field.max() - 1e-6
+
+
+def test_min_and_max_are_a_tree_of_parts() -> None:
+    text = letters(np.random.default_rng(1), 40)
+    node = Expression("\n".join(["# a comment", "", *text]), (0, 0, 0), (2, 2, 0.2))
+    assert len(parts_of(node)) > 100
+    assert not any("min" in line for line in node.clauses[:3])
+    points = np.random.default_rng(2).uniform(-1.0, 1.0, (2000, 3)) * (1.0, 1.0, 0.1)
+    value, _ = values(text, points)
+    assert ((node(points) > 0.5) == (value < 0.0))[np.abs(value) > 1e-6].all()
+
+
+def test_meshes_lie_on_the_surface() -> None:
+    text = letters(np.random.default_rng(3), 25)
+    mesh = polygonize(Expression(text, (0, 0, 0), (2, 2, 0.3)), resolution=96)
+    value, _ = values(text, mesh.vertices.astype(np.float64))
+    inside = np.abs(mesh.vertices[:, 2]) < 0.149
+    assert np.abs(value[inside]).max() < 1e-4
+
+
+def test_factors_and_offsets_are_moved_into_parts() -> None:
+    shape = ["x var-x", "y var-y", "h const 0.5", "a sub x h", "b sub y h", "m min a b"]
+    flipped = [*shape, "n neg m", "k const 2", "s mul n k", "t add s h"]
+    node = Expression(flipped, *BOX)
+    assert len(parts_of(node)) == 2
+    points = np.random.default_rng(4).uniform(-1.0, 1.0, (500, 3))
+    np.testing.assert_allclose(node(points), oracle.value(node, points), atol=1e-5)
+
+
+def test_shared_clauses_do_not_multiply() -> None:
+    lines = ["x var-x", "y var-y", "a0 sin x", "b0 cos y"]
+    for i in range(60):
+        lines += [f"a{i + 1} min a{i} b{i}", f"b{i + 1} max a{i} b{i}"]
+    node = Expression(lines, *BOX)
+    assert len(parts_of(node)) == 1
+    points = np.random.default_rng(4).uniform(-1.0, 1.0, (100, 3))
+    np.testing.assert_allclose(node(points), oracle.value(node, points), atol=1e-5)
+
+
+def test_negative_weights_carve_in_a_sum() -> None:
+    rng = np.random.default_rng(6)
+    text, points = letters(rng, 6, size=0.6), rng.uniform(-1.0, 1.0, (500, 3))
+    whole, carved = (Expression(text, *BOX, weight=weight)(points) for weight in (1.0, -0.5))
+    np.testing.assert_allclose(carved, -0.5 * whole, atol=1e-6)
+
+
+def test_files_hold_the_text() -> None:
+    node = Expression(program(np.random.default_rng(7), 8), *BOX, width=0.3)
+    assert from_json(to_json(node)) == node
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "expected 1 to 200,000 clauses"),
+        ("# nothing", "expected 1 to 200,000 clauses"),
+        ("x", r"clauses\[0\]: expected one of var-x, .*; got ''"),
+        ("x var-w", r"clauses\[0\]: expected one of var-x, .*; got 'var-w'"),
+        ("x var-x\ny rand x", r"clauses\[1\]: expected one of .*; got 'rand'"),
+        ("x var-x\ny add x", "expected 2 operands of add, got 1"),
+        ("x var-x 1", "expected 0 operands of var-x, got 1"),
+        ("x neg x", "expected names of earlier clauses, got 'x'"),
+        ("x neg y\ny neg x", "expected names of earlier clauses, got 'y'"),
+        ("c const nan", "expected a number up to 1e.15, got 'nan'"),
+        ("c const 1e400", "expected a number up to 1e.15, got '1e400'"),
+        ("c const one", "expected a number up to 1e.15, got 'one'"),
+        ("c const -1\nr sqrt c", "sqrt of -1 is no number here"),
+        ("c const 0\nr recip c", "recip of 0 is no number here"),
+        ([1, 2], "expected texts that are not empty"),
+    ],
+)
+def test_impossible_texts_are_refused(text: Any, message: str) -> None:
+    with pytest.raises(InvalidNode, match=message):
+        Expression(text, *BOX)
+
+
+def test_parts_with_too_many_values_are_refused() -> None:
+    lines = ["x var-x", *(f"a{i} sin {'x' if i == 0 else f'a{i - 1}'}" for i in range(40)), "s0 mul a0 a39"]
+    lines += [f"s{i + 1} mul s{i} a{i + 1}" for i in range(38)]
+    with pytest.raises(InvalidNode, match="need at most 29 values at once"):
+        Expression(lines, *BOX)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_huge_numbers_give_finite_fields(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    operations = tuple(VALUES)
+    for _ in range(10):
+        lines = ["x var-x", "y var-y", "k mul x x", "l exp k"]
+        for i in range(12):
+            operation = str(rng.choice(operations))
+            read = rng.choice([line.split()[0] for line in lines], clauses.ARITIES[operation])
+            lines.append(" ".join((f"_{i}", operation, *read)))
+        node = Expression(lines, *BOX)
+        points = rng.uniform(-1.5, 1.5, (50, 3))
+        assert np.isfinite(node(points)).all()
+        assert np.isfinite(node.gradient(points)).all()
+        assert np.isfinite(node.interval((-1, -1, -1), (1, 1, 1))).all()
