@@ -8,6 +8,7 @@ PACKAGES = {
     "blobtree": "Models",
     "blobtree.custom": "Kinds of nodes from single functions",
     "blobtree.tracing": "Rays",
+    "blobtree.foreign": "Trees of other programs",
     "blobtree.sampling": "Grids of fields and distances",
     "blobtree.errors": "Exceptions of models",
     "decals": "Decals, scenes and pictures",

@@ -11,6 +11,7 @@ EXTRAS: dict[str, str] = {
     "blobtree.conformance": "*",
     "blobtree.custom": "field",
     "blobtree.derivatives": "*",
+    "blobtree.foreign": "*",
     "blobtree.formulas": """
         falloffs noise
         """,

@@ -37,7 +37,8 @@ BY_KIND: dict[Kind, str] = {
     "processor": """
         blobtree.check_kind blobtree.content_hash blobtree.custom.define_falloff blobtree.custom.define_field
         blobtree.custom.define_operator blobtree.custom.define_skeleton blobtree.custom.define_warp
-        blobtree.formula blobtree.from_json blobtree.from_sdf
+        blobtree.foreign.read_lipschitz blobtree.foreign.read_program blobtree.foreign.read_three_js
+        blobtree.foreign.read_tree blobtree.formula blobtree.from_json blobtree.from_sdf
         blobtree.load blobtree.numeric_parameters blobtree.numeric_values blobtree.save blobtree.to_json
         blobtree.with_numeric_values blobtree.split_creases decals.define_contact decals.load_image
         decals.load_model decals.load_scene decals.pose decals.save_scene decals.shader decals.skin

@@ -17,7 +17,7 @@ from decals.errors import ImplicitDecalsError, InvalidEdit
 from decals.images import read_image
 from decals.scenes.objects import SceneObject, unused_name
 
-MODELS = (".json", ".ply", ".obj", ".stl", ".vtp", ".vtk", ".glb", ".gltf", ".3mf", ".off")
+MODELS = (".json", ".vm", ".frep", ".ply", ".obj", ".stl", ".vtp", ".vtk", ".glb", ".gltf", ".3mf", ".off")
 HDR = ".hdr"
 IMAGES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".gif", ".tif", ".tiff", HDR)
 

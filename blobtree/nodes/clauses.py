@@ -17,7 +17,7 @@ register below 0 stands for the number. Registers 0, 1 and 2 hold x, y and z.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -187,10 +187,22 @@ def checked_clauses(name: str, value: Any) -> tuple[str, ...]:
 
 CHECKS[Quantity.CLAUSES] = checked_clauses
 
-ClauseTexts = Annotated[
-    tuple[str, ...],
-    Parameter(Quantity.CLAUSES, "texts of the clauses, each after those that it reads; or one text of lines"),
-]
+if TYPE_CHECKING:
+
+    class ClauseTexts:
+        """For type checkers: a field that takes a text or several, and holds the clauses."""
+
+        def __get__(self, instance: object, owner: Any) -> tuple[str, ...]: ...
+
+        def __set__(self, instance: object, value: str | Sequence[str]) -> None: ...
+
+else:
+    ClauseTexts = Annotated[
+        tuple[str, ...],
+        Parameter(
+            Quantity.CLAUSES, "texts of the clauses, each after those that it reads; or one text of lines"
+        ),
+    ]
 
 
 def parsed(lines: Sequence[str]) -> list[Clause]:

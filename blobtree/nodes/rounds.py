@@ -204,8 +204,17 @@ class _ArcDifference(Operator):
         return KEEP_BOTH
 
 
+class _Rounded(Macro):
+    """A macro of two operands, which keeps what `field_at` returned for it."""
+
+    @Lazy
+    def fields(self) -> dict[float, float]:
+        """Return the fields of this node alone, by the distances from its surface."""
+        return {}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class RoundUnion(Macro):
+class RoundUnion(_Rounded):
     """Union of two nodes with a fillet, whose width is a length.
 
     The fillet leaves each surface at the distance `width` from the other one, whatever the falloffs and radii
@@ -236,7 +245,7 @@ class RoundUnion(Macro):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RoundIntersection(Macro):
+class RoundIntersection(_Rounded):
     """Intersection of two nodes with a rounded edge, whose width is a length.
 
     The edge begins on each surface at the depth `width` below the other one; otherwise as in `RoundUnion`.
@@ -265,7 +274,7 @@ class RoundIntersection(Macro):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RoundDifference(Macro):
+class RoundDifference(_Rounded):
     """`solid` without `tool`, with a rounded edge, whose width is a length.
 
     The edge begins on the solid at the distance `width` from the tool, and in the cut at that depth below the
@@ -309,17 +318,28 @@ def field_at(root: ProgramNode, distance: float) -> float:
     pending: list[tuple[ProgramNode, Placement, bool]] = [(root, WORLD, False)]
     while pending:
         node, placement, cuts = pending.pop()
+        if isinstance(node, _Rounded) and placement is WORLD and distance in node.fields and not cuts:
+            fields.add(node.fields[distance])
+            continue
         if isinstance(node, ProgramLeaf) and not node.program_children:
             if node.profile[2] > 0.5:  # it has a surface
                 field = _leaf_field(node, placement, -distance if cuts else distance)
                 fields.add(1.0 - field if cuts else field)
             continue
         below = node.child_placement(placement)
-        for number, child in enumerate(node.program_children):
-            is_tool = number > 0 and node.operator is not None and node.operator.support is Support.LEFT
+        is_cut = isinstance(node, RoundDifference) or (
+            node.operator is not None and node.operator.support is Support.LEFT
+        )
+        for number, child in enumerate(
+            node.children if isinstance(node, _Rounded) else node.program_children
+        ):
+            is_tool = is_cut and number > 0
             inner = Placement(below.matrix, -below.growth) if is_tool else below
             pending.append((child, inner, cuts != is_tool))
-    return min(fields, key=lambda field: abs(field - 0.5))
+    field = min(fields, key=lambda field: abs(field - 0.5))
+    if isinstance(root, _Rounded):
+        root.fields[distance] = field
+    return field
 
 
 def _leaf_field(leaf: ProgramLeaf, placement: Placement, distance: float) -> float:

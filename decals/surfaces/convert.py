@@ -27,6 +27,9 @@ from decals.surfaces.triangulate import polygon_triangles
 if TYPE_CHECKING:
     import pyvista as pv
 
+TREE_SUFFIXES = (".json", ".vm", ".frep")
+"""Suffixes of files that hold a tree."""
+
 MODEL_ADVICE = (
     "give a BlobTree, a pyvista dataset, a mesh with vertices and faces, a pair of arrays (vertices, faces)"
     " or the path of a model"
@@ -162,7 +165,7 @@ def _is_trimesh_scene(value: object) -> TypeGuard[Any]:
 
 
 def read_shape(path: str | os.PathLike[str]) -> Node | MeshData:
-    """Read a mesh file, or a tree from a JSON file.
+    """Read a mesh file, or a tree from the file of this package or of another program.
 
     Raises
     ------
@@ -170,15 +173,16 @@ def read_shape(path: str | os.PathLike[str]) -> Node | MeshData:
         If the file is missing or cannot be used.
     """
     path = Path(path)
-    if path.suffix.lower() != ".json":
+    if path.suffix.lower() not in TREE_SUFFIXES:
         data: MeshData = READERS["file"](path)
         return data
     try:
-        return blobtree.load(path)
+        tree: Node = READERS.get("tree", blobtree.load)(path)
     except OSError as error:
         raise InvalidMesh(
             f"could not read {str(path)!r} ({error.strerror}); check its permissions"
         ) from error
+    return tree
 
 
 def _is_array_pair(model: object) -> TypeGuard[tuple[ArrayLike, ArrayLike]]:

@@ -5,7 +5,7 @@ from typing import Any
 from blobtree.lazy import if_present
 
 READERS: dict[str, Any] = {}
-"""What reads a mesh file, a dataset of pyvista, and the colours of a mesh of trimesh."""
+"""What reads a mesh file, a tree, a dataset of pyvista, and the colours of a mesh of trimesh."""
 
 SMALL_PARTS: dict[str, Any] = {}
 """What finds small parts of a tree, tells which part is nearest to a point, and meshes them finely."""
@@ -15,6 +15,10 @@ with if_present():
     from decals.surfaces.trimesh_colors import trimesh_color
 
     READERS |= {"file": read_mesh_data, "dataset": dataset_mesh, "trimesh": trimesh_color}
+with if_present():
+    from blobtree.foreign import read_tree
+
+    READERS["tree"] = read_tree
 with if_present():
     from decals.surfaces.tree_parts import has_small_parts, nearest_leaves, polygonize_parts
 

@@ -17,9 +17,8 @@ from tests.oracles.expressions import VALUES, values
 
 Floats = NDArray[np.float64]
 BOX: Any = ((0.0, 0.0, 0.0), (2.0, 2.0, 2.0))
-ROW, RANGE = (
-    plain_python(cast(Any, function.func)) for function in (expressions.clause_row, expressions.clause_range)
-)
+FORMULAS: Any = expressions
+ROW, RANGE = (plain_python(formula.func) for formula in (FORMULAS.clause_row, FORMULAS.clause_range))
 CONSTANT_SECOND = ("mod", "compare", "pow", "nth-root")
 JUMPS = ("floor", "ceil", "round", "mod", "compare")
 
@@ -37,7 +36,7 @@ def operands_of(operation: str, rng: np.random.Generator) -> list[Floats]:
         center[0], radius[1] = abs(center[0]), 0.0
     if operation in ("nth-root", "mod", "compare"):
         center[1], radius[1] = rng.integers(1, 5), 0.0
-    return [np.array([c - r, c + r]) for c, r in zip(center, radius, strict=True)]
+    return list(np.column_stack([center - radius, center + radius]))
 
 
 @pytest.mark.parametrize("operation", VALUES)
@@ -50,7 +49,7 @@ def test_values_and_ranges_of_operations(operation: str) -> None:
             if operation == "pow" and rng.random() < 0.5:
                 b = b + 0.25 - b % 0.25
             count = clauses.ARITIES[operation]
-            x, y = rng.uniform(*a, 40), rng.uniform(*b, 40)
+            x, y = (rng.uniform(low, high, 40) for low, high in (a, b))
             exact = VALUES[operation](*(x, y)[:count])
             found = np.array([ROW(code, *pair) for pair in zip(x, y, strict=True)])
             sane = np.isfinite(exact) & (np.abs(exact) < 1e6)
