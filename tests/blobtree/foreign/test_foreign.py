@@ -18,7 +18,7 @@ from blobtree.foreign.programs import ORDERED, PACKED
 from tests.blobtree.expressions import letters, program
 from tests.blobtree.foreign_files import archive, distance_root, lipschitz_scene, root, scalis
 from tests.oracles import foreign
-from tests.oracles.expressions import values
+from tests.oracles.expressions import distances, values
 
 FOREIGN_MODELS = os.environ.get("FOREIGN_MODELS")
 ARC_BESIDE_PARABOLA = 0.06
@@ -283,12 +283,12 @@ def test_files_of_a_folder() -> None:
     assert paths
     for path in paths:
         tree: Any = read_tree(path)
-        lower, upper = tree.bounds
-        points = np.random.default_rng(1).uniform(lower, upper, (300, 3))
+        lower, upper = tree.support
+        points = np.random.default_rng(1).uniform(lower, upper, (100, 3))
         field = tree(points)
         assert np.isfinite(field).all(), path
         if isinstance(tree, Expression):
-            value, _ = values(tree.clauses, points)
+            value, _ = distances(tree, points)
             away = np.abs(value) > 1e-3
         else:
             scene = parsed_json(path.read_bytes())
@@ -296,4 +296,5 @@ def test_files_of_a_folder() -> None:
                 continue
             value = foreign.lipschitz(scene, points)
             away = np.abs(value) > 0.01
-        assert ((field > 0.5) == (value < 0.0))[away].mean() > 0.999, path
+        alike = 1.0 if isinstance(tree, Expression) else 0.95  # blends overlap in scenes
+        assert ((field > 0.5) == (value < 0.0))[away].mean() >= alike, path
