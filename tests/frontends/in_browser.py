@@ -978,6 +978,13 @@ async def lab(picture: str | None = None) -> None:
         await browser.get_by_role("button", name="open in the sandbox").click()
         await until(lambda: not lab_page.sandbox.in_lesson)
         assert len(window.document.decals.numbers) == 1
+        await browser.set_viewport_size({"width": 390, "height": 844})  # a phone
+        await browser.evaluate("trame.state.set('left_open', false)")
+        await browser.get_by_role("button", name="File", exact=True).click()
+        await browser.get_by_text("Open or new").click()
+        await browser.get_by_role("button", name="Two decals", exact=True).click()
+        see = browser.get_by_role("button", name="See", exact=True)
+        await browser.wait_for_function(REACHED, arg=await see.element_handle())  # the panel opens
 
 
 async def puzzle(browser: Page, lab_page: LabPage) -> None:
