@@ -8,7 +8,9 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 # Tests that no ordinary machine can run: those that need a CUDA device or a browser.
 ORDINARY := not gpu and not browser
 # Bytecode is kept also where containers forbid it: tests start many processes, and pytest rewrites every test.
-PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest --durations=10 --numprocesses 2 --dist loadfile
+# Pictures of tests are small: the software rasteriser compiles shaders fast rather than well. Two tests run at a time.
+TESTED := PYTHONDONTWRITEBYTECODE= GALLIVM_PERF=nopt LP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+PYTEST := $(TESTED) $(BIN)/python -m pytest --durations=10 --numprocesses 2 --dist loadfile
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
