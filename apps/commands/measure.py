@@ -22,6 +22,7 @@ LABELS = {
     "stretch_median": "stretch, median",
     "stretch_p95": "stretch, 95 % of the points below",
     "stretch_max": "stretch, largest",
+    "stretched": "share of stretch above 5",
     "folded": "folded share",
     "contact_length": "length of contact lines",
     "kept": "share of images that contact keeps",

@@ -44,6 +44,9 @@ TURN_STEP = 1e-2
 STREAM = 9
 """Stream of random numbers that no scattering uses."""
 
+STRETCHED = 5.0
+"""Ratio of the largest to the smallest stretch of an image above which it counts as stretched."""
+
 PERCENTILES = (50.0, 95.0, 100.0)
 
 
@@ -111,6 +114,8 @@ class Measures:
     stretch_median, stretch_p95, stretch_max
         Ratio of the largest to the smallest stretch of an image, over the points that show one; 1 keeps
         shapes. NaN without any.
+    stretched
+        Share of these points where that ratio is above 5.
     folded
         Share of these points where the image is folded, which means mirrored.
     contact_length
@@ -144,6 +149,7 @@ class Measures:
     stretch_median: float
     stretch_p95: float
     stretch_max: float
+    stretched: float
     folded: float
     contact_length: float
     kept: float
@@ -427,6 +433,7 @@ class _Sums:
             stretch_median=median,
             stretch_p95=high,
             stretch_max=most,
+            stretched=float((stretch > STRETCHED).mean()) if len(stretch) else float("nan"),
             folded=float(folds.mean()) if len(folds) else float("nan"),
             contact_length=0.5 * float(lengths.sum()),
             kept=float(_shares(self.kept.sum(), self.alone.sum())),

@@ -7,10 +7,8 @@ import numpy as np
 import decals
 from decals import Decals
 from decals.field.jacobian import folds_of, stretch_of
+from decals.scenes.measure import STRETCHED
 from tests.decals.fault_models import Arrays
-
-STRETCHED = 5.0
-"""Ratio of the largest to the smallest stretch of an image from which it counts as stretched."""
 
 CHUNK = 1 << 16
 """Points that are evaluated at a time."""

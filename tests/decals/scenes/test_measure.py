@@ -48,6 +48,8 @@ def test_two_decals_on_a_plane(contact: str) -> None:
     assert found.folded == 0
     assert found.stretch_median == pytest.approx(1, abs=0.3)
     assert found.stretch_max > 1.5
+    assert 0 <= found.stretched < 0.05
+    assert (found.stretched > 0) == (found.stretch_max > 5)
 
 
 def test_layers_hide_and_do_not_touch() -> None:
