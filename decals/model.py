@@ -36,6 +36,10 @@ from decals.validation import (
 FACING_LIMIT = -0.25
 """Smallest cosine between the normals of a decal and of the surface that it colours, unless it spills."""
 
+SHEET_HEIGHT = 0.15
+"""Height of a surface point above the tangent plane of a decal, and of the decal below that of the point, or
+the reverse, from which the two lie on different sheets: the root of their product, in visible radii."""
+
 MAX_COORDINATE = 2.0**50
 """Largest coordinate or radius, about 1e15: its square still fits float32."""
 
@@ -131,6 +135,10 @@ class Decals(Value):
     fade_depths : float32[n], optional
         Distance from the tangent plane of a decal, in its radii, at which it has faded away; it begins to
         fade at half of it. Default 0: no fade.
+    single_sheets : bool[n], optional
+        True if a decal keeps off other sheets of the surface, such as a plate below its own or a wall that
+        crosses it: off points above its tangent plane that it lies below the planes of, and the reverse; one
+        each, or one for all. Default False.
 
     Raises
     ------
@@ -175,6 +183,7 @@ class Decals(Value):
     receivers: NDArray[Any] = None  # type: ignore[assignment]  # filled in by __post_init__
     fade_angles: Annotated[Float32Array, Values(0.0, 180.0, "°", kind=float)] = None  # type: ignore[assignment]  # filled in by __post_init__
     fade_depths: Annotated[Float32Array, Values(0.0, 2.0, "radii", kind=float)] = None  # type: ignore[assignment]  # filled in by __post_init__
+    single_sheets: Annotated[BoolArray, Values(kind=bool)] = None  # type: ignore[assignment]  # filled in by __post_init__
 
     if TYPE_CHECKING:
 
@@ -194,6 +203,7 @@ class Decals(Value):
             receivers: ArrayLike | None = None,
             fade_angles: ArrayLike | None = None,
             fade_depths: ArrayLike | None = None,
+            single_sheets: ArrayLike | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -227,6 +237,7 @@ class Decals(Value):
             else receiver_array("receivers", self.receivers, count),
             "fade_angles": _fades("fade_angles", self.fade_angles, count, *FADE_ANGLES),
             "fade_depths": _fades("fade_depths", self.fade_depths, count, *FADE_DEPTHS),
+            "single_sheets": bool_array("single_sheets", self.single_sheets, count),
         }
         for name, array in arrays.items():
             array.flags.writeable = False
@@ -312,8 +323,9 @@ class Decals(Value):
 
     @cached_property
     def limited(self) -> bool:
-        """True if decals have receivers or fades."""
-        return bool((self.receivers != "").any() or self.fade_angles.any() or self.fade_depths.any())
+        """True if decals have receivers or fades, or keep to their sheets."""
+        plain = self.fade_angles, self.fade_depths, self.single_sheets
+        return bool((self.receivers != "").any() or any(values.any() for values in plain))
 
     @property
     def receiver_table(self) -> list[str]:
@@ -327,7 +339,7 @@ class Decals(Value):
         """Rows of receivers and fades that devices read: float32[n, 4], zeros where a decal has none.
 
         A row is (cosine at which the decal begins to fade, cosine at which it ends, depth at which it ends,
-        place of its receivers in `receiver_table`).
+        place of its receivers in `receiver_table`). A decal that keeps to its sheet has ½ added to the place.
         """
         return self.limits_of([""])
 
@@ -337,7 +349,8 @@ class Decals(Value):
         angles = np.radians(self.fade_angles.astype(np.float64))
         fading = angles > 0.0
         limits[fading, 0], limits[fading, 1] = np.cos(0.5 * angles[fading]), np.cos(angles[fading])
-        limits[:, 2], limits[:, 3] = self.fade_depths, codes_of(self.receivers, table)
+        limits[:, 2] = self.fade_depths
+        limits[:, 3] = codes_of(self.receivers, table) + np.where(self.single_sheets, 0.5, 0.0)
         return limits
 
     def packed(self) -> Float32Array:

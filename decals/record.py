@@ -10,6 +10,7 @@ import warp as wp
 from blobtree.formulas.falloff import RIM
 from decals.model import FACING_LIMIT as MODEL_FACING_LIMIT
 from decals.model import RECORD as MODEL_RECORD
+from decals.model import SHEET_HEIGHT as MODEL_SHEET_HEIGHT
 from decals.model import Interaction
 
 wp.set_module_options({"enable_backward": False})
@@ -58,6 +59,7 @@ MIN_KEPT_RADIUS = 0.21
 
 RECORD = MODEL_RECORD
 FACING_LIMIT = MODEL_FACING_LIMIT
+SHEET_HEIGHT = MODEL_SHEET_HEIGHT
 NO_FACING_LIMIT = -2.0
 RIM_RADIUS = float(RIM)
 REACH_SQUARED = NEIGHBOR_REACH * NEIGHBOR_REACH

@@ -40,6 +40,7 @@ COLUMNS = {
     "receivers": "receivers",
     "fade_angle": "fade_angles",
     "fade_depth": "fade_depths",
+    "single_sheet": "single_sheets",
 }
 """Arrays of `decals.Decals` by the names of their controls."""
 

@@ -1,8 +1,12 @@
-"""Where a decal acts: its facing rule, the objects that it lies on, and its fades by angle and depth.
+"""Where a decal acts: its facing rule, objects and sheet that it lies on, and its fades by angle and depth.
 
 A decal fades by the angle θ between its normal and that of the surface, from full at half its fade angle to
 nothing at the fade angle, and in the same way by the distance of the point from its tangent plane. It acts
 only where it has not faded away: the fade angle replaces the fixed limit of the facing rule.
+
+A point and the centre of a decal may each lie above or below the tangent plane of the other. On one bend both
+are below, or both above; on two parallel sheets that face the same way, or beyond a wall that crosses, one is
+above and the other below. A decal that keeps to its sheet does not act there.
 """
 
 # ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
@@ -17,6 +21,7 @@ from decals.record import (
     REACH_SQUARED,
     RECORD,
     RIM_RADIUS,
+    SHEET_HEIGHT,
     facing_limit,
     field_complement,
     visible_radius,
@@ -39,6 +44,10 @@ def acts(w: wp.vec3, n_q: wp.vec3, decal: wp.int32, index: IndexedDecals) -> wp.
             limit = own[1]
         if own[2] > 0.0:
             if wp.abs(wp.dot(w, xyz(facing))) >= own[2] * RIM_RADIUS * index.records[RECORD * decal][3]:
+                return False
+        if own[3] - wp.floor(own[3]) > 0.25:
+            least = SHEET_HEIGHT * visible_radius(decal, index.records)
+            if wp.dot(w, xyz(facing)) * wp.dot(w, n_q) > least * least:
                 return False
     return wp.dot(xyz(facing), n_q) > limit
 

@@ -159,7 +159,7 @@ class DecalEditor:
 
     @property
     def limited(self) -> bool:
-        """True if decals have had receivers or fades, see `Decals.limited`."""
+        """True if decals have had receivers, fades or sheets, see `Decals.limited`."""
         return self._rows.limited
 
     @property

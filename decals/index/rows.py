@@ -14,7 +14,7 @@ from decals.model import COLUMNS, LAYER_LIMIT, RECORD, Decals, Interaction
 MIN_SPARE_ROWS = 1024
 """Smallest number of spare rows of an array; arrays grow by half."""
 
-KEPT = "radii", "tints", "receivers", "fade_angles", "fade_depths"
+KEPT = "radii", "tints", "receivers", "fade_angles", "fade_depths", "single_sheets"
 """Columns with arrays of their own."""
 
 INTERACTION_MASK = 3
@@ -36,7 +36,7 @@ class DecalRows:
     receiver_table : list of str
         Receivers whose places the limits hold; it only grows.
     limited : bool
-        True if decals have had receivers or fades.
+        True if decals have had receivers or fades, or kept to their sheets.
     count : int
         Number of decals.
     end : int

@@ -118,6 +118,7 @@ class Appearance:
             radii=radii.astype(np.float32),
             images=self._chosen_images(images_at, radii, seed),
             spill=domain.one_sided(points),
+            single_sheets=None if points.heights is None else np.isfinite(points.heights),
         )
 
     def _with_mean_normals(

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from blobtree._typing import Float32Array, Float64Array, Int64Array
-from decals.model import FACING_LIMIT, Decals
-from decals.scattering.neighbors import FacingTree
+from decals.model import FACING_LIMIT, SHEET_HEIGHT, Decals
+from decals.scattering.neighbors import FacingTree, sheet_products
 from decals.surfaces.surface import Surface, tangent_axes
 
 NEARNESS = 1e-3
@@ -33,12 +33,14 @@ class Centers:
     """Centres of decals with the unit normals of their surfaces, ``float32[n, 3]`` each.
 
     A centre on an edge lies on several faces. `normals` are those nearest to the decals' own. `beside` are,
-    of the faces that these and the decal face, those that differ most; elsewhere the same.
+    of the faces that these and the decal face, those that differ most; elsewhere the same. `heights` are
+    those at which the decals end on other sheets, infinity for those that do not, ``float64[n]``.
     """
 
     positions: Float32Array
     normals: Float32Array
     beside: Float32Array
+    heights: Float64Array
 
     @staticmethod
     def of(decals: Decals, surfaces: Sequence[Surface], spacing: float) -> "Centers":
@@ -56,8 +58,9 @@ class Centers:
             Distance of neighbours, in model units.
         """
         positions, own = decals.positions, decals.normals.astype(np.float64)
+        heights = np.where(decals.single_sheets, SHEET_HEIGHT * decals.radii.astype(np.float64), np.inf)
         if not len(decals):
-            return Centers(positions, decals.normals, decals.normals)
+            return Centers(positions, decals.normals, decals.normals, heights)
         faces = _faces_at(
             decals, surfaces, max(NEARNESS * spacing, ROUNDING * float(np.abs(positions).max()))
         )
@@ -68,14 +71,16 @@ class Centers:
         others = np.take_along_axis(faces, apart.argmin(axis=0)[None, :, None], axis=0)[0]
         beside = np.where(apart.min(axis=0)[:, None] < 1.0, others, normals)
         behind = (cosines.max(axis=0) < FACING_LIMIT)[:, None]
-        return Centers(positions, *(np.where(behind, -rows, rows) for rows in (normals, beside)))
+        normals, beside = (np.where(behind, -rows, rows) for rows in (normals, beside))
+        return Centers(positions, normals, beside, heights)
 
     def rings(self, count: int = 6) -> tuple[Float64Array, Int64Array]:
         """Return distances and indices of the nearest neighbours of each centre, ``[n, count]`` each.
 
-        Neighbours face each other with all normals that they have. Rows fill up with infinity and -1.
+        Neighbours face each other with all normals that they have, and one that keeps to its sheet has its
+        neighbours there. Rows fill up with infinity and -1.
         """
-        tree = FacingTree(self.positions, self.normals)
+        tree = FacingTree(self.positions, self.normals, self.heights)
         distances, indices = tree.nearest(
             self.positions, self.normals, count=EXAMINED * count, skip_self=True
         )
@@ -83,6 +88,9 @@ class Centers:
         for mine in (self.normals, self.beside):
             for theirs in (self.normals, self.beside):
                 facing &= np.einsum("ni,nki->nk", mine, theirs[indices]) > FACING_LIMIT
+        offsets = self.positions[indices].astype(np.float64) - self.positions[:, None]
+        products = sheet_products(offsets, self.normals[indices], self.normals)
+        facing &= products <= self.heights[:, None] ** 2
         order = np.argsort(~facing, axis=1, kind="stable")[:, :count]
         kept = np.take_along_axis(facing, order, axis=1)
         near, found = (np.take_along_axis(rows, order, axis=1) for rows in (distances, indices))

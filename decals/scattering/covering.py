@@ -14,6 +14,7 @@ from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.gap_filling import EVEN, center_outsized
 from decals.scattering.neighbors import FacingTree, NearestFacing
 from decals.scattering.owned_points import CANDIDATES, DOUBTFUL, Centers, OwnedPoints, Shade, firsts
+from decals.scattering.sheets import on_single_sheets
 from decals.scattering.sizing import EXPECTED_RADIUS, WithNormals
 from decals.surfaces.surface import unit_rows
 
@@ -129,6 +130,7 @@ def covering_decals(
 
     even = bool(spacings.max() <= EVEN * spacings.min())
     decals = center_outsized(domain, centers, movable, spacings, samples, aim) if even else aim(centers)
+    decals = on_single_sheets(domain, decals, samples, expected)
     radii = covering_radii(
         decals,
         samples,
@@ -198,7 +200,7 @@ def covering_radii(
     centers = Centers.of(decals)
     if nearest is None:
         nearest = NearestFacing(samples.positions, samples.normals)
-    distances, owners = nearest.of(decals.positions, decals.normals)
+    distances, owners = nearest.of(decals.positions, decals.normals, decals.heights)
     limits = _max_radii(distances, owners, len(decals))
     if bounds is not None:
         limits = np.minimum(limits, bounds)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 import warp as wp
@@ -42,17 +42,24 @@ Mask: TypeAlias = Callable[[Float32Array], ArrayLike]
 """Where particles may lie: a function of ``points[n, 3]`` to ``bool[n]``."""
 
 
+LEAST_SHEET = 20.0
+"""Least area of a sheet with decals of its own, in squared spacings."""
+
 SAME_NORMAL = 0.9998
 """Cosine of the angle between two normals that count as the same."""
 
 
 @dataclass(frozen=True)
 class OrientedPoints:
-    """Points with unit normals, each on one of several surfaces."""
+    """Points with unit normals, each on one of several surfaces.
+
+    `heights` are those at which decals there end on other sheets, infinity for those that do not; ``[n]``.
+    """
 
     positions: Float32Array
     normals: Float32Array
     surface_ids: Int32Array
+    heights: Float64Array | None = None
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -144,6 +151,26 @@ class Domain:
             if isinstance(surface, ImplicitSurface) and surface.has_small_parts:
                 rows = np.flatnonzero(points.surface_ids == index)
                 numbers[rows] += len(self.surfaces) * surface.parts(points.positions[rows])
+        return numbers
+
+    def sheets(self, points: OrientedPoints, least_area: float) -> Int64Array | None:
+        """Return numbers (n,) of the sheets that points lie on; None if there are not several in any mesh.
+
+        Sheets of a smaller area than the least one are −1: they have too few decals to keep to themselves.
+        """
+        several = [
+            isinstance(surface, MeshSurface) and surface.sheet_areas.size > 1 for surface in self.surfaces
+        ]
+        if not any(several):
+            return None
+        numbers = points.surface_ids.astype(np.int64)
+        for index in np.flatnonzero(several):
+            surface = cast("MeshSurface", self.surfaces[index])
+            rows = np.flatnonzero(points.surface_ids == index)
+            faces = np.searchsorted(surface.sound, surface.locate(points.positions[rows])[0])
+            sheets = surface.sheets[faces]
+            numbers[rows] += len(self.surfaces) * sheets
+            numbers[rows[surface.sheet_areas[sheets] < least_area]] = -1
         return numbers
 
     @property

@@ -57,7 +57,8 @@ class NeighborQuery:
         self.refresh()
 
     def refresh(self) -> None:
-        """Update the search grid after particles moved."""
+        """Update the search grid and the sheets of particles that moved."""
+        self._state.number_sheets()
         self._grid.build(self._state.positions, self._reach * self._state.spacing)
 
     def nearest(
@@ -119,11 +120,12 @@ class NeighborQuery:
             state.sizes,
             state.device_surface_ids,
             state.device_movable,
+            state.particles.sheets,
         ]
         if len(rows) < state.count:
-            columns = [array[own].contiguous() for array in columns]
-        positions, normals, sizes, surface_ids, movable = columns
-        points = particle_struct(positions, normals, sizes)
+            columns = [None if array is None else array[own].contiguous() for array in columns]
+        positions, normals, sizes, surface_ids, movable, sheets = columns
+        points = particle_struct(positions, normals, sizes, sheets)
         mirrors = state.mirror_planes(points, surface_ids, movable)
         nearest: Float32Array = self.nearest(points, own, mirrors).numpy()
         return nearest
@@ -163,14 +165,17 @@ class FacingTree:
     """Search among oriented points for neighbours on the same side of a wall.
 
     An oriented point q faces another p if the dot product of their normals is above `FACING_LIMIT`, the
-    rule by which a decal at p colours q.
+    rule by which a decal at p colours q. Points of the tree with a finite height in `heights`,
+    ``float64[n]``, face only their own sheet: their `sheet_products` are at most its square.
     """
 
-    def __init__(self, positions: Float32Array, normals: Float32Array) -> None:
+    def __init__(
+        self, positions: Float32Array, normals: Float32Array, heights: Float64Array | None = None
+    ) -> None:
         from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
 
         self._tree = cKDTree(positions)
-        self._normals = normals
+        self._normals, self._heights = normals, heights
 
     def nearest(
         self, points: Float32Array, normals: Float32Array, *, count: int = 1, skip_self: bool = False
@@ -239,6 +244,10 @@ class FacingTree:
         )
         cosines = np.einsum("nki,ni->nk", self._normals[indices], normals)
         facing = cosines > FACING_LIMIT
+        if self._heights is not None:
+            offsets = points[:, None] - self._tree.data[indices]
+            products = sheet_products(offsets, self._normals[indices], normals)
+            facing &= products <= self._heights[indices] ** 2
         if own is not None:
             facing &= indices != own[:, None]
         order = np.argsort(~facing, axis=1, kind="stable")
@@ -246,6 +255,27 @@ class FacingTree:
         distances = np.where(facing, np.take_along_axis(distances, order, axis=1), np.inf)
         indices = np.where(facing, np.take_along_axis(indices, order, axis=1), -1)
         return distances, indices, np.abs(cosines - FACING_LIMIT).min(axis=1)
+
+
+def sheet_products(offsets: Float64Array, centers: Float32Array, points: Float32Array) -> Float64Array:
+    """Return products of two heights: of points over the planes of centres, and of these under the points'.
+
+    A product above 0 says that one of the two is above the other and the other is not above it: no bend of
+    one sheet has that, but two sheets have it that lie over each other or cross.
+
+    Parameters
+    ----------
+    offsets : float64[n, k, 3]
+        From centres to points.
+    centers : float32[n, k, 3]
+        Normals at the centres.
+    points : float32[n, 3]
+        Normals at the points.
+    """
+    products: Float64Array = np.einsum("nki,nki->nk", offsets, centers) * np.einsum(
+        "nki,ni->nk", offsets, points
+    )
+    return products
 
 
 class NearestFacing:
@@ -265,10 +295,13 @@ class NearestFacing:
         self._centers = self._center_normals = np.zeros((0, 3), np.float32)
         self._distances, self._indices = np.zeros(0), np.zeros(0, np.int64)
 
-    def of(self, centers: Float32Array, normals: Float32Array) -> tuple[Float64Array, Int64Array]:
+    def of(
+        self, centers: Float32Array, normals: Float32Array, heights: Float64Array | None = None
+    ) -> tuple[Float64Array, Int64Array]:
         """Return distance and index of the nearest facing centre of each point; infinity and -1 for none."""
-        rows = self._outdated(centers, normals)
-        tree = FacingTree(centers, normals)
+        every = np.arange(len(self._positions))
+        rows = self._outdated(centers, normals) if heights is None else every
+        tree = FacingTree(centers, normals, heights)
         found, which = tree.nearest(self._positions[rows], self._normals[rows])
         self._distances[rows], self._indices[rows] = found[:, 0], which[:, 0]
         self._centers, self._center_normals = centers.copy(), normals.copy()

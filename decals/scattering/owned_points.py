@@ -48,7 +48,7 @@ class Centers:
     @staticmethod
     def of(decals: OrientedPoints) -> "Centers":
         """Return decals with their search tree."""
-        tree = FacingTree(decals.positions, decals.normals)
+        tree = FacingTree(decals.positions, decals.normals, decals.heights)
         distances, _ = tree.around(2)
         gaps = distances[:, 1] if distances.shape[1] > 1 else np.full(len(decals), np.inf)
         return Centers(decals, tree, gaps)

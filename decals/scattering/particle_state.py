@@ -9,7 +9,7 @@ from blobtree._typing import BoolArray, Float32Array, Int64Array
 from blobtree.device import launch
 from blobtree.kernels import loaded
 from decals.model import FACING_LIMIT
-from decals.scattering.domain import Domain, OrientedPoints
+from decals.scattering.domain import LEAST_SHEET, Domain, OrientedPoints
 from decals.scattering.projection import spans_of
 from decals.scattering.repulsion import CUTOFF, SKIN, Law, Repulsion, no_mirror_planes, particle_struct
 from decals.scattering.repulsion_kernels import StepTerms
@@ -146,6 +146,19 @@ class ParticleState:
         """Let a new epoch begin before the next step, after positions were changed from outside."""
         self._listed = False
 
+    def number_sheets(self) -> None:
+        """Set the sheets of the particles, after they moved."""
+        sheets = self.sheets_of(self.points())
+        if sheets is not None:
+            self._current.particles.sheets = self._proposed.particles.sheets = sheets
+
+    def sheets_of(self, points: OrientedPoints) -> Any:
+        """Return the numbers of the sheets of points, an array of the device; None if there is one."""
+        sheets = self.domain.sheets(points, LEAST_SHEET * self.spacing**2)
+        if sheets is None:
+            return None
+        return wp.array(sheets.astype(np.int32), dtype=wp.int32, device=self.device)
+
     def move_to(self, rows: Int64Array, positions: Float32Array, normals: Float32Array) -> None:
         """Move some particles elsewhere on their surfaces; a new epoch begins if there are any."""
         if len(rows) == 0:
@@ -168,6 +181,7 @@ class ParticleState:
     def begin_epoch(self, law: Law) -> None:
         """Begin an epoch: list neighbours if they moved far, set the law, and evaluate the energy."""
         if not self._listed or self._drift >= MAX_DRIFT or not wp.get_device(self.device).is_cpu:
+            self.number_sheets()
             self._repulsion.list_neighbors(self.particles, spacing=self.spacing, varied=self.varied)
             self._drift = 0.0
         self._repulsion.mirrors = self.mirror_planes(

@@ -8,7 +8,7 @@ import warp as wp
 
 from blobtree._typing import BoolArray, Float32Array, Int64Array
 from blobtree.device import launch
-from decals.scattering.domain import crosses_density_step
+from decals.scattering.domain import OrientedPoints, crosses_density_step
 from decals.scattering.neighbors import CLOSE_DISTANCE, NeighborQuery, index_array, local_maxima
 from decals.scattering.particle_state import ParticleState
 from decals.scattering.projection import spans_of
@@ -142,7 +142,10 @@ def _try_candidates(
         forbidden.assign(flags.astype(np.int32))
         sizes.assign(candidate_sizes)
 
-    points = particle_struct(positions, normals, sizes)
+    trials = OrientedPoints(
+        positions.numpy(), normals.numpy(), np.repeat(state.surface_ids[movers], per_mover)
+    )
+    points = particle_struct(positions, normals, sizes, state.sheets_of(trials))
     surface_ids = state.device_surface_ids[own].contiguous()
     mirrors = state.mirror_planes(points, surface_ids, state.device_movable[own].contiguous())
     candidates: Any = Candidates()

@@ -159,6 +159,7 @@ def gap_sizes(
         vectors(candidates.positions, device),
         vectors(candidates.normals, device),
         wp.array(sizes, dtype=wp.float32, device=device),
+        state.sheets_of(candidates),
     )
     own: Any = index_array(np.full(count, -1), device)
     surface_ids = index_array(candidates.surface_ids, device)

@@ -183,10 +183,12 @@ def neighbor_search(grid: Any, reach: float, *, varied: bool) -> NeighborSearch:
     return rule
 
 
-def particle_struct(positions: Any, normals: Any, sizes: Any = None) -> Any:
+def particle_struct(positions: Any, normals: Any, sizes: Any = None, sheets: Any = None) -> Any:
     """Return a `Particles` struct of arrays on a device; `sizes` may be left out where they are not read."""
     particles: Any = Particles()
     particles.positions, particles.normals = positions, normals
     if sizes is not None:
         particles.sizes = sizes
+    if sheets is not None:
+        particles.sheets = sheets
     return particles

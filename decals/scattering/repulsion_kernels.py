@@ -25,6 +25,7 @@ from decals.scattering.search_kernels import (
     insert_distance,
     mean_distance,
     mirrored,
+    sheet_weight,
 )
 
 wp.set_module_options(KERNEL_OPTIONS)
@@ -349,6 +350,7 @@ def list_neighbors(
             square = wp.length_sq(p - particles.positions[j])
             if square < limit * limit:
                 weight = facing_weight(wp.dot(n, particles.normals[j]), search.facing_limit)
+                weight *= sheet_weight(particles, i, particles, j)
                 if weight > 0.0:
                     k = int(end)
                     while k > start and lists.weights[k - 1] > square:  # square distances until all are known

@@ -9,6 +9,16 @@ from blobtree.kernels import KERNEL_OPTIONS
 
 wp.set_module_options(KERNEL_OPTIONS)
 
+SHEETS_BEGIN, SHEETS_END = 0.15, 0.3
+"""Product of the sines between the line of two points and their tangent planes, one above and one below, from
+which two points of different sheets count less as neighbours, and from which they are none."""
+
+LEAST_PRODUCT = 0.02
+"""Product of the heights of two points over their tangent planes, in squared spacings, up to which they are
+neighbours in any case: those next to the line where two sheets cross."""
+
+MIN_SQUARE = 1.0e-37
+
 Six = wp.types.vector(6, wp.float32)
 """Distances to the six nearest particles, ascending."""
 
@@ -22,6 +32,8 @@ class Particles:
     """Unit normals of the surfaces at the positions."""
     sizes: wp.array(dtype=wp.float32)
     """Spacings, in model units."""
+    sheets: wp.array(dtype=wp.int32)
+    """Numbers of the sheets of the surfaces, −1 for small ones; empty where there is one sheet."""
 
 
 @wp.struct
@@ -47,6 +59,37 @@ class NeighborSearch:
     """Factor of the radius that the grid is searched with, above 1 where spacings vary."""
     facing_limit: wp.float32
     """Least cosine of two normals that face the same way."""
+
+
+@wp.func
+def sheet_weight(points: Particles, i: wp.int32, particles: Particles, j: wp.int32) -> wp.float32:
+    """Return the weight of two neighbours by their sheets: 0 over each other or across a wall, else 1.
+
+    One lies above the tangent plane of the other then, which lies below its own.
+    """
+    if points.sheets.shape[0] == 0:
+        return 1.0
+    own = points.sheets[i]
+    other = particles.sheets[j]
+    if own == other or own < 0 or other < 0:
+        return 1.0
+    offset = particles.positions[j] - points.positions[i]
+    product = wp.dot(offset, points.normals[i]) * wp.dot(offset, particles.normals[j])
+    share = (product - LEAST_PRODUCT * points.sizes[i] * particles.sizes[j]) / wp.max(
+        wp.length_sq(offset), MIN_SQUARE
+    )
+    t = wp.clamp((SHEETS_END - share) / (SHEETS_END - SHEETS_BEGIN), 0.0, 1.0)
+    return t * t * (3.0 - 2.0 * t)
+
+
+@wp.func
+def are_neighbors(
+    points: Particles, i: wp.int32, particles: Particles, j: wp.int32, search: NeighborSearch
+) -> wp.bool:
+    """Return True for two near points that face the same way, on one sheet."""
+    if wp.dot(points.normals[i], particles.normals[j]) <= search.facing_limit:
+        return False
+    return sheet_weight(points, i, particles, j) > 0.0
 
 
 @wp.func
@@ -118,7 +161,6 @@ def nearest_distances(
     """
     k = first + wp.tid()
     p = points.positions[k]
-    n = points.normals[k]
     size = points.sizes[k]
     least = float(search.reach)
     for w in range(mirrors.per_point * k, mirrors.per_point * (k + 1)):
@@ -130,7 +172,7 @@ def nearest_distances(
     while least > enough and wp.hash_grid_query_next(query, j):
         if j != own[k]:
             x = wp.length(p - particles.positions[j]) / (0.5 * (size + particles.sizes[j]))
-            if x < least and wp.dot(n, particles.normals[j]) > search.facing_limit:
+            if x < least and are_neighbors(points, k, particles, j, search):
                 least = x
     nearest[k] = least
 
@@ -181,7 +223,6 @@ def ring_distances(
     """
     k = first + wp.tid()
     p = points.positions[k]
-    n = points.normals[k]
     size = points.sizes[k]
     reach = search.reach
     six = Six(reach, reach, reach, reach, reach, reach)
@@ -196,7 +237,7 @@ def ring_distances(
             q = particles.positions[j]
             pair_size = 0.5 * (size + particles.sizes[j])
             x = wp.length(p - q) / pair_size
-            if x < six[5] and wp.dot(n, particles.normals[j]) > search.facing_limit:
+            if x < six[5] and are_neighbors(points, k, particles, j, search):
                 six = insert_distance(six, x)
                 for w in range(mirrors.per_point * k, mirrors.per_point * (k + 1)):
                     if wp.dot(q - mirrors.points[w], mirrors.normals[w]) > 0.0:

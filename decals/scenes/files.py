@@ -14,7 +14,8 @@
       "decals": [
         {"position": [x, y, z], "normal": ..., "tangent": ..., "radius": r, "image": 0, "spill": false,
          "interaction": "overlap", "layer": 1, "tint": [r, g, b], "opacity": 1.0,
-         "receivers": "hull, lid", "fade_angle": 80.0, "fade_depth": 0.5},
+         "receivers": "hull, lid", "fade_angle": 80.0, "fade_depth": 0.5,
+         "single_sheet": true},
         ...
       ]
     }

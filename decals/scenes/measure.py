@@ -420,7 +420,7 @@ class _Sums:
         nearest, around = centers.rings()
         bonds = bond_orders(centers.positions, centers.normals, around) if count else np.zeros(0)
         spacing = spacing_of_distances(nearest, ideal_spacing(area, count), bonds)
-        tree = FacingTree(centers.positions, centers.normals)
+        tree = FacingTree(centers.positions, centers.normals, centers.heights)
         covering = tree.nearest(points.positions, points.normals)[0][:, 0]
         gaps = np.concatenate([np.zeros(0), *self._gaps])
         lengths = self.area * self.lines

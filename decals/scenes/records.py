@@ -303,6 +303,7 @@ class DecalRecord(Struct, forbid_unknown_fields=True):
     receivers: str | UnsetType = UNSET
     fade_angle: float | UnsetType = UNSET
     fade_depth: float | UnsetType = UNSET
+    single_sheet: bool | UnsetType = UNSET
 
 
 _ARRAYS: dict[str, tuple[str, Any]] = {
@@ -319,6 +320,7 @@ _ARRAYS: dict[str, tuple[str, Any]] = {
     "receivers": ("receivers", ""),
     "fade_angle": ("fade_angles", 0.0),
     "fade_depth": ("fade_depths", 0.0),
+    "single_sheet": ("single_sheets", False),
 }
 """Array of `Decals` for each field of a record, and the value that a file leaves out."""
 

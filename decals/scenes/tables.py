@@ -81,6 +81,7 @@ COLUMNS: dict[str, _Column] = {
     "receivers": _Column("receivers", None, "text", ""),
     "fade_angle": _Column("fade_angles", default=0.0),
     "fade_depth": _Column("fade_depths", default=0.0),
+    "single_sheet": _Column("single_sheets", None, "truth", False),
 }
 """Columns of a table by name; those without a default are required."""
 
@@ -122,7 +123,7 @@ def to_pandas(decals: Decals) -> "pandas.DataFrame":
     -------
     pandas.DataFrame
         Columns x, y, z, nx, ny, nz, tx, ty, tz, radius, image, spill, interaction, layer, tint_r, tint_g,
-        tint_b, opacity, receivers, fade_angle and fade_depth, of the types of the arrays.
+        tint_b, opacity, receivers, fade_angle, fade_depth and single_sheet, of the types of the arrays.
 
     Raises
     ------

@@ -28,7 +28,7 @@ from decals.surfaces.surface import (
     unit_rows,
     vectors,
 )
-from decals.surfaces.topology import edge_twins, parts_of, welded
+from decals.surfaces.topology import edge_twins, parts_of, sheets_of, welded
 from decals.surfaces.windings import MeshOrientation, Triangles, Windings, wind
 from decals.validation import count_number, member, whole_number
 
@@ -37,6 +37,9 @@ MIN_FACE_QUALITY = 1e-6
 
 Warp's mesh queries skip the same faces.
 """
+
+BORDER_GAP = 3e-3
+"""Largest distance of the borders of two patches that are one sheet, in diagonals of the mesh."""
 
 MAX_SAMPLES = 1 << 30
 """Most points that `sample` returns."""
@@ -209,6 +212,23 @@ class MeshSurface(Value):
     def triangles(self) -> tuple[Int32Array, Float32Array, Int32Array]:
         """Return corners ``int32[m, 3]`` and unit normals of all sound faces, and their `edge_twins`."""
         return self._corners, self._normals, edge_twins(self._welded[self._corners])
+
+    @Lazy
+    def sheets(self) -> Int64Array:
+        """Return numbers of the sheets of the sound faces: connected parts, or several that borders join."""
+        corners, _, twins = self.triangles
+        sides = np.flatnonzero(twins < 0)
+        rows, k = sides // 3, sides % 3
+        ends = np.stack([corners[rows, k], corners[rows, (k + 1) % 3]], axis=1)
+        parts = parts_of(self._welded[corners])
+        gap = BORDER_GAP * float(np.linalg.norm(np.subtract(*self._bounds)))
+        return sheets_of(parts, self.vertices[ends].astype(np.float64), parts[rows], gap)
+
+    @Lazy
+    def sheet_areas(self) -> Float64Array:
+        """Return the area of each sheet, ``float64[k]``."""
+        areas = np.diff(self._cumulative, prepend=0.0)
+        return np.bincount(self.sheets, areas).astype(np.float64)
 
     @Lazy
     def angle_defects(self) -> Float64Array:

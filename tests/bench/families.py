@@ -53,7 +53,7 @@ def model_row(name: str, seed: int, count: int, samples: int) -> dict[str, float
 
 def worst(rows: Sequence[dict[str, Any]], key: str) -> float:
     """Return the worst of a figure, of the models that were measured."""
-    values = [row[key] for row in rows]
+    values: list[float] = [row[key] for row in rows]
     return min(values) if key == "rho" else max(values)
 
 

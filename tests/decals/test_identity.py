@@ -49,6 +49,7 @@ def random_decals(seed: int, count: int, images: int = 2) -> Decals:
         receivers=rng.choice(["", "ball", "corner, ball"], count).tolist(),
         fade_angles=rng.choice([0.0, 30.0, 80.0], count),
         fade_depths=rng.choice([0.0, 0.5], count),
+        single_sheets=rng.random(count) < 0.5,
     )
 
 

@@ -158,8 +158,13 @@ class _Scene:
         texts = getattr(decals, "receivers", [""] * count)
         self.limit = np.where(angles > 0, np.cos(angles), np.where(self.spill, -4, FACING_LIMIT))
         above = np.abs(sum(w * decals.normals[None, :, a] for a, w in enumerate(offsets)))
+        away = sum(w * normals[:, a, None] for a, w in enumerate(offsets))
+        signed = sum(w * decals.normals[None, :, a] for a, w in enumerate(offsets))
+        single = np.asarray(getattr(decals, "single_sheets", np.zeros(count)), bool)
+        self.through = np.where(single, signed * away / self.radii**2 - 0.15**2, -4.0)
         taken = [on is None or text == "" or not on.isdisjoint(text.split(", ")) for text in texts]
         self.facing = (self.cosine > self.limit) & ((depths == 0) | (above < depths)) & np.array(taken, bool)
+        self.facing &= self.through <= 0
         with np.errstate(all="ignore"):
             turned = (self.cosine - np.cos(angles)) / (np.cos(angles / 2) - np.cos(angles))
             sunk = 2 - 2 * above / depths
@@ -258,6 +263,7 @@ class _Scene:
     def facing_doubt(self) -> Any:
         """Distance to the facing limit of a decal that reaches the point."""
         doubt = np.minimum(np.abs(self.cosine - self.limit), self.sinking)
+        doubt = np.minimum(doubt, np.abs(self.through))
         return np.where(self.squared < 1, doubt, 4.0).min(axis=1, initial=4.0)
 
 

@@ -50,7 +50,7 @@ export class DecalSet {
     this.records.set(4 * number, [...place, ...row.tangent, image, ...tint.map(linear), opacity]);
     const angle = ((row.fade_angle ?? 0) * Math.PI) / 180;
     const fade = angle > 0 ? [Math.cos(angle / 2), Math.cos(angle)] : [0, 0];
-    const receiver = Math.max(receivers.indexOf(row.receivers ?? ""), 0);
+    const receiver = Math.max(receivers.indexOf(row.receivers ?? ""), 0) + (row.single_sheet ? 0.5 : 0);
     this.limits.set(number, [...fade, row.fade_depth ?? 0, receiver]);
   }
 

@@ -405,6 +405,7 @@ def test_values_of_decals_are_set_as_one_entry_each(sandbox: Sandbox, shared: Ed
         "receivers": "crate",
         "fade_angle": 90.0,
         "fade_depth": 0.5,
+        "single_sheet": True,
         "tint": "#ff0000",
         "image": "tint alone",
     }

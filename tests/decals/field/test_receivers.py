@@ -35,6 +35,7 @@ def mixed(seed: int, count: int = 60, *, layered: bool = True) -> tuple[Decals, 
         "receivers": [["", "hull", "lid", "lid, hull"][i] for i in rng.integers(0, 4, count)],
         "fade_angles": np.where(rng.random(count) < 0.5, rng.uniform(20, 180, count), 0),
         "fade_depths": np.where(rng.random(count) < 0.5, rng.uniform(0.05, 1, count), 0),
+        "single_sheets": rng.random(count) < 0.5,
     }
     points = random_units(rng, 800)
     normals = unit(points + 0.5 * rng.normal(size=points.shape))
@@ -104,14 +105,27 @@ def test_fades_are_monotone(angle: float, depth: float, radius: float, spill: bo
         assert (by_depth[heights <= 0.49 * depth * radius, 3] == 1).all()
 
 
+def test_a_decal_keeps_to_its_sheet() -> None:
+    """Parallel plates above and below take nothing of it; its own plate, and a wall that rises, do."""
+    up: dict[str, Any] = {"positions": [[0, 0, 0]], "normals": [[0, 0, 1]], "tangents": [[1, 0, 0]]}
+    decal = Decals(**up, radii=2.0)
+    plates = [[0.5, 0, 0], [0.5, 0, -0.4], [0.5, 0, 0.4], [0.5, 0, 0.2], [1, 0, 0.4], [1, 0, 0.4]]
+    normals = [*([[0, 0, 1]] * 4), [-1, 0, 0], [1, 0, 0]]
+    assert evaluate(decal, plates, normals).owner.tolist() == [0] * 6
+    single = decal.replace(single_sheets=True)
+    assert evaluate(single, plates, normals).owner.tolist() == [0, -1, -1, 0, 0, -1]
+
+
 def test_editors_keep_receivers_and_fades() -> None:
     decals, points, normals = mixed(3)
-    editor = DecalEditor(decals.replace(receivers=None, fade_angles=None, fade_depths=None))
+    editor = DecalEditor(
+        decals.replace(receivers=None, fade_angles=None, fade_depths=None, single_sheets=None)
+    )
     assert not editor.limited
     version = editor.version
     editor.assign(np.arange(len(decals)), decals)
     assert editor.changed_rows(version)["decal_limits"] == [(0, len(decals))]
-    for name in ("receivers", "fade_angles", "fade_depths"):
+    for name in ("receivers", "fade_angles", "fade_depths", "single_sheets"):
         assert np.array_equal(getattr(editor.decals, name), getattr(decals, name))
     twin = editor.copy()
     editor.change(5, receivers=["a much longer name than all the others"])

@@ -490,7 +490,7 @@ def test_wrong_values_of_decals_are_named() -> None:
         {"image": -1},
         {"number": 7},
         {"tint": [0, 0.5, 1], "opacity": 0.25, "layer": -3, "interaction": "overlap", "spill": True},
-        {"receivers": "hull", "fade_angle": 0, "fade_depth": 0.5},
+        {"receivers": "hull", "fade_angle": 0, "fade_depth": 0.5, "single_sheet": True},
     ]
     wrong: list[dict[str, Any]] = [
         {"position": [1e300, 0, 0]},

@@ -62,6 +62,7 @@ def _decals(count: int = 50) -> Decals:
         receivers=[["", "tetra", "blob, round thing"][i] for i in rng.integers(0, 3, count)],
         fade_angles=np.where(rng.random(count) < 0.5, 0.0, rng.uniform(1, 180, count)),
         fade_depths=np.where(rng.random(count) < 0.5, 0.0, rng.random(count)),
+        single_sheets=rng.random(count) < 0.5,
     )
 
 
@@ -171,7 +172,16 @@ def test_numbers_are_the_shortest_that_round_to_the_same_float32(tmp_path: Path)
 def test_decals_of_older_files_have_the_defaults(tmp_path: Path) -> None:
     """Before there were interactions, layers, tints and opacities; and without them the file is the same."""
     scene = _scene()
-    given = "interactions", "layers", "tints", "opacities", "receivers", "fade_angles", "fade_depths"
+    given = (
+        "interactions",
+        "layers",
+        "tints",
+        "opacities",
+        "receivers",
+        "fade_angles",
+        "fade_depths",
+        "single_sheets",
+    )
     plain = scene.decals.replace(**dict.fromkeys(given))
     text = to_json(scene.replace(decals=plain), folder=tmp_path)
     assert not any(

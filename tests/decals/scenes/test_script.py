@@ -50,6 +50,7 @@ def decals_at_random(count: int) -> decals.Decals:
         opacities=rng.uniform(size=count),
         fade_angles=rng.uniform(1, 180, count),
         fade_depths=rng.uniform(1, 2, count),
+        single_sheets=rng.integers(0, 2, count, dtype=bool),
     )
 
 

@@ -31,6 +31,7 @@ def random_decals(seed: int, count: int = 60) -> decals.Decals:
         receivers=rng.choice(["", "a", 'b, "c"', "é;\t|"], count),
         fade_angles=np.where(rng.random(count) < 0.5, rng.uniform(1, 180, count), 0),
         fade_depths=np.where(rng.random(count) < 0.5, rng.uniform(1e-6, 9, count), 0),
+        single_sheets=rng.random(count) < 0.5,
     )
 
 

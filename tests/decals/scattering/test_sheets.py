@@ -1,0 +1,51 @@
+"""Sheets of a mesh: patches whose borders meet are one; decals and particles of others do not mix."""
+
+import numpy as np
+import pytest
+
+import decals
+from decals.surfaces import MeshSurface
+from tests.decals.distortion import random_points
+from tests.decals.fault_models import Arrays, joined
+from tests.decals.meshes import icosphere
+
+
+def plate(x: float = 0.0, z: float = 0.0, cells: int = 8) -> Arrays:
+    """A unit square that faces up."""
+    i, j = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
+    vertices = np.stack([x + i / cells, j / cells, np.full(i.shape, z)], -1).reshape(-1, 3)
+    a = (i[:-1, :-1] * (cells + 1) + j[:-1, :-1]).ravel()
+    corners = a, a + cells + 1, a + cells + 2, a + 1
+    faces = [np.stack([corners[0], corners[k], corners[k + 1]], -1) for k in (1, 2)]
+    return vertices, np.concatenate(faces)
+
+
+@pytest.mark.parametrize(("gap", "sheets"), [(0.0, 1), (0.004, 1), (0.05, 2)])
+def test_patches_whose_borders_meet_are_one_sheet(gap: float, sheets: int) -> None:
+    surface = MeshSurface(*joined(plate(), plate(x=1 + gap, cells=5)))
+    assert surface.sheets.max() + 1 == sheets
+    assert len(surface.vertices) == 9**2 + 6**2
+
+
+def test_parallel_plates_have_decals_of_their_own() -> None:
+    plates = joined(plate(), plate(z=0.08))
+    layout = decals.scatter(MeshSurface(*plates), count=80, seed=3)
+    assert layout.single_sheets.any()
+    upper = layout.positions[:, 2] > 0.04
+    assert 35 <= upper.sum() <= 45
+    points, normals = random_points(plates, 20_000, 5)
+    owners = decals.evaluate(layout, points, normals).owner
+    assert (owners >= 0).all()
+    strange = upper[owners] != (points[:, 2] > 0.04)
+    assert strange.mean() < 0.04
+    mixed = decals.evaluate(layout.replace(single_sheets=None), points, normals).owner
+    assert (upper[mixed] != (points[:, 2] > 0.04)).mean() > 0.1
+    for side in (upper, ~upper):
+        positions = layout.positions[side]
+        apart = np.linalg.norm(positions[:, None] - positions, axis=2) + 9 * np.eye(len(positions))
+        assert apart.min() > 0.75 * np.sqrt(2 / (np.sqrt(3) * side.sum()))
+
+
+def test_one_sheet_has_plain_decals() -> None:
+    layout = decals.scatter(MeshSurface(*icosphere(3)), count=40)
+    assert not layout.single_sheets.any()
