@@ -62,6 +62,7 @@ from .nodes.repeats import PolarRepeat, Repeat
 from .nodes.rounds import RoundDifference, RoundIntersection, RoundUnion
 from .nodes.sharp import Frustum
 from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
+from .nodes.sweeps import Sweep
 from .nodes.tree import Difference, Intersection, Offset, Ricci, Sum, Transform, Twist, Union
 from .nodes.tree_volumes import sample
 from .nodes.volumes import Volume, from_mesh, from_sdf
@@ -155,6 +156,7 @@ __all__ = [
     "Sum",
     "SuperellipticBlend",
     "Superquadric",
+    "Sweep",
     "SymmetricDifference",
     "Tape",
     "Taper",

@@ -77,6 +77,25 @@ def _revolve(rng: Rng, _: Operand) -> Node:
     return blobtree.Revolve(_outline(rng), angle, origin=triple(rng.uniform(-0.3, 0.3, 3)), radius=radius)
 
 
+def _sweep(rng: Rng, _: Operand) -> Node:
+    """A sweep along a line or a curve; a closed one along a circle."""
+    outline, radius = _outline(rng).scale(0.3), float(rng.choice([0.0, 0.1]))
+    turns = np.linspace(0.0, 4.0, 4) + rng.uniform(-0.2, 0.2, 4)
+    points: Any = 0.9 * np.column_stack([np.cos(turns), np.sin(turns), rng.uniform(-0.3, 0.3, 4)])
+    match str(rng.choice(["straight", "sharp", "smooth", "closed"])):
+        case "straight":
+            changes: Any = {
+                "end_scale": float(rng.uniform(0.5, 1.5)),
+                "end_turn": float(rng.uniform(-90, 90)),
+            }
+            return blobtree.Sweep(outline, points[:2], radius=radius, **changes)
+        case "sharp":
+            return blobtree.Sweep(outline, points, radius=radius)
+        case "smooth":
+            return blobtree.Sweep(outline, points, corners="smooth", end_scale=0.8, radius=radius)
+    return blobtree.Sweep(outline, points, corners="smooth", ends="closed", radius=radius)
+
+
 def _contact(rng: Rng, operand: Operand) -> Node:
     solids = tuple(operand(rng) for _ in range(3))
     return blobtree.SolidContact(solids, stiffness=(1.0, 2.0, 1.5), width=0.3, height=0.05)
@@ -134,6 +153,7 @@ SPECIAL: dict[str, Callable[[Rng, Operand], Node]] = {
     "expression": _expression,
     "extrude": _extrude,
     "revolve": _revolve,
+    "sweep": _sweep,
     "contact": _contact,
     "blend_graph": _graph,
     "volume": _volume,

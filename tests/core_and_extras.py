@@ -22,9 +22,9 @@ EXTRAS: dict[str, str] = {
         part_kernels parts thickening thickening_kernels thin_parts wall_kernels walls
         """,
     "blobtree.nodes": """
-        blends clauses contact convolution crossings curves deformations drawings expressions fields flats
-        outlines parameter_gradient pieces profiles questions repeats rounds samples sharp solids
-        tree_volumes volumes
+        blends clauses contact convolution courses crossings curves deformations drawings expressions
+        fields flats outlines parameter_gradient pieces profiles questions repeats rounds samples
+        sections sharp solids sweeps tree_volumes unions volumes
         """,
     "blobtree.sampling": "*",
     "blobtree.tape": "attributes directed directed_along grown operands part_sizes poses rest_kernels",

@@ -55,6 +55,7 @@ ICONS = {
     "Rectangle": "vector-rectangle",
     "Repeat": "dots-horizontal",
     "Revolve": "rotate-3d-variant",
+    "Sweep": "vector-curve",
     "Torus": "circle-double",
     "Transform": "axis-arrow",
     "Volume": "cube-scan",

@@ -34,6 +34,7 @@ RESULTS: dict[str, Any] = {
     "bounds": wp.vec3,
     "sheet_at": wp.int32,
     "sheet_value_gradient": wp.vec4,
+    "part_size": wp.float32,
 }
 """The formulas of a direct field, and the types of their results."""
 
@@ -43,7 +44,7 @@ ROUNDING = 4e-6
 BEHIND_BOX = 7
 """Place of the first number of a field in a box, in floats: behind middle, `fade` and half lengths."""
 
-_CLAIMS = ("lipschitz", "interval", "bounds", "sheet_at", "sheet_value_gradient")
+_CLAIMS = ("lipschitz", "interval", "bounds", "sheet_at", "sheet_value_gradient", "part_size")
 _POINT: dict[str, Any] = {"q": wp.vec3}
 _SHEET: dict[str, Any] = {"q": wp.vec3, "sheet": wp.int32}
 _BALL: dict[str, Any] = {"center": wp.vec3, "radius": wp.float32}
@@ -68,6 +69,9 @@ class FieldKind:
     """The function (q, tape, at) of the smooth piece of the surface at a point, from 1 on; 0 for none."""
     own_sheet: wp.Function | None = None
     """The function (q, sheet, tape, at) of the value and the gradient of a piece, beyond its edges too."""
+    part_size: wp.Function | float = 0.0
+    """The function (center, radius, tape, at) of half the least thickness in a ball; 0 for one number, the
+    `inradii` of the kind."""
 
     @property
     def has_sheets(self) -> bool:
@@ -129,6 +133,7 @@ class FieldFormulas(PointFormulas):
         if self.numbers == PLACE:
             given = {name: part.function for name, part in self.given.items()}
             flags |= {"sheet_at": given.get("sheet_at", 0), "own_sheet": given.get("sheet_value_gradient")}
+            flags["part_size"] = given.get("part_size", 0.0)
             return FieldKind(self.kind, given["value_gradient"], given["bounds"], self.texels, **flags)
         reader = self.reader(digest, BEHIND_BOX if self.windowed else 0)
         x = "{} - wp.vec3(t0[0], t0[1], t0[2])" if self.windowed else "{}"
@@ -139,6 +144,11 @@ class FieldFormulas(PointFormulas):
             flags["sheet_at"] = reader.around("sheet_at", sheet_at, _POINT, wp.int32, x.format("q"))
             flags["own_sheet"] = reader.around(
                 "sheet_value_gradient", sheet, _SHEET, wp.vec4, x.format("q"), "sheet"
+            )
+        if "part_size" in self.given:
+            size = self.given["part_size"]
+            flags["part_size"] = reader.around(
+                "part_size", size, _BALL, wp.float32, x.format("center"), "radius"
             )
         return FieldKind(self.kind, value, bounds, reader.texels, **flags)
 

@@ -29,7 +29,7 @@ CONVERGED_STEP = 2e-3
 CELL_MARGIN = 0.01
 """Distance from its cell, in cells, up to which a vertex counts as inside."""
 
-MAX_CREASE_DISTANCE = 2.0
+MAX_CREASE_DISTANCE = 12.0
 """Largest distance of a crease from its cell, in cells: thin wedges end beyond the cells that they cross."""
 
 MIN_SINE = 0.03

@@ -167,6 +167,9 @@ class PartCells(AdaptiveCells):
         self._in_walls = np.empty(0, bool)
         self._counts: dict[int, int] = {}
         self._dropped: list[int] = []
+        tape = tree.cells.tape
+        self._varied = any(tape.instruction_set.fields[code].part_size for code in tape.fields)
+        """True if a solid says how thin it is in a block: cells as small as memory allows show most of it."""
         self._gaps = Gaps(tree)
         self._in_gap = np.zeros(len(tree.cells.leaves))
         """Edges across gaps in each block of the base, when it was last divided for them."""
@@ -246,7 +249,8 @@ class PartCells(AdaptiveCells):
             size, middle = float(needed[dropped].min()), self._middle(blocks[dropped])
             of_wall = None if self._walls is None else self._walls.leaf_at(middle, 4.0 * size)
             self.unresolved.append(ThinPart(size, middle, of_wall))
-            self._dropped += keys[parts == number].tolist()
+            if not self._varied:
+                self._dropped += keys[parts == number].tolist()
         return np.asarray(fits[part], bool)
 
     def _parts_of(self, keys: IndexArray) -> IndexArray:

@@ -19,6 +19,7 @@ with if_present():
     import blobtree.nodes.rounds
     import blobtree.nodes.sharp
     import blobtree.nodes.solids
+    import blobtree.nodes.sweeps
     import blobtree.nodes.volumes  # noqa: F401
 
 __all__ = ["NODE_KINDS", "primitives", "tree"]

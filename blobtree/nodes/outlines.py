@@ -4,7 +4,7 @@ An outline is SVG path data, whose curves stay curves in files. For fields they 
 leave the curve by at most `TOLERANCE` of the outline's size and turn by at most `LARGEST_TURN`.
 
 Loops inside others are holes, whatever their directions are. In drawings and fonts directions count: there
-only the loops stay that bound what is filled.
+only the loops stay that bound what is filled. Loops that cross are united first, see `nodes.unions`.
 """
 
 import cmath
@@ -28,6 +28,7 @@ from blobtree.identity import content_hash
 from blobtree.lazy import Lazy
 from blobtree.nodes.crossings import meeting_edges
 from blobtree.nodes.drawings import filled_shapes
+from blobtree.nodes.unions import united
 from blobtree.validation import LARGEST_NUMBER, LIMIT, describe, positive_number
 
 TOLERANCE = 2e-5
@@ -181,7 +182,8 @@ class Outline(msgspec.Struct, frozen=True, dict=True):
         """Return all filled shapes of an SVG file, or of a string with its contents, with y turned upward.
 
         Lengths are those of the file, whatever its size on a page is. Transforms count. Strokes, clips,
-        texts, style sheets and copies (`use`) are left out. Each shape is filled by its `fill-rule`. A `rule`
+        texts, style sheets and copies (`use`) are left out. Each shape is filled by its `fill-rule`, and all
+        shapes are united. A `rule`
         fills all of them as one shape instead: `"nonzero"`, or `"evenodd"`, by which shapes inside others
         are holes.
 
@@ -218,7 +220,7 @@ class Outline(msgspec.Struct, frozen=True, dict=True):
 
         `size` is the size of the font in model units: capitals are about 0.7 of it high. Lines are as far
         apart as the font says, and a tab is four spaces. Letters stand side by side, without kerning and
-        ligatures; letters that touch are refused.
+        ligatures; those that overlap or touch are united.
 
         Examples
         --------
@@ -237,6 +239,19 @@ class Outline(msgspec.Struct, frozen=True, dict=True):
         if not isinstance(other, Outline):
             return NotImplemented
         return type(self)(f"{self.path} {other.path}")
+
+    def __or__(self, other: Self) -> Self:
+        """Return the union of both, which may overlap or touch.
+
+        Examples
+        --------
+        >>> from blobtree import Outline
+        >>> (Outline("M0 0H2V2H0Z") | Outline("M1 1H3V3H1Z")).area
+        7.0
+        """
+        if not isinstance(other, Outline):
+            return NotImplemented
+        return self._of(_filling([(self._curves, "evenodd"), (other._curves, "evenodd")]))
 
     def scale(self, factor: float) -> Self:
         """Return this outline larger by a factor.
@@ -519,14 +534,19 @@ def _cross(a: Float64Array, b: Float64Array) -> Float64Array:
 
 def _check_apart(polygons: Sequence[Float64Array]) -> None:
     """Raise `InvalidNode` if polygons cross or touch each other or themselves."""
-    points = np.concatenate(polygons)
-    low, size = points.min(axis=0), float(np.ptp(points, axis=0).max())
-    if crossing := meeting_edges((points - low) / size, [len(polygon) for polygon in polygons]):
-        x, y = points[crossing[0]]
+    if crossing := _meeting(polygons):
+        x, y = np.concatenate(polygons)[crossing[0]]
         raise InvalidNode(
             f"outline: expected loops that neither cross nor touch, got edges that meet near ({x:g}, {y:g}); "
-            "unite shapes that overlap"
+            "unite outlines that overlap by a | b"
         )
+
+
+def _meeting(polygons: Sequence[Float64Array]) -> tuple[int, int] | None:
+    """Return two edges of polygons that cross or touch, None if there are none."""
+    points = np.concatenate(polygons)
+    low, size = points.min(axis=0), float(np.ptp(points, axis=0).max())
+    return meeting_edges((points - low) / size, [len(polygon) for polygon in polygons])
 
 
 def _inside_others(polygons: Sequence[Float64Array]) -> Iterator[list[int]]:
@@ -559,7 +579,8 @@ def _filling(shapes: Iterable[tuple[Sequence[Sequence[Curve]], str]]) -> list[Se
     if not known:
         raise InvalidNode("outline: expected a shape with an area, got none")
     points = [points for *_, points in known]
-    _check_apart(points)
+    if _meeting(points):
+        return _united([(loop, own) for loop, own, _ in known])
     ways = [1 if _area(polygon) > 0.0 else -1 for polygon in points]
 
     def filled(around: Iterable[int]) -> bool:
@@ -574,6 +595,21 @@ def _filling(shapes: Iterable[tuple[Sequence[Sequence[Curve]], str]]) -> list[Se
         for number, around in enumerate(_inside_others(points))
         if filled(around) != filled([*around, number])
     ]
+
+
+def _united(owned: Sequence[tuple[Sequence[Curve], tuple[int, str]]]) -> list[Sequence[Curve]]:
+    """Return the loops around the filled area of shapes that cross or touch."""
+    rules = [rule for _, (_, rule) in owned]
+    curves, shapes = list[Curve](), list[int]()
+    for number, (loop, (shape, _)) in enumerate(owned):
+        closed = [*loop, np.array([loop[-1][-1], loop[0][0]])]
+        curves += closed
+        shapes += len(closed) * [next(at for at in range(number + 1) if owned[at][1][0] == shape)]
+    size = float(np.ptp(np.concatenate(curves), axis=0).max())
+    chords = [_chords(curve, TOLERANCE * size) for curve in curves]
+    parts, lines = united(curves, chords, shapes, rules)
+    polygons = [polygon.points for polygon in _polygons(parts) if polygon]
+    return [*(lines if _meeting(polygons) else parts)]
 
 
 def _checked_outline(name: str, value: Any) -> Outline:

@@ -1,16 +1,7 @@
-"""Profiles: solids whose section is an outline, drawn along a line or turned around an axis.
-
-Both kinds place a point beside the outline: (x, y) in its plane, the distance from the nearer end, below 0
-between the ends, and the side of that end. The rest is one code.
-
-The data region holds a binary tree of boxes around edges in their order, so that few edges are tried for a
-point: after a header the boxes of a heap whose root is 1, then three texels for each edge, then the faces. A
-face is a chain of edges between corners. Behind its first and its last edge it goes on straight.
-"""
+"""Profiles: solids whose section is an outline, drawn along a line or turned around an axis."""
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,198 +17,26 @@ from blobtree.nodes.flats import polygon_in_plane
 from blobtree.nodes.node import Node
 from blobtree.nodes.outlines import SHORTEST, Outline, Section
 from blobtree.nodes.pieces import Pieces
-from blobtree.nodes.sharp import SHEET_TOLERANCE, SharpSolid, relative_bounds, relative_distance
+from blobtree.nodes.sections import (
+    FAR,
+    SectionSolid,
+    box_corners,
+    end_share,
+    face_row,
+    mean_distance,
+    mean_radius,
+    outline_row,
+    outline_texels,
+    profile_sheet_at,
+)
+from blobtree.nodes.sharp import SHEET_TOLERANCE, relative_bounds, relative_distance
+from blobtree.nodes.sweeps import upright_sweep
 from blobtree.texels import Texels
 from blobtree.validation import Vector
 
 wp.set_module_options({"enable_backward": False})
 
-EDGES_OF_BOX = wp.constant(4)
-"""Edges in a smallest box."""
-
-EDGE_TEXELS = wp.constant(3)
-"""Texels of an edge: start and way; normals at both ends; the edges before and behind, and the face."""
-
-FAR = wp.constant(1.0e18)
-"""A distance beyond all others, whose square is finite."""
-
 WHOLE_TURN = 360.0
-
-MUCH_THINNER = 0.25
-"""Width of thin parts over the mean radius, at most: meshes have smaller cells for such parts."""
-
-PARALLEL = np.cos(np.radians(3.0))
-"""Cosine of the angle between both sides of a thin part, at least: others are tips of corners."""
-
-LEAST_SHARE = 0.005
-"""Least share of an outline's length that counts as a thin part."""
-
-THINNEST = 0.1
-"""Share of the thin places that may be thinner than the width of thin parts."""
-
-MOST_SAMPLES = 2000
-"""Most places along an outline at which its thickness is measured."""
-
-MOST_PAIRS = 20_000_000
-"""Most pairs of such a place and an edge."""
-
-
-@wp.func
-def box_squared(p: wp.vec2, box: wp.vec4) -> wp.float32:
-    """Return the squared distance of p from a box (low, high)."""
-    x = wp.max(wp.max(box[0] - p[0], p[0] - box[2]), 0.0)
-    y = wp.max(wp.max(box[1] - p[1], p[1] - box[3]), 0.0)
-    return x * x + y * y
-
-
-@wp.func
-def edge_foot(p: wp.vec2, edge: wp.vec4, low: wp.float32, high: wp.float32) -> wp.vec3:
-    """Return the way to p from an edge's closest point, and the parameter (low to high) of that point."""
-    w = wp.vec2(p[0] - edge[0], p[1] - edge[1])
-    way = wp.vec2(edge[2], edge[3])
-    t = wp.clamp(wp.dot(w, way) / wp.dot(way, way), low, high)
-    return wp.vec3(w[0] - t * way[0], w[1] - t * way[1], t)
-
-
-@wp.func
-def nearest_in_box(
-    p: wp.vec2, best: wp.vec2, tape: Texels, edges: wp.int32, first: wp.int32, end: wp.int32
-) -> wp.vec2:
-    """Return (squared distance, edge) of the best or of a nearer edge from `first` to `end`."""
-    for i in range(first, end):
-        foot = edge_foot(p, tape[edges + EDGE_TEXELS * i], 0.0, 1.0)
-        squared = foot[0] * foot[0] + foot[1] * foot[1]
-        if squared < best[0]:
-            best = wp.vec2(squared, float(i))
-    return best
-
-
-@wp.func
-def nearest_edge(p: wp.vec2, tape: Texels, first: wp.int32) -> wp.int32:
-    """Return the nearest edge. A way down through nearer boxes finds a near one, then all boxes are tried.
-
-    tape[first] = (number of leaves of the heap, number of edges, ·, ·).
-    """
-    leaves = int(tape[first][0])
-    count = int(tape[first][1])
-    edges = first + 2 * leaves
-    k = int(1)
-    while k < leaves:
-        k = 2 * k
-        if box_squared(p, tape[first + k + 1]) < box_squared(p, tape[first + k]):
-            k = k + 1
-    start = EDGES_OF_BOX * (k - leaves)
-    best = nearest_in_box(p, wp.vec2(FAR * FAR, 0.0), tape, edges, start, wp.min(start + EDGES_OF_BOX, count))
-    k = int(1)
-    while k > 0:
-        inside = box_squared(p, tape[first + k]) < best[0]
-        if inside and k < leaves:
-            k = 2 * k
-        else:
-            if inside:
-                start = EDGES_OF_BOX * (k - leaves)
-                best = nearest_in_box(p, best, tape, edges, start, wp.min(start + EDGES_OF_BOX, count))
-            while (k & 1) == 1:
-                k = k >> 1
-            if k > 0:
-                k = k + 1
-    return int(best[1])
-
-
-@wp.func
-def signed_row(foot: wp.vec3, low: wp.float32, high: wp.float32, edge: wp.vec4, ends: wp.vec4) -> wp.vec3:
-    """Return (d, ∇d) for a foot on an edge: beside it by its normal, at its ends by the normals there."""
-    away = wp.vec2(foot[0], foot[1])
-    normal = wp.normalize(wp.vec2(edge[3], -edge[2]))
-    if foot[2] > low and foot[2] < high:
-        return wp.vec3(wp.dot(away, normal), normal[0], normal[1])
-    normal = wp.vec2(ends[2], ends[3])
-    if foot[2] <= low:
-        normal = wp.vec2(ends[0], ends[1])
-    d = wp.length(away)
-    if d == 0.0:
-        return wp.vec3(0.0, normal[0], normal[1])
-    if wp.dot(away, normal) < 0.0:
-        d = -d
-    return wp.vec3(d, away[0] / d, away[1] / d)
-
-
-@wp.func
-def outline_row(p: wp.vec2, tape: Texels, first: wp.int32) -> wp.vec4:
-    """Return (d, ∇d, nearest edge) of an outline."""
-    i = nearest_edge(p, tape, first)
-    at = first + 2 * int(tape[first][0]) + EDGE_TEXELS * i
-    row = signed_row(edge_foot(p, tape[at], 0.0, 1.0), 0.0, 1.0, tape[at], tape[at + 1])
-    return wp.vec4(row[0], row[1], row[2], float(i))
-
-
-@wp.func
-def face_row(p: wp.vec2, face: wp.int32, tape: Texels, first: wp.int32) -> wp.vec3:
-    """Return (d, ∇d) of a face, which goes on behind its ends.
-
-    The texel of a face is (its first edge, their number, 1 if it is a whole loop, ·).
-    """
-    edges = first + 2 * int(tape[first][0])
-    chain = tape[edges + EDGE_TEXELS * int(tape[first][1]) + face]
-    start = int(chain[0])
-    count = int(chain[1])
-    best = FAR * FAR
-    row = wp.vec3()
-    for i in range(count):
-        at = edges + EDGE_TEXELS * (start + i)
-        low = float(0.0)
-        high = float(1.0)
-        if chain[2] == 0.0 and i == 0:
-            low = -FAR
-        if chain[2] == 0.0 and i == count - 1:
-            high = FAR
-        foot = edge_foot(p, tape[at], low, high)
-        squared = foot[0] * foot[0] + foot[1] * foot[1]
-        if squared < best:
-            best = squared
-            row = signed_row(foot, low, high, tape[at], tape[at + 1])
-    return row
-
-
-@wp.func
-def end_share(flat: wp.float32, end: wp.float32) -> wp.vec3:
-    """Return (d, ∂d / ∂flat, ∂d / ∂end) of the solid between ends whose section is an outline."""
-    if flat > 0.0 and end > 0.0:
-        d = wp.length(wp.vec2(flat, end))
-        return wp.vec3(d, flat / d, end / d)
-    if end > flat:
-        return wp.vec3(end, 0.0, 1.0)
-    return wp.vec3(flat, 1.0, 0.0)
-
-
-@wp.func
-def profile_sheet_at(place: wp.vec4, tolerance: wp.float32, tape: Texels, first: wp.int32) -> wp.int32:
-    """Return 1 and 2 for the ends, and from 3 on the faces along the outline.
-
-    At a convex corner the face is the one that is farther away, as it goes on.
-    """
-    p = wp.vec2(place[0], place[1])
-    flat = outline_row(p, tape, first)
-    if wp.min(flat[0], place[2]) > tolerance:
-        return 0
-    if place[2] >= flat[0]:
-        if place[3] < 0.0:
-            return 1
-        return 2
-    at = first + 2 * int(tape[first][0]) + EDGE_TEXELS * int(flat[3])
-    face = int(tape[at + 2][2])
-    beyond = face_row(p, face, tape, first)[0]
-    if flat[0] > tolerance and flat[0] > beyond:
-        link = int(tape[at + 2][1])
-        if edge_foot(p, tape[at], 0.0, 1.0)[2] < 0.5:
-            link = int(tape[at + 2][0])
-        other = int(tape[first + 2 * int(tape[first][0]) + EDGE_TEXELS * link + 2][2])
-        beside = face_row(p, other, tape, first)[0]
-        if wp.min(beyond, beside) > tolerance:
-            return 0
-        if beside > beyond:
-            face = other
-    return 3 + face
 
 
 @wp.func
@@ -386,21 +205,7 @@ def revolution_sheet_value_gradient(q: wp.vec3, sheet: wp.int32, tape: Texels, a
     return relative_distance(wp.vec4(row[0], g[0], g[1], row[2]), shape[0], shape[1])
 
 
-class _Profile(SharpSolid):
-    """A solid whose section is an outline."""
-
-    outline: Section
-    origin: Vector = par.point("where the outline's origin lies")
-
-    @classmethod
-    def inradii(cls, leaves: Sequence[Any]) -> Float64Array:
-        """Return the radii of the solids, or of parts that are much thinner."""
-        radii = super().inradii(leaves)
-        thin = np.array([thin_width(leaf.outline) + leaf.offset for leaf in leaves])
-        return np.where((thin > 0.0) & (thin < MUCH_THINNER * radii), thin, radii)
-
-
-class _Extrusion(_Profile):
+class _Extrusion(SectionSolid):
     """An outline, drawn along the normal of its plane."""
 
     tag = "sharp_extrusion"
@@ -410,6 +215,8 @@ class _Extrusion(_Profile):
     sheet_at = formula(extrusion_sheet_at)
     sheet_value_gradient = formula(extrusion_sheet_value_gradient)
 
+    outline: Section
+    origin: Vector = par.point("where the outline's origin lies")
     u: Vector = par.direction("direction of the outline's x axis")
     v: Vector = par.direction("direction of the outline's y axis")
     height: float = par.length("length along the normal of the plane")
@@ -422,7 +229,7 @@ class _Extrusion(_Profile):
     @classmethod
     def hulls(cls, leaves: Sequence[Any]) -> Float64Array:
         """Return the corners of the outlines' boxes at both ends."""
-        corners = np.array([_box_corners(leaf.outline) for leaf in leaves])
+        corners = np.array([box_corners(leaf.outline) for leaf in leaves])
         frames = np.array([[leaf.u, leaf.v] for leaf in leaves])
         bases = np.array([[leaf.origin] for leaf in leaves]) + corners @ frames
         ways = np.array([[leaf.height] for leaf in leaves]) * np.cross(*frames.transpose(1, 0, 2))
@@ -438,7 +245,7 @@ class _Extrusion(_Profile):
         return np.array(rows, np.float64).reshape(len(rows), 4, 4)
 
 
-class _Revolution(_Profile):
+class _Revolution(SectionSolid):
     """An outline, turned around the z axis from the x axis on."""
 
     tag = "sharp_revolution"
@@ -448,6 +255,8 @@ class _Revolution(_Profile):
     sheet_at = formula(revolution_sheet_at)
     sheet_value_gradient = formula(revolution_sheet_value_gradient)
 
+    outline: Section
+    origin: Vector = par.point("where the outline's origin lies")
     angle: float = par.angle("angle of the turn", low=0.0, high=WHOLE_TURN)
 
     @property
@@ -458,7 +267,7 @@ class _Revolution(_Profile):
     @classmethod
     def hulls(cls, leaves: Sequence[Any]) -> Float64Array:
         """Return the corners of the outlines' boxes, at both ends and where the turn passes an axis."""
-        corners = np.array([_box_corners(leaf.outline) for leaf in leaves])
+        corners = np.array([box_corners(leaf.outline) for leaf in leaves])
         quarters = np.array([0.0, 90.0, 180.0, 270.0, 360.0])
         angles = np.radians(np.minimum(quarters, [[leaf.angle] for leaf in leaves]))[:, None]
         x, y = corners[:, :, :1], np.broadcast_to(corners[:, :, 1:], (len(leaves), 4, 5))
@@ -474,117 +283,6 @@ class _Revolution(_Profile):
             for leaf, angle in zip(leaves, np.radians([leaf.angle for leaf in leaves]), strict=True)
         ]  # fmt: skip
         return np.array(rows, np.float64).reshape(len(rows), 3, 4)
-
-
-def _box_corners(outline: Outline) -> Float64Array:
-    """Return the corners (4, 2) of the box around an outline."""
-    (x, y), (to_x, to_y) = outline.bounds
-    return np.array([(x, y), (to_x, y), (to_x, to_y), (x, to_y)])
-
-
-@lru_cache(maxsize=64)
-def outline_texels(outline: Outline, around: bool = False) -> Float64Array:
-    """Return the texels (n, 4) of an outline, see the head of this file; `around` an axis at x = 0.
-
-    Edges on that axis bound nothing: they are left out, and the normals at their ends lie along the axis.
-    """
-    counts = [len(loop.points) for loop in outline.loops]
-    starts = np.concatenate([loop.points for loop in outline.loops])
-    ends = np.concatenate([np.roll(loop.points, -1, axis=0) for loop in outline.loops])
-    numbers = np.arange(len(starts))
-    loops = np.split(numbers, np.cumsum(counts)[:-1])
-    before = np.concatenate([np.roll(loop, 1) for loop in loops])
-    after = np.concatenate([np.roll(loop, -1) for loop in loops])
-    firsts = np.concatenate([loop.corners | (np.arange(len(loop.points)) == 0) for loop in outline.loops])
-    closed = np.repeat([not loop.corners.any() for loop in outline.loops], counts)
-    faces = np.cumsum(firsts) - 1
-    ways = ends - starts
-    normals = np.column_stack([ways[:, 1], -ways[:, 0]]) / np.linalg.norm(ways, axis=1)[:, None]
-    on_axis = around & (np.maximum(starts[:, 0], ends[:, 0]) <= SHORTEST * np.ptp(starts, axis=0).max())
-    bisectors = normals + normals[before]
-    beside = on_axis != on_axis[before]
-    bisectors[beside] = np.where(on_axis[beside, None], normals[before[beside]], normals[beside]) * (0.0, 1.0)
-    bisectors /= np.linalg.norm(bisectors, axis=1)[:, None]
-    places = np.cumsum(~on_axis) - 1
-    links = [np.where(on_axis[other], places, places[other]) for other in (before, after)]
-    kept = ~on_axis
-    edges = np.stack(
-        [
-            np.concatenate([starts, ways], axis=1),
-            np.concatenate([bisectors, bisectors[after]], axis=1),
-            np.stack([*links, faces, 0.0 * faces], axis=1),
-        ],
-        axis=1,
-    )[kept]
-    chains = np.zeros((firsts.sum(), 4))
-    chains[:, 1] = np.bincount(faces[kept], minlength=len(chains))
-    chains[:, 0] = np.cumsum(chains[:, 1]) - chains[:, 1]
-    chains[:, 2] = closed[firsts]
-    boxes = _heap(np.minimum(starts, ends)[kept], np.maximum(starts, ends)[kept])
-    boxes[0] = len(boxes) / 2, len(edges), 0.0, 0.0
-    return np.concatenate([boxes, edges.reshape(-1, 4), chains])
-
-
-def _heap(lower: Float64Array, upper: Float64Array) -> Float64Array:
-    """Return boxes (2 · leaves, 4) around edges in their order, as a heap whose root is 1."""
-    used = -(-len(lower) // EDGES_OF_BOX)
-    leaves = 1 << (used - 1).bit_length()
-    boxes = np.full((2 * leaves, 4), (FAR, FAR, -FAR, -FAR))
-    starts = np.arange(0, len(lower), EDGES_OF_BOX)
-    boxes[leaves : leaves + used, :2] = np.minimum.reduceat(lower, starts)
-    boxes[leaves : leaves + used, 2:] = np.maximum.reduceat(upper, starts)
-    for k in range(leaves - 1, 0, -1):
-        boxes[k, :2] = np.minimum(boxes[2 * k, :2], boxes[2 * k + 1, :2])
-        boxes[k, 2:] = np.maximum(boxes[2 * k, 2:], boxes[2 * k + 1, 2:])
-    return boxes
-
-
-def _mean_radius(outline: Outline) -> float:
-    """Return twice the area of an outline over its length: the radius of a circle."""
-    lengths = [
-        np.linalg.norm(np.roll(loop.points, -1, axis=0) - loop.points, axis=1).sum() for loop in outline.loops
-    ]
-    return float(2.0 * outline.area / sum(lengths))
-
-
-def _mean_distance(outline: Outline) -> float:
-    """Return the x of the centroid of an outline."""
-    (x, y), (to_x, to_y) = (
-        np.concatenate([np.roll(loop.points, -step, axis=0) for loop in outline.loops]).T for step in (0, 1)
-    )
-    return float(((x * to_y - to_x * y) * (x + to_x)).sum() / (6.0 * outline.area))
-
-
-@lru_cache(maxsize=64)
-def thin_width(outline: Outline) -> float:
-    """Return the width of an outline's thin parts, infinity if it has none.
-
-    It is measured at even distances along the outline: inward, to the next edge.
-    """
-    starts = np.concatenate([loop.points for loop in outline.loops])
-    ways = np.concatenate([np.roll(loop.points, -1, axis=0) - loop.points for loop in outline.loops])
-    lengths = np.linalg.norm(ways, axis=1)
-    units = ways / lengths[:, None]
-    ends = np.cumsum(lengths)
-    count = min(MOST_SAMPLES, MOST_PAIRS // len(ways))
-    along = (np.arange(count) + 0.5) / count * ends[-1]
-    edges = np.minimum(np.searchsorted(ends, along), len(ways) - 1)
-    places = starts[edges] + (along - ends[edges] + lengths[edges])[:, None] * units[edges]
-    nearest = SHORTEST * np.ptp(starts, axis=0).max()
-
-    def width(place: Float64Array, unit: Float64Array) -> float:
-        """Return the distance of the next edge on the left of a place, infinity if it is not parallel."""
-        x, y = (starts - place).T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            rates = -1.0 / (ways @ unit)
-            distances, shares = (x * ways[:, 1] - y * ways[:, 0]) * rates, (x * unit[0] + y * unit[1]) * rates
-        distances[~((shares >= 0.0) & (shares <= 1.0) & (distances > nearest))] = np.inf
-        edge = distances.argmin()
-        return float(distances[edge]) if units[edge] @ unit < -PARALLEL else np.inf
-
-    widths = np.array([width(*sample) for sample in zip(places, units[edges], strict=True)])
-    thin = widths[widths < MUCH_THINNER * _mean_radius(outline)]
-    return float(np.quantile(thin, THINNEST)) if len(thin) > LEAST_SHARE * count else np.inf
 
 
 def _polygon_frame(points: Float64Array) -> tuple[Float64Array, Float64Array]:
@@ -634,7 +332,7 @@ class Prism(Pieces):
         """Return the direct field of the solid."""
         (u, v), corners = _polygon_frame(np.array(self.points))
         base = Outline.polygon(corners)
-        mean = self.radius or min(0.5 * self.height, _mean_radius(base))
+        mean = self.radius or min(0.5 * self.height, mean_radius(base))
         return _Extrusion(
             base,
             self.points[0],
@@ -654,8 +352,8 @@ class Extrude(Pieces):
     the sharp one. A width grows with the radius, or with the mean radius of a sharp solid: the smaller one of
     half its height and twice the area of the outline over its length.
 
-    A scale and a turn of the top are a taper and a twist: the surface is exact, and the field is no longer
-    that of a distance.
+    With a scale or a turn of the top the surface is exact, distances are those within a section, and the
+    field is steeper than that of a distance.
 
     Raises
     ------
@@ -684,23 +382,22 @@ class Extrude(Pieces):
 
     @Lazy
     def expanded(self) -> Node:
-        """Return the direct field of the solid, under the warps."""
-        warped = self.top_scale != 1.0 or self.top_turn != 0.0
-        solid: Node = _Extrusion(
+        """Return the direct field of the solid."""
+        mean = self.radius or min(0.5 * self.height, mean_radius(self.outline))
+        if self.top_scale != 1.0 or self.top_turn != 0.0:
+            changes = {"end_scale": self.top_scale, "end_turn": self.top_turn}
+            keywords = {**changes, "offset": self.radius, "mean": mean, **self.shared}
+            return upright_sweep(self.outline, self.origin, self.height, **keywords)
+        return _Extrusion(
             self.outline,
-            (0.0, 0.0, 0.0) if warped else self.origin,
+            self.origin,
             (1.0, 0.0, 0.0),
             (0.0, 1.0, 0.0),
             self.height,
             offset=self.radius,
-            mean=self.radius or min(0.5 * self.height, _mean_radius(self.outline)),
+            mean=mean,
             **self.shared,
         )
-        if self.top_scale != 1.0:
-            solid = solid.taper(self.top_scale, (0.0, self.height))
-        if self.top_turn != 0.0:
-            solid = solid.twist(self.top_turn / self.height)
-        return solid.translate(self.origin) if warped else solid
 
 
 class Revolve(Pieces):
@@ -743,9 +440,9 @@ class Revolve(Pieces):
     @Lazy
     def expanded(self) -> Node:
         """Return the direct field of the solid."""
-        mean = self.radius or _mean_radius(self.outline)
+        mean = self.radius or mean_radius(self.outline)
         if self.angle < WHOLE_TURN and not self.radius:
-            mean = min(mean, np.radians(self.angle) * _mean_distance(self.outline))
+            mean = min(mean, np.radians(self.angle) * mean_distance(self.outline))
         return _Revolution(
             self.outline, self.origin, self.angle, offset=self.radius, mean=mean, **self.shared
         )

@@ -137,6 +137,13 @@ def kind_sheet_value_gradient(
     """Return `FieldKind.sheet_value_gradient`."""
 
 
+@of_row("fields", "part_size")
+def kind_part_size(
+    kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32
+) -> wp.float32:
+    """Return `FieldKind.part_size`."""
+
+
 @of_row("operators", "monotone")
 def is_monotone(operator: wp.int32) -> wp.bool:
     """Return `Operator.monotone`."""

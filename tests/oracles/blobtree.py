@@ -30,7 +30,6 @@ from blobtree import (
     Disc,
     Ellipsoid,
     Expression,
-    Extrude,
     GradientBlend,
     Gyroid,
     HalfSpace,
@@ -134,8 +133,6 @@ def signed(node: Node, points: ArrayLike) -> Field:
         case Expression(size=size, width=width):
             (d, margin), mean = expressions.distances(node, q), 0.25 * min(size)
             return _falling(1.0 + d / mean, mean, width, node, margin / mean)
-        case Extrude() if sharp.is_warped(node):
-            return signed(sharp.written_out(node), q)
         case Primitive() if node.profiled:
             return _profiled(node, q)
         case Ellipsoid(semi_axes=axes, width=width):
@@ -291,7 +288,7 @@ def grown(node: Node, distance: float) -> Node:
     if isinstance(node, Profile) and node.weight < 0.0:
         distance = -distance
     match node:
-        case Leaf() if sharp.is_sharp(node) or sharp.is_warped(node):
+        case Leaf() if sharp.is_sharp(node):
             return cast(Node, sharp.grown(node, distance))
         case Operator(operands=(solid, tool)) if node.operator.support is Support.LEFT:
             return replace(node, operands=(grown(solid, distance), grown(tool, -distance)))

@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blobtree import Box, Cone, Cylinder, Extrude, Frustum, Node, Outline, Prism, Revolve
+from blobtree import Box, Cone, Cylinder, Extrude, Frustum, Outline, Prism, Revolve, Sweep
+from blobtree.nodes.courses import Span, spans_of
 
 Floats = NDArray[np.float64]
 
 KINDS = (Box, Cone, Cylinder, Frustum)
 
-ALWAYS = (Prism, Frustum, Extrude, Revolve)
+ALWAYS = (Prism, Frustum, Extrude, Revolve, Sweep)
 """Kinds whose field is that of a signed distance with every radius."""
 
 
@@ -23,21 +24,15 @@ STENCIL = 5e-3
 def is_sharp(node: Any) -> bool:
     """True for a solid whose field is that of its signed distance."""
     if isinstance(node, ALWAYS):
-        return not is_warped(node)
+        return True
     return isinstance(node, KINDS) and min(node.radius, getattr(node, "end_radius", node.radius)) == 0.0
 
 
-def is_warped(node: Any) -> bool:
-    """True for an extrusion under a taper or a twist."""
-    return isinstance(node, Extrude) and (node.top_scale != 1.0 or node.top_turn != 0.0)
-
-
-def written_out(node: Extrude) -> Node:
-    """An extrusion under a taper or a twist as a straight one under these warps."""
-    straight = replace(node, top_scale=1.0, top_turn=0.0, origin=(0.0, 0.0, 0.0))
-    object.__setattr__(straight, "growth", getattr(node, "growth", 0.0))
-    tapered = straight if node.top_scale == 1.0 else straight.taper(node.top_scale, (0.0, node.height))
-    return tapered.twist(node.top_turn / node.height).translate(node.origin)
+def is_swept(node: Any) -> bool:
+    """True for a sweep, or an extrusion whose section grows or turns."""
+    return isinstance(node, Sweep) or (
+        isinstance(node, Extrude) and (node.top_scale != 1.0 or node.top_turn != 0.0)
+    )
 
 
 def grown(node: Any, distance: float) -> Any:
@@ -53,8 +48,13 @@ def ratio(node: Any, q: Floats) -> tuple[Floats, Floats]:
     offset = getattr(node, "growth", 0.0) + (0.0 if isinstance(node, Cone) else node.radius)
     shifts = STENCIL * mean * np.concatenate([np.eye(3), -np.eye(3)])
     around = distance(node, (q + shifts[:, None]).reshape(-1, 3)).reshape(2, 3, -1)
-    steepness = np.linalg.norm((around[0] - around[1]) / (2.0 * STENCIL * mean), axis=0)
-    return 1.0 + (distance(node, q) - offset) / mean, np.where(np.abs(steepness - 1.0) < 0.01, np.inf, 0.0)
+    here = distance(node, q)
+    if is_swept(node):
+        # sines differ between languages, which turns gradients close to corners of an outline
+        kink = 5.0 * np.abs(around.sum(axis=0) - 2.0 * here).max(axis=0) / (2.0 * STENCIL * mean)
+    else:
+        kink = np.abs(np.linalg.norm((around[0] - around[1]) / (2.0 * STENCIL * mean), axis=0) - 1.0)
+    return 1.0 + (here - offset) / mean, np.where(kink < 0.01, np.inf, 0.0)
 
 
 def mean_radius(node: Any) -> float:
@@ -62,12 +62,15 @@ def mean_radius(node: Any) -> float:
     match node:
         case Cone():
             return float(max(node.radius, node.end_radius))
-        case Prism() | Frustum() | Extrude() | Revolve() if node.radius > 0.0:
+        case Prism() | Frustum() | Extrude() | Revolve() | Sweep() if node.radius > 0.0:
             return float(node.radius)
         case Extrude():
             return min(0.5 * node.height, mean_of(node.outline))
         case Revolve():
             return mean_of(node.outline)
+        case Sweep():
+            length = sum(span.length for span in course_of(node)[0])
+            return min(0.5 * length, mean_of(node.outline) * min(1.0, node.end_scale))
         case Box():
             return 0.5 * min(node.size)
         case Prism():
@@ -121,6 +124,71 @@ def revolution(node: Revolve, q: Floats) -> Floats:
     return np.where(inside, -nearest, nearest)
 
 
+def course_of(node: Any) -> tuple[list[Span], float, float, bool]:
+    """Spans of a sweep or of a tapered or twisted extrusion, its whole turn, its last scale; True if open."""
+    if hasattr(node, "top_scale"):
+        base = np.array(node.origin)
+        points = [base, base + np.array([0.0, 0.0, node.height])]
+        spans, missing = spans_of(points, (0.0, 1.0, 0.0), smooth=False, closed=False)
+        return spans, np.radians(node.top_turn) + missing, node.top_scale, True
+    closed = node.ends == "closed"
+    spans, missing = spans_of(node.points, node.up, smooth=node.corners == "smooth", closed=closed)
+    return spans, np.radians(node.end_turn) + missing, node.end_scale, not closed
+
+
+def sweep(node: Any, q: Floats) -> Floats:
+    """The signed distance (n,) of points from the surface of a sweep, as if its radius were 0."""
+    spans, turn, last_scale, is_open = course_of(node)
+    whole, behind, nearest = sum(span.length for span in spans), 0.0, np.full(len(q), np.inf)
+    for number, span in enumerate(spans):
+        shares = np.array([behind, behind + span.length]) / whole
+        behind += span.length
+        ends = is_open & (number == 0), is_open & (number == len(spans) - 1)
+        here = of_span(span, q, node.outline, shares, turn, last_scale, whole, is_open, ends)
+        nearest = np.minimum(nearest, here)
+    return nearest
+
+
+def of_span(
+    span: Span,
+    q: Floats,
+    outline: Outline,
+    shares: Floats,
+    turn: float,
+    last_scale: float,
+    whole: float,
+    is_open: bool,
+    ends: tuple[bool, bool],
+) -> Floats:
+    beside = np.cross(span.tangent, span.inward)
+    before, after = -(q - span.start) @ span.start_plane, (q - span.end) @ span.end_plane
+    sharp_ends = np.where(before >= after, span.corners[0], span.corners[1])
+    beyond = np.maximum(before, after)
+    x, y, across = ((q - span.start) @ way for way in (span.tangent, span.inward, beside))
+    if span.curvature:
+        radius = 1.0 / span.curvature
+        toward = radius - np.hypot(x, radius - y)
+        along = np.arctan2(x, radius - y) * radius
+    else:
+        toward, along = y, x
+    if not any(span.corners):
+        outside = beyond > 0.0
+        inward_there = np.cross(beside, span.end_tangent)
+        clamped = np.where(before >= after, y, (q - span.end) @ inward_there)
+        toward = np.where(outside, clamped, toward)
+        along = np.where(outside, np.where(before >= after, 0.0, span.length), along)
+    share = shares[0] + np.clip(along / span.length, 0.0, 1.0) * (shares[1] - shares[0])
+    scale, angle = 1.0 + (last_scale - 1.0) * share, span.frame + turn * share
+    place = (toward + 1j * across) * np.exp(-1j * angle) / scale
+    flat = scale * flat_distance(np.column_stack([place.real, place.imag]), outline)
+    end = whole * np.maximum(-share, share - 1.0) if is_open else np.full(len(q), -np.inf)
+    inside = np.maximum(flat, end)
+    outside = np.where(
+        sharp_ends, np.maximum(flat, 0.0) + 2.0 * beyond, np.hypot(np.maximum(flat, 0.0), beyond)
+    )
+    return np.asarray(np.where(beyond > 0.0, outside, inside))
+
+
 def off_axis(a: Floats, b: Floats) -> bool:
     """True for an edge that does not lie on the axis of a turn."""
     return bool(max(a[0], b[0]) > 1e-12)
@@ -128,6 +196,8 @@ def off_axis(a: Floats, b: Floats) -> bool:
 
 def distance(node: Any, q: Floats) -> Floats:
     """The signed distance (n,) of points from the surface of a solid, as if its radius were 0."""
+    if is_swept(node):
+        return sweep(node, q)
     match node:
         case Box():
             beyond = np.abs(q - np.array(node.center)) - 0.5 * np.array(node.size)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from blobtree import Extrude, Node, Outline, Prism, Revolve, polygonize
 from blobtree.errors import InvalidNode
-from blobtree.nodes.profiles import thin_width
+from blobtree.nodes.sections import thin_width
 from tests.blobtree.meshing.test_polygonize import assert_closed
 from tests.oracles import blobtree as oracle
 from tests.oracles import sharp

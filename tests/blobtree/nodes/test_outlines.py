@@ -15,6 +15,7 @@ from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
 from blobtree import Extrude, Outline, content_hash, from_json, to_json
 from blobtree.errors import ImplicitDecalsError, InvalidFile, InvalidNode, MissingFile
+from tests.oracles import sharp
 
 FONT = Path(matplotlib.get_data_path(), "fonts", "ttf", "DejaVuSans.ttf")
 PIXELS = 600
@@ -45,10 +46,10 @@ def assert_same_picture(outline: Outline, picture: Image.Image, top: float) -> N
     assert outline.area * PIXELS**2 == pytest.approx(area, rel=3e-3)
 
 
-@pytest.mark.parametrize("letters", ["A", "g", "&", "8", "\u00e4", "%"])
+@pytest.mark.parametrize("letters", ["A", "g", "&", "8", "\u00e4", "%", "\u00e7", "\u0105", "YY"])
 def test_letters_are_those_of_a_rasteriser(letters: str) -> None:
     font = ImageFont.truetype(str(FONT), PIXELS, layout_engine=ImageFont.Layout.BASIC)
-    picture = Image.new("L", (PIXELS, 2 * PIXELS))
+    picture = Image.new("L", (len(letters) * PIXELS, 2 * PIXELS))
     ImageDraw.Draw(picture).text((0, PIXELS), letters, fill=255, font=font, anchor="ls")
     assert_same_picture(Outline.text(letters), picture, top=1.0)
 
@@ -92,6 +93,72 @@ def test_a_file_is_its_text(tmp_path: Path) -> None:
     assert Outline.svg(tmp_path / "square.svg") == Outline.svg(text)
     assert Outline.svg("\ufeff\r\n" + text) == Outline.svg(text)
     assert Outline.svg(text).bounds == ((0.0, -1.0), (1.0, 0.0))
+
+
+def test_shapes_that_overlap_are_those_of_a_rasteriser() -> None:
+    drawing = """<svg xmlns="http://www.w3.org/2000/svg">
+      <circle cx=".6" cy=".6" r=".4"/><rect x=".5" y=".5" width=".9" height=".3"/>
+      <ellipse cx="1.4" cy=".7" rx=".3" ry=".5"/><path d="M.2 1.2 1 1.8V1.2L.2 1.8Z"/>
+      <path fill-rule="evenodd" d="M1.2 1.2H1.8V1.8H1.2ZM1.4 1.4H2V1.6H1.4Z"/></svg>"""
+    much = 8
+    picture = Image.new("L", (2 * PIXELS * much, 2 * PIXELS * much))
+    draw, one = ImageDraw.Draw(picture), PIXELS * much
+    draw.ellipse((0.2 * one, 0.2 * one, one - 1, one - 1), fill=255)
+    draw.rectangle((0.5 * one, 0.5 * one, 1.4 * one - 1, 0.8 * one - 1), fill=255)
+    draw.ellipse((1.1 * one, 0.2 * one, 1.7 * one - 1, 1.2 * one - 1), fill=255)
+    for side in (0.2, 1.0):
+        draw.polygon([(side * one, 1.2 * one), (0.6 * one, 1.5 * one), (side * one, 1.8 * one)], fill=255)
+    draw.rectangle((1.2 * one, 1.2 * one, 1.8 * one - 1, 1.8 * one - 1), fill=255)
+    draw.rectangle((1.4 * one, 1.4 * one, 2.0 * one - 1, 1.6 * one - 1), fill=255)
+    draw.rectangle((1.4 * one, 1.4 * one, 1.8 * one - 1, 1.6 * one - 1), fill=0)
+    coverage = picture.resize((2 * PIXELS, 2 * PIXELS), Image.Resampling.BOX)
+    assert_same_picture(Outline.svg(drawing), coverage, top=0.0)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_unions_hold_what_has_a_winding_number(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rule, number = str(rng.choice(["nonzero", "evenodd"])), int(rng.integers(2, 9))
+    corners = rng.uniform(0.0, 1.0, (number, 5, 2)).round(int(rng.choice([1, 9])))
+    paths = ["M" + " ".join(f"{x} {y}" for x, y in polygon) + "Z" for polygon in corners.tolist()]
+    outline = Outline.svg(f'<svg><path d="{" ".join(paths)}"/></svg>', rule=rule)
+    p = rng.uniform(0.0, 1.0, (2000, 2))
+    starts, ends = corners, np.roll(corners, -1, axis=1)
+    a, b = starts.reshape(-1, 1, 2), ends.reshape(-1, 1, 2)
+    (x, y), (u, v) = (np.moveaxis(way, -1, 0) for way in (b - a, p - a))
+    left = x * v - y * u
+    rises = ((a[..., 1] <= p[:, 1]) & (b[..., 1] > p[:, 1]) & (left > 0)).sum(axis=0)
+    falls = ((b[..., 1] <= p[:, 1]) & (a[..., 1] > p[:, 1]) & (left < 0)).sum(axis=0)
+    windings = rises - falls
+    filled = windings % 2 == 1 if rule == "evenodd" else windings != 0
+    flat = sharp.flat_distance(p * (1.0, -1.0), outline)
+    clear = np.abs(flat) > 1e-5
+    assert ((flat < 0.0) == filled)[clear].all()
+    assert clear.mean() > 0.99
+
+
+@pytest.mark.parametrize(
+    ("outline", "area", "loops"),
+    [
+        (Outline(SQUARE) | Outline("M1 0H2V1H1Z"), 2.0, 1),
+        (Outline(SQUARE) | Outline("M1 1H2V2H1Z"), 2.0, 2),
+        (Outline(SQUARE) | Outline(SQUARE), 1.0, 1),
+        (Outline(SQUARE) | Outline("M.5 .5H.75V.75H.5Z"), 1.0, 1),
+        (Outline.svg('<svg><path d="M0 0L2 2V0L0 2Z"/></svg>'), 2.0, 2),
+        (Outline.text("TT", size=2048.0), 2.0 * Outline.text("T", size=2048.0).area - 12.0 * 170.0, 1),
+        (Outline.svg(OVERLAPPING), 4.0 * np.pi + 0.4 * 5.0 - 0.4 * 2.0, 1),
+    ],
+)
+def test_unions(outline: Outline, area: float, loops: int) -> None:
+    assert outline.area == pytest.approx(area, rel=1e-3)
+    assert len(outline.loops) == loops
+
+
+def test_curves_of_unions_stay_curves() -> None:
+    discs = Outline.arcs([(-1, 0), (1, 0)], 1) | Outline.arcs([(0, 0), (2, 0)], 1)
+    assert discs.area == pytest.approx(4.0 / 3.0 * np.pi + 0.5 * np.sqrt(3.0), rel=1e-3)
+    assert "C" in discs.path
+    assert discs.loops[0].corners.sum() == 2
 
 
 def test_many_nested_loops_are_holes_in_turn() -> None:
@@ -192,7 +259,7 @@ def test_the_shape_lies_on_the_left() -> None:
         (lambda: Outline("M0 0A1 1 0"), "path: expected one without errors, got"),
         (lambda: Outline("M0 0H1e999V1Z"), "expected finite coordinates"),
         (lambda: Outline("M0 0L2 2V0L0 2Z"), r"got edges that meet near \("),
-        (lambda: Outline("M0 0H2V2H0ZM1 1H3V3H1Z"), "unite shapes that overlap"),
+        (lambda: Outline("M0 0H2V2H0ZM1 1H3V3H1Z"), r"unite outlines that overlap by a \| b"),
         (lambda: Outline("M0 0H2V2H0ZM0 0L1 .5 .5 1Z"), "neither cross nor touch"),
         (lambda: Outline.polygon([(0, 0, 0), (1, 0, 0), (0, 1, 0)]), "points: expected points of two finite"),
         (lambda: Outline.polygon([(0, 0), (np.nan, 0), (0, 1)]), "points: expected points of two finite"),
@@ -211,7 +278,6 @@ def test_the_shape_lies_on_the_left() -> None:
         (lambda: Outline.svg("<svg/>", rule=np.zeros(2)), "rule: expected 'nonzero', 'evenodd' or None"),  # type: ignore[arg-type]
         (lambda: Outline.svg("<svg><circle/></svg>"), "expected a shape with an area"),
         (lambda: Outline.svg('<svg><path d="M0 0Z"/></svg>'), "expected a shape with an area"),
-        (lambda: Outline.svg(OVERLAPPING), "unite shapes that overlap"),
         (
             lambda: Outline.svg(RECTANGLE.format("1mm")),
             "cannot read width='1mm' of a rect; use numbers without",
@@ -230,6 +296,11 @@ def test_the_shape_lies_on_the_left() -> None:
 def test_wrong_outlines_are_refused(make: Callable[[], Any], message: str) -> None:
     with pytest.raises(InvalidNode, match=message):
         make()
+
+
+def test_only_outlines_are_united() -> None:
+    with pytest.raises(TypeError, match="unsupported operand"):
+        Outline(SQUARE) | SQUARE  # type: ignore[operator]
 
 
 @pytest.mark.parametrize("other", [SQUARE, None])

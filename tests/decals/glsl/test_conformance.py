@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from blobtree import Box, Cone, Cylinder, Extrude, Node, Outline, Prism, Revolve
+from blobtree import Box, Cone, Cylinder, Extrude, Node, Outline, Prism, Revolve, Sweep
 from blobtree.conformance.samples import Rng
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.tape.instruction_set import library
@@ -53,6 +53,10 @@ SOLIDS: list[Node] = [
     Extrude(Outline.text("B&"), 0.3, top_turn=20.0),
     Revolve("M0 0H1L.5 1H0Z"),
     Revolve("M.5 0H1V1Z", 200.0),
+    Extrude("M0 0H1V1Z", 0.3),
+    Sweep("M-.2-.1H.2V.1Z", ((0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1))),
+    Sweep("M-.2-.1H.2V.1Z", ((0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1)), corners="smooth", end_turn=90.0),
+    Sweep("M-.2-.1H.2V.1Z", ((1, 0, 0), (0, 1, 0), (-1, 0, 0)), corners="smooth", ends="closed"),
 ]
 
 
