@@ -286,6 +286,10 @@ def call_table() -> Calls:
             blobtree.Outline.svg,
             {"drawing": '<svg><rect width="2" height="1"/></svg>', "rule": "evenodd"},
         ),
+        "Outline.__or__": (
+            lambda one, other: blobtree.Outline(one) | blobtree.Outline(other),
+            {"one": "M0 0H2V2H0Z", "other": "M1 1H3V3H1Z"},
+        ),
         "Outline.text": (blobtree.Outline.text, {"text": "ab", "size": 2.0}),
         "reproduce": (decals.reproduce, {"scene": covered}),
         "save_html": (

@@ -183,9 +183,8 @@ class Outline(msgspec.Struct, frozen=True, dict=True):
 
         Lengths are those of the file, whatever its size on a page is. Transforms count. Strokes, clips,
         texts, style sheets and copies (`use`) are left out. Each shape is filled by its `fill-rule`, and all
-        shapes are united. A `rule`
-        fills all of them as one shape instead: `"nonzero"`, or `"evenodd"`, by which shapes inside others
-        are holes.
+        shapes are united. A `rule` fills all of them as one shape instead: `"nonzero"`, or `"evenodd"`, by
+        which shapes inside others are holes.
 
         Examples
         --------
@@ -609,7 +608,7 @@ def _united(owned: Sequence[tuple[Sequence[Curve], tuple[int, str]]]) -> list[Se
     chords = [_chords(curve, TOLERANCE * size) for curve in curves]
     parts, lines = united(curves, chords, shapes, rules)
     polygons = [polygon.points for polygon in _polygons(parts) if polygon]
-    return [*(lines if _meeting(polygons) else parts)]
+    return [*(lines if polygons and _meeting(polygons) else parts)]
 
 
 def _checked_outline(name: str, value: Any) -> Outline:

@@ -62,6 +62,9 @@ PLATE_MARGIN = wp.constant(BALL_CELLS / PLATE_CELLS)
 MOST_BENT = 0.98
 """Reach of the section toward the centre of an arc, over the radius of the arc, at most."""
 
+ARC_STEP = math.radians(5.0)
+"""Largest angle between places of an arc at which its box is measured."""
+
 Ends = Annotated[str, Parameter(Quantity.CHOICE, "an open curve or a closed one", choices=("open", "closed"))]
 Corners = Annotated[
     str,
@@ -528,16 +531,18 @@ def _span_texels(leaf: _SweptSolid) -> Float64Array:
 def _box(leaf: Any) -> Float64Array:
     """Return the lower and the upper corner (2, 3) of a box around a sweep."""
     spans, turn = leaf.course
-    reach, places, done = reach_of(leaf.outline), list[Float64Array](), 0.0
+    reach, corners, done = reach_of(leaf.outline), list[Float64Array](), 0.0
     points = np.concatenate([loop.points for loop in leaf.outline.loops])
+    growth = (leaf.end_scale - 1.0) / leaf.length
     for span in spans:
+        places = list[Float64Array]()
         beside = np.cross(span.tangent, span.inward)
-        steps = max(math.ceil(span.curvature * span.length / math.radians(5.0)), 1)
+        r = 1.0 / span.curvature if span.curvature else 0.0
+        steps = max(math.ceil(span.curvature * span.length / ARC_STEP), 1)
         for t in np.arange(steps + 1) / steps:
-            scale = 1.0 + (leaf.end_scale - 1.0) * (done + t * span.length) / leaf.length
+            scale = 1.0 + growth * (done + t * span.length)
             angle = span.curvature * span.length * t
             c, s = math.cos(angle), math.sin(angle)
-            r = 1.0 / span.curvature if span.curvature else 0.0
             lead = r * s if span.curvature else t * span.length
             center = span.start + lead * span.tangent + r * (1.0 - c) * span.inward
             inward, along = c * span.inward - s * span.tangent, c * span.tangent + s * span.inward
@@ -548,16 +553,18 @@ def _box(leaf: Any) -> Float64Array:
                 places.append(center + scale * (points[:, :1] * u + points[:, 1:] * v))
             else:
                 places.append(np.array([center - across, center + across]))
-            if any(span.corners) and 0.0 in (t, 1.0 - t):
+            if any(span.corners) and t in (0.0, 1.0):
                 plane = span.end_plane if t else span.start_plane
                 lean = np.linalg.norm(plane - (plane @ along) * along) / (plane @ along)
                 places.append(center + np.outer([-1.0, 1.0], across + lean * reach * np.abs(along)))
         done += span.length
+        bulge = 0.0
         if span.curvature:
-            bulge = (r + scale * reach) * (1.0 - math.cos(0.5 * math.radians(5.0)))
-            places += [places[-1] - bulge, places[-1] + bulge]
-    everything = np.concatenate(places)
-    return np.array([everything.min(axis=0), everything.max(axis=0)])
+            bent = r + reach * (max(1.0, leaf.end_scale) + 2.0 * abs(growth) * r)
+            bulge = 0.125 * ARC_STEP**2 * bent
+        everything = np.concatenate(places)
+        corners += [everything.min(axis=0) - bulge, everything.max(axis=0) + bulge]
+    return np.array([np.min(corners, axis=0), np.max(corners, axis=0)])
 
 
 def _check_room(leaf: _SweptSolid) -> None:
@@ -647,7 +654,7 @@ class Sweep(Pieces):
         if changes and any(any(span.corners) for span in spans):
             raise InvalidNode(
                 "corners: expected 'smooth' for a curve along which the outline grows or turns, got 'sharp'; "
-                "sharp closed curves must lie in a plane"
+                "sharp closed curves must bring the outline back unturned"
             )
         if self.ends == "closed":
             if self.end_scale != 1.0:

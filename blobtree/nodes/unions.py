@@ -31,6 +31,7 @@ RETREAT = 16.0
 """Steps by which corners that touch move apart, at most."""
 
 CHUNK = 256
+"""Chords that are tried against all others at a time, so that memory suffices."""
 
 Curve = Float64Array
 

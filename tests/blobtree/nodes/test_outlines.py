@@ -23,6 +23,7 @@ PIXELS = 600
 
 SQUARE = "M0 0H1V1H0Z"
 OVERLAPPING = '<svg><circle r="2"/><rect x="0" y="-.2" width="5" height=".4"/></svg>'
+TWICE = 2 * '<rect width="1" height="1"/>'
 RECTANGLE = '<svg xmlns="http://www.w3.org/2000/svg"><rect width="{}" height="1"/></svg>'
 
 
@@ -278,6 +279,10 @@ def test_the_shape_lies_on_the_left() -> None:
         (lambda: Outline.svg("<svg/>", rule=np.zeros(2)), "rule: expected 'nonzero', 'evenodd' or None"),  # type: ignore[arg-type]
         (lambda: Outline.svg("<svg><circle/></svg>"), "expected a shape with an area"),
         (lambda: Outline.svg('<svg><path d="M0 0Z"/></svg>'), "expected a shape with an area"),
+        (
+            lambda: Outline.svg(f"<svg>{TWICE}</svg>", rule="evenodd"),
+            "expected a shape with an area, got none",
+        ),
         (
             lambda: Outline.svg(RECTANGLE.format("1mm")),
             "cannot read width='1mm' of a rect; use numbers without",

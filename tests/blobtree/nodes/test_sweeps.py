@@ -105,6 +105,17 @@ def test_three_points_lead_to_their_circle() -> None:
     assert missing == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("end_scale", "end_turn", "reach"), [(1.0, 0.0, 0.2), (1.0, 90.0, 0.2), (3.0, 0.0, 0.4)]
+)
+def test_boxes_hold_the_middle_of_an_arc(end_scale: float, end_turn: float, reach: float) -> None:
+    angles = np.radians([-63.5, 19.0, 101.5])
+    points = np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles]).tolist()
+    disc = Outline.arcs([(-0.2, 0), (0.2, 0)], 1)
+    solid = Sweep(disc, points, corners="smooth", width=1e-4, end_scale=end_scale, end_turn=end_turn)
+    assert solid.support[1][1] >= 1.0 + reach
+
+
 @pytest.mark.parametrize("closed", [False, True])
 def test_smooth_courses_have_no_corners_and_pass_their_points(closed: bool) -> None:
     points = np.random.default_rng(4).uniform(-1, 1, (9, 3))
@@ -154,7 +165,7 @@ def test_an_upright_sweep_is_an_extrusion() -> None:
             "bends too tightly near",
         ),
         (lambda: Sweep(BAR, STAIR, end_turn=20.0), "corners: expected 'smooth'"),
-        (lambda: Sweep(BAR, STAIR, ends="closed"), "must lie in a plane"),
+        (lambda: Sweep(BAR, STAIR, ends="closed"), "must bring the outline back unturned"),
         (lambda: Sweep(BAR, SQUARE, ends="closed", end_scale=2.0, corners="smooth"), "end_scale: expected 1"),
         (lambda: Sweep(BAR, SQUARE, ends="closed", end_turn=90.0, corners="smooth"), "end_turn: expected a"),
         (lambda: Sweep(BAR, STAIR, corners="round"), "corners: expected 'sharp' or 'smooth', got 'round'"),
