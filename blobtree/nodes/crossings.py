@@ -8,6 +8,7 @@ try neighbours, and n corners take time in proportion to n log n.
 from bisect import bisect_left
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -72,6 +73,17 @@ def meeting_edges(points: Float64Array, counts: Sequence[int] = ()) -> tuple[int
             if found := meeting(place) or meeting(place + 1):
                 return found
     return None
+
+
+def cross_products(a: Any, b: Any) -> Any:
+    """Return the cross products of vectors (…, 2) in the plane."""
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def area_of(points: Any) -> float:
+    """Return the area of a polygon, below 0 for a clockwise one."""
+    spokes = points - points[0]
+    return 0.5 * float(cross_products(spokes, np.roll(spokes, -1, axis=0)).sum())
 
 
 def _place(status: list[int], edge: int, near: int) -> int:

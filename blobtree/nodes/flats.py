@@ -16,7 +16,7 @@ from blobtree.declare.skeleton import PLATE_CELLS
 from blobtree.errors import InvalidNode
 from blobtree.formulas.skeletons import JOINT_YIELD, least_influence_at_joints
 from blobtree.lazy import Lazy
-from blobtree.nodes.crossings import meeting_edges
+from blobtree.nodes.crossings import cross_products, meeting_edges
 from blobtree.nodes.node import Node
 from blobtree.nodes.pieces import Pieces
 from blobtree.nodes.primitives import Columns, JoinedPrimitive, Primitive, beside
@@ -296,15 +296,9 @@ def _in_plane(points: Float64Array) -> Float64Array:
             "split the polygon into triangles"
         )
     flat: Float64Array = centered @ axes[:2].T
-    if _cross(flat, np.roll(flat, -1, axis=0)).sum() < 0.0:
+    if cross_products(flat, np.roll(flat, -1, axis=0)).sum() < 0.0:
         flat[:, 1] *= -1.0
     return flat
-
-
-def _cross(a: Float64Array, b: Float64Array) -> Float64Array:
-    """Return the cross products of vectors in the plane."""
-    result: Float64Array = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    return result
 
 
 def _ears(points: Float64Array) -> list[tuple[int, int, int]]:
@@ -323,7 +317,7 @@ def _ear(points: Float64Array, left: list[int]) -> tuple[int, bool]:
     """Return a corner to cut off a polygon: one on a line (then True), or else the roundest ear."""
     corners = points[left]
     before, after = np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0)
-    turns = _cross(corners - before, after - corners)
+    turns = cross_products(corners - before, after - corners)
     edges = [np.linalg.norm(a - b, axis=1) for a, b in ((corners, before), (after, corners), (before, after))]
     roundness = turns / np.maximum(np.max(edges, axis=0) ** 2, 1e-300)
     flat = np.abs(roundness) <= 2.0 * SMALLEST_SINE
@@ -331,8 +325,8 @@ def _ear(points: Float64Array, left: list[int]) -> tuple[int, bool]:
         return int(flat.argmax()), True
     for place in np.argsort(-roundness.round(3), kind="stable"):  # rounding chooses no ear among equal ones
         a, b, c = before[place], corners[place], after[place]
-        inside = (_cross(b - a, corners - a) >= 0.0) & (_cross(c - b, corners - b) >= 0.0)
-        inside &= _cross(a - c, corners - c) >= 0.0
+        inside = (cross_products(b - a, corners - a) >= 0.0) & (cross_products(c - b, corners - b) >= 0.0)
+        inside &= cross_products(a - c, corners - c) >= 0.0
         inside &= (corners != a).any(axis=1) & (corners != b).any(axis=1) & (corners != c).any(axis=1)
         if not inside.any():
             return int(place), False

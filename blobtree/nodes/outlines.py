@@ -26,7 +26,7 @@ from blobtree.declare.parameters import CHECKS, Parameter, Quantity
 from blobtree.errors import ImplicitDecalsError, InvalidNode, UnusableFile
 from blobtree.identity import content_hash
 from blobtree.lazy import Lazy
-from blobtree.nodes.crossings import meeting_edges
+from blobtree.nodes.crossings import area_of, cross_products, meeting_edges
 from blobtree.nodes.drawings import filled_shapes
 from blobtree.nodes.unions import united
 from blobtree.validation import LARGEST_NUMBER, LIMIT, describe, positive_number
@@ -284,14 +284,18 @@ class Outline(msgspec.Struct, frozen=True, dict=True):
     @property
     def area(self) -> float:
         """The area of the shape, without its holes."""
-        return float(sum(_area(loop.points) for loop in self.loops))
+        return float(sum(area_of(loop.points) for loop in self.loops))
 
     @property
     def bounds(self) -> tuple[Plane, Plane]:
         """The lower and the upper corner of the box around the shape."""
-        points = np.concatenate([loop.points for loop in self.loops])
-        (x, y), (to_x, to_y) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+        (x, y), (to_x, to_y) = self.points.min(axis=0).tolist(), self.points.max(axis=0).tolist()
         return (x, y), (to_x, to_y)
+
+    @property
+    def points(self) -> Float64Array:
+        """The vertices (n, 2) of the polygons of all loops."""
+        return np.concatenate([loop.points for loop in self.loops])
 
     @property
     def _curves(self) -> list[list[Curve]]:
@@ -462,12 +466,6 @@ def _text(points: Float64Array) -> str:
     return " ".join(map(repr, points.ravel().tolist()))
 
 
-def _area(points: Float64Array) -> float:
-    """Return the area of a polygon, below 0 for a clockwise one."""
-    x, y = (points - points[0]).T
-    return 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
-
-
 def _polygons(loops: Sequence[Sequence[Curve]]) -> list[Loop | None]:
     """Return the polygon of each loop, None for one without an area."""
     everything = [curve for loop in loops for curve in loop]
@@ -502,7 +500,7 @@ def _polygon(loop: Sequence[Curve], size: float) -> Loop | None:
         return None
     ways = np.roll(points, -1, axis=0) - points
     before = np.roll(ways, 1, axis=0)
-    turns = np.abs(np.arctan2(_cross(before, ways), (before * ways).sum(axis=1)))
+    turns = np.abs(np.arctan2(cross_products(before, ways), (before * ways).sum(axis=1)))
     return Loop(points, joints & (turns > np.where(curved | np.roll(curved, 1), CORNER, STRAIGHT)))
 
 
@@ -515,7 +513,7 @@ def _chords(curve: Curve, tolerance: float) -> Float64Array:
     legs = legs[np.abs(legs).max(axis=1) > 0.0]
     if not len(legs):
         return curve[:1]
-    turn = np.abs(np.arctan2(_cross(legs[:-1], legs[1:]), (legs[:-1] * legs[1:]).sum(axis=1))).sum()
+    turn = np.abs(np.arctan2(cross_products(legs[:-1], legs[1:]), (legs[:-1] * legs[1:]).sum(axis=1))).sum()
     bend = degree * (degree - 1) * np.linalg.norm(np.diff(curve, 2, axis=0), axis=1).max()
     count = max(math.ceil(turn / LARGEST_TURN), math.ceil(math.sqrt(bend / (8.0 * tolerance))), 1)
     t = np.arange(min(count, MOST_CORNERS + 1))[:, None] / count
@@ -523,12 +521,6 @@ def _chords(curve: Curve, tolerance: float) -> Float64Array:
     while levels.shape[1] > 1:  # de Casteljau's
         levels = levels[:, :-1] + t[:, :, None] * np.diff(levels, axis=1)
     return levels[:, 0]
-
-
-def _cross(a: Float64Array, b: Float64Array) -> Float64Array:
-    """Return the cross products of vectors in the plane."""
-    result: Float64Array = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    return result
 
 
 def _check_apart(polygons: Sequence[Float64Array]) -> None:
@@ -564,7 +556,7 @@ def _inside_others(polygons: Sequence[Float64Array]) -> Iterator[list[int]]:
 
 def _directed(loop: Loop, *, hole: bool) -> Loop:
     """Return a loop with the shape on its left, which starts at a corner if it has one."""
-    step = 1 if (_area(loop.points) < 0.0) == hole else -1
+    step = 1 if (area_of(loop.points) < 0.0) == hole else -1
     points, corners = loop.points[::step], loop.corners[::step]
     first = int(corners.argmax())
     return Loop(np.roll(points, -first, axis=0), np.roll(corners, -first))
@@ -580,7 +572,7 @@ def _filling(shapes: Iterable[tuple[Sequence[Sequence[Curve]], str]]) -> list[Se
     points = [points for *_, points in known]
     if _meeting(points):
         return _united([(loop, own) for loop, own, _ in known])
-    ways = [1 if _area(polygon) > 0.0 else -1 for polygon in points]
+    ways = [1 if area_of(polygon) > 0.0 else -1 for polygon in points]
 
     def filled(around: Iterable[int]) -> bool:
         """Return True if a shape fills the places that are inside these loops alone."""

@@ -232,7 +232,7 @@ def outline_texels(outline: Outline, around: bool = False) -> Float64Array:
     Edges on that axis bound nothing: they are left out, and the normals at their ends lie along the axis.
     """
     counts = [len(loop.points) for loop in outline.loops]
-    starts = np.concatenate([loop.points for loop in outline.loops])
+    starts = outline.points
     ends = np.concatenate([np.roll(loop.points, -1, axis=0) for loop in outline.loops])
     numbers = np.arange(len(starts))
     loops = np.split(numbers, np.cumsum(counts)[:-1])
@@ -304,7 +304,7 @@ def thin_width(outline: Outline) -> float:
 
     It is measured at even distances along the outline: inward, to the next edge.
     """
-    starts = np.concatenate([loop.points for loop in outline.loops])
+    starts = outline.points
     ways = np.concatenate([np.roll(loop.points, -1, axis=0) - loop.points for loop in outline.loops])
     lengths = np.linalg.norm(ways, axis=1)
     units = ways / lengths[:, None]

@@ -485,7 +485,7 @@ class _SweptSolid(SectionSolid):
 
 def reach_of(outline: Outline) -> float:
     """Return the largest distance of an outline from its origin."""
-    return float(max(np.linalg.norm(loop.points, axis=1).max() for loop in outline.loops))
+    return float(np.linalg.norm(outline.points, axis=1).max())
 
 
 def wall_of(outline: Outline) -> float:
@@ -532,7 +532,7 @@ def _box(leaf: Any) -> Float64Array:
     """Return the lower and the upper corner (2, 3) of a box around a sweep."""
     spans, turn = leaf.course
     reach, corners, done = reach_of(leaf.outline), list[Float64Array](), 0.0
-    points = np.concatenate([loop.points for loop in leaf.outline.loops])
+    points = leaf.outline.points
     growth = (leaf.end_scale - 1.0) / leaf.length
     for span in spans:
         places = list[Float64Array]()
@@ -570,7 +570,7 @@ def _box(leaf: Any) -> Float64Array:
 def _check_room(leaf: _SweptSolid) -> None:
     """Raise `InvalidNode` where sections of neighbouring places of the course would cross."""
     spans, turn = leaf.course
-    points = np.concatenate([loop.points for loop in leaf.outline.loops]) * max(1.0, leaf.end_scale)
+    points = leaf.outline.points * max(1.0, leaf.end_scale)
     for span in spans:
         c, s = math.cos(span.frame), math.sin(span.frame)
         toward = c * points[:, 0] - s * points[:, 1]
@@ -687,7 +687,7 @@ class Sweep(Pieces):
 
 def _is_turned_to_itself(outline: Outline, angle: float) -> bool:
     """Return True if a turn maps the corners of an outline to its corners."""
-    points = np.concatenate([loop.points for loop in outline.loops])
+    points = outline.points
     turned = (points[:, 0] + 1j * points[:, 1]) * np.exp(1j * angle)
     nearest = [np.abs(points[:, 0] + 1j * points[:, 1] - place).min() for place in turned]
     return max(nearest) <= 1e-4 * reach_of(outline)

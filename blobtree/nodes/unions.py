@@ -14,6 +14,7 @@ import numpy as np
 
 from blobtree._typing import Float64Array, IndexArray
 from blobtree.errors import InvalidNode
+from blobtree.nodes.crossings import area_of, cross_products
 
 GRID = 1 << 24
 """Steps of the grid along the larger side of the shapes' box."""
@@ -130,7 +131,8 @@ def _crossings(chords: Chords, one: IndexArray, other: IndexArray) -> list[tuple
     """Return where pairs of chords cross, and where ends of the others lie on the first ones."""
     a, b = chords.start[one], chords.end[one]
     c, d = chords.start[other], chords.end[other]
-    of_c, of_d, of_a, of_b = _cross(a, b, c), _cross(a, b, d), _cross(c, d, a), _cross(c, d, b)
+    of_c, of_d = cross_products(b - a, c - a), cross_products(b - a, d - a)
+    of_a, of_b = cross_products(d - c, a - c), cross_products(d - c, b - c)
     crosses = (np.sign(of_c) * np.sign(of_d) < 0) & (np.sign(of_a) * np.sign(of_b) < 0)
     share = of_a[crosses] / (of_a - of_b)[crosses]
     places = np.rint(a[crosses] + share[:, None] * (b - a)[crosses]).astype(np.int64)
@@ -147,13 +149,6 @@ def _crossings(chords: Chords, one: IndexArray, other: IndexArray) -> list[tuple
             ((places != chords.start[owners]).any(axis=1)) & (places != chords.end[owners]).any(axis=1)
         ]
     ]
-
-
-def _cross(a: IndexArray, b: IndexArray, c: IndexArray) -> IndexArray:
-    """Return the cross products of the ways from a to b and to c."""
-    (x, y), (u, v) = (b - a).T, (c - a).T
-    result: IndexArray = x * v - y * u
-    return result
 
 
 def _border(chords: Chords, shapes: IndexArray, even_odd: IndexArray) -> Chords:
@@ -245,11 +240,8 @@ def _loops(border: Chords) -> list[IndexArray]:
 
 def _is_thick(corners: IndexArray) -> bool:
     """Return True for a loop that encloses more than rounding errors."""
-    around = np.roll(corners, -1, axis=0)
-    x, y = (corners - corners[0]).T.astype(np.float64)
-    to_x, to_y = (around - corners[0]).T
-    area = 0.5 * abs(float((x * to_y - to_x * y).sum()))
-    return area > THINNEST * float(np.linalg.norm(around - corners, axis=1).sum())
+    length = float(np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1).sum())
+    return abs(area_of(corners)) > THINNEST * length
 
 
 def _apart(loops: Sequence[IndexArray]) -> list[Float64Array]:
