@@ -301,17 +301,10 @@ def test_the_pair_energy_of_the_page_is_that_of_a_relaxation() -> None:
     positions = relaxation.positions.astype(np.float64)
     i, j = np.triu_indices(len(positions), 1)
     x = np.linalg.norm(positions[i] - positions[j], axis=1) / relaxation.spacing
-    exponent, cutoff, closest = 2 + 1 / 150, 2.0, 0.6
-
-    def slope(distance: Array) -> Array:
-        result: Array = -exponent * distance ** (-exponent - 1) + exponent * cutoff ** (-exponent - 1)
-        return result
-
+    cutoff, closest = 2.0, 0.6
     clamped = np.maximum(x, closest)
-    values = (
-        clamped**-exponent - cutoff**-exponent + exponent * cutoff ** (-exponent - 1) * (clamped - cutoff)
-    )
-    values -= (clamped - x) * slope(clamped)
+    values = clamped**-2 - cutoff**-2 + 2 * cutoff**-3 * (clamped - cutoff)
+    values += (clamped - x) * 2 * (clamped**-3 - cutoff**-3)
     assert relaxation.energy == pytest.approx(values[x < cutoff].sum(), rel=1e-5)
 
 
