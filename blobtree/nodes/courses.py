@@ -181,9 +181,10 @@ def _framed(curves: list[Curve], up: Float64Array, closed: bool) -> tuple[list[S
         spans.append(Span(start, tangent, inward, curvature, length, end, end_tangent, frame, *planes))
         u = _turned(u, tangent, inward, turn)
         before = end_tangent
+    if not closed:
+        return spans, 0.0
     u = _least_turn(u, before, first)
-    missing = math.atan2(np.cross(u, begun) @ first, u @ begun) if closed else 0.0
-    return spans, missing
+    return spans, math.atan2(np.cross(u, begun) @ first, u @ begun)
 
 
 def _turned(way: Float64Array, tangent: Float64Array, inward: Float64Array, angle: float) -> Float64Array:

@@ -534,7 +534,7 @@ class Expression(Pieces):
     >>> text = ["x var-x", "y var-y", "r hypot x y", "one const 1", "tube sub r one"]
     >>> tube = Expression(text, (0, 0, 0), (4, 4, 2))
     >>> tube([[1, 0, 0], [0, 0, 1], [0, 0, 0.9]]).astype(float).round(3).tolist()
-    [0.5, 0.5, 0.644]
+    [0.5, 0.5, 0.654]
     """
 
     file_tag = "expression"

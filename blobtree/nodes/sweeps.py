@@ -628,8 +628,8 @@ class Sweep(Pieces):
     --------
     >>> from blobtree import Sweep
     >>> rail = Sweep("M-.1-.2H.1V.2H-.1Z", [(0, 0, 0), (2, 0, 0), (2, 2, 0)])
-    >>> rail([[1, 0, 0.2], [2.1, 1, 0], [2.05, -0.05, 0]]).round(3).tolist()
-    [0.5, 0.5, 0.874]
+    >>> rail([[1, 0, 0.2], [2.1, 1, 0], [2.05, -0.05, 0]]).astype(float).round(3).tolist()
+    [0.5, 0.5, 0.777]
     """
 
     file_tag = "sweep"

@@ -115,8 +115,8 @@ class ParticleState:
 
     @property
     def energy(self) -> float:
-        """Energy of all pairs together, by the law and the lists of this epoch."""
-        return float(self._accepted_energy.numpy()[0])
+        """Energy of all pairs together, by the law and the lists of this epoch; 0 after moves from outside."""
+        return float(self._accepted_energy.numpy()[0]) if self._listed else 0.0
 
     @property
     def epoch_over(self) -> bool:

@@ -231,7 +231,10 @@ class Relaxation:
 
     @property
     def energy(self) -> float:
-        """Energy of all pairs together, in square spacings; it never rises within an `epoch`."""
+        """Energy of all pairs together, in square spacings; it never rises within an `epoch`.
+
+        0 where it is not known: before the first step, and after particles were polished or moved.
+        """
         return 0.0 if self._state is None else self._state.energy / self.spacing**2
 
     @property

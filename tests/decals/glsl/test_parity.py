@@ -57,6 +57,7 @@ OF_WARP_ALONE = {
     "starts_from_zero",
     "unknown_extent",
     "warp_extent",
+    "kind_part_size",
 }
 """Functions that no shader calls."""
 
