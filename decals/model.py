@@ -137,8 +137,8 @@ class Decals(Value):
         fade at half of it. Default 0: no fade.
     single_sheets : bool[n], optional
         True if a decal keeps off other sheets of the surface, such as a plate below its own or a wall that
-        crosses it: off points above its tangent plane that it lies below the planes of, and the reverse; one
-        each, or one for all. Default False.
+        crosses it. It does not act where a point lies above its tangent plane while its centre lies below
+        the plane of the point, or the reverse. One each, or one for all. Default False.
 
     Raises
     ------
@@ -321,11 +321,18 @@ class Decals(Value):
         """True if decals can cover each other: they are not all contact decals of one layer."""
         return bool((self.interactions != Interaction.PUSH).any() or (self.layers != self.layers[:1]).any())
 
+    def _contents(self) -> Any:
+        """Return what counts; decals that reach other sheets keep the content hashes of earlier versions."""
+        contents = super()._contents()
+        if not self.single_sheets.any():
+            del contents["single_sheets"]
+        return contents
+
     @cached_property
     def limited(self) -> bool:
         """True if decals have receivers or fades, or keep to their sheets."""
-        plain = self.fade_angles, self.fade_depths, self.single_sheets
-        return bool((self.receivers != "").any() or any(values.any() for values in plain))
+        limits = self.fade_angles, self.fade_depths, self.single_sheets
+        return bool((self.receivers != "").any() or any(values.any() for values in limits))
 
     @property
     def receiver_table(self) -> list[str]:

@@ -275,7 +275,7 @@ class PointerTools:
     def forget_press(self) -> bool:
         """Forget what the press of the button has begun; return True if that was a drag, a box or a lasso."""
         dragged = self.dragging or bool(self.selection_line)
-        self.selection_line, self._drag, self._brush = [], None, None
+        self.selection_line, self._drag, self._brush, self._handle_press = [], None, None, None
         return dragged
 
     def _also_select(self, numbers: Int64Array) -> None:

@@ -260,8 +260,8 @@ class FacingTree:
 def sheet_products(offsets: Float64Array, centers: Float32Array, points: Float32Array) -> Float64Array:
     """Return products of two heights: of points over the planes of centres, and of these under the points'.
 
-    A product above 0 says that one of the two is above the other and the other is not above it: no bend of
-    one sheet has that, but two sheets have it that lie over each other or cross.
+    A product above 0 says that one of the two is above the other and the other is below it. That is so of
+    two sheets that lie over each other or cross, and of bumps of one sheet, but not of one bend.
 
     Parameters
     ----------

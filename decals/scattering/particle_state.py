@@ -26,6 +26,9 @@ from decals.surfaces.surface import Scalars, Vectors, vectors
 MAX_AGE = 12
 """Steps after which an epoch ends in any case: the law changes along the schedule."""
 
+MAX_EPOCHS_OF_LISTS = 4
+"""Epochs after which neighbours are listed anew in any case, as a few particles may have moved far."""
+
 MAX_DRIFT = 0.5 * SKIN
 """Sum of the lengths of typical moves, in spacings, after which neighbours are listed anew."""
 
@@ -50,9 +53,9 @@ class _State(NamedTuple):
 class ParticleState:
     """Particles that repel each other, on one device.
 
-    An epoch lasts as long as the neighbour lists, the spacings and the law of repulsion stay the same. Within
-    it the total energy never rises: a step that would raise it is rejected, and the particles whose energy
-    rose halve their next step (backtracking, particle by particle).
+    An epoch lasts as long as the spacings and the law of repulsion stay the same. Lists of neighbours last
+    for some epochs. Within one the total energy never rises: a step that would raise it is rejected, and the
+    particles whose energy rose halve their next step (backtracking, particle by particle).
 
     Parameters
     ----------
@@ -88,7 +91,7 @@ class ParticleState:
         self._repulsion = Repulsion(self.count, device=self.device)
         self._law = Law(0.0)
         self._steps = self._age = 0
-        self._drift = 0.0
+        self._drift, self._epochs_of_lists = 0.0, 0
         self._listed = False
         self.resize(sizes)
 
@@ -115,7 +118,7 @@ class ParticleState:
 
     @property
     def energy(self) -> float:
-        """Energy of all pairs together, by the law and the lists of this epoch; 0 after moves from outside."""
+        """Energy of all pairs together, by the law and the lists of this epoch; 0 after other moves."""
         return float(self._accepted_energy.numpy()[0]) if self._listed else 0.0
 
     @property
@@ -180,10 +183,12 @@ class ParticleState:
 
     def begin_epoch(self, law: Law) -> None:
         """Begin an epoch: list neighbours if they moved far, set the law, and evaluate the energy."""
-        if not self._listed or self._drift >= MAX_DRIFT or not wp.get_device(self.device).is_cpu:
+        drifted = self._drift >= MAX_DRIFT or self._epochs_of_lists >= MAX_EPOCHS_OF_LISTS
+        if not self._listed or drifted or not wp.get_device(self.device).is_cpu:
             self.number_sheets()
             self._repulsion.list_neighbors(self.particles, spacing=self.spacing, varied=self.varied)
-            self._drift = 0.0
+            self._drift, self._epochs_of_lists = 0.0, 0
+        self._epochs_of_lists += 1
         self._repulsion.mirrors = self.mirror_planes(
             self.particles, self.device_surface_ids, self.device_movable
         )
@@ -201,7 +206,7 @@ class ParticleState:
         self._steps += 1
         self._age += 1
         if wp.get_device(self.device).is_cpu:
-            self._drift += _typical_length(self._lengths.numpy() / self.host_sizes)
+            self._drift += _typical_length((self._lengths.numpy() / self.host_sizes)[self.movable])
 
     def _propose(self) -> None:
         """Write the next positions, on the surfaces, to the proposed state."""
@@ -247,5 +252,7 @@ class ParticleState:
 
 def _typical_length(lengths: Float32Array) -> float:
     """Return the length of the longest move, the few fastest particles aside."""
+    if not len(lengths):
+        return 0.0
     rank = int((1.0 - IGNORED_FASTEST) * (len(lengths) - 1))
     return float(np.partition(lengths, rank)[rank])

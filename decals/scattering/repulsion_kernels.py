@@ -7,8 +7,8 @@ The energy has three terms (the family began with Witkin and Heckbert 1994):
 * a ring term for each particle: the deviation of its mean distance to the six nearest neighbours from the
   mean of all particles, under Tukey's biweight.
 
-Each thread owns one particle and adds up its neighbours in the order of the hash grid, so the result does
-not depend on scheduling.
+Each thread owns one particle and adds up its neighbours in the order of its list, the nearest first, so the
+result does not depend on scheduling.
 """
 
 # mypy: disable-error-code="call-overload"
@@ -56,7 +56,7 @@ class NeighborLists:
     indices: wp.array(dtype=wp.int32)
     """Neighbours of particle i, from index ``i * capacity`` on."""
     weights: wp.array(dtype=wp.float32)
-    """Weight of each neighbour by the angle of the normals, above 0 and at most 1."""
+    """Weight of each neighbour by the angle of the normals and by their sheets, above 0 and at most 1."""
 
 
 @wp.struct
@@ -362,8 +362,9 @@ def list_neighbors(
                     end += 1
     lists.counts[i] = end - start
     for k in range(start, end):
-        cosine = wp.dot(n, particles.normals[lists.indices[k]])
-        lists.weights[k] = facing_weight(cosine, search.facing_limit)
+        j = lists.indices[k]
+        weight = facing_weight(wp.dot(n, particles.normals[j]), search.facing_limit)
+        lists.weights[k] = weight * sheet_weight(particles, i, particles, j)
 
 
 @wp.kernel

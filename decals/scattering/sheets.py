@@ -50,7 +50,7 @@ def on_single_sheets(
     offsets = samples.positions[:, None].astype(np.float64) - decals.positions[rows]
     heights = sheet_products(offsets, decals.normals[rows], samples.normals) / radii[rows] ** 2
     reached = distances <= REACH * radii[rows]
-    beyond = heights > SHEET_HEIGHT**2
+    beyond = reached & (heights > SHEET_HEIGHT**2)
     covered = (~beyond & (distances <= COVERED * radii[rows])).any(axis=1)
     keeps = np.zeros(len(decals), np.bool_)
     other = (of_decals[rows] != sheets[:, None]) & (of_decals[rows] >= 0) & (sheets[:, None] >= 0)

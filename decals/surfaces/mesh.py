@@ -38,9 +38,6 @@ MIN_FACE_QUALITY = 1e-6
 Warp's mesh queries skip the same faces.
 """
 
-BORDER_GAP = 3e-3
-"""Largest distance of the borders of two patches that are one sheet, in diagonals of the mesh."""
-
 MAX_SAMPLES = 1 << 30
 """Most points that `sample` returns."""
 
@@ -221,8 +218,7 @@ class MeshSurface(Value):
         rows, k = sides // 3, sides % 3
         ends = np.stack([corners[rows, k], corners[rows, (k + 1) % 3]], axis=1)
         parts = parts_of(self._welded[corners])
-        gap = BORDER_GAP * float(np.linalg.norm(np.subtract(*self._bounds)))
-        return sheets_of(parts, self.vertices[ends].astype(np.float64), parts[rows], gap)
+        return sheets_of(parts, self.vertices[ends].astype(np.float64), parts[rows])
 
     @Lazy
     def sheet_areas(self) -> Float64Array:

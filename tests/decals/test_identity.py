@@ -53,6 +53,12 @@ def random_decals(seed: int, count: int, images: int = 2) -> Decals:
     )
 
 
+def test_plain_decals_keep_the_hash_of_earlier_versions() -> None:
+    plain = Decals([[0, 0, 1.0]], [[0, 0, 1.0]], [[1.0, 0, 0]], [0.5])
+    assert plain.content_hash == "69072d0a73a43570a474eae7068bc6865da990b9"
+    assert plain.replace(single_sheets=True).content_hash != plain.content_hash
+
+
 def painted() -> BaseColor:
     texture = BaseTexture(PIXELS, ("repeat", "mirror"))
     rows = np.linspace(0, 1, 8).reshape(4, 2)

@@ -27,6 +27,17 @@ def test_patches_whose_borders_meet_are_one_sheet(gap: float, sheets: int) -> No
     assert len(surface.vertices) == 9**2 + 6**2
 
 
+def test_a_point_that_meets_another_plate_joins_no_sheets() -> None:
+    upper, faces = plate(z=0.1)
+    upper[0, 2] = 0.001
+    assert MeshSurface(*joined(plate(), (upper, faces))).sheets.max() == 1
+
+
+def test_gaps_follow_the_parts_not_what_lies_far_away() -> None:
+    speck = plate(x=10_000.0)[0] * (1.0, 0.001, 1.0), plate()[1]
+    assert MeshSurface(*joined(plate(), plate(z=0.5), speck)).sheets.max() == 2
+
+
 def test_parallel_plates_have_decals_of_their_own() -> None:
     plates = joined(plate(), plate(z=0.08))
     layout = decals.scatter(MeshSurface(*plates), count=80, seed=3)
