@@ -32,16 +32,16 @@ MOST_PARTS = 50_000
 """Most places at which min and max read parts; an expression with more is one part."""
 
 LARGEST_CONSTANT = 1e15
-"""Largest constant, far below the largest number of float32."""
+"""Largest constant and factor, far below the largest number of float32; 1 over it is the least factor."""
+
+LEAST_OF_LOGARITHM = 1e-18
+"""Number whose logarithm is that of smaller ones."""
 
 REGISTERS = 32
 """Registers of a part, three of which hold x, y and z."""
 
 CODE_BITS = 6
 """Bits of the code of an operation on the tape, below the output's register."""
-
-LARGEST_EXPONENT = 64
-"""Largest whole exponent that is written as products."""
 
 VARIABLES = ("var-x", "var-y", "var-z")
 
@@ -65,14 +65,18 @@ ARITIES = {
 """Number of operands, by operation."""
 
 FOLDS: dict[str, Callable[..., float]] = {
-    "neg": np.negative, "abs": np.abs, "square": np.square, "sqrt": np.sqrt, "recip": np.reciprocal,
-    "sin": np.sin, "cos": np.cos, "tan": np.tan, "asin": np.arcsin, "acos": np.arccos, "atan": np.arctan,
-    "exp": np.exp, "ln": np.log, "floor": np.floor, "ceil": np.ceil,
-    "round": lambda a: np.trunc(a + np.copysign(0.5, a)),
+    "neg": np.negative, "abs": np.abs, "square": np.square, "recip": np.reciprocal,
+    "sqrt": lambda a: np.sqrt(np.maximum(a, 0.0)), "sin": np.sin, "cos": np.cos, "tan": np.tan,
+    "asin": lambda a: np.arcsin(np.clip(a, -1.0, 1.0)), "acos": lambda a: np.arccos(np.clip(a, -1.0, 1.0)),
+    "atan": np.arctan, "exp": np.exp, "ln": lambda a: np.log(np.maximum(a, LEAST_OF_LOGARITHM)),
+    "floor": np.floor, "ceil": np.ceil, "round": lambda a: np.trunc(a + np.copysign(0.5, a)),
     "add": np.add, "sub": np.subtract, "mul": np.multiply, "div": np.divide, "min": np.minimum,
     "max": np.maximum, "hypot": np.hypot, "atan2": np.arctan2, "mod": lambda a, b: np.mod(a, np.abs(b)),
-    "compare": lambda a, b: np.sign(a - b), "pow": np.power,
-    "nth-root": lambda a, n: np.copysign(np.abs(a) ** (1.0 / n), a) if n % 2.0 else np.power(a, 1.0 / n),
+    "compare": lambda a, b: np.sign(a - b),
+    "pow": lambda a, b: np.power(a if b == np.round(b) else np.maximum(a, 0.0), b),
+    "nth-root": lambda a, n: (
+        np.copysign(np.abs(a) ** (1.0 / n), a) if n % 2.0 else np.maximum(a, 0.0) ** (1.0 / n)
+    ),
 }  # fmt: skip
 """What operations return for numbers."""
 
@@ -143,8 +147,8 @@ class Clauses:
         return self._numbers[row]
 
     def _power(self, base: int, exponent: float) -> int:
-        """Return a power as products if the exponent is a small whole number."""
-        if exponent != round(exponent) or abs(exponent) > LARGEST_EXPONENT:
+        """Return a power as products if the exponent is a whole number."""
+        if exponent != round(exponent):
             return self._number(Clause("pow", (base, self.constant(exponent))))
         if exponent < 0.0:
             return self.add("recip", self._power(base, -exponent))
@@ -227,6 +231,8 @@ def parsed(lines: Sequence[str]) -> list[Clause]:
 
 def _clause(clauses: Clauses, numbers: dict[str, int], words: list[str]) -> int:
     """Return the number of the clause of a line; raise `ValueError` if there is none."""
+    if words[0] in numbers:
+        raise ValueError(f"expected a name of its own, got {words[0][:40]!r} again")
     operation = words[1] if len(words) > 1 else ""
     if operation not in ARITIES:
         raise ValueError(f"expected one of {', '.join(ARITIES)}; got {operation[:40]!r}")
@@ -322,24 +328,30 @@ def _joint(rows: Sequence[Clause], value: Scaled) -> Joint | None:
 
 
 def _unwrapped(rows: Sequence[Clause], value: Scaled) -> Scaled:
-    """Return the same value by a clause that a number is neither added to nor multiplied with."""
+    """Return the same value by a clause that a number is neither added to nor multiplied with.
+
+    A number that would make the factor or the offset too large or too small stays in the clause.
+    """
     while True:
         operation, operands, _ = rows[value.clause]
         constants = [rows[operand].value for operand in operands if rows[operand].operation == "const"]
         others = [operand for operand in operands if rows[operand].operation != "const"]
         _, factor, offset = value
         if operation == "neg":
-            value = Scaled(others[0], -factor, offset)
+            inner = Scaled(others[0], -factor, offset)
         elif operation not in ("add", "sub", "mul") or not constants or not constants[0]:
             return value
         elif operation == "mul":
-            value = Scaled(others[0], factor * constants[0], offset)
+            inner = Scaled(others[0], factor * constants[0], offset)
         elif operation == "add":
-            value = Scaled(others[0], factor, offset + factor * constants[0])
+            inner = Scaled(others[0], factor, offset + factor * constants[0])
         elif operands[0] == others[0]:
-            value = Scaled(others[0], factor, offset - factor * constants[0])
+            inner = Scaled(others[0], factor, offset - factor * constants[0])
         else:
-            value = Scaled(others[0], -factor, offset + factor * constants[0])
+            inner = Scaled(others[0], -factor, offset + factor * constants[0])
+        if not 1.0 / LARGEST_CONSTANT <= abs(inner.factor) <= LARGEST_CONSTANT >= abs(inner.offset):
+            return value
+        value = inner
 
 
 def part_texels(rows: Sequence[Clause], value: Scaled) -> tuple[Texel, ...]:
@@ -347,8 +359,8 @@ def part_texels(rows: Sequence[Clause], value: Scaled) -> tuple[Texel, ...]:
 
     Raises
     ------
-    InvalidNode
-        It needs more registers than there are.
+    ValueError
+        It needs more registers than there are, or is a constant that is too large.
     """
     own = Clauses()
     places: dict[int, int] = {}
@@ -413,8 +425,8 @@ def _allocated(rows: Sequence[Clause], order: list[int]) -> tuple[Texel, ...]:
         ended = [operand for operand in {*operands} if last_use[operand] == number]
         free += [places[operand] for operand in ended if places.get(operand, 0) >= len(VARIABLES)]
         if not free:
-            raise InvalidNode(
-                f"clauses: expected parts between min and max that need at most {REGISTERS - len(VARIABLES)} "
+            raise ValueError(
+                f"expected parts between min and max that need at most {REGISTERS - len(VARIABLES)} "
                 f"values at once, got more in one of {len(steps)} clauses"
             )
         places[number] = free.pop()

@@ -340,6 +340,17 @@ def power_range(a: wp.vec3, b: wp.vec3) -> wp.vec3:
 
 
 @wp.func
+def root_range(a: wp.vec3, b: wp.vec3) -> wp.vec3:
+    """Return (smallest value, largest value, slope) of a root; any value if b varies, or at a pole."""
+    if b[0] < b[1] or (b[0] < 0.0 and least_size(a) <= 0.0):
+        return scaled_range(-HUGE, HUGE, a[2] + b[2], HUGE)
+    c0 = real_root(a[0], b[0])
+    c1 = real_root(a[1], b[0])
+    rate = wp.max(wp.abs(held(c0 / divisor(a[0]))), wp.abs(held(c1 / divisor(a[1])))) / wp.abs(divisor(b[0]))
+    return scaled_range(wp.min(c0, c1), wp.max(c0, c1), a[2], wp.where(least_size(a) > 0.0, rate, HUGE))
+
+
+@wp.func
 def angle_range(a: wp.vec3, b: wp.vec3) -> wp.vec3:
     """Return (smallest value, largest value, slope) of atan2(a, b), which jumps where a = 0 and b < 0."""
     slope = a[2] + b[2]
@@ -389,9 +400,7 @@ def clause_range(code: wp.int32, a: wp.vec3, b: wp.vec3) -> wp.vec3:
         return step_range(low, high, a[2] + b[2])
     if code == POW:
         return power_range(a, b)
-    near = least_size(a)
-    rate = held(real_root(near, b[0]) / divisor(near)) / divisor(b[0])
-    return scaled_range(real_root(a[0], b[0]), real_root(a[1], b[0]), a[2], wp.where(near > 0.0, rate, HUGE))
+    return root_range(a, b)
 
 
 @wp.func
@@ -559,7 +568,10 @@ class Expression(Pieces):
 
         @cache
         def part(value: Any) -> Node:
-            program = tuple(number for texel in part_texels(rows, value) for number in texel)
+            try:
+                program = tuple(number for texel in part_texels(rows, value) for number in texel)
+            except ValueError as error:
+                raise InvalidNode(f"clauses: {error}") from None
             return _ExpressionPart(program, self.center, self.size, **keywords)
 
         nodes: dict[Any, Node] = {}

@@ -68,6 +68,48 @@ def test_values_and_ranges_of_operations(operation: str) -> None:
                 assert (steps <= slope * (1.0 + 1e-6)).all()
 
 
+@pytest.mark.parametrize("degree", [-3.0, -2.0, -1.0, 0.5, 3.0, (2.0, 4.0)])
+def test_ranges_of_roots_of_any_degree(degree: Any) -> None:
+    rng, code = np.random.default_rng(8), clauses.CODES["nth-root"]
+    n = np.array([degree, degree]).reshape(-1)[[0, -1]]
+    for _ in range(50):
+        center, radius = rng.uniform(-2.0, 2.0), 10.0 ** rng.uniform(-2.0, 0.0)
+        low, high, slope = RANGE(
+            code, vector(center - radius, center + radius, 1.0), vector(*n, float(n[0] < n[1]))
+        )
+        pairs = np.column_stack(
+            [rng.uniform(center - radius, center + radius, 40), rng.uniform(n[0], n[1], 40)]
+        )
+        rows = np.array([ROW(code, *pair)[:2] for pair in pairs])
+        assert low <= rows[:, 0].min() + 1e-6
+        assert rows[:, 0].max() <= high + 1e-6
+        assert np.abs(rows[:, 1]).max() <= slope * (1.0 + 1e-6)
+
+
+def test_large_whole_powers_have_the_sign_of_their_parity() -> None:
+    lines = ["x var-x", "n const 65", "p pow x n", "one const 1", "s add p one"]
+    node = Expression(lines, (0, 0, 0), (4, 4, 4))
+    assert (node([[-1.01, 0, 0], [-0.9, 0, 0]]) > 0.5).tolist() == [True, False]
+
+
+@pytest.mark.parametrize("factor", [1e15, -1e15])
+def test_products_beyond_floats_have_the_right_sign(factor: float) -> None:
+    shape = ["x var-x", "y var-y", "m min x y", f"a const {factor}", "b const 1e15"]
+    node = Expression([*shape, "p mul m a", "q mul p b", "r mul q b"], *BOX)
+    inside = node(np.array([[0.5, 0.5, 0.0], [-0.5, 0.5, 0.0]])) > 0.5
+    assert inside.tolist() == [factor < 0.0, factor > 0.0]
+
+
+@pytest.mark.parametrize(
+    "operation", ["sqrt -4", "ln -4", "asin -4", "acos 4", "pow -4 0.5", "nth-root -4 2"]
+)
+def test_constants_are_folded_as_they_are_computed(operation: str) -> None:
+    name, *constants = operation.split()
+    lines = [f"c{i} const {value}" for i, value in enumerate(constants)]
+    folded = clauses.parsed([*lines, " ".join(["r", name, *(f"c{i}" for i in range(len(constants)))])])
+    assert folded[-1].value == pytest.approx(ROW(clauses.CODES[name], *map(float, [*constants, "0"][:2]))[0])
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_fields_and_gradients_are_those_of_the_oracle(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -157,7 +199,8 @@ def test_files_hold_the_text() -> None:
         ("c const nan", "expected a number up to 1e.15, got 'nan'"),
         ("c const 1e400", "expected a number up to 1e.15, got '1e400'"),
         ("c const one", "expected a number up to 1e.15, got 'one'"),
-        ("c const -1\nr sqrt c", "sqrt of -1 is no number here"),
+        ("x var-x\nx neg x", "expected a name of its own, got 'x' again"),
+        ("x var-x\nb const 1e15\nm min b x\nn mul m b", "mul of .* is no number here"),
         ("c const 0\nr recip c", "recip of 0 is no number here"),
         ([1, 2], "expected texts that are not empty"),
     ],
