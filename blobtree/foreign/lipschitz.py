@@ -23,6 +23,7 @@ from blobtree.nodes.rounds import RoundDifference, RoundIntersection, RoundUnion
 from blobtree.nodes.sharp import Frustum
 from blobtree.nodes.solids import Cylinder
 from blobtree.nodes.tree import Difference, Intersection, Union
+from blobtree.validation import LARGEST_NUMBER, describe
 
 WIDTH_FACTOR = 1.5
 """How far fields reach, over the widest blend: so rounded edges fit inside too."""
@@ -35,6 +36,9 @@ SHARP_SHARE = 1e-3
 
 MOST_ROUNDING = 0.9999
 """Largest radius of edges over half a side: at 1 nothing flat is left, as of a ball."""
+
+SHORTEST_SIDE = 1e-9
+"""Shortest side of a box."""
 
 _SHARP: dict[str, Callable[..., Node]] = {"union": Union, "sub": Difference, "inter": Intersection}
 _ROUNDED: dict[str, Callable[..., Node]] = {
@@ -109,6 +113,10 @@ def _ordered(scene: Any) -> tuple[list[_Entry], float]:
     while pending:
         values, above, place = pending.pop()
         matrix = above @ np.array([*numbers(values, "matrix", place, 12), 0, 0, 0, 1]).reshape(4, 4)
+        if np.abs(matrix).max() > LARGEST_NUMBER:
+            raise InvalidFile(
+                f"{place}: matrix: expected numbers up to {LARGEST_NUMBER:g} together with those above"
+            )
         order.append(_Entry(values, matrix, place))
         kind = member(values, "nodeType", place)
         if kind == "binaryOperator":
@@ -117,7 +125,9 @@ def _ordered(scene: Any) -> tuple[list[_Entry], float]:
                         for side in ("leftChild", "rightChild")]  # fmt: skip
             pending += reversed(children)
         elif kind != "primitive":
-            raise InvalidFile(f"{place}: nodeType: expected primitive or binaryOperator, got {kind!r:.60}")
+            raise InvalidFile(
+                f"{place}: nodeType: expected primitive or binaryOperator, got {describe(kind)}"
+            )
     return order, widest
 
 
@@ -162,7 +172,7 @@ def _cone(values: Any, place: str, keywords: Keywords) -> Node:
 
 def _box(values: Any, place: str, keywords: Keywords) -> Node:
     """Return a box, whose vertical edges have radii of their own; those at both ends have one."""
-    x, height, z = numbers(values, "sides", place, 3, 0.0)
+    x, height, z = numbers(values, "sides", place, 3, SHORTEST_SIDE)
     bevels = numbers(values, "bevel", place, 4, 0.0)
     most = MOST_ROUNDING * 0.5 * min(x, height, z)
     edge = min(most, *(number(values, name, place, 0.0) for name in ("round_x", "round_y")))

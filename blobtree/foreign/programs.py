@@ -5,6 +5,7 @@ Clauses follow: a byte for the operation, then four bytes of a constant, or four
 operand, the last one first. The byte 255 ends them; names of free variables end the shape.
 """
 
+import codecs
 import os
 import struct
 from collections.abc import Sequence
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike
 from blobtree.errors import InvalidFile, InvalidNode, UnusableFile
 from blobtree.nodes.clauses import ARITIES, MOST_CLAUSES
 from blobtree.nodes.expressions import Expression
+from blobtree.validation import describe
 
 FLAT_DEPTH = 0.2
 """Thickness of a program without z, by default."""
@@ -30,6 +32,12 @@ ORDERED = (*_FIRST, *_LATER, "abs", "recip", "ln", "compare", "oracle")
 
 PACKED = (*_FIRST, "abs", "ln", "recip", *_LATER, "compare", "oracle")
 """The same in archives of MPR, and of other builds with packed codes."""
+
+ABSENT_IF_PACKED = frozenset({"add", "mul", "min"})
+"""What packed codes of unary operations are in the order of libfive, with too few operands to end well."""
+
+PRESENT_IF_PACKED = frozenset({"div", "atan2", "pow", "nth-root"})
+"""What packed codes of min, max, sub and div are in the order of libfive."""
 
 
 def read_program(
@@ -65,7 +73,7 @@ def read_program(
     """
     content = read_bytes(path)
     try:
-        lines = archive_clauses(content) if content[:1] in (b"T", b"t") else text_clauses(content)
+        lines = archive_clauses(content) if content.startswith(b'T"') else text_clauses(content)
         flat = not any(line.split()[1:2] == ["var-z"] for line in lines)
         box: ArrayLike = (2.0, 2.0, FLAT_DEPTH if flat else 2.0) if size is None else size
         return Expression("\n".join(lines), center, box)  # type: ignore[arg-type]  # checked there
@@ -78,13 +86,13 @@ def read_program(
 
 
 def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Return the content of a file; raise `UnusableFile` if there is none."""
+    """Return the content of a file without a byte order mark; raise `UnusableFile` if there is none."""
     try:
-        return Path(path).read_bytes()
+        return Path(path).read_bytes().removeprefix(codecs.BOM_UTF8)
     except OSError as error:
         raise UnusableFile.of(error, os.fspath(path), "read") from error
     except ValueError:
-        raise InvalidFile(f"path: expected the path of a file, got {path!r}") from None
+        raise InvalidFile(f"path: expected the path of a file, got {describe(path)}") from None
 
 
 def text_clauses(content: bytes) -> list[str]:
@@ -99,8 +107,8 @@ def text_clauses(content: bytes) -> list[str]:
 def archive_clauses(content: bytes) -> list[str]:
     """Return the clauses of the first shape of an archive.
 
-    Nothing in an archive says which codes it has. With the wrong ones it does not end, or nothing is added,
-    multiplied or united.
+    Nothing in an archive says which codes it has. With the wrong ones it does not end, or it has nothing of
+    `ABSENT_IF_PACKED` but something of `PRESENT_IF_PACKED`.
     """
     try:
         lines = _shape_clauses(content, ORDERED)
@@ -109,7 +117,8 @@ def archive_clauses(content: bytes) -> list[str]:
             return _shape_clauses(content, PACKED)
         except InvalidFile:
             raise error from None
-    if any(f" {operation} " in line for line in lines for operation in ("add", "mul", "min")):
+    found = {line.split()[1] for line in lines}
+    if found & ABSENT_IF_PACKED or not found & PRESENT_IF_PACKED:
         return lines
     try:
         return _shape_clauses(content, PACKED)
@@ -137,8 +146,6 @@ class _Archive:
     def __init__(self, content: bytes) -> None:
         self._content = content
         self._place = 1
-        if content[:1] != b"T":
-            raise InvalidFile("expected a shape that begins with T, got a reference to a shape")
         for _ in ("name", "description"):
             self._skip_text()
 

@@ -1,6 +1,7 @@
 """Trees in files of this package and of others, told apart by suffix and content."""
 
 import os
+import re
 from pathlib import Path
 
 from blobtree.errors import InvalidFile
@@ -14,8 +15,8 @@ from blobtree.nodes.node import Node
 PROGRAM_SUFFIXES = (".vm", ".frep")
 """Suffixes of programs."""
 
-OWN_MARK = b'"blobtree"'
-"""Text of every file that `blobtree.save` writes, near its start."""
+OWN_START = re.compile(rb'\s*\{\s*"format"\s*:\s*"blobtree"')
+"""How every file begins that `blobtree.save` writes."""
 
 
 def read_tree(path: str | os.PathLike[str]) -> Node:
@@ -61,7 +62,7 @@ def read_tree(path: str | os.PathLike[str]) -> Node:
 
 def _json_tree(content: bytes) -> Node:
     """Return the tree of a JSON text of any of the formats."""
-    if OWN_MARK in content[:200]:
+    if OWN_START.match(content):
         return from_json(content)
     values = parsed_json(content)
     if isinstance(values, dict) and "nodeType" in values:

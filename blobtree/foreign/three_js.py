@@ -22,9 +22,13 @@ from blobtree.nodes.flats import Triangle
 from blobtree.nodes.node import Node
 from blobtree.nodes.primitives import Cone, Leaf, Point, Segment
 from blobtree.nodes.tree import Difference, Intersection, Ricci, Sum, Union
+from blobtree.validation import describe
 
 ROOT_EXPONENT = 64.0
-"""Exponent of the Ricci blend of a root."""
+"""Exponent of the Ricci blend of a root, by default."""
+
+NEAR_SUM = 1.0 + 1e-6
+"""Exponent of a sum that takes operands below 0 for 0, as those of three-js-blobtree are."""
 
 REACH = 2.0
 """Reach of a kernel over the thickness."""
@@ -39,10 +43,11 @@ Corners = tuple[Float64Array, Float64Array]
 
 
 class _Part(NamedTuple):
-    """A node, and the box that three-js-blobtree gives it."""
+    """A node, the box that three-js-blobtree gives it, and whether its field may fall below 0."""
 
     node: Node
     box: Corners
+    is_signed: bool = False
 
 
 class _Entry(NamedTuple):
@@ -110,7 +115,7 @@ def _children(entry: _Entry) -> list[Any]:
         return []
     found = entry.values["children"]
     if not isinstance(found, list) or not found:
-        raise InvalidFile(f"{entry.place}: children: expected a list of nodes, got {found!r:.60}")
+        raise InvalidFile(f"{entry.place}: children: expected a list of nodes, got {describe(found)}")
     return found
 
 
@@ -121,7 +126,11 @@ def _joined(make: Callable[[tuple[Node, ...]], Node]) -> Callable[[_Entry, list[
         if not below:
             raise InvalidFile(f"{entry.place}: the field 'children' is missing")
         nodes = tuple(part.node for part in below)
-        return _Part(make(nodes) if len(nodes) > 1 else nodes[0], _around([part.box for part in below]))
+        return _Part(
+            make(nodes) if len(nodes) > 1 else nodes[0],
+            _around([part.box for part in below]),
+            any(part.is_signed for part in below),
+        )
 
     return join
 
@@ -132,10 +141,13 @@ def _around(boxes: list[Corners]) -> Corners:
 
 
 def _ricci(entry: _Entry, below: list[_Part], scale: float) -> _Part:
-    exponent = number(entry.values, "ricci_n", entry.place, 1.0, default=ROOT_EXPONENT)
-    return _joined(lambda nodes: Sum(nodes) if exponent == 1.0 else Ricci(nodes, exponent=exponent))(
-        entry, below, scale
-    )
+    """Return a Ricci blend; its exponent is called `ricci` in older files, and a root may have none."""
+    name = "ricci" if "ricci" in entry.values else "ricci_n"
+    default = ROOT_EXPONENT if entry.values["type"] == "RootNode" else None
+    exponent = number(entry.values, name, entry.place, 1.0, default)
+    if exponent == 1.0 and not any(part.is_signed for part in below):
+        return _joined(Sum)(entry, below, scale)
+    return _joined(lambda nodes: Ricci(nodes, exponent=max(exponent, NEAR_SUM)))(entry, below, scale)
 
 
 def _difference(entry: _Entry, below: list[_Part], scale: float) -> _Part:
@@ -143,15 +155,15 @@ def _difference(entry: _Entry, below: list[_Part], scale: float) -> _Part:
     if len(below) != 2:
         raise InvalidFile(f"{entry.place}: children: expected two nodes, got {len(below)}")
     solid, tool = below
-    if number(entry.values, "alpha", entry.place, default=1.0) == 1.0 and (carving := _negative(tool.node)):
-        return _Part(Sum((solid.node, *carving)), solid.box)
-    return _Part(Difference(solid.node, tool.node), solid.box)
+    if number(entry.values, "alpha", entry.place, default=1.0) == 1.0 and (carving := _negative(tool)):
+        return _Part(Sum((solid.node, *carving)), solid.box, True)
+    return _Part(Difference(solid.node, tool.node), solid.box, solid.is_signed)
 
 
-def _negative(node: Any) -> tuple[Node, ...]:
-    """Return leaves whose sum is minus the field of a node; none if there are no such leaves."""
-    leaves: tuple[Any, ...] = node.operands if isinstance(node, Sum) else (node,)
-    if not all(isinstance(leaf, Leaf) for leaf in leaves):
+def _negative(part: _Part) -> tuple[Node, ...]:
+    """Return leaves whose sum is minus the field of a part; none if there are no such leaves."""
+    leaves: tuple[Any, ...] = part.node.operands if isinstance(part.node, Sum) else (part.node,)
+    if part.is_signed or not all(isinstance(leaf, Leaf) for leaf in leaves):
         return ()
     return tuple(replace(leaf, weight=-leaf.weight) for leaf in leaves)
 
@@ -167,7 +179,7 @@ def _scaled(entry: _Entry, below: list[_Part], scale: float) -> _Part:
     middle = _middle(box)
     grown = (box[1] - box[0]) * (factors - 1.0)
     node = below[-1].node.transform(np.column_stack([np.diag(factors), middle - factors * middle]))
-    return _Part(node, (box[0] - grown, box[1] + grown))
+    return _Part(node, (box[0] - grown, box[1] + grown), below[-1].is_signed)
 
 
 def _twisted(entry: _Entry, below: list[_Part], scale: float) -> _Part:
@@ -184,14 +196,15 @@ def _twisted(entry: _Entry, below: list[_Part], scale: float) -> _Part:
     frame = np.array([x, np.cross(z, x), z])
     middle = _middle(box)
     local = below[-1].node.transform(np.column_stack([frame, -frame @ middle]))
-    return _Part(local.twist(math.degrees(turns)).transform(np.column_stack([frame.T, middle])), box)
+    twisted = local.twist(math.degrees(turns)).transform(np.column_stack([frame.T, middle]))
+    return _Part(twisted, box, below[-1].is_signed)
 
 
 def _vertices(entry: _Entry, count: int) -> list[tuple[Float64Array, float]]:
     """Return the positions and thicknesses of a Scalis primitive."""
     found = member(entry.values, "v", entry.place)
     if not isinstance(found, list) or len(found) != count:
-        raise InvalidFile(f"{entry.place}: v: expected {count} vertices, got {found!r:.60}")
+        raise InvalidFile(f"{entry.place}: v: expected {count} vertices, got {describe(found)}")
     return [
         (_vector(vertex, "position", f"{entry.place}, vertex {place}"),
          number(vertex, "thickness", f"{entry.place}, vertex {place}", 1e-9))
@@ -207,6 +220,8 @@ def _vector(values: Any, name: str, place: str) -> Float64Array:
 def _keywords(entry: _Entry, factor: float) -> dict[str, Any]:
     """Return the colour, the mean one of all materials, and the weight of a Scalis primitive."""
     materials = member(entry.values, "materials", entry.place)
+    if not isinstance(materials, list):
+        raise InvalidFile(f"{entry.place}: materials: expected a list, got {describe(materials)}")
     colors = [member(material, "color", f"{entry.place}, material") for material in materials]
     density = number(entry.values, "density", entry.place, 0.0, default=1.0)
     return {"color": _mean_color(colors, entry.place), "weight": density * factor}
@@ -215,18 +230,20 @@ def _keywords(entry: _Entry, factor: float) -> dict[str, Any]:
 def _mean_color(colors: list[Any], place: str) -> Any:
     texts = [color for color in colors if isinstance(color, str) and len(color) == 7 and color[0] == "#"]
     if not colors or len(texts) < len(colors):
-        raise InvalidFile(f"{place}: color: expected texts such as '#aaaaaa', got {colors!r:.60}")
+        raise InvalidFile(f"{place}: color: expected texts such as '#aaaaaa', got {describe(colors)}")
     try:
         parts = np.array([[int(text[i : i + 2], 16) for i in (1, 3, 5)] for text in texts])
     except ValueError:
-        raise InvalidFile(f"{place}: color: expected texts such as '#aaaaaa', got {colors!r:.60}") from None
+        raise InvalidFile(
+            f"{place}: color: expected texts such as '#aaaaaa', got {describe(colors)}"
+        ) from None
     return "#" + "".join(f"{round(part):02x}" for part in parts.mean(axis=0))
 
 
 def _is_convolution(entry: _Entry) -> bool:
     kind = member(entry.values, "volType", entry.place)
     if kind not in ("dist", "convol"):
-        raise InvalidFile(f"{entry.place}: volType: expected dist or convol, got {kind!r:.60}")
+        raise InvalidFile(f"{entry.place}: volType: expected dist or convol, got {describe(kind)}")
     return bool(kind == "convol")
 
 
@@ -291,13 +308,13 @@ def _distance_root(entry: _Entry, below: list[_Part], scale: float) -> _Part:
     place = entry.place
     functor = member(entry.values, "f", place)
     if member(functor, "type", f"{place}: f") != "Poly6DistanceFunctor":
-        raise InvalidFile(f"{place}: f: expected a Poly6DistanceFunctor, got {functor['type']!r:.60}")
+        raise InvalidFile(f"{place}: f: expected a Poly6DistanceFunctor, got {describe(functor['type'])}")
     reach = number(functor, "scale", f"{place}: f", 1e-9)
     shape = member(entry.values, "sdfRoot", place)
     while isinstance(shape, dict) and shape.get("type") == "SDFNode":
         inside = member(shape, "children", f"{place}: sdfRoot")
         if not isinstance(inside, list) or not inside:
-            raise InvalidFile(f"{place}: sdfRoot: expected a child, got {inside!r:.60}")
+            raise InvalidFile(f"{place}: sdfRoot: expected a child, got {describe(inside)}")
         shape = inside[0]
     kind = chosen(_DISTANCES, member(shape, "type", f"{place}: sdfRoot"), "type", f"{place}: sdfRoot")
     keywords = {"color": _keywords(entry, 1.0)["color"], "width": reach}

@@ -146,6 +146,34 @@ def test_nodes_of_three_js_blobtree_have_half_the_value(tmp_path: Path, make: Ca
         assert from_json(to_json(tree)) == tree
 
 
+def _difference(solid: Any, tool: Any) -> Any:
+    return {"type": "DifferenceNode", "alpha": 1.0, "children": [solid, tool]}
+
+
+def test_differences_below_sums_and_differences_end_at_nothing(tmp_path: Path) -> None:
+    rng = np.random.default_rng(14)
+    for _ in range(6):
+        a, b, c = (scalis(rng, "ScalisPoint") for _ in range(3))
+        points = np.concatenate([rng.uniform(-1.5, 1.5, (200, 3)), [list(b["v"][0]["position"].values())]])
+        blend = {"type": "RicciNode", "ricci_n": 1.0, "children": [_difference(a, b), c]}
+        tree = read_tree(written(tmp_path, root(blend)))
+        np.testing.assert_allclose(2.0 * tree(points), foreign.three_js(blend, points), atol=1e-3)
+        nested = _difference(a, _difference(c, b))
+        whole, carved = (read_tree(written(tmp_path, root(node)))(points) for node in (a, nested))
+        assert (carved <= whole + 1e-6).all()
+
+
+def test_older_files_call_the_exponent_ricci(tmp_path: Path) -> None:
+    rng = np.random.default_rng(15)
+    blend = _joined("RicciNode", ricci_n=3.0)(rng)
+    older = {**blend, "ricci": blend["ricci_n"]}
+    del older["ricci_n"]
+    assert read_tree(written(tmp_path, root(older))) == read_tree(written(tmp_path, root(blend)))
+    del older["ricci"]
+    with pytest.raises(InvalidFile, match="node 1, child 0: the field 'ricci_n' is missing"):
+        read_tree(written(tmp_path, root(older)))
+
+
 @pytest.mark.parametrize("radii", [(0.3, 0.3), (0.3, 0.5)])
 def test_signed_distances_have_their_surface(tmp_path: Path, radii: tuple[float, float]) -> None:
     rng = np.random.default_rng(13)
@@ -169,6 +197,24 @@ def test_programs_are_the_same_as_text_and_as_archives(tmp_path: Path, operation
     for tree in (text, packed):
         assert ((tree(points) > 0.5) == (value < 0.0))[away].all()
     assert read_program(written(tmp_path, program(np.random.default_rng(3), 4), "a.vm")).size == (2, 2, 2)
+
+
+def test_archives_without_sums_and_products_are_those_of_libfive(tmp_path: Path) -> None:
+    box = ["x var-x", "h const 0.5", "low neg x", "a sub x h", "b sub low h", "box max a b"]
+    tree = read_program(written(tmp_path, archive(box), "box.frep"), size=(2, 2, 2))
+    assert (tree([[0.4, 0, 0], [-0.4, 0, 0], [0.6, 0, 0], [-0.6, 0, 0]]) > 0.5).tolist() == [1, 1, 0, 0]
+
+
+@pytest.mark.parametrize("mark", [b"\xef\xbb\xbf", b""])
+def test_texts_may_have_a_byte_order_mark_and_any_names(tmp_path: Path, mark: bytes) -> None:
+    assert read_program(written(tmp_path, mark + b"Tx var-x", "a.vm")).clauses == ("Tx var-x",)
+    own = mark + to_json(Expression("x var-x", (0, 0, 0), (1, 1, 1)))
+    assert isinstance(read_tree(written(tmp_path, own)), Expression)
+
+
+def test_foreign_files_may_name_this_package(tmp_path: Path) -> None:
+    scene = {"name": "blobtree", **root(scalis(np.random.default_rng(1), "ScalisPoint"))}
+    assert read_tree(written(tmp_path, scene)) == read_three_js(written(tmp_path, scene))
 
 
 def test_meshes_of_scenes_lie_on_their_surface(tmp_path: Path) -> None:
@@ -195,6 +241,24 @@ def test_own_files_are_read_too(tmp_path: Path) -> None:
     assert read_tree(tmp_path / "own.json") == tree
 
 
+_BOX = {
+    "nodeType": "primitive", "primitiveType": "box", "sides": [1, 1, 1], "bevel": [0, 0, 0, 0], "round_x": 0,
+    "round_y": 0, "color": [1, 0, 0], "matrix": [1e18, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0],
+}  # fmt: skip
+
+
+def _scene(**fields: Any) -> bytes:
+    return _deep_text({"aabb_min": [0, 0, 0], "aabb_max": [1, 1, 1], **_BOX, **fields})
+
+
+def _point(materials: Any) -> bytes:
+    return _deep_text(root({**scalis(np.random.default_rng(1), "ScalisPoint"), "materials": materials}))
+
+
+def _deep_text(content: Any) -> bytes:
+    return json.dumps(content).replace('"DEEP"', "[" * 20_000 + "]" * 20_000).encode()
+
+
 HOSTILE: list[tuple[str, bytes, str]] = [
     ("a.json", b"", "expected more, the file ends too early"),
     ("a.json", b"{", "expected more, the file ends too early"),
@@ -207,13 +271,22 @@ HOSTILE: list[tuple[str, bytes, str]] = [
     ("a.json", b'{"type": "RootNode", "iso": 0, "children": [1]}', "iso: expected a number from 1e-06"),
     ("a.json", b'{"type": "RootNode", "children": [1]}', "expected an object in braces, got 1.0"),
     ("a.json", b'{"nodeType": "primitive"}', "the field 'aabb_min' is missing"),
+    ("a.json", _point(None), "materials: expected a list, got None"),
+    ("a.json", _point([{"color": "DEEP"}]), "color: expected texts such as '#aaaaaa', got a list"),
+    ("a.json", _scene(nodeType="DEEP"), "nodeType: expected primitive or binaryOperator, got a list"),
+    ("a.json", _scene(sides=[1, 0, 1]), "sides: expected a number from 1e-09"),
+    (
+        "a.json",
+        _scene(nodeType="binaryOperator", leftChild=_BOX, rightChild=_BOX, blendRadius=0),
+        "node 1, leftChild: matrix: expected numbers up to 1e.18",
+    ),
     ("a.json", b"[1, 2]", "not a BlobTree"),
     ("a.json", b"nul", "expected a value, got 'nul'"),
     ("a.vm", b"", "expected 1 to 200,000 clauses"),
     ("a.vm", b"x var-x\ny frob x", "expected one of var-x"),
     ("a.vm", b"\xff\x00", "expected a text of clauses"),
-    ("a.frep", b"T", "the archive ends too early"),
-    ("a.frep", b"t", "reference to a shape"),
+    ("a.frep", b'T"', "the archive ends too early"),
+    ("a.frep", b'T""x', "expected a text in .quotes."),
     ("a.frep", b'T""""\x02', "the archive ends too early"),
     ("a.frep", b'T""""\x07\x05\0\0\0\xff', "expected earlier clauses as operands, got 5"),
     ("a.frep", b'T""""\x20\xff', "oracle has no counterpart"),
