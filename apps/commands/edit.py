@@ -30,8 +30,8 @@ def edit(
     Parameters
     ----------
     model
-        Mesh files, BlobTrees in JSON, samples, or one saved scene, as for render. Default: an empty scene, in
-        which N adds a ball.
+        Mesh files, BlobTrees in JSON, programs (vm, frep), samples, or one saved scene, as for render.
+        Default: an empty scene, in which N adds a ball.
     size
         Width and height of the window in pixels.
     """

@@ -58,8 +58,8 @@ def render(
     Parameters
     ----------
     model
-        Mesh files (ply, obj, stl, vtp, ...), BlobTrees in JSON, samples (creature, dragon, horse, knot,
-        spheres), or one saved scene.
+        Mesh files (ply, obj, stl, vtp, ...), BlobTrees in JSON, programs (vm, frep), samples (creature,
+        dragon, horse, knot, spheres), or one saved scene.
     output
         The picture: png, jpg, webp or tif.
     camera

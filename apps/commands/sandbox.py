@@ -76,7 +76,8 @@ def sandbox(
     Parameters
     ----------
     model
-        Mesh files, BlobTrees in JSON, samples, or one saved scene, as for render. Default: a start page.
+        Mesh files, BlobTrees in JSON, programs (vm, frep), samples, or one saved scene, as for render.
+        Default: a start page.
     port
         Port of the page; 0 takes a free one.
     host

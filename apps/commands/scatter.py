@@ -62,8 +62,8 @@ def scatter(
     Parameters
     ----------
     model
-        Mesh files (ply, obj, stl, vtp, ...), BlobTrees in JSON, or samples (creature, dragon, horse, knot,
-        spheres), or one saved scene, which keeps its images and camera.
+        Mesh files (ply, obj, stl, vtp, ...), BlobTrees in JSON, programs (vm, frep), samples (creature,
+        dragon, horse, knot, spheres), or one saved scene, which keeps its images and camera.
     output
         The output file: json, a scene that other commands open, or csv or parquet, a table with a row for
         each decal, which they take by --table.

@@ -44,7 +44,8 @@ def load_model(
         return sample(model)
     if not is_file(Path(model)):
         raise InvalidInput(
-            f"expected a mesh file, a BlobTree or scene in JSON, or a sample ({', '.join(SAMPLES)}); "
+            "expected a mesh file, a BlobTree or scene in JSON, a program (.vm, .frep), or a sample "
+            f"({', '.join(SAMPLES)}); "
             f"found no file {model!r}"
         )
     try:
