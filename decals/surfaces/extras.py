@@ -16,7 +16,7 @@ with if_present():
 
     READERS |= {"file": read_mesh_data, "dataset": dataset_mesh, "trimesh": trimesh_color}
 with if_present():
-    from blobtree.foreign import read_tree
+    from blobtree.foreign.reading import read_tree
 
     READERS["tree"] = read_tree
 with if_present():

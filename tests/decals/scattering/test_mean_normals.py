@@ -63,7 +63,7 @@ def test_images_bend_over_the_edges_of_parts(name: str) -> None:
 
 
 @pytest.mark.ordinary_cases("bowl-4")
-@pytest.mark.parametrize(("name", "seed"), [("cup", 1), ("cup", 5), ("bowl", 3), ("bowl", 4), ("ears", 1)])
+@pytest.mark.parametrize(("name", "seed"), [("cup", 1), ("cup", 7), ("bowl", 3), ("bowl", 4), ("ears", 1)])
 def test_lips_and_ragged_borders_get_no_outsized_decals(name: str, seed: int) -> None:
     """A cup's wall is thinner than the spacing: its floor faces decals outside, its lip few decals."""
     mesh = FAULT_MODELS[name]()
