@@ -117,7 +117,7 @@ def member(values: Any, name: str, place: str) -> Any:
 
 
 def number(values: Any, name: str, place: str, low: float = -LARGEST_NUMBER, default: Any = None) -> float:
-    """Return a number of an object, from `low` on; without it the default, if there is one."""
+    """Return a number of an object, at least `low`; if it is missing, the default, where one is given."""
     if default is not None and isinstance(values, dict) and name not in values:
         return float(default)
     return as_number(member(values, name, place), f"{place}: {name}", low)

@@ -13,8 +13,8 @@ import numpy as np
 
 from blobtree._typing import Float64Array
 from blobtree.errors import ImplicitDecalsError, InvalidFile
+from blobtree.foreign.content import naming, read_bytes
 from blobtree.foreign.json_values import chosen, member, number, numbers, parsed_json
-from blobtree.foreign.programs import read_bytes
 from blobtree.nodes.node import Node
 from blobtree.nodes.outlines import Outline
 from blobtree.nodes.primitives import Box, Point
@@ -75,10 +75,8 @@ def read_lipschitz(path: str | os.PathLike[str]) -> Node:
     [0.5]
     """
     content = read_bytes(path)
-    try:
+    with naming(path):
         return lipschitz_tree(parsed_json(content))
-    except InvalidFile as error:
-        raise InvalidFile(f"{os.fspath(path)}: {error}") from None
 
 
 class _Entry(NamedTuple):

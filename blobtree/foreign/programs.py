@@ -5,18 +5,16 @@ Clauses follow: a byte for the operation, then four bytes of a constant, or four
 operand, the last one first. The byte 255 ends them; names of free variables end the shape.
 """
 
-import codecs
 import os
 import struct
 from collections.abc import Sequence
-from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from blobtree.errors import InvalidFile, InvalidNode, UnusableFile
+from blobtree.errors import InvalidFile, InvalidNode
+from blobtree.foreign.content import naming, read_bytes
 from blobtree.nodes.clauses import ARITIES, MOST_CLAUSES
 from blobtree.nodes.expressions import Expression
-from blobtree.validation import describe
 
 FLAT_DEPTH = 0.2
 """Thickness of a program without z, by default."""
@@ -72,27 +70,16 @@ def read_program(
     (2.0, 2.0, 0.2)
     """
     content = read_bytes(path)
-    try:
+    with naming(path):
         lines = archive_clauses(content) if content.startswith(b'T"') else text_clauses(content)
         flat = not any(line.split()[1:2] == ["var-z"] for line in lines)
         box: ArrayLike = (2.0, 2.0, FLAT_DEPTH if flat else 2.0) if size is None else size
-        return Expression("\n".join(lines), center, box)  # type: ignore[arg-type]  # checked there
-    except InvalidNode as error:
-        if str(error).startswith("clauses"):
-            raise InvalidFile(f"{os.fspath(path)}: {error}") from None
-        raise
-    except InvalidFile as error:
-        raise InvalidFile(f"{os.fspath(path)}: {error}") from None
-
-
-def read_bytes(path: str | os.PathLike[str]) -> bytes:
-    """Return the content of a file without a byte order mark; raise `UnusableFile` if there is none."""
-    try:
-        return Path(path).read_bytes().removeprefix(codecs.BOM_UTF8)
-    except OSError as error:
-        raise UnusableFile.of(error, os.fspath(path), "read") from error
-    except ValueError:
-        raise InvalidFile(f"path: expected the path of a file, got {describe(path)}") from None
+        try:
+            return Expression("\n".join(lines), center, box)  # type: ignore[arg-type]  # checked there
+        except InvalidNode as error:
+            if str(error).startswith("clauses"):
+                raise InvalidFile(str(error)) from None
+            raise
 
 
 def text_clauses(content: bytes) -> list[str]:

@@ -2,12 +2,11 @@
 
 import os
 import re
-from pathlib import Path
 
-from blobtree.errors import InvalidFile
+from blobtree.foreign.content import naming, read_bytes
 from blobtree.foreign.json_values import parsed_json
 from blobtree.foreign.lipschitz import lipschitz_tree
-from blobtree.foreign.programs import read_bytes, read_program
+from blobtree.foreign.programs import read_program
 from blobtree.foreign.three_js import three_js_tree
 from blobtree.io import from_json
 from blobtree.nodes.node import Node
@@ -51,13 +50,11 @@ def read_tree(path: str | os.PathLike[str]) -> Node:
     >>> read_tree(path)([[0.5, 0, 0]]).tolist()
     [0.5]
     """
-    content = read_bytes(path)
-    if Path(path).suffix.lower() in PROGRAM_SUFFIXES:
+    if str(path).lower().endswith(PROGRAM_SUFFIXES):
         return read_program(path)
-    try:
+    content = read_bytes(path)
+    with naming(path):
         return _json_tree(content)
-    except InvalidFile as error:
-        raise InvalidFile(f"{os.fspath(path)}: {error}") from None
 
 
 def _json_tree(content: bytes) -> Node:

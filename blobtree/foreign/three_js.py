@@ -14,8 +14,8 @@ import numpy as np
 
 from blobtree._typing import Float64Array
 from blobtree.errors import ImplicitDecalsError, InvalidFile
+from blobtree.foreign.content import naming, read_bytes
 from blobtree.foreign.json_values import chosen, member, number, parsed_json
-from blobtree.foreign.programs import read_bytes
 from blobtree.formulas.falloff import RIM
 from blobtree.nodes.convolution import LINE_RIM, SHEET_RIM, ConvolutionSegment, ConvolutionTriangle
 from blobtree.nodes.flats import Triangle
@@ -79,10 +79,8 @@ def read_three_js(path: str | os.PathLike[str]) -> Node:
     [0.5]
     """
     content = read_bytes(path)
-    try:
+    with naming(path):
         return three_js_tree(parsed_json(content))
-    except InvalidFile as error:
-        raise InvalidFile(f"{os.fspath(path)}: {error}") from None
 
 
 def three_js_tree(root: Any) -> Node:

@@ -230,7 +230,7 @@ def parsed(lines: Sequence[str]) -> list[Clause]:
 
 
 def _clause(clauses: Clauses, numbers: dict[str, int], words: list[str]) -> int:
-    """Return the number of the clause of a line; raise `ValueError` if there is none."""
+    """Add the clause of a line and return its number; raise `ValueError` for a line that is no clause."""
     if words[0] in numbers:
         raise ValueError(f"expected a name of its own, got {words[0][:40]!r} again")
     operation = words[1] if len(words) > 1 else ""

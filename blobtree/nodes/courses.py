@@ -27,6 +27,9 @@ SHARPEST = math.radians(150.0)
 LARGEST_ARC = 0.5 * math.pi
 """Largest angle of one arc."""
 
+SHARPEST_ARC = math.pi - 1e-3
+"""Largest turn from line to line through the points of a smooth course: beyond it the course turns back."""
+
 
 class Span(NamedTuple):
     """A line or an arc of a course, and the planes at its ends."""
@@ -115,7 +118,8 @@ def _arcs(points: Float64Array, ways: Float64Array, closed: bool) -> list[Curve]
     before, after = (np.roll(ways, 1, axis=0), ways) if closed else (ways[:-1], ways[1:])
     tangents = before / (before**2).sum(axis=1)[:, None] + after / (after**2).sum(axis=1)[:, None]
     norms = np.linalg.norm(tangents, axis=1)
-    if norms.min() * np.linalg.norm(ways, axis=1).max() <= STRAIGHT:
+    sharpest = max(_angle(a, b) for a, b in zip(before, after, strict=True))
+    if sharpest > SHARPEST_ARC or norms.min() * np.linalg.norm(ways, axis=1).max() <= STRAIGHT:
         raise InvalidNode("points: the curve turns back at one; use more points")
     tangents = tangents / norms[:, None]
     if closed:

@@ -156,7 +156,7 @@ class ParticleState:
             self._current.particles.sheets = self._proposed.particles.sheets = sheets
 
     def sheets_of(self, points: OrientedPoints) -> Any:
-        """Return the numbers of the sheets of points, an array of the device; None if there is one."""
+        """Return the numbers of the sheets of points, an array of the device; None for a single sheet."""
         sheets = self.domain.sheets(points, LEAST_SHEET * self.spacing**2)
         if sheets is None:
             return None

@@ -159,6 +159,7 @@ def test_an_upright_sweep_is_an_extrusion() -> None:
         (lambda: Sweep(BAR, ((0, 0, 0), (0, 0, 0))), "points: two neighbours are equal"),
         (lambda: Sweep(BAR, ((0, 0, 0), (1, 0, 0), (0, 0.01, 0))), "expected turns up to 150 degrees"),
         (lambda: Sweep(BAR, ((0, 0, 0), (1, 0, 0), (0, 0, 0)), corners="smooth"), "points: the curve turns"),
+        (lambda: Sweep(BAR, ((0, 0, 0), (1, 0, 0), (-1, 0, 0)), corners="smooth"), "points: the curve turns"),
         (lambda: Sweep(BAR, ((0, 0, 0), (0.1, 0, 0), (0.1, 1, 0))), "too short for its corners"),
         (
             lambda: Sweep(BAR, ((0.1, 0, 0), (0, 0.1, 0), (-0.1, 0, 0)), corners="smooth"),
