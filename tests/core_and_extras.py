@@ -48,7 +48,7 @@ EXTRAS: dict[str, str] = {
         """,
     "decals.scattering": """
         bare_places center_normals covering creases deform density gap_filling
-        image_projections owned_points polish relocation remesh sheets
+        image_projections owned_points polish relocation remesh sheets zones
         """,
     "decals.scenes": """
         animation area_gradient figure gaps measure outlines pose reproduction

@@ -433,6 +433,24 @@ def call_table() -> Calls:
             {"image": pixels, "projection": scattering.Planar(origin, (1, 0, 0), (0, 1, 0)), "repeat": False},
         ),
         "Creases": (scattering.Creases, {"surface": mesh, "angle": 30.0, "boundary": True}),
+        "Zone": (
+            scattering.Zone,
+            {
+                "where": [True],
+                "density": 2.0,
+                "factor": 1.0,
+                "direction": axis,
+                "images": [1, 2],
+                "weights": [1.0, 2.0],
+                "choice": "random",
+            },
+        ),
+        "scatter in zones": (
+            lambda where, width: decals.scatter(
+                mesh, count=3, zones=scattering.Zones(scattering.Zone(where), border_width=width)
+            ),
+            {"where": [True], "width": 0.1},
+        ),
         "region_mask": (scattering.region_mask, {"surface": mesh, "flags": [True]}),
         "vertex_density": (
             scattering.vertex_density,

@@ -4,6 +4,7 @@ from .image_projections import Cylindrical, Planar, Spherical, TextureCoordinate
 from .orientation import Orientation, gradient_of
 from .remesh import remeshed_points
 from .variation import ImageChoice, Jitter
+from .zones import Zone, Zones
 
 __all__ = [
     "Creases",
@@ -15,6 +16,8 @@ __all__ = [
     "Planar",
     "Spherical",
     "TextureCoordinates",
+    "Zone",
+    "Zones",
     "gradient_of",
     "region_mask",
     "remeshed_points",

@@ -1,8 +1,9 @@
 """Decals of oriented points: radii, tangents and images by a set of rules."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +12,7 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array, 
 from decals.errors import InvalidScattering
 from decals.model import Decals
 from decals.scattering.decal_normals import mean_normals
-from decals.scattering.domain import Domain, OrientedPoints
+from decals.scattering.domain import Density, Domain, Mask, OrientedPoints
 from decals.scattering.extras import RULES
 from decals.scattering.orientation import Direction, as_direction, max_curvatures, tangents
 from decals.scattering.sizing import EXPECTED_RADIUS, Sizing, delaunay_radii, touching_radii
@@ -25,7 +26,41 @@ MIN_SAMPLES = 4096
 """Least number of samples, so that the radii of few decals are accurate as well."""
 
 _SAMPLE_STREAM, _TRIAL_STREAM, _ANGLE_STREAM, _IMAGE_STREAM = 3, 4, 5, 6
-_POSITION_JITTER_STREAM, _SIZE_JITTER_STREAM, _ANGLE_JITTER_STREAM = 7, 8, 9
+_POSITION_JITTER_STREAM, _SIZE_JITTER_STREAM, _ANGLE_JITTER_STREAM, _ZONE_STREAM = 7, 8, 9, 10
+
+
+class PlacedZones(Protocol):
+    """Zones on surfaces: what `Zones.placed_on` returns."""
+
+    @property
+    def density(self) -> Density | None:
+        """Relative density of decals; None if it is the same everywhere."""
+        ...
+
+    @property
+    def spacing(self) -> float | None:
+        """Distance of neighbours where the density is 1; None if the zones do not state it."""
+        ...
+
+    def mask(self, points: Float32Array) -> BoolArray:
+        """Return True where a zone is."""
+        ...
+
+    def styles(
+        self, base: "Appearance", positions: Float32Array, seed: int
+    ) -> "list[tuple[Appearance, Int64Array]]":
+        """Return appearances, and the rows of the decals (n, 3) that each is for; together all rows."""
+        ...
+
+
+class ZonesOfModels(Protocol):
+    """Zones for `scatter`: `decals.scattering.Zones`."""
+
+    def placed_on(
+        self, models: object, *, density: Density | None, mask: Mask | None, seed: int, device: str
+    ) -> PlacedZones:
+        """Return the zones on models."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +76,7 @@ class Appearance:
     sizing: Sizing = Sizing.COVERING
     factor: float = 1.0
     direction: Direction = None
-    images: int = 1
+    images: int | Sequence[int] = 1
     weights: ArrayLike | None = None
     choice: ImageChoice = ImageChoice.RANDOM
     jitter: Jitter | None = None
@@ -54,7 +89,7 @@ class Appearance:
             sizing: Sizing | str = Sizing.COVERING,
             factor: float = 1.0,
             direction: Direction = None,
-            images: int = 1,
+            images: int | Sequence[int] = 1,
             weights: ArrayLike | None = None,
             choice: ImageChoice | str = ImageChoice.RANDOM,
             jitter: Jitter | None = None,
@@ -87,6 +122,7 @@ class Appearance:
         movable: BoolArray,
         *,
         seed: int,
+        zones: "PlacedZones | None" = None,
     ) -> Decals:
         """Return a decal for each point.
 
@@ -102,13 +138,25 @@ class Appearance:
             True for points that jitter may move, ``bool[n]``.
         seed
             Seed of all random choices.
+        zones
+            Zones with factors, directions and images of their own; this appearance is that of points outside.
         """
         jitter = self.jitter or Jitter()
         points = jitter.move(domain, points, spacings, movable, _stream(seed, _POSITION_JITTER_STREAM))
         images_at = points
         points, radii = self._with_radii(domain, points, spacings, movable, seed)
-        radii = jitter.scale(self.factor * radii, _stream(seed, _SIZE_JITTER_STREAM))
-        directions = tangents(points.positions, points.normals, self.direction, _stream(seed, _ANGLE_STREAM))
+        styles = [(self, np.arange(len(points)))]
+        if zones is not None:
+            parts = zones.styles(self, points.positions, _stream(seed, _ZONE_STREAM))
+            styles = [(style, rows) for style, rows in parts if len(rows)]
+        factors, directions = np.ones(len(points)), np.zeros((len(points), 3), np.float32)
+        for style, rows in styles:
+            factors[rows] = style.factor
+            directions[rows] = style._directions(points, rows, _stream(seed, _ANGLE_STREAM))
+        radii = jitter.scale(factors * radii, _stream(seed, _SIZE_JITTER_STREAM))
+        chosen = np.zeros(len(points), np.int32)
+        for style, rows in styles:
+            chosen[rows] = style._chosen_images(images_at, radii, rows, seed)
         if jitter.angle:
             directions = jitter.turn(directions, points.normals, _stream(seed, _ANGLE_JITTER_STREAM))
         return Decals(
@@ -116,7 +164,7 @@ class Appearance:
             normals=points.normals,
             tangents=directions,
             radii=radii.astype(np.float32),
-            images=self._chosen_images(images_at, radii, seed),
+            images=chosen,
             spill=domain.one_sided(points),
             single_sheets=None if points.heights is None else np.isfinite(points.heights),
         )
@@ -160,12 +208,21 @@ class Appearance:
             domain, centers, spacings, movable, samples, aim, _stream(seed, _TRIAL_STREAM)
         )
 
-    def _chosen_images(self, points: OrientedPoints, radii: Float64Array, seed: int) -> Int32Array:
+    def _directions(self, points: OrientedPoints, rows: Int64Array, seed: int) -> Float32Array:
+        """Return the tangents of some of the points; those of the others decide on a surface's directions."""
+        if callable(self.direction):
+            return tangents(points.positions[rows], points.normals[rows], self.direction, seed)
+        return tangents(points.positions, points.normals, self.direction, seed)[rows]
+
+    def _chosen_images(
+        self, points: OrientedPoints, radii: Float64Array, rows: Int64Array, seed: int
+    ) -> Int32Array:
+        """Return the images of some of the points."""
         if self.choice is ImageChoice.SIZE:
-            return ranked_images(self._shares, radii)
+            return ranked_images(self._shares, radii[rows])
         if self.choice is ImageChoice.CURVATURE:
-            return ranked_images(self._shares, max_curvatures(points.positions, points.normals))
-        return random_images(self._shares, len(points), _stream(seed, _IMAGE_STREAM))
+            return ranked_images(self._shares, max_curvatures(points.positions, points.normals)[rows])
+        return random_images(self._shares, len(points), _stream(seed, _IMAGE_STREAM))[rows]
 
 
 def _stream(seed: int, purpose: int) -> int:

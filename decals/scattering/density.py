@@ -73,8 +73,8 @@ def region_mask(surface: MeshSurface, flags: ArrayLike) -> Callable[[Float32Arra
     surface : MeshSurface
         The mesh. If it has as many faces as vertices, flags are those of the faces.
     flags : array_like
-        True inside the region: for each face, ``bool[m]``, or for each vertex, ``bool[n]``. Of flags at
-        vertices, the border lies half way between a vertex inside and one outside.
+        True inside the region: for each face, ``bool[m]``, or for each vertex, ``bool[n]``; or numbers from 0
+        to 1. Those of vertices are interpolated, and the border lies at 1/2.
 
     Returns
     -------
@@ -102,10 +102,10 @@ def region_mask(surface: MeshSurface, flags: ArrayLike) -> Callable[[Float32Arra
         real_array("flags", flags, InvalidScattering, truths=True),
         (len(surface.faces), len(surface.vertices)),
     )
-    if values.shape not in ((faces,), (vertices,)) or not np.isin(values, (0.0, 1.0)).all():
+    if values.shape not in ((faces,), (vertices,)) or not ((values >= 0.0) & (values <= 1.0)).all():
         raise InvalidScattering(
-            f"flags: expected true or false for each of {faces} faces or {vertices} vertices, "
-            f"got shape {list(values.shape)}"
+            f"flags: expected true or false, or numbers from 0 to 1, for each of {faces} faces or {vertices} "
+            f"vertices, got shape {list(values.shape)}"
         )
     corners = np.repeat(values[:, None], 3, axis=1) if values.shape == (faces,) else values[surface.faces]
 
@@ -185,7 +185,7 @@ class PaintedImage:
 
     def __init__(self, image: AnyImage | ArrayLike, projection: Projection, *, repeat: bool = False) -> None:
         ready = isinstance(image, np.ndarray | list)  # these may be finer than bytes
-        self.grey = _grey_values(
+        self.grey = grey_values(
             cast(ArrayLike, image) if ready else as_bytes(image_pixels(cast(AnyImage, image)))
         )
         if not callable(projection):
@@ -246,7 +246,7 @@ class PaintedImage:
         return np.clip(ticks, 0, count - 1).astype(np.int64)
 
 
-def _grey_values(image: ArrayLike) -> Float64Array:
+def grey_values(image: ArrayLike) -> Float64Array:
     """Return the brightness of each pixel, ``float64[h, w]``."""
     pixels = np.asarray(image)
     is_color = pixels.ndim == 3 and pixels.shape[2] in (3, 4)

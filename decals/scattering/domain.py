@@ -192,7 +192,7 @@ class Domain:
         """Return the relative density, ``float64[n]``, or raise `InvalidScattering` for invalid values."""
         if self._density is None or len(positions) == 0:
             return np.ones(len(positions))
-        return _values_at("density", self._density, positions)
+        return checked_values("density", self._density, positions)
 
     def boundary(self, spacing: float) -> Boundary | None:
         """Return the open boundaries for particles about a spacing apart; None without an open mesh."""
@@ -277,16 +277,7 @@ class Domain:
             return OrientedPoints.empty()
         if not self.surfaces:
             raise InvalidScattering("fixed: expected a surface for them to lie on, got none")
-        points = point_array(fixed, "fixed")
-        candidates = [surface.project(points) for surface in self.surfaces]
-        gaps = np.stack([np.linalg.norm(positions - points, axis=1) for positions, _ in candidates])
-        nearest = gaps.argmin(axis=0)
-        rows = np.arange(len(points))
-        return OrientedPoints(
-            np.stack([positions for positions, _ in candidates])[nearest, rows],
-            np.stack([normals for _, normals in candidates])[nearest, rows],
-            nearest.astype(np.int32),
-        )
+        return on_nearest(self.surfaces, point_array(fixed, "fixed"))
 
     def sample(self, counts: Int64Array, stream: int) -> OrientedPoints:
         """Sample exact numbers of random visible points of each surface, stratified by area and density."""
@@ -337,7 +328,7 @@ class Domain:
 
     def _outside_mask(self, positions: Float32Array) -> BoolArray:
         assert self._mask is not None
-        return ~_values_at("mask", self._mask, positions).astype(np.bool_)
+        return ~checked_values("mask", self._mask, positions, truths=True).astype(np.bool_)
 
     def _stream(self, index: int, stream: int) -> int:
         """Derive the seed of one surface's samples for one purpose."""
@@ -345,17 +336,37 @@ class Domain:
         return int(words[0])
 
 
-def as_surfaces(models: object) -> tuple[Surface, ...]:
-    """Return one model or several as a tuple of surfaces, or raise `InvalidScattering`."""
-    several = tuple(models) if isinstance(models, list | tuple) else (models,)
+def listed(models: object) -> list[object]:
+    """Return one model or several as a list."""
+    several = list(models) if isinstance(models, list | tuple) else [models]
     if all(is_surface(model) for model in several):
         return several
-    from decals.surfaces.convert import as_surface, is_model  # imports pyvista, which surfaces do not need
+    from decals.surfaces.convert import is_model  # imports pyvista, which surfaces do not need
 
     members = None if is_model(models) else items(models)
-    return tuple(
-        as_surface(model, name="surfaces", error=InvalidScattering)
-        for model in ((models,) if members is None else members)
+    return [models] if members is None else list(members)
+
+
+def as_surfaces(models: object) -> tuple[Surface, ...]:
+    """Return one model or several as a tuple of surfaces, or raise `InvalidScattering`."""
+    several = listed(models)
+    if all(is_surface(model) for model in several):
+        return tuple(cast("list[Surface]", several))
+    from decals.surfaces.convert import as_surface
+
+    return tuple(as_surface(model, name="surfaces", error=InvalidScattering) for model in several)
+
+
+def on_nearest(surfaces: Sequence[Surface], points: Float32Array) -> OrientedPoints:
+    """Project points (n, 3) onto those of the surfaces that they are closest to, the first at a tie."""
+    candidates = [surface.project(points) for surface in surfaces]
+    gaps = np.stack([np.linalg.norm(positions - points, axis=1) for positions, _ in candidates])
+    nearest = gaps.argmin(axis=0)
+    rows = np.arange(len(points))
+    return OrientedPoints(
+        np.stack([positions for positions, _ in candidates])[nearest, rows],
+        np.stack([normals for _, normals in candidates])[nearest, rows],
+        nearest.astype(np.int32),
     )
 
 
@@ -427,17 +438,21 @@ def _choose_evenly(weights: Float64Array, count: int) -> Int64Array:
     return rows
 
 
-def _values_at(
-    name: str, function: Callable[[Float32Array], ArrayLike], positions: Float32Array
+def checked_values(
+    name: str,
+    function: Callable[[Float32Array], ArrayLike],
+    positions: Float32Array,
+    *,
+    truths: bool = False,
 ) -> Float64Array:
-    """Return the checked values of the user's density or mask at positions."""
-    values = function_values(name, function, positions, error=InvalidScattering, truths=name == "mask")
+    """Return the checked values of the user's density, or with ``truths`` of a mask, at positions."""
+    values = function_values(name, function, positions, error=InvalidScattering, truths=truths)
     if values.shape != (len(positions),):
         raise InvalidScattering(
             f"{name}: expected shape [{len(positions)}], got {list(values.shape)}; "
             "return one number for each point"
         )
-    if not np.isfinite(values).all() or (name == "density" and not (values > 0).all()):
+    if not np.isfinite(values).all() or not (truths or (values > 0).all()):
         raise InvalidScattering(
             f"{name}: expected finite numbers, and densities above zero; bar regions by a mask"
         )

@@ -10,7 +10,7 @@ from blobtree.progress import Progress, reporting
 from blobtree.validation import point_array, truth
 from decals.errors import InvalidScattering
 from decals.model import Decals
-from decals.scattering.appearance import Appearance
+from decals.scattering.appearance import Appearance, PlacedZones
 from decals.scattering.domain import (
     Density,
     Domain,
@@ -489,10 +489,11 @@ class Relaxation:
         sizing: Sizing | str = Sizing.COVERING,
         factor: float = 1.0,
         direction: Direction = None,
-        images: int = 1,
+        images: int | Sequence[int] = 1,
         weights: ArrayLike | None = None,
         choice: ImageChoice | str = ImageChoice.RANDOM,
         jitter: Jitter | None = None,
+        zones: PlacedZones | None = None,
     ) -> Decals:
         """Return a decal for each particle.
 
@@ -502,6 +503,8 @@ class Relaxation:
             Seed of the random choices in this call; `decals.scatter` passes its own.
         sizing, factor, direction, images, weights, choice, jitter
             Radii, tangents and images, as for `decals.scatter`.
+        zones : optional
+            Zones as `decals.scattering.Zones.placed_on` returns them.
 
         Returns
         -------
@@ -517,4 +520,4 @@ class Relaxation:
         if self.count == 0:
             return Decals.empty()
         spacings = self.sizes_at(self.positions)
-        return appearance.decals_of(self.points, self.domain, spacings, ~self._fixed, seed=seed)
+        return appearance.decals_of(self.points, self.domain, spacings, ~self._fixed, seed=seed, zones=zones)

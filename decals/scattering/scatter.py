@@ -3,18 +3,20 @@
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike
 
 from blobtree.device import known_device
 from blobtree.kernels import load_together
 from blobtree.progress import Progress, reporting
+from blobtree.validation import describe
 from decals.errors import InvalidScattering
 from decals.index.build_kernels import list_cells
 from decals.model import Decals
 from decals.options import Values
-from decals.scattering.appearance import Appearance
-from decals.scattering.domain import Density, Mask, as_surfaces
+from decals.scattering.appearance import Appearance, ZonesOfModels
+from decals.scattering.domain import Density, Mask, as_surfaces, listed
 from decals.scattering.neighbors import CLOSE_DISTANCE
 from decals.scattering.orientation import Direction
 from decals.scattering.relaxation import Relaxation
@@ -53,10 +55,11 @@ def scatter(
     sizing: Sizing | str = Sizing.COVERING,
     factor: Annotated[float, Values(0.2, 2.0, label="radius factor")] = 1.0,
     direction: Direction = None,
-    images: int = 1,
+    images: int | Sequence[int] = 1,
     weights: ArrayLike | None = None,
     choice: Annotated[ImageChoice | str, Values(label="image choice")] = ImageChoice.RANDOM,
     jitter: Jitter | None = None,
+    zones: ZonesOfModels | None = None,
     device: str = "cpu",
     progress: Progress | None = None,
     cancel: Callable[[], bool] | None = None,
@@ -94,14 +97,18 @@ def scatter(
     direction : array_like, callable, Orientation or str, optional
         Direction of the images' u axes: a vector, a function of ``points[n, 3]`` to ``vectors[n, 3]``, or an
         `Orientation`, ``"curvature"`` or ``"cross"``. Random by default.
-    images : int, default: 1
-        Number of images to choose from.
+    images : int or sequence of int, default: 1
+        Number of images to choose from, or the numbers of some, such as ``[2, 5]``.
     weights : array_like, optional
-        Relative frequency of each image, ``float[images]``; equal by default.
+        Relative frequency of each of these images; equal by default.
     choice : ImageChoice or str, default: ImageChoice.RANDOM
         Rule for the image of each decal: ``"random"``, ``"size"`` or ``"curvature"``.
     jitter : Jitter, optional
         Random deviations of positions, radii and directions; none by default.
+    zones : Zones, optional
+        Parts of the surfaces with decals of their own, see `decals.scattering.Zones`. What a zone does not
+        state, and `count`, are those of this call. If zones state their spacing, give no `count` or
+        `spacing`.
     device : str, default: "cpu"
         Warp device of the relaxation, such as ``"cuda:0"``.
     progress : callable, optional
@@ -136,13 +143,25 @@ def scatter(
     >>> int((half.positions[:, 1] < 0).sum())
     40
     """
-    checked_surfaces = as_surfaces(surfaces)
+    models = listed(surfaces)
+    checked_surfaces = as_surfaces(models)
     check_regularity(regularity)
     function_or_none("progress", progress, InvalidScattering)
-    Appearance(sizing, factor, direction, images, weights, choice, jitter)  # check before the long work
+    base = Appearance(sizing, factor, direction, images, weights, choice, jitter)  # before the long work
+    if zones is not None and not hasattr(zones, "placed_on"):
+        raise InvalidScattering(f"zones: expected such as Zones(Zone(…)), got {describe(zones)}")
     with reporting(progress) as report:
         device = known_device(device)
         load_together([*_projections(checked_surfaces), *SCATTER_KERNELS], device)
+        placed = None
+        if zones is not None:
+            placed = zones.placed_on(models, density=density, mask=mask, seed=seed, device=device)
+            placed.styles(base, np.zeros((0, 3), np.float32), seed)  # check before the long work
+            density, mask = placed.density, placed.mask
+            if placed.spacing is not None:
+                if (count, spacing) != (None, None):
+                    raise InvalidScattering("expected no count or spacing beside those of the zones, got one")
+                spacing = placed.spacing
         relaxation = Relaxation(
             checked_surfaces,
             count=count,
@@ -172,6 +191,7 @@ def scatter(
                 weights=weights,
                 choice=choice,
                 jitter=jitter,
+                zones=placed,
             )
             report_radii("measuring radii", 1.0)
     return decals

@@ -1,5 +1,6 @@
 """Variation of decals: jitter of positions, radii and tangents, and the choice of images."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated
@@ -8,12 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
+from blobtree.validation import items
 from decals.errors import InvalidScattering
 from decals.model import MAX_IMAGES
 from decals.options import Values
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.surfaces.surface import unit_rows
-from decals.validation import allowed_number, count_number, real_array
+from decals.validation import allowed_number, count_number, real_array, whole_number
 
 
 @dataclass(frozen=True)
@@ -128,18 +130,35 @@ class ImageChoice(Enum):
     """By curvature: the first image where the surface is flattest, the last where it bends most."""
 
 
-def image_shares(images: int, weights: ArrayLike | None) -> Float64Array:
-    """Return the share of each image, ``float64[images]``, or raise `InvalidScattering`."""
-    images = count_number("images", images, 1, MAX_IMAGES, InvalidScattering)
+def image_shares(images: int | Sequence[int], weights: ArrayLike | None) -> Float64Array:
+    """Return the share of each image up to the last that has one, or raise `InvalidScattering`.
+
+    `images` is a number of images, or the numbers of some; `weights` has one for each of them.
+    """
+    numbers = items(images)
+    if numbers is None:
+        count = count_number("images", images, 1, MAX_IMAGES, InvalidScattering)
+    else:
+        numbers = tuple(
+            whole_number("images", number, 0, MAX_IMAGES - 1, InvalidScattering) for number in numbers
+        )
+        count = len(numbers)
+        if count == 0 or len(set(numbers)) < count:
+            raise InvalidScattering(f"images: expected different numbers of images, got {list(numbers)}")
     if weights is None:
-        return np.full(images, 1.0 / images)
-    values = real_array("weights", weights, InvalidScattering)
-    if values.shape != (images,):
-        raise InvalidScattering(f"weights: expected shape [{images}], got {list(values.shape)}")
-    if not (np.isfinite(values).all() and (values >= 0).all() and values.sum() > 0):
-        raise InvalidScattering("weights: expected finite numbers from 0 upward, one of them above 0")
-    shares: Float64Array = values / values.sum()
-    return shares
+        shares = np.full(count, 1.0 / count)
+    else:
+        values = real_array("weights", weights, InvalidScattering)
+        if values.shape != (count,):
+            raise InvalidScattering(f"weights: expected shape [{count}], got {list(values.shape)}")
+        if not (np.isfinite(values).all() and (values >= 0).all() and values.sum() > 0):
+            raise InvalidScattering("weights: expected finite numbers from 0 upward, one of them above 0")
+        shares = values / values.sum()
+    if numbers is None:
+        return shares
+    of_all = np.zeros(max(numbers) + 1)
+    of_all[list(numbers)] = shares
+    return of_all
 
 
 def random_images(shares: Float64Array, count: int, seed: int) -> Int32Array:

@@ -41,7 +41,8 @@ OF_PACKAGES = {
     ],
     "scattering": [
         "Creases", "Cylindrical", "ImageChoice", "Jitter", "Orientation", "PaintedImage", "Planar",
-        "Spherical", "TextureCoordinates", "gradient_of", "region_mask", "remeshed_points", "vertex_density",
+        "Spherical", "TextureCoordinates", "Zone", "Zones", "gradient_of", "region_mask", "remeshed_points",
+        "vertex_density",
     ],
     "surfaces": [
         "BaseColor", "BaseTexture", "ImplicitSurface", "MeshCheck", "MeshSurface", "Model", "Surface", "Wrap",

@@ -102,7 +102,7 @@ APPEARANCE_ARGUMENTS: list[tuple[str, list[Any]]] = [
     ("sizing", ["x", None, 5]),
     ("factor", ["x", 0, -1, NAN, np.inf, None, [1]]),
     ("direction", ["x", 5, [1, 2], [NAN, 0, 0], fail, lambda p: None, lambda p: p[:2], {}]),
-    ("images", ["x", 0, -1, 1.5, None, [3], 10**9, True]),
+    ("images", ["x", 0, -1, 1.5, None, [3, 3], 10**9, True]),
     ("weights", ["x", [1, 2], [NAN], [-1], [0], [[1]], {}, 5, ["a"], fail]),
     ("choice", ["x", None, 5]),
     ("jitter", ["x", 5, True]),
