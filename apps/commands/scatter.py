@@ -18,6 +18,7 @@ from decals.apps.commands.options import (
     check_count,
 )
 from decals.apps.commands.progress_bars import preparing
+from decals.apps.commands.zone_options import parse_zones
 from decals.apps.models.loading import load_models
 from decals.apps.models.samples import axes_of
 from decals.apps.models.tables import ASPECT, scale_images
@@ -49,6 +50,8 @@ def scatter(
     painted: Annotated[Path | None, Parameter(show_default=False)] = None,
     painted_along: Annotated[Literal["x", "y", "z"] | None, Parameter(show_default=False)] = None,
     black: Annotated[float | None, Parameter(show_default=False)] = None,
+    zone: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
+    border_width: Annotated[float | None, Parameter(show_default=False)] = None,
     regularity: float = 1.0,
     seed: Whole = 0,
     crease_angle: CreaseAngle = None,
@@ -84,9 +87,16 @@ def scatter(
     painted
         An image file, projected onto the models, that sets the density of decals: highest where it is white.
     painted_along
-        Axis of that projection. Default: z.
+        Axis of that projection, and of those of zones. Default: z.
     black
         Density where the image is black, as a fraction of that where it is white. Default: 0.1.
+    zone
+        A zone with decals of its own, such as "head:spacing=0.1,images=0+2". Where: the name of a model, of a
+        node of a tree or of a label; a tree file, for the inside of its solid; an image file, where it is
+        bright; or * for everywhere else. Keys: density, spacing, factor, images, along. May be repeated; the
+        first zone at a place counts.
+    border_width
+        Width of the band in which decals of neighbouring zones mix. Default: 0, they press each other.
     regularity
         From 0 (random positions) to 1 (as even as possible).
     seed
@@ -94,13 +104,13 @@ def scatter(
     """
     if count is not None and spacing is not None:
         raise InvalidInput("expected --count or --spacing, got both; leave one of them out")
-    if painted is None and (painted_along is not None or black is not None):
+    if painted is None and ((painted_along is not None and not zone) or black is not None):
         raise InvalidInput(
             "--painted-along and --black change a painted image; give --painted, or leave them out"
         )
+    if border_width is not None and not zone:
+        raise InvalidInput("--border-width is that of zones; give --zone, or leave it out")
     painted_along, black = painted_along or "z", 0.1 if black is None else black
-    if count is None and spacing is None:
-        count = 500
     if count is not None:
         check_count("--count", count, 0, MAX_DECALS)
     if images is not None:
@@ -130,7 +140,18 @@ def scatter(
             "images": len(pictures),
             "choice": choice,
         }
-        decals = scatter_decals(surfaces, density=density, seed=seed, progress=progress, **options)
+        if zone:
+            options["zones"] = zones = parse_zones(
+                zone,
+                border_width or 0.0,
+                objects,
+                axis=painted_along,
+                images=len(pictures),
+                trust=trust,
+            )
+        if count is None and spacing is None and not (zone and zones.have_spacings):
+            options["count"] = 500
+        decals = scatter_decals(list(objects), density=density, seed=seed, progress=progress, **options)
         if output.suffix.lower() in TABLE_SUFFIXES:
             save_table(decals, output, images=own, origin=objects[0].origin)
         else:

@@ -210,6 +210,14 @@ class Zones:
             "border_width", border_width, "a width from 0 upward", lambda width: width >= 0, InvalidScattering
         )
 
+    def __repr__(self) -> str:
+        return f"Zones({len(self.zones)} zones, border_width={self.border_width:g})"
+
+    @property
+    def have_spacings(self) -> bool:
+        """True if the zones state their spacings, from which the number of decals follows."""
+        return self.zones[0].spacing is not None
+
     def placed_on(
         self,
         models: object,

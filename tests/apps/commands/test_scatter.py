@@ -7,8 +7,11 @@ import pytest
 import pyvista as pv
 from PIL import Image
 
-from decals import Camera, Scene, load_scene, save_scene
+from blobtree import Point, Segment, save
+from decals import Camera, Scene, TreeObject, load_scene, reproduce, save_scene
 from decals.apps.cli import run
+from decals.scenes.cover import fitting_camera
+from decals.scenes.scene import as_images
 from tests.apps.commands.pictures import picture
 
 Capture = pytest.CaptureFixture[str]
@@ -109,9 +112,44 @@ def test_a_painted_image_sets_the_density(folder: Path) -> None:
     assert (positions[:, 2] < 0).sum() == pytest.approx(40, abs=4)  # seen from +y, z runs to the right
 
 
+def test_zones_by_solids_names_images_and_the_rest(folder: Path) -> None:
+    tree = Point((0, 0, 0), radius=1.0) + Segment((0.8, 0, 0), (2.2, 0, 0), radius=0.35)
+    body = TreeObject("body", tree, names={(1,): "limb"})
+    save_scene(
+        Scene(objects=[body], camera=fitting_camera([body]), images=as_images(["tile"] * 4)), "body.json"
+    )
+    save(Point((0, 1, 0), radius=0.7), "mask.json")
+    Image.fromarray(np.array([[255, 0]], np.uint8).repeat(8, axis=1)).save(folder / "left.png")
+    zones = ["mask.json:density=4,images=1", "limb:images=2+3,along=curvature", "left.png:images=0"]
+    options = [text for zone in zones for text in ("--zone", zone)]
+    assert run(["scatter", "body.json", "--count", "120", *options, "-o", "scene.json"]) == 0
+    decals = load_scene(folder / "scene.json").decals
+    assert len(decals) == 120
+    in_mask = np.linalg.norm(decals.positions - [0, 1, 0], axis=1) < 0.7
+    assert np.array_equal(decals.images == 1, in_mask)
+    assert (decals.images[in_mask] == 1).sum() > 20
+    assert decals.positions[decals.images >= 2, 0].min() > 0.9
+    assert decals.positions[decals.images == 0, 0].max() < 0.8  # the middle of the picture
+
+
+def test_spacings_of_zones_set_the_count(folder: Path) -> None:
+    pv.Sphere(radius=0.5).save(folder / "ball.ply")
+    zones = ["--zone", "ball:spacing=0.2", "--border-width", "0.1"]
+    assert run(["scatter", "ball.ply", *zones, "-o", "scene.json"]) == 0
+    scene = load_scene(folder / "scene.json")
+    assert len(scene.decals) == pytest.approx(np.pi / (0.2**2 * np.sqrt(0.75)), abs=3)
+    assert "zones" in reproduce(scene).missing[0]
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["--zone", "tail", "-o", "a.json"], "expected a name of the models, which have 'spheres'"),
+        (["--zone", "*:taste=1", "-o", "a.json"], "expected WHERE:KEY=VALUE"),
+        (["--zone", "*:density=much", "-o", "a.json"], "expected WHERE:KEY=VALUE"),
+        (["--zone", "*:images=1", "-o", "a.json"], "there are 1 images, from 0 on; raise --images"),
+        (["--zone", "*:spacing=0.5", "--count", "5", "-o", "a.json"], "no count or spacing beside"),
+        (["--border-width", "0.1", "-o", "a.json"], "give --zone"),
         (["--regularity", "2", "-o", "a.json"], "regularity: expected a number from 0 to 1"),
         (["--painted", "none.png", "-o", "a.json"], "found no file"),
         (["--count", "5", "--spacing", "0.1", "-o", "a.json"], "--count or --spacing"),
