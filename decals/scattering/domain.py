@@ -153,18 +153,24 @@ class Domain:
                 numbers[rows] += len(self.surfaces) * surface.parts(points.positions[rows])
         return numbers
 
+    @property
+    def sheeted(self) -> list[int]:
+        """Indices of the meshes that have several sheets."""
+        return [
+            index
+            for index, surface in enumerate(self.surfaces)
+            if isinstance(surface, MeshSurface) and surface.sheet_areas.size > 1
+        ]
+
     def sheets(self, points: OrientedPoints, least_area: float) -> Int64Array | None:
         """Return numbers (n,) of the sheets that points lie on; None if there are not several in any mesh.
 
         Sheets of a smaller area than the least one are −1: they have too few decals to keep to themselves.
         """
-        several = [
-            isinstance(surface, MeshSurface) and surface.sheet_areas.size > 1 for surface in self.surfaces
-        ]
-        if not any(several):
+        if not self.sheeted:
             return None
         numbers = points.surface_ids.astype(np.int64)
-        for index in np.flatnonzero(several):
+        for index in self.sheeted:
             surface = cast("MeshSurface", self.surfaces[index])
             rows = np.flatnonzero(points.surface_ids == index)
             faces = np.searchsorted(surface.sound, surface.locate(points.positions[rows])[0])

@@ -10,21 +10,22 @@ from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.neighbors import FacingTree, NearestFacing, NeighborQuery
 from decals.scattering.particle_state import ParticleState
 
-SAMPLES_PER_PARTICLE = 24
-"""Samples for each particle among which gaps are looked for."""
+WIDE_GAP = 0.8
+"""Distance from the nearest particle, in spacings, from which a point lies in a wide gap. In a hexagonal
+tiling no point is farther than 0.577, in a square one 0.658."""
 
-WIDE_GAP = 0.74
-"""Distance from the nearest particle, in spacings, from which a sample lies in a wide gap. In a hexagonal
-tiling no point is farther than 0.577."""
+WIDE_CELL = 0.72
+"""Reach of a cell in the tangent plane, in spacings, from which its border is looked at on the surface."""
 
 GAP_REACH = 1.5
-"""Largest distance of a sample from its nearest particle, in spacings; farther ones lie on scraps."""
+"""Largest distance of a point from its nearest particle, in spacings; farther ones lie on scraps."""
+
+OWN = 1.02
+"""Ratio of a point's distances from a particle and from the nearest one up to which it is of the particle's
+cell: points on the border of a cell are as far from others."""
 
 EVEN = 1.1
 """Largest ratio of spacings at which the density counts as even."""
-
-MIN_SAMPLES = 2
-"""Least number of samples of a wide gap; the corner of a square has fewer."""
 
 ROUNDS = 8
 """Largest number of rounds of moves."""
@@ -47,8 +48,6 @@ MIN_DISTANCE = 0.7
 NEIGHBORS = 8
 """Nearest decals whose largest radius must fall when a decal moves."""
 
-_SAMPLE_STREAM = 11
-
 Aim: TypeAlias = Callable[[OrientedPoints], OrientedPoints]
 """A function of centres, with the normals of their surfaces, to these with the normals of decals there."""
 
@@ -56,7 +55,7 @@ Aim: TypeAlias = Callable[[OrientedPoints], OrientedPoints]
 def fill_gaps(state: ParticleState, least: float) -> None:
     """Move particles beside wide gaps; gaps remain along lips and ragged boundaries.
 
-    A particle beside a wide gap moves toward the centre of the least ball around the samples nearest to it.
+    A particle beside a wide gap moves toward the centre of the least ball around its Voronoi cell.
     It stays if another particle would be nearer than before, and nearer than `least`. Where the density is
     not even, all stay: wide gaps belong beside its steps.
 
@@ -70,24 +69,42 @@ def fill_gaps(state: ParticleState, least: float) -> None:
     sizes = state.host_sizes
     if sizes.max() > EVEN * sizes.min():
         return
-    counts = np.bincount(state.surface_ids, minlength=len(state.domain.surfaces))
-    samples = state.domain.sample(SAMPLES_PER_PARTICLE * counts, stream=_SAMPLE_STREAM)
-    query = NeighborQuery(state, GAP_REACH)
+    query = NeighborQuery(state, 2.0 * GAP_REACH)
+    near = np.arange(state.count)
     for _ in range(ROUNDS):
-        gaps, owners = query.owners(samples.positions, samples.normals)
-        in_gap = (owners >= 0) & (gaps > WIDE_GAP) & state.movable[owners]
-        found, counts = np.unique(owners[in_gap], return_counts=True)
-        rows = found[counts >= MIN_SAMPLES]
+        rows = near[state.movable[near]]
+        rows = rows[query.cells(rows, outlines=False)[0] > WIDE_CELL]
+        points = state.points()
+        outlines, owners = _outlines(state, query, points, rows)
+        gaps = query.owners(outlines.positions, outlines.normals)[0]
+        own = np.linalg.norm(outlines.positions - points.positions[owners], axis=1)
+        owners = np.where(own <= OWN * state.spacing * gaps, owners, -1)
+        rows = np.unique(owners[(owners >= 0) & (gaps > WIDE_GAP)])
         if len(rows) == 0:
             break
-        points = state.points()
-        moved = _moved(state.domain, points, rows, samples.positions, owners)
-        tree = FacingTree(points.positions, points.normals)
-        keep = np.flatnonzero(_far_enough(tree, points, moved, rows, sizes, least))
+        moved = _moved(state.domain, points, rows, outlines.positions, owners)
+        now, then = (
+            query.apart(some, rows).astype(np.float64) * sizes[rows] for some in (points[rows], moved)
+        )
+        keep = np.flatnonzero(_far_enough(moved, now, then, least * sizes[rows]))
         if len(keep) == 0:
             break
-        state.move_to(rows[keep], moved.positions[keep], moved.normals[keep])
+        left, rows, moved = points.positions[rows[keep]], rows[keep], moved[keep]
+        state.move_to(rows, moved.positions, moved.normals)
         query.refresh()
+        near = query.near(np.concatenate([left, moved.positions]))
+
+
+def _outlines(
+    state: ParticleState, query: NeighborQuery, points: OrientedPoints, rows: Int64Array
+) -> tuple[OrientedPoints, Int64Array]:
+    """Return the points of the surfaces on the borders of some particles' cells, and the particle of each."""
+    outlines = query.cells(rows)[1]
+    around = np.repeat(rows, outlines.shape[1])
+    flat = OrientedPoints(outlines.reshape(-1, 3), points.normals[around], points.surface_ids[around])
+    projected, allowed = state.domain.project(flat)
+    found = np.flatnonzero(allowed)
+    return projected[found], around[found]
 
 
 def center_outsized(
@@ -131,7 +148,8 @@ def center_outsized(
             break
         moved = _moved(domain, centers, rows, samples.positions, owners)
         tree = FacingTree(centers.positions, centers.normals)
-        keep = np.flatnonzero(_far_enough(tree, centers, moved, rows, sizes, MIN_DISTANCE))
+        now, then = (_apart(tree, some, rows) for some in (centers[rows], moved))
+        keep = np.flatnonzero(_far_enough(moved, now, then, MIN_DISTANCE * sizes[rows]))
         rows, moved = rows[keep], moved[keep]
         if len(rows) == 0:
             break
@@ -195,23 +213,28 @@ def _center(points: Float64Array, start: Float64Array) -> Float64Array:
     return center
 
 
+def _apart(tree: FacingTree, points: OrientedPoints, own: Int64Array) -> Float64Array:
+    """Return the distance of each point to the nearest centre of a tree but its own."""
+    distances, others = tree.nearest(points.positions, points.normals, count=2)
+    nearest: Float64Array = np.where(others == own[:, None], np.inf, distances).min(axis=1)
+    return nearest
+
+
 def _far_enough(
-    tree: FacingTree,
-    points: OrientedPoints,
-    moved: OrientedPoints,
-    rows: Int64Array,
-    sizes: Float32Array,
-    least: float,
+    moved: OrientedPoints, now: Float64Array, then: Float64Array, least: Float32Array
 ) -> BoolArray:
-    """Return True for moves after which no particle is too near, also none that moves at the same time."""
-    before = points[rows]
-    distances, others = tree.nearest(before.positions, before.normals, count=2)
-    now = np.where(others[:, 0] == rows, distances[:, 1], distances[:, 0])
-    near, which = tree.nearest(moved.positions, moved.normals, count=2)
-    fixed = np.where(which == rows[:, None], np.inf, near).min(axis=1)
-    apart = np.linalg.norm(moved.positions[:, None].astype(np.float64) - moved.positions, axis=2)
-    np.fill_diagonal(apart, np.inf)
-    apart[moved.normals @ moved.normals.T < 0] = np.inf
-    limit = np.minimum(least * sizes[rows], now)
-    enough: BoolArray = (fixed >= limit) & (apart.min(axis=1, initial=np.inf) >= limit)
+    """Return True for moves after which no particle is too near, also none that moves at the same time.
+
+    Parameters
+    ----------
+    moved
+        The particles after their moves.
+    now, then
+        Distance of each to the nearest other particle, before and after its move alone.
+    least
+        Distance that is enough.
+    """
+    tree = FacingTree(moved.positions, moved.normals)
+    apart = tree.nearest(moved.positions, moved.normals, skip_self=True)[0][:, 0]
+    enough: BoolArray = np.minimum(then, apart) >= np.minimum(least, now)
     return enough

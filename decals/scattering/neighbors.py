@@ -12,12 +12,16 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.device import launch
 from blobtree.progress import check_cancelled
 from decals.model import FACING_LIMIT
+from decals.scattering.domain import OrientedPoints
 from decals.scattering.particle_state import ParticleState
-from decals.scattering.repulsion import make_grid, neighbor_search, particle_struct
+from decals.scattering.repulsion import make_grid, neighbor_search, no_mirror_planes, particle_struct
 from decals.scattering.search_kernels import (
+    DIRECTIONS,
     MirrorPlanes,
     Particles,
     mark_local_maxima,
+    mark_near,
+    measure_cells,
     nearest_distances,
     nearest_particles,
     ring_distances,
@@ -105,10 +109,45 @@ class NeighborQuery:
         points = particle_struct(vectors(positions, state.device), vectors(normals, state.device))
         distances = self._empty(len(positions))
         owners: Any = wp.empty(len(positions), dtype=wp.int32, device=state.device)
-        search = neighbor_search(self._grid, self._reach * state.spacing, varied=False)
+        search = self._search_by_length()
         inputs = [search, state.particles, points]
         launch(nearest_particles, len(positions), inputs, [distances, owners], device=state.device)
         return distances.numpy() / np.float32(state.spacing), owners.numpy().astype(np.int64)
+
+    def apart(self, points: OrientedPoints, own: Int64Array) -> Float32Array:
+        """Return the distance of each point to the nearest particle but its own, in spacings, ``float32[n]``.
+
+        As `nearest`, without images behind mirror planes.
+        """
+        state = self._state
+        sizes: Any = wp.array(state.host_sizes[own], dtype=wp.float32, device=state.device)
+        positions, normals = (vectors(rows, state.device) for rows in (points.positions, points.normals))
+        particles = particle_struct(positions, normals, sizes, state.sheets_of(points))
+        mirrors = no_mirror_planes(state.device)
+        distances: Float32Array = self.nearest(particles, index_array(own, state.device), mirrors).numpy()
+        return distances
+
+    def cells(self, rows: Int64Array, *, outlines: bool = True) -> tuple[Float32Array, Float32Array]:
+        """Return how far the cells of some particles reach, in spacings, and points on their borders.
+
+        Cells are those of `measure_cells` and end at half the reach. The points are ``float32[k, 24, 3]``,
+        in the tangent planes, or empty without `outlines`. All spacings count as the typical one.
+        """
+        state = self._state
+        radii = self._empty(len(rows))
+        points: Any = wp.empty(DIRECTIONS * len(rows) if outlines else 0, dtype=wp.vec3, device=state.device)
+        search = self._search_by_length()
+        inputs = [search, state.particles, index_array(rows, state.device)]
+        launch(measure_cells, len(rows), inputs, [radii, points], device=state.device)
+        return radii.numpy() / np.float32(state.spacing), points.numpy().reshape(-1, DIRECTIONS, 3)
+
+    def near(self, positions: Float32Array) -> Int64Array:
+        """Return the particles within the reach of any of some positions; all spacings count as typical."""
+        state = self._state
+        flags: Any = wp.zeros(state.count, dtype=wp.int32, device=state.device)
+        inputs = [self._search_by_length(), state.particles, vectors(positions, state.device)]
+        launch(mark_near, len(positions), inputs, [flags], device=state.device)
+        return np.flatnonzero(flags.numpy())
 
     def nearest_of(self, rows: Int64Array) -> Float32Array:
         """Return `nearest` for some particles of the state, ``float32[k]``."""
@@ -132,6 +171,9 @@ class NeighborQuery:
 
     def _search(self) -> Any:
         return neighbor_search(self._grid, self._reach, varied=self._state.varied)
+
+    def _search_by_length(self) -> Any:
+        return neighbor_search(self._grid, self._reach * self._state.spacing, varied=False)
 
     def _empty(self, count: int) -> Any:
         return wp.empty(count, dtype=wp.float32, device=self._state.device)

@@ -151,8 +151,8 @@ class ParticleState:
 
     def number_sheets(self) -> None:
         """Set the sheets of the particles, after they moved."""
-        sheets = self.sheets_of(self.points())
-        if sheets is not None:
+        if self.domain.sheeted:
+            sheets = self.sheets_of(self.points())
             self._current.particles.sheets = self._proposed.particles.sheets = sheets
 
     def sheets_of(self, points: OrientedPoints) -> Any:

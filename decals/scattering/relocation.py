@@ -32,6 +32,9 @@ GAP_REACH = 1.5
 CANDIDATES_PER_MOVER, CANDIDATES_PER_PARTICLE = 200, 4
 """Candidate points for each particle that moves, and at most for each particle."""
 
+MAX_CANDIDATES = 500_000
+"""Largest number of candidates: more take longer to draw than all steps of a million particles on a GPU."""
+
 THIN_REACH, THIN_SHARE = 4.0, 0.45
 """Distance in spacings within which a thin part has less than this share of the area of a disc."""
 
@@ -74,14 +77,16 @@ class Relocation:
 
     def _next_batch(self, mover_count: int, count: int) -> tuple[OrientedPoints, Float32Array]:
         """Return enough points for some movers of `count` particles, and the spacings there."""
-        points, sizes = self._drawn(CANDIDATES_PER_PARTICLE * count)
+        points, sizes = self._drawn(count)
         batch_size = min(len(points), CANDIDATES_PER_MOVER * mover_count + 1000)
         rows = (self._next + np.arange(batch_size)) % len(points)
         self._next = (self._next + batch_size) % len(points)
         return points[rows], sizes[rows]
 
-    def _drawn(self, count: int) -> tuple[OrientedPoints, Float32Array]:
+    def _drawn(self, particles: int) -> tuple[OrientedPoints, Float32Array]:
+        """Return the candidates for so many particles, and the spacings there."""
         if self._points is None or self._sizes is None:
+            count = min(CANDIDATES_PER_PARTICLE * particles, MAX_CANDIDATES)
             points = self._domain.sample(apportion(self._domain.masses, count), stream=_CANDIDATE_STREAM)
             self._points = points[np.random.default_rng(_CANDIDATE_STREAM).permutation(count)]
             self._sizes = self._sizes_at(self._points.positions)
@@ -95,11 +100,11 @@ class Relocation:
         """
         from scipy.spatial import cKDTree  # most domains have no thin parts
 
-        points, sizes = self._drawn(CANDIDATES_PER_PARTICLE * count)
+        points, sizes = self._drawn(count)
         tree = cKDTree(points.positions)
         if self._thin is None:
             nearby = tree.query_ball_point(points.positions, THIN_REACH * sizes, return_length=True)
-            flat = CANDIDATES_PER_PARTICLE * np.pi * THIN_REACH**2 / (0.5 * np.sqrt(3.0))
+            flat = len(points) / count * np.pi * THIN_REACH**2 / (0.5 * np.sqrt(3.0))
             self._thin = nearby < THIN_SHARE * flat
         return np.asarray(self._thin[tree.query(positions)[1]], np.bool_)
 

@@ -22,6 +22,7 @@ from decals.scattering.search_kernels import (
     NeighborSearch,
     Particles,
     Six,
+    any_tangent,
     insert_distance,
     mean_distance,
     mirrored,
@@ -143,15 +144,6 @@ def facing_weight(cosine: wp.float32, facing_limit: wp.float32) -> wp.float32:
     """Return the weight of two neighbours by their normals: 1 above the facing limit, 0 from 1/4 below it."""
     t = wp.clamp(1.0 + 4.0 * (cosine - facing_limit), 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
-
-
-@wp.func
-def any_tangent(normal: wp.vec3) -> wp.vec3:
-    """Return a unit vector at right angles to the unit normal, the same for the same normal."""
-    axis = wp.vec3(1.0, 0.0, 0.0)
-    if wp.abs(normal[0]) > 0.6:
-        axis = wp.vec3(0.0, 1.0, 0.0)
-    return wp.normalize(axis - normal * wp.dot(axis, normal))
 
 
 @wp.func

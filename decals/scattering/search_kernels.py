@@ -22,6 +22,15 @@ MIN_SQUARE = 1.0e-37
 Six = wp.types.vector(6, wp.float32)
 """Distances to the six nearest particles, ascending."""
 
+DIRECTIONS = 24
+"""Directions of the tangent plane in which a cell is measured, at equal angles."""
+
+Lengths = wp.types.vector(DIRECTIONS, wp.float32)
+"""Distances from a particle to the border of its cell, in these directions."""
+
+Partners = wp.types.vector(DIRECTIONS, wp.int32)
+"""Particles on the other side of the border, −1 for none."""
+
 
 @wp.struct
 class Particles:
@@ -96,6 +105,15 @@ def are_neighbors(
 def mirrored(q: wp.vec3, point: wp.vec3, normal: wp.vec3) -> wp.vec3:
     """Return the image of a point behind a plane; a point behind the plane is its own image."""
     return q - 2.0 * wp.max(wp.dot(q - point, normal), 0.0) * normal
+
+
+@wp.func
+def any_tangent(normal: wp.vec3) -> wp.vec3:
+    """Return a unit vector at right angles to the unit normal, the same for the same normal."""
+    axis = wp.vec3(1.0, 0.0, 0.0)
+    if wp.abs(normal[0]) > 0.6:
+        axis = wp.vec3(0.0, 1.0, 0.0)
+    return wp.normalize(axis - normal * wp.dot(axis, normal))
 
 
 @wp.func
@@ -204,6 +222,96 @@ def nearest_particles(
             owner = j
     distances[k] = wp.sqrt(least)
     owners[k] = owner
+
+
+@wp.kernel
+def measure_cells(
+    first: wp.int32,
+    search: NeighborSearch,
+    particles: Particles,
+    rows: wp.array(dtype=wp.int32),
+    radii: wp.array(dtype=wp.float32),
+    outlines: wp.array(dtype=wp.vec3),
+) -> None:
+    """Measure the Voronoi cells of some particles in their tangent planes.
+
+    A neighbour at the offset d bounds the cell at d · d / (2 d · u) in the direction u. Where two neighbours
+    bound the cell in directions side by side, the corner between them is taken; it lies outside where a third
+    neighbour cuts it off. Cells end at half the reach of the search.
+
+    Parameters
+    ----------
+    rows
+        The particles.
+    radii
+        Their distance from the farthest point of their cell, in model units.
+    outlines
+        Points on the border of each cell, `DIRECTIONS` of them; not written if the array is empty.
+    """
+    k = first + wp.tid()
+    i = rows[k]
+    p = particles.positions[i]
+    n = particles.normals[i]
+    u = any_tangent(n)
+    v = wp.cross(n, u)
+    angle = 2.0 * wp.pi / wp.float32(DIRECTIONS)
+    limit = 0.5 * search.reach
+    lengths = Lengths()
+    partners = Partners()
+    for d in range(DIRECTIONS):
+        lengths[d] = limit
+        partners[d] = -1
+    j = int(0)
+    query = wp.hash_grid_query(search.grid, p, search.reach)
+    while wp.hash_grid_query_next(query, j):
+        offset = particles.positions[j] - p
+        square = wp.length_sq(offset)
+        facing = wp.dot(n, particles.normals[j]) > search.facing_limit
+        if facing and j != i and square < search.reach * search.reach:
+            x = wp.dot(offset, u)
+            y = wp.dot(offset, v)
+            for d in range(DIRECTIONS):
+                along = x * wp.cos(angle * wp.float32(d)) + y * wp.sin(angle * wp.float32(d))
+                if 2.0 * along * lengths[d] > square:
+                    lengths[d] = 0.5 * square / along
+                    partners[d] = j
+    radius = float(0.0)
+    for d in range(DIRECTIONS):
+        x = lengths[d] * wp.cos(angle * wp.float32(d))
+        y = lengths[d] * wp.sin(angle * wp.float32(d))
+        one = partners[d]
+        other = partners[(d + 1) % DIRECTIONS]
+        if one != other and one >= 0 and other >= 0:
+            a = particles.positions[one] - p
+            b = particles.positions[other] - p
+            det = wp.dot(a, u) * wp.dot(b, v) - wp.dot(a, v) * wp.dot(b, u)
+            if wp.abs(det) > 1.0e-3 * wp.length(a) * wp.length(b):
+                corner_x = 0.5 * (wp.length_sq(a) * wp.dot(b, v) - wp.length_sq(b) * wp.dot(a, v)) / det
+                corner_y = 0.5 * (wp.length_sq(b) * wp.dot(a, u) - wp.length_sq(a) * wp.dot(b, u)) / det
+                if corner_x * corner_x + corner_y * corner_y < limit * limit:
+                    x = corner_x
+                    y = corner_y
+        radius = wp.max(radius, wp.sqrt(x * x + y * y))
+        if outlines.shape[0] > 0:
+            outlines[k * DIRECTIONS + d] = p + x * u + y * v
+    radii[k] = radius
+
+
+@wp.kernel
+def mark_near(
+    first: wp.int32,
+    search: NeighborSearch,
+    particles: Particles,
+    points: wp.array(dtype=wp.vec3),
+    flags: wp.array(dtype=wp.int32),
+) -> None:
+    """Write 1 for the particles within the reach of the search around points."""
+    p = points[first + wp.tid()]
+    j = int(0)
+    query = wp.hash_grid_query(search.grid, p, search.reach)
+    while wp.hash_grid_query_next(query, j):
+        if wp.length_sq(p - particles.positions[j]) < search.reach * search.reach:
+            flags[j] = 1
 
 
 @wp.kernel
