@@ -36,7 +36,7 @@ from decals.scattering.variation import ImageChoice, image_shares
 from decals.surfaces.convert import TREE_SUFFIXES, as_surface
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.mesh_file import read_objects
+from decals.surfaces.mesh_file import read_parts
 from decals.surfaces.surface import Surface
 from decals.validation import allowed_number, instance, member
 
@@ -86,9 +86,10 @@ class Zone:
         A mask, which is a function of ``points[n, 3]`` to ``bool[n]``. Or a `PaintedImage`: where it is
         brighter than 1/2. Or a BlobTree: inside its solid; of one that is a node of the model itself, the
         part of the surface that it makes. Or a name: of an object or its label, of a node of a
-        `TreeObject`, of an object in a mesh file, or of an array of a pyvista mesh. Or values of the
-        vertices or faces of a mesh that is the only model: true or false, numbers from 0 to 1, or colours
-        ``[n, 3]`` or ``[n, 4]``, whose brightness counts; the zone is where they are 1/2 or more.
+        `TreeObject`, of an object in a mesh file, a group or a material in an OBJ file, or of an array of a
+        pyvista mesh. Or values of the vertices or faces of a mesh that is the only model: true or false,
+        numbers from 0 to 1, or colours ``[n, 3]`` or ``[n, 4]``, whose brightness counts; the zone is where
+        they are 1/2 or more.
     density : float or callable, optional
         Density relative to other zones: a number above 0, or a function of ``points[n, 3]`` to such numbers.
     spacing : float, optional
@@ -532,10 +533,10 @@ def _named_parts(model: Any, surface: Surface, name: str) -> Iterator[tuple[str,
         for path, known in getattr(model, "names", {}).items():
             yield known, partial(_part, surface.tree, [path])
     if isinstance(model, str | os.PathLike) and not os.fspath(model).lower().endswith(TREE_SUFFIXES):
-        yield from _separate_parts({known: MeshSurface(*arrays) for known, arrays in read_objects(model)})
+        for parts in read_parts(model):
+            yield from _separate_parts([(known, MeshSurface(*arrays)) for known, arrays in parts])
     elif hasattr(model, "keys") and hasattr(model, "combine"):  # blocks of pyvista
-        blocks = zip(model.keys(), model, strict=True)
-        yield from _separate_parts({known: as_surface(block) for known, block in blocks})
+        yield from _separate_parts(list(zip(model.keys(), map(as_surface, model), strict=True)))
     elif hasattr(model, "point_data") and hasattr(model, "cell_data"):
         faces = model.extract_surface(algorithm="dataset_surface").triangulate()
         mesh = MeshSurface(faces.points, faces.regular_faces)
@@ -544,10 +545,10 @@ def _named_parts(model: Any, surface: Surface, name: str) -> Iterator[tuple[str,
                 yield known, partial(_painted_region, mesh, values, name)
 
 
-def _separate_parts(parts: dict[str, Any]) -> Iterator[tuple[str, Callable[[], Region]]]:
+def _separate_parts(parts: list[tuple[str, Surface]]) -> Iterator[tuple[str, Callable[[], Region]]]:
     """Yield the names of surfaces, and functions that return where each is the nearest."""
-    surfaces = list(parts.values())
-    for index, known in enumerate(parts):
+    surfaces = [surface for _, surface in parts]
+    for index, (known, _) in enumerate(parts):
         yield known, partial(_nearest_region, surfaces, index)
 
 

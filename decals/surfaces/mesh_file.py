@@ -5,7 +5,7 @@ VTK's readers crash or hang on some damaged files, so they run in a process of t
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ from decals.surfaces.base_color import checked_color
 from decals.surfaces.dataset_colors import dataset_color, has_colors
 from decals.surfaces.files.content import encoding_of, without_mark
 from decals.surfaces.files.gltf import gltf_objects, read_gltf
-from decals.surfaces.files.obj import obj_objects, read_obj
+from decals.surfaces.files.obj import PARTS, obj_parts, read_obj
 from decals.surfaces.files.off import read_off
 from decals.surfaces.files.paint import Paint
 from decals.surfaces.files.ply import read_ply, strip_triangles
@@ -119,19 +119,29 @@ def read_objects(path: str | PathLike[str]) -> list[tuple[str, MeshArrays]]:
 
     Other files are one object. Parameters and errors are those of `read_mesh`.
     """
+    return next(read_parts(path))
+
+
+def read_parts(path: str | PathLike[str]) -> Iterator[list[tuple[str, MeshArrays]]]:
+    """Read the parts of a mesh file by name: first its objects, then the groups and the materials of OBJ.
+
+    Each list has all faces. Parameters and errors are those of `read_mesh`.
+    """
     path = _existing(path)
     suffix = path.suffix.lower()
     if suffix in _OBJECT_READERS:
         parts = _OBJECT_READERS[suffix](path)
-        return [(name, polygon_triangles(*part.arrays, name=name)) for name, part in parts.items()]
-    if suffix == ".obj":
+        yield [(name, polygon_triangles(*part.arrays, name=name)) for name, part in parts.items()]
+    elif suffix == ".obj":
         points, polygons, _ = read_obj(path)
         faces = np.split(polygons.corners, np.cumsum(polygons.sizes)[:-1])
-        return [
-            (name, polygon_triangles(points, [faces[row] for row in rows], name=name))
-            for name, rows in obj_objects(path)
-        ]
-    return [(path.name, read_mesh_data(path).arrays)]
+        for keyword in PARTS:
+            yield [
+                (name, polygon_triangles(points, [faces[row] for row in rows], name=name))
+                for name, rows in obj_parts(path, keyword)
+            ]
+    else:
+        yield [(path.name, read_mesh_data(path).arrays)]
 
 
 def read_mesh_data(path: str | PathLike[str]) -> MeshData:

@@ -31,7 +31,7 @@ _REFERRED = {b"v": "vertex", b"vt": "texture coordinate", b"vn": "normal"}
 _MATERIAL = (b"mtllib", b"usemtl")
 """Keywords of materials."""
 
-_NAMED = (*_MATERIAL, b"o")
+_NAMED = (*_MATERIAL, b"o", b"g")
 """Keywords that names follow."""
 
 _NUMBERS = (*_REFERRED, b"f", b"fo")
@@ -57,11 +57,15 @@ def read_obj(path: Path) -> tuple[Float64Array, Polygons, Paint]:
         raise refusal(path, "OBJ", error) from error
 
 
-def obj_objects(path: Path) -> list[tuple[str, Int64Array]]:
-    """Return the names of the objects of an OBJ file, and the numbers of the faces of each that has any."""
+PARTS = (b"o", b"g", b"usemtl")
+"""Keywords of objects, groups and materials, which name the faces below them."""
+
+
+def obj_parts(path: Path, keyword: bytes) -> list[tuple[str, Int64Array]]:
+    """Return the names after one of `PARTS` in an OBJ file, and the numbers of the faces below, if any."""
     lines = _lines_by_keyword(text_lines(file_bytes(path)))
-    names = [b"", *(line.text.strip() for line in lines[b"o"])]
-    of_face = np.searchsorted([line.number for line in lines[b"o"]], [line.number for line in lines[b"f"]])
+    names = [b"", *(line.text.strip() for line in lines[keyword])]
+    of_face = np.searchsorted([line.number for line in lines[keyword]], [line.number for line in lines[b"f"]])
     numbered = ((name, np.flatnonzero(of_face == number)) for number, name in enumerate(names))
     return [(name.decode("utf-8", "replace") or "unnamed", rows) for name, rows in numbered if len(rows)]
 

@@ -142,11 +142,11 @@ def test_painted_meshes(kind: str) -> None:
         assert np.array_equal(numbers[clear] == 0, points[clear, 2] > 0)
 
 
-def test_objects_of_a_file_and_blocks(tmp_path: Path) -> None:
+def test_parts_of_a_file_and_blocks(tmp_path: Path) -> None:
     cubes = {"left": pv.Cube(), "right": pv.Cube(center=(3, 0, 0))}
     rows = []
     for number, (name, cube) in enumerate(cubes.items()):
-        rows.append(f"o {name}")
+        rows += [f"o {name}", f"g side {name}", f"usemtl {name}-paint"]
         rows += [f"v {x} {y} {z}" for x, y, z in cube.clean().points]
         rows += [
             "f " + " ".join(str(8 * number + 1 + k) for k in face) for face in cube.clean().regular_faces
@@ -154,9 +154,11 @@ def test_objects_of_a_file_and_blocks(tmp_path: Path) -> None:
     path = tmp_path / "cubes.obj"
     path.write_text("\n".join(rows))
     for model in (path, str(path), pv.MultiBlock(cubes)):
-        zones = Zones(Zone("right"), Zone("left")).placed_on(model)
+        names = ["right", *(["side right", "right-paint"] if model is path else [])]
         points = as_surface(model).sample(100, seed=0)[0]
-        assert np.array_equal(zones.numbers(points) == 0, points[:, 0] > 1.5)
+        for name in names:
+            zones = Zones(Zone(name), Zone("left")).placed_on(model)
+            assert np.array_equal(zones.numbers(points) == 0, points[:, 0] > 1.5)
 
 
 # -- borders -----------------------------------------------------------------------------------------------
