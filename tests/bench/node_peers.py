@@ -7,8 +7,8 @@ Every method samples or meshes the same field in the same box, with cells of the
 * the same samples, then VTK's flying edges;
 * Blender's metaballs (`bpy`), for the sum of balls, whose field is the same.
 
-Methods whose package is missing are left out. Of PyPI's packages none is libfive or the fidget of implicit
-surfaces. Times are processor times of all threads, without compilation.
+Methods whose package is missing are left out. `program_peers.py` compares modellers that are built from
+source. Times are processor times of all threads, without compilation.
 """
 
 import argparse
