@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from decals import DecalImage, Interaction
 from tests.bench import box_peers
@@ -50,7 +51,8 @@ def test_decals_without_contact_keep_all_but_their_interaction() -> None:
     assert (alone.positions == decals.positions).all()
 
 
-def test_the_table_has_a_row_for_each_number_of_decals() -> None:
+def test_the_table_has_a_row_for_each_number_of_decals(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(box_peers, "WARM_SECONDS", 0.0)
     figures = box_peers.measure("knot", [100, 300], [(32, 24)], 1)
     lines = box_peers.table(figures, [100, 300], [(32, 24)]).splitlines()
     assert len(figures) == 1 + 2 * len(box_peers.KINDS)
