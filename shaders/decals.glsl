@@ -60,11 +60,7 @@ DecalHit decal_hit(int owner, vec3 q, vec3 n) {
 DecalHit decal_at(vec3 q, vec3 n) {
     if (decal_single_layer) {
         vec4 found = single_layer_at(q, n, decal_contact);
-        int owner = int(found.x);
-        if (owner < 0) {
-            return DecalHit(-1, 0.0, vec2(0.0));
-        }
-        return DecalHit(owner, 1.0 - found.y, uv_at(q, n, owner, found.yzw));
+        return DecalHit(int(found.x), found.x < 0.0 ? 0.0 : 1.0 - found.y, found.zw);
     }
     return decal_hit(owner_at(q, n, decal_contact), q, n);
 }
