@@ -71,6 +71,24 @@ class RayCells:
 
 
 @wp.func
+def block_at(place: wp.vec3, cells: RayCells) -> wp.int32:
+    """Return the entry of the block at a place, in blocks from the grid's corner; EMPTY beyond the grid."""
+    counts = cells.counts
+    x = int(wp.floor(place[0]))
+    y = int(wp.floor(place[1]))
+    z = int(wp.floor(place[2]))
+    if x < 0 or y < 0 or z < 0 or x >= counts[0] or y >= counts[1] or z >= counts[2]:
+        return EMPTY
+    return cells.blocks[(x * counts[1] + y) * counts[2] + z]
+
+
+@wp.func
+def tape_of_block(block: wp.int32, cells: RayCells) -> wp.vec2i:
+    """Return the first texel of the tape of a block with this entry, and one past its last."""
+    return wp.vec2i(block + 1, block + 1 + int(cells.tape[block][0]))
+
+
+@wp.func
 def passed_way(way: wp.float32, t: wp.float32) -> wp.float32:
     """Return t; up to `way` a ray is known to be free of surface.
 
@@ -219,7 +237,7 @@ def trace_ray(origin: wp.vec3, direction: wp.vec3, start: wp.float32, cells: Ray
             whole = float(cells.start + 1)
             return wp.vec3(interval[0] + t, whole, whole + cells.tape[cells.start][0])
         if block >= 0:
-            span = wp.vec2i(block + 1, block + 1 + int(cells.tape[block][0]))
+            span = tape_of_block(block, cells)
             hit = first_hit(entry, direction, t, leave, cells.tolerance, cells.tape, span)
             if hit >= 0.0:
                 return wp.vec3(interval[0] + hit, float(span[0]), float(span[1]))

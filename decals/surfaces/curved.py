@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from blobtree import ISO, Mesh
-from blobtree._typing import Float32Array, Float64Array, Int64Array
+from blobtree import Mesh
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from decals.surfaces.mesh import MeshSurface
 from decals.surfaces.space_curve import curve_keys
 from decals.surfaces.windings import MeshOrientation, Triangles, Windings
@@ -29,8 +29,8 @@ EDGE_HEIGHT = 0.6
 HALVINGS = 6
 """Bisection steps up to the surface above or below a face."""
 
-Field = Callable[[Float32Array], Float32Array]
-"""The field at points[n, 3]."""
+Inside = Callable[[Float32Array], BoolArray]
+"""True for each of the points[n, 3] where the field is at least the iso value."""
 
 
 class CurvedMesh(MeshSurface):
@@ -41,12 +41,12 @@ class CurvedMesh(MeshSurface):
     share of few samples.
     """
 
-    def __init__(self, mesh: Mesh, field: Field, *, device: str) -> None:
+    def __init__(self, mesh: Mesh, inside_of: Inside, *, device: str) -> None:
         mesh = replace(mesh, faces=mesh.faces[np.argsort(curve_keys(mesh.vertices[mesh.faces[:, 0]]))])
         super().__init__(mesh.vertices, mesh.faces, device=device, orientation=MeshOrientation.KEEP)
         areas = _curved_areas(mesh)
         sharp = _edge_faces(mesh)
-        areas[sharp] = _areas_at_edges(mesh, sharp, field)
+        areas[sharp] = _areas_at_edges(mesh, sharp, inside_of)
         self._cumulative = np.cumsum(areas[self.sound])
 
     def _same_vertices(self) -> Int64Array:
@@ -106,7 +106,7 @@ def _edge_faces(mesh: Mesh) -> Int64Array:
     return np.flatnonzero((spans > SHARP_SPAN) & beside_flat)
 
 
-def _areas_at_edges(mesh: Mesh, faces: Int64Array, field: Field) -> Float64Array:
+def _areas_at_edges(mesh: Mesh, faces: Int64Array, inside_of: Inside) -> Float64Array:
     """Return the areas (n,) of the surface above faces that cut off edges.
 
     Each face is divided, and the new corners move onto the surface, at right angles to the face.
@@ -121,7 +121,7 @@ def _areas_at_edges(mesh: Mesh, faces: Int64Array, field: Field) -> Float64Array
         for j in range(DIVISIONS + 1 - i)
     }
     for place in lattice.keys() - {(0, 0), (DIVISIONS, 0), (0, DIVISIONS)}:
-        lattice[place] = _onto_surface(lattice[place], ways, field)
+        lattice[place] = _onto_surface(lattice[place], ways, inside_of)
     total = np.zeros(len(faces))
     for i in range(DIVISIONS):
         for j in range(DIVISIONS - i):
@@ -131,20 +131,23 @@ def _areas_at_edges(mesh: Mesh, faces: Int64Array, field: Field) -> Float64Array
     return total
 
 
-def _onto_surface(points: Float64Array, ways: Float64Array, field: Field) -> Float64Array:
+def _onto_surface(points: Float64Array, ways: Float64Array, inside_of: Inside) -> Float64Array:
     """Return where ways from points inside, or against them from points outside, cross the surface.
 
     Points whose ways cross no surface stay.
     """
-    inside = field(points.astype(np.float32)) >= ISO
+    inside = inside_of(points.astype(np.float32))
     ways = np.where(inside[:, None], ways, -ways)
-    crosses = (field((points + ways).astype(np.float32)) >= ISO) != inside
-    low, high = np.zeros(len(points)), np.where(crosses, 1.0, 0.0)
+    crossing = np.flatnonzero(inside_of((points + ways).astype(np.float32)) != inside)
+    starts, ways, inside = points[crossing], ways[crossing], inside[crossing]
+    low, high = np.zeros(len(starts)), np.ones(len(starts))
     for _halving in range(HALVINGS):
         middle = 0.5 * (low + high)
-        same = (field((points + middle[:, None] * ways).astype(np.float32)) >= ISO) == inside
+        same = inside_of((starts + middle[:, None] * ways).astype(np.float32)) == inside
         low, high = np.where(same, middle, low), np.where(same, high, middle)
-    return points + (0.5 * (low + high))[:, None] * ways
+    moved = points.copy()
+    moved[crossing] += (0.5 * (low + high))[:, None] * ways
+    return moved
 
 
 def _dot(first: Float64Array, second: Float64Array) -> Float64Array:

@@ -14,8 +14,8 @@ from blobtree.device import known_device, launch
 from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
 from blobtree.tape.codes import OPERATORS
-from blobtree.tape.model import values_at
 from blobtree.tracing.trace import trace
+from blobtree.tracing.tree_cells import device_cells
 from blobtree.validation import describe, point_array
 from decals.errors import InvalidMesh, InvalidScattering
 from decals.surfaces.curved import CurvedMesh
@@ -116,7 +116,7 @@ class ImplicitSurface(Immutable):
         )
         """True if parts of the tree are small beside it, not only what is cut out of it."""
         self._coarse = (
-            CurvedMesh(coarse, partial(values_at, tree.tape), device=device)
+            CurvedMesh(coarse, partial(_marked, tree, ISO, device), device=device)
             if self.has_small_parts
             else MeshSurface(coarse.vertices, coarse.faces, device=device, orientation=MeshOrientation.KEEP)
         )
@@ -226,11 +226,8 @@ class DeviceImplicitSurface:
         self._least_way = least_way
         self.device = coarse.device
         self._tape = tree.tape.on(self.device)
-        kernel_for = tree.tape.instruction_set.kernel_for
-        self._project, self._mark_above = kernel_for(project_with_mesh), kernel_for(mark_above)
+        self._tree, self._project = tree, tree.tape.instruction_set.kernel_for(project_with_mesh)
         self._coarse, self._max_step = coarse, max_step
-        low, high = tree.support
-        self._low, self._high = wp.vec3(*low), wp.vec3(*high)
 
     def project(self, points: Vectors, reaches: Scalars, positions: Vectors, normals: Vectors) -> None:
         """Write the points that Newton's method reaches, and the normals of the field there."""
@@ -240,8 +237,22 @@ class DeviceImplicitSurface:
 
     def mark_inside(self, points: Vectors, flags: Scalars) -> None:
         """Write 1 where the field is above the iso value."""
-        inputs = [self._tape.data, self._tape.span, self._low, self._high, points]
-        launch(self._mark_above, len(points), inputs, [flags], device=self.device)
+        _mark(self._tree, np.nextafter(np.float32(ISO), np.float32(1.0)), points, flags)
+
+
+def _mark(tree: Node, least: float, points: Vectors, flags: Scalars) -> None:
+    """Write 1 where the field is at least `least`, see `mark_above`."""
+    device = str(points.device)
+    kernel = tree.tape.instruction_set.kernel_for(mark_above)
+    launch(kernel, len(points), [device_cells(tree, device=device).arrays, least, points], [flags], device)
+
+
+def _marked(tree: Node, least: float, device: str, points: Float32Array) -> BoolArray:
+    """Return True for each point where the field is at least `least`, see `mark_above`."""
+    flags: Any = wp.zeros(len(points), dtype=wp.int32, device=device)
+    _mark(tree, least, vectors(points, device), flags)
+    marked: BoolArray = flags.numpy() == 1
+    return marked
 
 
 def _cell_size(tree: Node, resolution: int) -> float:

@@ -5,10 +5,12 @@
 
 import warp as wp
 
+from blobtree.cells.refine_kernels import SURELY_INSIDE
 from blobtree.formulas.falloff import ISO
 from blobtree.kernels import KERNEL_OPTIONS
 from blobtree.tape.evaluate_kernels import project_to_surface
 from blobtree.tape.interpreter import field_value
+from blobtree.tracing.ray_kernels import RayCells, block_at, tape_of_block
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -114,17 +116,19 @@ def project_with_mesh(
 @wp.kernel
 def mark_above(
     first: wp.int32,
-    tape: wp.array(dtype=wp.vec4),
-    span: wp.vec2i,
-    low: wp.vec3,
-    high: wp.vec3,
+    cells: RayCells,
+    least: wp.float32,
     points: wp.array(dtype=wp.vec3),
     flags: wp.array(dtype=wp.int32),
 ) -> None:
-    """Write 1 where the field is above the iso value."""
+    """Write 1 where the field is at least `least`, the iso value or the next number."""
     i = first + wp.tid()
-    p = points[i]
-    if wp.min(p, low) == low and wp.max(p, high) == high:
-        f = field_value(p, tape, span)  # only here: Warp works out both sides of `and`
-        if f > ISO:
+    block = block_at((points[i] - cells.lower) / cells.block_size, cells)
+    if block == SURELY_INSIDE:
+        flags[i] = 1
+    elif block >= 0:
+        f = field_value(
+            points[i], cells.tape, tape_of_block(block, cells)
+        )  # Warp works out both sides of `and`
+        if f >= least:
             flags[i] = 1

@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import ISO, Disc, Intersection, Node, Point, Segment, SolidContact, Union
+from blobtree import ISO, Box, Disc, Intersection, Node, Point, Repeat, Segment, SolidContact, Union
 from decals import scatter
 from decals.errors import InvalidMesh, InvalidPoints
 from decals.surfaces import ImplicitSurface, Surface
@@ -181,3 +181,13 @@ def test_rays_hit_the_contact_surface_of_a_single_solid() -> None:
     left = SolidContact(BALLS).solids()[0]
     distances = ImplicitSurface(left).raycast([[3.0, 0.1, 0.0]], [[-1.0, 0.0, 0.0]])
     np.testing.assert_allclose(distances, 3.0, atol=1e-4)
+
+
+def test_points_inside_one_of_many_copies_are_found() -> None:
+    brick = Box((0, 0, 0), (0.6, 0.6, 0.6), radius=0)
+    grid = Repeat(Repeat(brick, (1, 0, 0), 12, "union"), (0, 1, 0), 12, "union")
+    points = np.random.default_rng(4).uniform([-1, -1, -0.5], [12, 12, 0.5], (4000, 3))
+    centers = np.column_stack([points[:, :2].round().clip(0, 11), np.zeros(len(points))])
+    within = np.abs(points - centers).max(axis=1) < 0.3
+    assert 500 < within.sum() < 2000
+    assert ImplicitSurface(grid).contains(points).tolist() == within.tolist()
