@@ -60,7 +60,11 @@ DecalHit decal_hit(int owner, vec3 q, vec3 n) {
 DecalHit decal_at(vec3 q, vec3 n) {
     if (decal_single_layer) {
         vec4 found = single_layer_at(q, n, decal_contact);
-        return DecalHit(int(found.x), found.x < 0.0 ? 0.0 : 1.0 - found.y, found.zw);
+        int owner = int(found.x);
+        if (owner < 0) {
+            return DecalHit(-1, 0.0, vec2(0.0));
+        }
+        return DecalHit(owner, 1.0 - found.y, uv_at(q, n, owner, found.yzw));
     }
     return decal_hit(owner_at(q, n, decal_contact), q, n);
 }

@@ -46,7 +46,7 @@ def log_one_minus(w: wp.float32) -> wp.float32:
 @wp.func
 def contact_push(e_i: wp.float32, e_k: wp.float32) -> wp.float32:
     """Return the push φ_i = 1 − h_i of neighbour i on the owner k, from 0 (none) to 1 (onto the rim)."""
-    w = wp.max(e_i - e_k, 0.0) / wp.max(1.0 - 2.0 * e_k, MIN_SPAN)
+    w = (e_i - e_k) / wp.max(1.0 - 2.0 * e_k, MIN_SPAN)
     if w >= 1.0:
         return 0.0
     return wp.exp(log_one_minus(w) / wp.max(e_k, MIN_COMPLEMENT))

@@ -42,7 +42,6 @@ from decals.field.radial import (
     comes_next,
     is_above,
     lies_on_top,
-    lies_past,
     nested_owner,
     power,
     size_above,
@@ -308,16 +307,13 @@ def kept_owner(
 
 
 @wp.func
-def single_layer_elastic(
-    q: wp.vec3, n_q: wp.vec3, past: wp.float32, after: wp.int32, index: IndexedDecals
-) -> wp.vec4:
+def single_layer_elastic(q: wp.vec3, n_q: wp.vec3, index: IndexedDecals) -> wp.vec4:
     """Return (owner, E, shift) at q; (NO_OWNER, 0) outside all rims. The decals must not be layered.
 
-    They are those of `contact_owner` and `elastic_contact`. One traversal of the index finds the candidates,
-    and of the holders of q, whose rims contain it, the number, the topmost, and of those that `lies_past`
-    admits the one of least power. This one is the owner, unless it is nested with another holder above it
-    that faces the surface well, and whose image reaches q. Only sets with nested decals
-    (`IndexedDecals.nested`) are searched for such a holder.
+    They are those of `cell_owner` and `elastic_contact`. One traversal of the index finds the candidates,
+    and of the holders of q, whose rims contain it, the number, the topmost, and the one of least power. This
+    one is the owner, unless it is nested with another holder above it that faces the surface well, and whose
+    image reaches q. Only sets with nested decals (`IndexedDecals.nested`) are searched for such a holder.
     """
     closest = wp.int32(NO_OWNER)
     least = wp.float32(0.0)
@@ -346,14 +342,13 @@ def single_layer_elastic(
                             topmost = decal
                             topmost_ball = ball
                         own = power(offset, RIM_RADIUS * ball[3])
-                        if lies_past(own, decal, size, past, after):
-                            if (
-                                closest < 0
-                                or own < least
-                                or (own == least and is_above(decal, closest, index.records))
-                            ):
-                                least = own
-                                closest = decal
+                        if (
+                            closest < 0
+                            or own < least
+                            or (own == least and is_above(decal, closest, index.records))
+                        ):
+                            least = own
+                            closest = decal
     if closest < 0:
         return wp.vec4(float(NO_OWNER), 0.0, 0.0, 0.0)
     owner = wp.int32(closest)

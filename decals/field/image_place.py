@@ -19,8 +19,8 @@ wp.set_module_options({"enable_backward": False})
 MIN_PLACE = 1.0e-12
 """Smallest distance in the image by which is divided."""
 
-FLAT_ARC, MORE_ARC = 0.0938, 0.0799
-"""Bounds of the corrected mapping: length² ≤ chord² (1 + t (FLAT_ARC + MORE_ARC t)), for t = |n_q − n_p|²."""
+MAX_ARC = 0.4126
+"""Bound on (length²/chord² − 1)/|n_q − n_p|² of the corrected mapping."""
 
 
 @wp.func
@@ -48,8 +48,7 @@ def image_reaches(q: wp.vec3, n_q: wp.vec3, decal: wp.int32, index: IndexedDecal
         return True
     w = (q - xyz(index.records[RECORD * decal])) / visible_radius(decal, index.records)
     turn = n_q - xyz(index.records[RECORD * decal + 1])
-    turned = wp.dot(turn, turn)
-    if not index.walked and wp.dot(w, w) * (1.0 + turned * (FLAT_ARC + MORE_ARC * turned)) < 1.0:
+    if not index.walked and wp.dot(w, w) * (1.0 + MAX_ARC * wp.dot(turn, turn)) < 1.0:
         return True  # as most points, without the length
     length = image_place(w, n_q, decal, index)[2]
     return 0.25 * length * length <= IMAGE_RADIUS_SQUARED

@@ -7,8 +7,7 @@ would depend on the surface it meets.
 
 The length enters only where the image is read (`image_distance`). The image then shows the unrolled surface
 between contact lines that stay in place. The rim of the image lies at its radius along the surface. On a
-curved surface that is a little inside the rim of the field, and the gap between them shows another decal, or
-stays uncoloured.
+curved surface that is a little inside the rim of the field, and the gap between them stays uncoloured.
 
 The corrected mapping assumes a circular arc between two points with their normals. It is exact on planes,
 spheres and cylinders. Seen from a flat face, the arc to the next face has length zero at their edge, so

@@ -26,10 +26,10 @@ from decals.field.contact import (
     rim_distance,
 )
 from decals.field.elastic import MAX_KEPT, elastic_contact, single_layer_elastic
-from decals.field.image_place import image_place, image_reaches
-from decals.field.mapping import ImageMapping, image_distance, in_image, tangent_coordinates
-from decals.field.radial import MAX_TRIED, NEAREST, contact_owner, lies_past, nearness, radial_complement
+from decals.field.image_place import image_place
+from decals.field.mapping import ImageMapping, image_distance, tangent_coordinates
 from decals.field.radial import NO_OWNER as CELL_NO_OWNER
+from decals.field.radial import cell_owner, radial_complement
 from decals.field.receivers import complement_of
 from decals.index.lookup import ABOVE_ALL, IndexedDecals, cell_range, end_of_lower, rank_range
 from decals.record import (
@@ -65,7 +65,7 @@ def owner_below(
     """
     if has_cells(contact):
         if not index.layered:
-            return contact_owner(q, n_q, 0, contact, index)
+            return cell_owner(q, n_q, 0, index)
     owner = wp.int32(NO_OWNER)
     top = wp.int32(-1)
     least = wp.float32(0.5)
@@ -100,10 +100,9 @@ def owner_below(
                             owner = index.ids[j]
                             top = other
                         break
-    if owner >= 0:
+    if has_cells(contact) and owner >= 0:
         if is_contact_rank(top):
-            if has_cells(contact) or not image_reaches(q, n_q, owner, index):
-                return contact_owner(q, n_q, rank_of(owner, index.records), contact, index)
+            return cell_owner(q, n_q, rank_of(owner, index.records), index)
     return owner
 
 
@@ -193,20 +192,18 @@ def uv_at(
 
 
 @wp.func
-def single_layer_contact(
+def single_layer_at(
     q: wp.vec3,
     n_q: wp.vec3,
-    past: wp.float32,
-    after: wp.int32,
     contact: wp.int32,
     index: IndexedDecals,
 ) -> wp.vec4:
     """Return (owner, E, shift) at q in all contact modes but RADIAL; (NO_OWNER, 0) outside all rims.
 
-    Owners are those that `decals.field.radial.lies_past` admits, or decals above them.
+    They are those of `owner_at` and `contact_at`. The decals must not be layered.
     """
     if contact == Contact.ELASTIC:
-        return single_layer_elastic(q, n_q, past, after, index)
+        return single_layer_elastic(q, n_q, index)
     owner = wp.int32(NO_OWNER)
     least = wp.float32(0.5)
     ties = wp.int32(0)
@@ -222,9 +219,9 @@ def single_layer_contact(
                 b = wp.vec4(a[3], b[0], b[1], b[2])
                 a = wp.vec4(e, a[0], a[1], a[2])
                 count += 1
-                if e <= least and lies_past(e, decal, 1.0, past, after):
-                    if e < least:
-                        ties = 0
+                if e < least:
+                    ties = 0
+                if e <= least:
                     ties += 1
                     if e < least or owner < 0 or decal < owner:
                         owner = decal
@@ -240,44 +237,6 @@ def single_layer_contact(
     push = add_pushes(push, a, least, per_span, per_least, contact)
     if count > 4:
         push = add_pushes(push, b, least, per_span, per_least, contact)
-    if ties > 1 or past > NEAREST:  # on a contact line, or beyond it
+    if ties > 1:  # on a contact line
         push = 1.0
     return wp.vec4(float(owner), contact_complement(least, push), 0.0, 0.0)
-
-
-@wp.func
-def single_layer_at(
-    q: wp.vec3,
-    n_q: wp.vec3,
-    contact: wp.int32,
-    index: IndexedDecals,
-) -> wp.vec4:
-    """Return (owner, E, uv) at q in all contact modes but RADIAL; (NO_OWNER, 0) outside all rims.
-
-    They are those of `owner_at`, `contact_at` and `uv_at`. The decals must not be layered. Where the image
-    coordinates lie outside the image, it ends before q, and the next nearest decal is tried, as in
-    `decals.field.radial.contact_owner`.
-    """
-    result = wp.vec4(float(NO_OWNER), 0.0, 0.0, 0.0)
-    past = wp.float32(NEAREST)
-    after = wp.int32(NO_OWNER)
-    tried = wp.int32(0)
-    while True:
-        found = single_layer_contact(q, n_q, past, after, contact, index)
-        owner = int(found[0])
-        searching = bool(tried > 0 and tried < MAX_TRIED)
-        if owner >= 0:
-            uv = uv_at(q, n_q, owner, wp.vec3(found[1], found[2], found[3]), index)
-            result = wp.vec4(found[0], found[1], uv[0], uv[1])
-            searching = bool(tried < MAX_TRIED and not in_image(uv))
-            if searching:
-                past = wp.max(past, nearness(q, n_q, owner, contact, index))
-                after = owner
-        tried += 1
-        if owner < 0 or tried == MAX_TRIED:  # no image reaches q: the first owner again
-            past = NEAREST
-            after = NO_OWNER
-            tried = MAX_TRIED
-        if not searching:  # last in the loop: some drivers run the rest of it even where no pixel needs it
-            break
-    return result

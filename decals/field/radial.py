@@ -12,8 +12,7 @@ Nested decals do not push each other. The smaller one lies above the other, and 
 lower number, on surface that it faces well (`lies_on_top`), as far as its image reaches (`image_reaches`).
 So a small decal deep inside a large one is seen whole, and R ≥ MIN_KEPT_RADIUS·ρ: no image is compressed more
 than 1/MIN_KEPT_RADIUS times. There are no gaps: every point inside a rim lies at least in the cell of the
-decal of least |q − p|² − ρ². Where its image ends before the point, that of the next least is tried
-(`contact_owner`).
+decal of least |q − p|² − ρ².
 """
 
 # ruff: noqa: SIM102  (Warp evaluates both sides of `and`)
@@ -32,7 +31,6 @@ from decals.record import (
     balls_nested,
     facing_limit,
     field_complement,
-    has_cells,
     rank_of,
     visible_radius,
     xyz,
@@ -45,15 +43,6 @@ NO_OWNER = -1
 
 TOP_MARGIN = 0.75
 """Amount above the facing limit of the least cosine between the normals of surface and of an upper decal."""
-
-NEAREST = -1.0e30
-"""Below the nearness of every decal."""
-
-TIE = 1.0e-7
-"""Difference of nearness, over squared radii of influence or of fields, up to which two are equally near."""
-
-MAX_TRIED = 16
-"""Number of the nearest decals of which one may be the owner; seldom more than two have to be tried."""
 
 RIM_SQUARED = RIM_RADIUS * RIM_RADIUS
 MIN_ADVANCE = 1.0e-37
@@ -188,73 +177,35 @@ def nested_owner(
 
 
 @wp.func
-def nearness(
-    q: wp.vec3, n_q: wp.vec3, decal: wp.int32, contact: wp.int32, index: IndexedDecals
-) -> wp.float32:
-    """Return the number whose least value, of contact decals whose rims contain q, is that of its owner."""
-    if has_cells(contact):
-        return power_of(q, decal, index.records)
-    return complement_of(q, n_q, decal, index)
+def cell_owner(q: wp.vec3, n_q: wp.vec3, rank: wp.int32, index: IndexedDecals) -> wp.int32:
+    """Return the topmost contact decal of a rank whose cell contains q; NO_OWNER outside all rims.
 
-
-@wp.func
-def lies_past(
-    own: wp.float32, decal: wp.int32, size: wp.float32, past: wp.float32, after: wp.int32
-) -> wp.bool:
-    """Return True if a decal is less near than `past`, or equally near and of a number above `after`."""
-    slack = TIE * size
-    return own > past + slack or (own >= past - slack and decal > after)
-
-
-@wp.func
-def contact_owner(
-    q: wp.vec3, n_q: wp.vec3, rank: wp.int32, contact: wp.int32, index: IndexedDecals
-) -> wp.int32:
-    """Return the topmost contact decal of a rank that shows at q; NO_OWNER outside all rims.
-
-    It is the nearest one, or in RADIAL and ELASTIC the topmost whose cell contains q. If its image ends
-    before q, the next nearest is tried, so that no point is bare that an image reaches. Where none of the
-    nearest MAX_TRIED does, the first is the owner.
+    The image of an upper one must reach q.
     """
-    first = wp.int32(NO_OWNER)
-    past = wp.float32(NEAREST)
-    after = wp.int32(NO_OWNER)
-    for _tried in range(MAX_TRIED):
-        closest = wp.int32(NO_OWNER)
-        least = wp.float32(0.0)
-        holders = wp.int32(0)
-        for level in range(index.level_count):
-            span = rank_range(q, rank, level, index)
-            for j in range(span[0], span[1]):
-                decal = index.ids[j]
-                if complement_of(q, n_q, decal, index) <= 0.5:
-                    holders += 1
-                    own = nearness(q, n_q, decal, contact, index)
-                    size = wp.float32(1.0)
-                    if has_cells(contact):
-                        size = index.records[RECORD * decal][3] * index.records[RECORD * decal][3]
-                    if lies_past(own, decal, size, past, after):
-                        if (
-                            closest < 0
-                            or own < least
-                            or (own == least and is_above(decal, closest, index.records))
-                        ):
-                            least = own
-                            closest = decal
-        if closest < 0:
-            return first
-        owner = wp.int32(closest)
-        searching = bool(holders > 1 and index.nested and has_cells(contact))
-        while searching:
-            owner = nested_owner(q, n_q, closest, owner, index)
-            searching = bool(owner != closest and not image_reaches(q, n_q, owner, index))
-        if owner != closest or image_reaches(q, n_q, owner, index):
+    owner = wp.int32(NO_OWNER)
+    least = wp.float32(0.0)
+    holders = wp.int32(0)
+    for level in range(index.level_count):
+        span = rank_range(q, rank, level, index)
+        for j in range(span[0], span[1]):
+            if complement_of(q, n_q, index.ids[j], index) <= 0.5:
+                holders += 1
+                own = power_of(q, index.ids[j], index.records)
+                if (
+                    owner < 0
+                    or own < least
+                    or (own == least and is_above(index.ids[j], owner, index.records))
+                ):
+                    least = own
+                    owner = index.ids[j]
+    if holders < 2 or not index.nested:
+        return owner
+    closest = owner
+    while True:
+        owner = nested_owner(q, n_q, closest, owner, index)
+        if owner == closest or image_reaches(q, n_q, owner, index):
             return owner
-        if first < 0:
-            first = closest
-        past = wp.max(past, least)
-        after = closest
-    return first
+    return owner
 
 
 # -- deformation ----------------------------------------------------------------------------------------

@@ -163,18 +163,22 @@ def look_at_points(
     i = wp.tid()
     q = points[i]
     n = wp.normalize(normals[i])
-    found = wp.vec4(float(NO_OWNER), 0.0, 0.0, 0.0)
+    owner = wp.int32(NO_OWNER)
+    pushed = wp.vec3(0.0, 0.0, 0.0)
     if once:
         found = single_layer_at(q, n, contact, index)
+        owner = int(found[0])
+        pushed = wp.vec3(found[1], found[2], found[3])
     else:
         owner = owner_at(q, n, contact, index)
         if owner != NO_OWNER:
             pushed = contact_at(q, n, owner, contact, index)
-            place = uv_at(q, n, owner, pushed, index)
-            found = wp.vec4(float(owner), pushed[0], place[0], place[1])
-    owners[i] = int(found[0])
-    rims[i] = rim_distance(found[1])
-    uv[i] = wp.vec2(found[2], found[3])
+    owners[i] = owner
+    rims[i] = 0.0
+    uv[i] = wp.vec2(0.0, 0.0)
+    if owner != NO_OWNER:
+        rims[i] = rim_distance(pushed[0])
+        uv[i] = uv_at(q, n, owner, pushed, index)
 
 
 @wp.func

@@ -43,7 +43,7 @@ def log_factor(e: Any, least: Any) -> Any:
     with np.errstate(all="ignore"):
         w = np.minimum((e - least) / (1 - 2 * least), 1)
         log_h = np.log1p(-np.exp(np.log1p(-w) / least))
-    return np.where(e <= least, -np.inf, np.where(w < 1, log_h, 0.0))
+    return np.where(e == least, -np.inf, np.where(w < 1, log_h, 0.0))
 
 
 def contact_complement(e: Any, *, strongest: bool = False) -> Any:

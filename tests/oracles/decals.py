@@ -15,7 +15,6 @@ from tests.oracles.contact import RIM, complements, log_factor, rim_distance
 FACING_LIMIT = -0.25
 LEAST = 0.21
 ON_TOP = 0.5
-TRIED = 16
 IMAGE_END = 2 * np.sqrt(0.25001)
 STIFFNESS = 2.0
 CHUNK = 2_000_000
@@ -191,10 +190,7 @@ class _Scene:
             return self.cells(members, elastic=contact == "elastic")
         count = len(squared)
         e = np.column_stack([np.where(acts, complements(squared), 2.0), np.full(count, 2.0)])
-        who = np.append(members, -1)
-        spare = self.spare(e <= 0.5, who)
-        reaching = np.where((spare >= 0) & _tried(e), e, 2.0)
-        owner = np.where(reaching.min(axis=1) <= 0.5, reaching.argmin(axis=1), e.argmin(axis=1))
+        owner = e.argmin(axis=1)
         least = e[np.arange(count), owner]
         owned = least <= 0.5
         pair, other = np.nonzero(owned[:, None] & (e + least[:, None] < 1))
@@ -206,11 +202,11 @@ class _Scene:
         else:
             together = np.bincount(pair, log_h, minlength=count).astype(np.float64)
         complement = least + (0.5 - least) * -np.expm1(together)
-        doubt = np.minimum(_tie_doubt(squared, acts), np.abs(spare).min(axis=1))
-        return np.where(owned, who[owner], -1), complement, doubt
+        who = np.append(members, -1)
+        return np.where(owned, who[owner], -1), complement, _tie_doubt(squared, acts)
 
     def spare(self, inside: Any, members: Any) -> Any:
-        """How far images reach beyond points inside their rims, in their radii; more elsewhere."""
+        """How far images reach beyond points inside their rims, in their radii."""
         result = np.full(inside.shape, 4.0)
         if self.corrected:
             rows, columns = np.nonzero(inside)
@@ -223,7 +219,7 @@ class _Scene:
     def cells(self, members: Any, *, elastic: bool) -> Any:
         """Convex cells between radical planes. Of stacked decals the smallest shows that faces q well.
 
-        Its image must reach q. The lowest is that of least power whose image does, or of all if none does.
+        Its image must reach q.
         """
         centres, radii = self.centres[members], self.radii[members]
         squared, facing = self.squared[:, members], self.facing[:, members]
@@ -240,12 +236,9 @@ class _Scene:
         # Beyond the plane to j where j has less power, unless i and j are stacked or j faces away.
         less = power_few[:, None, :] < power_few[:, :, None]
         beyond = less & (inside_few[:, None, :] & ~stacked_few)
+        lowest = ~(less & inside_few[:, None, :]).any(axis=2)
         spare_few = self.spare(inside_few, members[few])
-        reaching = inside_few & (spare_few >= 0)
-        tried = reaching & _tried(np.where(inside_few, power_few, np.inf))
-        bottom = np.where(tried.any(axis=1, keepdims=True), tried, inside_few)
-        lowest = bottom & ~(less & bottom[:, None, :]).any(axis=2)
-        shows = reaching & ~beyond.any(axis=2) & (away_few > 0) | lowest
+        shows = inside_few & ~beyond.any(axis=2) & ((away_few > 0) & (spare_few >= 0) | lowest)
         upper = np.argsort(np.argsort(radii, kind="stable"), kind="stable")
         uppermost = np.where(shows, upper[few], len(members)).argmin(axis=1)
         owner, owned = few[np.arange(len(few)), uppermost], shows.any(axis=1)
@@ -273,7 +266,6 @@ class _Scene:
         over = (inside_few[:, None, :] & stacked_few & less).any(axis=2)
         unsure = np.minimum(np.abs(away_few), np.abs(spare_few))
         doubt = np.minimum(doubt, np.where(inside_few & over, unsure, 4.0).min(axis=1))
-        doubt = np.minimum(doubt, np.abs(spare_few).min(axis=1))
         if elastic:
             aside = facing & stacked & (squared < 1.6 * RIM**2) & (radii < radii[owner][:, None])
             doubt = np.minimum(doubt, np.where(aside, np.abs(away), 4.0).min(axis=1))
@@ -321,11 +313,6 @@ def _compressed(
         total = np.sqrt(((moved / (1 - t[:, None] - moved)) ** 2).sum(axis=1))
         r = 1 - (1 - t) / (1 + total)
     return np.where((t >= 1) | (t[:, None] >= planes).any(axis=1), 1.0, np.where(total > 0, r, t))
-
-
-def _tried(nearness: NDArray[Any]) -> Any:
-    """True for the nearest decals of each point, of which one may own it."""
-    return nearness.argsort(axis=1, kind="stable").argsort(axis=1) < TRIED
 
 
 def _tie_doubt(squared: NDArray[Any], acts: Any) -> Any:

@@ -117,75 +117,16 @@ def top_rank(q: wp.vec3d, n: wp.vec3d, first: wp.int32, these: Members) -> wp.in
 
 
 @wp.func
-def unrolled(w: wp.vec3d, n_p: wp.vec3d, n_q: wp.vec3d) -> wp.vec4d:
-    """Offset by an arc of the ends' harmonic mean height, and length by one of their geometric mean."""
-    fall = -wp.dot(w, n_p)
-    rise = wp.dot(w, n_q)
-    turn = n_q - n_p
-    angle = TWO * wp.atan2(wp.length(turn), wp.length(n_q + n_p))
-    if fall * rise <= ZERO or angle == ZERO:
-        return wp.vec4d(w[0], w[1], w[2], wp.length(w))
-    versine = HALF * wp.dot(turn, turn)
-    radius = TWO * fall * rise / ((fall + rise) * versine)
-    toward = turn + versine * n_p
-    m = w + radius * (angle - wp.sin(angle)) / wp.max(wp.sin(angle), TINY) * toward
-    skew = (rise - fall) / (rise + fall)
-    gain = fall * rise * (ONE + TWO * skew * skew) / (versine * versine)
-    length = wp.sqrt(wp.dot(w, w) + gain * (angle * angle - TWO * versine))
-    return wp.vec4d(m[0], m[1], m[2], length)
-
-
-@wp.func
-def spare(q: wp.vec3d, n: wp.vec3d, i: wp.int32, corrected: wp.bool, these: Members) -> wp.float64:
-    """How far the image of i reaches beyond q, in its radii."""
-    if not corrected:
-        return FOUR
-    w = (q - wide(these.positions[i])) / wp.float64(these.radii[i])
-    return IMAGE_END - unrolled(w, wide(these.normals[i]), n)[3]
-
-
-@wp.func
-def doubt_of_rims(
-    q: wp.vec3d, n: wp.vec3d, first: wp.int32, corrected: wp.bool, these: Members
-) -> wp.float64:
-    """How near q lies to any rim, the end of an image within it, or the limit of facing of what reaches q."""
+def doubt_of_rims(q: wp.vec3d, n: wp.vec3d, first: wp.int32, these: Members) -> wp.float64:
+    """How near q lies to any rim, or to the limit of facing of what reaches it."""
     doubt = wp.float64(4.0)
     for i in range(first, first + these.size):
         squared = relative(q, i, these)
         if facing(n, i, these):
             doubt = wp.min(doubt, wp.abs(wp.sqrt(squared) / RIM - ONE))
-            if complement(squared) <= HALF:
-                doubt = wp.min(doubt, wp.abs(spare(q, n, i, corrected, these)))
         if squared < ONE and these.spill[i] == 0:
             doubt = wp.min(doubt, wp.abs(wp.dot(n, wide(these.normals[i])) - FACING_LIMIT))
     return doubt
-
-
-@wp.func
-def holds(
-    q: wp.vec3d,
-    n: wp.vec3d,
-    i: wp.int32,
-    rank: wp.int32,
-    least: wp.float64,
-    corrected: wp.bool,
-    these: Members,
-) -> wp.bool:
-    """True for a decal of a rank whose rim holds q, and whose image reaches at least so far beyond."""
-    if these.ranks[i] != rank or not facing(n, i, these) or complement(relative(q, i, these)) > HALF:
-        return False
-    return spare(q, n, i, corrected, these) >= least
-
-
-@wp.func
-def least_spare(
-    q: wp.vec3d, n: wp.vec3d, first: wp.int32, rank: wp.int32, corrected: wp.bool, these: Members
-) -> wp.float64:
-    """What images of a rank must reach beyond q if they can own it: 0, or anything if none reaches q."""
-    for i in range(first, first + these.size):
-        if holds(q, n, i, rank, ZERO, corrected, these):
-            return ZERO
-    return -FOUR
 
 
 @wp.func
@@ -195,12 +136,10 @@ def sheet(
     first: wp.int32,
     rank: wp.int32,
     contact: wp.int32,
-    corrected: wp.bool,
     reach: wp.float64,
     these: Members,
 ) -> Answer:
     """Equation 5, repaired, over the decals of one rank; those beyond reach influence radii do not push."""
-    need = least_spare(q, n, first, rank, corrected, these)
     owner = wp.int32(-1)
     least = wp.float64(4.0)
     second = wp.float64(4.0)
@@ -209,11 +148,10 @@ def sheet(
         if these.ranks[i] == rank and facing(n, i, these):
             squared = relative(q, i, these)
             edge = wp.min(edge, wp.abs(wp.sqrt(squared) / reach - ONE))
-            if holds(q, n, i, rank, need, corrected, these):
-                second = wp.min(second, wp.max(least, squared))
-                if squared < least:
-                    owner = i
-                least = wp.min(least, squared)
+            second = wp.min(second, wp.max(least, squared))
+            if squared < least:
+                owner = i
+            least = wp.min(least, squared)
     if least < UNDERFLOW:
         edge = wp.float64(0.0)
     own = complement(least)
@@ -287,6 +225,34 @@ def moved_by(
 
 
 @wp.func
+def unrolled(w: wp.vec3d, n_p: wp.vec3d, n_q: wp.vec3d) -> wp.vec4d:
+    """Offset by an arc of the ends' harmonic mean height, and length by one of their geometric mean."""
+    fall = -wp.dot(w, n_p)
+    rise = wp.dot(w, n_q)
+    turn = n_q - n_p
+    angle = TWO * wp.atan2(wp.length(turn), wp.length(n_q + n_p))
+    if fall * rise <= ZERO or angle == ZERO:
+        return wp.vec4d(w[0], w[1], w[2], wp.length(w))
+    versine = HALF * wp.dot(turn, turn)
+    radius = TWO * fall * rise / ((fall + rise) * versine)
+    toward = turn + versine * n_p
+    m = w + radius * (angle - wp.sin(angle)) / wp.max(wp.sin(angle), TINY) * toward
+    skew = (rise - fall) / (rise + fall)
+    gain = fall * rise * (ONE + TWO * skew * skew) / (versine * versine)
+    length = wp.sqrt(wp.dot(w, w) + gain * (angle * angle - TWO * versine))
+    return wp.vec4d(m[0], m[1], m[2], length)
+
+
+@wp.func
+def spare(q: wp.vec3d, n: wp.vec3d, i: wp.int32, corrected: wp.bool, these: Members) -> wp.float64:
+    """How far the image of i reaches beyond q, in its radii."""
+    if not corrected:
+        return FOUR
+    w = (q - wide(these.positions[i])) / wp.float64(these.radii[i])
+    return IMAGE_END - unrolled(w, wide(these.normals[i]), n)[3]
+
+
+@wp.func
 def convex(
     q: wp.vec3d,
     n: wp.vec3d,
@@ -298,9 +264,8 @@ def convex(
 ) -> Answer:
     """Radial and elastic contact: the uppermost cell that holds q, and where q lies on the ray to its end.
 
-    The image of the owner reaches q if that of any decal does.
+    The image of an upper decal reaches q.
     """
-    need = least_spare(q, n, first, rank, corrected, these)
     owner = wp.int32(-1)
     doubt = wp.float64(4.0)
     smallest = wp.float64(1e300)
@@ -314,19 +279,19 @@ def convex(
             if inside:
                 left = spare(q, n, i, corrected, these)
             shows = bool((these.spill[i] != 0 or away > ZERO) and left >= ZERO)
-            lowest = holds(q, n, i, rank, need, corrected, these)
+            lowest = bool(True)
             for j in range(first, first + these.size):
                 if j != i and these.ranks[j] == rank and facing(n, j, these):
                     doubt = wp.min(doubt, doubt_of_pair(own, power(q, j, these), i, j, these))
                     if power(q, j, these) < own:
-                        lowest = lowest and not holds(q, n, j, rank, need, corrected, these)
+                        lowest = False
                         if not lie_over(i, j, these):
                             inside = False
                         elif own <= ZERO:
                             doubt = wp.min(doubt, wp.abs(left))
                             if these.spill[i] == 0:
                                 doubt = wp.min(doubt, wp.abs(away))
-            if ((inside and shows) or lowest) and r < smallest:  # of equal ones the first stays
+            if inside and (shows or lowest) and r < smallest:  # of equal ones the first stays
                 smallest = r
                 owner = i
     if owner < 0:
@@ -466,12 +431,13 @@ def topmost(
     first = group * these.size
     rank = top_rank(q, n, first, these)
     if rank < 0:
-        return Answer(-1, ONE, doubt_of_rims(q, n, first, corrected, these), FOUR)
-    doubt = doubt_of_rims(q, n, first, corrected, these)
+        return Answer(-1, ONE, doubt_of_rims(q, n, first, these), FOUR)
     if (rank & 3) == PUSH:
         if contact >= RADIAL:
-            return doubted(convex(q, n, first, rank, contact, corrected, these), doubt)
-        return doubted(sheet(q, n, first, rank, contact, corrected, reach, these), doubt)
+            return doubted(
+                convex(q, n, first, rank, contact, corrected, these), doubt_of_rims(q, n, first, these)
+            )
+        return doubted(sheet(q, n, first, rank, contact, reach, these), doubt_of_rims(q, n, first, these))
     owner = wp.int32(-1)
     e = wp.float64(1.0)
     for i in range(first, first + these.size):
@@ -479,7 +445,7 @@ def topmost(
             if complement(relative(q, i, these)) <= HALF:
                 owner = i
                 e = complement(relative(q, i, these))
-    return Answer(owner, e, doubt, FOUR)
+    return Answer(owner, e, doubt_of_rims(q, n, first, these), FOUR)
 
 
 @wp.kernel

@@ -5,7 +5,7 @@ import warp as wp
 from blobtree.kernels import KERNEL_OPTIONS
 from decals.field.contact import add_push, contact_complement, contact_push, contact_uv, rim_distance
 from decals.field.mapping import image_distance, in_image, tangent_coordinates, unroll, unroll_step
-from decals.field.ownership import NO_OWNER, contact_at, owner_at, single_layer_at, uv_at
+from decals.field.ownership import NO_OWNER, contact_at, owner_at, single_layer_at
 from decals.index.lookup import IndexedDecals
 from decals.record import NO_FIELD, RECORD, RIM_RADIUS, field_complement, xyz
 
@@ -166,7 +166,6 @@ def coordinates_of(
 @wp.kernel
 def both_ways(
     points: wp.array(dtype=wp.vec3),
-    normals: wp.array(dtype=wp.vec3),
     contact: wp.int32,
     index: IndexedDecals,
     once: wp.array(dtype=wp.vec4),
@@ -174,11 +173,10 @@ def both_ways(
 ) -> None:
     i = wp.tid()
     q = points[i]
-    n = normals[i]
-    once[i] = single_layer_at(q, n, contact, index)
-    owner = owner_at(q, n, contact, index)
-    twice[i] = wp.vec4(float(NO_OWNER), 0.0, 0.0, 0.0)
+    up = wp.vec3(0.0, 0.0, 1.0)
+    once[i] = single_layer_at(q, up, contact, index)
+    owner = owner_at(q, up, contact, index)
+    pushed = wp.vec3(0.0, 0.0, 0.0)
     if owner >= 0:
-        pushed = contact_at(q, n, owner, contact, index)
-        uv = uv_at(q, n, owner, pushed, index)
-        twice[i] = wp.vec4(float(owner), pushed[0], uv[0], uv[1])
+        pushed = contact_at(q, up, owner, contact, index)
+    twice[i] = wp.vec4(float(owner), pushed[0], pushed[1], pushed[2])

@@ -43,7 +43,6 @@ def test_once_is_twice(
     points[: len(decals)] = decals.positions[: len(points)]
     inputs = [
         wp.array(points, dtype=wp.vec3, device="cpu"),
-        wp.full(len(points), wp.vec3(0.0, 0.0, 1.0), dtype=wp.vec3, device="cpu"),
         int(contact),
         index_on(decals, "cpu"),
     ]

@@ -98,7 +98,7 @@ BY_NAME: dict[str, Draw] = {
     "inverse": uniform(-3.0, 3.0, 3), "length": uniform(0.0, 1.5), "m": place,
     "mapping": whole(0, 2), "n": units, "n_p": units, "n_q": units, "nearest": uniform(0.0, 1.5),
     "most": uniform(0.0, 3.0, 2), "rise": uniform(0.0, 5.0, 2),
-    "after": whole(-1, DECALS), "offset": beside(powers(-9, 9), powers(-9, 9)), "past": uniform(-1.0, 0.1),
+    "offset": beside(powers(-9, 9), powers(-9, 9)),
     "packed_rank": among(0.0, 0.5, 1.0, 4194303.5), "rank": whole(0, 4), "ray": units,
     "operator": whole(0, len(OPERATORS)), "origin": place,
     "profile": beside(among(1), among(0), uniform(0.3, 3.0), uniform(-2.0, 2.0)), "phi": share,
@@ -159,8 +159,7 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
         "first": kept, "last": kept, "closest": whole(0, DECALS), "after": whole(0, DECALS),
     },
     "sum_of_pushes": {"distance": uniform(0.0, 0.2)},  # before all planes, where z is infinite
-    "contact_owner": {"rank": among(1)},
-    "lies_past": {"own": among(-0.5, -0.1), "past": among(-0.5, -0.2), "size": share},
+    "cell_owner": {"rank": among(1)},
     "log_one_minus": {"w": uniform(0.0, 0.999)},
     "cell_coordinate": {"x": uniform(-1000.0, 1000.0)},
     "cell_hash": dict.fromkeys("xyz", whole(-(2**31), 2**31)),
