@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from typing import Any, TypeAlias, cast
 
 import numpy as np
@@ -33,11 +33,12 @@ from decals.scattering.domain import (
 from decals.scattering.neighbors import FacingTree
 from decals.scattering.orientation import Direction, as_direction
 from decals.scattering.variation import ImageChoice, image_shares
-from decals.surfaces.convert import TREE_SUFFIXES, as_surface
+from decals.surfaces.convert import TREE_SUFFIXES
 from decals.surfaces.implicit import ImplicitSurface
 from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.mesh_file import read_parts
+from decals.surfaces.mesh_file import block_triangles, read_parts
 from decals.surfaces.surface import Surface
+from decals.surfaces.triangulate import MeshArrays
 from decals.validation import allowed_number, instance, member
 
 SAMPLES = 16384
@@ -71,6 +72,9 @@ Region: TypeAlias = Callable[[Float32Array], BoolArray]
 
 Host: TypeAlias = tuple[Any, Surface]
 """A model and its surface."""
+
+NamedPart: TypeAlias = tuple[int, str, Callable[[], Region]]
+"""The number of a model, a name that it has for a part of it, and what returns the region of that part."""
 
 Where: TypeAlias = Mask | PaintedImage | Node | str | ArrayLike
 """Where a zone is: see `Zone`."""
@@ -266,8 +270,11 @@ class _PlacedZones:
         self._surfaces = as_surfaces(several)
         self._density, self._mask = density, mask
         hosts = list(zip(several, self._surfaces, strict=True))
+        named = cache(  # of all zones: it reads files
+            lambda: [(index, *part) for index, host in enumerate(hosts) for part in _named_parts(*host)]
+        )
         self._wheres = [
-            _region(zone.where, f"where of zone {number}", hosts)
+            _region(zone.where, f"where of zone {number}", hosts, named)
             for number, zone in enumerate(self._zones, 1)
         ]
         self._border = OrientedPoints.empty()
@@ -430,14 +437,16 @@ def _one_of_each_cube(positions: Float32Array, side: float) -> Int64Array:
 # -- where zones are -------------------------------------------------------------------------------------
 
 
-def _region(where: Where, name: str, hosts: Sequence[Host]) -> Region:
+def _region(
+    where: Where, name: str, hosts: Sequence[Host], named: Callable[[], Sequence[NamedPart]]
+) -> Region:
     """Return where a zone is on models, see `Zone`; `name` is that of the value in messages."""
     if isinstance(where, PaintedImage):
         return where.mask()
     if isinstance(where, Node):
         return _solid_or_part(where, hosts)
     if isinstance(where, str):
-        return _named_region(where, name, hosts)
+        return _named_region(where, name, hosts, named())
     if callable(where):
         return lambda points: checked_values(name, where, points, truths=True) != 0.0
     meshes = [surface for _, surface in hosts if isinstance(surface, MeshSurface)]
@@ -511,13 +520,8 @@ def _on_hosts(parts: Sequence[tuple[int, Region]], hosts: Sequence[Host]) -> Reg
     return inside
 
 
-def _named_region(wanted: str, name: str, hosts: Sequence[Host]) -> Region:
+def _named_region(wanted: str, name: str, hosts: Sequence[Host], named: Sequence[NamedPart]) -> Region:
     """Return the parts of models that have a name."""
-    named = [
-        (index, known, region)
-        for index, (model, surface) in enumerate(hosts)
-        for known, region in _named_parts(model, surface, name)
-    ]
     parts = [(index, region()) for index, known, region in named if known == wanted]
     if not parts:
         names = ", ".join(sorted({repr(known) for _, known, _ in named})[:12]) or "none"
@@ -525,7 +529,7 @@ def _named_region(wanted: str, name: str, hosts: Sequence[Host]) -> Region:
     return _on_hosts(parts, hosts)
 
 
-def _named_parts(model: Any, surface: Surface, name: str) -> Iterator[tuple[str, Callable[[], Region]]]:
+def _named_parts(model: Any, surface: Surface) -> Iterator[tuple[str, Callable[[], Region]]]:
     """Yield the names that a model has for itself and its parts, and functions that return their regions."""
     if isinstance(own := getattr(model, "name", None), str):
         yield from ((known, lambda: _everywhere) for known in (own, *getattr(model, "labels", ())))
@@ -534,24 +538,24 @@ def _named_parts(model: Any, surface: Surface, name: str) -> Iterator[tuple[str,
             yield known, partial(_part, surface.tree, [path])
     if isinstance(model, str | os.PathLike) and not os.fspath(model).lower().endswith(TREE_SUFFIXES):
         for parts in read_parts(model):
-            yield from _separate_parts([(known, MeshSurface(*arrays)) for known, arrays in parts])
+            yield from _parts_of_mesh(parts)
     elif hasattr(model, "keys") and hasattr(model, "combine"):  # blocks of pyvista
-        yield from _separate_parts(list(zip(model.keys(), map(as_surface, model), strict=True)))
+        yield from _parts_of_mesh(block_triangles(model))
     elif hasattr(model, "point_data") and hasattr(model, "cell_data"):
-        faces = model.extract_surface(algorithm="dataset_surface").triangulate()
-        mesh = MeshSurface(faces.points, faces.regular_faces)
-        for arrays in (faces.point_data, faces.cell_data):
+        shell = model.extract_surface(
+            pass_pointid=False, pass_cellid=False, algorithm="dataset_surface"
+        ).triangulate()
+        mesh = MeshSurface(shell.points, shell.regular_faces)
+        for arrays in (shell.point_data, shell.cell_data):
             for known, values in arrays.items():
-                yield known, partial(_painted_region, mesh, values, name)
+                yield known, partial(_painted_region, mesh, values, f"array {known!r}")
 
 
-def _separate_parts(parts: list[tuple[str, Surface]]) -> Iterator[tuple[str, Callable[[], Region]]]:
-    """Yield the names of surfaces, and functions that return where each is the nearest."""
-    surfaces = [surface for _, surface in parts]
-    for index, (known, _) in enumerate(parts):
-        yield known, partial(_nearest_region, surfaces, index)
-
-
-def _nearest_region(surfaces: Sequence[Surface], index: int) -> Region:
-    """Return where one of several surfaces is the nearest."""
-    return lambda points: on_nearest(surfaces, points).surface_ids == index
+def _parts_of_mesh(parts: Sequence[tuple[str, MeshArrays]]) -> Iterator[tuple[str, Callable[[], Region]]]:
+    """Yield the names of parts of a mesh, and functions that return where each is the nearest."""
+    corners = [vertices[faces].reshape(-1, 3) for _, (vertices, faces) in parts]
+    part_of_face = np.repeat(np.arange(len(parts)), [len(rows) // 3 for rows in corners])
+    faces = np.arange(3 * len(part_of_face)).reshape(-1, 3)
+    mesh = MeshSurface(np.concatenate(corners), faces, orientation="keep")
+    for number, (known, _) in enumerate(parts):
+        yield known, partial(region_mask, mesh, part_of_face == number)

@@ -125,7 +125,7 @@ def read_objects(path: str | PathLike[str]) -> list[tuple[str, MeshArrays]]:
 def read_parts(path: str | PathLike[str]) -> Iterator[list[tuple[str, MeshArrays]]]:
     """Read the parts of a mesh file by name: first its objects, then the groups and the materials of OBJ.
 
-    Each list has all faces. Parameters and errors are those of `read_mesh`.
+    Each list has all triangles. Parameters and errors are those of `read_mesh`.
     """
     path = _existing(path)
     suffix = path.suffix.lower()
@@ -134,12 +134,12 @@ def read_parts(path: str | PathLike[str]) -> Iterator[list[tuple[str, MeshArrays
         yield [(name, polygon_triangles(*part.arrays, name=name)) for name, part in parts.items()]
     elif suffix == ".obj":
         points, polygons, _ = read_obj(path)
-        faces = np.split(polygons.corners, np.cumsum(polygons.sizes)[:-1])
+        vertices, faces, triangles = traced_triangles(points, polygons, name=str(path))
         for keyword in PARTS:
-            yield [
-                (name, polygon_triangles(points, [faces[row] for row in rows], name=name))
-                for name, rows in obj_parts(path, keyword)
+            parts = [
+                (name, faces[np.isin(triangles.polygons, rows)]) for name, rows in obj_parts(path, keyword)
             ]
+            yield [(name, (vertices, part)) for name, part in parts if len(part)]
     else:
         yield [(path.name, read_mesh_data(path).arrays)]
 
@@ -169,6 +169,12 @@ def _existing(path: str | PathLike[str]) -> Path:
     if not is_file(path):
         raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
     return path
+
+
+def block_triangles(blocks: "pv.MultiBlock") -> list[tuple[str, MeshArrays]]:
+    """Return the names, the vertices and the triangles of blocks that have cells."""
+    named = zip(blocks.keys(), blocks, strict=True)
+    return [(name, dataset_triangles(block, name=name)) for name, block in named if not _is_empty(block)]
 
 
 def dataset_triangles(dataset: "pv.DataSet | pv.MultiBlock", *, name: str) -> MeshArrays:

@@ -161,6 +161,45 @@ def test_parts_of_a_file_and_blocks(tmp_path: Path) -> None:
             assert np.array_equal(zones.numbers(points) == 0, points[:, 0] > 1.5)
 
 
+def obj_of_triangles(count: int, more: str) -> str:
+    """Text of an OBJ file of separate triangles in a row, each a group of its own, and other lines."""
+    rows = [f"v {k} 0 0\nv {k + 0.9} 0 0\nv {k} 1 0" for k in range(count)]
+    rows += [f"g part{k}\nf {3 * k + 1} {3 * k + 2} {3 * k + 3}" for k in range(count)]
+    return "\n".join([*rows, more])
+
+
+def test_parts_without_area_do_not_hinder_others(tmp_path: Path) -> None:
+    path = tmp_path / "row.obj"
+    path.write_text(obj_of_triangles(3, "g flat\nf 1 1 2\ng lines\nf 1 2\ng part0\nf 5 7 9"))
+    points = rows_of([[0.2, 0.2, 0], [1.2, 0.2, 0], [1.99, 0.3, 0], [2.2, 0.2, 0]])
+    numbers = Zones(Zone("part2"), Zone("part0")).placed_on(path).numbers(points)
+    assert numbers.tolist() == [1, -1, 1, 0]
+    with pytest.raises(InvalidScattering, match="expected visible area in zone 1"):
+        Zones(Zone("flat")).placed_on(path)
+    with pytest.raises(InvalidScattering, match=r"which have 'flat', 'part0', .*; got 'lines'"):
+        Zones(Zone("lines")).placed_on(path)
+    cubes = pv.MultiBlock({"left": pv.Cube(), "none": None, "points": pv.PolyData(), "mesh": pv.Sphere()})
+    assert Zones(Zone("left")).placed_on(cubes).numbers(rows_of([[0.5, 0.5, 0.5]])).tolist() == [0]
+
+
+def test_each_of_many_groups_is_a_zone(tmp_path: Path) -> None:
+    path = tmp_path / "row.obj"
+    path.write_text(obj_of_triangles(40, ""))
+    zones = Zones(*(Zone(f"part{k}") for k in range(40))).placed_on(path)
+    points = rows_of([[k + 0.2, 0.2, 0] for k in range(40)])
+    assert np.array_equal(zones.numbers(points), np.arange(40))
+
+
+def test_names_are_those_that_the_user_gave() -> None:
+    mesh = pv.Plane(i_resolution=3, j_resolution=3)
+    mesh.clear_data()
+    mesh.point_data["paint"] = np.full(mesh.n_points, np.nan)
+    with pytest.raises(InvalidScattering, match=r"which have 'paint'; got 'pain'"):
+        Zones(Zone("pain")).placed_on(mesh)
+    with pytest.raises(InvalidScattering, match="array 'paint': flags: expected"):
+        Zones(Zone("paint")).placed_on(mesh)
+
+
 # -- borders -----------------------------------------------------------------------------------------------
 
 
