@@ -29,6 +29,12 @@ MAX_SAMPLING_ROUNDS = 12
 SAMPLES_PER_CHOICE = 8
 """Samples for each particle that is drawn from a varying density."""
 
+SAMPLES_AT_PEAK = 2
+"""Samples for each particle where the density is highest."""
+
+MAX_PEAK_SAMPLES = 262_144
+"""Most samples of a surface that are drawn for the sake of the peak."""
+
 DENSITY_STEP = 1.2
 """Factor between two levels of density; a particle stays within it of the density at which it began."""
 
@@ -120,10 +126,11 @@ class Domain:
         outside = self._outside_mask if mask is not None else None
         self.projection = SurfaceProjection(self.surfaces, outside, self.device)
         measures = [self._measure(index) for index in range(len(self.surfaces))]
-        self.areas = np.array([area for area, _ in measures])
+        self.areas = np.array([area for area, _, _ in measures])
         """Visible area of each surface."""
-        self.masses = np.array([mass for _, mass in measures])
+        self.masses = np.array([mass for _, mass, _ in measures])
         """Integral of the density over the visible area of each surface."""
+        self._peaks = [peak for _, _, peak in measures]
         self._boundaries: dict[int, Boundary] = {}
 
     def deformed(self, surfaces: Surface | Sequence[Surface]) -> "Domain":
@@ -300,7 +307,10 @@ class Domain:
             return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32)
         if self._is_whole(index):
             return surface.sample(count, seed)
-        required = count if self.uniform else SAMPLES_PER_CHOICE * count
+        required = count
+        if not self.uniform:
+            at_peak = int(np.ceil(SAMPLES_AT_PEAK * count * self._peaks[index]))
+            required = max(SAMPLES_PER_CHOICE * count, min(at_peak, MAX_PEAK_SAMPLES))
         visible_area = max(self.areas[index], surface.area / AREA_SAMPLES)
         samples = int(np.ceil(1.1 * required * surface.area / visible_area)) + 16
         for _ in range(MAX_SAMPLING_ROUNDS if self.areas[index] > 0 else 0):
@@ -317,15 +327,17 @@ class Domain:
             "move it"
         )
 
-    def _measure(self, index: int) -> tuple[float, float]:
-        """Return the visible area of a surface, and the integral of the density over it."""
+    def _measure(self, index: int) -> tuple[float, float, float]:
+        """Return the visible area of a surface, and the density's integral and peak over mean there."""
         surface = self.surfaces[index]
         if self._is_whole(index):
-            return surface.area, surface.area
+            return surface.area, surface.area, 1.0
         positions, normals = surface.sample(AREA_SAMPLES, self._stream(index, 0))
         visible = np.flatnonzero(~self.forbidden(index, positions, normals))
         area = surface.area / len(positions)
-        return area * len(visible), area * float(self.density(positions[visible]).sum())
+        densities = self.density(positions[visible])
+        peak = float(densities.max() / densities.mean()) if len(visible) else 1.0
+        return area * len(visible), area * float(densities.sum()), peak
 
     def _is_whole(self, index: int) -> bool:
         """Return True if the density is uniform and no part of the surface can be forbidden."""

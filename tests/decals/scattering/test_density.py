@@ -150,3 +150,18 @@ def test_invalid_flags_raise(wrong: Any) -> None:
         region_mask(box(), wrong)
     with pytest.raises(InvalidScattering, match="surface: expected a MeshSurface"):
         region_mask(wrong, [True])
+
+
+def test_small_regions_of_high_density_get_their_share() -> None:
+    """Without samples for the peak, it gets none or twice its share, as one sample falls there."""
+    ball, radius = sphere(level=5), 0.1
+    expected = radius**2 / (radius / 2) ** 2 * np.pi * 2 / np.sqrt(3)
+    for seed in range(8):
+        relaxation = Relaxation(
+            ball,
+            spacing=radius / 2,
+            seed=seed,
+            density=lambda points: np.where(points[:, 2] > 1 - radius**2 / 2, 1.0, 1 / 64),
+        )
+        count = (relaxation.positions[:, 2] > 1 - radius**2 / 2).sum()
+        assert count == pytest.approx(expected, rel=0.45)
