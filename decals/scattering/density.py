@@ -102,10 +102,11 @@ def region_mask(surface: MeshSurface, flags: ArrayLike) -> Callable[[Float32Arra
         real_array("flags", flags, InvalidScattering, truths=True),
         (len(surface.faces), len(surface.vertices)),
     )
-    if values.shape not in ((faces,), (vertices,)) or not ((values >= 0.0) & (values <= 1.0)).all():
+    shaped = values.shape in ((faces,), (vertices,))
+    if not shaped or not ((values >= 0.0) & (values <= 1.0)).all():
         raise InvalidScattering(
             f"flags: expected true or false, or numbers from 0 to 1, for each of {faces} faces or {vertices} "
-            f"vertices, got shape {list(values.shape)}"
+            f"vertices, got {'others' if shaped else f'shape {list(values.shape)}'}"
         )
     corners = np.repeat(values[:, None], 3, axis=1) if values.shape == (faces,) else values[surface.faces]
 

@@ -15,6 +15,7 @@ from blobtree.errors import InvalidNode
 from blobtree.lazy import Lazy
 from blobtree.nodes.paths import Path, node_in_world
 from blobtree.nodes.surgery import without_branches
+from blobtree.validation import describe
 from decals.errors import InvalidImage, InvalidScattering
 from decals.scattering.appearance import Appearance
 from decals.scattering.covering import random_points_around
@@ -87,13 +88,18 @@ class Zone:
     Parameters
     ----------
     where : callable, PaintedImage, Node, str or array_like
-        A mask, which is a function of ``points[n, 3]`` to ``bool[n]``. Or a `PaintedImage`: where it is
-        brighter than 1/2. Or a BlobTree: inside its solid; of one that is a node of the model itself, the
-        part of the surface that it makes. Or a name: of an object or its label, of a node of a
-        `TreeObject`, of an object in a mesh file, a group or a material in an OBJ file, or of an array of a
-        pyvista mesh. Or values of the vertices or faces of a mesh that is the only model: true or false,
-        numbers from 0 to 1, or colours ``[n, 3]`` or ``[n, 4]``, whose brightness counts; the zone is where
-        they are 1/2 or more.
+        One of these:
+
+        * A mask: a function of ``points[n, 3]`` to ``bool[n]``.
+        * A `PaintedImage`: the zone is where it is brighter than 1/2.
+        * A BlobTree that is no node of the model: the zone is inside its solid.
+        * A node of the model: the zone is the part of the surface that it makes, and that equal nodes make.
+        * A name: of an object or its label, of a node of a `TreeObject`, of an object in a mesh file, of a
+          group or a material in an OBJ file, of a block of a pyvista `MultiBlock`, or of an array of a
+          pyvista mesh. If several parts have the name, the zone is all of them.
+        * Values of the vertices or of the faces, if the only model is a mesh: true or false, numbers from 0
+          to 1, or colours ``[n, 3]`` or ``[n, 4]``, whose brightness counts. The zone is where they are 1/2
+          or more.
     density : float or callable, optional
         Density relative to other zones: a number above 0, or a function of ``points[n, 3]`` to such numbers.
     spacing : float, optional
@@ -103,7 +109,7 @@ class Zone:
     direction : array_like, callable, Orientation or str, optional
         Direction of the images' u axes, as for `scatter`; that of `scatter` by default.
     images : int or sequence of int, optional
-        Number of images, or the numbers of some, as for `scatter`; those of `scatter` by default.
+        How many images, or a list of their numbers, as for `scatter`; those of `scatter` by default.
     weights : array_like, optional
         Relative frequency of each of these images.
     choice : ImageChoice or str, optional
@@ -179,10 +185,11 @@ class Zones:
     *zones : Zone
         The zones.
     border_width : float, default: 0.0
-        0: a decal belongs to the zone of its centre, and neighbours press against each other across the
-        border. Above 0: width in model units of the band around a border in which decals of both zones
-        mix. At a distance d inside a zone, its share of them is ``t² (3 - 2 t)``, where ``t`` is
-        ``1/2 + d / width``, and the density changes in the same way.
+        Width in model units of the band along a border in which decals of both zones mix. With 0 there is
+        none: each decal belongs to the zone of its centre, and neighbours press against each other across
+        the border. In the band, at a distance d inside a zone, the share of that zone is ``t² (3 - 2 t)``,
+        where ``t`` is ``1/2 + d / width``. Where several bands meet, shares are scaled to a sum of 1. The
+        density changes in the same way.
 
     Raises
     ------
@@ -247,14 +254,14 @@ class Zones:
 
         Returns
         -------
-        An object whose ``density`` and ``mask`` are for `Relaxation`, and itself for `Relaxation.to_decals`.
-        ``numbers(points)`` are the numbers of the zones of points, -1 where there is none;
-        ``shares(points)``, ``float64[n, k]``, the shares of all zones there.
+        An object to give to `Relaxation.to_decals`, and its ``density`` and ``mask`` to `Relaxation`.
+        ``numbers(points)`` returns the number of the zone at each point, -1 where there is none;
+        ``shares(points)`` the shares of all zones there, ``float64[n, k]``.
 
         Raises
         ------
         InvalidScattering
-            For a zone that these models cannot have, or without visible area that no zone before it has.
+            For a zone that these models cannot have, or that has no visible area outside the zones before it.
         """
         placed = _PlacedZones(self, models, density, mask)
         placed.measure(seed, device)
@@ -353,8 +360,8 @@ class _PlacedZones:
         missing = np.flatnonzero(np.bincount(numbers + 1, minlength=len(self._zones) + 1)[1:] == 0)
         if len(missing):
             raise InvalidScattering(
-                f"expected visible area in zone {missing[0] + 1} that no zone before it has, got none in "
-                f"{SAMPLES} samples; move it, or put it first"
+                f"expected visible area in zone {missing[0] + 1} outside the zones before it, got none in "
+                f"{SAMPLES} samples; move or enlarge it, or put it first"
             )
         if self._width == 0.0:
             return
@@ -449,6 +456,10 @@ def _region(
         return _named_region(where, name, hosts, named())
     if callable(where):
         return lambda points: checked_values(name, where, points, truths=True) != 0.0
+    if not (isinstance(where, Sequence) or hasattr(where, "__array__")):
+        raise InvalidScattering(
+            f"{name}: expected a mask, a PaintedImage, a BlobTree, a name or values, got {describe(where)}"
+        )
     meshes = [surface for _, surface in hosts if isinstance(surface, MeshSurface)]
     if len(hosts) != 1 or not meshes:
         raise InvalidScattering(
@@ -462,9 +473,10 @@ def _painted_region(mesh: MeshSurface, values: ArrayLike, name: str) -> Region:
     """Return where values or colours of the vertices or faces of a mesh are 1/2 or more."""
     try:
         array = np.asarray(values)
-        return region_mask(mesh, grey_values(array[None])[0] if array.ndim == 2 else values)
+        painted = array.shape[1:] in ((3,), (4,))
+        return region_mask(mesh, grey_values(array[None])[0] if painted else values)
     except (InvalidImage, InvalidScattering, ValueError) as error:
-        raise InvalidScattering(f"{name}: {error}") from error
+        raise InvalidScattering(f"{name}: {str(error).removeprefix('image: ')}") from error
 
 
 def _solid_or_part(node: Node, hosts: Sequence[Host]) -> Region:

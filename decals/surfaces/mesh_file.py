@@ -136,10 +136,11 @@ def read_parts(path: str | PathLike[str]) -> Iterator[list[tuple[str, MeshArrays
         points, polygons, _ = read_obj(path)
         vertices, faces, triangles = traced_triangles(points, polygons, name=str(path))
         for keyword in PARTS:
-            parts = [
-                (name, faces[np.isin(triangles.polygons, rows)]) for name, rows in obj_parts(path, keyword)
+            yield [
+                (name, (vertices, faces[own]))
+                for name, rows in obj_parts(path, keyword)
+                if (own := np.isin(triangles.polygons, rows)).any()
             ]
-            yield [(name, (vertices, part)) for name, part in parts if len(part)]
     else:
         yield [(path.name, read_mesh_data(path).arrays)]
 
