@@ -8,7 +8,7 @@ import numpy as np
 
 from blobtree.files import is_file
 from decals.apps.models.loading import load_model
-from decals.errors import InvalidInput
+from decals.errors import ImplicitDecalsError, InvalidInput
 from decals.scattering import PaintedImage, Planar, Zone, Zones
 from decals.scenes.objects import SceneObject, TreeObject
 from decals.surfaces.convert import TREE_SUFFIXES
@@ -53,21 +53,25 @@ def parse_zones(
 
 def _zone(text: str, objects: Sequence[SceneObject], axis: str, trust: bool) -> Zone:
     """Return the zone that a text describes."""
-    where, colon, options = text.rpartition(":")
+    where, _, options = text.rpartition(":")
     if "=" not in options:
-        where, colon, options = text, "", ""
+        where, options = text, ""
     values: dict[str, Any] = {}
-    for item in options.split(",") if colon else ():
+    unread = dict(VALUES)
+    for item in options.split(",") if options else ():
         key, _, value = item.partition("=")
         try:
-            field, read = VALUES[key]
+            field, read = unread.pop(key)
             values[field] = read(value)
         except (KeyError, ValueError) as error:
             keys = ", ".join(VALUES)
             raise InvalidInput(
-                f"--zone {text}: expected WHERE:KEY=VALUE,… with keys among {keys}, got {item!r}"
+                f"--zone {text}: expected WHERE:KEY=VALUE,… with keys among {keys}, each once, got {item!r}"
             ) from error
-    return Zone(_where(where, objects, axis, trust), **values)
+    try:
+        return Zone(_where(where, objects, axis, trust), **values)
+    except ImplicitDecalsError as error:
+        raise InvalidInput(f"--zone {text}: {error}") from error
 
 
 def _where(text: str, objects: Sequence[SceneObject], axis: str, trust: bool) -> Any:
@@ -81,5 +85,5 @@ def _where(text: str, objects: Sequence[SceneObject], axis: str, trust: bool) ->
         return PaintedImage(path, Planar.over([item.surface for item in objects], axis))
     solid = load_model(text, trust=trust)
     if not isinstance(solid, TreeObject):
-        raise InvalidInput(f"--zone: expected a BlobTree for the inside of its solid, got a scene: {text!r}")
+        raise InvalidInput(f"expected a BlobTree for the inside of its solid, got {text!r}")
     return solid.tree.translate(np.subtract(solid.origin, objects[0].origin))

@@ -147,6 +147,8 @@ def test_spacings_of_zones_set_the_count(folder: Path) -> None:
         (["--zone", "tail", "-o", "a.json"], "expected a name of the models, which have 'spheres'"),
         (["--zone", "*:taste=1", "-o", "a.json"], "expected WHERE:KEY=VALUE"),
         (["--zone", "*:density=much", "-o", "a.json"], "expected WHERE:KEY=VALUE"),
+        (["--zone", "*:factor=2,factor=3", "-o", "a.json"], "each once, got 'factor=3'"),
+        (["--zone", "*:factor=2", "--zone", "*:factor=-2", "-o", "a.json"], "--zone *:factor=-2: factor of"),
         (["--zone", "*:images=1", "-o", "a.json"], "there are 1 images, from 0 on; raise --images"),
         (["--zone", "*:spacing=0.5", "--count", "5", "-o", "a.json"], "no count or spacing beside"),
         (["--border-width", "0.1", "-o", "a.json"], "give --zone"),
