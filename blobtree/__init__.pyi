@@ -58,7 +58,7 @@ from .nodes.outlines import Outline
 from .nodes.parameter_gradient import ParameterGradient
 from .nodes.primitives import Box, Cone, Disc, Point, Primitive, Segment, Torus
 from .nodes.profiles import Extrude, Prism, Revolve
-from .nodes.repeats import PolarRepeat, Repeat
+from .nodes.repeats import EndlessRepeat, PolarRepeat, Repeat
 from .nodes.rounds import RoundDifference, RoundIntersection, RoundUnion
 from .nodes.sharp import Frustum
 from .nodes.solids import Cylinder, Ellipsoid, HalfSpace
@@ -100,6 +100,7 @@ __all__ = [
     "Difference",
     "Disc",
     "Ellipsoid",
+    "EndlessRepeat",
     "Expression",
     "Extrude",
     "Falloff",

@@ -125,6 +125,12 @@ def _repeat(rng: Rng, operand: Operand) -> Node:
     return blobtree.Repeat(operand(rng), step, count, joining, copies)
 
 
+def _endless_repeat(rng: Rng, operand: Operand) -> Node:
+    step = triple(rng.uniform(0.5, 1.5) * rng.permutation([1.0, 0.3, 0.0]))
+    joining, copies = str(rng.choice(["sum", "union"])), str(rng.choice(["alike", "mirrored"]))
+    return blobtree.EndlessRepeat(operand(rng), step, joining, copies)
+
+
 def _polar_repeat(rng: Rng, operand: Operand) -> Node:
     joining = str(rng.choice(["sum", "union"]))
     return blobtree.PolarRepeat(operand(rng), triple(rng.normal(size=3)), int(rng.integers(1, 4)), joining)
@@ -148,6 +154,7 @@ SPECIAL: dict[str, Callable[[Rng, Operand], Node]] = {
     "transform": _transform,
     "repeat": _repeat,
     "polar_repeat": _polar_repeat,
+    "endless_repeat": _endless_repeat,
     "polygon": _polygon,
     "prism": _prism,
     "expression": _expression,
@@ -172,7 +179,7 @@ def sample(
     for _ in range(ATTEMPTS):
         try:
             node = SPECIAL[kind.file_tag](rng, operand)
-            node.tape, node.support  # noqa: B018  (they may refuse a combination of parameters)
+            node.tape, node.field_box  # noqa: B018  (they may refuse a combination of parameters)
         except InvalidNode:
             continue
         return node

@@ -51,6 +51,7 @@ ICONS = {
     "Mirror": "flip-horizontal",
     "Polygon": "vector-polygon",
     "Prism": "hexagon-outline",
+    "EndlessRepeat": "dots-grid",
     "PolarRepeat": "dots-circle",
     "Rectangle": "vector-rectangle",
     "Repeat": "dots-horizontal",

@@ -42,6 +42,7 @@ from blobtree.tape.dispatch import (
     warp_extent,
     warp_forward,
     warp_stretch,
+    warp_texel,
 )
 from blobtree.tape.evaluators import direct_bounds, profile_value, to_local
 from blobtree.texels import Texels
@@ -367,7 +368,11 @@ def prune(
             extent = wp.min(extent, wp.vec3(ball, ball, ball))
             warped += 1
             if write:
-                copy_texels(tape, at - 1, size + 1, out, start + end)
+                copy_texels(tape, at - 1, PREFIX, out, start + end)
+                for i in range(1 + int(header[3])):
+                    kept = tape[at + PREFIX - 1 + i]
+                    kept = warp_texel(operator, local, reach, kept, i, tape, at + PREFIX - 1)
+                    out[start + end + PREFIX + i] = kept
             end += size + 1
             peak = wp.max(peak, end)
             accumulator_start = end

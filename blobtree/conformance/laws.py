@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from blobtree._typing import Float64Array
 from blobtree.conformance.bound_kernels import evaluate_bounds
 from blobtree.conformance.plain_field import PlainField
-from blobtree.conformance.samples import Rng, drawn_node, falling_ball, points_around
+from blobtree.conformance.samples import Rng, drawn_node, falling_ball, points_around, sampled_box
 from blobtree.declare.falloff import Falloff
 from blobtree.declare.falloff_checks import find_rim
 from blobtree.declare.formula import shown
@@ -238,7 +238,7 @@ def gradients_match(case: Case) -> Contradictions:
     """Compare gradients with differences of the field in double precision, away from kinks."""
     points = case.points(POINTS)
     seen = case.gradients(points)
-    size = float(np.max(np.subtract(*case.node.support[::-1])))
+    size = float(np.max(np.subtract(*sampled_box(case.node)[::-1])))
     step = STEP * size
     shifts = step * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     moved = (points.astype(np.float64) + shifts[:, None]).reshape(-1, 3)
@@ -329,13 +329,14 @@ def slopes_hold(case: Case) -> Contradictions:
 
 def box_holds_the_field(case: Case) -> Contradictions:
     """Sample values outside the support, half of them just outside its faces, which must be 0."""
-    lower, upper = (corner.astype(np.float64) for corner in case.node.support)
+    lower, upper = sampled_box(case.node)
     margin = float((upper - lower).max())
     points = case.rng.uniform(lower - 0.1 * margin, upper + 0.1 * margin, (8 * POINTS, 3))
     for number, (axis, side) in enumerate(product(range(3), (0, 1))):
         face = lower[axis] - 1e-4 * margin if side == 0 else upper[axis] + 1e-4 * margin
         points[number : 6 * POINTS : 6, axis] = face
     single = points.astype(np.float32)
+    lower, upper = (corner.astype(np.float64) for corner in case.node.field_box)
     outside = single[((single < lower) | (single > upper)).any(axis=1)]
     yield from _compared(
         "the field outside its box", case.values(outside), np.zeros(len(outside)), outside, 0.0

@@ -13,12 +13,16 @@ from blobtree.declare.parameters import OPTIONAL, Parameter, Quantity, fields_of
 from blobtree.errors import InvalidNode
 from blobtree.nodes.node import Node
 from blobtree.nodes.primitives import Point
+from blobtree.validation import LARGEST_NUMBER
 
 Rng = np.random.Generator
 Draw = Callable[[Rng, Parameter], Any]
 Operand = Callable[[Rng], Node]
 
 ATTEMPTS = 60
+MOST_SAMPLED = 4.0
+"""Distance from the origin up to which endless nodes are sampled."""
+
 WEIGHTS = (1.0, 1.0, 0.7, 2.5)
 """Factors of the fields of operands: above 1 they reach values that sums of fields have."""
 
@@ -101,7 +105,7 @@ def drawn_node(
     for _ in range(ATTEMPTS):
         try:
             node = kind(**_drawn_values(kind, rng, operand or balls(rng), draws))
-            node.tape, node.support  # noqa: B018  (they may refuse a combination of parameters)
+            node.tape, node.field_box  # noqa: B018  (they may refuse a combination of parameters)
         except (InvalidNode, TypeError) as error:
             refusal = error
             continue
@@ -138,6 +142,13 @@ def falling_ball(falloff: Falloff) -> Callable[[Rng], Node]:
     return draw
 
 
+def sampled_box(node: Node) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the corners of a node's box; where it has no end, they are `MOST_SAMPLED` from the origin."""
+    lower, upper = (corner.astype(np.float64) for corner in node.field_box)
+    ends = np.abs([lower, upper]) > LARGEST_NUMBER
+    return np.where(ends[0], -MOST_SAMPLED, lower), np.where(ends[1], MOST_SAMPLED, upper)
+
+
 def points_around(
     rng: Rng, node: Node, count: int, values: Callable[[NDArray[np.float32]], NDArray[Any]] | None = None
 ) -> NDArray[np.float32]:
@@ -145,7 +156,7 @@ def points_around(
 
     `values` returns the field at points; by default `node` does.
     """
-    lower, upper = (corner.astype(np.float64) for corner in node.support)
+    lower, upper = sampled_box(node)
     margin = 0.1 * (upper - lower)
     pool = rng.uniform(lower - margin, upper + margin, (8 * count, 3)).astype(np.float32)
     empty = (values or node)(pool) == 0.0

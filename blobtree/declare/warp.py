@@ -8,7 +8,9 @@ makes them:
 * `pullback(q, g, tape, at) -> Jᵀ g`, which takes the subtree's gradient to the outer space;
 * `lipschitz(q, reach, tape, at)`: a bound on ‖J‖ over the ball of radius `reach` about q;
 * `image_box(q, half, tape, at)`, which is optional: half the size of a box about T(q) that holds the image of
-  the box q ± half. It is worth its time for warps whose `lipschitz` is far above 1 in one direction alone.
+  the box q ± half. It is worth its time for warps whose `lipschitz` is far above 1 in one direction alone;
+* `texel(q, reach, kept, number, tape, at)`, which is optional: the texel tape[at + number] = kept in a tape
+  that is pruned to the ball of radius `reach` about q.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -30,6 +32,7 @@ RESULTS: dict[str, Any] = {
     "pullback": wp.vec3,
     "lipschitz": wp.float32,
     "image_box": wp.vec3,
+    "texel": wp.vec4,
 }
 """The formulas of a warp, and the types of their results."""
 
@@ -38,6 +41,7 @@ LEADING: dict[str, dict[str, Any]] = {
     "pullback": {"q": wp.vec3, "g": wp.vec3},
     "lipschitz": {"q": wp.vec3, "reach": wp.float32},
     "image_box": {"q": wp.vec3, "half": wp.vec3},
+    "texel": {"q": wp.vec3, "reach": wp.float32, "kept": wp.vec4, "number": wp.int32},
 }
 """The parameters in front of the numbers."""
 
@@ -59,6 +63,14 @@ def unknown_extent(q: wp.vec3, half: wp.vec3, tape: Texels, at: wp.int32) -> wp.
     return wp.vec3(UNKNOWN_EXTENT, UNKNOWN_EXTENT, UNKNOWN_EXTENT)
 
 
+@wp.func
+def same_texel(
+    q: wp.vec3, reach: wp.float32, kept: wp.vec4, number: wp.int32, tape: Texels, at: wp.int32
+) -> wp.vec4:
+    """Return the texel as it is."""
+    return kept
+
+
 @dataclass(frozen=True, eq=False)
 class SpaceWarp:
     """A warp's name and functions."""
@@ -72,6 +84,7 @@ class SpaceWarp:
     room: Room | None = None
     """Return further numbers, those that depend on the inner box outside of which the subtree is 0."""
     image_box: Any = unknown_extent
+    texel: Any = same_texel
     digest: str = ""
     """Digest of the sources of a custom warp."""
 

@@ -84,7 +84,14 @@ class Model(ImplicitModel):
         smallest, largest, _, _ = out.numpy()[0].tolist()
         return smallest, largest
 
-    def raycast(self, origins: ArrayLike, directions: ArrayLike, *, device: str | None = None) -> Hits:
+    def raycast(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        *,
+        far: float | None = None,
+        device: str | None = None,
+    ) -> Hits:
         """Return the first intersections of rays with the surface.
 
         Parameters
@@ -93,6 +100,9 @@ class Model(ImplicitModel):
             Starts of the rays, or of one ray. A ray that starts inside hits at once.
         directions : array-like (n, 3) or (3,)
             Directions of any length above 0.
+        far : float, optional
+            Distance beyond which rays hit nothing. A tree without an end, such as an `EndlessRepeat`, needs
+            one; hits are exact to about 4e-5 of it there.
         device : str, optional
             Warp device that does the work; the current one by default.
 
@@ -105,6 +115,8 @@ class Model(ImplicitModel):
         ------
         InvalidPoints
             Origins and directions differ in number, or a direction has no length.
+        InvalidNode
+            `far` is not a number above 0, or missing although the tree has no end.
         InvalidDevice
             Warp has no such device.
 
@@ -115,4 +127,4 @@ class Model(ImplicitModel):
         >>> hits.distances.round(3).tolist()
         [4.0]
         """
-        return raycast(self, origins, directions, device=device)
+        return raycast(self, origins, directions, far=far, device=device)

@@ -138,7 +138,7 @@ def _touched_points(
     """Return the indices of the points in the support of each node that has one of the parameters."""
     touched: dict[Path, NDArray[np.intp]] = {}
     for path in {parameter.path for parameter in parameters}:
-        lower, upper = _in_world(tree, path).support
+        lower, upper = _in_world(tree, path).field_box
         margin = 1e-5 * np.maximum(np.abs(lower), np.abs(upper))
         inside = ((points >= lower - margin) & (points <= upper + margin)).all(axis=1)
         touched[path] = np.flatnonzero(inside)

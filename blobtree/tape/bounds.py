@@ -1,9 +1,10 @@
 """Boxes outside of which a tree's field is exactly 0."""
 
 from itertools import product
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from blobtree._typing import Box, Float32Array
 from blobtree.declare.claims import OperatorRow, Support
@@ -21,6 +22,13 @@ from blobtree.tape.program import (
     grown_fields,
     support_radii,
 )
+from blobtree.validation import LARGEST_NUMBER
+
+ENDLESS = 1e30
+"""Coordinate of a side of a box that lies nowhere: the field goes on there without end."""
+
+TURN_ROUNDING = 1e-12
+"""Entry of a map, over its largest one, below which it moves no side of an endless box."""
 
 EMPTY: Box = (np.full(3, np.inf), np.full(3, -np.inf))
 
@@ -133,8 +141,15 @@ def _warped(box: Box, entry: EnterWarp) -> Box:
     lower, upper = entry.warp.box(*box, entry.parameters)
     corners = np.array(list(product(*zip(lower, upper, strict=True))))
     matrix = entry.placement.matrix
+    if is_endless((lower, upper)):
+        matrix = np.where(np.abs(matrix) < TURN_ROUNDING * np.abs(matrix).max(), 0.0, matrix)
     placed = corners @ matrix[:3, :3].T + matrix[:3, 3]
-    return placed.min(axis=0), placed.max(axis=0)
+    return placed.min(axis=0).clip(-ENDLESS, ENDLESS), placed.max(axis=0).clip(-ENDLESS, ENDLESS)
+
+
+def is_endless(box: tuple[NDArray[Any], NDArray[Any]]) -> bool:
+    """Return True if a side of a box lies beyond all numbers that models may have."""
+    return bool(max(-box[0].min(), box[1].max()) > LARGEST_NUMBER)
 
 
 def _combine(operator: OperatorRow, left: Box, right: Box) -> Box:

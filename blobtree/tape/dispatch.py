@@ -245,6 +245,19 @@ def warp_extent(kind: wp.int32, q: wp.vec3, half: wp.vec3, tape: Texels, at: wp.
     """Return half the size of a box about T(q) that holds the image of the box q ± half."""
 
 
+@of_row("warps", "texel")
+def warp_texel(
+    kind: wp.int32,
+    q: wp.vec3,
+    reach: wp.float32,
+    kept: wp.vec4,
+    number: wp.int32,
+    tape: Texels,
+    at: wp.int32,
+) -> wp.vec4:
+    """Return the texel tape[at + number] = kept of a warp in a tape that is pruned to a ball about q."""
+
+
 @of_row("falloffs", "value")
 def falloff_value(kind: wp.int32, distance: wp.float32) -> wp.float32:
     """Return g(d) of a falloff, 0 ≤ d ≤ 1."""

@@ -11,7 +11,7 @@ from blobtree._typing import Float32Array
 from blobtree.errors import InvalidNode
 from blobtree.kernels import loaded
 from blobtree.lazy import Lazy
-from blobtree.tape.bounds import support_box
+from blobtree.tape.bounds import is_endless, support_box
 from blobtree.tape.evaluate_kernels import evaluate_colors, evaluate_gradients, evaluate_values
 from blobtree.tape.program import Instruction, ProgramNode, compile_program
 from blobtree.tape.tape import Tape, compile_tape
@@ -35,7 +35,20 @@ class ImplicitModel(ProgramNode):
 
     @Lazy
     def support(self) -> tuple[Float32Array, Float32Array]:
-        """Lower and upper corner, float32[3] each, of a box outside which the field is exactly 0."""
+        """Lower and upper corner, float32[3] each, of a box outside which the field is exactly 0.
+
+        A tree without an end, such as an `EndlessRepeat`, has none, and raises `InvalidNode`.
+        """
+        if is_endless(self.field_box):
+            raise InvalidNode(
+                "tree: expected one that ends, got one with endless repeats; intersect it with a finite "
+                "solid, as in `tree & Box((0, 0, 0), (4, 4, 4), radius=0)`, or trace rays with `far=`"
+            )
+        return self.field_box
+
+    @Lazy
+    def field_box(self) -> tuple[Float32Array, Float32Array]:
+        """Lower and upper corner as of `support`, at ±`ENDLESS` where the tree has no end."""
         return support_box(self._program)
 
     def __call__(self, points: ArrayLike) -> Float32Array:

@@ -13,12 +13,16 @@ from blobtree.cells.sparse_cells import CELL_KERNELS
 from blobtree.device import known_device, launch
 from blobtree.errors import InvalidPoints
 from blobtree.kernels import load_together
+from blobtree.tape.bounds import is_endless
 from blobtree.tape.instruction_set import InstructionSet
 from blobtree.tape.model import ImplicitModel
 from blobtree.tracing.ray_kernels import trace_rays
 from blobtree.tracing.shade_kernels import shade_hits
-from blobtree.tracing.tree_cells import device_cells
-from blobtree.validation import points_or_point
+from blobtree.tracing.tree_cells import Corners, DeviceCells, device_cells
+from blobtree.validation import points_or_point, positive_number
+
+BOX_MARGIN = 1e-3
+"""Margin of the box around rays that end, over their length and their distance from the origin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +65,17 @@ class Hits:
 
 
 def trace(
-    tree: ImplicitModel, origins: ArrayLike, directions: ArrayLike, *, device: str | None = None
+    tree: ImplicitModel,
+    origins: ArrayLike,
+    directions: ArrayLike,
+    *,
+    far: float | None = None,
+    device: str | None = None,
 ) -> Float32Array:
     """Return the distances (n,) of rays to the surface from `origins` (n, 3) along `directions` (n, 3).
 
-    The distance of a miss is inf. A ray that starts inside hits at once. `device` is the Warp device that
-    traces, by default the current one.
+    The distance of a miss is inf, and so is one beyond `far`. A ray that starts inside hits at once. `device`
+    is the Warp device that traces, by default the current one.
 
     Raises
     ------
@@ -75,20 +84,46 @@ def trace(
     """
     rays = _uploaded(origins, directions, device)
     load_ray_kernels(tree, str(rays[0].device), trace_rays)
-    distances: Float32Array = trace_arrays(tree, *rays)[0].numpy()
+    distances: Float32Array = _traced(tree, rays, far)[0].numpy()
     return distances
 
 
 def raycast(
-    tree: ImplicitModel, origins: ArrayLike, directions: ArrayLike, *, device: str | None = None
+    tree: ImplicitModel,
+    origins: ArrayLike,
+    directions: ArrayLike,
+    *,
+    far: float | None = None,
+    device: str | None = None,
 ) -> Hits:
     """Return the first hits of rays, with normals and colours; arguments and errors are those of `trace`."""
     rays = _uploaded(origins, directions, device)
     device = str(rays[0].device)
     load_ray_kernels(tree, device, trace_rays, shade_hits)
-    distances, spans = trace_arrays(tree, *rays)
-    cells = device_cells(tree, device=device)
+    distances, spans, cells = _traced(tree, rays, far)
     return Hits(*shaded(cells.instruction_set, cells.tape, rays, distances, spans))
+
+
+def _traced(tree: ImplicitModel, rays: Sequence[Any], far: float | None) -> tuple[Any, Any, DeviceCells]:
+    """Return what `trace_arrays` does, without hits beyond `far`, and the cells.
+
+    Cells of a tree without an end are those around the rays.
+    """
+    device, within = str(rays[0].device), None
+    limit = np.inf if far is None else positive_number("far", far)
+    if far is not None and is_endless(tree.field_box):
+        starts, ways = (array.numpy().astype(np.float64) for array in rays)
+        ends = starts + limit * ways / np.linalg.norm(ways, axis=1)[:, None]
+        ends = np.concatenate([starts, ends, np.zeros((int(not len(starts)), 3))])
+        margin = BOX_MARGIN * (limit + np.abs(ends).max())
+        low, high = np.clip(tree.field_box, ends.min(axis=0) - margin, ends.max(axis=0) + margin)
+        within = low.astype(np.float32), high.astype(np.float32)
+    origins, directions = rays
+    distances, spans = trace_arrays(tree, origins, directions, within)
+    if far is not None:
+        found = distances.numpy()
+        distances.assign(np.where(found <= limit, found, np.float32(np.inf)))
+    return distances, spans, device_cells(tree, device=device, within=within)
 
 
 def shaded(
@@ -102,16 +137,18 @@ def shaded(
     return [distances.numpy(), *(array.numpy() for array in arrays)]
 
 
-def trace_arrays(tree: ImplicitModel, origins: Any, directions: Any) -> tuple[Any, Any]:
+def trace_arrays(
+    tree: ImplicitModel, origins: Any, directions: Any, within: Corners | None = None
+) -> tuple[Any, Any]:
     """Do the same as `trace` for Warp arrays of vec3, without copies and checks, on their device.
 
     Return the distances, and for each hit the first texel of the tape that holds there and one past its last,
-    in the tape of `device_cells`.
+    in the tape of `device_cells` `within` a box.
     """
     device = str(origins.device)
     distances: wp.array[Any] = wp.empty(len(origins), dtype=wp.float32, device=device)
     spans: wp.array[Any] = wp.empty(len(origins), dtype=wp.vec2i, device=device)
-    cells = device_cells(tree, device=device)
+    cells = device_cells(tree, device=device, within=within)
     inputs = [origins, directions, cells.arrays]
     launch(cells.instruction_set.kernel_for(trace_rays), len(origins), inputs, [distances, spans], device)
     return distances, spans

@@ -41,6 +41,9 @@ MAX_CELLS_BYTES = 1 << 22
 
 Corner: TypeAlias = tuple[float, ...]
 
+Corners: TypeAlias = tuple[Float32Array, Float32Array]
+"""Lower and upper corner (3,) of a box."""
+
 
 @dataclass(frozen=True, eq=False)
 class TracingCells:
@@ -118,22 +121,31 @@ class DeviceCells:
 
 
 def tracing_cells(
-    tree: ImplicitModel, *, device: str | None = None, blocks: int | None = None
+    tree: ImplicitModel,
+    *,
+    device: str | None = None,
+    blocks: int | None = None,
+    within: Corners | None = None,
 ) -> TracingCells:
     """Return the cells for rays through `tree`.
 
     `device` is the Warp device that builds them, by default the current one. `blocks` is the number of finest
-    blocks along the longest side, by default `blocks_along`.
+    blocks along the longest side, by default `blocks_along`. `within` is the box of the cells, by default the
+    support.
     """
+    box = within or tree.support
     if blocks is None:
         is_long = len(tree.tape.data) >= MIN_CULLED_TEXELS
-        blocks = blocks_along(tree.tape, *tree.support) if is_long else BLOCKS_ALONG
-    return _tracing_cells(tree.tape, *_corners(tree), known_device(device), blocks)
+        blocks = blocks_along(tree.tape, *box) if is_long else BLOCKS_ALONG
+    lower, upper = (tuple(corner.tolist()) for corner in box)
+    return _tracing_cells(tree.tape, lower, upper, known_device(device), blocks)
 
 
-def device_cells(tree: ImplicitModel, *, device: str | None = None) -> DeviceCells:
+def device_cells(
+    tree: ImplicitModel, *, device: str | None = None, within: Corners | None = None
+) -> DeviceCells:
     """Return the cells for rays through `tree` in a device's memory."""
-    return tracing_cells(tree, device=device).on(known_device(device))
+    return tracing_cells(tree, device=device, within=within).on(known_device(device))
 
 
 def blocks_along(tape: Tape, lower: Float32Array, upper: Float32Array) -> int:
@@ -166,11 +178,6 @@ def block_counts(lower: Float32Array, upper: Float32Array, block_size: float) ->
 def trace_tolerance(bounds: tuple[Float32Array, Float32Array]) -> float:
     """Return the distance to the surface at which a ray hits a model of these bounds."""
     return RELATIVE_TOLERANCE * float(np.linalg.norm(bounds[1] - bounds[0]))
-
-
-def _corners(tree: ImplicitModel) -> tuple[Corner, Corner]:
-    lower, upper = tree.support
-    return tuple(lower.tolist()), tuple(upper.tolist())
 
 
 @sized_cache(MAX_CELLS_BYTES)

@@ -49,8 +49,12 @@ NATURAL = {
 DIRECTIONS = ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 """Directions of a new primitive in turn."""
 
-NOT_OFFERED = ("transform", "volume", "press", "bulge", "rated_union")
-"""Kinds that need data or are parts: the gizmo moves nodes, and `SolidContact` makes the last three."""
+NOT_OFFERED = ("transform", "volume", "press", "bulge", "rated_union", "endless_repeat")
+"""Kinds that need data, are parts, or have no mesh alone.
+
+The gizmo moves nodes, `SolidContact` makes presses, bulges and rated unions, and an endless repeat needs a
+finite solid around it.
+"""
 
 GENTLER = 1.0, 2.0, 4.0, 8.0, 16.0
 """Factors of the size of an operand for which warps of it are tried: they bend less per unit."""

@@ -85,7 +85,7 @@ def result_of(node: Node, rng: np.random.Generator) -> bytes:
         node.colors(points),
         bounds_along(node.tape, points, directions, reaches),
         np.array([node.interval(center - half, center + half) for center, half in boxes], np.float32),
-        np.array(node.support, np.float32),
+        np.array(node.field_box, np.float32),
     ]
     return b"".join(np.ascontiguousarray(answer, "<f4").tobytes() for answer in answers)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from blobtree import to_json
+from blobtree import Box, to_json
 from blobtree.conformance.laws import LAWS
 from blobtree.nodes.kinds import NODE_KINDS
 from tests.conformance import NAMES, problems_of, sample
@@ -55,6 +55,8 @@ def test_a_class_of_nodes_conforms_on_a_graphics_card(tag: str) -> None:
 def test_meshes_and_rays_of_a_class_are_sound(tag: str) -> None:
     rng = np.random.default_rng(5)
     node = sample(NODE_KINDS[tag], rng)
+    if tag == "endless_repeat":
+        node = node & Box((0, 0, 0), (3, 3, 3), radius=0)
     assert failures_of(node, rng) == []
 
 

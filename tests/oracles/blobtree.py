@@ -29,6 +29,7 @@ from blobtree import (
     Difference,
     Disc,
     Ellipsoid,
+    EndlessRepeat,
     Expression,
     GradientBlend,
     Gyroid,
@@ -99,6 +100,10 @@ HUGE = 64.0
 """Factor of radii that takes every point of a test into a primitive's influence."""
 
 RIM = np.sqrt(1.0 - 0.5 ** (1.0 / 3.0))
+
+
+ENDLESS_REACH = 14.0
+"""Distance up to which an endless repeat has copies here."""
 
 
 @dataclass(frozen=True)
@@ -242,7 +247,7 @@ def signed(node: Node, points: ArrayLike) -> Field:
             values = parameter_values(node)
             fields = [evaluate(x, q) for x in node.operands]
             return reduce(lambda a, b: _blended(a, b, node, **values), fields)
-        case ConvolutionStroke() | Mirror() | Repeat() | PolarRepeat():
+        case ConvolutionStroke() | Mirror() | Repeat() | EndlessRepeat() | PolarRepeat():
             return signed(written_out(node), q)
         case Macro():
             return evaluate(written_out(node), q)
@@ -350,7 +355,7 @@ def written_out(node: Node) -> Node:
         case Mirror(child=child, axis=axis):
             signs = [-1.0 if name == axis else 1.0 for name in "xyz"]
             return Sum(child, Transform(child, tuple((*row, 0.0) for row in np.diag(signs).tolist())))
-        case Repeat() | PolarRepeat():
+        case Repeat() | EndlessRepeat() | PolarRepeat():
             kind: Any = Sum if node.joining == "sum" else Union
             return cast(Node, kind([Transform(node.child, matrix) for matrix in copy_maps(node)]))
         case RoundUnion() | RoundIntersection() | RoundDifference():
@@ -370,21 +375,26 @@ def written_out(node: Node) -> Node:
     raise TypeError(type(node))
 
 
-def copy_maps(node: Repeat | PolarRepeat) -> list[Any]:
-    """The maps, three rows of four numbers, from the child of a repeat to its copies."""
-    maps = []
-    for number in range(node.count):
-        linear, offset = np.eye(3), np.zeros(3)
-        if isinstance(node, Repeat):
-            offset = number * np.array(node.step)
-            if node.copies == "mirrored" and number % 2:
-                linear = linear - 2.0 * np.outer(node.step, node.step) / np.dot(node.step, node.step)
-        else:
-            n = np.array(node.axis) / np.linalg.norm(node.axis)
-            angle, cross = 2.0 * np.pi * number / node.count, np.cross(np.eye(3), n)
-            linear = np.cos(angle) * linear + np.sin(angle) * cross + (1.0 - np.cos(angle)) * np.outer(n, n)
-        maps.append(tuple(map(tuple, np.column_stack([linear, offset]).tolist())))
-    return maps
+def copy_maps(node: Repeat | EndlessRepeat | PolarRepeat) -> list[Any]:
+    """The maps, three rows of four numbers, from the child of a repeat to its copies.
+
+    Of an endless one they are the copies within `ENDLESS_REACH`.
+    """
+    if isinstance(node, PolarRepeat):
+        n = np.array(node.axis) / np.linalg.norm(node.axis)
+        cross = np.cross(np.eye(3), n)
+        maps = []
+        for angle in 2.0 * np.pi * np.arange(node.count) / node.count:
+            linear = np.cos(angle) * np.eye(3) + np.sin(angle) * cross
+            maps.append(np.column_stack([linear + (1.0 - np.cos(angle)) * np.outer(n, n), np.zeros(3)]))
+    else:
+        step = np.array(node.step)
+        mirror = np.eye(3) - 2.0 * np.outer(step, step) / np.dot(step, step)
+        last = int(ENDLESS_REACH / np.linalg.norm(step)) if isinstance(node, EndlessRepeat) else 0
+        numbers = range(-last, last + 1) if isinstance(node, EndlessRepeat) else range(node.count)
+        odd = mirror if node.copies == "mirrored" else np.eye(3)
+        maps = [np.column_stack([odd if number % 2 else np.eye(3), number * step]) for number in numbers]
+    return [tuple(map(tuple, matrix.tolist())) for matrix in maps]
 
 
 def pressed_solids(contact: SolidContact) -> tuple[Node, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blobtree import Box, Node, Point
-from blobtree.conformance.samples import DRAWS, Rng
+from blobtree.conformance.samples import DRAWS, Rng, sampled_box
 from blobtree.declare.parameters import Quantity, fields_of, parameters_of
 from blobtree.nodes.kinds import NODE_KINDS
 from blobtree.nodes.primitives import Leaf
@@ -80,7 +80,8 @@ def leaves_of(node: Node) -> Iterator[Node]:
 
 def degenerate_points(rng: Rng, node: Node) -> Array:
     """Points at which coordinates agree with those of a node's parameters, of its faces and of its box."""
-    known: list[Any] = [np.zeros((1, 3)), np.array(node.support), np.mean(node.support, axis=0)[None]]
+    box = np.array(sampled_box(node))
+    known: list[Any] = [np.zeros((1, 3)), box, box.mean(axis=0)[None]]
     for leaf in leaves_of(node):
         declared = parameters_of(type(leaf))
         values = {f.name: getattr(leaf, f.name) for f in fields_of(type(leaf)) if f.name in declared}
