@@ -97,7 +97,7 @@ class Zone:
         * A name: of an object or its label, of a node of a `TreeObject`, of an object in a mesh file, of a
           group or a material in an OBJ file, of a block of a pyvista `MultiBlock`, or of an array of a
           pyvista mesh. If several parts have the name, the zone is all of them.
-        * Values of the vertices or of the faces, if the only model is a mesh: true or false, numbers from 0
+        * Values of the vertices or triangles, if the only model is a mesh: true or false, numbers from 0
           to 1, or colours ``[n, 3]`` or ``[n, 4]``, whose brightness counts. The zone is where they are 1/2
           or more.
     density : float or callable, optional

@@ -6,6 +6,7 @@ VTK's readers crash or hang on some damaged files, so they run in a process of t
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -173,9 +174,13 @@ def _existing(path: str | PathLike[str]) -> Path:
 
 
 def block_triangles(blocks: "pv.MultiBlock") -> list[tuple[str, MeshArrays]]:
-    """Return the names, the vertices and the triangles of blocks that have cells."""
-    named = zip(blocks.keys(), blocks, strict=True)
-    return [(name, dataset_triangles(block, name=name)) for name, block in named if not _is_empty(block)]
+    """Return the names, the vertices and the triangles of blocks that have some."""
+    found: list[tuple[str, MeshArrays]] = []
+    for name, block in zip(blocks.keys(), blocks, strict=True):
+        if not _is_empty(block):
+            with suppress(InvalidMesh):  # of points or lines
+                found.append((name, dataset_triangles(block, name=name)))
+    return found
 
 
 def dataset_triangles(dataset: "pv.DataSet | pv.MultiBlock", *, name: str) -> MeshArrays:

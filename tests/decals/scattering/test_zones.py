@@ -178,7 +178,8 @@ def test_parts_without_area_do_not_hinder_others(tmp_path: Path) -> None:
         Zones(Zone("flat")).placed_on(path)
     with pytest.raises(InvalidScattering, match=r"which have 'flat', 'part0', .*; got 'lines'"):
         Zones(Zone("lines")).placed_on(path)
-    cubes = pv.MultiBlock({"left": pv.Cube(), "none": None, "points": pv.PolyData(), "mesh": pv.Sphere()})
+    others = {"none": None, "empty": pv.PolyData(), "point": pv.PolyData([[0.0, 0, 0]]), "line": pv.Line()}
+    cubes = pv.MultiBlock({**others, "left": pv.Cube(), "ball": pv.Sphere(center=(3, 0, 0))})
     assert Zones(Zone("left")).placed_on(cubes).numbers(rows_of([[0.5, 0.5, 0.5]])).tolist() == [0]
 
 
