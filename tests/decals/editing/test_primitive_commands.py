@@ -121,8 +121,9 @@ def test_decals_stay_on_the_surface_and_come_back(tree: Any, command: Any) -> No
     assert len(change.after.numbers)
     decals, item = session.document.decals.decals, session.document.objects[0]
     assert np.abs(item.tree(decals.positions) - ISO).max() < 1e-4
-    normals = item.surface.normal(decals.positions)
-    cosines = np.einsum("ni,ni->n", normals, decals.normals)
+    rows = change.after.numbers  # the others keep the mean normals of images that bend over the old crease
+    normals = item.surface.normal(decals.positions[rows])
+    cosines = np.einsum("ni,ni->n", normals, decals.normals[rows])
     assert (cosines < 0.999).sum() <= 2  # on a crease, rounding decides whose normal it is
     session.undo()
     assert digest(session.document) == first

@@ -174,6 +174,7 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
     },
     "newton_step": {"gap": uniform(0.0, 0.01), "rise": uniform(-1.0, 3.0), "tolerance": uniform(1e-3, 0.1)},
     "widened_range": {"smallest": field, "largest": field},
+    "warp_texel": {"kept": four, "number": whole(0, 6)},
 }  # fmt: skip
 
 

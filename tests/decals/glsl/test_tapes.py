@@ -5,7 +5,18 @@ from itertools import cycle
 import numpy as np
 import pytest
 
-from blobtree import Box, GradientBlend, Node, Point, Polyline, Segment, SolidContact, Superquadric, from_sdf
+from blobtree import (
+    Box,
+    EndlessRepeat,
+    GradientBlend,
+    Node,
+    Point,
+    Polyline,
+    Segment,
+    SolidContact,
+    Superquadric,
+    from_sdf,
+)
 from blobtree.nodes import blends as blend_kinds
 from blobtree.nodes import rounds
 from blobtree.nodes.kinds import NODE_KINDS
@@ -124,7 +135,7 @@ def test_blends_are_the_same_in_both_languages(context: Context) -> None:
 
 
 def test_deformations_are_the_same_in_both_languages(context: Context) -> None:
-    trees = list(STRONG.values())
+    trees = [*STRONG.values(), EndlessRepeat(Segment((0, 0, 0), (0.2, 0.3, 0), radius=0.3), (0.9, 0, 0.2))]
     kinds = kinds_of(trees)
     assert kinds.warps == tuple(range(1, len(kinds.instruction_set.warps)))
     assert_same_in_both_languages(context, trees, kinds)
