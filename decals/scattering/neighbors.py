@@ -14,7 +14,7 @@ from blobtree.progress import check_cancelled
 from decals.model import FACING_LIMIT
 from decals.scattering.domain import OrientedPoints
 from decals.scattering.particle_state import ParticleState
-from decals.scattering.repulsion import make_grid, neighbor_search, no_mirror_planes, particle_struct
+from decals.scattering.repulsion import make_grid, neighbor_search, particle_struct
 from decals.scattering.search_kernels import (
     DIRECTIONS,
     MirrorPlanes,
@@ -117,13 +117,16 @@ class NeighborQuery:
     def apart(self, points: OrientedPoints, own: Int64Array) -> Float32Array:
         """Return the distance of each point to the nearest particle but its own, in spacings, ``float32[n]``.
 
-        As `nearest`, without images behind mirror planes.
+        Images behind mirror planes count, the own one too.
         """
         state = self._state
         sizes: Any = wp.array(state.host_sizes[own], dtype=wp.float32, device=state.device)
         positions, normals = (vectors(rows, state.device) for rows in (points.positions, points.normals))
         particles = particle_struct(positions, normals, sizes, state.sheets_of(points))
-        mirrors = no_mirror_planes(state.device)
+        surface_ids = index_array(points.surface_ids, state.device)
+        mirrors = state.mirror_planes(
+            particles, surface_ids, state.device_movable[index_array(own, state.device)].contiguous()
+        )
         distances: Float32Array = self.nearest(particles, index_array(own, state.device), mirrors).numpy()
         return distances
 
