@@ -16,6 +16,7 @@ from blobtree.nodes.numeric_parameters import nodes_with_paths
 from blobtree.nodes.primitives import Cone, Leaf, Point, Segment
 from blobtree.nodes.tree import Transform
 from blobtree.nodes.values import operands_of
+from blobtree.tape.bounds import is_endless
 from blobtree.tape.model import checked_tree
 
 _RADII = (Quantity.RADIUS, Quantity.SEMI_AXES, Quantity.RADII)
@@ -106,11 +107,17 @@ def node_in_world(tree: Node, path: Path) -> Node:
     return result
 
 
+def world_box(tree: Node, path: Path) -> tuple[Float32Array, Float32Array]:
+    """Return the corners of the box around the node at a path in the world; the tree's if it has no end."""
+    box = node_in_world(tree, path).field_box
+    return tree.support if is_endless(box) else box
+
+
 def inside_support(points: Float32Array, *nodes: Node) -> BoolArray:
     """Return True for each of the points (n, 3) that lies in the support of one of the nodes."""
     inside = np.zeros(len(points), np.bool_)
     for node in nodes:
-        lower, upper = node.support
+        lower, upper = node.field_box
         inside |= ((points >= lower) & (points <= upper)).all(axis=1)
     return inside
 

@@ -7,7 +7,7 @@ import numpy as np
 from blobtree import ISO, Node
 from blobtree._typing import Float32Array, Float64Array, IndexArray, Int64Array
 from blobtree.lazy import Lazy
-from blobtree.nodes.paths import Path, inside_support, moved, node_at, node_in_world, with_node
+from blobtree.nodes.paths import Path, inside_support, moved, node_at, node_in_world, with_node, world_box
 from blobtree.nodes.places import Place, mirror_maps
 from decals.editing.document import Document, ForkFamily
 from decals.editing.queries import SurfacePoints, nearest_points
@@ -181,7 +181,7 @@ def following_weights(tree: Node, path: Path, points: Float64Array, turns: Float
 
 def _shifted_trees(tree: Node, path: Path) -> tuple[float, list[tuple[Node, Node]]]:
     """Return a small step, and for each world axis the trees with the node moved ahead and back by it."""
-    low, high = node_in_world(tree, path).support
+    low, high = world_box(tree, path)
     step = DIFFERENCE_STEP * float((high - low).min())
     place = Place(tree, path)
 

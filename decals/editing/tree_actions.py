@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from blobtree import Node, Point, Segment
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.formulas.falloff import RIM
-from blobtree.nodes.paths import Path, node_at, node_in_world, primitive_at
+from blobtree.nodes.paths import Path, node_at, primitive_at, world_box
 from blobtree.nodes.places import Place
 from blobtree.nodes.surgery import Join, dominant_primitive, join_of, path_of, paths_after, world_space_path
 from blobtree.validation import describe
@@ -316,7 +316,7 @@ class TreeActions(WindowActions):
 
     def select_node(self, number: int, path: Path) -> None:
         """Select a node of an object's tree, with its handle on the side that the camera sees."""
-        low, high = node_in_world(self._tree(number), path).support
+        low, high = world_box(self._tree(number), path)
         eye, _ = self._state.camera.eye_and_target()
         toward = unit_rows((np.asarray(eye) - (low + high) / 2)[None])[0]
         self._state.select_primitive(number, path, float((high - low).min()) / 2 * toward)
@@ -550,7 +550,7 @@ class TreeActions(WindowActions):
         """Return path, approximate radius and colour of the primitive that shows at a point."""
         number, path = self._primitive_under(pick)
         tree = self._tree(number)
-        return path, _thickness(node_in_world(tree, path)), primitive_at(tree, path).color
+        return path, _thickness(tree, path), primitive_at(tree, path).color
 
     def _grow(self, pick: SurfacePick, path: Path, node: Node, height: float) -> None:
         command = AddPrimitive(pick.object, world_space_path(self._tree(pick.object), path), node)
@@ -559,7 +559,7 @@ class TreeActions(WindowActions):
     def duplicate_selected(self) -> None:
         """Add a copy of the selected primitive, to the right of it as seen."""
         number, path, _ = self._selected()
-        distance = _thickness(node_in_world(self._tree(number), path))
+        distance = _thickness(self._tree(number), path)
         self._restructure(DuplicatePrimitive(number, path, distance * self._aside()))
 
     def _aside(self) -> Float64Array:
@@ -719,9 +719,9 @@ def _rounded(center: Float64Array, size: float) -> tuple[Float64Array, float]:
     return np.round(center, digits), round(size, digits)
 
 
-def _thickness(node: Node) -> float:
+def _thickness(tree: Node, path: Path) -> float:
     """Return the approximate visible radius of a primitive; its box has its influence radius."""
-    low, high = node.support
+    low, high = world_box(tree, path)
     return RIM * float((high - low).min()) / 2
 
 

@@ -255,8 +255,8 @@ class Zones:
         Returns
         -------
         An object to give to `Relaxation.to_decals`, and its ``density`` and ``mask`` to `Relaxation`.
-        ``numbers(points)`` returns the number of the zone at each point, -1 where there is none;
-        ``shares(points)`` the shares of all zones there, ``float64[n, k]``.
+        Its ``numbers(points)`` returns the zone of each point, -1 outside all zones. Its ``shares(points)``
+        returns the shares of all zones at each point, ``float64[n, k]``.
 
         Raises
         ------

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import ISO, Cone, Mirror, Point, Ricci, Segment
+from blobtree import ISO, Box, Cone, EndlessRepeat, Mirror, Point, Ricci, Segment
 from blobtree.errors import InvalidNode
 from blobtree.nodes.paths import node_in_world, primitive_at
 from blobtree.nodes.places import Place
@@ -91,6 +91,20 @@ def test_a_move_is_one_in_the_world_whatever_lies_above(path: Any) -> None:
     after = node_in_world(session.document.objects[0].tree, path)
     points = np.random.default_rng(0).uniform(*before.support, (300, 3)).astype(np.float32)
     np.testing.assert_allclose(after(points + offset), before(points), atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "command", [MovePrimitive(0, (0, 0), (0.05, 0.05, 0)), ResizePrimitive(0, (0, 0), 1.1)]
+)
+def test_a_primitive_of_an_endless_repeat_is_edited(command: Any) -> None:
+    endless = EndlessRepeat(Point((0, 0, 0), radius=0.4), (1, 0, 0))
+    session = session_of(endless & Box((0, 0, 0), (2.5, 2, 2), radius=0))
+    first = digest(session.document)
+    session.do(command)
+    decals, item = session.document.decals.decals, session.document.objects[0]
+    assert np.abs(item.tree(decals.positions) - ISO).max() < 1e-4
+    session.undo()
+    assert digest(session.document) == first
 
 
 def test_decals_on_a_primitive_go_along_and_the_others_stay() -> None:
