@@ -96,7 +96,7 @@ Pixel pixel_at(ivec2 texel) {
 #else
         Surface surface = surface_at(texel);
 #ifdef FILTERED
-        vec4 color = filtered_color(surface.position, surface.normal, surface.right, surface.up);
+        vec4 color = filtered_color(surface);
 #else
         vec3 position = surface.position;
         vec3 normal = surface.normal;

@@ -427,32 +427,39 @@ vec4 layers_average(int owner, vec3 q, vec3 n, vec3 right, vec3 up, float share,
     return color;
 }
 
+// Premultiplied linear colour of part number `i` of a pixel in `parts`. A whole pixel with many boundaries, or with sides
+// that are long beside its owner, sets `parts` instead.
+vec4 part_color(Surface surface, int i, inout ivec2 parts) {
+    vec3 right = surface.right / float(parts.x), up = surface.up / float(parts.y);
+    vec2 at = part_middle(i, parts);
+    vec3 q = surface.position + at.x * surface.right + at.y * surface.up;
+    float share = 1.0 / float(parts.x * parts.y);
+    bool whole = parts == ivec2(1);
+    int owner = part_owner(q, surface.normal, right, up);
+    if (whole && owner >= 0) {
+        parts = parts_beside(owner, right, up);
+        owner = parts == ivec2(1) || decal_layered ? owner : -1;  // parts of layers may need more
+    }
+    int boundaries;
+    vec4 color = layers_average(owner, q, surface.normal, right, up, share, boundaries);
+    if (whole && boundaries > MAX_BOUNDARIES) {
+        parts = parts_at_boundaries(surface.right, surface.up);
+    }
+    return color;
+}
+
 #ifndef SHARED
-// Premultiplied linear colour of all decals over each other, averaged over a pixel. Pixels with many boundaries, or
-// with sides that are long beside their owner, are the mean of several parts.
-vec4 exact_color(vec3 q, vec3 n, vec3 right, vec3 up) {
+// Premultiplied linear colour of all decals over each other, averaged over a pixel, which may be divided.
+vec4 exact_color(Surface surface) {
     vec4 sum = vec4(0.0);
     ivec2 parts = ivec2(1);
 #ifdef MATERIALS
     clear_materials();
 #endif
     for (int i = 0; i < parts.x * parts.y; i++) {
-        vec2 at = part_middle(i, parts);
-        vec3 point = q + at.x * right + at.y * up;
-        vec3 part_right = right / float(parts.x), part_up = up / float(parts.y);
-        bool whole = parts == ivec2(1);
-        int owner = part_owner(point, n, part_right, part_up);
-        if (whole && owner >= 0) {
-            parts = parts_beside(owner, right, up);
-            if (parts != ivec2(1) && !decal_layered) {  // parts of layers may need more
-                i = -1;
-                continue;
-            }
-        }
-        int boundaries;
-        vec4 color = layers_average(owner, point, n, part_right, part_up, 1.0 / float(parts.x * parts.y), boundaries);
-        parts = whole && boundaries > MAX_BOUNDARIES ? parts_at_boundaries(right, up) : parts;
-        if (whole && parts != ivec2(1)) {
+        ivec2 before = parts;
+        vec4 color = part_color(surface, i, parts);
+        if (parts != before) {
             i = -1;
 #ifdef MATERIALS
             clear_materials();
@@ -529,16 +536,16 @@ vec4 inner_color(vec3 q, vec3 n, vec3 right, vec3 up) {
 
 #ifndef SHARED
 // The colour of a pixel. MARKED: by the quicker way, where it is enough.
-vec4 filtered_color(vec3 q, vec3 n, vec3 right, vec3 up) {
+vec4 filtered_color(Surface surface) {
 #ifdef MARKED
 #ifdef MATERIALS
     material_left = 1.0;
     clear_materials();
 #endif
     pixel_divided = decal_layered;
-    return decal_layered ? vec4(0.0) : inner_color(q, n, right, up);
+    return decal_layered ? vec4(0.0) : inner_color(surface.position, surface.normal, surface.right, surface.up);
 #else
-    return exact_color(q, n, right, up);
+    return exact_color(surface);
 #endif
 }
 #endif

@@ -22,27 +22,6 @@ void add_parts(int member, ivec2 parts) {
     }
 }
 
-// Premultiplied linear colour of part number `i` of a pixel in `parts`. A whole pixel that must be divided, as in
-// `exact_color`, sets `parts` instead.
-vec4 part_color(Surface surface, int i, inout ivec2 parts) {
-    vec3 right = surface.right / float(parts.x), up = surface.up / float(parts.y);
-    vec2 at = part_middle(i, parts);
-    vec3 q = surface.position + at.x * surface.right + at.y * surface.up;
-    float share = 1.0 / float(parts.x * parts.y);
-    bool whole = parts == ivec2(1);
-    int owner = part_owner(q, surface.normal, right, up);
-    if (whole && owner >= 0) {
-        parts = parts_beside(owner, right, up);
-        owner = parts == ivec2(1) || decal_layered ? owner : -1;  // parts of layers may need more
-    }
-    int boundaries;
-    vec4 color = layers_average(owner, q, surface.normal, right, up, share, boundaries);
-    if (whole && boundaries > MAX_BOUNDARIES) {
-        parts = parts_at_boundaries(surface.right, surface.up);
-    }
-    return color;
-}
-
 // Premultiplied linear colour of the decals at an invocation's pixel, in `pixel_parts` or more. All invocations of the
 // group must call it at once.
 vec4 shared_color(ivec2 texel) {
