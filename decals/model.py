@@ -1,9 +1,9 @@
 """`Decals`: decals as data, a frozen and validated structure of arrays (paper, section 3.1)."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import KW_ONLY, dataclass, fields, replace
 from enum import IntEnum
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
@@ -17,7 +17,7 @@ from blobtree.validation import describe, items
 from decals.errors import InvalidDecals, InvalidRow
 from decals.images.texels import decode_srgb
 from decals.options import Values
-from decals.receivers import TEXT, codes_of, receiver_array
+from decals.receivers import codes_of, receiver_array
 from decals.validation import (
     bool_array,
     check_range,
@@ -207,38 +207,11 @@ class Decals(Value):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        positions = finite_array("positions", self.positions, (-1, 3))
-        count = len(positions)
-        normals = finite_array("normals", self.normals, (count, 3))
-        tangents = finite_array("tangents", self.tangents, (count, 3))
-        radii = finite_array("radii", one_or_each(self.radii, count), (count,))
-        check_range("radii", radii, MIN_RADIUS, MAX_COORDINATE)
-        check_range("positions", positions, -MAX_COORDINATE, MAX_COORDINATE)
-        normals = unit_vectors("normals", normals)
-        arrays = {
-            "positions": positions.astype(np.float32),
-            "normals": normals.astype(np.float32),
-            "tangents": orthogonal_vectors(unit_vectors("tangents", tangents), normals).astype(np.float32),
-            "radii": radii.astype(np.float32),
-            "images": whole_array("images", self.images, count, low=NO_IMAGE, high=MAX_IMAGES - 1, default=0),
-            "spill": bool_array("spill", self.spill, count),
-            "interactions": member_array(
-                "interactions", self.interactions, count, Interaction, Interaction.PUSH
-            ),
-            "layers": whole_array(
-                "layers", self.layers, count, low=-LAYER_LIMIT, high=LAYER_LIMIT - 1, default=0
-            ),
-            "tints": color_array("tints", self.tints, count).astype(np.float32),
-            "opacities": unit_interval("opacities", one_or_each(self.opacities, count), (count,)).astype(
-                np.float32
-            ),
-            "receivers": np.zeros(count, TEXT)
-            if self.receivers is None
-            else receiver_array("receivers", self.receivers, count),
-            "fade_angles": _fades("fade_angles", self.fade_angles, count, *FADE_ANGLES),
-            "fade_depths": _fades("fade_depths", self.fade_depths, count, *FADE_DEPTHS),
-            "single_sheets": bool_array("single_sheets", self.single_sheets, count),
-        }
+        positions = _positions(self.positions)
+        self._keep(positions=positions, **_checked(vars(self), COLUMNS[1:], len(positions)))
+
+    def _keep(self, **arrays: NDArray[Any]) -> None:
+        """Set arrays, which are read-only from then on."""
         for name, array in arrays.items():
             array.flags.writeable = False
             object.__setattr__(self, name, array)
@@ -262,9 +235,7 @@ class Decals(Value):
     def of_rows(cls, arrays: Mapping[str, NDArray[Any]]) -> Self:
         """Return decals of arrays that are rows of valid decals, by name, without another check."""
         decals = cls.__new__(cls)
-        for name in COLUMNS:
-            arrays[name].flags.writeable = False
-            object.__setattr__(decals, name, arrays[name])
+        decals._keep(**{name: arrays[name] for name in COLUMNS})
         return decals
 
     def replace(self, **arrays: ArrayLike | None) -> Self:
@@ -275,7 +246,13 @@ class Decals(Value):
         InvalidDecals
             An array is invalid.
         """
-        return replace(self, **arrays)  # type: ignore[arg-type]  # any array-like is converted
+        positions = _positions(arrays["positions"]) if "positions" in arrays else self.positions
+        if len(positions) != len(self) or not arrays.keys() <= set(COLUMNS):
+            return replace(self, **arrays)  # type: ignore[arg-type]  # any array-like is converted
+        kept = {name: getattr(self, name) for name in COLUMNS}
+        others = [name for name in arrays if name != "positions"]
+        checked = _checked(kept | arrays, others, len(self))
+        return self.of_rows({**kept, "positions": positions, **checked})
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -353,6 +330,8 @@ class Decals(Value):
     def limits_of(self, table: list[str]) -> Float32Array:
         """Return `limits` with places in another table of receivers; new ones are appended to it."""
         limits = np.zeros((len(self), 4), np.float32)
+        if not self.limited:
+            return limits
         angles = np.radians(self.fade_angles.astype(np.float64))
         fading = angles > 0.0
         limits[fading, 0], limits[fading, 1] = np.cos(0.5 * angles[fading]), np.cos(angles[fading])
@@ -378,6 +357,27 @@ class Decals(Value):
         return record.reshape(-1, 4)
 
 
+def _positions(values: Any) -> Float32Array:
+    positions = finite_array("positions", values, (-1, 3))
+    check_range("positions", positions, -MAX_COORDINATE, MAX_COORDINATE)
+    return positions.astype(np.float32)
+
+
+def _frames(values: Mapping[str, Any], count: int) -> dict[str, Float32Array]:
+    """Return unit normals, and unit tangents perpendicular to them."""
+    normals, tangents = (
+        unit_vectors(name, finite_array(name, values[name], (count, 3))) for name in ("normals", "tangents")
+    )
+    perpendicular = orthogonal_vectors(tangents, normals)
+    return {"normals": normals.astype(np.float32), "tangents": perpendicular.astype(np.float32)}
+
+
+def _radii(values: Any, count: int) -> Float32Array:
+    radii = finite_array("radii", one_or_each(values, count), (count,))
+    check_range("radii", radii, MIN_RADIUS, MAX_COORDINATE)
+    return radii.astype(np.float32)
+
+
 def _fades(name: str, values: Any, count: int, low: float, high: float) -> Float32Array:
     """Return fade angles or depths as a new array; 0 in each row for None."""
     given = np.zeros(count) if values is None else one_or_each(values, count)
@@ -386,5 +386,39 @@ def _fades(name: str, values: Any, count: int, low: float, high: float) -> Float
     return array.astype(np.float32)
 
 
+def _checked(values: Mapping[str, Any], names: Collection[str], count: int) -> dict[str, NDArray[Any]]:
+    """Return new arrays of these columns for so many decals; of normals or tangents always both."""
+    arrays: dict[str, NDArray[Any]] = {}
+    if not _FRAME.isdisjoint(names):
+        arrays |= _frames(values, count)
+    arrays |= {name: _CHECKS[name](values[name], count) for name in names if name not in _FRAME}
+    return arrays
+
+
 COLUMNS = tuple(field.name for field in fields(Decals))
 """Names of the arrays of `Decals`."""
+
+_FRAME = frozenset(("normals", "tangents"))
+
+_CHECKS: dict[str, Callable[[Any, int], NDArray[Any]]] = {
+    "radii": _radii,
+    "images": lambda values, count: whole_array(
+        "images", values, count, low=NO_IMAGE, high=MAX_IMAGES - 1, default=0
+    ),
+    "spill": partial(bool_array, "spill"),
+    "interactions": lambda values, count: member_array(
+        "interactions", values, count, Interaction, Interaction.PUSH
+    ),
+    "layers": lambda values, count: whole_array(
+        "layers", values, count, low=-LAYER_LIMIT, high=LAYER_LIMIT - 1, default=0
+    ),
+    "tints": lambda values, count: color_array("tints", values, count).astype(np.float32),
+    "opacities": lambda values, count: unit_interval(
+        "opacities", one_or_each(values, count), (count,)
+    ).astype(np.float32),
+    "receivers": partial(receiver_array, "receivers"),
+    "fade_angles": lambda values, count: _fades("fade_angles", values, count, *FADE_ANGLES),
+    "fade_depths": lambda values, count: _fades("fade_depths", values, count, *FADE_DEPTHS),
+    "single_sheets": partial(bool_array, "single_sheets"),
+}
+"""Checks of the columns besides positions and frames: of given values and a number of rows."""

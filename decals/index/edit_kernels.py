@@ -1,4 +1,4 @@
-"""Warp kernels that insert a decal, remove it, and find decals nested with it."""
+"""Warp kernels that insert a decal, find decals nested with it, and remove it."""
 
 # mypy: ignore-errors
 # (kernel code is Python only in form: its names have Warp types)
@@ -32,6 +32,20 @@ IDS_END = wp.constant(0)
 CELLS = wp.constant(1)
 TOUCHED = wp.constant(2)
 FITS = wp.constant(3)
+NESTED = wp.constant(4)
+STATES = 5
+"""Numbers that describe the index and its last change: end of all lists, cells, touched ones, and answers."""
+
+DECAL = wp.constant(0)
+EXPONENT = wp.constant(1)
+LEVEL = wp.constant(2)
+SEARCHED = wp.constant(3)
+REQUESTS = 4
+"""Numbers that ask for a change: a decal, its level, and the number of levels to search for nested decals."""
+
+NOT_NESTED = wp.constant(0)
+IS_NESTED = wp.constant(1)
+UNKNOWN = wp.constant(2)
 
 
 @wp.func
@@ -60,16 +74,44 @@ def room_needed(
     return 1 + 2 * count
 
 
+@wp.func
+def nested_with(decal: wp.int32, level_count: wp.int32, index: IndexedDecals) -> wp.int32:
+    """Return IS_NESTED if a contact decal is nested with a listed one, UNKNOWN if it reaches too many cells.
+
+    By `find_nested`, the larger of two nested decals reaches the centre of the smaller one. A cell that the
+    decal reaches therefore lists the other: it holds the centre of one of them.
+    """
+    found = wp.int32(NOT_NESTED)
+    ball = index.records[RECORD * decal]
+    position = xyz(ball)
+    for level in range(level_count):
+        width = wp.float64(index.levels[level][1])
+        corner = lowest_cell(position, ball[3], width)
+        across = cells_across(position, ball[3], width)
+        if wp.max(wp.max(across[0], across[1]), across[2]) > MOST_CELLS_ACROSS:
+            found = UNKNOWN
+        else:
+            for number in range(cells_in(across)):
+                slot = slot_of(cell_key(cell_of_block(corner, across, number), level), index)
+                if index.table[slot][0] != EMPTY:
+                    head = index.table[slot][3]
+                    for j in range(index.ids[head]):
+                        if are_nested_contact(decal, index.ids[head + 1 + j], index.records):
+                            return IS_NESTED
+    return found
+
+
 @wp.kernel
 def remove_decal(
-    decal: wp.int32,
-    exponent: wp.int32,
-    level: wp.int32,
+    request: wp.array(dtype=wp.int32),
     index: IndexedDecals,
     state: wp.array(dtype=wp.int32),
     ranges: wp.array(dtype=wp.vec2i),
 ):
     """Remove a decal with an unchanged record from its lists; write the ranges of ids that changed."""
+    decal = request[DECAL]
+    exponent = request[EXPONENT]
+    level = request[LEVEL]
     ball = index.records[RECORD * decal]
     position = xyz(ball)
     width = power_of_two(exponent)
@@ -94,16 +136,17 @@ def remove_decal(
 
 @wp.kernel
 def insert_decal(
-    decal: wp.int32,
-    exponent: wp.int32,
-    level: wp.int32,
+    request: wp.array(dtype=wp.int32),
     index: IndexedDecals,
     rooms: wp.array(dtype=wp.int32),
     state: wp.array(dtype=wp.int32),
     ranges: wp.array(dtype=wp.vec2i),
     slots: wp.array(dtype=wp.int32),
 ):
-    """Insert a decal with its record into its lists, if all fit; write what changed."""
+    """Insert a decal with its record into its lists, if all fit; write what changed, and if it is nested."""
+    decal = request[DECAL]
+    exponent = request[EXPONENT]
+    level = request[LEVEL]
     ball = index.records[RECORD * decal]
     position = xyz(ball)
     width = power_of_two(exponent)
@@ -153,34 +196,4 @@ def insert_decal(
             slots[touched] = wp.where(taken > 0, slot, -1)
             touched += 1
     state[TOUCHED] = touched
-
-
-@wp.kernel
-def find_nested_with(
-    changed: wp.array(dtype=wp.int32),
-    level_count: wp.int32,
-    index: IndexedDecals,
-    found: wp.array(dtype=wp.int32),
-):
-    """Write 1 first if a contact decal is nested with a changed one, second if one reaches too many cells.
-
-    By `find_nested`, the larger of two nested decals reaches the centre of the smaller one. A cell that the
-    changed decal reaches therefore lists the other: it holds the centre of one of them.
-    """
-    decal = changed[wp.tid()]
-    ball = index.records[RECORD * decal]
-    position = xyz(ball)
-    for level in range(level_count):
-        width = wp.float64(index.levels[level][1])
-        corner = lowest_cell(position, ball[3], width)
-        across = cells_across(position, ball[3], width)
-        if wp.max(wp.max(across[0], across[1]), across[2]) > MOST_CELLS_ACROSS:
-            found[1] = 1
-        else:
-            for number in range(cells_in(across)):
-                slot = slot_of(cell_key(cell_of_block(corner, across, number), level), index)
-                if index.table[slot][0] != EMPTY:
-                    head = index.table[slot][3]
-                    for j in range(index.ids[head]):
-                        if are_nested_contact(decal, index.ids[head + 1 + j], index.records):
-                            found[0] = 1
+    state[NESTED] = nested_with(decal, request[SEARCHED], index)

@@ -230,7 +230,8 @@ class DecalEditor:
         """
         _require_decals(decals)
         rows = self._rows.require_assignable(numbers, len(decals))
-        codes_of(decals.receivers, self._rows.receiver_table)  # raises for too many different ones
+        if decals.limited:
+            codes_of(decals.receivers, self._rows.receiver_table)  # raises for too many different ones
         self._prepare_index(rows)
         version, existing = self._log.version + 1, rows[self._rows.contains(rows)]
         balls_before = self._rows.balls(existing)
@@ -244,7 +245,7 @@ class DecalEditor:
                 for number, rank in zip(rows.tolist(), decals.ranks.tolist(), strict=True)
             )
         if not self._index.stale:
-            self._index.check_nesting(self._rows.records, self.next_number, rows)
+            self._index.check_nesting(self._rows.records, self.next_number)
 
     # -- changes ----------------------------------------------------------------------------------------
 
@@ -291,13 +292,13 @@ class DecalEditor:
 
     def _write(self, rows: Int64Array, decals: Decals) -> None:
         records, limits = self._rows.records, self._rows.limits
-        limited = limits[rows[rows < len(limits)]].any()
+        limited = self.limited and bool(limits[rows[rows < len(limits)]].any())
         self._rows.assign(rows, decals)
         if self._rows.records is not records:
             self._log.add(RECORDS, (0, len(self._rows.records)), new=True)
         if self._rows.limits is not limits:
             self._log.add(LIMITS, (0, len(self._rows.limits)), new=True)
-        limited = limited or self._rows.limits[rows].any()
+        limited = limited or decals.limited
         for first, last in runs_of(rows):
             self._log.add(RECORDS, (RECORD * first, RECORD * (last + 1)))
             if limited:

@@ -189,7 +189,7 @@ def as_numbers(numbers: ArrayLike) -> Int64Array:
 
 
 def _require_unique(numbers: Int64Array) -> Int64Array:
-    if len(np.unique(numbers)) < len(numbers):
+    if len(numbers) > 1 and len(np.unique(numbers)) < len(numbers):
         raise InvalidDecals(f"expected each number once, got {numbers.tolist()!s:.80}; drop the repeats")
     return numbers
 
@@ -208,8 +208,10 @@ def _records_with_spare(records: Float32Array, min_decals: int) -> Float32Array:
 
 def runs_of(rows: Int64Array) -> list[tuple[int, int]]:
     """Return the first and last number of each run of consecutive numbers."""
+    if len(rows) < 2:
+        return [(row, row) for row in rows.tolist()]
     ordered = np.sort(rows)
     breaks = np.flatnonzero(np.diff(ordered) > 1)
-    firsts = ordered[np.concatenate([[0], breaks + 1])] if len(ordered) else ordered
-    lasts = ordered[np.concatenate([breaks, [-1]])] if len(ordered) else ordered
+    firsts = ordered[np.concatenate([[0], breaks + 1])]
+    lasts = ordered[np.concatenate([breaks, [-1]])]
     return list(zip(firsts.tolist(), lasts.tolist(), strict=True))

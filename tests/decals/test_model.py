@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from blobtree import RIM
 from decals import Decals, Interaction
 from decals.errors import ImplicitDecalsError, InvalidDecals
-from decals.model import LAYER_LIMIT, MAX_COORDINATE, MIN_RADIUS, RECORD
+from decals.model import COLUMNS, LAYER_LIMIT, MAX_COORDINATE, MIN_RADIUS, RECORD
 
 
 def some(count: int = 5, seed: int = 0, **changes: Any) -> Any:
@@ -46,6 +46,39 @@ def test_valid_frames_survive_bit_for_bit() -> None:
     again = decals.replace()
     for name in ("positions", "normals", "tangents", "radii", "images", "spill"):
         assert np.array_equal(getattr(again, name), getattr(decals, name))
+
+
+@settings(max_examples=60)
+@given(st.sets(st.sampled_from(COLUMNS)), st.integers(0, 4), st.integers(0, 2**31))
+def test_replaced_columns_are_checked_as_those_of_new_decals(names: set[str], count: int, seed: int) -> None:
+    """Arrays that stay are not checked again; the result is that of a check of all."""
+    before, other = some(count, seed), some(count, seed + 1, receivers="hull", fade_angles=90.0, tints="red")
+    rng = np.random.default_rng(seed)
+    arrays = {
+        name: rng.uniform(0.5, 2.0) * getattr(other, name)
+        if name in ("normals", "tangents")
+        else getattr(other, name)
+        for name in names
+    }
+    kept = {name: getattr(before, name) for name in COLUMNS}
+    expected, replaced = Decals(**{**kept, **arrays}), before.replace(**arrays)
+    for name in COLUMNS:
+        one, two = getattr(expected, name), getattr(replaced, name)
+        assert one.dtype == two.dtype
+        assert one.tobytes() == two.tobytes(), name
+        assert not two.flags.writeable
+
+
+def test_replace_takes_another_number_of_decals_with_all_their_columns() -> None:
+    more = some(7)
+    arrays = {name: getattr(more, name) for name in COLUMNS}
+    assert some(5).replace(**arrays) == more
+    with pytest.raises(InvalidDecals, match=r"normals: expected shape \[7, 3\], got \[5, 3\]"):
+        some(5).replace(positions=more.positions)
+    with pytest.raises(InvalidDecals, match=r"radii: expected shape \[5\], got \[7\]"):
+        some(5).replace(radii=more.radii)
+    with pytest.raises(TypeError, match="radius"):
+        some(5).replace(radius=1.0)
 
 
 def test_arrays_are_float32_copies_that_nobody_can_write() -> None:
