@@ -31,7 +31,7 @@ EXTRAS: dict[str, str] = {
     "decals.baking": "*",
     "decals.editing": """
         bare_watch brush_actions brushes filling outline_actions overlays slicing visibility
-        visibility_actions
+        visibility_actions zone_actions
         """,
     "decals.experiments": "*",
     "decals.field": """

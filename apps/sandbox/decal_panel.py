@@ -1,5 +1,6 @@
 """The panel of the selected decals, of the brush and of the contact modes."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from decals.editing.commands import ReplaceImage, SetValues
 from decals.editing.decal_actions import FIRST_DECAL_COUNT
 from decals.editing.document import Document
 from decals.editing.scatter_commands import ScatterDecals
+from decals.editing.zone_actions import ZoneActions
 from decals.errors import InvalidEdit
 from decals.model import FADE_ANGLES, FADE_DEPTHS, NO_IMAGE, Decals
 from decals.options import arguments_of, described, options_of, values_of
@@ -44,8 +46,12 @@ COLUMNS = {
 }
 """Arrays of `decals.Decals` by the names of their controls."""
 
-NOT_OF_SCATTER = ("images", "spacing")
-"""Options of `decals.scatter` that the scene decides, or another option."""
+ZONE = "zone_density"
+SCATTER = {**options_of(scatter), ZONE: options_of(ZoneActions.scatter)[ZONE]}
+"""Options of the next scattering beside the images; the last one is for zones alone."""
+
+NOT_OF_SCATTER = ("spacing",)
+"""Options of `decals.scatter` that another option decides."""
 
 MATTE = {"roughness": 1.0, "metallic": 0.0, "occlusion": 1.0, "relief": 0.0}
 """Numbers of an image without maps."""
@@ -134,24 +140,41 @@ def brush_values(document: Document, brush: BrushSettings) -> dict[str, Any]:
     options = options_of(BrushSettings)
     controls = [option_control(options[name], *values) for name, values in shown.items()]
     if brush.brush is Brush.SCATTER:
-        names, doc = tuple(image_names(document)[1:]), described(BrushSettings)["images"]
-        chosen = [names[image] for image in brush.images if image < len(names)] or list(names)
-        controls.append(vars(Control("images", "choices", chosen, doc, choices=names)))
+        controls.append(_images_control(document, brush.images, described(BrushSettings)["images"]))
     return {"brush": str(brush.brush), "controls": controls}
 
 
 def set_brush(state: ActionState, name: str, raw: Any, **_others: object) -> None:
     """Set the brush, its images, or one of its numbers, to what a page sent."""
-    brush, names = state.brush, image_names(state.session.document)[1:]
+    brush = state.brush
     if name == "images":
-        given = raw if isinstance(raw, list) else [raw]
-        images = [names.index(one_of("image", one, names, InvalidEdit)) for one in given]
-        brush.images = tuple(images) if len(images) < len(names) else ()
+        document = state.session.document
+        brush.images = _numbers_of(document, chosen_images(document, raw))
         return
     value = parsed_option(BrushSettings, name, raw)
     if name != "brush":
         positive_number(name, value)
     setattr(brush, name, value)
+
+
+def _images_control(document: Document, images: Sequence[int], doc: str) -> dict[str, Any]:
+    """Return the control that chooses some of the images; none stands for all."""
+    names = tuple(image_names(document)[1:])
+    chosen = [names[image] for image in images if image < len(names)] or list(names)
+    return vars(Control("images", "choices", chosen, doc, choices=names))
+
+
+def chosen_images(document: Document, raw: Any) -> tuple[str, ...]:
+    """Return the checked names of the images that a page sent; none for all."""
+    names, given = image_names(document)[1:], raw if isinstance(raw, list) else [raw]
+    chosen = tuple(one_of("image", one, names, InvalidEdit) for one in given)
+    return chosen if len(chosen) < len(names) else ()
+
+
+def _numbers_of(document: Document, names: Sequence[str]) -> tuple[int, ...]:
+    """Return the numbers of the images with some names; those that are gone are left out."""
+    known = image_names(document)[1:]
+    return tuple(known.index(name) for name in names if name in known)
 
 
 # -- options of functions and classes -------------------------------------------------------------------
@@ -175,21 +198,27 @@ def set_drawing(state: ActionState, name: str, raw: Any, *, last: bool, **_other
 
 def first_scatter_values(count: int) -> dict[str, Any]:
     """Return the options of `decals.scatter` at the beginning, for a scene with a number of decals."""
-    options = options_of(scatter).values()
-    first = {o.name: o.default for o in options if o.name not in NOT_OF_SCATTER}
-    return first | {"count": count or FIRST_DECAL_COUNT}
+    first = {o.name: o.default for o in SCATTER.values() if o.name not in NOT_OF_SCATTER}
+    return {"images": ()} | first | {"count": count or FIRST_DECAL_COUNT}
 
 
-def check_scatter_values(values: dict[str, Any]) -> None:
-    """Raise an error for options of `decals.scatter` that the next scattering would refuse."""
-    options = arguments_of(scatter, values)
+def scatter_arguments(document: Document, values: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments of the next scattering; raise an error for those that it would refuse."""
+    arguments = arguments_of(scatter, values)
+    images = _numbers_of(document, arguments.pop("images"))
+    arguments |= {"images": images} if images else {}
+    options = dict(arguments)
     count, seed = options.pop("count"), options.pop("seed")
     ScatterDecals((), 0 if count is None else count, seed, options).check_values()
+    positive_number(SCATTER[ZONE].values.label, values[ZONE])
+    return arguments
 
 
-def scatter_controls(values: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the controls of options of `decals.scatter`."""
-    return [option_control(options_of(scatter)[name], value) for name, value in values.items()]
+def scatter_controls(document: Document, values: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the controls of the options of the next scattering."""
+    images = _images_control(document, _numbers_of(document, values["images"]), "those of the next decals")
+    shown = [option_control(SCATTER[name], value) for name, value in values.items() if name in SCATTER]
+    return [images, *shown]
 
 
 def image_values(document: Document, number: int | None) -> dict[str, Any]:

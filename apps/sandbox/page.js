@@ -28,6 +28,8 @@
   };
 
   const HOVER_MS = 60;
+  const MENU_MS = 50; // until a menu is drawn
+  const FIELD = ".v-overlay--active .v-sheet input";
   const hovering = { key: "", told: null };
 
   trame.utils.sandbox = {
@@ -144,6 +146,33 @@
       if (size) trame.utils.download(name.trim().split("/").pop(), new Blob(parts));
     },
 
+    // A menu of kinds begins in its field, and ends where it was opened. Firefox tells no pointer that it has left.
+    async menu(open) {
+      if (open) this.opener = document.activeElement;
+      else this.hover("");
+      trame.state.set("kind_sought", "");
+      await new Promise((drawn) => setTimeout(drawn, MENU_MS));
+      if (!open && document.activeElement === document.body) this.opener?.focus();
+      if (open && matchMedia("(pointer: fine)").matches) document.querySelector(FIELD)?.focus();
+    },
+    // Return the first kind below the field in which it is sought.
+    firstKind({ target }) {
+      return target.closest(".v-sheet").querySelector(".v-list-item");
+    },
+    // Return the rows of number fields of a control: what each shows, its label, and the indices that lead to it.
+    numbers({ kind, value, label }) {
+      const field = (number, index) => ({
+        shown: typeof number === "number" ? Number(number.toPrecision(5)) : null,
+        label: [label, ...index.map((i) => i + 1)].join(" "),
+        index,
+      });
+      if (kind === "number" || kind === "field") return [[field(value, [])]];
+      if (kind === "vector") return [value.map((number, i) => field(number, [i]))];
+      if (kind !== "list") return [];
+      return value.map((row, i) =>
+        Array.isArray(row) ? row.map((number, j) => field(number, [i, j])) : [field(row, [i])],
+      );
+    },
     // Return true for a row that is found, or that lies below no folded row while nothing is sought.
     shown(row, folded, sought) {
       if (sought) return this.found(`${row.label} ${row.type}`, sought);
@@ -252,9 +281,11 @@
     true,
   );
 
-  // Of the toolbar and of the outline, Tab reaches one button; arrows lead from it to the others.
+  // Of the toolbar and of the outline, Tab reaches one button, the selected row; arrows lead from it to the others.
   const BUTTONS = "button, [role=button]";
-  const rove = (group, reached = group.reached) => {
+  const reachedOf = (group) =>
+    (!group.contains(document.activeElement) && group.querySelector(".v-list-item--active")) || group.reached;
+  const rove = (group, reached = reachedOf(group)) => {
     const buttons = [...group.querySelectorAll(BUTTONS)];
     group.reached = buttons.includes(reached) ? reached : buttons[0];
     buttons.forEach((button) => (button.tabIndex = button === group.reached ? 0 : -1));
@@ -303,9 +334,11 @@
     reopen(message);
   };
 
-  // The view shows an image without the text that screen readers ask for; new buttons join their group.
+  // The view shows an image without the text that screen readers ask for, and Tab reaches the view once, not what
+  // trame puts into it; new buttons join their group.
   const complete = () => {
     explainEnd();
+    document.querySelectorAll("[role=application] [tabindex='0']").forEach((inner) => (inner.tabIndex = -1));
     document.querySelectorAll("img:not([alt])").forEach((image) => (image.alt = ""));
     document.querySelectorAll("[data-roving]").forEach((group) => rove(group));
   };

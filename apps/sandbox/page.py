@@ -14,7 +14,7 @@ from decals.apps.sandbox import panels
 from decals.apps.sandbox.connections import Connections
 from decals.apps.sandbox.folder import IMAGES, MODELS, thumbnails
 from decals.apps.sandbox.guard import Guard
-from decals.apps.sandbox.panels import DEFAULTS, named
+from decals.apps.sandbox.panels import DEFAULTS, TEMPLATES, named, template
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.apps.sandbox.view import StreamedView
 from decals.apps.sandbox.words import words
@@ -55,11 +55,6 @@ STYLE, SCRIPT = (
 QUIET = "({ install: () => { console.info = console.log = () => {}; } })"
 """The first plugin of Vue. It turns off trame's notes in the console; warnings and errors stay."""
 
-TEMPLATES = {
-    path.stem: path.read_text(encoding="utf-8") for path in sorted(Path(__file__).parent.glob("*.html"))
-}
-"""Parts of the page in HTML, by their names."""
-
 EVENTS = {*re.findall(r"trigger\(['\"](\w+)", "".join([SCRIPT, *TEMPLATES.values()]))}
 EVENTS = EVENTS - {"ask_to_drive", "pass_control", "EVENT"} | {"add", "wrap", "combine"}
 """Events of the `Sandbox` that script and templates send; those of the driver are of `Connections`."""
@@ -99,12 +94,6 @@ CTRL_KEYS = "".join(
     if gesture.startswith("Ctrl+") and len(gesture.split("+")[-1]) == 1
 )
 """Letters that have an action together with Ctrl."""
-
-
-def template(name: str, **words: str) -> None:
-    """Build a part of the page, with words in the place of others, whose elements are those of its parent."""
-    text = re.sub("|".join(words) or "$^", lambda found: words[found[0]], TEMPLATES[name])
-    html.Div(text, style="display: contents")
 
 
 def drawer(side: str, width: str = str(PANEL_WIDTH)) -> Any:
@@ -295,7 +284,7 @@ class Page:
 
     def _build_panels(self) -> None:
         """Build the panels of decals and nodes, and the history."""
-        panels.build_scatter(self.sandbox)
+        template("scatter", FILL=panels.SUMMARIES["fill"])
         panels.build_options(self.sandbox)
         panels.build_decal_panel(self.sandbox)
         self._build_panel()
@@ -319,7 +308,8 @@ class Page:
                     ("Modify", "mdi-tune-variant", "modifiers", "wrap"),
                     ("Combine", "mdi-set-center", "combinations", "combine"),
                 ):
-                    with panels.menu(title, icon, max_height=480, width=360), vuetify3.VSheet():
+                    options = {"max_height": 480, "update_modelValue": "utils.sandbox.menu($event)"}
+                    with panels.menu(title, icon, width=360, **options), vuetify3.VSheet():
                         template("kinds", FAMILY=family, EVENT=event)
                 panels.build_actions(self.sandbox)
             panels.build_brushes(self.sandbox)

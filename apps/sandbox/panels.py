@@ -1,7 +1,9 @@
 """Parts of the sandbox's page beside outline and history: start, files, view, brushes, decals, actions."""
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from trame.widgets import html, vuetify3
@@ -50,14 +52,16 @@ NOT_LISTED = CAMERA, "move", "close", "select", "select_further", "select_also",
 SUMMARIES = {b.action: f"{b.summary} ({format_gestures(b)})" for b in KEYS.bindings}
 """What each action does, and its keys."""
 
-CURVE = """<svg viewBox="-0.02 -0.02 1.04 1.04" preserveAspectRatio="none"
-  style="width: 100%; height: 48px"><polyline :points="c.curve" fill="none" stroke="currentColor"
-  stroke-width="2" vector-effect="non-scaling-stroke"/></svg>"""
-"""The curve of the control ``c``."""
+TEMPLATES = {
+    path.stem: path.read_text(encoding="utf-8") for path in sorted(Path(__file__).parent.glob("*.html"))
+}
+"""Parts of the page in HTML, by their names."""
 
-HELP = """<img :src="words[c.word].picture" alt=""> {{ words[c.word].sentence }}
-  <button type="button" :aria-label="'more about ' + c.word" @click="word = c.word">More</button>"""
-"""What the word of the control ``c`` means."""
+
+def template(name: str, **words: str) -> None:
+    """Build a part of the page, with words in the place of others, whose elements are those of its parent."""
+    text = re.sub("|".join(words) or "$^", lambda found: words[found[0]], TEMPLATES[name])
+    html.Div(text, style="display: contents")
 
 
 def named(expression: str) -> list[str]:
@@ -95,101 +99,9 @@ def build_controls(source: str, event: Any, identifiers: str, *, key: str = "c.n
     key
         Expression that distinguishes the control from those of another selection.
     """
-    with html.Div(v_for=f"c in {source}", key=key, title=("c.doc",), classes="mb-2"):
-        html.Label(
-            "{{ c.label }}{{ c.unit ? ', ' + c.unit : '' }}",
-            v_if="c.kind !== 'switch'",
-            classes="text-caption",
-        )
-        with html.Div(v_if="c.kind === 'number' || c.kind === 'field'", classes="d-flex align-center"):
-            vuetify3.VSlider(
-                v_if="c.kind === 'number'",
-                model_value=("c.value",),
-                min=("c.low",),
-                max=("c.high",),
-                step=("c.step",),
-                name=("c.label",),
-                update_modelValue=(event, f"[{identifiers}, $event, false]"),
-                end=(event, f"[{identifiers}, $event, true]"),
-            )
-            sent = f"[{identifiers}, $event.target.value, true]"
-            _number_field("c.value", "c.label", event, sent, f"[{identifiers}]", "max-width: 84px")
-        with html.Div(v_if="c.kind === 'vector'", classes="d-flex ga-1"):
-            sent = f"[{identifiers}, $event.target.value, true, [i]]"
-            label = "`${c.label} ${i + 1}`"
-            _number_field(
-                "number", label, event, sent, f"[{identifiers}, i]", v_for="(number, i) in c.value", key="i"
-            )
-        with (
-            html.Div(v_if="c.kind === 'list'"),
-            html.Div(v_for="(row, i) in c.value", key="i", classes="d-flex ga-1 mb-1"),
-        ):
-            sent = f"[{identifiers}, $event.target.value, true, Array.isArray(row) ? [i, j] : [i]]"
-            label = "`${c.label} ${i + 1} ${j + 1}`"
-            place = f"[{identifiers}, i].concat(Array.isArray(row) ? [j] : [])"
-            _number_field("number", label, event, sent, place, v_for="(number, j) in [].concat(row)", key="j")
-        html.Input(
-            v_if="c.kind === 'color'",
-            type="color",
-            value=("c.value",),
-            raw_attrs=named("c.label"),
-            style="width: 100%; height: 28px",
-            change=(event, f"[{identifiers}, $event.target.value, true]"),
-        )
-        vuetify3.VSelect(
-            v_if="c.kind === 'choice' || c.kind === 'choices'",
-            multiple=("c.kind === 'choices'",),
-            model_value=("c.value",),
-            items=("c.choices",),
-            raw_attrs=named("c.label"),
-            update_modelValue=(event, f"[{identifiers}, $event, true]"),
-        )
-        vuetify3.VTextarea(
-            v_if="c.kind === 'path'",
-            model_value=("c.value",),
-            rows=3,
-            raw_attrs=named("c.label"),
-            change=(event, f"[{identifiers}, $event.target.value, true]"),
-        )
-        html.Div(CURVE, v_if="c.curve")
-        html.Div(HELP, v_if="c.word", classes="text-caption help")
-        vuetify3.VSwitch(
-            v_if="c.kind === 'switch'",
-            model_value=("c.value",),
-            label=("c.label",),
-            update_modelValue=(event, f"[{identifiers}, $event, true]"),
-            color="primary",
-        )
-        html.Div("{{ c.value }}", v_if="c.kind === 'text'", classes="text-caption")
-        html.Div(
-            "{{ fields.text }}",
-            v_if=f"fields.control === [{identifiers}].join(' ')",
-            classes="text-caption refused",
-            raw_attrs=['role="alert"'],
-        )
-
-
-def _number_field(
-    value: str, label: str, event: Any, sent: str, place: str, style: str = "", **options: Any
-) -> None:
-    """Build a field for a number, or for nothing; a refused value marks it.
-
-    What was refused goes away: a reset turns the value into another type, so that the field takes it anew.
-    """
-    number = f"typeof {value} === 'number' ? Number({value}.toPrecision(5)) : null"
-    field = f"{place}.join(' ')"
-    vuetify3.VTextField(
-        model_value=(f"(n => fields.resets[{field}] % 2 ? n : String(n ?? ''))({number})",),
-        error=(f"fields.refused === {field}",),
-        raw_attrs=[
-            *named(label),
-            f':aria-invalid="fields.refused === {field}"',
-            f":data-value=\"{number} ?? ''\"",
-        ],
-        style=style,
-        change=(event, sent),
-        **options,
-    )
+    with html.Div(style="display: contents") as parent:
+        name = parent.server.trigger_name(event)
+        template("controls", SOURCE=source, EVENT=name, IDENTIFIERS=identifiers, KEY=key)
 
 
 def build_file_input(text: str, kinds: Sequence[str], key: str = "''", **options: Any) -> None:
@@ -279,24 +191,6 @@ def _build_light(sandbox: Sandbox) -> None:
     build_file_input("light from a panorama", IMAGES, f"'{LIGHT}'")
     present = "drawing.some(c => c.name.startsWith('environment.'))"
     vuetify3.VBtn("Remove this light", v_if=present, variant="tonal", click=sandbox.remove_light)
-
-
-def build_scatter(sandbox: Sandbox) -> None:
-    """Build the button that covers an object with decals, and the one that fills what a pull has opened."""
-    with html.Div(v_if="outline.length > 1", classes="d-flex flex-wrap align-center ga-2 px-3 pt-3"):
-        vuetify3.VBtn(
-            "{{ decals ? 'Scatter again' : 'Scatter decals' }}",
-            variant="tonal",
-            click=sandbox.scatter,
-        )
-        vuetify3.VBtn(
-            "Fill {{ bare }} bare {{ bare === 1 ? 'place' : 'places' }}",
-            v_if="bare",
-            color="primary",
-            variant="tonal",
-            title=SUMMARIES["fill"],
-            click=(sandbox.perform, "['fill']"),
-        )
 
 
 def build_actions(sandbox: Sandbox) -> None:

@@ -15,7 +15,7 @@ from PIL import Image
 
 from blobtree import Node
 from decals.apps.sandbox import decal_panel
-from decals.apps.sandbox.controls import KIND, controls_of, exchanged, kind_control, parsed, parsed_option
+from decals.apps.sandbox.controls import KIND, controls_of, exchanged, kind_control, parsed
 from decals.apps.sandbox.display import PHASES, Display
 from decals.apps.sandbox.fields import Fields
 from decals.apps.sandbox.files import SandboxFiles
@@ -29,8 +29,6 @@ from decals.editing.session import UndoEntry
 from decals.editing.tree_actions import FollowedNode
 from decals.errors import InvalidEdit
 from decals.images.builtin import BUILTIN_IMAGES, generate_image
-from decals.options import arguments_of
-from decals.scattering.scatter import scatter
 from decals.scenes.objects import TreeObject, bounds_of
 from decals.validation import any_number, one_of, whole_number
 from decals.window import EditWindow
@@ -188,7 +186,7 @@ class Sandbox:
             },
             "brush": decal_panel.brush_values(document, state.brush),
             "drawing": decal_panel.drawing_controls(document.drawing),
-            "scattering": decal_panel.scatter_controls(self._scatter_values()),
+            "scattering": decal_panel.scatter_controls(document, self._scatter_values()),
             "image": decal_panel.image_values(document, self._shown_image),
             "pick": self._pick(),
             "decals": len(document.decals),
@@ -370,10 +368,12 @@ class Sandbox:
         decal_panel.set_image_value(self._state, number, name, raw, last=last)
 
     def _set_scattering(self, name: str, raw: Any, **_others: object) -> None:
-        one_of("option", name, self._scatter_values(), InvalidEdit)
-        changed = {name: parsed_option(scatter, name, raw)}
-        decal_panel.check_scatter_values(self._scatter_values() | changed)
-        self._scattering |= changed
+        document, values = self._window.document, self._scatter_values()
+        one_of("option", name, values, InvalidEdit)
+        images = decal_panel.chosen_images(document, raw) if name == "images" else None
+        value = decal_panel.SCATTER[name].parsed(raw, InvalidEdit) if images is None else images
+        decal_panel.scatter_arguments(document, values | {name: value})
+        self._scattering[name] = value
         self._state.show(f"set {name}")
 
     def slide(self, step: Callable[[], None], *, last: bool) -> None:
@@ -542,11 +542,21 @@ class Sandbox:
     @event
     def scatter(self) -> None:
         """Cover the object of the selected node, or every object, with decals; each time another seed."""
-        state, values = self._state, self._scatter_values()
-        objects = range(len(self._window.document.objects))
-        numbers = tuple(objects) if state.primitive is None else (state.primitive[0],)
-        self._window.actions.decals.scatter_over(numbers, **arguments_of(scatter, values))
-        self._scattering["seed"] = values["seed"] + 1
+        primitive, objects = self._state.primitive, range(len(self._window.document.objects))
+        numbers = tuple(objects) if primitive is None else (primitive[0],)
+        self._scatter(partial(self._window.actions.decals.scatter_over, numbers))
+
+    @event
+    def scatter_zone(self) -> None:
+        """Replace the decals on the selected nodes, else those around the selected decals, likewise."""
+        density = self._scatter_values()[decal_panel.ZONE]
+        self._scatter(partial(self._window.actions.zones.scatter, zone_density=density))
+
+    def _scatter(self, scatter: Callable[..., None]) -> None:
+        """Scatter with the options of the panel, and choose the next seed."""
+        arguments = decal_panel.scatter_arguments(self._window.document, self._scatter_values())
+        scatter(**arguments)
+        self._scattering["seed"] = arguments["seed"] + 1
 
     def _scatter_values(self) -> dict[str, Any]:
         """Return the options of the next scattering: those that were set, else the first ones."""

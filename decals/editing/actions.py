@@ -19,6 +19,7 @@ from decals.editing.session import EditSession
 from decals.editing.tree_actions import TreeActions
 from decals.editing.view_actions import ViewActions
 from decals.editing.visibility_actions import VisibilityActions
+from decals.editing.zone_actions import ZoneActions
 from decals.errors import InvalidEdit
 
 
@@ -42,6 +43,8 @@ class Actions(SceneActions):
         Counts the bare places that edits open.
     decals : DecalActions
         Actions on decals.
+    zones : ZoneActions
+        Scatters decals in the zone that is selected.
     trees : TreeActions
         Actions on objects and primitives.
     files : FileActions
@@ -86,7 +89,7 @@ class Actions(SceneActions):
         state = ActionState(session, threaded=threaded)
         super().__init__(state, TreeActions(state))
         self.bare = BareWatch(session)
-        self.decals = DecalActions(state, self.bare.filling)
+        self.decals, self.zones = DecalActions(state, self.bare.filling), ZoneActions(state)
         self.files = FileActions(state, path)
         self.visibility = VisibilityActions(state)
         self.outline = OutlineActions(state, self.trees, self.visibility)

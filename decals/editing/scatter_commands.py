@@ -16,7 +16,7 @@ from decals.editing.queries import SurfacePoints, move_decals, nearest_points
 from decals.errors import InvalidEdit
 from decals.model import MAX_COORDINATE, Decals
 from decals.scattering.appearance import Appearance
-from decals.scattering.domain import Domain, OrientedPoints
+from decals.scattering.domain import Domain, Mask, OrientedPoints, checked_values
 from decals.scattering.local_relaxation import PUSHING_RADIUS, relax_near
 from decals.scattering.scatter import check_regularity, scatter
 from decals.scenes.objects import (
@@ -28,14 +28,21 @@ from decals.scenes.objects import (
     same_shape,
 )
 from decals.scenes.recipe import Recipe
-from decals.validation import any_number, count_number, instance, one_of, whole_number
+from decals.validation import (
+    any_number,
+    count_number,
+    function_or_none,
+    instance,
+    one_of,
+    whole_number,
+)
 
 SPACING = 3.0**0.5 / 1.03
 """Distance of neighbours among decals without gaps, in radii (see `covering.RADIUS_MARGIN`)."""
 
 MAX_SCATTERED_DECALS = 1_000_000
 
-SCATTER_OPTIONS = ("regularity", "sizing", "factor", "direction", "choice", "jitter", "weights")
+SCATTER_OPTIONS = ("regularity", "sizing", "factor", "direction", "images", "choice", "jitter", "weights")
 """Arguments of `decals.scatter` that a command may have besides count and seed."""
 
 RELAXED_DISTANCE = 1.01 * PUSHING_RADIUS
@@ -68,6 +75,8 @@ class ReplaceDecals(EditCommand):
         The objects for which the decals were made. The command is refused if their shapes changed meanwhile.
     recipe
         How they were made. Default: the scene keeps its recipe.
+    mask
+        A function that is True for the points (n, 3) where decals are deleted. Default: everywhere.
 
     Examples
     --------
@@ -84,6 +93,7 @@ class ReplaceDecals(EditCommand):
     decals: Decals
     expected_objects: tuple[SceneObject, ...] = ()
     recipe: Recipe | None = None
+    mask: Mask | None = None
     long: ClassVar[bool] = True
     label: ClassVar[str] = "scatter"
 
@@ -93,7 +103,12 @@ class ReplaceDecals(EditCommand):
         pairs = zip(objects, self.expected_objects, strict=False)
         if not all(same_shape(item, expected) for item, expected in pairs):
             raise InvalidEdit("an object changed while its new decals were computed; scatter again")
-        deletion = document.compute_deletion(decals_on(document, self.objects))
+        numbers = decals_on(document, self.objects)
+        function_or_none("mask", self.mask, InvalidEdit)
+        if self.mask is not None and len(numbers):
+            positions = document.decals.take(numbers).positions
+            numbers = numbers[checked_values("mask", self.mask, positions, truths=True) != 0.0]
+        deletion = document.compute_deletion(numbers)
         edit = deletion.then(document.compute_addition(self.decals))
         return edit if self.recipe is None else edit.then(document.compute_parts(recipes=(self.recipe,)))
 
@@ -111,6 +126,8 @@ class ScatterDecals(EditCommand):
         Random seed.
     options
         More arguments of `decals.scatter`, such as ``{"regularity": 0.5}``.
+    mask
+        A zone, as the mask of `decals.scatter`: decals outside it stay. Default: everywhere.
 
     Examples
     --------
@@ -127,6 +144,7 @@ class ScatterDecals(EditCommand):
     count: int
     seed: int = 0
     options: dict[str, Any] = field(default_factory=dict)
+    mask: Mask | None = None
     long: ClassVar[bool] = True
     label: ClassVar[str] = "scatter"
 
@@ -155,23 +173,27 @@ class ScatterDecals(EditCommand):
             raise InvalidEdit("expected an image for the decals to show, got none; add one first")
         self.check_values()
         covered = tuple(objects[number] for number in self.objects)
+        chosen = {"images": images, **self.options}
         decals = scatter(
             [item.surface for item in covered],
             count=self.count,
             seed=self.seed,
-            images=images,
+            mask=self.mask,
             progress=progress,
             cancel=cancel,
-            **self.options,
+            **chosen,
         )
+        if self.mask is not None:
+            return ReplaceDecals(self.objects, decals, covered, mask=self.mask)
         names = [item.name for item in covered]
-        given = {"models": names, "count": len(decals), "images": images, **self.options}
+        given = {"models": names, "count": len(decals), **chosen}
         recipe = Recipe.of("decals.scatter", seed=self.seed, **given).giving(decals, covered)
         return ReplaceDecals(self.objects, decals, covered, recipe)
 
     def check_values(self) -> None:
         """Raise `InvalidEdit` or `InvalidScattering` for a count, a seed or an option that is not valid."""
         count_number("count", self.count, 0, MAX_SCATTERED_DECALS, InvalidEdit)
+        function_or_none("mask", self.mask, InvalidEdit)
         whole_number("seed", self.seed, 0, None, InvalidEdit)
         options = dict(instance("options", self.options, dict, InvalidEdit, "such as {'factor': 0.5}"))
         for name in options:

@@ -5,6 +5,7 @@ import io
 import shutil
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from contextvars import ContextVar
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,12 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from PIL import Image
-from playwright.async_api import ConsoleMessage, Page, async_playwright, expect
+from playwright.async_api import Browser, ConsoleMessage, Page, Playwright, async_playwright, expect
 
 from decals.apps.sandbox.guard import Guard
+
+CHOSEN: ContextVar[str] = ContextVar("browser", default="chromium")
+"""The browser of all checks, "chromium" or "firefox"."""
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 SIZE = (500, 380)
@@ -43,6 +47,16 @@ def firefox_path() -> str | None:
     return next((path for path in map(shutil.which, ("firefox", "firefox-esr")) if path), None)
 
 
+async def launched(player: Playwright) -> Browser:
+    """Start the chosen browser; playwright drives Debian's Firefox on a screen alone, such as xvfb's."""
+    if CHOSEN.get() == "firefox":
+        return await player.firefox.launch(
+            channel="moz-firefox", executable_path=firefox_path(), headless=False
+        )
+    arguments = ["--no-sandbox", "--disable-gpu"]
+    return await player.chromium.launch(executable_path=browser_path(), args=arguments)
+
+
 @asynccontextmanager
 async def opened(
     url: str, *, size: tuple[int, int] = SIZE, ends: bool = False, touch: bool = False
@@ -52,9 +66,7 @@ async def opened(
     The console of the sandbox's pages, whose address has a token, stays empty.
     """
     async with async_playwright() as player:
-        browser = await player.chromium.launch(
-            executable_path=browser_path(), args=["--no-sandbox", "--disable-gpu"]
-        )
+        browser = await launched(player)
         page = await browser.new_page(viewport={"width": size[0], "height": size[1]}, has_touch=touch)
         page.set_default_timeout(1000 * PATIENCE)
         written: list[str] = []

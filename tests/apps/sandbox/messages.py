@@ -71,6 +71,7 @@ EVENTS: dict[str, list[list[Any]]] = {
         [[], [], [0], [1], [9]],
     ],
     "scatter": [],
+    "scatter_zone": [],
     "add": [KINDS],
     "add_at": [KINDS, ["view 5000/5000", "view 0/10000", "view 99999/1", "0/1"]],
     "wrap": [KINDS],
@@ -106,8 +107,8 @@ EVENTS: dict[str, list[list[Any]]] = {
     ],
     "set_control scattering": [
         ["scattering"],
-        ["count", "factor", "sizing", "jitter.size"],
-        [3, "10", 0.5, "touching"],
+        ["count", "factor", "sizing", "jitter.size", "images", "zone_density"],
+        [3, "10", 0.5, "touching", ["scale"]],
     ],
     "set_control image": [["image"], ["roughness", "relief"], [0.2, 0.5], [True, False]],
     "change_row": [KEYS_OF_ROWS, CHANGES, ["name", "0/1", "0"]],

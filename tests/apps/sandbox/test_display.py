@@ -518,7 +518,40 @@ def test_scattering_takes_the_options_of_its_panel(sandbox: Sandbox, shared: Edi
     )
     np.testing.assert_array_equal(shared.document.scene.decals.positions, expected.positions)
     np.testing.assert_array_equal(shared.document.scene.decals.radii, expected.radii)
-    assert sandbox.values()["scattering"][1]["value"] == 1  # the next seed
+    seed = next(control for control in sandbox.values()["scattering"] if control["name"] == "seed")
+    assert seed["value"] == 1  # the next one
+
+
+def test_a_zone_has_images_and_a_density_of_its_own(sandbox: Sandbox, shared: EditWindow) -> None:
+    before = shared.document.decals
+    numbers, positions = before.numbers, before.decals.positions.copy()
+    for name in ("scale", "eye"):
+        shared.session.do(AddImage(decals.DecalImage.load(name)))
+    sandbox.set_control("scattering", "count", 60)
+    sandbox.set_control("scattering", "images", ["scale", "eye"])
+    sandbox.set_control("scattering", "images", ["eye"])
+    sandbox.set_control("scattering", "zone_density", 0)
+    assert "expected a number above 0" in sandbox.status
+    sandbox.set_control("scattering", "zone_density", "4")
+    sandbox.scatter_zone()
+    assert "no zone is selected" in sandbox.status
+    sandbox.select("0/1")
+    sandbox.scatter_zone()
+    finish(shared)
+    document, chosen = shared.document, sandbox._state.selection
+    kept = np.isin(numbers, document.decals.numbers)
+    assert 0 < kept.sum() < len(kept)
+    np.testing.assert_array_equal(document.decals.take(numbers[kept]).positions, positions[kept])
+    new = document.decals.take(np.array(chosen))
+    assert sandbox.values()["decal"]["count"] == len(new) > 8
+    assert set(new.images.tolist()) == {2}
+    sandbox.change_row("image 0", "remove")  # the numbers of the others change, the choice does not
+    sandbox.scatter()
+    finish(shared)
+    assert (len(document.decals), set(document.decals.decals.images.tolist())) == (60, {1})
+    assert sandbox.values()["done"][-3:] == ["scatter", "remove an image", "scatter"]
+    sandbox.go_to(0)
+    np.testing.assert_array_equal(shared.document.decals.decals.positions, positions)
 
 
 def test_images_become_materials_and_are_dropped_on_rows(sandbox: Sandbox, shared: EditWindow) -> None:

@@ -123,6 +123,8 @@ COMMANDS: dict[str, Callable[[Any], Any]] = {
     "scatter on which": lambda x: ScatterDecals((x,), 3),
     "scatter": lambda x: ScatterDecals((1,), x),
     "scatter from which seed": lambda x: ScatterDecals((1,), 3, x),
+    "scatter in which zone": lambda x: ScatterDecals((1,), 3, 0, {}, x),
+    "coat in which zone": lambda x: ReplaceDecals((1,), one(), mask=x),
     "coat where": lambda x: ReplaceDecals(x, one()),
     "coat": lambda x: ReplaceDecals((1,), x),
     "nothing": lambda x: x,
