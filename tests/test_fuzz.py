@@ -52,6 +52,7 @@ def test_a_stage_reports_crashes_hangs_and_foreign_exceptions(
     assert line.startswith("5: LookupError: of Python")
 
 
+@pytest.mark.slow
 def test_a_torn_file_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With a writer that writes to its target at once."""
     monkeypatch.setattr(fuzz, "write_atomically", lambda path, content: path.write_bytes(content))

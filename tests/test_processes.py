@@ -104,6 +104,7 @@ def test_a_fork_during_work_in_a_thread_does_not_hang(tmp_path: Path) -> None:
     assert run_script(text, tmp_path) == "True\n"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif("fork" not in KNOWN_METHODS, reason="the system has no fork")
 def test_drawing_after_a_fork_names_spawn(tmp_path: Path) -> None:
     """OpenGL does not survive a fork; a renderer of the parent and a new one both say so."""

@@ -39,7 +39,7 @@ def ring_scene(*, layered: bool) -> Scene:
     return Scene(objects=(item,), camera=view_of(decals, ring).camera, decals=decals, images=(white,))
 
 
-@pytest.mark.slow_cases("False")
+@pytest.mark.slow
 @pytest.mark.parametrize("filtered", [False, True])
 def test_a_recorded_picture_is_drawn_again(tmp_path: Path, gl: moderngl.Context, filtered: bool) -> None:
     path = tmp_path / "ring.npz"
@@ -54,6 +54,7 @@ def test_a_recorded_picture_is_drawn_again(tmp_path: Path, gl: moderngl.Context,
         assert 0.02 < figures.get("listed", 0.1) < figures["covered"]
 
 
+@pytest.mark.slow
 def test_replaced_decals_cover_the_same_part_of_the_picture(tmp_path: Path, gl: moderngl.Context) -> None:
     path = tmp_path / "ring.npz"
     record.record(

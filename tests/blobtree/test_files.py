@@ -136,6 +136,7 @@ KILLED = """
 """
 
 
+@pytest.mark.slow
 @posix
 def test_a_kill_while_saving_leaves_one_of_the_files(tmp_path: Path) -> None:
     import pyvista as pv

@@ -208,6 +208,7 @@ def test_files_of_kernels_that_compile_together_share_parsed_headers(cache: Path
     assert kept.stat().st_mtime_ns == parsed
 
 
+@pytest.mark.slow
 def test_damaged_headers_are_replaced(cache: Path, capfd: pytest.CaptureFixture[str]) -> None:
     _doubled()
     (kept,) = (cache / HEADERS).glob("*/*.pch")

@@ -250,6 +250,8 @@ def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("small_pictures")
 @pytest.mark.slow_cases(
+    "figures",
+    "measures",
     "baking",
     "character",
     "contact",

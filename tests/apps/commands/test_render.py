@@ -41,6 +41,7 @@ def test_pictures_depend_on_the_seed_only(folder: Path) -> None:
     assert not np.array_equal(pictures[0], pictures[2])
 
 
+@pytest.mark.slow
 def test_a_saved_scene_gives_the_same_picture(folder: Path) -> None:
     pv.Sphere().save(folder / "ball.stl")
     Image.new("RGB", (8, 8), (200, 30, 30)).save(folder / "red.png")
@@ -73,6 +74,7 @@ def test_contact_and_mapping_are_passed_to_the_renderer(folder: Path) -> None:
                 assert default == np.array_equal(drawn, picture(folder / "default.png"))
 
 
+@pytest.mark.slow
 def test_an_environment_is_kept_and_changed(
     folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

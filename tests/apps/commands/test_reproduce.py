@@ -47,6 +47,7 @@ def test_a_scene_is_made_again(saved: Path, capsys: Capture) -> None:
     assert "positions: 5 of 5 decals differ" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_scenes_of_samples_are_made_again(saved: Path, capsys: Capture) -> None:
     assert run(["render", "knot", "--decals", "9", "--save", "a.json", "--size", "40x30", "-o", "a.png"]) == 0
     assert run(["export", "a.json", "-o", "a.glb", "--size", "64"]) == 0

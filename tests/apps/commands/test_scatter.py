@@ -17,6 +17,7 @@ from tests.apps.commands.pictures import picture
 Capture = pytest.CaptureFixture[str]
 
 
+@pytest.mark.slow
 def test_a_scene_and_a_table_hold_the_same_decals(folder: Path) -> None:
     arguments = ["scatter", "spheres", "--count", "25", "--images", "3", "--seed", "4"]
     assert run([*arguments, "-o", "scene.json"]) == 0
@@ -39,6 +40,7 @@ def test_a_scene_and_a_table_hold_the_same_decals(folder: Path) -> None:
     assert np.allclose(table, np.hstack(expected), rtol=1e-6, atol=1e-7)
 
 
+@pytest.mark.slow_cases("parquet")
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])
 def test_commands_take_the_written_table(suffix: str, folder: Path, capsys: Capture) -> None:
     """A model with a table is the scene that was written beside it: pictures and measures are equal."""

@@ -70,7 +70,7 @@ def number_of(lab: Lab, label: str) -> int:
     return next(int(s["number"]) for s in lab.values()["lab_sliders"] if s["name"].startswith(label))
 
 
-@pytest.mark.slow_cases("5")
+@pytest.mark.slow_cases("0", "5", "6")
 @pytest.mark.parametrize("number", range(len(ANSWERS)))
 def test_wrong_and_right_answers_are_told_apart(lab: Lab, number: int) -> None:
     begin(lab, number)

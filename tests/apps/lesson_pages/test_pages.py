@@ -276,6 +276,7 @@ def test_lessons_without_a_page_say_why(lessons: dict[str, Lesson]) -> None:
         lesson_page(lessons["1-one-decal"], language="xx")
 
 
+@pytest.mark.slow
 def test_a_table_has_the_values_of_balls(tmp_path: Path) -> None:
     for end in ("md", "json"):
         text = (LESSONS / f"7-volume-and-area.{end}").read_text(encoding="utf-8")

@@ -312,6 +312,7 @@ def test_two_fingers_turn_the_view_around_its_target(sandbox: Sandbox, shared: E
         assert abs(np.dot(camera.up, camera.direction)) < 1e-6
 
 
+@pytest.mark.slow_cases("0.25-False", "4.0-True")
 @pytest.mark.parametrize("parallel", [False, True])
 @pytest.mark.parametrize("factor", [0.25, 4.0])
 def test_any_number_of_pinches_leaves_a_view(

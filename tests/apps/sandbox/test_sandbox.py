@@ -648,6 +648,7 @@ def test_added_primitives_lie_where_the_view_looks(vtk_display: None, toward: tu
             assert (seen.positions[0] <= high + 0.01 * size).all()
 
 
+@pytest.mark.slow_cases("Box", "Cylinder", "Torus")
 @pytest.mark.parametrize("kind", ["Point", "Box", "Torus", "Cylinder", "Polyline"])
 def test_the_ghost_under_the_mouse_is_what_a_click_adds_there(window: EditWindow, kind: str) -> None:
     sandbox, state = Sandbox(window), window.actions.state

@@ -143,6 +143,7 @@ class Dome(FieldPrimitive):
         return wp.vec3(wp.max(1.0 - far * far, 0.0), wp.max(1.0 - near * near, 0.0), steepest)
 
 
+@pytest.mark.slow
 def test_a_field_that_ends_by_itself_keeps_all_laws() -> None:
     def oracle(node: Any, points: Float64Array) -> Float64Array:
         squares = ((points.astype(np.float64) - node.middle) ** 2).sum(axis=1)

@@ -122,6 +122,7 @@ def test_an_isolated_primitive_shows_its_radius_and_ends_at_its_width(kind: str,
         assert reach <= abs(float(corner @ outward)) <= 1.1 * reach
 
 
+@pytest.mark.slow_cases("'staircase'")
 @pytest.mark.parametrize("falloff", [Staircase, Tent], ids=repr)
 def test_a_custom_falloff_is_evaluated_and_bounded(falloff: Any) -> None:
     tree = Point((0, 0, 0), radius=1.0, falloff=falloff) + Point((1, 0, 0), radius=0.5, width=0.7)

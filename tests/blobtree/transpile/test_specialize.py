@@ -6,6 +6,7 @@ from types import FunctionType
 from typing import Any
 
 import numpy as np
+import pytest
 import warp as wp
 
 from blobtree.formulas.falloff import WYVILL
@@ -17,6 +18,7 @@ from tests.blobtree.transpile.kernels import choose, chosen
 from tests.programs import output_of
 
 
+@pytest.mark.slow
 def test_a_choice_by_a_code_calls_the_function_of_the_row() -> None:
     text = inspect.getsource(chosen.func)
     assert text.count("if code == ") == 2
@@ -78,6 +80,7 @@ print([wp.get_module(name).hash_module().hex() for name in measured])
 """
 
 
+@pytest.mark.slow
 def test_the_key_of_a_kernel_does_not_depend_on_earlier_compilations() -> None:
     def keys(*loaded: str) -> str:
         return output_of(KEY, *loaded).splitlines()[-1]

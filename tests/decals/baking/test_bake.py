@@ -350,6 +350,7 @@ def square_texture(size: int, samples: int = 2) -> Callable[[], Array]:
     return texture
 
 
+@pytest.mark.slow
 def test_blocks_bound_the_memory_and_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     texture = square_texture(256)
     whole = texture()
@@ -380,6 +381,7 @@ def error(texels: Array, exact: Array) -> float:
     return float((apart.reshape(42, 12, 42, 12, 3).mean(axis=(1, 3)) ** 2).mean())
 
 
+@pytest.mark.slow
 def test_several_samples_smooth_the_rims(exact_square: Array) -> None:
     assert error(square(128, 4), exact_square) < 0.8 * error(square(128, 1), exact_square)
 

@@ -181,6 +181,7 @@ def test_objects_that_go_take_the_handle_along_only_if_numbers_move(user: Any, g
     assert user.actions.state.primitive == held
 
 
+@pytest.mark.slow
 def test_skeletons_of_ones_own_stay_held_while_they_are_dragged() -> None:
     session = session_of(Point((0, 0, 0), radius=1.0) + Bar(0.5, radius=0.4).translate((0.8, 0, 0)), 20)
     first = digest(session.document)

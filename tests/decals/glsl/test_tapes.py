@@ -110,6 +110,7 @@ def test_whole_tapes_are_the_same_in_both_languages(context: Context, start: int
     assert_same_in_both_languages(context, TREES[start : start + 6], ALL_KINDS, start)
 
 
+@pytest.mark.slow
 def test_direct_fields_are_the_same_in_both_languages(context: Context) -> None:
     kinds = kinds_of(FIELD_TREES)
     others = [field.name for code, field in enumerate(library().fields) if code not in kinds.fields]
@@ -118,6 +119,7 @@ def test_direct_fields_are_the_same_in_both_languages(context: Context) -> None:
     assert_same_in_both_languages(context, FIELD_TREES, kinds, bounds_agreement=1e-4)
 
 
+@pytest.mark.slow
 def test_library_skeletons_are_the_same_in_both_languages(context: Context) -> None:
     assert_same_in_both_languages(context, LIBRARY_TREES, kinds_of(LIBRARY_TREES))
 
@@ -128,6 +130,7 @@ def test_contacts_are_the_same_in_both_languages(context: Context) -> None:
     assert_same_in_both_languages(context, CONTACT_TREES, kinds_of(CONTACT_TREES))
 
 
+@pytest.mark.slow
 def test_blends_are_the_same_in_both_languages(context: Context) -> None:
     used = {library().operators[code].name for tree in BLEND_TREES for code in tree.tape.operators}
     assert set(blends.VALUES) - {"gradient_blend"} <= used
@@ -150,7 +153,7 @@ def test_gradient_blends_are_the_same_in_both_languages(context: Context, name: 
     assert_same_in_both_languages(context, [tree], kinds, 0, bounds_agreement=1e-3, field_agreement=1e-3)
 
 
-@pytest.mark.slow_cases("signed")
+@pytest.mark.slow
 @pytest.mark.parametrize("more", [PROFILED, SIGNED], ids=["profiled", "signed"])
 def test_other_falloffs_are_the_same_in_both_languages(context: Context, more: MoreKinds) -> None:
     trees = random_trees(seed=35, count=6, more=more)
@@ -159,6 +162,7 @@ def test_other_falloffs_are_the_same_in_both_languages(context: Context, more: M
     assert_same_in_both_languages(context, trees, kinds)
 
 
+@pytest.mark.slow
 def test_own_kinds_are_the_same_in_both_languages(context: Context) -> None:
     instruction_set = EVERYTHING.tape.instruction_set
     all_kinds = Kinds(

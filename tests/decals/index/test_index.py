@@ -306,6 +306,7 @@ def excess(decals: Decals) -> float:
     return float((nested / b)[pairs].max(initial=-9.0))
 
 
+@pytest.mark.slow
 def test_nested_decals_are_found() -> None:
     """At once, by an editor, and by its edits of one decal and of many."""
     rng, found = np.random.default_rng(3), []

@@ -37,6 +37,7 @@ SIDES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (
 CUBE = CORNERS, np.array([face for a, b, c, d in SIDES for face in ((a, b, c), (a, c, d))])
 
 
+@pytest.mark.slow_cases("True")
 @pytest.mark.parametrize("filtered", [False, True])
 def test_without_nested_decals_their_code_is_left_out(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, filtered: bool
@@ -118,6 +119,7 @@ def test_every_pixel_of_walked_images(renderer: Renderer, layered: bool) -> None
         assert (np.abs(plain.uv - buffers.uv[seen])[same].max(axis=1) > 0.02).mean() > 0.1
 
 
+@pytest.mark.slow
 def test_no_scene_needs_more_textures_than_every_driver_has(context: Context) -> None:
     form = Form(Contact.ELASTIC, *(True,) * 6)
     names = {name for program in decal_programs(context, form, posed=True) for name in program}

@@ -52,6 +52,7 @@ def edit(editor: DecalEditor, step: int) -> None:
         editor.assign(numbers, turned.replace(radii=turned.radii * np.float32(0.9)))
 
 
+@pytest.mark.slow
 def test_edited_scenes_look_like_fresh_ones(renderer: Renderer, edited: EditedScene) -> None:
     pictures = [renderer.render(edited, RenderOptions(size=(160, 120)))]
     for step in range(10):

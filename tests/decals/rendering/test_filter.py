@@ -58,6 +58,8 @@ def difference(drawer: Renderer, angle: float, kind: str, contact: str = "elasti
 
 
 @pytest.mark.slow_cases(
+    "compute-45-layers-elastic-46",
+    "compute-85-plain-elastic-50",
     "fragment-80-waves-elastic-46",
     "fragment-45-waves-radial-43",
     "fragment-45-layers-elastic-46",

@@ -127,6 +127,7 @@ def _received(light: Light, position: np.ndarray, normal: np.ndarray) -> np.ndar
     return np.asarray((normal * away).sum(axis=1) / far / attenuation)
 
 
+@pytest.mark.slow_cases("compute-images6-opacities6-lights6-True", "compute-images2-opacities2-None-False")
 @pytest.mark.parametrize(
     ("images", "opacities", "lights", "filtered"),
     [
@@ -157,6 +158,7 @@ def test_every_pixel_is_the_reference_shaders(
     assert worst <= 2.0
 
 
+@pytest.mark.slow
 def test_filtered_maps_are_nearer_to_many_samples(renderer: Renderer) -> None:
     """Bumps and stripes of four texels, on decals of 10 to 25 pixels."""
     y, x = np.mgrid[:128, :128] * (32 * np.pi / 128)

@@ -77,6 +77,7 @@ def test_sides_of_a_thin_wall_are_independent() -> None:
     assert both.statistics().mean == pytest.approx(alone.statistics().mean, rel=0.1)
 
 
+@pytest.mark.slow
 def test_threads_do_not_change_the_bytes() -> None:
     first, again = (Relaxation([blob(), box()], count=1500, seed=5, iterations=12) for _ in range(2))
     first.run()

@@ -43,6 +43,7 @@ def test_no_particles_inside_another_surface() -> None:
     assert relaxation.statistics().rho > 0.75
 
 
+@pytest.mark.slow
 def test_coincident_surfaces_do_not_hide_each_other() -> None:
     ball = sphere(level=3)
     relaxation = Relaxation([ball, ball], count=200)

@@ -105,7 +105,7 @@ CASES = [(look, Contact.PRODUCT) for look in LOOKS] + [
 ]
 
 
-@pytest.mark.ordinary_cases("flat-3", "culled-0", "cell scalars-0")
+@pytest.mark.ordinary_cases("culled-0", "cell scalars-0")
 @pytest.mark.parametrize(("look", "contact"), CASES)
 def test_owner_and_uv_are_those_of_the_renderer(plotter: Factory, look: str, contact: Contact) -> None:
     mesh = torus()

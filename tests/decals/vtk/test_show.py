@@ -80,6 +80,7 @@ def test_showing_hands_over_to_pyvista(
     np.testing.assert_allclose(seen["position"], both().camera.position)
 
 
+@pytest.mark.slow
 def test_pyvista_finds_us_by_itself(plotter: Factory) -> None:
     """By the entry point, where the package is installed; importing the package does it in any case."""
     plotter()

@@ -110,6 +110,7 @@ def test_frames_that_are_shown_again_say_nothing_of_the_machine(driver: Driver) 
     assert driver.window.frames.budget.expected(2.0) == pytest.approx(10.0)
 
 
+@pytest.mark.slow
 def test_what_rests_is_drawn_better_slice_by_slice(opened: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ticks draw parts, never a whole frame, so user input in between is not delayed."""
     driver, other = opened(samples=3), opened()

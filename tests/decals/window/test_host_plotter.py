@@ -35,6 +35,7 @@ def take_hold(driver: Driver) -> None:
     assert driver.window.handle.widget is not None
 
 
+@pytest.mark.slow
 def test_hands_in_a_subplot_that_is_no_longer_the_active_one(plotter: Factory) -> None:
     pl = plotter(shape=(1, 2), window_size=(320, 120))
     ball = pl.add_mesh(pv.Sphere())

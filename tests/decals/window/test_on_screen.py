@@ -62,6 +62,7 @@ sys.exit(run(["edit", "knot", "--decals", "2", "--size", "120x80"]))
 """
 
 
+@pytest.mark.slow
 def test_ctrl_c_in_the_terminal_closes_the_window(display: str, tmp_path: Path) -> None:
     done = run_script(INTERRUPTED, tmp_path, display)
     assert done.returncode == 130, done.stderr

@@ -32,6 +32,7 @@ async def rested(window: EditWindow) -> None:
     assert not window.busy
 
 
+@pytest.mark.slow
 def test_scattered_decals_are_applied_and_the_drawing_is_reported(plotter: Factory) -> None:
     pl = plotter()
     drawn: list[object] = []

@@ -141,6 +141,7 @@ def test_other_programs_leave_the_picture_before_until_they_are_there(waiting: A
     np.testing.assert_array_equal(pixels(window), whole.shot())
 
 
+@pytest.mark.slow
 def test_a_frame_at_rest_holds_no_objects_of_earlier_ones(waiting: Any) -> None:
     window = waiting()
 
