@@ -24,7 +24,8 @@ def reaches(code: wp.int32, center: wp.vec3, half: wp.float32, tape: Texels, at:
     """Return True if a primitive may differ from 0 somewhere in the cube center ± half."""
     r = wp.vec2()
     if code >= FIELD:
-        r = direct_range(code - FIELD, center, half * HALF_DIAGONAL, tape, at)
+        cube = wp.vec3(half, half, half)
+        r = direct_range(code - FIELD, center, cube, half * HALF_DIAGONAL, tape, at)
     elif code >= STRETCHED:
         cube = wp.vec3(half, half, half)
         r = stretched_range(code - STRETCHED, center, cube, half * HALF_DIAGONAL, tape, at)

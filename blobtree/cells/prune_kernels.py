@@ -33,6 +33,7 @@ from blobtree.tape.dispatch import (
     closest,
     depth,
     direct_stride,
+    has_distances,
     influence_around,
     is_convex,
     operator_choice,
@@ -44,7 +45,7 @@ from blobtree.tape.dispatch import (
     warp_stretch,
     warp_texel,
 )
-from blobtree.tape.evaluators import direct_bounds, profile_value, to_local
+from blobtree.tape.evaluators import direct_bounds, direct_within, profile_value, to_local
 from blobtree.texels import Texels
 
 wp.set_module_options(KERNEL_OPTIONS)
@@ -112,10 +113,20 @@ def distances_in_box(
 
 
 @wp.func
-def direct_range(kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32) -> wp.vec2:
-    """Return the range of a direct field over a ball in front of its map, which is at tape[at]."""
+def direct_range(
+    kind: wp.int32, center: wp.vec3, extent: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32
+) -> wp.vec2:
+    """Return the range of a direct field in front of its map, which is at tape[at].
+
+    It holds where a ball and the box center ± extent meet.
+    """
     local = to_local(center, tape, at)
-    bounds = direct_bounds(kind, local, radius * tape[at + 3][0], tape, at + PREFIX)
+    bounds = wp.vec2()
+    if has_distances(kind):
+        bounds = direct_within(kind, local, extent_to_local(extent, tape, at), tape, at + PREFIX)
+    else:
+        around = direct_bounds(kind, local, radius * tape[at + 3][0], tape, at + PREFIX)
+        bounds = wp.vec2(around[0], around[1])
     profile = tape[at + 3]
     margin = RANGE_MARGIN * (1.0 + profile[2]) * wp.abs(profile[3])
     if bounds[0] == 0.0 and bounds[1] == 0.0:
@@ -331,7 +342,7 @@ def prune(
             for _i in range(count):
                 r = wp.vec2()
                 if direct:
-                    r = direct_range(kind, point, ball, tape, at)
+                    r = direct_range(kind, point, extent, ball, tape, at)
                 else:
                     r = range_anywhere(kind, stretched, warped > 0, point, half, extent, ball, tape, at)
                 accumulator, end, run_at, run, needed = fold_range(

@@ -13,6 +13,9 @@ A kind with `distance` returns a distance u in place of f, which is RIM on the s
 ends by default. The field is a falloff of u, which the leaf chooses. The field of a kind with `windowed` has
 no end of its own: it is multiplied by the window of a box (`formulas.windows`). Both are done around these
 functions, and so is the factor `weight` (`tape.evaluators.direct_value_gradient`).
+
+A distance of this package may have three more functions: of u alone, of its range and rates along a line, and
+of its range in a box.
 """
 
 from collections.abc import Sequence
@@ -23,6 +26,7 @@ import numpy as np
 import warp as wp
 
 from blobtree.declare.readers import PLACE, PointFormulas, Reader, require_numbers
+from blobtree.texels import Texels
 
 wp.set_module_options({"enable_backward": False})
 
@@ -38,6 +42,13 @@ RESULTS: dict[str, Any] = {
 }
 """The formulas of a direct field, and the types of their results."""
 
+DISTANCES: dict[str, Any] = {
+    "distance_at": wp.float32,
+    "distance_along": wp.vec4,
+    "distance_within": wp.vec2,
+}
+"""Sharper formulas that a distance of this package may have, all or none, and the types of their results."""
+
 ROUNDING = 4e-6
 """Widening of the range of a field that claims no `bounds`, for the rounding errors of its formula."""
 
@@ -48,6 +59,34 @@ _CLAIMS = ("lipschitz", "interval", "bounds", "sheet_at", "sheet_value_gradient"
 _POINT: dict[str, Any] = {"q": wp.vec3}
 _SHEET: dict[str, Any] = {"q": wp.vec3, "sheet": wp.int32}
 _BALL: dict[str, Any] = {"center": wp.vec3, "radius": wp.float32}
+_LEADING: dict[str, dict[str, Any]] = {
+    **dict.fromkeys(RESULTS, _BALL),
+    "sheet_at": _POINT,
+    "sheet_value_gradient": _SHEET,
+    "distance_at": _POINT,
+    "distance_along": {"q": wp.vec3, "direction": wp.vec3, "reach": wp.float32},
+    "distance_within": {"center": wp.vec3, "half": wp.vec3},
+}
+
+
+@wp.func
+def no_distance_at(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
+    """Return 0 for a kind without a formula of its own; nothing reads it."""
+    return 0.0
+
+
+@wp.func
+def no_distance_along(
+    q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: Texels, at: wp.int32
+) -> wp.vec4:
+    """Do the same for a range and rates."""
+    return wp.vec4(0.0, 0.0, 0.0, 0.0)
+
+
+@wp.func
+def no_distance_within(center: wp.vec3, half: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec2:
+    """Do the same for a range."""
+    return wp.vec2(0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +111,19 @@ class FieldKind:
     part_size: wp.Function | float = 0.0
     """The function (center, radius, tape, at) of half the least thickness in a ball; 0 for one number, the
     `inradii` of the kind."""
+
+    distance_at: wp.Function = no_distance_at
+    """The function (q, tape, at) of u alone, the same number as that of `value_gradient`."""
+    distance_along: wp.Function = no_distance_along
+    """The function (q, direction, reach, tape, at) of (smallest u, largest u, least du/dt, greatest du/dt) at
+    q + t · direction for t from 0 to `reach`."""
+    distance_within: wp.Function = no_distance_within
+    """The function (center, half, tape, at) of (smallest u, largest u) in the box center ± half."""
+
+    @property
+    def has_distances(self) -> bool:
+        """True for a kind with these three functions."""
+        return self.distance_at is not no_distance_at
 
     @property
     def has_sheets(self) -> bool:
@@ -109,8 +161,7 @@ class FieldFormulas(PointFormulas):
     def require(self, declared: Sequence[str] | None) -> None:
         """Raise `InvalidDefinition` for formulas or claims that do not fit, see `require_numbers`."""
         source = self.source
-        leading = {**dict.fromkeys(RESULTS, _BALL), "sheet_at": _POINT, "sheet_value_gradient": _SHEET}
-        require_numbers(source, self.given, leading, declared)
+        require_numbers(source, self.given, _LEADING, declared)
         if len(self.given.keys() & {"sheet_at", "sheet_value_gradient"}) == 1:
             raise source.refusal("expected both formulas `sheet_at` and `sheet_value_gradient`, or none")
         if len(self.given.keys() & {"value", "value_gradient"}) == 2:
@@ -134,6 +185,7 @@ class FieldFormulas(PointFormulas):
             given = {name: part.function for name, part in self.given.items()}
             flags |= {"sheet_at": given.get("sheet_at", 0), "own_sheet": given.get("sheet_value_gradient")}
             flags["part_size"] = given.get("part_size", 0.0)
+            flags |= {name: given[name] for name in DISTANCES if name in given}
             return FieldKind(self.kind, given["value_gradient"], given["bounds"], self.texels, **flags)
         reader = self.reader(digest, BEHIND_BOX if self.windowed else 0)
         x = "{} - wp.vec3(t0[0], t0[1], t0[2])" if self.windowed else "{}"

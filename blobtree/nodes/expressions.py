@@ -16,6 +16,7 @@ import warp as wp
 
 from blobtree import par
 from blobtree._typing import Float64Array
+from blobtree.declare.field import DISTANCES, RESULTS
 from blobtree.declare.formula import formula
 from blobtree.declare.parameters import Parameter, Quantity
 from blobtree.errors import InvalidNode
@@ -222,6 +223,29 @@ def part_row(q: wp.vec3, tape: Texels, first: wp.int32, count: wp.int32) -> wp.v
 
 
 @wp.func
+def part_value(q: wp.vec3, tape: Texels, first: wp.int32, count: wp.int32) -> wp.float32:
+    """Return v of the program of a part at q: the same number as `part_row`."""
+    v = Registers()
+    v[0] = q[0]
+    v[1] = q[1]
+    v[2] = q[2]
+    out = int(0)
+    for i in range(count):
+        texel = tape[first + i]
+        out = int(texel[0]) >> CODE_BITS
+        a = float(texel[3])
+        b = float(texel[3])
+        j = int(texel[1])
+        if j >= 0:
+            a = v[j]
+        k = int(texel[2])
+        if k >= 0:
+            b = v[k]
+        v[out] = held(clause_row(int(texel[0]) & LOWEST_BITS, a, b)[0])
+    return v[out]
+
+
+@wp.func
 def scaled_range(low: wp.float32, high: wp.float32, slope: wp.float32, rate: wp.float32) -> wp.vec3:
     """Return a range whose slope is at most `rate` times that of the operand, which may be constant."""
     return wp.vec3(low, high, wp.where(slope > 0.0, wp.min(slope * rate, HUGE), 0.0))
@@ -404,16 +428,14 @@ def clause_range(code: wp.int32, a: wp.vec3, b: wp.vec3) -> wp.vec3:
 
 
 @wp.func
-def part_range(
-    center: wp.vec3, radius: wp.float32, tape: Texels, first: wp.int32, count: wp.int32
-) -> wp.vec3:
-    """Return (smallest v, largest v, largest |∇v|) of the program of a part over a ball."""
+def part_range(center: wp.vec3, half: wp.vec3, tape: Texels, first: wp.int32, count: wp.int32) -> wp.vec3:
+    """Return (smallest v, largest v, largest |∇v|) of the program of a part over the box center ± half."""
     low = Registers()
     high = Registers()
     slope = Registers()
     for axis in range(3):
-        low[axis] = center[axis] - radius
-        high[axis] = center[axis] + radius
+        low[axis] = center[axis] - half[axis]
+        high[axis] = center[axis] + half[axis]
         slope[axis] = 1.0
     out = int(0)
     for i in range(count):
@@ -436,6 +458,183 @@ def part_range(
 
 
 @wp.func
+def product_of_ranges(a: wp.vec2, b: wp.vec2) -> wp.vec2:
+    """Return (smallest, largest) of a product."""
+    low = wp.min(wp.min(a[0] * b[0], a[0] * b[1]), wp.min(a[1] * b[0], a[1] * b[1]))
+    high = wp.max(wp.max(a[0] * b[0], a[0] * b[1]), wp.max(a[1] * b[0], a[1] * b[1]))
+    margin = STEP_MARGIN * wp.max(wp.abs(low), wp.abs(high))
+    return wp.vec2(held(low - margin), held(high + margin))
+
+
+@wp.func
+def norm_rate(a: wp.vec4, b: wp.vec4) -> wp.vec2:
+    """Return the range of ∂h/∂a = a / h, h = √(a² + b²), which rises with a."""
+    near = least_size(wp.vec3(b[0], b[1], 0.0))
+    far = largest_size(wp.vec3(b[0], b[1], 0.0))
+    low = a[0] / divisor(wp.length(wp.vec2(a[0], wp.where(a[0] < 0.0, near, far))))
+    high = a[1] / divisor(wp.length(wp.vec2(a[1], wp.where(a[1] < 0.0, far, near))))
+    return wp.vec2(low, high)
+
+
+@wp.func
+def unary_rate(code: wp.int32, a: wp.vec3, slope: wp.float32) -> wp.vec2:
+    """Return the range of the derivative of an operation over a range; `slope` bounds its size."""
+    low = a[0]
+    high = a[1]
+    near = least_size(a)
+    far = largest_size(a)
+    if code == COPY:
+        return wp.vec2(1.0, 1.0)
+    if code == NEG:
+        return wp.vec2(-1.0, -1.0)
+    if code == SQUARE:
+        return wp.vec2(2.0 * low, 2.0 * high)
+    if code == ABS:
+        return wp.vec2(wp.where(low >= 0.0, 1.0, -1.0), wp.where(high <= 0.0, -1.0, 1.0))
+    if code == SQRT:
+        return wp.vec2(wp.where(low > 0.0, 0.5 / divisor(wp.sqrt(wp.max(high, 0.0))), 0.0), slope)
+    if code == RECIP and near > 0.0:
+        return wp.vec2(-slope, held(-1.0 / divisor(far) / divisor(far)))
+    if code == EXP and high <= 41.0:
+        return wp.vec2(wp.exp(low), slope)
+    if code == LN and low >= TINY:
+        return wp.vec2(1.0 / high, slope)
+    if code == ATAN:
+        return wp.vec2(1.0 / (1.0 + far * far), slope)
+    if code == SIN:
+        row = sine_range(low + 0.5 * HALF_TURN, high + 0.5 * HALF_TURN, 0.0)
+        return wp.vec2(row[0], row[1])
+    if code == COS:
+        row = sine_range(low + HALF_TURN, high + HALF_TURN, 0.0)
+        return wp.vec2(row[0], row[1])
+    if code == ASIN or code == EXP or code == LN or code == TAN or code >= FLOOR:  # noqa: SIM109
+        return wp.vec2(0.0, slope)
+    if code == ACOS:
+        return wp.vec2(-slope, 0.0)
+    return wp.vec2(-slope, slope)
+
+
+@wp.func
+def rate_of_unary(code: wp.int32, a: wp.vec4) -> wp.vec4:
+    """Return `clause_along` of an operation of one operand."""
+    whole = unary_range(code, wp.vec3(a[0], a[1], 1.0))
+    rate = product_of_ranges(unary_rate(code, wp.vec3(a[0], a[1], 0.0), whole[2]), wp.vec2(a[2], a[3]))
+    return wp.vec4(whole[0], whole[1], rate[0], rate[1])
+
+
+@wp.func
+def product_along(a: wp.vec4, b: wp.vec4) -> wp.vec4:
+    """Return `clause_along` of a product."""
+    value = product_of_ranges(wp.vec2(a[0], a[1]), wp.vec2(b[0], b[1]))
+    by_a = product_of_ranges(wp.vec2(b[0], b[1]), wp.vec2(a[2], a[3]))
+    by_b = product_of_ranges(wp.vec2(a[0], a[1]), wp.vec2(b[2], b[3]))
+    return wp.vec4(value[0], value[1], by_a[0] + by_b[0], by_a[1] + by_b[1])
+
+
+@wp.func
+def larger_along(a: wp.vec4, b: wp.vec4) -> wp.vec4:
+    """Return `clause_along` of the larger operand."""
+    if a[0] > b[1]:
+        return a
+    if b[0] > a[1]:
+        return b
+    return wp.vec4(wp.max(a[0], b[0]), wp.max(a[1], b[1]), wp.min(a[2], b[2]), wp.max(a[3], b[3]))
+
+
+@wp.func
+def opposite_along(a: wp.vec4) -> wp.vec4:
+    """Return `clause_along` of −a."""
+    return wp.vec4(-a[1], -a[0], -a[3], -a[2])
+
+
+@wp.func
+def clause_along(code: wp.int32, a: wp.vec4, b: wp.vec4) -> wp.vec4:
+    """Return (smallest value, largest value, least rate, greatest rate) of an operation along a line.
+
+    The rate is the change of a value on the way.
+    """
+    if code < ADD:
+        return rate_of_unary(code, a)
+    if code == ADD:
+        return a + b
+    if code == SUB:
+        return a + opposite_along(b)
+    if code == MUL:
+        return product_along(a, b)
+    if code == DIV:
+        return product_along(a, rate_of_unary(RECIP, b))
+    if code == MAX:
+        return larger_along(a, b)
+    if code == MIN:
+        return opposite_along(larger_along(opposite_along(a), opposite_along(b)))
+    steepest_a = wp.max(-a[2], a[3])
+    steepest_b = wp.max(-b[2], b[3])
+    whole = clause_range(code, wp.vec3(a[0], a[1], steepest_a), wp.vec3(b[0], b[1], steepest_b))
+    rate = wp.vec2(-whole[2], whole[2])
+    if code == HYPOT:
+        by_a = product_of_ranges(norm_rate(a, b), wp.vec2(a[2], a[3]))
+        by_b = product_of_ranges(norm_rate(b, a), wp.vec2(b[2], b[3]))
+        rate = wp.vec2(by_a[0] + by_b[0], by_a[1] + by_b[1])
+    return wp.vec4(whole[0], whole[1], rate[0], rate[1])
+
+
+@wp.func
+def part_along(
+    q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: Texels, first: wp.int32, count: wp.int32
+) -> wp.vec4:
+    """Return `clause_along` of the program of a part on the way from q along `direction` up to `reach`."""
+    low = Registers()
+    high = Registers()
+    least = Registers()
+    greatest = Registers()
+    for axis in range(3):
+        way = direction[axis] * reach
+        low[axis] = q[axis] + wp.min(way, 0.0)
+        high[axis] = q[axis] + wp.max(way, 0.0)
+        margin = STEP_MARGIN * wp.max(wp.abs(low[axis]), wp.abs(high[axis]))
+        low[axis] -= margin
+        high[axis] += margin
+        least[axis] = direction[axis]
+        greatest[axis] = direction[axis]
+    out = int(0)
+    for i in range(count):
+        texel = tape[first + i]
+        out = int(texel[0]) >> CODE_BITS
+        a = wp.vec4(texel[3], texel[3], 0.0, 0.0)
+        b = wp.vec4(texel[3], texel[3], 0.0, 0.0)
+        j = int(texel[1])
+        if j >= 0:
+            a = wp.vec4(low[j], high[j], least[j], greatest[j])
+        k = int(texel[2])
+        if k >= 0:
+            b = wp.vec4(low[k], high[k], least[k], greatest[k])
+        row = clause_along(int(texel[0]) & LOWEST_BITS, a, b)
+        margin = STEP_MARGIN * wp.max(wp.abs(row[0]), wp.abs(row[1]))
+        low[out] = held(row[0] - margin)
+        high[out] = held(row[1] + margin)
+        margin = STEP_MARGIN * wp.max(wp.abs(row[2]), wp.abs(row[3]))
+        least[out] = held(row[2] - margin)
+        greatest[out] = held(row[3] + margin)
+    return wp.vec4(low[out], high[out], least[out], greatest[out])
+
+
+@wp.func
+def box_along(x: wp.vec3, direction: wp.vec3, reach: wp.float32, half: wp.vec3) -> wp.vec4:
+    """Return (smallest d, largest d, least rate, greatest rate) of a box along a line from x.
+
+    The distance is a convex function on a line: it is largest at an end, and its rate only grows.
+    """
+    start = box_distance(x, half)
+    end = box_distance(x + direction * reach, half)
+    speed = wp.length(direction)
+    least = wp.dot(wp.vec3(start[1], start[2], start[3]), direction) - STEP_MARGIN * speed
+    greatest = wp.dot(wp.vec3(end[1], end[2], end[3]), direction) + STEP_MARGIN * speed
+    low = wp.max(start[0] + wp.min(least, 0.0) * reach, end[0] - wp.max(greatest, 0.0) * reach)
+    margin = STEP_MARGIN * (wp.length(x) + speed * reach)
+    return wp.vec4(low - margin, wp.max(start[0], end[0]) + margin, least, greatest)
+
+
+@wp.func
 def part_value_gradient(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return (u, ∇u) of a part; tape[at] = (program, clauses, offset, mean), then middle and half lengths."""
     head = tape[at]
@@ -449,21 +648,66 @@ def part_value_gradient(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
 
 
 @wp.func
-def part_bounds(center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32) -> wp.vec3:
-    """Bound u over a ball."""
+def part_distance_at(q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
+    """Return u of a part."""
     head = tape[at]
     middle = tape[at + 1]
     half = tape[at + 2]
-    d = part_range(center, radius, tape, int(head[0]), int(head[1]))
-    end = box_distance(center - wp.vec3(middle[0], middle[1], middle[2]), wp.vec3(half[0], half[1], half[2]))[
-        0
-    ]
+    d = part_value(q, tape, int(head[0]), int(head[1]))
+    end = box_distance(q - wp.vec3(middle[0], middle[1], middle[2]), wp.vec3(half[0], half[1], half[2]))[0]
+    return RIM + (wp.max(end, d) - head[2]) * (RIM / head[3])
+
+
+@wp.func
+def part_distance_along(
+    q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: Texels, at: wp.int32
+) -> wp.vec4:
+    """Return (smallest u, largest u, least du/dt, greatest du/dt) of a part along a line from q."""
+    head = tape[at]
+    middle = tape[at + 1]
+    half = tape[at + 2]
+    d = part_along(q, direction, reach, tape, int(head[0]), int(head[1]))
+    x = q - wp.vec3(middle[0], middle[1], middle[2])
+    d = larger_along(d, box_along(x, direction, reach, wp.vec3(half[0], half[1], half[2])))
     rate = RIM / head[3]
-    slope = wp.where(end - radius > d[1], 1.0, wp.max(d[2], 1.0))
-    margin = STEP_MARGIN * (wp.abs(end) + radius)
-    low = wp.max(d[0], end - radius - margin) - head[2]
-    high = wp.max(d[1], end + radius + margin) - head[2]
+    return wp.vec4(RIM + (d[0] - head[2]) * rate, RIM + (d[1] - head[2]) * rate, d[2] * rate, d[3] * rate)
+
+
+@wp.func
+def part_bounds_in(center: wp.vec3, extent: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec3:
+    """Return (smallest u, largest u, largest |∇u|) of a part over the box center ± extent."""
+    head = tape[at]
+    middle = tape[at + 1]
+    half = tape[at + 2]
+    d = part_range(center, extent, tape, int(head[0]), int(head[1]))
+    near = wp.vec3()
+    far = wp.vec3()
+    for axis in range(3):
+        away = wp.abs(center[axis] - middle[axis])
+        near[axis] = wp.max(away - extent[axis], 0.0)
+        far[axis] = away + extent[axis]
+    size = wp.vec3(half[0], half[1], half[2])
+    margin = STEP_MARGIN * wp.length(far)
+    smallest = box_distance(near, size)[0] - margin
+    largest = box_distance(far, size)[0] + margin
+    rate = RIM / head[3]
+    slope = wp.where(smallest > d[1], 1.0, wp.max(d[2], 1.0))
+    low = wp.max(d[0], smallest) - head[2]
+    high = wp.max(d[1], largest) - head[2]
     return wp.vec3(RIM + low * rate, RIM + high * rate, slope * rate)
+
+
+@wp.func
+def part_bounds(center: wp.vec3, radius: wp.float32, tape: Texels, at: wp.int32) -> wp.vec3:
+    """Bound u over a ball."""
+    return part_bounds_in(center, wp.vec3(radius, radius, radius), tape, at)
+
+
+@wp.func
+def part_distance_within(center: wp.vec3, extent: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec2:
+    """Return (smallest u, largest u) of a part over the box center ± extent."""
+    bounds = part_bounds_in(center, extent, tape, at)
+    return wp.vec2(bounds[0], bounds[1])
 
 
 class _ExpressionPart(SharpSolid):
@@ -474,6 +718,10 @@ class _ExpressionPart(SharpSolid):
     texels_read = 3
     value_gradient = formula(part_value_gradient)
     bounds = formula(part_bounds)
+    distance_at = formula(part_distance_at)
+    distance_along = formula(part_distance_along)
+    distance_within = formula(part_distance_within)
+    formula_results = RESULTS | DISTANCES
 
     program: Annotated[
         tuple[float, ...], Parameter(Quantity.FACTORS, "texels of the clauses, one after the other")

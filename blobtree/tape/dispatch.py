@@ -105,6 +105,30 @@ def kind_bounds(kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: Texel
     """Return `FieldKind.bounds`."""
 
 
+@of_row("fields", "has_distances")
+def has_distances(kind: wp.int32) -> wp.bool:
+    """Return `FieldKind.has_distances`."""
+
+
+@of_row("fields", "distance_at")
+def kind_distance_at(kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
+    """Return `FieldKind.distance_at`."""
+
+
+@of_row("fields", "distance_along")
+def kind_distance_along(
+    kind: wp.int32, q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: Texels, at: wp.int32
+) -> wp.vec4:
+    """Return `FieldKind.distance_along`."""
+
+
+@of_row("fields", "distance_within")
+def kind_distance_within(
+    kind: wp.int32, center: wp.vec3, half: wp.vec3, tape: Texels, at: wp.int32
+) -> wp.vec2:
+    """Return `FieldKind.distance_within`."""
+
+
 @of_row("fields", "distance")
 def is_distance(kind: wp.int32) -> wp.bool:
     """Return `FieldKind.distance`."""

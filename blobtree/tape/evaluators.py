@@ -46,10 +46,14 @@ from blobtree.tape.dispatch import (
     falloff_numbers,
     falloff_slope,
     falloff_value,
+    has_distances,
     is_distance,
     is_monotone,
     is_windowed,
     kind_bounds,
+    kind_distance_along,
+    kind_distance_at,
+    kind_distance_within,
     kind_value_gradient,
     paints,
     partials,
@@ -134,6 +138,23 @@ def profile_steepest(nearest: wp.float32, farthest: wp.float32, profile: wp.vec4
 
 
 @wp.func
+def falling_value(u: wp.float32, profile: wp.vec4) -> wp.float32:
+    """Return g(u), before its weight, of a direct field that is a falloff of u."""
+    if profile[1] != 0.0 or profile[2] != 1.0:
+        return profile_value(u, profile)
+    x = wp.max(u, 0.0)
+    return falloff(x * x)
+
+
+@wp.func
+def falling_steepest(nearest: wp.float32, farthest: wp.float32, profile: wp.vec4) -> wp.float32:
+    """Return a bound on |∂g/∂u| over [nearest, farthest] of such a field."""
+    if profile[1] != 0.0 or profile[2] != 1.0:
+        return profile_steepest(nearest, farthest, profile)
+    return falloff_steepest(wp.max(nearest, 0.0), wp.max(farthest, 0.0))
+
+
+@wp.func
 def direct_value_gradient(kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec4:
     """Return (value, ∇f) of a direct field: its kind's function, falloff, window and weight.
 
@@ -170,21 +191,47 @@ def direct_bounds(kind: wp.int32, center: wp.vec3, radius: wp.float32, tape: Tex
             return wp.vec3(0.0, 0.0, 0.0)
     f = kind_bounds(kind, center, radius, tape, at)
     if is_distance(kind):
-        near = wp.max(f[0], 0.0)
-        far = wp.max(f[1], 0.0)
-        g = wp.vec3(falloff(far * far), falloff(near * near), falloff_steepest(near, far))
-        if profile[1] != 0.0 or profile[2] != 1.0:
-            g = wp.vec3(
-                profile_value(f[1], profile),
-                profile_value(f[0], profile),
-                profile_steepest(f[0], f[1], profile),
-            )
-        f = wp.vec3(g[0], g[1], g[2] * f[2])
+        steepest = falling_steepest(f[0], f[1], profile)
+        f = wp.vec3(falling_value(f[1], profile), falling_value(f[0], profile), steepest * f[2])
     if is_windowed(kind):
         f = windowed_bounds(f, w)
     if profile[3] < 0.0:
         f = wp.vec3(f[1], f[0], -f[2])
     return f * profile[3]
+
+
+@wp.func
+def direct_value(kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32) -> wp.float32:
+    """Return the value of a direct field; tape[at − 1] is its profile."""
+    if has_distances(kind):
+        profile = tape[at - 1]
+        return falling_value(kind_distance_at(kind, q, tape, at), profile) * profile[3]
+    return direct_value_gradient(kind, q, tape, at)[0]
+
+
+@wp.func
+def direct_within(kind: wp.int32, center: wp.vec3, half: wp.vec3, tape: Texels, at: wp.int32) -> wp.vec2:
+    """Return (smallest, largest) value, in a box, of a direct field that has `distance_within`."""
+    profile = tape[at - 1]
+    u = kind_distance_within(kind, center, half, tape, at)
+    f = wp.vec2(falling_value(u[1], profile), falling_value(u[0], profile))
+    if profile[3] < 0.0:
+        return wp.vec2(f[1], f[0]) * profile[3]
+    return f * profile[3]
+
+
+@wp.func
+def direct_change(
+    kind: wp.int32, q: wp.vec3, direction: wp.vec3, reach: wp.float32, tape: Texels, at: wp.int32
+) -> wp.vec2:
+    """Return bounds on (rise, fall) along a line of a direct field that has `distance_along`."""
+    profile = tape[at - 1]
+    u = kind_distance_along(kind, q, direction, reach, tape, at)
+    steepest = falling_steepest(u[0], u[1], profile) * wp.abs(profile[3])
+    change = wp.vec2(wp.max(-u[2], 0.0), wp.max(u[3], 0.0)) * steepest
+    if profile[3] < 0.0:
+        return wp.vec2(change[1], change[0])
+    return change
 
 
 @wp.func
@@ -223,7 +270,7 @@ def value_direct(
     kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32, color: wp.vec4, ahead: wp.vec4, speed: wp.float32
 ) -> wp.float32:
     """Return the value of a direct field."""
-    return direct_value_gradient(kind, q, tape, at)[0]
+    return direct_value(kind, q, tape, at)
 
 
 @wp.func
@@ -337,13 +384,17 @@ def bound_direct(
 ) -> wp.vec3:
     """Return (value at q, bound on the rise of a direct field ahead, bound on its fall).
 
-    Both are its largest slope over the ball around the way ahead, or around all points within reach.
+    Both are its largest slope over the ball around the way ahead, or around all points within reach, unless
+    the kind knows its change along a line.
     """
     direction = wp.vec3(ahead[0], ahead[1], ahead[2])
     reach = ahead[3]
-    value = direct_value_gradient(kind, q, tape, at)[0]
+    value = direct_value(kind, q, tape, at)
     rate = wp.length(direction)
     if rate > 0.0:
+        if has_distances(kind):
+            change = direct_change(kind, q, direction, reach, tape, at)
+            return wp.vec3(value, change[0], change[1])
         middle = q + direction * (0.5 * reach)
         along = direct_bounds(kind, middle, 0.5 * reach * rate * BALL_MARGIN, tape, at)[2] * rate
         return wp.vec3(value, along, along)
@@ -494,7 +545,7 @@ def color_direct(
     kind: wp.int32, q: wp.vec3, tape: Texels, at: wp.int32, color: wp.vec4, ahead: wp.vec4, speed: wp.float32
 ) -> wp.vec4:
     """Return (value, red, green, blue) of a direct field."""
-    return wp.vec4(direct_value_gradient(kind, q, tape, at)[0], color[0], color[1], color[2])
+    return wp.vec4(direct_value(kind, q, tape, at), color[0], color[1], color[2])
 
 
 @wp.func

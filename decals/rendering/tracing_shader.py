@@ -20,10 +20,13 @@ from blobtree.tape.dispatch import (
     falloff_numbers,
     falloff_slope,
     falloff_value,
+    has_distances,
     is_distance,
     is_monotone,
     is_windowed,
     kind_bounds,
+    kind_distance_along,
+    kind_distance_at,
     kind_value_gradient,
     paints,
     partials,
@@ -88,6 +91,8 @@ _CHOOSERS = (
     warp_stretch,
     kind_value_gradient,
     kind_bounds,
+    kind_distance_at,
+    kind_distance_along,
     falloff_value,
     falloff_slope,
 )
@@ -258,7 +263,10 @@ def _dispatch(kinds: Kinds) -> str:
 
 def _flags(kinds: Kinds) -> list[Any]:
     """Return the functions of a code that return a bool."""
-    return [is_monotone, paints, is_distance, is_windowed, *([reads_gradients] * kinds.directed)]
+    return [
+        *(is_monotone, paints, is_distance, is_windowed, has_distances),
+        *([reads_gradients] * kinds.directed),
+    ]
 
 
 def _flag(name: str, values: dict[int, bool]) -> str:

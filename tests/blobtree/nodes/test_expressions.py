@@ -9,16 +9,22 @@ from numpy.typing import NDArray
 from blobtree import Expression, Node, from_json, polygonize, to_json
 from blobtree.errors import InvalidNode
 from blobtree.nodes import clauses, expressions
+from blobtree.tape.model import gradients_at
 from blobtree.tape.program import postorder
 from blobtree.transpile.python import plain_python, vector
 from tests.blobtree.expressions import letters, program
+from tests.blobtree.tape.evaluations import bounds_along
+from tests.conformance import broken_laws
 from tests.oracles import blobtree as oracle
 from tests.oracles.expressions import VALUES, values
 
 Floats = NDArray[np.float64]
 BOX: Any = ((0.0, 0.0, 0.0), (2.0, 2.0, 2.0))
 FORMULAS: Any = expressions
-ROW, RANGE = (plain_python(formula.func) for formula in (FORMULAS.clause_row, FORMULAS.clause_range))
+ROW, RANGE, ALONG = (
+    plain_python(formula.func)
+    for formula in (FORMULAS.clause_row, FORMULAS.clause_range, FORMULAS.clause_along)
+)
 CONSTANT_SECOND = ("mod", "compare", "pow", "nth-root")
 JUMPS = ("floor", "ceil", "round", "mod", "compare")
 
@@ -66,6 +72,44 @@ def test_values_and_ranges_of_operations(operation: str) -> None:
                 order = np.argsort(x)
                 steps = np.abs(np.diff(exact[order])) / np.diff(x[order])
                 assert (steps <= slope * (1.0 + 1e-6)).all()
+
+
+def any_program(rng: np.random.Generator, count: int) -> list[str]:
+    """The lines of a program of clauses of all kinds, whose numbers may be huge."""
+    lines = ["x var-x", "y var-y", "k mul x x", "l exp k"]
+    for i in range(count):
+        operation = str(rng.choice(tuple(VALUES)))
+        read = rng.choice([line.split()[0] for line in lines], clauses.ARITIES[operation])
+        lines.append(" ".join((f"_{i}", operation, *read)))
+    return lines
+
+
+def inner_operands(operation: str, rng: np.random.Generator) -> Floats:
+    """Values (2, 33) of both operands on the way from 0 to 1; those that must be constant are."""
+    start, rate = rng.uniform(-2.0, 2.0, 2), rng.normal(size=2) * 10.0 ** rng.uniform(-3.0, 0.5, 2)
+    start = np.where(rng.random(2) < 0.2, 0.0, start)
+    if operation in CONSTANT_SECOND:
+        start[1], rate[1] = rng.integers(1, 5), 0.0
+    return np.asarray(start[:, None] + rate[:, None] * np.linspace(0.0, 1.0, 33))
+
+
+@pytest.mark.parametrize("operation", VALUES)
+def test_rates_along_lines_hold_of_operations(operation: str) -> None:
+    rng, code = np.random.default_rng(6), clauses.CODES[operation]
+    for _ in range(200):
+        operands = inner_operands(operation, rng)
+        rates = 32.0 * np.diff(operands, axis=1)
+        ranges = np.stack([operands.min(axis=1), operands.max(axis=1), rates.min(axis=1), rates.max(axis=1)])
+        low, high, least, greatest = ALONG(code, *(vector(*numbers) for numbers in ranges.T))
+        found = np.array([ROW(code, *pair)[0] for pair in operands.T])
+        if np.abs(found).max() >= 1e6:
+            continue
+        changes = 32.0 * np.diff(found)
+        slack = 1e-6 * (1.0 + np.abs(found).max())
+        assert low <= found.min() + slack
+        assert high >= found.max() - slack
+        assert least <= changes.min() + 64.0 * slack
+        assert greatest >= changes.max() - 64.0 * slack
 
 
 @pytest.mark.parametrize("degree", [-3.0, -2.0, -1.0, 0.5, 3.0, (2.0, 4.0)])
@@ -121,6 +165,30 @@ def test_fields_and_gradients_are_those_of_the_oracle(seed: int) -> None:
     exact = oracle.gradient(node, points[smooth])
     tolerance = 1e-3 * (1.0 + np.abs(exact).max(initial=0.0))
     np.testing.assert_allclose(node.gradient(points[smooth]), exact, atol=tolerance)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_values_alone_are_those_beside_gradients(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    node = Expression(any_program(rng, 20), *BOX, width=0.7)
+    points = rng.uniform(-1.2, 1.2, (500, 3))
+    np.testing.assert_array_equal(node(points), gradients_at(node.tape, points)[:, 0])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_rays_are_no_steeper_than_their_bounds(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    node = Expression(program(rng, 12), *BOX, weight=(1.0, -0.7)[seed % 2])
+    assert not broken_laws(node, rng, "interval", "pruning", "Lipschitz bound")
+
+
+def test_rays_along_a_wall_do_not_change() -> None:
+    node = Expression(["x var-x", "y var-y", "r hypot x y", "s square r", "h const 0.3", "d sub s h"], *BOX)
+    starts = np.array([(0.5, 0.3, -0.9), (0.1, -0.6, 0.9)])
+    value, rise, fall = bounds_along(node.tape, starts, [(0, 0, 1), (0, 0, -1)], 0.8).T
+    assert (value > 0.0).all()
+    assert (value < 1.0).all()
+    assert rise.tolist() == fall.tolist() == [0.0, 0.0]
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -220,13 +288,8 @@ def test_parts_with_too_many_values_are_refused() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_huge_numbers_give_finite_fields(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    operations = tuple(VALUES)
     for _ in range(10):
-        lines = ["x var-x", "y var-y", "k mul x x", "l exp k"]
-        for i in range(12):
-            operation = str(rng.choice(operations))
-            read = rng.choice([line.split()[0] for line in lines], clauses.ARITIES[operation])
-            lines.append(" ".join((f"_{i}", operation, *read)))
+        lines = any_program(rng, 12)
         node = Expression(lines, *BOX)
         points = rng.uniform(-1.5, 1.5, (50, 3))
         assert np.isfinite(node(points)).all()

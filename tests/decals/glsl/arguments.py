@@ -121,6 +121,7 @@ BY_FUNCTION: dict[str, dict[str, Draw]] = {
     **{
         f"profile_{name}": {"u": uniform(0.0, 1.5)} for name in ("distance", "value", "slope", "steepest")
     },
+    "falling_value": {"u": uniform(0.0, 1.5)},
     "unroll_step": {"step": place},
     "roll_step": {"step": place},
     "bound_pullback_affine": {"f": uniform(0, 3, 3)},

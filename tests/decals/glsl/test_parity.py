@@ -49,7 +49,9 @@ MODULES = (
     "decals.field.ownership",
 )
 OF_WARP_ALONE = {
+    "direct_within",
     "has_sheets",
+    "kind_distance_within",
     "kind_sheet_at",
     "kind_sheet_value_gradient",
     "operator_choice",
@@ -71,6 +73,7 @@ WRITTEN_TWICE = {
     "is_monotone",
     "paints",
     "falloff_numbers",
+    "has_distances",
     "is_distance",
     "is_windowed",
 }
@@ -79,8 +82,12 @@ WRITTEN_TWICE = {
 OF_LIBRARY_KINDS = {
     "direct_value_gradient",
     "direct_bounds",
+    "direct_change",
+    "direct_value",
     "kind_value_gradient",
     "kind_bounds",
+    "kind_distance_along",
+    "kind_distance_at",
     "value_direct",
     "bound_direct",
     "gradient_direct",
