@@ -12,9 +12,13 @@ import numpy as np
 
 from blobtree._typing import Float32Array
 from blobtree.declare.claims import OperatorRow, Support
+from blobtree.declare.field import FieldKind
 from blobtree.tape.codes import OPERATORS
 from blobtree.tape.program import EnterWarp, Instruction, LeaveWarp, Pop, ProgramLeaf, Push, Run
 from blobtree.tape.tape import Tape
+
+MOST_WALLED_PARTS = 64
+"""Most parts of expressions in a tree whose walls are looked for, operand by operand."""
 
 
 @dataclass(frozen=True)
@@ -84,12 +88,20 @@ def removes(operator: OperatorRow) -> bool:
 
 
 def has_walls(program: list[Instruction]) -> bool:
-    """Return True if an operator of the program may leave walls or lenses."""
-    return any(removes(step.operator) for step in program if isinstance(step, Run | Pop))
+    """Return True if an operator of the program may leave walls or lenses that are looked for.
+
+    They are not in a tree with more than `MOST_WALLED_PARTS` parts of expressions: each would be an operand.
+    """
+    kinds = [(step.kind, len(step.primitives)) for step in program if isinstance(step, Run)]
+    parts = sum(count for kind, count in kinds if isinstance(kind, FieldKind) and kind.has_distances)
+    removing = any(removes(step.operator) for step in program if isinstance(step, Run | Pop))
+    return removing and parts <= MOST_WALLED_PARTS
 
 
 def operands_of(program: list[Instruction], tape: Tape) -> list[Operand]:
-    """Return the operands of a tree that removes; none for other trees."""
+    """Return the operands of a tree that `has_walls`; none for other trees."""
+    if not has_walls(program):
+        return []
     value = _Value()
     leaves: list[ProgramLeaf] = []
     registers: dict[int, tuple[_Value, Float32Array]] = {}

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from blobtree import Box, Node, Point, Segment, Shell, SmoothDifference
+from blobtree import Box, Expression, Node, Point, Segment, Shell, SmoothDifference
 from blobtree.tape.model import values_at
-from blobtree.tape.operands import has_walls, leaves_of, operands_of
+from blobtree.tape.operands import MOST_WALLED_PARTS, has_walls, leaves_of, operands_of
 
 BALL = Point((0, 0, 0), radius=1.0)
 ROD = Segment((-1, 0, 0), (1, 0.2, 0), radius=0.4)
@@ -44,6 +44,16 @@ def test_a_tree_that_only_adds_has_no_operands() -> None:
     tree = (BALL + ROD) | BOX.twist(20.0)
     assert not has_walls(tree._program)
     assert operands_of(tree._program, tree.tape) == []
+
+
+@pytest.mark.parametrize(("count", "walls"), [(MOST_WALLED_PARTS, True), (MOST_WALLED_PARTS + 1, False)])
+def test_an_expression_of_many_parts_has_no_operands(count: int, walls: bool) -> None:
+    lines = ["x var-x", "y var-y", "m0 add x y"]
+    for i in range(1, count):
+        lines += [f"c{i} const {1.0 + i}", f"s{i} mul y c{i}", f"a{i} add x s{i}", f"m{i} max m{i - 1} a{i}"]
+    tree = Expression(lines, (0, 0, 0), (1, 1, 1))
+    assert has_walls(tree._program) is walls
+    assert (operands_of(tree._program, tree.tape) != []) is walls
 
 
 @pytest.mark.parametrize(
