@@ -113,6 +113,12 @@ def world_box(tree: Node, path: Path) -> tuple[Float32Array, Float32Array]:
     return tree.support if is_endless(box) else box
 
 
+def ended_box(node: Node) -> tuple[Float32Array, Float32Array]:
+    """Return the corners of the box around a node; around what it repeats if it has no end."""
+    box = node.field_box
+    return ended_box(node.children[0]) if is_endless(box) else box
+
+
 def inside_support(points: Float32Array, *nodes: Node) -> BoolArray:
     """Return True for each of the points (n, 3) that lies in the support of one of the nodes."""
     inside = np.zeros(len(points), np.bool_)

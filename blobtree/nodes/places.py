@@ -12,7 +12,7 @@ from blobtree._typing import Float64Array
 from blobtree.declare.warp import SpaceWarp
 from blobtree.errors import InvalidNode
 from blobtree.nodes.node import Node
-from blobtree.nodes.paths import Path, nodes_along, square_matrix
+from blobtree.nodes.paths import Path, ended_box, nodes_along, square_matrix
 from blobtree.nodes.tree import Transform
 from blobtree.transpile.python import plain_python, vector
 
@@ -45,7 +45,7 @@ class Place:
 
     def __init__(self, tree: Node, path: Path) -> None:
         *above, node = nodes_along(tree, path)
-        low, high = node.support
+        low, high = ended_box(node)
         self.own_middle: Float64Array = (low + high).astype(np.float64) / 2.0
         self._size = float((high - low).max())
         self._steps: list[Float64Array | Callable[[Float64Array], Float64Array]] = []
@@ -57,7 +57,7 @@ class Place:
                 self._steps.append(_forward(parent.warp, _parameters(parent)))
             else:
                 continue
-            low, high = parent.support
+            low, high = ended_box(parent)
             self._boxes.append((low.astype(np.float64), high.astype(np.float64)))
 
     @property

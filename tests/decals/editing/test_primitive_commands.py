@@ -94,7 +94,13 @@ def test_a_move_is_one_in_the_world_whatever_lies_above(path: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "command", [MovePrimitive(0, (0, 0), (0.05, 0.05, 0)), ResizePrimitive(0, (0, 0), 1.1)]
+    "command",
+    [
+        MovePrimitive(0, (0, 0), (0.05, 0.05, 0)),
+        MovePrimitive(0, (0,), (0.2, 0.05, 0)),
+        TransformPrimitive(0, (0,), np.diag([1.0, 1.1, 0.9, 1.0])),
+        ResizePrimitive(0, (0, 0), 1.1),
+    ],
 )
 def test_a_primitive_of_an_endless_repeat_is_edited(command: Any) -> None:
     endless = EndlessRepeat(Point((0, 0, 0), radius=0.4), (1, 0, 0))
