@@ -93,6 +93,7 @@ class Lab:
         self._guess: float | None = None
         self._recording: Recording | None = None
         self._puzzle: Puzzle | None = None
+        self._framed: tuple[Any, ...] = (None,)
 
     # -- state ------------------------------------------------------------------------------------------
 
@@ -113,22 +114,17 @@ class Lab:
 
     def experiment(self) -> Experiment:
         """Return the present state as immutable values."""
-        document, lesson = self._window.document, self.lesson
-        settings = lesson.settings
+        document = self._window.document
         decals = document.decals.take(np.array(self.numbers, np.int64))
         relaxed = None
         if self._recording is not None:
             step = self._recording.step_of(decals.positions)
             relaxed = self._recording.relaxed(self._step if step is None else step)
-        return Experiment(
-            objects=document.objects,
+        return replace(
+            self.lesson.experiment(document.objects),
             decals=decals,
             rules=document.drawing.rules,
             probe=self.probe,
-            camera=lesson.scene.camera,
-            size=lesson.size,
-            in_space=settings.space,
-            line=settings.line,
             relaxed=relaxed,
             plane=self._plane,
         )
@@ -152,6 +148,7 @@ class Lab:
             "lab_sliders": [self._slider(i, slider) for i, slider in enumerate(lesson.settings.sliders)],
             "lab_guess": {**guess, "waits": self.waits, **results.guess},
             **{f"lab_{name}": getattr(results, name) for name in ("values", "plots", "readings", "tasks")},
+            "lab_stale": self.busy,
             "lab_verdict": {"right": right, "text": marked(escape(text))},
             "lab_puzzle": self._scores(results.scores, right),
         }
@@ -198,6 +195,7 @@ class Lab:
 
     def refresh(self) -> None:
         """Go on with what is under way; call this regularly."""
+        self._follow_size()
         if self._recording is not None and self._step != self._target:
             self._relax(self._recording)
         key = self._key()
@@ -264,9 +262,7 @@ class Lab:
             self._step = self._target = 0
             self._recording = self._recorded(0) if settings.steps else None
             window.subplot.scene = window.document  # its bounds, before the camera's planes follow from them
-            show_camera(window.plotter, lesson.scene)
-            width, height = window.plotter.window_size
-            window.subplot.vtk_renderer.camera.zoom(min(width / height, 1.0))  # a narrow view shows it all
+            self._frame()
             self._put_probe(settings.probe)
             window.redraw(whole=True)
 
@@ -275,6 +271,22 @@ class Lab:
         begin = begin if puzzle is None else puzzle.sized(begin)
         scene = begin.replace(drawing=window.document.drawing.overridden(**modes))
         window.actions.state.run(ReplaceScene(scene, f"lesson: {settings.title}"), started)
+
+    def _frame(self) -> None:
+        """Show the lesson as its camera does, and all of it in a narrow view."""
+        plotter = self._window.plotter
+        show_camera(plotter, self.lesson.scene)
+        width, height = plotter.window_size
+        self._window.subplot.vtk_renderer.camera.zoom(min(width / height, 1.0))
+        self._framed = plotter.window_size, plotter.camera_position, plotter.camera.view_angle
+
+    def _follow_size(self) -> None:
+        """Frame the lesson again in a window of another size, unless its view was turned."""
+        plotter = self._window.plotter
+        size, *view = self._framed
+        if plotter.window_size != size and [plotter.camera_position, plotter.camera.view_angle] == view:
+            self._frame()
+            self._window.redraw(whole=True)
 
     def _recorded(self, seed: int) -> Recording:
         lesson = self.lesson

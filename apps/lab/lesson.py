@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,9 +13,9 @@ import numpy as np
 from msgspec import Struct, field
 
 from blobtree import SolidContact, Union
-from decals.apps.lab.bindings import OWN, binding
+from decals.apps.lab.bindings import MODES, OWN, binding
 from decals.apps.lab.errors import InvalidLesson
-from decals.apps.lab.experiment import Scope
+from decals.apps.lab.experiment import Experiment, Scope
 from decals.apps.lab.formulas import Formula, parse
 from decals.apps.lab.measures import MEASURES
 from decals.errors import ImplicitDecalsError
@@ -23,7 +23,7 @@ from decals.field.mapping import ImageMapping
 from decals.model import Interaction
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 from decals.scenes.files import load_scene
-from decals.scenes.objects import MeshObject, TreeObject
+from decals.scenes.objects import MeshObject, SceneObject, TreeObject
 from decals.scenes.scene import Scene
 from decals.validation import member, stiffness_number
 
@@ -197,6 +197,21 @@ class Lesson:
         ]
         alone = self.scene.decals.replace(interactions=Interaction.OVERLAP)
         return self.scene.replace(objects=objects, decals=alone)
+
+    def experiment(self, objects: Sequence[SceneObject] | None = None) -> Experiment:
+        """Return the state at the beginning, with contact; objects take the place of the scene's."""
+        settings, scene = self.settings, self.scene
+        modes = {name: getattr(settings, name) for name in MODES}
+        return Experiment(
+            objects=scene.objects if objects is None else tuple(objects),
+            decals=scene.decals,
+            rules=scene.drawing.overridden(**modes).rules,
+            probe=settings.probe,
+            camera=scene.camera,
+            size=self.size,
+            in_space=settings.space,
+            line=settings.line,
+        )
 
     def filled(self, text: str, scope: Scope) -> str:
         """Return one of the lesson's texts with the values of its formulas."""

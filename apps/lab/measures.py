@@ -33,10 +33,15 @@ MAX_STEPS = 20_000
 RESOLUTION = 48
 """Cells along the longest side of a solid."""
 
+FINE_RESOLUTION = 128
+"""The same of solids that do not deform each other, whose edges may be sharp."""
+
 BULGED = 1e-3
 """Field below ½ at which a deformed solid counts as bulged."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+Model = TypeVar("Model", bound=Node)
 
 MEASURES: dict[str, Measure] = {}
 """All measures, by their names."""
@@ -233,29 +238,39 @@ def _jacobians(scope: Scope) -> Float64Array:
 # -- solids in contact ----------------------------------------------------------------------------------
 
 
-def solids_of(scope: Scope) -> SolidContact:
-    """Return the solids of the scene; raise `InvalidLesson` if it has none."""
+def bodies_of(scope: Scope) -> tuple[Node, ...]:
+    """Return the solids of the scene before contact; raise `InvalidLesson` if it has none."""
+    return _model(scope, Node).children
+
+
+def _solids_of(scope: Scope) -> tuple[Node, ...]:
+    """Return the solids of the scene as they deform each other."""
+    model = _model(scope, Node)
+    return model.solids() if isinstance(model, SolidContact) else model.children
+
+
+def _model(scope: Scope, kind: type[Model]) -> Model:
     trees = (item.tree for item in scope.experiment.objects if isinstance(item, TreeObject))
-    model = next((tree for tree in trees if isinstance(tree, SolidContact)), None)
+    model = next((tree for tree in trees if isinstance(tree, kind) and tree.children), None)
     if model is None:
-        raise InvalidLesson("the scene has no SolidContact; undo, or start the lesson again")
+        raise InvalidLesson("the scene has no such solids any more; undo, or start the lesson again")
     return model
 
 
-def _solid(scope: Scope, number: Any, solids: tuple[Node, ...]) -> Node:
+def _solid(number: Any, solids: tuple[Node, ...]) -> Node:
     return solids[as_index("solid", number, len(solids))]
 
 
 @measure("number")
 def body(scope: Scope, i: Any) -> Float64Array:
     """Return the field of solid i before it deforms."""
-    return _field(_solid(scope, i, solids_of(scope).children), scope.points)
+    return _field(_solid(i, bodies_of(scope)), scope.points)
 
 
 @measure("number")
 def solid(scope: Scope, i: Any) -> Float64Array:
     """Return the field of solid i after it deforms."""
-    return _field(_solid(scope, i, solids_of(scope).solids()), scope.points)
+    return _field(_solid(i, _solids_of(scope)), scope.points)
 
 
 def _field(node: Node, points: Points) -> Float64Array:
@@ -265,25 +280,25 @@ def _field(node: Node, points: Points) -> Float64Array:
 @measure("number", "number")
 def area(scope: Scope, i: Any, k: Any) -> float:
     """Return the area of the contact of solids i and k; 0 if they are apart."""
-    return float(sum(surface.area for surface in _contacts_of(solids_of(scope), i, k)))
+    return float(sum(surface.area for surface in _contacts_of(_model(scope, SolidContact), i, k)))
 
 
 @measure("number")
 def volume(scope: Scope, i: Any) -> float:
     """Return the volume of solid i after it deforms."""
-    return _volume(_solid(scope, i, solids_of(scope).solids()))
+    return _volume(scope, _solid(i, _solids_of(scope)))
 
 
 @measure("number")
 def free_volume(scope: Scope, i: Any) -> float:
     """Return the volume of solid i alone."""
-    return _volume(_solid(scope, i, solids_of(scope).children))
+    return _volume(scope, _solid(i, bodies_of(scope)))
 
 
 @measure("number", "number")
 def penetration(scope: Scope, i: Any, k: Any) -> float:
     """Return how deep solids i and k would overlap without contact, on the line of their centres."""
-    pair = [_solid(scope, number, solids_of(scope).children) for number in (i, k)]
+    pair = [_solid(number, bodies_of(scope)) for number in (i, k)]
     ends = [np.mean(node.bounds, axis=0, dtype=np.float64) for node in pair]
     reach = max(float(np.ptp(node.bounds, axis=0).max()) for node in pair)
     apart = ends[1] - ends[0]
@@ -297,11 +312,11 @@ def penetration(scope: Scope, i: Any, k: Any) -> float:
 @measure("number", "number")
 def bulge(scope: Scope, i: Any, k: Any) -> float:
     """Return the width of the bulge of solid i around its contact with solid k."""
-    model = solids_of(scope)
+    model = _model(scope, SolidContact)
     rings = [ring for surface in _contacts_of(model, i, k) for ring in surface.outlines]
     if not rings:
         return 0.0
-    vertices = _mesh(_solid(scope, i, model.solids())).vertices
+    vertices = _mesh(_solid(i, model.solids())).vertices
     fields = np.array([node(vertices) for node in model.children])
     nearest = np.argmax(np.delete(fields, int(i), axis=0), axis=0)
     nearest += nearest >= int(i)
@@ -310,12 +325,13 @@ def bulge(scope: Scope, i: Any, k: Any) -> float:
 
 
 @lru_cache(maxsize=16)
-def _mesh(node: Node) -> Any:
-    return polygonize(node, resolution=RESOLUTION)
+def _mesh(node: Node, resolution: int = RESOLUTION) -> Any:
+    return polygonize(node, resolution=resolution)
 
 
-def _volume(node: Node) -> float:
-    mesh = _mesh(node)
+def _volume(scope: Scope, node: Node) -> float:
+    deforms = isinstance(_model(scope, Node), SolidContact)
+    mesh = _mesh(node, RESOLUTION if deforms else FINE_RESOLUTION)
     return enclosed_volume(mesh.vertices, mesh.faces)
 
 

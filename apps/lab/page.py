@@ -8,8 +8,8 @@ from trame.widgets import client, html, vuetify3
 
 from decals.apps.lab.lab import Lab
 from decals.apps.lab.lesson import Lesson
-from decals.apps.lab.symbols import ACTS, LIT
-from decals.apps.sandbox.page import PANEL_WIDTH, Page, drawer
+from decals.apps.lab.symbols import styles
+from decals.apps.sandbox.page import PANEL_WIDTH, PHONE, UPRIGHT_TABLET, Page, drawer
 from decals.apps.sandbox.panels import build_controls, icon_button, named
 from decals.editing.slicing import NONE
 from decals.errors import InvalidEdit
@@ -17,11 +17,14 @@ from decals.window import EditWindow
 
 LESSON_WIDTH, PLOTS_WIDTH = 370, 350
 
+ON_PHONE = f"$vuetify.display.width <= {PHONE}"
+"""True for a window in which a lesson lies below the view."""
+
 STYLE, LESSON, PLOTS = (
     Path(__file__).with_name(name).read_text(encoding="utf-8")
     for name in ("page.css", "lesson.html", "plots.html")
 )
-STYLE += f"{LIT} {{ stroke-width: 5 }} {ACTS} {{ opacity: 0.5 }}"
+STYLE += styles(".v-application")
 
 
 class LabPage(Page):
@@ -54,6 +57,7 @@ class LabPage(Page):
         super().__init__(server, window, lessons=titles, start_lesson=self.lab.start, **options)
         trigger = server.controller.trigger
         trigger("check")(self.lab.check)
+        trigger("start_lesson")(self._restart)
         trigger("puzzle")(lambda text: self.sandbox.attempt(lambda: self._play(text)))
         trigger("guess")(lambda value: self.sandbox.attempt(lambda: self._guess(value)))
         if in_lesson:
@@ -75,7 +79,7 @@ class LabPage(Page):
         return values
 
     def _build_left_side(self) -> None:
-        with drawer("left", f"(in_lesson ? {LESSON_WIDTH} : {PANEL_WIDTH})"):
+        with drawer("left", f"(in_lesson ? {LESSON_WIDTH} : {PANEL_WIDTH})", f"(in_lesson && {ON_PHONE})"):
             client.Style(STYLE)
             client.ClientTriggers(mounted="utils.sandbox.puzzles((text) => trigger('puzzle', [text]))")
             with html.Div(v_if="!in_lesson"):
@@ -124,7 +128,7 @@ class LabPage(Page):
         self.sandbox.slide(lambda: self.lab.set_value(number, raw, last), last=bool(last))
 
     def _build_right_side(self) -> None:
-        with drawer("right", f"(in_lesson ? {PLOTS_WIDTH} : {PANEL_WIDTH})"):
+        with drawer("right", f"(in_lesson ? {PLOTS_WIDTH} : {PANEL_WIDTH})", UPRIGHT_TABLET):
             html.Div(PLOTS, v_if="in_lesson")
             with html.Div(v_if="!in_lesson || lab_side === 'model'"):
                 with html.Div(v_if="in_lesson"):

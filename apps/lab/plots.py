@@ -11,7 +11,7 @@ from blobtree._typing import BoolArray, Float64Array
 from decals.apps.lab.experiment import MAP_PIXELS, Points, Scope
 from decals.apps.lab.lesson import Lesson, Plot
 from decals.apps.lab.measures import owner
-from decals.apps.lab.symbols import SYMBOL, marked, regions
+from decals.apps.lab.symbols import SYMBOL, acting, marked
 from decals.apps.sandbox.outline import png_url
 
 WIDTH, HEIGHT, MAP_HEIGHT = 330, 150, 205
@@ -33,9 +33,6 @@ SCALE = np.array(
 )[::-1]
 """Colours of a map from its lowest to its highest value: viridis, whose lightness rises evenly."""
 
-ACTING = "#56b4e9"
-"""Colour of the part of a line at which a symbol acts."""
-
 RED, LINE = (213, 0, 0), (255, 255, 255)
 
 
@@ -45,7 +42,7 @@ def drawn(plot: Plot, lesson: Lesson, scope: Scope) -> str:
         return _map(plot, lesson, scope) if plot.map else _curves(plot, lesson, scope)
 
 
-class _Axes:
+class Axes:
     """A picture with axes; positions in it follow from values."""
 
     def __init__(self, x: Sequence[float], y: Sequence[float], height: float, *, rows: int = 0) -> None:
@@ -101,7 +98,7 @@ def _ticks(low: float, high: float) -> list[float]:
     return [float(value * step) for value in np.arange(first, last + 1) + 0.0]  # 0 in place of -0
 
 
-def _mark(plot: Plot, lesson: Lesson, scope: Scope, axes: _Axes) -> None:
+def _mark(plot: Plot, lesson: Lesson, scope: Scope, axes: Axes) -> None:
     """Add the marks of a plot: its own formulas at the probe."""
     for pair in plot.marks:
         axes.cross(*(float(np.ravel(lesson.formulas[text].evaluate(scope))[0]) for text in pair))
@@ -124,7 +121,7 @@ def _curves(plot: Plot, lesson: Lesson, scope: Scope) -> str:
         np.broadcast_to(np.asarray(lesson.formulas[c.formula].evaluate(at), np.float64), x.shape)
         for c in plot.curves
     ]
-    axes = _Axes(ends, plot.values or _range(np.concatenate(rows), 0.05), HEIGHT, rows=(len(rows) + 1) // 2)
+    axes = Axes(ends, plot.values or padded(np.concatenate(rows), 0.05), HEIGHT, rows=(len(rows) + 1) // 2)
     for number, (curve, row) in enumerate(zip(plot.curves, rows, strict=True)):
         look = {"stroke": COLORS[number % 6], "stroke_dasharray": DASHES[number % 6]}
         path, symbol = _path(axes, x, row), SYMBOL.match(curve.label)
@@ -134,7 +131,7 @@ def _curves(plot: Plot, lesson: Lesson, scope: Scope) -> str:
         axes.add("line", x1=left, x2=left + 22, y1=down - 4, y2=down - 4, stroke_width=2, **look)
         axes.add("text", curve.label, x=left + 27, y=down)
     if plot.x is None:
-        _shade(axes, x, regions(at))
+        _shade(axes, x, acting(at))
         here, _ = axes.at(experiment.along_line(scope.points.positions[0]), 0.0)
         look = {"stroke": "currentColor", "stroke_dasharray": "3 3"}
         bottom = axes.top + axes.size[1]
@@ -143,7 +140,7 @@ def _curves(plot: Plot, lesson: Lesson, scope: Scope) -> str:
     return axes.svg(plot.title)
 
 
-def _shade(axes: _Axes, x: Float64Array, found: dict[str, BoolArray]) -> None:
+def _shade(axes: Axes, x: Float64Array, found: dict[str, BoolArray]) -> None:
     """Add where symbols act along a line; the page shows it while the pointer is at one of them."""
     half = (x[1] - x[0]) / 2
     for name, acts in found.items():
@@ -151,10 +148,11 @@ def _shade(axes: _Axes, x: Float64Array, found: dict[str, BoolArray]) -> None:
         for first, last in ends.reshape(-1, 2):
             (left, right), _ = axes.at([max(x[first] - half, x[0]), min(x[last - 1] + half, x[-1])], 0.0)
             across = {"x": f"{left:.1f}", "width": f"{right - left:.1f}"}
-            axes.add("rect", data_region=name, fill=ACTING, y=axes.top, height=axes.size[1], **across)
+            axes.add("rect", data_region=name, y=axes.top, height=axes.size[1], **across)
 
 
-def _range(values: Float64Array, padding: float = 0.0) -> tuple[float, float]:
+def padded(values: Float64Array, padding: float = 0.0) -> tuple[float, float]:
+    """Return the least and the greatest number, with a margin: a part of their difference."""
     finite = values[np.isfinite(values)]
     if not len(finite):
         return 0.0, 1.0
@@ -163,7 +161,7 @@ def _range(values: Float64Array, padding: float = 0.0) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _path(axes: _Axes, x: Float64Array, y: Float64Array) -> str:
+def _path(axes: Axes, x: Float64Array, y: Float64Array) -> str:
     """Return the line through points; it is interrupted where a value is no number."""
     right, down = axes.at(x, np.clip(y, axes.low[1], axes.high[1]))
     known, parts, pen = np.isfinite(y), [], "M"
@@ -195,15 +193,15 @@ def _map(plot: Plot, lesson: Lesson, scope: Scope) -> str:
         return values.reshape(MAP_PIXELS, MAP_PIXELS)
 
     values = pixels(plot.map)
-    low, high = plot.values or _range(values)
+    low, high = plot.values or padded(values)
     red = pixels(plot.red) > 0 if plot.red else np.zeros_like(values, np.bool_)
     on_surface = plot.x is None and not experiment.in_space
     lines = _borders(owner(at).reshape(values.shape)) if on_surface else _borders(values >= 0.5)
-    axes = _Axes(*ends, MAP_HEIGHT)
+    axes = Axes(*ends, MAP_HEIGHT)
     source = png_url(_colored(values, low, high, red, lines), compress_level=1)
     width, height = axes.size
     axes.add("image", x=LEFT, y=TOP, width=width, height=height, href=source, preserveAspectRatio="none")
-    for name, acts in regions(at).items() if plot.x is None else ():
+    for name, acts in acting(at).items() if plot.x is None else ():
         shade = png_url(_colored(np.where(acts, 1.0, np.nan).reshape(values.shape), 0, 1, red & False, None))
         places = {"x": LEFT, "y": TOP, "width": width, "height": height}
         axes.add("image", data_region=name, href=shade, preserveAspectRatio="none", **places)

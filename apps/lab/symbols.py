@@ -3,13 +3,15 @@
 import re
 from collections.abc import Iterable, Mapping
 from html import escape
+from pathlib import Path
 
 import numpy as np
 from markdown_it import MarkdownIt
 
 from blobtree._typing import BoolArray
 from decals.apps.lab.experiment import Scope
-from decals.apps.lab.measures import MEASURES, F, h, owner, solids_of, top
+from decals.apps.lab.formulas import parse
+from decals.apps.lab.measures import MEASURES, F, bodies_of, h, owner
 from decals.model import Interaction
 from decals.record import Contact
 
@@ -30,47 +32,73 @@ SYMBOL = re.compile(rf"(?<![\w'’])([{''.join(DEFINITIONS)}])([₀-₉]*)(?![^\
 TAG = re.compile(r"(<[^>]*>)")
 
 NAMES = *DEFINITIONS, "f₀", "f₁", "F₀", "F₁"
-LIT, ACTS = (
-    ",".join(f'.v-application:has(:is(abbr, tspan)[data-symbol="{s}"]:hover) {part}="{s}"]' for s in NAMES)
-    for part in ("path[data-symbol", "[data-region")
-)
-"""Selectors of the curve whose symbol is under the pointer, and of the region in which that symbol acts."""
+
+EXPLAINED = Path(__file__).with_name("symbols.css").read_text(encoding="utf-8")
+"""Styles of symbols: a tap or the focus shows their definition, as the pointer does."""
 
 PUSHED = 1e-3
 """Least change of the field by which a push counts."""
 
 
-def marked(html: str, *, svg: bool = False, definitions: Mapping[str, str] = DEFINITIONS) -> str:
-    """Return HTML, or the text of an SVG element, whose symbols show their definitions under the pointer."""
+def styles(page: str) -> str:
+    """Return styles of symbols in a page, by its selector.
+
+    A symbol under the pointer, or with the focus, lights up its curve and shades the region where it acts.
+    """
+
+    def chosen(part: str) -> str:
+        symbols = (f'[data-symbol="{name}"]:is(:hover, :focus)' for name in NAMES)
+        pairs = zip(symbols, NAMES, strict=True)
+        return ",".join(f'{page}:has(:is(abbr, tspan){symbol}) {part}="{name}"]' for symbol, name in pairs)
+
+    curves, places = chosen("path[data-symbol"), chosen("[data-region")
+    return f"{EXPLAINED}{curves} {{ stroke-width: 5 }}\n{places} {{ opacity: 0.5 }}\n"
+
+
+def marked(
+    html: str,
+    *,
+    svg: bool = False,
+    reached: bool = False,
+    definitions: Mapping[str, str] = DEFINITIONS,
+) -> str:
+    """Return HTML, or the text of an SVG element, whose symbols show their definitions under the pointer.
+
+    A tap shows them, too; with `reached`, also the Tab key.
+    """
+    tab = 0 if reached else -1
 
     def definition(match: re.Match[str]) -> str:
         title = escape(f"{match[0]}: {definitions[match[1]]}")
         if svg:
             return f'<tspan data-symbol="{match[0]}"><title>{title}</title>{match[0]}</tspan>'
-        return f'<abbr data-symbol="{match[0]}" title="{title}">{match[0]}</abbr>'
+        return f'<abbr data-symbol="{match[0]}" title="{title}" tabindex="{tab}">{match[0]}</abbr>'
 
     parts = TAG.split(html)
     return "".join(part if i % 2 else SYMBOL.sub(definition, part) for i, part in enumerate(parts))
 
 
-def regions(scope: Scope) -> dict[str, BoolArray]:
-    """Return the points at which each symbol acts, bool[n] each.
+def regions(*, in_space: bool, count: int) -> dict[str, str]:
+    """Return the formula of the points at which each symbol acts, of that many decals or of solids.
 
     A field acts where its image or solid is, ½ or more, h where it lowers the highest field, and g, d and s
     where the influence of a decal reaches.
     """
+    pairs = [(i, "₀₁"[i]) for i in range(2)]
+    if in_space:
+        measures = {"f": "body", "F": "solid"}.items()
+        return {f"{symbol}{sign}": f"{name}({i}) >= 0.5" for symbol, name in measures for i, sign in pairs}
+    own = {f"f{sign}": f"f({i}) >= 0.5" for i, sign in pairs if i < count}
+    everywhere = dict.fromkeys("gds", "top > 0") | dict.fromkeys("fr", "top >= 0.5")
+    return {**everywhere, **own, "F": "owner >= 0", "h": f"owner >= 0 and top - F > {PUSHED}"}
 
-    def of(measure: str, number: int) -> BoolArray:
-        return np.asarray(MEASURES[measure].function(scope, number) >= 0.5)
 
-    pairs = range(2)
-    if scope.experiment.in_space:
-        return {f"{s}{'₀₁'[i]}": of(name, i) for s, name in (("f", "body"), ("F", "solid")) for i in pairs}
-    highest, seen = top(scope), owner(scope) >= 0
-    pushed = seen & (highest - F(scope) > PUSHED)
-    found = dict.fromkeys("gds", highest > 0.0) | dict.fromkeys("fr", highest >= 0.5)
-    found |= {f"f{'₀₁'[i]}": of("f", i) for i in pairs if i < len(scope.experiment.decals)}
-    return {name: acts & scope.points.exists for name, acts in {**found, "F": seen, "h": pushed}.items()}
+def acting(scope: Scope) -> dict[str, BoolArray]:
+    """Return whether each symbol acts at the points of a scope, bool[n] each."""
+    experiment, points = scope.experiment, scope.points
+    texts = regions(in_space=experiment.in_space, count=len(experiment.decals))
+    found = {text: parse(text, MEASURES, frozenset()).evaluate(scope) for text in texts.values()}
+    return {name: np.asarray(found[text], np.bool_) & points.exists for name, text in texts.items()}
 
 
 def document(text: str, definitions: Mapping[str, str] = DEFINITIONS) -> str:
@@ -91,7 +119,7 @@ def readings(scope: Scope) -> list[tuple[str, list[float]]]:
         return name, [float(np.ravel(MEASURES[measure].function(scope, i))[0]) for i in numbers]
 
     if scope.experiment.in_space:
-        solids = range(len(solids_of(scope).children))
+        solids = range(len(bodies_of(scope)))
         return [("solid", [*map(float, solids)]), row("f", "body", solids), row("F", "solid", solids)]
     if not len(decals):
         return []
@@ -111,7 +139,7 @@ def readings(scope: Scope) -> list[tuple[str, list[float]]]:
 def table(rows: list[tuple[str, list[str]]]) -> str:
     """Return the readings as an HTML table, with a column for each symbol."""
     height = max((len(texts) for _, texts in rows), default=0)
-    head = "".join(f'<th scope="col">{marked(name)}</th>' for name, _ in rows)
+    head = "".join(f'<th scope="col">{marked(name, reached=True)}</th>' for name, _ in rows)
     lines = [
         "".join(f'<td rowspan="{height // len(row)}">{row[i]}</td>' for _, row in rows if i < len(row))
         for i in range(height)

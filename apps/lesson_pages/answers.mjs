@@ -6,8 +6,7 @@ export async function send({ lesson, live, root, guess, sliders, value }, form) 
   const numbers = [guess, ...places, ...values]; // those that are no numbers become null
   const right = root.querySelector(".verdict").dataset.right === "true";
   const answer = { lesson: lesson.name, name: form.person.value, numbers, right };
-  const headers = { "Content-Type": "application/json" };
-  const request = { method: "POST", body: JSON.stringify(answer), headers };
-  const sent = await fetch("answer", request).catch(() => ({}));
+  const body = new Blob([JSON.stringify(answer)], { type: "application/json" });
+  const sent = await fetch("answer", { method: "POST", body }).catch(() => ({}));
   form.querySelector("output").textContent = lesson.words[sent.ok ? "sent" : "unsent"];
 }

@@ -17,13 +17,13 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from html import escape
 from pathlib import Path
-from typing import Any
 
 import msgspec
 from aiohttp import web
-from msgspec import Struct
 
+from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.lesson import Lesson
+from decals.apps.lesson_pages.board import Answer, Choice, board, labels, table
 from decals.apps.lesson_pages.page import lesson_page, no_page
 from decals.apps.sandbox.guard import FRAMES, NEAR, Guard, new_token, page_of
 
@@ -48,7 +48,7 @@ MAX_RATE = 100
 BODY_SECONDS = 10.0
 """Time in which an answer must have come."""
 
-FILES = Path(__file__).parent
+SCRIPT = Path(__file__).with_name("class.mjs")
 
 POLICY = (
     "default-src 'none'; script-src 'sha256-{}'; style-src 'unsafe-inline'; img-src data: blob:; "
@@ -58,23 +58,6 @@ POLICY = (
 
 FORMULA = tuple("=+-@\t\r")
 """First characters of a text that a spreadsheet would compute."""
-
-
-class Answer(Struct, forbid_unknown_fields=True, frozen=True):
-    """What a student sends: the numbers of a lesson, in the order of `labels`, and whether it is solved."""
-
-    lesson: str
-    name: str
-    numbers: tuple[float | None, ...]
-    right: bool
-
-
-def labels(lesson: Lesson) -> list[str]:
-    """Return the names of the numbers of an answer."""
-    settings = lesson.settings
-    sliders = [slider for slider in settings.sliders if not slider.choices]
-    rows: list[Any] = [*sliders, *settings.values, *settings.scores]
-    return ["guess", *(row.label for row in rows)]
 
 
 class Classroom:
@@ -87,6 +70,11 @@ class Classroom:
     lessons
         The lessons; those without a page are left out.
 
+    Raises
+    ------
+    InvalidLesson
+        None of them has a page.
+
     Attributes
     ----------
     token
@@ -97,7 +85,12 @@ class Classroom:
 
     def __init__(self, guard: Guard, lessons: Sequence[Lesson]) -> None:
         self._guard = guard
-        self._lessons = {lesson.name: lesson for lesson in lessons if not no_page(lesson)}
+        reasons = {lesson.name: no_page(lesson) for lesson in lessons}
+        self._lessons = {lesson.name: lesson for lesson in lessons if not reasons[lesson.name]}
+        if not self._lessons:
+            raise InvalidLesson(
+                f"a class needs a lesson with a page: {'; '.join(map(str, reasons.values()))}"
+            )
         self.token = new_token()
         self.answers: dict[tuple[int, str], Answer] = {}
         self._secret = secrets.token_bytes(32)
@@ -115,7 +108,7 @@ class Classroom:
         self._guard.doors[STUDENT] = self._answer
         app.router.add_get("/class", self._board)
         app.router.add_get("/class/answers", self._answers)
-        app.router.add_get("/class/{name}.mjs", _script)
+        app.router.add_get("/class/class.mjs", _script)
         app.router.add_get("/class/{name}.csv", self._table)
 
     # -- students ---------------------------------------------------------------------------------------
@@ -202,16 +195,18 @@ class Classroom:
     # -- the teacher ------------------------------------------------------------------------------------
 
     async def _board(self, request: web.Request) -> web.Response:
-        bound = request.get_extra_info("sockname")
-        page = (FILES / "class.html").read_text(encoding="utf-8")
-        return _html(page.replace("<!--URL-->", escape(self.url(bound[1]))))
+        port = request.get_extra_info("sockname")[1]
+        return _html(board(self.url(port), self._lessons, Choice.of(self._lessons, request.query)))
 
-    async def _answers(self, _request: web.Request) -> web.Response:
-        lessons = {
-            name: {"title": one.settings.title, "labels": labels(one)} for name, one in self._lessons.items()
-        }
-        rows = [{"student": who, **msgspec.to_builtins(one)} for (who, _), one in self.answers.items()]
-        return web.json_response({"lessons": lessons, "answers": rows}, headers={"Cache-Control": "no-store"})
+    async def _answers(self, request: web.Request) -> web.Response:
+        choice = Choice.of(self._lessons, request.query)
+        response = _html(table(choice, self._answers_to(choice.lesson)))
+        response.headers["Cache-Control"] = "no-store"
+        return response
+
+    def _answers_to(self, lesson: Lesson) -> dict[int, Answer]:
+        """Return the newest answers to a lesson, by the numbers of the students."""
+        return {who: one for (who, name), one in sorted(self.answers.items()) if name == lesson.name}
 
     async def _table(self, request: web.Request) -> web.Response:
         """Return the answers to a lesson as CSV, without texts that a spreadsheet would compute."""
@@ -219,12 +214,11 @@ class Classroom:
         if lesson is None:
             raise web.HTTPNotFound(text="expected the name of a lesson")
         file = io.StringIO()
-        table = csv.writer(file)
-        table.writerow(["student", "name", "right", *labels(lesson)])
-        for (student, name), one in sorted(self.answers.items()):
-            if name == lesson.name:
-                shown = f"'{one.name}" if one.name.startswith(FORMULA) else one.name
-                table.writerow([student, shown, one.right, *one.numbers])
+        rows = csv.writer(file)
+        rows.writerow(["student", "name", "right", *labels(lesson)])
+        for student, one in self._answers_to(lesson).items():
+            shown = f"'{one.name}" if one.name.startswith(FORMULA) else one.name
+            rows.writerow([student, shown, one.right, *one.numbers])
         headers = {"Content-Disposition": f'attachment; filename="{lesson.name}.csv"'}
         return web.Response(text=file.getvalue(), content_type="text/csv", headers=headers)
 
@@ -250,9 +244,5 @@ def _limited(text: str) -> web.Response:
     return response
 
 
-async def _script(request: web.Request) -> web.Response:
-    name = request.match_info["name"]
-    if name not in ("class", "plots"):
-        raise web.HTTPNotFound(text="expected a script of the class")
-    text = (FILES / f"{name}.mjs").read_text(encoding="utf-8")
-    return web.Response(text=text, content_type="text/javascript")
+async def _script(_request: web.Request) -> web.Response:
+    return web.Response(text=SCRIPT.read_text(encoding="utf-8"), content_type="text/javascript")

@@ -90,10 +90,9 @@ class LessonPage {
 
   // Change decals by a function of their rows; drags of one slider are one step.
   edit(numbers, change) {
-    const { viewer } = this;
-    const rows = numbers.map((number) => [number, viewer.decals.rows[number]]).filter(([, row]) => row);
+    const rows = numbers.map((number) => [number, this.viewer.decals.rows[number]]).filter(([, row]) => row);
     const changed = rows.map(([number, row]) => [number, { ...row, ...change(row) }]);
-    this.step = viewer.edit(changed, this.step);
+    this.step = this.viewer.edit(changed, this.step);
   }
 
   // -- the probe --------------------------------------------------------------------------------------------
@@ -106,9 +105,10 @@ class LessonPage {
       const { surface } = isHeld ? viewer.pick(...viewer.pointer.place(event)) : {};
       if (surface) this.moveProbe(surface.position);
     });
-    ball.addEventListener("keydown", ({ key }) => {
-      const way = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [1, 1], ArrowDown: [1, -1] }[key];
+    ball.addEventListener("keydown", (event) => {
+      const way = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [1, 1], ArrowDown: [1, -1] }[event.key];
       if (!way) return;
+      event.preventDefault(); // the page does not scroll
       const along = unit(viewer.camera.frame(1)[way[0]]);
       this.moveProbe(add(this.probe, scaled(along, (way[1] * lesson.size) / 100)));
     });
@@ -196,10 +196,9 @@ class LessonPage {
     for (const box of this.all("[data-task] input")) box.checked = done[box.value];
     const failed = done.indexOf(false);
     showScores(this, failed < 0);
-    const text = failed < 0 ? live.right : this.tried ? live.checks[failed].otherwise : () => "";
     const verdict = root.querySelector(".verdict");
     verdict.dataset.right = failed < 0;
-    const said = value(text);
+    const said = value(failed < 0 ? live.right : this.tried ? live.checks[failed].otherwise : () => "");
     if (verdict.innerHTML !== said) verdict.innerHTML = said;
     this.tried = false; // another state has another answer
     root.querySelector(".seen").innerHTML = this.guess === null ? "" : value(live.seen);
@@ -218,8 +217,8 @@ class LessonPage {
     const names = ["radius", "influence", "d", "f"];
     const columns = pair.map((number) => [number, ...names.map((name) => m[name](q, number))]);
     columns[0]?.push(...ofPoint);
-    const cell = (value) => `<td>${m.say(value)}</td>`;
-    body.innerHTML = columns.map((values) => `<tr>${values.map(cell).join("")}</tr>`).join("");
+    const line = (values) => `<tr><td>${values.map(m.say).join("</td><td>")}</td></tr>`;
+    body.innerHTML = columns.map(line).join("");
   }
 
   // Show the maps, or the curves.
@@ -241,7 +240,8 @@ class LessonPage {
     if (!plot.map) {
       const curves = plot.curves.map((curve) => ({ ...curve, values: valuesOf(curve.formula) }));
       const here = plot.x || lesson.states ? NaN : m.onLine(point.position);
-      return drawCurves(chart, { ...look, x: points.map(({ x }) => x), curves, here });
+      const acts = Object.entries(plot.acts).map(([symbol, of]) => ({ symbol, values: valuesOf(of) }));
+      return drawCurves(chart, { ...look, x: points.map(({ x }) => x), curves, acts, here });
     }
     const side = [-lesson.size / 2, lesson.size / 2];
     const { x = side, y = side } = plot;

@@ -2,7 +2,7 @@
 
 import html
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from itertools import cycle
 from pathlib import Path
@@ -14,10 +14,11 @@ from PIL import Image
 from blobtree.progress import Progress, reporting
 from decals.apps.lab.bindings import AXES, binding
 from decals.apps.lab.errors import InvalidLesson
-from decals.apps.lab.lesson import Lesson, Plot, Slider
+from decals.apps.lab.lesson import Guess, Lesson, Plot, Slider, Value
 from decals.apps.lab.measures import MEASURES
 from decals.apps.lab.plots import COLORS, DASHES, SCALE, viridis
-from decals.apps.lab.symbols import document
+from decals.apps.lab.script import script as python_lines
+from decals.apps.lab.symbols import SYMBOL, document, marked, regions, styles
 from decals.apps.lesson_pages.code import (
     FORMS,
     WORDS,
@@ -60,19 +61,6 @@ SEND = (
     '<button>{send}</button> <output role="status"></output></form>'
 )
 """What a student sends in a class."""
-
-SYMBOLS = (
-    '<table><thead><tr><th scope="col">{decal}</th>'
-    + "".join(f'<th scope="col">{symbol}</th>' for symbol in "rsdfhF")
-    + '<th scope="col">{stretch}</th></tr></thead><tbody></tbody></table>'
-)
-"""The readings at the probe."""
-
-LOOKS = [
-    f'stroke="{color}" stroke-width="2" stroke-dasharray="{dashes}"'
-    for color, dashes in zip(COLORS, DASHES, strict=True)
-]
-"""Lines of plots."""
 
 COLORS_OF_MAP = 64
 """Colours between the lowest and the highest value of a map."""
@@ -143,7 +131,7 @@ def lesson_page(
     )
     slots |= _markup(lesson, words, table, links)
     slots["SEND"] = SEND.format(**words.page) if sends else ""
-    slots["STYLE"] += (FILES / "lesson.css").read_text(encoding="utf-8")
+    slots["STYLE"] += (FILES / "lesson.css").read_text(encoding="utf-8") + styles("#lesson")
     slots["SCRIPT"] = as_script(lesson_script(), "begin") + begin
     template = (FILES / "lesson.html").read_text(encoding="utf-8")
     return Page(filled(template, slots), slots["DATA"], title)
@@ -244,12 +232,14 @@ def _live(lesson: Lesson, words: Translation, table: Table | None) -> dict[str, 
         return Code(f"(m, q) => {said(words.said(given), code, words.definitions)}")
 
     def plotted(plot: Plot) -> dict[str, Any]:
-        curves = zip(plot.curves, cycle(LOOKS), strict=False)
+        acts = {} if table or plot.x or plot.map else regions(in_space=False, count=len(lesson.scene.decals))
         return {
             "points": Code(_points(plot, table)),
             "curves": [
-                {"formula": value(c.formula, "[q.i]" if table else ""), "look": look} for c, look in curves
+                {"formula": value(c.formula, "[q.i]" if table else ""), "look": look}
+                for c, look in _lines(plot)
             ],
+            "acts": {symbol: value(formula) for symbol, formula in acts.items()},
             "map": plot.map and value(plot.map),
             "red": plot.red and value(plot.red),
             "marks": () if table else [[value(one) for one in pair] for pair in plot.marks],
@@ -257,17 +247,20 @@ def _live(lesson: Lesson, words: Translation, table: Table | None) -> dict[str, 
             **{name: ends for name in ("x", "y", "values") if (ends := getattr(plot, name))},
         }
 
-    def seen(truth: str, why: str) -> Code:
-        numbers = {"guess": "m.guess", "truth": code(truth)}
+    def seen(guess: Guess) -> Code:
+        numbers = {"guess": "m.guess", "truth": code(guess.truth)}
         compared = said(words.page["compared"] + " ", numbers.__getitem__, {})
-        return Code(f"(m, q) => {compared} + {said(words.said(why), code, words.definitions)}")
+        meters = " + ".join(_meter(words.page[name], guess, number) for name, number in numbers.items())
+        return Code(
+            f"(m, q) => {compared} + {meters} + {said(words.said(guess.why), code, words.definitions)}"
+        )
 
     return {
         "values": [value(one.formula) for one in settings.values],
         "scores": [value(score.formula) for score in settings.scores],
         "checks": [{"holds": value(check.holds), "otherwise": text(check.otherwise)} for check in checks],
         "right": text(settings.question.right),
-        "seen": guess and seen(guess.truth, guess.why),
+        "seen": guess and seen(guess),
         "plots": [plotted(plot) for plot in _plots(lesson)],
         "sliders": [access(slider.path) for slider in settings.sliders],
     }
@@ -329,7 +322,8 @@ def _markup(
         f'<div class="note">{text(plot.note)}</div></div>'
         for plot in _plots(lesson)
     )
-    names = ("lessons", "about", "parameters", "values", "readings", "check", "again", "needs", "later")
+    names = ["lessons", "about", "parameters", "values", "readings"]
+    names += ["check", "again", "needs", "later", "python"]
     undo = f'<button type="button" name="back">{words.page["undo"]}</button>'
     body = words.bodies.get(lesson.name, lesson.text)
     return {
@@ -352,7 +346,8 @@ def _markup(
             f'<stop offset="{part}" stop-color="rgb({", ".join(map(str, color))})"/>'
             for part, color in zip(np.linspace(0, 1, len(SCALE)), SCALE.astype(int), strict=True)
         ),
-        "SYMBOLS": "" if settings.space else SYMBOLS.format(**words.page),
+        "SYMBOLS": "" if settings.space else _readings(words),
+        "LINES": html.escape(python_lines(lesson, lesson.experiment())),
         "PROBE": html.escape(words.page["probe"]),
         "PLOTS": plots,
     }
@@ -364,10 +359,34 @@ def _key(plot: Plot, words: Translation) -> str:
         return f'<p class="red">{html.escape(words.said(plot.red_label))}</p>'
     lines = "".join(
         f'<span><svg viewBox="0 0 22 4" aria-hidden="true"><path d="M0 2h22" {look}/></svg> '
-        f"{html.escape(words.said(curve.label))}</span>"
-        for curve, look in zip(plot.curves, cycle(LOOKS), strict=False)
+        f"{marked_text(words.said(curve.label), words.definitions)}</span>"
+        for curve, look in _lines(plot)
     )
     return f'<div class="key">{lines}</div>'
+
+
+def _lines(plot: Plot) -> Iterator[tuple[Value, str]]:
+    """Yield the curves of a plot, each with the attributes of its line: its look, and its symbol."""
+    for curve, color, dashes in zip(plot.curves, cycle(COLORS), cycle(DASHES), strict=False):
+        symbol = SYMBOL.match(curve.label)
+        of = f' data-symbol="{symbol[0]}"' if symbol else ""
+        yield curve, f'stroke="{color}" stroke-width="2" stroke-dasharray="{dashes}"{of}'
+
+
+def _meter(label: str, guess: Guess, number: str) -> str:
+    """Return an expression of JavaScript: a bar for a number, on the scale of a guess."""
+    ends = f'min="{guess.low:g}" max="{guess.high:g}"'
+    begin = f"<label class='meter'>{html.escape(label)} <meter {ends} value='"
+    end = "'></meter></label>"
+    return f"{script_json(begin)} + {number} + {script_json(end)}"
+
+
+def _readings(words: Translation) -> str:
+    """Return the table of the symbols at the probe, without its rows."""
+    names = (html.escape(words.page["decal"]), *"rsdfhF", html.escape(words.page["stretch"]))
+    heads = (marked(name, reached=True, definitions=words.definitions) for name in names)
+    cells = "".join(f'<th scope="col">{head}</th>' for head in heads)
+    return f"<table><thead><tr>{cells}</tr></thead><tbody></tbody></table>"
 
 
 def _slider(slider: Slider, lesson: Lesson, words: Translation, table: Table | None) -> str:

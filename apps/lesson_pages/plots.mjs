@@ -14,7 +14,7 @@ function ticks(low, high) {
   return Array.from({ length: count }, (_, i) => Number(((first + i) * step).toPrecision(6)));
 }
 
-export function range(values) {
+function range(values) {
   const finite = values.filter(Number.isFinite);
   const [low, high] = [Math.min(...finite), Math.max(...finite)];
   const margin = high > low ? 0.05 * (high - low) : 0.5;
@@ -48,13 +48,14 @@ function show(element, { x, y, across, inner, marks, say }, draw) {
   ].join("")}</svg>`; // prettier-ignore
 }
 
-// Curves, [{look, values}], over x; `here` is the x of the probe, and `marks` are points.
-export function drawCurves(element, { x, curves, ends, here, marks, say }) {
+// Curves, [{look, values}], over x; `here` is the x of the probe, `marks` are points, and `acts` says where symbols act.
+export function drawCurves(element, { x, curves, acts, ends, here, marks, say }) {
   const y = ends ?? range(curves.flatMap(({ values }) => values));
   const [across, inner] = [WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM];
   const within = (value) => Math.min(Math.max(value, y[0]), y[1]);
   const probe = Number.isFinite(here) ? y.map((up) => [here, up]) : [];
   show(element, { x: [x[0], x.at(-1)], y, across, inner, marks, say }, (at) => [
+    ...acts.map(({ symbol, values }) => stroke(values.map((isActing, i) => at(x[i], isActing ? (y[0] + y[1]) / 2 : NaN)), `data-region="${symbol}" stroke-width="${inner}"`)), // prettier-ignore
     ...curves.map(({ look, values }) => stroke(values.map((value, i) => at(x[i], within(value))), look)), // prettier-ignore
     stroke(probe.map((place) => at(...place)), 'stroke="#000" stroke-dasharray="3 3"'), // prettier-ignore
   ]);

@@ -9,7 +9,7 @@ import numpy as np
 
 from decals.apps.lab.bindings import NodePath, binding
 from decals.apps.lab.errors import InvalidLesson
-from decals.apps.lab.experiment import Experiment, Scope
+from decals.apps.lab.experiment import Scope
 from decals.apps.lab.lesson import Lesson
 from decals.editing.session import EditSession
 from decals.scenes.objects import SceneObject
@@ -96,7 +96,7 @@ def tabulated(lesson: Lesson) -> Table:
             session.do(path.command(session.document, (), place))
         model = session.document.objects[0]
         models.append(replace(model, name=f"{model.name} {len(models) + 1}"))
-        experiment = _experiment(lesson, session.document.objects)
+        experiment = lesson.experiment(session.document.objects)
         scope = Scope.at_probe(experiment)
         along = scope.at(experiment.line_points(SAMPLES))
         line = [_short(x) for x in along["x"]]
@@ -106,20 +106,6 @@ def tabulated(lesson: Lesson) -> Table:
         for text, formula in scalars.items():
             values[text].append(_short(np.ravel(formula.evaluate(scope))[0]))
     return Table(positions, models, line, values)
-
-
-def _experiment(lesson: Lesson, objects: tuple[SceneObject, ...]) -> Experiment:
-    settings, scene = lesson.settings, lesson.scene
-    return Experiment(
-        objects=objects,
-        decals=scene.decals,
-        rules=scene.drawing.rules,
-        probe=settings.probe,
-        camera=scene.camera,
-        size=lesson.size,
-        in_space=True,
-        line=settings.line,
-    )
 
 
 def _short(value: Any) -> Any:

@@ -50,6 +50,9 @@ PAGE_TEXTS = {
     "send": "Send my numbers",
     "sent": "Sent to the teacher.",
     "unsent": "Not sent: wait a second, then send again.",
+    "guess": "Your guess",
+    "truth": "It is now",
+    "python": "Python for the first picture",
     "lost": "A decal of the lesson was deleted: undo, or start again.",
 }
 """Texts of a page that belong to no lesson, by their names."""

@@ -179,7 +179,7 @@
       return !folded.some((key) => isBelow(row.key, key));
     },
     copy(text) {
-      navigator.clipboard.writeText(text);
+      navigator.clipboard?.writeText(text); // browsers have it on this machine and by https
     },
     // Copy the address of this page with a puzzle behind it, and return it.
     share(text) {

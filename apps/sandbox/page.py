@@ -96,15 +96,15 @@ CTRL_KEYS = "".join(
 """Letters that have an action together with Ctrl."""
 
 
-def drawer(side: str, width: str = str(PANEL_WIDTH)) -> Any:
+def drawer(side: str, width: str = str(PANEL_WIDTH), lower: str = "false") -> Any:
     """Return the panel at a side of the page, with a width that is an expression of the page.
 
     In a narrow window it is closed at first, above the view; on an upright tablet, both lie beside the view.
+    Where the expression `lower` is true, it lies below the view.
     """
-    lower = UPRIGHT_TABLET if side == "right" else "false"
     return vuetify3.VNavigationDrawer(
         v_model=(f"{side}_open", None),
-        mobile_breakpoint=(f"{UPRIGHT_TABLET} ? 0 : {NARROW}",),
+        mobile_breakpoint=(f"{UPRIGHT_TABLET} || {lower} ? 0 : {NARROW}",),
         width=(f"{lower} ? {LOWER_HEIGHT} : {width}",),
         location=(f"{lower} ? 'bottom' : '{side}'",),
         order="1" if side == "left" else "0",
@@ -279,7 +279,7 @@ class Page:
 
     def _build_right_side(self) -> None:
         """Build what stands right of the view."""
-        with drawer("right"):
+        with drawer("right", lower=UPRIGHT_TABLET):
             self._build_panels()
 
     def _build_panels(self) -> None:

@@ -68,6 +68,8 @@ SCROLLED_TWICE = """() => {
 """Classes of areas that scroll inside others."""
 
 BLOB = Point((0, 0, 0), radius=1.0) + Point((1.2, 0.4, 0), radius=0.6)
+DEFINED = "getComputedStyle(document.activeElement, '::after').content"
+"""The definition that the page shows of the symbol with the focus."""
 EMPTY = empty_scene(["scale"], UPRIGHT["y"])
 WIDE = 1280, 800
 """Size of a laptop's window."""
@@ -927,6 +929,8 @@ async def lab(picture: str | None = None) -> None:
             assert await tasks.count() == len(lab_page.lab.lesson.settings.question.checks)
             if not attempts[-1].right:
                 await find_step(browser, lab_page)
+            follows = browser.get_by_role("button", name="Next lesson")
+            await expect(follows).to_have_count(int(number + 1 < len(ANSWERS)))
             lowest = browser.get_by_label(lab_page.lab.values()["lab_sliders"][-1]["label"], exact=True).last
             box = await lowest.bounding_box()
             assert box is not None
@@ -963,6 +967,12 @@ async def lab(picture: str | None = None) -> None:
             await expect(curve).to_have_css("stroke-width", "5px")
             await browser.get_by_role("button", name="Check the answer").hover()
             await expect(curve).to_have_css("stroke-width", "2px")
+        for place, words in (
+            (".lesson-side abbr[data-symbol='g']", "falloff"),
+            (".readings abbr", "visible radius"),
+        ):
+            await browser.locator(place).first.focus()  # as a tap and the Tab key give it
+            assert words in await browser.evaluate(DEFINED)
         await browser.set_viewport_size({"width": 820, "height": 1180})  # a tablet
         parts = [browser.locator(part) for part in (".lesson-side", "[role=application]", ".plots")]
         async with asyncio.timeout(PATIENCE):
@@ -985,6 +995,13 @@ async def lab(picture: str | None = None) -> None:
         await browser.get_by_role("button", name="Two decals", exact=True).click()
         see = browser.get_by_role("button", name="See", exact=True)
         await browser.wait_for_function(REACHED, arg=await see.element_handle())  # the panel opens
+        shown_view, panel = [
+            await browser.locator(part).bounding_box() for part in ("[role=application]", ".lesson-side")
+        ]
+        assert shown_view is not None
+        assert panel is not None
+        assert shown_view["height"] > 200  # above the lesson
+        assert panel["y"] >= shown_view["y"] + shown_view["height"]
 
 
 async def puzzle(browser: Page, lab_page: LabPage) -> None:
@@ -997,7 +1014,7 @@ async def puzzle(browser: Page, lab_page: LabPage) -> None:
     now, par, best = (await cells.all_inner_texts())[:3]
     assert (par, best) == ("0.5", now)
     await browser.get_by_role("button", name="Share as a puzzle").click()
-    await browser.get_by_text("Copied:").get_by_text("#puzzle=0.5,0.45,0.4,0.3&par=").wait_for()
+    await browser.get_by_text("Link to the puzzle:").get_by_text("#puzzle=0.5,0.45,0.4,0.3&par=").wait_for()
 
 
 async def guess(browser: Page, lab_page: LabPage) -> None:

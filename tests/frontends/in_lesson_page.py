@@ -15,16 +15,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.async_api import Browser, Locator, Page, async_playwright
+from playwright.async_api import Browser, Locator, Page, async_playwright, expect
 
-from decals.apps.lab.experiment import Experiment, Scope
+from decals.apps.lab.experiment import Scope
 from decals.apps.lab.lesson import LESSONS, Lesson, load_lessons
 from decals.apps.lesson_pages.classroom import Classroom
 from decals.apps.lesson_pages.page import lesson_page, no_page
 from tests.apps.lab.answers import ANSWERS, SOLVED, Attempt
 from tests.apps.lesson_pages.test_classroom import serve, students
 from tests.apps.sandbox.test_sessions import TOKEN
-from tests.frontends.browsing import ERRORS
+from tests.frontends.browsing import ERRORS, pull
 from tests.frontends.in_html_page import Fingers, accessible, launched
 
 SIZE = {"width": 1280, "height": 800}
@@ -55,26 +55,28 @@ SET = """(input, value) => {
 }"""
 
 
+EXPLAINED = "getComputedStyle(document.activeElement, '::after').content"
+"""The definition that a page shows of the symbol with the focus."""
+
+LOOK = "(line, name) => getComputedStyle(line)[name]"
+
+PLACES = """places => places.map((place, i) => {
+  const { left, top, width, height } = document.querySelector("#viewer canvas").getBoundingClientRect();
+  return [page.viewer.decals.rows[i].position, [...place, 0]].map((at) => {
+    const [x, y] = page.viewer.camera.seen(at, width / height);
+    return [left + (0.5 + x / 2) * width, top + (0.5 - y / 2) * height];
+  });
+})"""
+"""Where the images of a puzzle are in the window, and where they shall be."""
+
 MOVE = """places => page.viewer.edit(
   places.map((p, i) => [i, {...page.viewer.decals.rows[i], position: [...p, 0]}]))"""
 
 
-def truths(lesson: Lesson) -> list[float]:
+def truths(lesson: Lesson, *formulas: str) -> list[float]:
     """Return the values that the lab shows at the beginning of a lesson."""
-    settings, scene = lesson.settings, lesson.scene
-    modes = {name: getattr(settings, name) for name in ("contact", "stiffness", "mapping")}
-    experiment = Experiment(
-        objects=scene.objects,
-        decals=scene.decals,
-        rules=scene.drawing.overridden(**modes).rules,
-        probe=settings.probe,
-        camera=scene.camera,
-        size=lesson.size,
-        in_space=settings.space,
-        line=settings.line,
-    )
-    scope = Scope.at_probe(experiment)
-    return [float(np.ravel(lesson.formulas[v.formula].evaluate(scope))[0]) for v in settings.values]
+    scope = Scope.at_probe(lesson.experiment())
+    return [float(np.ravel(lesson.formulas[text].evaluate(scope))[0]) for text in formulas]
 
 
 async def settled(page: Page) -> None:
@@ -147,8 +149,15 @@ async def learned(browser: Browser, lesson: Lesson, attempts: list[Attempt], pat
     await page.get_by_role("button", name="See", exact=True).click()
     await settled(page)
     assert re.match(r"You guessed .*, it is", await page.inner_text(".seen"))
+    question, meters = lesson.settings.guess, page.locator(".meter meter")
+    assert question is not None
+    ends = [1.0, *truths(lesson, question.truth)]
+    for meter, end in zip(await meters.all(), np.clip(ends, question.low, question.high), strict=True):
+        assert await meter.evaluate("meter => meter.value") == pytest.approx(end, rel=CLOSE, abs=1e-3)
     for text, value in zip(
-        await page.locator(".values td:last-child").all_inner_texts(), truths(lesson), strict=True
+        await page.locator(".values td:last-child").all_inner_texts(),
+        truths(lesson, *(value.formula for value in lesson.settings.values)),
+        strict=True,
     ):
         found = text == "yes" if text in ("yes", "no") else float(text)
         assert found == pytest.approx(value, rel=CLOSE, abs=1e-3), (text, value)
@@ -199,7 +208,7 @@ async def played(browser: Browser, path: Path, width: int, height: int) -> None:
     cells = page.locator(".scores td")
     await settled(page)
     assert (await cells.all_inner_texts())[2::3] == ["–", "–"]  # what overlaps too much does not count
-    await page.evaluate(MOVE, SOLVED)
+    await packed(page)
     await settled(page)
     scores = await cells.all_inner_texts()
     assert float(scores[0]) <= 1 < 4 >= float(scores[3])
@@ -232,6 +241,17 @@ async def played(browser: Browser, path: Path, width: int, height: int) -> None:
     await page.close()
 
 
+async def packed(page: Page) -> None:
+    """Drag the images of the puzzle to a good answer, with a finger or the mouse."""
+    await page.evaluate("scrollTo(0, 0)")
+    fingers = Fingers(await page.context.new_cdp_session(page)) if is_chromium(page) else None
+    for start, end in await page.evaluate(PLACES, SOLVED):
+        if fingers:
+            await fingers.move([complex(*start)], [complex(*end)])
+        else:
+            await pull(page, start, (end[0] - start[0], end[1] - start[1]))
+
+
 async def typed(browser: Browser, path: Path, width: int, height: int) -> None:
     """Take the first lesson by the keyboard alone, from the guess to the right answer and back."""
     page = await browser.new_page(viewport={"width": width, "height": height})
@@ -244,21 +264,48 @@ async def typed(browser: Browser, path: Path, width: int, height: int) -> None:
     await settled(page)
     for part, count in ((".probe", 14), ("[data-path='decals.0.radius']", 62)):
         await reach(page, part)
+        if part == ".probe":
+            scrolled = await page.evaluate("scrollY")
+            await page.keyboard.press("ArrowDown")  # it has no slider up and down
+            assert await page.evaluate("scrollY") == scrolled
         for _ in range(count):
             await page.keyboard.press("ArrowRight")
         await settled(page)
     assert await page.get_attribute(".verdict", "data-right") == "true", await page.inner_text(".tasks")
-    await reach(page, "[name=again]")
+    await reach(page, ".readings abbr[data-symbol='d']")
+    assert "over the influence radius" in await page.evaluate(EXPLAINED)
+    await reach(page, "[name=again]", "Shift+Tab")
     await page.keyboard.press("Space")
     await page.wait_for_selector("#lesson[data-waits=true]")
     assert await page.evaluate("window.pageErrors") == []
     await page.close()
 
 
-async def reach(page: Page, part: str) -> None:
+async def explained(browser: Browser, path: Path, width: int, height: int) -> None:
+    """A symbol of lesson 2 says what it means, and lights up its curve and region: finger, then mouse."""
+    page = await browser.new_page(viewport={"width": width, "height": height}, has_touch=True)
+    await page.goto(path.as_uri())
+    await press(page, "Skip the guess")
+    await settled(page)
+    looks = {"path[data-symbol='h']": "stroke-width", "path[data-region='h']": "opacity"}
+    lines = {page.locator(f".chart {part}").first: name for part, name in looks.items()}
+    first = [await line.evaluate(LOOK, name) for line, name in lines.items()]
+    assert first == ["2px", "0"]
+    symbol = page.locator(".readings abbr[data-symbol='h']")
+    await (symbol.tap() if is_chromium(page) else symbol.click())
+    assert "factor by which a neighbour lowers" in await page.evaluate(EXPLAINED)
+    assert [await line.evaluate(LOOK, name) for line, name in lines.items()] == ["5px", "0.5"]
+    await page.locator(".question").click()
+    await page.locator(".body abbr[data-symbol='F']").first.hover()
+    assert [await line.evaluate(LOOK, name) for line, name in lines.items()] == first
+    await expect(page.locator(".chart path[data-symbol='F']")).to_have_css("stroke-width", "5px")
+    await page.close()
+
+
+async def reach(page: Page, part: str, key: str = "Tab") -> None:
     """Press Tab until a part of the page has the focus, which can be seen."""
     for _ in range(60):
-        await page.keyboard.press("Tab")
+        await page.keyboard.press(key)
         if await page.evaluate("part => document.activeElement.matches(part)", part):
             assert await page.locator(part).evaluate("e => getComputedStyle(e).outlineStyle") != "none"
             return
@@ -310,6 +357,9 @@ async def learn(name: str, numbers: set[int]) -> None:
                     if number == 1:
                         for size in SIZES:
                             await typed(browser, path, *size)
+                    if number == 2:
+                        for size in SIZES:
+                            await explained(browser, path, *size)
                     if lesson.settings.scores:
                         for size in SIZES:
                             await played(browser, path, *size)

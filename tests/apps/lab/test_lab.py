@@ -109,6 +109,33 @@ def test_the_first_even_step_is_the_answer(lab: Lab) -> None:
     assert lab.experiment().relaxed != relaxed
 
 
+def test_a_lesson_fits_a_window_of_another_size_until_its_view_is_turned(
+    lab: Lab, window: EditWindow
+) -> None:
+    plotter = window.plotter
+    begin(lab, 0)
+    wait(lab)
+    size, fov = plotter.window_size, lab.lesson.scene.camera.fov
+    assert plotter.camera.view_angle == pytest.approx(fov)
+    plotter.window_size = [40, 60]
+    lab.refresh()
+    assert plotter.camera.view_angle == pytest.approx(1.5 * fov)  # all of the plate, in a narrow window
+    plotter.camera.position = (1.0, 0.0, 8.0)
+    plotter.window_size = size
+    lab.refresh()
+    assert plotter.camera.view_angle == pytest.approx(1.5 * fov)
+    begin(lab, 0)
+    assert plotter.camera.view_angle == pytest.approx(fov)
+
+
+def test_values_of_another_state_are_marked(lab: Lab) -> None:
+    begin(lab, 0)
+    assert not wait(lab)["lab_stale"]
+    lab.set_value(number_of(lab, "Visible radius"), 0.8)
+    assert lab.values()["lab_stale"]
+    assert not wait(lab)["lab_stale"]
+
+
 def test_the_probe_follows_the_pointer_where_its_slider_leads(lab: Lab, window: EditWindow) -> None:
     begin(lab, 0)
     wait(lab)

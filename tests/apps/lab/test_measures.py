@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import Point, SolidContact
+from blobtree import Extrude, Point, Revolve, SolidContact, Union
 from decals import Camera, Contact, Decals, MeshObject, TreeObject
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Points, Relaxed, Scope
@@ -174,6 +174,16 @@ def test_a_small_decal_in_a_large_one_folds_it_in_the_mode_of_the_paper_only() -
 def test_two_balls_in_contact(text: str, expected: float, tolerance: float) -> None:
     state = experiment(objects=(TreeObject("balls", BALLS),), decals=Decals.empty(), in_space=True)
     assert value(text, state) == pytest.approx(expected, abs=tolerance)
+
+
+def test_operands_of_any_tree_have_volumes_and_fields() -> None:
+    """A turn of the top keeps all sections; a ring is its section times the way of its middle."""
+    square = "M-.5 -.5H.5V.5H-.5Z"
+    tree = Union([Extrude(square, 2.7, top_turn=90.0, origin=(-3, 0, 0)), Revolve("M.5 0H1.5V1H.5Z", 90.0)])
+    state = experiment(objects=(TreeObject("solids", tree),), in_space=True, probe=(1.0, 1.0, 1.0))
+    for text, expected in (("volume(0)", 2.7), ("free_volume(0)", 2.7), ("volume(1)", np.pi / 2)):
+        assert value(text, state) == pytest.approx(expected, rel=3e-3), text
+    assert value("body(1)", state) == value("solid(1)", state) == pytest.approx(0.5, abs=1e-5)
 
 
 def test_a_bulge_has_a_width() -> None:

@@ -11,7 +11,7 @@ from decals.apps.lab.experiment import Scope
 from decals.apps.lab.lab import measured
 from decals.apps.lab.lesson import LESSONS, Lesson, load_lessons, shown
 from decals.apps.lab.plots import LEFT, RIGHT, SAMPLES, WIDTH, drawn
-from decals.apps.lab.symbols import DEFINITIONS, PUSHED, document, marked, readings, regions, table
+from decals.apps.lab.symbols import DEFINITIONS, PUSHED, acting, document, marked, readings, table
 from decals.field.rules import PictureRules
 from tests.apps.lab.test_lab import plain
 from tests.apps.lab.test_measures import BALLS, TWO, experiment
@@ -138,7 +138,7 @@ def test_regions_lie_where_the_symbols_act(lessons: list[Lesson], gap: float) ->
     high, low = f.max(axis=1), f.min(axis=1)
     expected = {"g": high > 0, "f": high > 0.5, "f₀": f[:, 0] > 0.5, "f₁": f[:, 1] > 0.5}
     expected |= {"F": high > 0.5, "h": (high > 0.5) & (high - contact_field(f) > PUSHED)}
-    found = regions(Scope.at_probe(state).at(along))
+    found = acting(Scope.at_probe(state).at(along))
     svg = measured(lesson, state).plots[0]["svg"]
     for name, acts in expected.items():
         differs = np.flatnonzero(found[name] != acts)

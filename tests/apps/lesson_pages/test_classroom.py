@@ -4,6 +4,7 @@ import asyncio
 import csv
 import io
 import json
+import re
 import sys
 from collections.abc import Awaitable, Callable
 from pathlib import Path
@@ -16,14 +17,17 @@ pytest.importorskip("aiohttp")
 pytest.importorskip("trame_server")
 
 import aiohttp
+import numpy as np
 from yarl import URL
 
 from decals.apps.cli import run
 from decals.apps.lab.lesson import LESSONS, load_lesson
 from decals.apps.lesson_pages import classroom
-from decals.apps.lesson_pages.classroom import MAX_RATE, MAX_STUDENTS, Classroom, labels
+from decals.apps.lesson_pages.board import Answer, Choice, labels, table
+from decals.apps.lesson_pages.classroom import MAX_RATE, MAX_STUDENTS, Classroom
 from decals.apps.sandbox.guard import Guard
 from decals.apps.sandbox.sessions import Sessions
+from decals.errors import InvalidInput
 from tests.apps.sandbox.attacks import NAVIGATE, Server, student
 from tests.apps.sandbox.test_sessions import PROGRAM, TOKEN
 
@@ -98,18 +102,27 @@ def test_forty_students_answer_and_the_teacher_sees_all() -> None:
             async with teacher.get(f"{address}?token={TOKEN}") as found:
                 assert found.status == 200
             near = {"Sec-Fetch-Site": "same-origin", "Sec-Fetch-Mode": "cors"}
-            async with teacher.get(f"{address}class/answers", headers=near) as found:
-                seen = await found.json()
-            assert sorted(one["numbers"][0] for one in seen["answers"]) == [*range(STUDENTS)]
-            assert {one["numbers"][3] for one in seen["answers"]} == {52.0}  # the newest ones
-            assert seen["lessons"]["9-packing"]["labels"] == labels(load_lesson(LESSONS / "9-packing.md"))
+            asked = f"{address}class/answers?lesson=9-packing&x=0&y=3"
+            async with teacher.get(asked, headers=near) as found:
+                seen = await found.text()
+            texts = [re.findall("<td>(.*?)</td>", line) for line in re.findall("<tr>(.*?)</tr>", seen)[1:]]
+            assert sorted(int(line[2]) for line in texts) == [*range(STUDENTS)]
+            assert {line[5] for line in texts} == {"52"}  # the newest ones
+            assert {line[7] for line in texts} == {"–"}
+            names = re.findall("<th>(.*?)</th>", seen)
+            assert names == ["student", "done", *labels(load_lesson(LESSONS / "9-packing.md"))]
+            dots = re.findall(r'<circle cx="([\d.]+)" cy="([\d.]+)"', seen)
+            assert np.ptp(np.diff(sorted(float(x) for x, _ in dots))) < 0.2  # guesses are even
+            assert len({y for _, y in dots}) == 1
+            assert len(dots) == STUDENTS
             async with teacher.get(f"{address}class/9-packing.csv", headers=near) as found:
                 rows = [*csv.DictReader(io.StringIO(await found.text()))]
             assert {row["name"] for row in rows} == {f"'=Ü {number}" for number in range(STUDENTS)}
             assert {float(row["guess"]) for row in rows} == {*range(STUDENTS)}
-            async with teacher.get(f"{address}class") as found:
+            async with teacher.get(f"{address}class?lesson=9-packing&x=0&y=9") as found:
                 text = await found.text()
             assert f"{students(address)}/{room.token}/" in text
+            assert re.findall('<option value="([^"]+)" selected>', text) == ["9-packing", "0", "5"]
 
     sessions = serve(check)
     assert len(sessions._numbers) == 1  # the teacher alone has a process
@@ -174,7 +187,20 @@ def test_a_student_of_two_classes_on_one_machine_is_one_student_in_each() -> Non
     serve(first)
 
 
+def test_texts_of_students_are_no_markup() -> None:
+    lesson = load_lesson(LESSONS / "1-one-decal.md")
+    bad = "<img src=x onerror=alert(1)>"
+    choice = Choice.of({lesson.name: lesson}, {"lesson": bad, "x": bad})
+    assert (choice.lesson, choice.x, choice.y) == (lesson, 1, 3)
+    answers = {7: Answer(lesson.name, bad, (None, 1.0, 2.0, 3.0), True)}
+    assert "<img" not in table(choice, answers)
+    assert "&lt;img src=x" in table(choice, answers)
+    assert "student 7" in table(choice, {7: Answer(lesson.name, "", (None,) * 4, False)})
+
+
 def test_a_class_needs_lessons(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(InvalidInput, match="needs a lesson with a page: Scattering: a relaxation"):
+        Classroom(Guard(token=TOKEN), [load_lesson(LESSONS / "5-scattering.md")])
     assert run(["sandbox", "--class"]) != 0
     assert "--class needs --lab or --lessons" in capsys.readouterr().err
     assert json.dumps(labels(load_lesson(LESSONS / "1-one-decal.md"))).startswith('["guess"')
