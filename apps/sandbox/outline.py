@@ -10,6 +10,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from PIL import Image
 
+from blobtree import Node
 from blobtree.nodes.paths import Path as TreePath
 from decals.editing.document import Document
 from decals.editing.outline_actions import Part
@@ -64,6 +65,15 @@ ICONS = {
 """Icons of rows by their class, else by their kind."""
 
 
+GROUPS = {
+    **dict.fromkeys(("primitives", "tree", "Shell", "Mirror"), "basic"),
+    "deformations": "warps",
+    "sharp": "solids",
+    "sweeps": "profiles",
+}
+"""Groups of kinds in menus by the class, else by the file of the class, whose name is the group of others."""
+
+
 @dataclass(frozen=True)
 class Row:
     """One row of the outline; plain values, as a page receives them.
@@ -100,6 +110,12 @@ def icon(name: str, kind: str) -> str:
     """Return the icon of a class, else of a kind of rows, else ""."""
     known = ICONS.get(name, ICONS.get(kind))
     return f"mdi-{known}" if known else ""
+
+
+def group(name: str, kind: type[Node]) -> str:
+    """Return the group of a class of nodes in a menu; "custom" for one of a user."""
+    package, _, file = kind.__module__.rpartition(".")
+    return GROUPS.get(name, GROUPS.get(file, file)) if package == "blobtree.nodes" else "custom"
 
 
 def outline(document: Document) -> list[dict[str, Any]]:

@@ -146,14 +146,23 @@
       if (size) trame.utils.download(name.trim().split("/").pop(), new Blob(parts));
     },
 
-    // A menu of kinds begins in its field, and ends where it was opened. Firefox tells no pointer that it has left.
+    // A menu of kinds begins in its field, and ends where it was opened. The pointer, which rests, has left it then.
     async menu(open) {
       if (open) this.opener = document.activeElement;
-      else this.hover("");
-      trame.state.set("kind_sought", "");
       await new Promise((drawn) => setTimeout(drawn, MENU_MS));
-      if (!open && document.activeElement === document.body) this.opener?.focus();
       if (open && matchMedia("(pointer: fine)").matches) document.querySelector(FIELD)?.focus();
+      if (open) return;
+      trame.state.set("kind_sought", "");
+      if (document.activeElement === document.body) this.opener?.focus();
+      setTimeout(() => this.hover(""), MENU_MS);
+    },
+    // Return the kinds of a family whose name has what is sought, then those whose description or group has it.
+    kinds({ docs, groups, ...families }, family, sought) {
+      const found = families[family].filter((kind) =>
+        this.found(`${kind} ${docs[kind]} ${groups[kind]}`, sought),
+      );
+      const named = found.filter((kind) => this.found(kind, sought));
+      return [...named, ...found.filter((kind) => !named.includes(kind))];
     },
     // Return the first kind below the field in which it is sought.
     firstKind({ target }) {
@@ -234,6 +243,18 @@
     if (/^[ei]$/i.test(key) || (shiftKey && /^s$/i.test(key))) view.focus({ preventScroll: true });
     view.dispatchEvent(new KeyboardEvent("keydown", { key, ctrlKey, metaKey, shiftKey }));
   });
+
+  // One key changes the colours of the page from everywhere.
+  document.addEventListener(
+    "keydown",
+    (event) => {
+      if (!event.altKey || event.code !== "KeyL") return;
+      event.preventDefault();
+      event.stopPropagation();
+      trame.state.set("theme", trame.state.get("theme") === "light" ? "dark" : "light");
+    },
+    true,
+  );
 
   // A press elsewhere takes what is being typed, before anything else follows from it. Escape drops it.
   const typedIn = () => document.activeElement?.closest("input:not([type=range]), textarea");

@@ -323,7 +323,7 @@ class Page:
                         icon, panels.SUMMARIES[action], (self.sandbox.perform, f"['{action}']")
                     )
                 theme = "theme = theme === 'light' ? 'dark' : 'light'"
-                panels.icon_button("mdi-theme-light-dark", "light or dark", theme)
+                panels.icon_button("mdi-theme-light-dark", "light or dark (Alt + L)", theme)
 
     def _build_outline(self) -> None:
         html.Div(TEMPLATES["outline"])

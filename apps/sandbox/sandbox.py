@@ -21,7 +21,7 @@ from decals.apps.sandbox.fields import Fields
 from decals.apps.sandbox.files import SandboxFiles
 from decals.apps.sandbox.folder import MAX_UPLOADS
 from decals.apps.sandbox.hover import VIEW, Hover
-from decals.apps.sandbox.outline import PICTURE_SIZE, icon, outline, png_url
+from decals.apps.sandbox.outline import PICTURE_SIZE, group, icon, outline, png_url
 from decals.editing import new_nodes
 from decals.editing.action_state import joined
 from decals.editing.outline_actions import Part
@@ -224,11 +224,12 @@ class Sandbox:
 
     @staticmethod
     def catalog() -> dict[str, Any]:
-        """Return the names of the kinds that can be added, by family; what each is, and built-in images."""
+        """Return the kinds that can be added, by family; what each is, its group and icon; and images."""
         families = new_nodes.families()
         return {
             **families,
             "docs": {name: first_line(kind) for name, kind in new_nodes.kinds().items()},
+            "groups": {name: group(name, kind) for name, kind in new_nodes.kinds().items()},
             "icons": {name: icon(name, family[:-1]) for family in families for name in families[family]},
             "images": {
                 name: png_url(Image.fromarray(generate_image(name, PICTURE_SIZE))) for name in BUILTIN_IMAGES

@@ -6,7 +6,8 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from blobtree.nodes.paths import Path
+from blobtree import Mirror
+from blobtree.nodes.paths import Path, node_at
 from blobtree.validation import describe
 from decals.editing.action_state import ActionState, WindowActions
 from decals.editing.commands import DeleteDecals, RemoveImage, SetValues
@@ -16,6 +17,7 @@ from decals.editing.tree_actions import TreeActions
 from decals.editing.visibility import RenameLayer, RenameNode, RenameObject, RenumberLayers
 from decals.editing.visibility_actions import VisibilityActions
 from decals.errors import InvalidEdit
+from decals.scenes.objects import TreeObject
 
 FLAGS = {"hide": "hidden", "lock": "locked"}
 """Flags of two of the changes."""
@@ -96,8 +98,9 @@ class OutlineActions(WindowActions):
             "rename", "remove", "duplicate", "group", "move", "reorder", "hide", "lock" or "isolate". "hide"
             shows a hidden part, and "lock" unlocks a locked one.
         value
-            New name; or the key of the part to which a part is moved: a node of any object, or the layer of
-            an image. A layer or an object that is reordered takes the place of another one.
+            New name; or the key of the part to which a part is moved: a node of any object, where a mirror
+            takes it as an operand, or the layer of an image. A layer or an object that is reordered takes
+            the place of another one.
         marked
             Keys of the marked nodes, or layers.
 
@@ -143,7 +146,7 @@ class OutlineActions(WindowActions):
                 self._trees.duplicate_selected()
             case "object" | "node", "move":
                 target = Part.node(value)
-                self._trees.move_node(number, path, target.number, target.path)
+                self._trees.move_node(number, path, target.number, self._operand_of_mirror(target))
             case "object" | "layer", "reorder":
                 target = Part.named(value)
                 if target.kind != kind:
@@ -159,6 +162,12 @@ class OutlineActions(WindowActions):
                 raise InvalidEdit(f"move: expected a node, or an image onto a layer, got {describe(key)}")
             case _:
                 raise InvalidEdit(f"change: expected one that {describe(key)} has, got {describe(change)}")
+
+    def _operand_of_mirror(self, target: Part) -> Path:
+        """Return the path of a mirror's operand, which shows twice; of another node, its own."""
+        item = self._state.session.document.object(target.number)
+        mirrors = isinstance(item, TreeObject) and isinstance(node_at(item.tree, target.path), Mirror)
+        return (*target.path, 0) if mirrors else target.path
 
     def _reorder(self, kind: str, number: int, place: int) -> None:
         """Let an object or a layer take the place of another one; those between move by one place."""

@@ -1,5 +1,9 @@
-"""Decals in a real browser, served by trame, as a program: ``python -m tests.frontends.in_browser NAME``.
+"""Decals in a real browser, served by trame, as a program.
 
+    python -m tests.frontends.in_browser NAME [firefox]
+
+Firefox needs a display, such as that of ``xvfb-run -a``; `touch` is for Chromium alone, and `sandbox` has no
+fingers there.
 ``page``, ``sandbox``, ``panels``, ``lab`` and ``touch`` take a path behind their name, where they save the
 picture of their page of docs.
 """
@@ -43,6 +47,7 @@ from tests.decals.vtk.scenes import both
 from tests.decals.window.driver import Driver
 from tests.frontends import page as docs
 from tests.frontends.browsing import (
+    CHOSEN,
     LOSS,
     PATIENCE,
     PICTURE,
@@ -233,7 +238,11 @@ async def sandbox(picture: str | None = None) -> None:
         await clicks(browser, window)
         await hovers(browser, window)
         await browser.get_by_role("button", name="Add", exact=True).click()
+        groups = browser.locator(".v-overlay--active .v-list-subheader")
+        await groups.get_by_text("basic").wait_for()
+        assert await groups.count() > 5
         await browser.get_by_label("search in primitives").fill("TORUS:")
+        await expect(groups).to_have_count(1)
         kinds = browser.locator(".v-overlay--active .v-list-item-title")
         await expect(kinds).to_have_count(1)
         await kinds.get_by_text("Torus", exact=True).hover()
@@ -241,6 +250,7 @@ async def sandbox(picture: str | None = None) -> None:
         ghost = np.array(sandbox_page.sandbox.values()["hovered"]["lines"])
         await kinds.get_by_text("Torus", exact=True).click()
         await until(lambda: window.session.labels[-1:] == ("add Torus",))
+        await expect(browser.locator(".hovered line")).to_have_count(0)  # though the mouse rests
         sandbox_page.sandbox.hover("0/2")
         np.testing.assert_allclose(sandbox_page.sandbox.values()["hovered"]["lines"], ghost, atol=1e-3)
         sandbox_page.sandbox.hover("")
@@ -273,8 +283,9 @@ async def sandbox(picture: str | None = None) -> None:
         await until(lambda: sandbox_page.sandbox.display.options.slice != cut)
         assert np.allclose(normal(), cut.normal if cut else 0.0)
         distance = plotter.camera.distance
-        await fingers(browser, [(-40, 0), (40, 0)], [(-60, 0), (60, 0)], [(-80, 0), (80, 0)])
-        await until(lambda: np.isclose(plotter.camera.distance, 0.5 * distance, rtol=0.02))
+        if CHOSEN.get() == "chromium":
+            await fingers(browser, [(-40, 0), (40, 0)], [(-60, 0), (60, 0)], [(-80, 0), (80, 0)])
+            await until(lambda: np.isclose(plotter.camera.distance, 0.5 * distance, rtol=0.02))
         await browser.get_by_text("Start", exact=True).click()
         await until(lambda: digest(window.document) == state)
         await until(lambda: window.session.undone_labels == (*slid, "add Torus", "set ring_radius"))
@@ -347,6 +358,7 @@ async def placed(browser: Page, window: EditWindow) -> None:
             await browser.get_by_text("Click where the Cone goes").wait_for(state="detached")
         else:
             await drag(browser, window.plotter, at)
+            await expect(browser.locator(".hovered line")).to_have_count(0)
     await until(lambda: window.session.labels == (*labels, "add Cone"))
     await until(lambda: not window.background.busy)
     await browser.keyboard.press("Control+z")
@@ -469,7 +481,69 @@ async def by_keys(browser: Page) -> None:
     steps = 0
     while await focused() != "center 1":
         await browser.keyboard.press("Tab")
-        assert (steps := steps + 1) < 12
+        assert (steps := steps + 1) < 14
+
+
+async def keyboard() -> None:
+    """With keys alone a user adds, places, resizes, removes, undoes and saves, from the start page on."""
+    file = Path(tempfile.mkdtemp()) / "scene.json"
+    async with sandboxed(EMPTY, file, start=True) as (browser, _, window):
+        press, toolbar = browser.keyboard.press, partial(browser.get_by_role, "button", exact=True)
+
+        async def tab_to(what: str) -> None:
+            """Press Tab until something is true of the element `e` with the focus."""
+            steps = 0
+            while not await browser.evaluate(f"(e => {what})(document.activeElement)"):
+                await press("Tab")
+                assert (steps := steps + 1) < 60, what
+
+        async def add(sought: str, *keys: str) -> None:
+            """Add what a search finds, from the toolbar, which has the focus before and after."""
+            entries = len(window.session.labels)
+            await press("Enter")
+            await expect(browser.get_by_label("search in primitives")).to_be_focused()
+            await browser.keyboard.type(sought)
+            for key in (*keys, "Enter"):
+                await press(key)
+            await until(lambda: len(window.session.labels) > entries and not window.background.busy)
+            await expect(toolbar(name="Add")).to_be_focused()
+
+        await expect(browser.get_by_label("New model")).to_be_visible()
+        await tab_to("e.ariaLabel === 'New model'")
+        await press("Enter")
+        await browser.get_by_label("New model").wait_for(state="hidden")
+        await tab_to("e.innerText.trim() === 'FILE'")
+        for name in ("View", "Add"):
+            await press("ArrowRight")
+            await expect(toolbar(name=name)).to_be_focused()
+        await add("a ball")
+        await add("cyl", "ArrowDown")  # a Superquadric, which can be a cylinder, comes after it
+        tree: Any = tree_of(window.document)
+        assert [type(node).__name__ for node in tree.children] == ["Point", "Cylinder"], tree
+        await browser.get_by_label("start 2", exact=True).wait_for()
+        await press("Tab")
+        await expect(toolbar(name="Cylinder")).to_be_focused()
+        await tab_to("e.ariaLabel === 'start 2'")
+        await press("Control+a")
+        await browser.keyboard.type("0.3")
+        await press("Tab")
+        await until(lambda: window.session.labels[-1:] == ("set start",) and not window.background.busy)
+        before = window.session.labels
+        await tab_to("e.role === 'slider'")
+        for _ in range(3):
+            await press("ArrowRight")
+        await until(lambda: len(window.session.labels) > len(before) and not window.session.stroke_open)
+        await press("Control+z")
+        await until(lambda: window.session.labels == before)
+        assert not await browser.locator("[role=application] [tabindex='0']").count()  # the view is one stop
+        await tab_to("e.dataset.ctrlKeys")
+        await tab_to("e.innerText.trim() === 'Cylinder' && e.draggable")
+        await press("Delete")
+        await until(lambda: window.session.labels[-1:] == ("remove a primitive",))
+        await press("Control+z")
+        await until(lambda: window.session.labels == before)
+        await press("Control+s")
+        await until(file.exists)
 
 
 async def creature(picture: str | None = None) -> None:
@@ -843,6 +917,10 @@ async def panels(picture: str | None = None) -> None:
         sandbox_page.sandbox.unwrap()  # is refused, in red
         await browser.locator(".refused").wait_for()
         await accessible(browser)
+        await browser.keyboard.press("Alt+l")
+        await browser.locator(".v-theme--dark").first.wait_for()
+        await browser.get_by_label("light or dark").click()
+        await browser.locator(".v-theme--dark").first.wait_for(state="detached")
         await browser.get_by_label("light or dark").click()
         await accessible(browser)
         await browser.get_by_text("Start", exact=True).click()
@@ -1191,7 +1269,11 @@ def main() -> None:
         "filled": filled,
         "shared": shared,
         "touch": touch,
+        "keyboard": keyboard,
     }
+    if "firefox" in arguments:
+        arguments.remove("firefox")
+        CHOSEN.set("firefox")
     asyncio.run(checks[name](*arguments))
     print("done")
 

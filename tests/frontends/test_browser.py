@@ -18,6 +18,11 @@ pytestmark = pytest.mark.browser
 
 NEEDED = ("playwright", "axe_playwright_python", "trame_pyvista")
 HTML_CHECKS = "picture", "sizes", "use", "mounts", "address", "losses", "drags", "refusals"
+FIREFOX_CHECKS = (
+    *(f"in_html_page {check}" for check in HTML_CHECKS),
+    *(f"in_browser {check}" for check in ("sandbox", "keyboard")),
+    "in_lesson_page",
+)
 FIREFOX_DRIVER = 1, 60
 """The newest version of playwright that is known to start Firefox of Debian; 1.65 waits for ever."""
 FOR_NOTEBOOKS = ("nbclient", "ipykernel", "ipywidgets", "nest_asyncio2")
@@ -53,6 +58,7 @@ def require(*modules: str) -> None:
         "fields",
         "filled",
         "shared",
+        "keyboard",
     ],
 )
 def test_in_a_browser(check: str) -> None:
@@ -72,9 +78,9 @@ def test_lesson_pages(check: tuple[str, ...]) -> None:
     assert "done" in run_module("tests.frontends.in_lesson_page", *check)
 
 
-@pytest.mark.parametrize("check", [*HTML_CHECKS, "lessons"])
+@pytest.mark.parametrize("check", [*FIREFOX_CHECKS])
 def test_pages_in_firefox(display: str, check: str) -> None:
-    require("playwright", "axe_playwright_python")
+    require(*NEEDED)
     from tests.frontends.browsing import firefox_path
 
     if firefox_path() is None:
@@ -82,8 +88,8 @@ def test_pages_in_firefox(display: str, check: str) -> None:
     numbers = tuple(map(int, version("playwright").split(".")[:2]))
     if numbers > FIREFOX_DRIVER:
         pytest.skip("newer versions of playwright do not start this Firefox: pip install playwright==1.60")
-    module = ("in_lesson_page",) if check == "lessons" else ("in_html_page", check)
-    assert "done" in run_module(f"tests.frontends.{module[0]}", *module[1:], "firefox", DISPLAY=display)
+    module, *rest = check.split()
+    assert "done" in run_module(f"tests.frontends.{module}", *rest, "firefox", DISPLAY=display)
 
 
 def test_in_a_live_notebook() -> None:

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import Point, Segment
+import decals
+from blobtree import Mirror, Point, Segment
 from decals import TreeObject
 from decals.editing import Actions, EditSession, SetValues
 from decals.editing.outline_actions import Part
@@ -71,6 +72,27 @@ def test_objects_and_layers_take_the_place_of_others(number: int, place: int) ->
     assert set(document.hidden.decals.layers.tolist()) == {after[7]}
     assert (document.locked_layers, document.layer_names) == ((after[-3],), {after[7]: "top"})
     goes_back_and_forth(actions.state.session)
+
+
+def test_a_mirror_takes_what_is_moved_onto_it() -> None:
+    tree = Mirror(Point((1, 0, 0), radius=0.5)) + Point((0, 0, 0), radius=1.0)
+    horn = Point((1, 1, 0), radius=0.4)
+    models = [TreeObject("body", tree + horn), TreeObject("far", Point((2, 3, 0), radius=0.4))]
+    actions = Actions(EditSession(decals.cover(models, count=8, images=["eye"])))
+    session, document = actions.state.session, actions.state.session.document
+    before = digest(document)
+    for key, place, count in (("0/2", (1, 1, 0), 1), ("object 1", (2, 3, 0), 0)):
+        actions.outline.change(key, "move", "0/0")
+        ends = np.array([place, (-place[0], *place[1:])], np.float32)
+        values = tree_of(document)(ends)
+        np.testing.assert_allclose(values[0], values[1], rtol=1e-5)
+        assert values.min() > 0.9
+        assert len(document.objects) == count + 1
+    with pytest.raises(InvalidInput, match="outside the branch"):
+        actions.outline.change("0/0", "move", "0/0")
+    while session.labels:
+        session.undo()
+    assert digest(document) == before
 
 
 @pytest.mark.parametrize(
