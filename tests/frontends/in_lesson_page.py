@@ -55,8 +55,11 @@ SET = """(input, value) => {
 }"""
 
 
-EXPLAINED = "getComputedStyle(document.activeElement, '::after').content"
-"""The definition that a page shows of the symbol with the focus."""
+EXPLAINED = """() => {
+  const { content } = getComputedStyle(document.activeElement, "::after");
+  return content === "attr(title)" ? document.activeElement.title : content;
+}"""
+"""The definition that a page shows of the symbol with the focus; Firefox names the attribute."""
 
 LOOK = "(line, name) => getComputedStyle(line)[name]"
 
