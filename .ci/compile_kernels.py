@@ -4,16 +4,14 @@
 
 The folder holds the sources, by default those of the checkout.
 
-They fit the architecture and the system of this machine. Run it right before the wheel is built: kernels
-whose sources have changed since are carried along, but never loaded.
+They fit the architecture and the system of this machine. Kernels that the kernel cache has are not compiled
+again, and the others stay there. Run it right before the wheel is built: kernels whose sources have changed
+since are carried along, but never loaded.
 """
 
 import importlib
-import os
 import shutil
 import sys
-import tempfile
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -33,13 +31,13 @@ def kernel_files(source: Path) -> list[str]:
     ]
 
 
-def compile_all(source: Path, cache: Path) -> None:
-    """Compile every kernel into an empty kernel cache."""
-    os.environ["WARP_CACHE_PATH"] = str(cache)
+def compile_all(source: Path) -> list[Path]:
+    """Compile every kernel; return their folders in the kernel cache."""
     import warp as wp
 
     from blobtree import GradientBlend
     from blobtree.device import start_warp
+    from blobtree.kernels import kernel_cache, load_together
     from blobtree.tape.instruction_set import core, instruction_set_for, library
 
     start_warp()
@@ -59,9 +57,10 @@ def compile_all(source: Path, cache: Path) -> None:
         for kernel in kernels
         if not kernel.module.name.startswith(WITHOUT_GRADIENT_BLENDS)
     ]
-    modules = list({kernel.module.name: kernel.module for kernel in (*kernels, *instances)}.values())
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
-        list(threads.map(lambda module: wp.load_module(module, device="cpu"), modules))
+    every = [*kernels, *instances]
+    load_together(every, "cpu")
+    names = {kernel.module.get_module_identifier(1): None for kernel in every}  # blocks of one thread
+    return [kernel_cache() / name for name in names]
 
 
 def main() -> None:
@@ -69,10 +68,10 @@ def main() -> None:
     source = Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT
     sys.path.insert(0, str(source))
     target = source / "blobtree" / "compiled"
-    with tempfile.TemporaryDirectory() as folder:
-        compile_all(source, Path(folder))
-        shutil.rmtree(target, ignore_errors=True)
-        shutil.copytree(folder, target, ignore=_left_out)
+    folders = compile_all(source)
+    shutil.rmtree(target, ignore_errors=True)
+    for folder in folders:
+        shutil.copytree(folder, target / folder.parent.name / folder.name, ignore=_left_out)
     files = [file for file in target.rglob("*") if file.is_file()]
     size = sum(file.stat().st_size for file in files)
     print(f"{len(files)} files, {size / 1e6:.1f} MB in {target}")
