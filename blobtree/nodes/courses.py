@@ -24,6 +24,9 @@ STRAIGHT = 1e-7
 SHARPEST = math.radians(150.0)
 """Largest turn at a corner."""
 
+FIRST_FRAME = -0.75 * math.pi
+"""Least angle of a frame. Frames of plane courses are quarter turns, and stay near them as points move."""
+
 LARGEST_ARC = 0.5 * math.pi
 """Largest angle of one arc."""
 
@@ -43,7 +46,7 @@ class Span(NamedTuple):
     end: Float64Array
     end_tangent: Float64Array
     frame: float
-    """Angle of the outline's x axis from `inward`."""
+    """Angle of the outline's x axis from `inward`, from FIRST_FRAME on."""
     start_plane: Float64Array
     end_plane: Float64Array
     """Unit normals, along the course; across the tangents but at corners."""
@@ -182,6 +185,7 @@ def _framed(curves: list[Curve], up: Float64Array, closed: bool) -> tuple[list[S
         after = follows if closed or number + 1 < len(curves) else end_tangent
         planes = [(a + b) / np.linalg.norm(a + b) for a, b in ((before, tangent), (end_tangent, after))]
         frame = math.atan2(u @ beside, u @ inward)
+        frame += 2.0 * math.pi * (frame < FIRST_FRAME)
         spans.append(Span(start, tangent, inward, curvature, length, end, end_tangent, frame, *planes))
         u = _turned(u, tangent, inward, turn)
         before = end_tangent

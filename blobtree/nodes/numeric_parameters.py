@@ -59,7 +59,8 @@ class NumericParameter:
 def numeric_parameters(tree: ProgramNode) -> list[NumericParameter]:
     """Return all numbers of a tree on which its field depends, node by node from the root, left to right.
 
-    Widths and weights that texts leave out are left out too, and so are radii of 0.
+    Widths and weights that texts leave out are left out too, and so are radii of 0 and numbers that may not
+    change while the others stay, such as the scale at the end of a closed sweep.
 
     Parameters
     ----------
@@ -220,6 +221,8 @@ def _numbers_of(path: Path, node: ProgramNode) -> Iterator[NumericParameter]:
         value = getattr(node, field.name)
         declaration = declared.get(field.name)
         if not declaration or declaration.quantity is Quantity.COLOR or left_out(field, value):
+            continue
+        if field.name in node.fixed_numbers:
             continue
         if declaration.quantity is not Quantity.RADIUS or value > 0.0:  # a sharp solid has no smaller radius
             for index in _places(value):

@@ -666,6 +666,13 @@ class Sweep(Pieces):
                 )
         _check_room(solid)
 
+    @property
+    def fixed_numbers(self) -> frozenset[str]:
+        """The scale of the end, where the curve is closed or has corners."""
+        spans, _ = self.expanded.course
+        grows = self.ends == "open" and not any(any(span.corners) for span in spans)
+        return frozenset() if grows else frozenset(("end_scale",))
+
     @Lazy
     def expanded(self) -> Any:
         """Return the direct field of the solid."""

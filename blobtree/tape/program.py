@@ -111,6 +111,11 @@ class ProgramNode:
         """The numbers that the warp takes."""
         return ()
 
+    @property
+    def fixed_numbers(self) -> frozenset[str]:
+        """Names of parameters whose numbers may not change while the others stay."""
+        return frozenset()
+
     def child_placement(self, placement: Placement) -> Placement:
         """Return the placement of the child of a node that itself has `placement`."""
         return placement
