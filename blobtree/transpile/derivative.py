@@ -43,7 +43,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from threading import RLock
-from types import FunctionType, NoneType
+from types import FunctionType, ModuleType, NoneType
 from typing import Any, get_args, get_origin
 
 import warp as wp
@@ -285,7 +285,7 @@ class _Transformation:
         name = f"{self.function.key}_along_{along}"
         if self.python.__closure__:
             values = referenced_values(self.python).items()
-            keys = [f"{name}={getattr(value, 'key', value)}" for name, value in sorted(values)]
+            keys = [f"{name}={_label(value)}" for name, value in sorted(values)]
             name += "_" + hashlib.sha256("\n".join(keys).encode()).hexdigest()[:8]
         return re.sub(r"_+", "_", re.sub(r"\W+", "_", name)).strip("_")
 
@@ -742,6 +742,11 @@ def _sum(rule: Rule, codes: list[str], tangents: list[str | None], result: str, 
 def _plain(hint: Any) -> Any:
     """Return Warp's type for one of Python's."""
     return _SAME_TYPES.get(hint, hint) if isinstance(hint, type) else hint
+
+
+def _label(value: Any) -> Any:
+    """Return what tells a value from others in every installation: the text of a module holds its path."""
+    return value.__name__ if isinstance(value, ModuleType) else getattr(value, "key", value)
 
 
 def _shape(kind: Any) -> tuple[int, ...]:

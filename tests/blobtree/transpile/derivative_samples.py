@@ -162,3 +162,21 @@ def inner(u: wp.float32, v: wp.float32) -> wp.float32:
 def counted(x: wp.float32, y: wp.float32) -> wp.float32:
     """Call a function of both parameters once."""
     return wp.exp(inner(x, y))
+
+
+@wp.func
+def halved(x: wp.float32) -> wp.float32:
+    return 0.5 * x
+
+
+@wp.func
+def doubled(x: wp.float32) -> wp.float32:
+    return 2.0 * x
+
+
+def sine_of(inner: Any) -> Any:
+    @wp.func
+    def sine(x: wp.float32) -> wp.float32:
+        return wp.sin(inner(x))
+
+    return sine

@@ -335,3 +335,14 @@ def test_equal_requests_return_one_function() -> None:
     first = directional_derivative(interpreter.field_gradient, ["q"])
     assert directional_derivative(interpreter.field_gradient, ("q",)) is first
     assert differentiated(interpreter.field_gradient) is None
+
+
+def test_names_do_not_depend_on_where_packages_lie(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kernels of a wheel are compiled in one environment, and found in others by their names."""
+    names = []
+    for folder in ("/one", "/two"):
+        monkeypatch.setattr(wp.__spec__, "origin", f"{folder}/warp/__init__.py")
+        assert folder in repr(wp)
+        names.append(derivative_along(samples.sine_of(samples.halved), (frozenset({"x"}),)).key)
+    assert names[0] == names[1]
+    assert derivative_along(samples.sine_of(samples.doubled), (frozenset({"x"}),)).key != names[0]
