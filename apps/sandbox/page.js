@@ -146,7 +146,7 @@
       if (size) trame.utils.download(name.trim().split("/").pop(), new Blob(parts));
     },
 
-    // A menu of kinds begins in its field, and ends where it was opened. The pointer, which rests, has left it then.
+    // A menu of kinds focuses its search field, and its button again when it closes. Its ghost goes with it.
     async menu(open) {
       if (open) this.opener = document.activeElement;
       await new Promise((drawn) => setTimeout(drawn, MENU_MS));

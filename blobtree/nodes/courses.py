@@ -25,7 +25,7 @@ SHARPEST = math.radians(150.0)
 """Largest turn at a corner."""
 
 FIRST_FRAME = -0.75 * math.pi
-"""Least angle of a frame. Frames of plane courses are quarter turns, and stay near them as points move."""
+"""Least angle of a frame, far from quarter turns: frames of plane courses have these, up to rounding."""
 
 LARGEST_ARC = 0.5 * math.pi
 """Largest angle of one arc."""

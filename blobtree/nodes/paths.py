@@ -114,7 +114,7 @@ def world_box(tree: Node, path: Path) -> tuple[Float32Array, Float32Array]:
 
 
 def ended_box(node: Node) -> tuple[Float32Array, Float32Array]:
-    """Return the corners of the box around a node; around what it repeats if it has no end."""
+    """Return the corners of the box around a node; for an endless one, around the node that it repeats."""
     box = node.field_box
     return ended_box(node.children[0]) if is_endless(box) else box
 

@@ -745,7 +745,7 @@ def _plain(hint: Any) -> Any:
 
 
 def _label(value: Any) -> Any:
-    """Return what tells a value from others in every installation: the text of a module holds its path."""
+    """Return a value for a hash that is the same everywhere; the text of a module would hold its path."""
     return value.__name__ if isinstance(value, ModuleType) else getattr(value, "key", value)
 
 

@@ -1,4 +1,4 @@
-"""Zones of an editor: the surface that selected nodes make, or around selected decals, with other decals."""
+"""Zones in an editor: other decals on the surface of the selected nodes, or around the selected decals."""
 
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any
@@ -39,7 +39,8 @@ class ZoneActions(WindowActions):
     ) -> None:
         """Replace the decals in a zone by scattered ones, and select these.
 
-        The zone is the surface nearest to the selected decals, else that which the selected nodes make.
+        The zone is the surface nearest to the selected decals. If none is selected, it is the surface of the
+        selected nodes.
 
         Parameters
         ----------

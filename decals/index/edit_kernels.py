@@ -34,14 +34,14 @@ TOUCHED = wp.constant(2)
 FITS = wp.constant(3)
 NESTED = wp.constant(4)
 STATES = 5
-"""Numbers that describe the index and its last change: end of all lists, cells, touched ones, and answers."""
+"""Numbers of a state: the end of all lists, the cells, and the cells, fit and nesting of the last change."""
 
 DECAL = wp.constant(0)
 EXPONENT = wp.constant(1)
 LEVEL = wp.constant(2)
 SEARCHED = wp.constant(3)
 REQUESTS = 4
-"""Numbers that ask for a change: a decal, its level, and the number of levels to search for nested decals."""
+"""Numbers of a request: a decal, its level, and how many levels are searched for nested decals."""
 
 NOT_NESTED = wp.constant(0)
 IS_NESTED = wp.constant(1)

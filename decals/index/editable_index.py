@@ -113,7 +113,7 @@ class EditableIndex:
             return False
         self._widen_level(exponent, float(rank), log)
         insert, _ = self._recorded(records)
-        self._ask(number, exponent)
+        self._request_change(number, exponent)
         insert.launch()
         _, _, touched, fits, nested = self._state.tolist()
         if not fits:
@@ -136,7 +136,7 @@ class EditableIndex:
     def remove(self, records: Float32Array, number: int, log: ChangeLog) -> None:
         """Remove a decal, whose record is still unchanged, from the lists of its cells."""
         _, remove = self._recorded(records)
-        self._ask(number, self._exponent(records, number))
+        self._request_change(number, self._exponent(records, number))
         remove.launch()
         self._log_lists(log)
 
@@ -155,8 +155,8 @@ class EditableIndex:
             )
         return self._launches
 
-    def _ask(self, number: int, exponent: int) -> None:
-        """Write what the next launch reads."""
+    def _request_change(self, number: int, exponent: int) -> None:
+        """Write the numbers that the next launch reads."""
         searched = 0 if self.nested else self.level_count
         self._request[:] = number, exponent, self._level_of[exponent], searched
 
