@@ -231,11 +231,15 @@
     },
   };
 
+  // Inputs in which one types: Escape and keys with Ctrl act on their text.
+  const TYPED =
+    "input:not([type=range], [type=color], [type=checkbox], [type=file], [role=combobox]), textarea";
+
   // Keys with Ctrl act from everywhere as in the view; in a field, only the one that saves, after the field's change.
   document.addEventListener("keydown", (event) => {
     const { key, ctrlKey, metaKey, shiftKey, target } = event;
     const view = document.querySelector("[role=application]");
-    const typing = target.matches("input, textarea");
+    const typing = target.matches(TYPED);
     const keys = typing ? "s" : view.dataset.ctrlKeys;
     if (!(ctrlKey || metaKey) || view.contains(target) || !keys.includes(key.toLowerCase())) return;
     event.preventDefault();
@@ -257,7 +261,7 @@
   );
 
   // A press elsewhere takes what is being typed, before anything else follows from it. Escape drops it.
-  const typedIn = () => document.activeElement?.closest("input:not([type=range]), textarea");
+  const typedIn = () => document.activeElement?.closest(TYPED);
   document.addEventListener("change", ({ target }) => (target.taken = true), true);
   ["input", "focusin"].forEach((name) => {
     document.addEventListener(name, ({ target }) => (target.taken = false), true);
@@ -276,6 +280,10 @@
       const field = typedIn();
       const value = field?.closest("[data-value]")?.dataset.value;
       if (event.key !== "Escape" || value === undefined) return;
+      if (field.value === value) {
+        field.blur(); // nothing is typed
+        return;
+      }
       event.stopPropagation();
       field.value = value;
       field.dispatchEvent(new Event("input", { bubbles: true }));

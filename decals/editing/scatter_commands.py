@@ -77,6 +77,8 @@ class ReplaceDecals(EditCommand):
         How they were made. Default: the scene keeps its recipe.
     mask
         A function that is True for the points (n, 3) where decals are deleted. Default: everywhere.
+    label
+        Label of the history entry.
 
     Examples
     --------
@@ -94,8 +96,8 @@ class ReplaceDecals(EditCommand):
     expected_objects: tuple[SceneObject, ...] = ()
     recipe: Recipe | None = None
     mask: Mask | None = None
+    label: str = "scatter"
     long: ClassVar[bool] = True
-    label: ClassVar[str] = "scatter"
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""

@@ -1,6 +1,7 @@
 """Zones in an editor: other decals on the surface of the selected nodes, or around the selected decals."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -64,6 +65,8 @@ class ZoneActions(WindowActions):
             raise InvalidEdit("no zone is selected; click on a part of the model, or select decals")
         zone = zone_of_decals(document, selection) if selection else None
         places = document.decals.take(np.array(selection, np.int64)).positions
+        replaced = f"in place of {len(selection)} decal{'' if len(selection) == 1 else 's'}"
+        label = f"scatter {f'on {name_of_parts(objects, nodes)}' if zone is None else replaced}"
 
         def compute(progress: Progress, cancel: Callable[[], bool]) -> Command:
             on = [number for number, _ in nodes] if zone is None else nearest_points(objects, places).objects
@@ -72,13 +75,24 @@ class ZoneActions(WindowActions):
             mask = zone_of_nodes(objects, nodes) if zone is None else zone
             wanted = max(1, round(whole * density * share_of_area(items, mask)))
             command = ScatterDecals(numbers, wanted, seed, options, mask)
-            return command.compute_command(objects, images, progress=progress, cancel=cancel)
+            made = command.compute_command(objects, images, progress=progress, cancel=cancel)
+            return replace(made, label=label)
 
         def select() -> None:
             state.primitive = None
             state.selection = tuple(range(first, state.session.document.decals.next_number))
 
-        state.background.compute("scatter in a zone", compute, select)
+        state.background.compute(label, compute, select)
+
+
+def name_of_parts(objects: Sequence[SceneObject], nodes: Sequence[tuple[int, Path]]) -> str:
+    """Return the name of a node, else of its class; the number of nodes if there are more."""
+    (number, path), *others = nodes
+    if others:
+        return f"{len(nodes)} parts"
+    item = objects[number]
+    assert isinstance(item, TreeObject)  # meshes have no nodes
+    return item.names.get(path, type(node_at(item.tree, path)).__name__)
 
 
 def zone_of_decals(document: Document, numbers: ArrayLike) -> Mask:

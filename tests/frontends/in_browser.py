@@ -485,7 +485,7 @@ async def by_keys(browser: Page) -> None:
 
 
 async def keyboard() -> None:
-    """With keys alone a user adds, places, resizes, removes, undoes and saves, from the start page on."""
+    """With keys alone a user adds, places, resizes, removes, undoes, scatters and saves, from the start."""
     file = Path(tempfile.mkdtemp()) / "scene.json"
     async with sandboxed(EMPTY, file, start=True) as (browser, _, window):
         press, toolbar = browser.keyboard.press, partial(browser.get_by_role, "button", exact=True)
@@ -542,6 +542,17 @@ async def keyboard() -> None:
         await until(lambda: window.session.labels[-1:] == ("remove a primitive",))
         await press("Control+z")
         await until(lambda: window.session.labels == before)
+        await tab_to("e.draggable")
+        for _ in range(await browser.locator("[draggable=true]").count()):
+            await press("ArrowUp")
+        for name in ("Sum", "Point", "Cylinder"):
+            await press("ArrowDown")
+            await expect(toolbar(name=name)).to_be_focused()
+        await press("Enter")
+        await tab_to("e.innerText.trim().toLowerCase() === 'scatter on this part'")
+        await press("Enter")
+        await until(lambda: window.session.labels == (*before, "scatter on Cylinder") and not window.busy)
+        assert len(window.actions.state.selection) == len(window.document.decals) > 0
         await press("Control+s")
         await until(file.exists)
 
@@ -769,8 +780,16 @@ async def sandbox_start(picture: str | None = None) -> None:
 
 
 async def escapes(browser: Page, window: EditWindow) -> None:
-    """Escape closes an open menu first, wherever the focus is, and then ends the brush."""
-    brush = window.actions.state.brush
+    """Escape closes an open list or menu first, wherever the focus is, and then ends what the view does."""
+    brush, selected = window.actions.state.brush, window.actions.state.selection
+    await browser.get_by_role("combobox", name="interaction", exact=True).press("ArrowDown")
+    entry = browser.get_by_role("option", name="overlap", exact=True)
+    await entry.wait_for()
+    await browser.keyboard.press("Escape")
+    await entry.wait_for(state="hidden")
+    assert window.actions.state.selection == selected != ()
+    await browser.keyboard.press("Escape")  # the focus is still on the list
+    await until(lambda: window.actions.state.selection == ())
     await browser.get_by_label("erase brush").click()
     await until(lambda: brush.brush == "erase")
     for focus in ("[role=application]", ".toolbar button"):
@@ -963,8 +982,73 @@ async def fields() -> None:
         await browser.get_by_role("button", name="undo").first.click()
         await until(lambda: window.session.undone_labels == ("set radius",))
         await expect(field).to_have_value("0.5")
-        await browser.keyboard.press("Escape")  # the focus is on the button
+        for text in ("0.7", "0.5"):
+            await field.fill(text)
+            await browser.keyboard.press("Escape")
+            await expect(field).to_have_value("0.5")
+            await until(lambda text=text: (keys.primitive is None) == (text == "0.5"))  # type: ignore[misc]
+            await browser.get_by_text("Point", exact=True).nth(1).click()
+            await until(lambda: keys.primitive == (0, (1,)))
+        await browser.get_by_role("button", name="undo").first.focus()
+        await browser.keyboard.press("Escape")
         await until(lambda: keys.primitive is None)
+
+
+async def zone() -> None:
+    """A part of a model gets decals of its own by four clicks, and a lasso's decals by three; others stay."""
+    for size in ((1280, 800), (820, 1180), (390, 844)):
+        async with sandboxed(
+            decals.cover(BLOB, count=80, images=["tile", "scale"]), size=size
+        ) as opened_page:
+            await zones(*opened_page)
+
+
+async def zones(browser: Page, _: Any, window: EditWindow) -> None:
+    """What a user clicks for a zone, in a window of any size."""
+    document, state = window.document, window.actions.state
+    phone = await browser.evaluate("innerWidth < 600")
+
+    async def show(side: str) -> None:
+        if phone:
+            await browser.get_by_label(f"{side} panel").first.click()
+
+    await show_all(browser, window)
+    before, numbers = digest(document), document.decals.numbers
+    small = Driver(window)
+    _, at = next((n, at) for n, at in small.visible() if document.decals[n].positions[0, 0] > 1.4)
+    await drag(browser, window.plotter, at)
+    await until(lambda: len(state.selection) == 1)
+    await drag(browser, window.plotter, at)
+    await until(lambda: state.primitive == (0, (1,)))
+    await show("right")
+    await browser.get_by_role("button", name="Scatter on this part").click()
+    await until(lambda: window.session.labels == ("scatter on Point",) and not window.busy)
+    new = np.setdiff1d(document.decals.numbers, numbers)
+    assert state.selection == tuple(new.tolist())
+    assert document.decals.take(new).positions[:, 0].min() > 0.6
+    await browser.get_by_role("heading", name=f"{len(new)} decals").wait_for()
+    await choose(browser, "image", "scale")
+    await until(lambda: set(document.decals.take(new).images.tolist()) == {1})
+    kept = np.intersect1d(document.decals.numbers, numbers)
+    assert 0 < len(kept) < 80
+    await show("right")
+    await browser.keyboard.press("Escape")
+    await until(lambda: state.selection == ())
+    for _ in range(2):
+        await browser.get_by_role("button", name="undo").first.click()
+    await until(lambda: digest(document) == before)
+    await browser.get_by_label("lasso: drag").click()
+    width, height = window.plotter.window_size
+    corners = ((0.2, 0.2), (0.5, 0.2), (0.5, 0.8), (0.2, 0.8), (0.2, 0.25))
+    await drag(browser, window.plotter, *((int(x * width), int(y * height)) for x, y in corners))
+    await until(lambda: len(state.selection) > 3)
+    chosen = state.selection
+    await show("right")
+    await browser.get_by_role("button", name="Scatter in their place").click()
+    label = f"scatter in place of {len(chosen)} decals"
+    await until(lambda: window.session.labels == (label,) and not window.busy)
+    assert not np.isin(chosen, document.decals.numbers).any()
+    assert len(np.intersect1d(document.decals.numbers, numbers)) == 80 - len(chosen)
 
 
 async def filled() -> None:
@@ -1267,6 +1351,7 @@ def main() -> None:
         "panels": panels,
         "fields": fields,
         "filled": filled,
+        "zone": zone,
         "shared": shared,
         "touch": touch,
         "keyboard": keyboard,

@@ -57,6 +57,7 @@ def require(*modules: str) -> None:
         "panels",
         "fields",
         "filled",
+        "zone",
         "shared",
         "keyboard",
     ],

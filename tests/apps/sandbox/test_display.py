@@ -550,7 +550,7 @@ def test_a_zone_has_images_and_a_density_of_its_own(sandbox: Sandbox, shared: Ed
     sandbox.scatter()
     finish(shared)
     assert (len(document.decals), set(document.decals.decals.images.tolist())) == (60, {1})
-    assert sandbox.values()["done"][-3:] == ["scatter", "remove an image", "scatter"]
+    assert sandbox.values()["done"][-3:] == ["scatter on Point", "remove an image", "scatter"]
     sandbox.go_to(0)
     np.testing.assert_array_equal(shared.document.decals.decals.positions, positions)
 

@@ -47,6 +47,7 @@ def test_a_part_of_a_model_gets_decals_of_its_own(density: float) -> None:
     assert set(chosen.images.tolist()) == {1}
     assert actions.state.nodes == ()
     assert abs(len(chosen) - 20 * density) <= 1
+    assert actions.state.session.labels == ("scatter on Point",)
     gone, new = changes(actions, numbers)
     assert max(np.linalg.norm(places - SMALL, axis=1).max() for places in (gone, new)) < 0.6
     assert len(gone) == (np.linalg.norm(document.decals.decals.positions - SMALL, axis=1) < 0.6).sum()
@@ -61,11 +62,32 @@ def test_a_zone_of_decals_is_where_they_are_the_nearest() -> None:
     above = positions[:, 1] > 0.3
     actions.state.selection = tuple(numbers[above].tolist())
     actions.zones.scatter(None, 1)
+    assert actions.state.session.labels == (f"scatter in place of {above.sum()} decals",)
     gone, new = changes(actions, numbers)
     np.testing.assert_array_equal(gone, positions[above].astype(np.float32))
     nearest = np.linalg.norm(new[:, None] - positions[None], axis=2).argmin(axis=1)
     assert above[nearest].all()
     assert abs(len(new) - above.sum()) <= 3
+
+
+def test_the_history_names_the_zone() -> None:
+    actions = editing(BALLS, 20)
+    state, document = actions.state, actions.state.session.document
+    actions.outline.change("0/1", "rename", "small ball", [])
+    state.select_primitive(0, (1,), np.zeros(3, np.float32))
+    actions.zones.scatter(20, 3)
+    (one, *_) = state.selection = state.selection[:1]
+    actions.zones.scatter(20, 4)
+    assert one not in document.decals.numbers
+    state.selection = ()
+    actions.trees.select_node(0, (0,))
+    actions.trees.select_also(0, (1,), toggle=True)
+    actions.zones.scatter(20, 5)
+    assert state.session.labels[1:] == (
+        "scatter on small ball",
+        "scatter in place of 1 decal",
+        "scatter on 2 parts",
+    )
 
 
 def test_a_zone_that_is_none_is_refused() -> None:
