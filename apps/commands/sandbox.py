@@ -118,15 +118,17 @@ def sandbox(
         guard = _guard(host, allow_host, os.environ.pop(TOKEN, ""))
         room = _classroom(guard, lessons) if classroom else None
         return _serve_sessions(command, sessions, guard, host, port, room, browser=browser)
-    from decals.apps.commands.opening import check_options, opened, report_unsaved
-    from decals.apps.memory import import_ahead, keep_memory_low, share_heap
-    from decals.apps.models.loading import import_definitions
-    from decals.window import EditWindow
-    from decals.window.host_plotter import new_plotter
+    from decals.apps.memory import import_ahead, keep_memory_low, made_to_stay, share_heap
 
     share_heap()
-    check_options(start)
-    serve, page = _toolkit(lessons)
+    with made_to_stay():
+        from decals.apps.commands.opening import check_options, opened, report_unsaved
+        from decals.apps.models.loading import import_definitions
+        from decals.window import EditWindow
+        from decals.window.host_plotter import new_plotter
+
+        check_options(start)
+        serve, page = _toolkit(lessons)
     given = _read_token() if session else os.environ.pop(TOKEN, "")
     guard = _guard(host, allow_host, given, framed=done)
     import_definitions(inputs.define)

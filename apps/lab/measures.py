@@ -5,7 +5,6 @@ from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from blobtree import Node, Point, SolidContact, polygonize
 from blobtree._typing import Float64Array
@@ -312,6 +311,8 @@ def penetration(scope: Scope, i: Any, k: Any) -> float:
 @measure("number", "number")
 def bulge(scope: Scope, i: Any, k: Any) -> float:
     """Return the width of the bulge of solid i around its contact with solid k."""
+    from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
+
     model = _model(scope, SolidContact)
     rings = [ring for surface in _contacts_of(model, i, k) for ring in surface.outlines]
     if not rings:

@@ -1,6 +1,7 @@
 """A folder as the start page lists it, and files that a page sends."""
 
 import base64
+import mimetypes
 import os
 import tempfile
 from collections.abc import Iterator
@@ -154,10 +155,8 @@ def plain_name(name: str) -> str:
     return f"{plain}-" if is_reserved(plain) else plain
 
 
-def thumbnails() -> dict[str, str]:
-    """Return the pictures of the samples as data of a page, by name."""
-    pictures = sorted((Path(__file__).parent / "thumbnails").glob("*.jpg"))
-    return {
-        path.stem: "data:image/jpeg;base64," + base64.b64encode(path.read_bytes()).decode()
-        for path in pictures
-    }
+def thumbnails(suffix: str = ".jpg") -> dict[str, str]:
+    """Return pictures of the samples, or of the built-in images (".png"), as data of a page, by name."""
+    pictures = sorted((Path(__file__).parent / "thumbnails").glob(f"*{suffix}"))
+    start = f"data:{mimetypes.types_map[suffix]};base64,"
+    return {path.stem: start + base64.b64encode(path.read_bytes()).decode() for path in pictures}

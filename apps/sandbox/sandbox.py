@@ -11,24 +11,21 @@ from functools import partial, wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
-from PIL import Image
-
 from blobtree import Node
 from decals.apps.sandbox import decal_panel
 from decals.apps.sandbox.controls import KIND, controls_of, exchanged, kind_control, parsed
 from decals.apps.sandbox.display import PHASES, Display
 from decals.apps.sandbox.fields import Fields
 from decals.apps.sandbox.files import SandboxFiles
-from decals.apps.sandbox.folder import MAX_UPLOADS
+from decals.apps.sandbox.folder import MAX_UPLOADS, thumbnails
 from decals.apps.sandbox.hover import VIEW, Hover
-from decals.apps.sandbox.outline import PICTURE_SIZE, group, icon, outline, png_url
+from decals.apps.sandbox.outline import group, icon, outline
 from decals.editing import new_nodes
 from decals.editing.action_state import joined
 from decals.editing.outline_actions import Part
 from decals.editing.session import UndoEntry
 from decals.editing.tree_actions import FollowedNode
 from decals.errors import InvalidEdit
-from decals.images.builtin import BUILTIN_IMAGES, generate_image
 from decals.scenes.objects import TreeObject, bounds_of
 from decals.validation import any_number, one_of, whole_number
 from decals.window import EditWindow
@@ -231,9 +228,7 @@ class Sandbox:
             "docs": {name: first_line(kind) for name, kind in new_nodes.kinds().items()},
             "groups": {name: group(name, kind) for name, kind in new_nodes.kinds().items()},
             "icons": {name: icon(name, family[:-1]) for family in families for name in families[family]},
-            "images": {
-                name: png_url(Image.fromarray(generate_image(name, PICTURE_SIZE))) for name in BUILTIN_IMAGES
-            },
+            "images": thumbnails(".png"),
         }
 
     def _outline(self) -> list[dict[str, Any]]:

@@ -5,8 +5,6 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from scipy.sparse import csc_array, csr_array, diags_array
-from scipy.sparse.linalg import splu
 
 from blobtree._typing import BoolArray, Float64Array, Int32Array, Int64Array
 from blobtree.device import array_on, launch
@@ -126,6 +124,8 @@ class SeamSystem:
         """Write the solutions of wide parts, each by SuperLU."""
         if not len(self._wide):
             return
+        from scipy.sparse import csc_array, csr_array, diags_array  # most parts are narrow
+
         all_slopes, all_gaps = self.slopes.numpy(), gaps.numpy()
         for part in self._wide.tolist():
             tick()
@@ -143,8 +143,10 @@ class SeamSystem:
             solution[own] = _solved(matrix, right)
 
 
-def _solved(matrix: csc_array, right: Float64Array) -> Float64Array:
-    """Return the solution of a symmetric system; its unknowns lie along lines, so few others fill in."""
+def _solved(matrix: Any, right: Float64Array) -> Float64Array:
+    """Return the solution of a symmetric sparse system; its unknowns lie along lines: few others fill in."""
+    from scipy.sparse.linalg import splu
+
     factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     solution: Float64Array = factors.solve(right)
     return solution

@@ -14,8 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from blobtree._typing import BoolArray, Float64Array, Int32Array, Int64Array, UInt8Array
 from blobtree.device import array_on, launch
@@ -311,6 +309,8 @@ class _Runs(NamedTuple):
     @classmethod
     def of(cls, mixed: Mixed, texels: int, device: str) -> "_Runs":
         """Return the runs of points, of which so many texels are mixed."""
+        from scipy.sparse import csr_array  # imported where it is used: it takes a fifth of a second
+
         starts, index = np.append(mixed.starts, len(mixed.places)), mixed.mixed
         each = np.ones(index.size, np.bool_), index.reshape(-1), np.arange(0, index.size + 1, 8)
         there, here = (
@@ -427,6 +427,9 @@ class _Match:
 
     def _least_squares(self, runs: Int64Array) -> None:
         """Minimise the change of texels and the weighted differences, with more weight where these stay."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import reverse_cuthill_mckee
+
         used, columns, label = self._linked(runs)
         links = np.repeat(columns[:, 0], 7), columns[:, 1:].reshape(-1)
         both = np.concatenate(links), np.concatenate(links[::-1])

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from blobtree._typing import (
     BoolArray,
@@ -346,6 +345,8 @@ class Sheet:
     def _faces_of_bands(self, size: int) -> list[Any]:
         """Return the faces at each band of rows of texels, in their order."""
         if self._lists[0] != size:
+            from scipy.sparse import csr_array  # imported where it is used: it takes a fifth of a second
+
             bands = -(-size // BAND)
             faces, heights = self._part.faces[self._chosen], self._part.places[:, 1] / np.float32(BAND)
             corners = [heights[faces[:, k]] for k in range(3)]

@@ -84,6 +84,33 @@ def test_kernels_of_the_first_drag_are_imported_ahead() -> None:
     assert output_of(AHEAD) == "True\n"
 
 
+KEPT = """
+import gc, weakref
+from decals.apps.memory import made_to_stay
+
+class Node: pass
+
+def cycle():
+    node = Node()
+    node.itself = node
+    return weakref.ref(node)
+
+gc.collect()
+try:
+    with made_to_stay():
+        enabled, kept = gc.isenabled(), cycle()
+        raise OSError
+except OSError:
+    later = cycle()
+gc.collect()
+print(enabled, gc.isenabled(), kept() is not None, later() is None)
+"""
+
+
+def test_what_is_made_to_stay_is_left_out_of_the_search_for_cycles() -> None:
+    assert output_of(KEPT) == "False True True True\n"
+
+
 FAULTS = """
 import resource, numpy as np
 from decals.apps.memory import keep_for_work, keep_memory_low

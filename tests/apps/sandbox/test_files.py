@@ -1,5 +1,6 @@
 """Files of the sandbox without a browser: the start page, opening, uploads, and what is written."""
 
+import base64
 import io
 import os
 import runpy
@@ -20,9 +21,11 @@ from decals import MeshObject, load_scene, save_scene
 from decals.apps.models.samples import SAMPLES, sample
 from decals.apps.models.scenes import empty_scene
 from decals.apps.sandbox.folder import MAX_UPLOADS, listed, plain_name, read_upload, thumbnails
+from decals.apps.sandbox.outline import PICTURE_SIZE
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing import ScaleDecals
 from decals.errors import ImplicitDecalsError
+from decals.images.builtin import BUILTIN_IMAGES, generate_image
 from decals.scenes.camera import UPRIGHT
 from decals.window import EditWindow
 from decals.window.host_plotter import pixels_of
@@ -212,6 +215,16 @@ def test_dropped_files_are_added(sandbox: Sandbox, window: EditWindow, tmp_path:
     finish(window)
     assert len(window.document.decals) == 3
     assert sandbox.values()["title"] == "all-2.json"
+
+
+def test_pictures_of_built_in_images_are_what_is_generated() -> None:
+    pictures = thumbnails(".png")
+    assert list(pictures) == list(BUILTIN_IMAGES)
+    for name, url in pictures.items():
+        start, _, data = url.partition(",")
+        assert start == "data:image/png;base64"
+        shown = np.asarray(Image.open(io.BytesIO(base64.b64decode(data)))).astype(int)
+        assert np.abs(shown - generate_image(name, PICTURE_SIZE)).max() <= 1
 
 
 def test_built_in_images_are_added(sandbox: Sandbox, window: EditWindow) -> None:
