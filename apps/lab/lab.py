@@ -70,6 +70,8 @@ class Lab:
     ----------
     probe
         The point at which values are measured.
+    begun
+        Number of changes of the session when the present lesson began, before the guess.
 
     Notes
     -----
@@ -87,7 +89,7 @@ class Lab:
         self._asked: object = None
         self._asking = False
         self._submitted: object = None
-        self._number = self._first = self._step = self._target = 0
+        self._number = self._first = self._step = self._target = self.begun = 0
         self.probe = self.lesson.settings.probe
         self._plane: SlicePlane | None = None
         self._guess: float | None = None
@@ -258,6 +260,8 @@ class Lab:
             self._number, self._asked, self._asking = number, None, False
             self._results, self._pending, self._guess = None, None, guess
             self._puzzle = puzzle
+            if guess is None:
+                self.begun = window.session.changes
             self._first = window.document.decals.next_number - len(lesson.scene.decals)
             self._step = self._target = 0
             self._recording = self._recorded(0) if settings.steps else None

@@ -20,6 +20,9 @@ LESSON_WIDTH, PLOTS_WIDTH = 370, 350
 ON_PHONE = f"$vuetify.display.width <= {PHONE}"
 """True for a window in which a lesson lies below the view."""
 
+CHOOSE = "coming = lab_titles[$event].title; trigger('start_lesson', [$event])"
+"""Starts a chosen lesson, whose title stands above the view until its picture is there."""
+
 STYLE, LESSON, PLOTS = (
     Path(__file__).with_name(name).read_text(encoding="utf-8")
     for name in ("page.css", "lesson.html", "plots.html")
@@ -74,6 +77,8 @@ class LabPage(Page):
             self.lab.cut(self.sandbox.display.options.slice)
             self.lab.refresh()
             values |= {**self.lab.values(), "title": self.lab.lesson.settings.title, "left_open": True}
+            coming = values["lab_titles"][values["lab_number"]]["title"]
+            values["coming"] = "" if self.view.shows(self.lab.begun) else coming
         elif self._server.state.in_lesson:
             self.lab.leave()
         return values
@@ -90,7 +95,7 @@ class LabPage(Page):
                         model_value=("lab_number",),
                         items=("lab_titles",),
                         raw_attrs=named("'lesson'"),
-                        update_modelValue=(self._restart, "[$event]"),
+                        update_modelValue=CHOOSE,
                     )
                     icon_button("mdi-restart", "start the lesson again", (self._restart, "[lab_number]"))
                     icon_button("mdi-language-python", "lines of Python for this picture", self._show_script)

@@ -73,15 +73,9 @@ TOOLBAR = {
 }
 """Icons of the actions in the toolbar."""
 
-ROW_CHANGES = {
-    "duplicate": "mdi-content-duplicate",
-    "group": "mdi-group",
-    "remove": "mdi-delete-outline",
-}
-"""Icons of what can be done with the selected rows."""
-
 FORMATS = {
     "opened": ",".join(MODELS + IMAGES),
+    "images": ",".join(IMAGES),
     "exported": " ".join(EXPORT_SUFFIXES),
     "videos": list(map(str, Video)),
 }
@@ -195,7 +189,7 @@ class Page:
 
     def values(self) -> dict[str, Any]:
         """Return all values that the page shows, by their names there."""
-        return self.sandbox.values()
+        return {**self.sandbox.values(), "coming": ""}
 
     def refresh(self) -> None:
         """Send the values that have changed; the state leaves out those that are equal."""
@@ -326,17 +320,9 @@ class Page:
                 panels.icon_button("mdi-theme-light-dark", "light or dark (Alt + L)", theme)
 
     def _build_outline(self) -> None:
-        html.Div(TEMPLATES["outline"])
-        with html.Div(classes="px-3 py-1"):
-            panels.build_file_input("add images", IMAGES, multiple=True)
-        with html.Div(v_if="selected", classes="d-flex ga-1 px-2 row-changes"):
-            for change, icon in ROW_CHANGES.items():
-                panels.icon_button(
-                    icon,
-                    f"{change} the selection",
-                    (self.sandbox.change_row, f"[selected, '{change}']"),
-                    variant="text",
-                )
+        template("outline")
+        template("file_input", TEXT="add images", KEY="''")
+        template("row_changes")
 
     def _build_panel(self) -> None:
         with html.Div(v_if="panel.kind", classes="pa-3"):
@@ -350,12 +336,4 @@ class Page:
                 variant="tonal",
                 click=self.sandbox.unwrap,
             )
-        with html.Div(v_if="!panel.kind && !decal.count && !image.name", classes="pa-3"):
-            html.H2("Scene", classes="text-subtitle-1")
-            html.P("{{ panel.doc }}", classes="text-caption")
-            html.P(
-                "{{ outline.some(row => row.kind === 'object') ? 'Click on the model or on a row.' : "
-                "outline.some(row => row.kind === 'mesh') ? 'Scatter decals, or click on one.' : "
-                "'Add a primitive or drop a model.' }}",
-                classes="text-caption",
-            )
+        template("scene")

@@ -1,7 +1,7 @@
 """Parts of the sandbox's page beside outline and history: start, files, view, brushes, decals, actions."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -9,7 +9,6 @@ from typing import Any
 from trame.widgets import html, vuetify3
 
 from decals.apps.sandbox.files import LIGHT
-from decals.apps.sandbox.folder import IMAGES
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.editing.actions import KEYS
 from decals.editing.brush_settings import Brush
@@ -104,16 +103,6 @@ def build_controls(source: str, event: Any, identifiers: str, *, key: str = "c.n
         template("controls", SOURCE=source, EVENT=name, IDENTIFIERS=identifiers, KEY=key)
 
 
-def build_file_input(text: str, kinds: Sequence[str], key: str = "''", **options: Any) -> None:
-    """Build a field that takes files, also dropped ones, for a key, which is an expression of the page."""
-    take = f"utils.sandbox.take($event, {key})"
-    with html.Div(
-        dragover="$event.preventDefault()", drop=take, __events=["dragover", "drop"], classes="drop"
-    ):
-        html.Label(f"{text}: choose, or drop here", classes="text-caption")
-        html.Input(type="file", accept=",".join(kinds), change=take, raw_attrs=named(f"'{text}'"), **options)
-
-
 # -- view -----------------------------------------------------------------------------------------------
 
 
@@ -172,7 +161,7 @@ def build_decal_panel(sandbox: Sandbox) -> None:
             html.H2(title, classes="text-subtitle-1")
             if panel == "image":
                 html.Img(src=("image.picture",), alt="", style="width: 50%; border-radius: 50%")
-                build_file_input("replace this image", IMAGES, "selected")
+                template("file_input", TEXT="replace this image", KEY="selected")
             build_controls(f"{values}.controls", sandbox.set_control, f"'{panel}', c.name")
 
 
@@ -188,7 +177,7 @@ def build_options(sandbox: Sandbox) -> None:
 
 def _build_light(sandbox: Sandbox) -> None:
     """Build the inputs that load and remove the panorama that lights the scene."""
-    build_file_input("light from a panorama", IMAGES, f"'{LIGHT}'")
+    template("file_input", TEXT="light from a panorama", KEY=f"'{LIGHT}'")
     present = "drawing.some(c => c.name.startsWith('environment.'))"
     vuetify3.VBtn("Remove this light", v_if=present, variant="tonal", click=sandbox.remove_light)
 

@@ -67,7 +67,7 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
     ) -> None:
         self._window, self._before_frame, self._behind = window, before_frame, behind
         self._sizes = sizes
-        self._outdated = False
+        self._outdated, self._sent = False, -1
         self._task: asyncio.Task[None] | None = None
         self._animation: asyncio.Task[None] | None = None
         self._delivery: Any = None
@@ -124,6 +124,8 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
                 if not self._window.plotter.render_window:
                     return
                 pixels = self._draw()
+                before = self._window.subplot.warming_up  # the frame before stays
+                shown = self._sent if before else self._window.session.changes
                 coarse = self._window.frames.state is FrameState.COARSE
                 quality, sizes = COARSE_QUALITY if coarse else QUALITY, self._sizes()
                 own, drawn = self._size(), (pixels.shape[1], pixels.shape[0])
@@ -134,6 +136,7 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
                 for client, size in sizes.items():
                     if size in images:  # else the view is hidden
                         self._publish(images[size], size, client_id=client)
+                self._sent = shown
         finally:
             self._task = None
 
@@ -148,6 +151,10 @@ class StreamedView(PyVistaRemoteView):  # type: ignore[misc]  # trame is not typ
         picture.Update()
         pixels: UInt8Array = pv.convert_array(picture.GetOutput().GetPointData().GetScalars())
         return np.ascontiguousarray(pixels.reshape(height, width, 3)[::-1])
+
+    def shows(self, changes: int) -> bool:
+        """Return True once a picture was sent with so many changes of the session, or more."""
+        return self._sent >= changes
 
     def fit(self) -> None:
         """Limit the size of the window, which trame has set to that of the page's view."""

@@ -37,6 +37,7 @@ from decals.apps.lab.lesson import LESSONS, load_lessons, shown
 from decals.apps.lab.page import LabPage
 from decals.apps.models.scenes import empty_scene
 from decals.apps.sandbox.page import Page as SandboxPage
+from decals.apps.sandbox.view import StreamedView
 from decals.editing.recovery import AUTOSAVE_SECONDS
 from decals.editing.scatter_commands import decals_on
 from decals.scenes.camera import UPRIGHT
@@ -1079,6 +1080,7 @@ async def lab(picture: str | None = None) -> None:
     requests: list[str] = []
     async with sandboxed(empty, lessons=load_lessons(LESSONS), kind=LabPage) as (browser, lab_page, window):
         browser.on("request", lambda request: requests.append(request.url))
+        await arrives(browser, lab_page, window, 2)
         for number, attempts in enumerate(ANSWERS):
             await choose(browser, "lesson", lab_page.lab.values()["lab_titles"][number]["title"])
             await until(partial(shows_lesson, lab_page, number))
@@ -1164,6 +1166,29 @@ async def lab(picture: str | None = None) -> None:
         assert panel is not None
         assert shown_view["height"] > 200  # above the lesson
         assert panel["y"] >= shown_view["y"] + shown_view["height"]
+
+
+CHOSEN_AT_ONCE = """async (option) => {
+  option.click();
+  await new Promise(requestAnimationFrame);
+  return document.querySelector(".coming").innerText;
+}"""
+"""Choose an entry, and return what stands above the view in the next frame of the page."""
+
+
+async def arrives(browser: Page, lab_page: LabPage, window: EditWindow, number: int) -> None:
+    """The title of a lesson covers the picture of the one before at once, until its own is there."""
+    title, cover = lab_page.lab.values()["lab_titles"][number]["title"], browser.locator(".coming")
+    await cover.wait_for(state="detached")
+    await browser.get_by_role("combobox", name="lesson", exact=True).press("ArrowDown")
+    with patch.object(StreamedView, "shows", lambda *_: False):
+        option = browser.get_by_role("option", name=title, exact=True)
+        assert title in await option.evaluate(CHOSEN_AT_ONCE)
+        await until(partial(shows_lesson, lab_page, number))
+        await browser.get_by_role("heading", name=title.split(". ")[1], exact=True).wait_for()
+        await expect(cover).to_contain_text(title)
+    await cover.wait_for(state="detached")
+    await shows(browser, window.plotter)
 
 
 async def puzzle(browser: Page, lab_page: LabPage) -> None:

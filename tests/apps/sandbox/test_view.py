@@ -14,8 +14,10 @@ from PIL import Image
 import decals
 from decals.editing import KEYS
 from decals.editing.brush_settings import Brush
+from decals.editing.commands import AddImage
 from decals.editing.key_bindings import format_gestures
 from decals.editing.view_actions import SIDE_KEYS
+from decals.vtk.subplot import SubplotRenderer
 from decals.window import EditWindow
 from tests.apps.sandbox.browsers import Connect, serve, until
 from tests.apps.sandbox.test_sandbox import TREE, covered
@@ -59,7 +61,9 @@ def test_each_action_shows_its_key_and_is_in_the_menu(vtk_display: None) -> None
     assert all("title=" in icon and "aria-label=" in icon for icon in icons)
 
 
-def test_many_changes_are_one_picture_of_the_newest_state(vtk_display: None) -> None:
+def test_many_changes_are_one_picture_of_the_newest_state(
+    vtk_display: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pytest.importorskip("trame_vtk")
     from trame.app import get_server
     from trame.ui.vuetify3 import VAppLayout
@@ -80,6 +84,7 @@ def test_many_changes_are_one_picture_of_the_newest_state(vtk_display: None) -> 
         view._take_over(Protocol(object(), delivery))
         view.update()  # without a loop, nothing is sent
         assert sent == []
+        assert not view.shows(0)
 
         async def changes() -> None:
             for _ in range(5):
@@ -102,12 +107,21 @@ def test_many_changes_are_one_picture_of_the_newest_state(vtk_display: None) -> 
                 while len(sent) < 3:
                     await asyncio.sleep(0.01)
             await asyncio.sleep(0.05)
+            assert view.shows(0)
+            first = window.session.changes
+            window.session.do(AddImage(decals.DecalImage.load("eye")))
+            for warming in (True, False):
+                monkeypatch.setattr(SubplotRenderer, "warming_up", warming)  # the picture before stays
+                view.update()
+                await until(lambda: view._task is None)
+                assert view.shows(first)
+                assert view.shows(window.session.changes) != warming
 
         asyncio.run(changes())
-    assert steps == [0, 1, 2]
-    pictures = [Image.open(BytesIO(message["image"])) for message in sent]
+    assert steps == [0, 1, 2, 3, 4]
+    pictures = [Image.open(BytesIO(message["image"])) for message in sent[:3]]
     assert [picture.size for picture in pictures] == [(100, 70), (100, 70), (91, 70)]
-    assert [message["id"] for message in sent] == ["7"] * 3
+    assert [message["id"] for message in sent] == ["7"] * 5
     assert pictures[0].tobytes() != pictures[1].tobytes()
 
 
