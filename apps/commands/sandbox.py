@@ -117,7 +117,8 @@ def sandbox(
             return _show_window(command(1))
         guard = _guard(host, allow_host, os.environ.pop(TOKEN, ""))
         room = _classroom(guard, lessons) if classroom else None
-        return _serve_sessions(command, sessions, guard, host, port, room, browser=browser)
+        early = not model and lessons is None  # nothing is read that may be missing
+        return _serve_sessions(command, sessions, guard, host, port, room, browser=browser, early=early)
     from decals.apps.memory import import_ahead, keep_memory_low, made_to_stay, share_heap
 
     share_heap()
@@ -192,6 +193,7 @@ def _serve_sessions(
     room: Any = None,
     *,
     browser: bool,
+    early: bool,
 ) -> int:
     """Serve a session to each browser, and pages to the students of a class; return the exit code."""
     from decals.apps.sandbox.sessions import Sessions
@@ -205,7 +207,7 @@ def _serve_sessions(
             Console(stderr=True, soft_wrap=True).print(address, highlight=False, markup=False)
 
     with suppress(KeyboardInterrupt), _port_in_use_reported(port):
-        return asyncio.run(served.serve(host, port, ready))
+        return asyncio.run(served.serve(host, port, ready, early=early))
     return 0
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from aiohttp import WSCloseCode, web
 from wslink.websocket import LinkProtocol
 
-from decals.apps.sandbox.guard import ASKING, Guard
+from decals.apps.sandbox.guard import ASKING, Guard, Handler
 
 MOUSE = "viewport.mouse.interaction"
 TRIGGER = "trame.trigger"
@@ -157,9 +157,7 @@ class Outbox:
 
 
 @web.middleware
-async def _compressed(
-    request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
-) -> web.StreamResponse:
+async def _compressed(request: web.Request, handler: Handler) -> web.StreamResponse:
     response = await handler(request)
     asks_for_part = {"If-None-Match", "If-Modified-Since", "Range"} & set(request.headers)
     if not response.prepared and not asks_for_part:  # an empty answer cannot be compressed
@@ -241,7 +239,7 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
         """Check all calls of a web server; compress files, but no messages: pictures are small already."""
         self._web = bound
         bound.config["ws_compress"] = False
-        bound.app.middlewares.append(_compressed)
+        bound.app.middlewares.extend((_compressed, self._preloaded))
         routes, bound._default_routes = bound._default_routes, []
         bound.app.add_routes(routes)  # wslink would add them to the application that is served
         bound.set_app(self._guard.protected(bound.app))
@@ -249,6 +247,18 @@ class Connections(LinkProtocol):  # type: ignore[misc]  # wslink is not typed
             handler.onMessage = _closing(handler, handler.onMessage, self._limit_of)
             for name, (part, call) in handler.functionMap.items():
                 handler.functionMap[name] = part, self._checked(name, call)
+
+    @web.middleware
+    async def _preloaded(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        """Name scripts and styles with the page itself: trame does in its first message only."""
+        response = await handler(request)
+        if request.path.endswith("/index.html"):
+            kinds, state = ("script", "style"), self._server.state
+            files = (
+                f"<{path}>; rel=preload; as={kind}" for kind in kinds for path in state[f"trame__{kind}s"]
+            )
+            response.headers["Link"] = ", ".join(files)
+        return response
 
     def _checked(self, name: str, call: Callable[..., Any]) -> Callable[..., Any]:
         async def checked(part: Any, *arguments: Any, **options: Any) -> Any:

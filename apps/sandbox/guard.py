@@ -374,9 +374,9 @@ def new_token() -> str:
     return f"t{secrets.token_urlsafe(24)}"
 
 
-def page_of(text: str, status: int = 200, *, refresh: str | None = None, seconds: int = 0) -> web.Response:
-    """Return a page with a text. If an address is given, the page opens it after some seconds."""
-    again = f"<meta http-equiv='refresh' content='{seconds};url={escape(refresh)}'>" if refresh else ""
+def page_of(text: str, status: int = 200, *, refresh: str | None = None) -> web.Response:
+    """Return a page with a text. If an address is given, the page asks for it at once."""
+    again = f"<meta http-equiv='refresh' content='0;url={escape(refresh)}'>" if refresh else ""
     return web.Response(
         text=PAGE.format(text=escape(text), refresh=again), status=status, content_type="text/html"
     )

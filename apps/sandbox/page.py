@@ -153,17 +153,8 @@ class Page:
         )
         self._task: asyncio.Task[None] | None = None
         self._end: asyncio.Task[None] | None = None
-        server.state.client_only(
-            "left_open",
-            "right_open",
-            "file_open",
-            "theme",
-            "folded",
-            "sought",
-            "kind_sought",
-            "placing",
-            "word",
-        )  # another browser has its own
+        own = "left_open right_open file_open theme folded sought kind_sought placing word"
+        server.state.client_only(*own.split())  # another browser has its own
         server.state.update({**self.values(), "catalog": self.sandbox.catalog(), "thumbnails": thumbnails()})
         server.state.update({"theme": "light", "dropped": None, "dropped_on": "", "folded": [], "sought": ""})
         server.state.update({"kind_sought": "", "placing": "", "word": "", "words": words()})

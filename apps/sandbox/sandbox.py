@@ -120,10 +120,8 @@ class Sandbox:
         self.new_model, self.show_start = self._event(files.new_model), files.show_start
         self.open_sample, self.open_file = self._event(files.open_sample), self._event(files.open_file)
         self.place_image, self.write_file = self._event(files.place_image), self._event(files.write)
-        self.remove_light, self.add_built_in = (
-            self._event(files.remove_light),
-            self._event(files.add_built_in),
-        )
+        self.remove_light = self._event(files.remove_light)
+        self.add_built_in = self._event(files.add_built_in)
         self._setters: dict[str, Callable[..., None]] = {
             "display": self.display.set_option,
             "decals": partial(decal_panel.set_decal_value, self._state),

@@ -33,6 +33,9 @@ STOP_SECONDS = 20.0
 MAX_PART_BYTES = 5_000_000
 """Longest part of a message of a browser; trame sends longer messages in parts of 4 MiB."""
 
+WAIT_SECONDS = 1.0
+"""Longest time for which a request waits for a session that starts, before the page says so."""
+
 AGAIN = "The session has ended. Load this page again."
 
 
@@ -63,6 +66,7 @@ class Session:
         self.headers = {"Authorization": f"Bearer {key}"}
         self._connections = 0
         self._left_at = time.monotonic()
+        self._known = asyncio.Event()
         self._output = asyncio.get_running_loop().create_task(self._read())
 
     async def _read(self) -> None:
@@ -71,6 +75,15 @@ class Session:
             text = line.decode(errors="replace").strip()
             if not self.url and text.startswith("http://"):
                 self.url = text
+                self._known.set()
+        await self._process.wait()
+        self._known.set()
+
+    async def started(self, seconds: float | None = None) -> bool:
+        """Wait until the URL is known or the process ends, at most so long; return True if it is known."""
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._known.wait(), seconds)
+        return bool(self.url)
 
     @property
     def exit_code(self) -> int | None:
@@ -165,10 +178,11 @@ class Sessions:
         self._ending: set[Session] = set()
         self._opening = asyncio.Lock()
 
-    async def serve(self, host: str, port: int, ready: Callable[[int], None]) -> int:
+    async def serve(self, host: str, port: int, ready: Callable[[int], None], *, early: bool = False) -> int:
         """Serve until the first session fails to start, or the task is cancelled; return the exit code.
 
-        ``ready`` is called with the port once the address can be opened. The first session starts at once.
+        ``ready`` is called with the port once the first session shows its page; ``early``: while it starts,
+        so that the browser starts meanwhile. The page says so.
         """
         self._waiting = first = await self._start(1)
         app = web.Application()
@@ -180,10 +194,9 @@ class Sessions:
         async with ClientSession(auto_decompress=False) as self._http:
             try:
                 await web.TCPSite(runner, host, port).start()
-                while not first.url and first.exit_code is None:
-                    await asyncio.sleep(0.02)
-                if first.url:
+                if early or await first.started():
                     ready(runner.addresses[0][1])
+                if await first.started():
                     await self._watch()
                 return first.exit_code or 0
             finally:
@@ -243,8 +256,8 @@ class Sessions:
         if session.exit_code is not None:
             del self._sessions[browser]
             return page_of(AGAIN, 503)
-        if not session.url:
-            return page_of("The session starts. This takes some seconds.", refresh=".", seconds=1)
+        if not await session.started(WAIT_SECONDS):
+            return page_of("The session starts. This takes some seconds.", refresh=".")
         if not path:
             return web.Response(status=302, headers={"Location": "index.html"})
         return await self._file(session, path, request)
@@ -271,7 +284,7 @@ class Sessions:
         headers = {**session.headers, "Accept-Encoding": request.headers.get("Accept-Encoding", "identity")}
         try:
             async with self._http.get(f"{session.url}{path}", headers=headers) as answer:
-                names = ("Content-Type", "Content-Encoding")
+                names = ("Content-Type", "Content-Encoding", "Link")
                 kept = {name: answer.headers[name] for name in names if name in answer.headers}
                 return web.Response(body=await answer.read(), status=answer.status, headers=kept)
         except ClientError:

@@ -144,8 +144,8 @@ def test_each_session_has_its_own_file(folder: Path, monkeypatch: pytest.MonkeyP
             assert guard.url(8080).startswith(f"http://127.0.0.1:8080{guard.place}/?token=")
             self.command = command
 
-        async def serve(self, host: str, port: int, _ready: Any) -> int:
-            assert (host, port) == ("127.0.0.1", 8080)
+        async def serve(self, host: str, port: int, _ready: Any, *, early: bool) -> int:
+            assert (host, port, early) == ("127.0.0.1", 8080, False)
             (folder / "knot-3.recovery.json").touch()
             for number in (1, 2, 2, 3):
                 commands.append(self.command(number)[4:])

@@ -137,7 +137,8 @@ def test_the_page_is_small_and_names_no_other_server(vtk_display: None) -> None:
         import aiohttp
 
         state, base = page._server.state, page.guard.address(page._server.port)
-        names = ["index.html", "vue.global.js", *state.trame__scripts, *state.trame__styles]
+        files = {*state.trame__scripts, *state.trame__styles}
+        names = ["index.html", "vue.global.js", *files]
         bearer = {"Authorization": f"Bearer {page.guard.token}"}
         async with aiohttp.ClientSession(auto_decompress=False, headers=bearer) as client:
             sent = 0
@@ -146,6 +147,8 @@ def test_the_page_is_small_and_names_no_other_server(vtk_display: None) -> None:
                 async with client.get(base + name, headers={"Accept-Encoding": "gzip"}) as answer:
                     body = await answer.read()
                     assert answer.status == 200
+                named = set(re.findall(r"<([^>]*)>; rel=preload; as=\w+", answer.headers.get("Link", "")))
+                assert named == (files if name == "index.html" else set())
                 known = {"Accept-Encoding": "gzip", "If-None-Match": answer.headers["ETag"]}
                 async with client.get(base + name, headers=known) as answer:
                     assert (answer.status, await answer.read()) == (304, b"")

@@ -54,6 +54,9 @@ async def started(name: str = "", **options: Any) -> tuple[Sessions, asyncio.Tas
     return sessions, task, guard.address(await port).rstrip("/")
 
 
+LATE = 'import pathlib, time\nwhile not pathlib.Path("go").exists(): time.sleep(0.01)\n'
+
+
 async def ended(task: asyncio.Task[int]) -> None:
     task.cancel()
     await asyncio.gather(task, return_exceptions=True)
@@ -119,6 +122,26 @@ def test_each_browser_has_a_session_of_its_own(folder: Path) -> None:
 
     serve(check, limit=2)
     assert {path.name for path in folder.iterdir()} == {"saved 1", "saved 2"}
+
+
+def test_an_early_server_answers_while_its_first_session_starts(folder: Path) -> None:
+    async def run() -> None:
+        guard, ports = Guard(token=TOKEN), asyncio.Queue[int]()
+        sessions = Sessions(lambda _: [sys.executable, "-c", LATE + PROGRAM, "one"], limit=1, guard=guard)
+        task = asyncio.create_task(sessions.serve("127.0.0.1", 0, ports.put_nowait, early=True))
+        try:
+            url = guard.address(await ports.get())
+            async with browser() as user:
+                assert "The session starts" in (await text(user, f"{url}?token={TOKEN}"))[1]
+                page = asyncio.create_task(text(user, url))
+                await asyncio.wait({page}, timeout=0.1)
+                (folder / "go").touch()
+                assert await page == (200, "session one /index.html")
+            assert ports.empty()
+        finally:
+            await ended(task)
+
+    asyncio.run(run())
 
 
 def test_servers_on_two_ports_keep_their_sessions_apart() -> None:
@@ -210,7 +233,7 @@ def test_a_page_starts_a_session_and_nothing_else_does(folder: Path) -> None:
             assert len(sessions._sessions) == 1
             assert await opened(two, url) == "session 2 /index.html"
             for path in ("/", "/index.html"):  # a bookmark, a second tab
-                assert await text(one, f"{url}{path}") == (200, "session 1 /index.html")
+                assert await text(one, f"{url}{path}") == (200, "session one /index.html")
 
     serve(check, limit=2)
 
