@@ -233,7 +233,7 @@ def test_a_page_starts_a_session_and_nothing_else_does(folder: Path) -> None:
             assert len(sessions._sessions) == 1
             assert await opened(two, url) == "session 2 /index.html"
             for path in ("/", "/index.html"):  # a bookmark, a second tab
-                assert await text(one, f"{url}{path}") == (200, "session one /index.html")
+                assert await text(one, f"{url}{path}") == (200, f"session {1} /index.html")
 
     serve(check, limit=2)
 
