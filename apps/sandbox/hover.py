@@ -22,6 +22,9 @@ from decals.window.overlay import box_edges
 MAX_DOTS = 300
 """Most decals of a row that get a dot."""
 
+TOP = 0.6
+"""Distance of the top of an image from its centre, in radii of the decal, to which an arrow leads."""
+
 KIND = "kind "
 """First part of the key of a row of the menu of kinds."""
 
@@ -50,7 +53,7 @@ class Hover:
         self._key = ""
         self._at: ArrayLike | None = None
         self._known: tuple[object, ...] = ()
-        self._lines = self._dots = np.zeros((0, 2, 3), np.float32)
+        self._lines, self._dots = np.zeros((0, 2, 3), np.float32), np.zeros((0, 3, 3), np.float32)
 
     def at_place(self, pick: SurfacePick | None) -> None:
         """Light up the rows of the primitive and of the layer of the decal at a surface point."""
@@ -70,14 +73,17 @@ class Hover:
         self._key, self._rows, self._at = str(key), [], at
 
     def values(self) -> dict[str, Any]:
-        """Return the keys of the lit rows; and lines and dots in parts of the view, which cost no frame."""
+        """Return the keys of the lit rows; and lines and dots in parts of the view, which cost no frame.
+
+        A dot has two more numbers: the place toward which the top of the decal's image points.
+        """
         if not self._key:
             return {**NOTHING, "rows": self._rows}
         document = self._window.document
         shown = self._key, document.objects, document.decals.version
         if shown != self._known:
             self._known = shown
-            self._lines = self._dots = np.zeros((0, 2, 3), np.float32)
+            self._lines, self._dots = self._lines[:0], self._dots[:0]
             with suppress(ImplicitDecalsError):  # the scene need not have what a page asks for
                 if self._key.startswith(KIND):
                     self._lines = self._ghost_of(self._key.removeprefix(KIND))
@@ -102,12 +108,11 @@ class Hover:
     def _placed(self) -> dict[str, Any]:
         """Return lines and dots where they lie in the view."""
         eye = np.asarray(self._window.camera.eye_and_target()[0])
-        centers, normals = self._dots[:, 0], self._dots[:, 1]
-        facing = ((eye - centers) * normals).sum(axis=1) > 0.0
+        facing = ((eye - self._dots[:, 0]) * self._dots[:, 2]).sum(axis=1) > 0.0
         return {
             "rows": [],
             "lines": self._in_view(self._lines.reshape(-1, 3), 4),
-            "dots": self._in_view(centers[facing][:MAX_DOTS], 2),
+            "dots": self._in_view(self._dots[facing][:MAX_DOTS, :2].reshape(-1, 3), 4),
         }
 
     def _in_view(self, points: Float32Array, width: int) -> list[list[float]]:
@@ -141,8 +146,8 @@ def _box_of(document: Document, part: Part) -> Float32Array:
 
 
 def _decals_of(document: Document, part: Part) -> Float32Array:
-    """Return centres and normals of the decals of a layer, or of those with an image, shape (n, 2, 3)."""
+    """Return centres, tops and normals of the decals of a layer, or of those with an image, (n, 3, 3)."""
     column = {"layer": "layers", "image": "images"}[part.kind]
-    of_row = document.decals.column(column) == part.number
-    places = [document.decals.column(name)[of_row] for name in ("positions", "normals")]
-    return np.stack(places, axis=1).astype(np.float32)
+    decals = document.decals.decals[document.decals.column(column) == part.number]
+    tops = decals.positions + TOP * decals.radii[:, None] * decals.bitangents
+    return np.stack([decals.positions, tops, decals.normals], axis=1)

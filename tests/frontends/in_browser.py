@@ -328,6 +328,8 @@ async def hovers(browser: Page, window: EditWindow) -> None:
     await expect(browser.locator(".hovered line")).to_have_count(12)
     await browser.get_by_text("layer 0").hover()
     await browser.locator(".hovered circle").first.wait_for()
+    await browser.get_by_role("button", name="tile", exact=True).hover()
+    await expect(browser.locator(".hovered [marker-end='url(#top)']").first).to_be_attached()
     await browser.get_by_text("Point").nth(0).click()
     await until(lambda: state.nodes == ((0, (0,)),))
     rows = browser.locator("[data-roving] .v-list-item--active")

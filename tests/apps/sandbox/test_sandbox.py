@@ -196,6 +196,25 @@ def test_the_pointer_lights_up_rows_and_rows_light_up_the_view(window: EditWindo
     assert (sandbox.status, window.session.labels) == (message, ())
 
 
+def test_arrows_lead_to_the_tops_of_images(vtk_display: None) -> None:
+    halves = np.full((16, 16, 4), 255, np.uint8)
+    halves[:8, :, 1:3], halves[8:, :, :2] = 0, 0  # red above, blue below
+    ball = Point((0, 0, 0), radius=1.0)
+    scene = decals.cover(ball, count=24, images=[decals.DecalImage("halves", halves)])
+    with EditWindow(scene.replace(camera=CAMERA), off_screen=True, size=(360, 300)) as window:
+        window.show()
+        sandbox = Sandbox(window)
+        sandbox.hover("image 0")
+        picture = window.plotter.screenshot(None, return_img=True).astype(int)
+        arrows = np.array(sandbox.values()["hovered"]["dots"]).reshape(-1, 2, 2)
+        inside = np.abs(arrows[:, 0] - 0.5).max(axis=1) < 0.1  # those that face the camera
+        assert inside.sum() >= 2
+        for center, top in arrows[inside] * (360, 300):
+            for (x, y), channel in ((top, 0), (2 * center - top, 2)):
+                pixel = picture[int(y), int(x)]
+                assert pixel[channel] > pixel[2 - channel] + 60
+
+
 def test_a_page_says_what_the_scene_has_and_what_was_done_last(window: EditWindow) -> None:
     sandbox = Sandbox(window)
     sandbox.select("")
