@@ -51,7 +51,7 @@ class Hover:
         self._window = window
         self._rows: list[str] = []
         self._key = ""
-        self._at: ArrayLike | None = None
+        self._put: tuple[ArrayLike | None, float | None] = None, None
         self._known: tuple[object, ...] = ()
         self._lines, self._dots = np.zeros((0, 2, 3), np.float32), np.zeros((0, 3, 3), np.float32)
 
@@ -65,12 +65,13 @@ class Hover:
                 layer = int(self._window.document.decals[pick.owner].layers[0])
                 self._rows.append(Part("layer", layer).key)
 
-    def at_row(self, key: str, at: ArrayLike | None = None) -> None:
+    def at_row(self, key: str, at: ArrayLike | None = None, reach: float | None = None) -> None:
         """Light up the box of a row's node or object, or its decals; "" lights up nothing.
 
-        "kind Torus" lights up the box of the node that the menu would add; at a point of the scene its shape.
+        "kind Torus" lights up the box of the node that the menu would add; at a point of the scene its shape,
+        of a reach from there.
         """
-        self._key, self._rows, self._at = str(key), [], at
+        self._key, self._rows, self._put = str(key), [], (at, reach)
 
     def values(self) -> dict[str, Any]:
         """Return the keys of the lit rows; and lines and dots in parts of the view, which cost no frame.
@@ -95,10 +96,8 @@ class Hover:
 
     def _ghost_of(self, kind: str) -> Float32Array:
         """Return lines of the node that the menu of a kind would add, shape (n, 2, 3)."""
-        make, box = (
-            self._window.actions.trees.node_in_view(kind.partition(VIEW)[0], self._at),
-            self._at is None,
-        )
+        make = self._window.actions.trees.node_in_view(kind.partition(VIEW)[0], *self._put)
+        box = self._put[0] is None
         found = self._window.actions.state.asked("place a node", lambda _document: _drawn(make(), box=box))
         if found is None:  # a thread compiles its kernels; the next call asks again
             self._known = ()

@@ -28,6 +28,7 @@
   };
 
   const HOVER_MS = 60;
+  const DRAG_PIXELS = 6; // from which on a press is a drag
   const MENU_MS = 50; // until a menu is drawn
   const FIELD = ".v-overlay--active .v-sheet input";
   const hovering = { key: "", told: null };
@@ -36,6 +37,7 @@
     // Two fingers turn and zoom the view, three move it; the first does what the mouse does, until others come.
     touchstart(event) {
       if (event.touches.length > 1) {
+        if (event.currentTarget.placed) event.currentTarget.placed = true; // another press may place it
         event.currentTarget.fingers = fingersOf(event);
         trame.trigger("pinch", [0, 0, 1, "begin"]);
       }
@@ -57,8 +59,10 @@
     pointerdown(event) {
       const kind = trame.state.get("placing");
       if (kind && event.isPrimary && !event.target.closest("button")) {
-        this.leave(event);
-        trame.trigger("add_at", [kind, this.place(event)]);
+        event.stopPropagation();
+        event.preventDefault();
+        event.currentTarget.setPointerCapture(event.pointerId);
+        event.currentTarget.placed = { kind, place: this.place(event), x: event.clientX, y: event.clientY };
       } else if (event.isPrimary) event.currentTarget.fingers = event.currentTarget.placed = null;
       else event.stopPropagation();
     },
@@ -69,19 +73,30 @@
       if (view.fingers) event.stopPropagation();
       const kind = trame.state.get("placing");
       const place = event.buttons ? "" : this.place(event);
-      this.hover(kind && place ? `kind ${kind} ${place}` : place, event);
+      const { placed } = view;
+      if (placed?.kind) this.hover(`kind ${kind} ${placed.place} ${this.edge(event)}`.trim());
+      else this.hover(kind && place ? `kind ${kind} ${place}` : place, event);
       view.style.setProperty("--x", `${event.clientX - box.left}px`);
       view.style.setProperty("--y", `${event.clientY - box.top}px`);
     },
     pointerup(event) {
-      if (!event.isPrimary || event.currentTarget.placed) event.stopPropagation();
+      const { placed } = event.currentTarget;
+      if (!event.isPrimary || placed) event.stopPropagation();
+      if (!event.isPrimary || !placed?.kind) return;
+      trame.trigger("add_at", [placed.kind, placed.place, this.edge(event)]);
+      this.leave(event);
+    },
+    // Return the place to which the shape that is being placed is dragged, "" for a click.
+    edge(event) {
+      const { x, y } = event.currentTarget.placed;
+      return Math.hypot(event.clientX - x, event.clientY - y) < DRAG_PIXELS ? "" : this.place(event);
     },
 
     // Leave the placing of a new part; the press that places it does nothing else.
     leave(event) {
       event.stopPropagation();
       event.preventDefault();
-      event.currentTarget.placed = true;
+      document.querySelector("[role=application]").placed = true;
       trame.state.set("placing", "");
       this.hover("");
     },

@@ -480,20 +480,23 @@ class Sandbox:
         """Light up what the pointer is at: the row of a key in the view, or the part at a place of the view.
 
         A place that has no part, and a key that the scene does not have, light up nothing. "kind Torus view
-        5000/5000" shows what `add_at` would add.
+        5000/5000" shows what `add_at` would add, "kind Torus view 5000/5000 view 6000/5000" in a size.
         """
-        kind, _, place = str(key).partition(VIEW)
-        if place and not self._window.background.busy_editing:
-            self._hover.at_row(key, self._files.point_at(f"view {place}"))
-        elif not place and not kind.startswith("view "):
+        kind, *places = str(key).split(VIEW)
+        if places and not self._window.background.busy_editing:
+            self._hover.at_row(key, *self._files.put(*(f"view {each}" for each in places[:2])))
+        elif not places and not kind.startswith("view "):
             self._hover.at_row(key)
         elif not self._window.background.busy_editing:
             self._hover.at_place(self._files.surface_at(key))
 
     @event
-    def add_at(self, kind: str, place: str) -> None:
-        """Add a primitive of a kind at a place of the view, see `SandboxFiles.surface_at`."""
-        self._trees.add_node(kind, self._files.point_at(place))
+    def add_at(self, kind: str, place: str, edge: str = "") -> None:
+        """Add a primitive of a kind at a place of the view, see `SandboxFiles.surface_at`.
+
+        Its surface reaches to the place of its edge, without one as far as suits the model.
+        """
+        self._trees.add_node(kind, *self._files.put(place, edge))
 
     @event
     def move_camera(self, name: str, value: Any = None) -> None:

@@ -357,7 +357,7 @@ class TreeActions(WindowActions):
         if last:
             self.end_drag()
 
-    def add_node(self, kind: str, at: ArrayLike | None = None) -> None:
+    def add_node(self, kind: str, at: ArrayLike | None = None, reach: float | None = None) -> None:
         """Add a primitive to a scene, blended into the selected node, else as an object.
 
         Parameters
@@ -366,8 +366,10 @@ class TreeActions(WindowActions):
             Name of its class; see `decals.editing.new_nodes.kinds`.
         at
             Its place, shape (3,). Default: the middle of the view.
+        reach
+            Half of its longest extent. Default: one that suits the model.
         """
-        make, middle = self.node_in_view(kind, at), np.zeros(3, np.float32)
+        make, middle = self.node_in_view(kind, at, reach), np.zeros(3, np.float32)
         if self._state.primitive is None:
             self._add_tree(kind.lower(), make, middle)
             return
@@ -378,13 +380,15 @@ class TreeActions(WindowActions):
 
         self._restructure_later(f"add {kind}", number, command, middle)
 
-    def node_in_view(self, kind: str, at: ArrayLike | None = None) -> Callable[[], Node]:
+    def node_in_view(
+        self, kind: str, at: ArrayLike | None = None, reach: float | None = None
+    ) -> Callable[[], Node]:
         """Return a function that makes the node that `add_node` adds now."""
         checked_kind(kind)
         objects, view = self._state.session.document.objects, self._state.camera.eye_and_target()
         if self._state.primitive is not None:
             objects = objects[self._state.primitive[0] :][:1]
-        return lambda: new_node(kind, (), *_place_in_view(objects, *view, kind, at))
+        return lambda: new_node(kind, (), *_place_in_view(objects, *view, kind, at, reach))
 
     def wrap_node(self, kind: str) -> None:
         """Put the selected node under a new node of a kind with one operand, such as a warp."""
@@ -694,7 +698,12 @@ def _surface_check(number: int) -> Step:
 
 
 def _place_in_view(
-    objects: Sequence[SceneObject], eye: ArrayLike, target: ArrayLike, kind: str, at: ArrayLike | None
+    objects: Sequence[SceneObject],
+    eye: ArrayLike,
+    target: ArrayLike,
+    kind: str,
+    at: ArrayLike | None,
+    reach: float | None,
 ) -> tuple[Float64Array, float]:
     """Return centre (3,) and size for a new node of a kind.
 
@@ -702,6 +711,9 @@ def _place_in_view(
     closest to the target; without objects, at the target.
     """
     position, middle = np.asarray(eye, np.float64), np.asarray(target if at is None else at, np.float64)
+    if reach is not None:
+        kind_low, kind_high = new_node(kind).bounds
+        return _rounded(middle, 2.0 * reach / float((kind_high - kind_low).max()))
     if not objects:
         return _rounded(middle, FIRST_OBJECT_RADIUS * float(np.linalg.norm(position - middle)))
     if at is None:

@@ -33,6 +33,7 @@ from trame_server.core import Server
 
 import decals
 from blobtree import Point
+from blobtree.nodes.paths import node_at
 from decals.apps.lab.lesson import LESSONS, load_lessons, shown
 from decals.apps.lab.page import LabPage
 from decals.apps.models.scenes import empty_scene
@@ -41,6 +42,7 @@ from decals.apps.sandbox.view import StreamedView
 from decals.editing.recovery import AUTOSAVE_SECONDS
 from decals.editing.scatter_commands import decals_on
 from decals.scenes.camera import UPRIGHT
+from decals.scenes.objects import bounds_of
 from decals.window import EditWindow, notebook
 from tests.apps.lab.answers import ANSWERS, STEP
 from tests.decals.editing.scenes import digest, scene, tree_of
@@ -346,7 +348,7 @@ async def hovers(browser: Page, window: EditWindow) -> None:
 
 
 async def placed(browser: Page, window: EditWindow) -> None:
-    """A kind is placed under the mouse, which shows its shape before; it can be left; one undo takes it."""
+    """A kind is placed and sized by the mouse, which shows its shape before; it can be left, and undone."""
     labels, (_, at) = window.session.labels, next(Driver(window).visible())
     leave = browser.get_by_role("button", name="Leave", exact=True)
     for left in (partial(browser.keyboard.press, "Escape"), leave.click, None):
@@ -360,10 +362,13 @@ async def placed(browser: Page, window: EditWindow) -> None:
             await left()
             await browser.get_by_text("Click where the Cone goes").wait_for(state="detached")
         else:
-            await drag(browser, window.plotter, at)
+            await drag(browser, window.plotter, at, (at[0] + 20, at[1]), (at[0] + 140, at[1]))
             await expect(browser.locator(".hovered line")).to_have_count(0)
     await until(lambda: window.session.labels == (*labels, "add Cone"))
     await until(lambda: not window.background.busy)
+    low, high = node_at(tree_of(window.document), window.actions.state.primitive[1]).bounds  # type: ignore[index]
+    box = bounds_of(window.document.objects)
+    assert (high - low).max() > 0.15 * (box[1] - box[0]).max()  # a click makes a tenth
     await browser.keyboard.press("Control+z")
     await until(lambda: window.session.labels == labels)
     await browser.get_by_text("Torus", exact=True).first.click()

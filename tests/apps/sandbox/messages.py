@@ -73,7 +73,7 @@ EVENTS: dict[str, list[list[Any]]] = {
     "scatter": [],
     "scatter_zone": [],
     "add": [KINDS],
-    "add_at": [KINDS, ["view 5000/5000", "view 0/10000", "view 99999/1", "0/1"]],
+    "add_at": [KINDS, ["view 5000/5000", "view 0/10000", "view 99999/1", "0/1"], ["", "view 6000/5000"]],
     "wrap": [KINDS],
     "combine": [KINDS],
     "unwrap": [],

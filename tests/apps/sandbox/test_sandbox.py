@@ -669,32 +669,37 @@ def test_added_primitives_lie_where_the_view_looks(vtk_display: None, toward: tu
 
 @pytest.mark.slow_cases("Box", "Cylinder", "Torus")
 @pytest.mark.parametrize("kind", ["Point", "Box", "Torus", "Cylinder", "Polyline"])
-def test_the_ghost_under_the_mouse_is_what_a_click_adds_there(window: EditWindow, kind: str) -> None:
+def test_the_ghost_under_the_mouse_is_what_a_press_adds_there(window: EditWindow, kind: str) -> None:
     sandbox, state = Sandbox(window), window.actions.state
     size = float(np.ptp(tree_of(window.document).bounds, axis=0).max())
-    for x, y in np.random.default_rng(len(kind)).integers(0, 10_000, (3, 2)).tolist():
-        pixel = x / 10_000 * 80, y / 10_000 * 60
-        ray = ray_through(window.subplot, *pixel)
+    places = np.random.default_rng(len(kind)).integers(0, 10_000, (3, 4)).tolist()
+    for number, (x, y, *end) in enumerate(places):  # the first one is a click, the others are drags
+        edge = "view {}/{}".format(*end) if number else ""
+        pixel, end_pixel = np.array([(x, y), end]) / 10_000 * (80, 60)
+        ray, end_ray = ray_through(window.subplot, *pixel), ray_through(window.subplot, *end_pixel)
         assert ray is not None
+        assert end_ray is not None
         eye, target = window.camera.eye_and_target()
         sandbox.select("0/0")
         for _ in range(2):  # a thread loads the kernels of the first questions, which have no answer then
             pick = window.tools.at(*pixel)
             finish(window)
-            sandbox.hover(f"kind {kind} view {x}/{y}")
+            sandbox.hover(f"kind {kind} view {x}/{y} {edge}".strip())
             ghost = sandbox.values()["hovered"]["lines"]
             finish(window)
             sandbox.hover("")
             sandbox.values()
         seen: Any = on_plane(target, np.subtract(eye, target), ray) if pick is None else pick.position
-        sandbox.add_at(kind, f"view {x}/{y}")
+        there: Any = on_plane(seen, np.subtract(eye, target), end_ray)
+        extent = 2 * np.linalg.norm(there - seen) if edge else 0.1 * size
+        sandbox.add_at(kind, f"view {x}/{y}", edge)
         finish(window)
         assert state.primitive is not None
         node = node_at(tree_of(window.document), state.primitive[1])
         low, high = node.bounds
-        assert (high - low).max() == pytest.approx(0.1 * size, rel=0.02)
-        assert (low - 0.01 * size <= seen).all()
-        assert (seen <= high + 0.01 * size).all()
+        assert (high - low).max() == pytest.approx(extent, rel=0.02)
+        assert (low - 0.1 * extent <= seen).all()
+        assert (seen <= high + 0.1 * extent).all()
         lines = (pixels_of(window.subplot, outlines(node).reshape(-1, 3)) + 0.5) / (80, 60) * (1, -1) + (0, 1)
         np.testing.assert_allclose(ghost, lines.reshape(-1, 4), atol=1e-3)
         sandbox.go_to(0)
