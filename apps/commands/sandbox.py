@@ -63,6 +63,7 @@ def sandbox(
     inputs: Inputs = Inputs(),
     lab: Annotated[bool, Parameter(negative=())] = False,
     lessons: Path | None = None,
+    lesson: str | None = None,
     classroom: Annotated[bool, Parameter(name="--class", negative=())] = False,
     done: Annotated[bool, Parameter(negative=())] = False,
     session: Annotated[bool, Parameter(negative=(), show=False)] = False,
@@ -96,6 +97,8 @@ def sandbox(
         Open the contact lab: lessons on decals and solids in contact.
     lessons
         A folder of other lessons for the lab.
+    lesson
+        The lesson with which the lab begins: its number, or the name of its file without the ending.
     classroom
         Serve the lessons to students as pages, by an address of their own, and show what they send at /class.
     done
@@ -106,18 +109,21 @@ def sandbox(
     """
     check_count("--port", port, 0, MAX_PORT)
     check_count("--sessions", sessions, 1, MAX_SESSIONS)
-    if model and (lab or lessons is not None):
-        raise InvalidInput("the lab has its own scenes; leave out the model, or --lab and --lessons")
-    if classroom and (desktop or share or done or session or not (lab or lessons is not None)):
+    lab = lab or lessons is not None or lesson is not None
+    if model and lab:
+        raise InvalidInput(
+            "the lab has its own scenes; leave out the model, or --lab, --lessons and --lesson"
+        )
+    if classroom and (desktop or share or done or session or not lab):
         raise InvalidInput("--class needs --lab or --lessons, without --share, --desktop and --done")
     if desktop or not (share or done or session):
-        options = {**vars(start), **vars(inputs), "lab": lab, "lessons": lessons}
+        options = {**vars(start), **vars(inputs), "lab": lab, "lessons": lessons, "lesson": lesson}
         command = _commands(model, options, options.pop("save"))
         if desktop:
             return _show_window(command(1))
         guard = _guard(host, allow_host, os.environ.pop(TOKEN, ""))
         room = _classroom(guard, lessons) if classroom else None
-        early = not model and lessons is None  # nothing is read that may be missing
+        early = not model and lessons is None and lesson is None  # nothing is read that may be missing
         return _serve_sessions(command, sessions, guard, host, port, room, browser=browser, early=early)
     from decals.apps.memory import import_ahead, keep_memory_low, made_to_stay, share_heap
 
@@ -129,7 +135,7 @@ def sandbox(
         from decals.window.host_plotter import new_plotter
 
         check_options(start)
-        serve, page = _toolkit(lessons)
+        serve, page = _toolkit(lessons, (lesson or "1") if lab else None)
     given = _read_token() if session else os.environ.pop(TOKEN, "")
     guard = _guard(host, allow_host, given, framed=done)
     import_definitions(inputs.define)
@@ -141,9 +147,8 @@ def sandbox(
         with window:
             window.show()
             server = serve(f"sandbox {id(window)}", client_type="vue3")
-            in_lesson = lab or lessons is not None
-            fresh = not model and not in_lesson and not window.session.modified  # nothing was recovered
-            page(server, window, guard=guard, in_lesson=in_lesson, start=fresh, done=done, shared=share)
+            fresh = not model and not lab and not window.session.modified  # nothing was recovered
+            page(server, window, guard=guard, start=fresh, done=done, shared=share)
             ready = server.controller.on_server_ready
             if session:
                 ready.add(lambda **_: print(guard.address(server.port), flush=True))
@@ -173,7 +178,7 @@ def _commands(
         if number > 1:  # others have their own files
             known = names.get(number)
             path = names[number] = known or _unused(first, names.values())
-            if known is not None and _exists(known) and not (options["lab"] or options["lessons"]):
+            if known is not None and _exists(known) and not options["lab"]:
                 opened, given = (
                     [str(known)],
                     {**options, "decals": None, "image": None, "seed": None, "table": None},
@@ -301,8 +306,8 @@ def _end_with_input() -> None:
     signal.raise_signal(signal.SIGINT)
 
 
-def _toolkit(folder: Path | None) -> tuple[Any, Any]:
-    """Return trame's server and our page with the lessons of a folder; both need trame."""
+def _toolkit(folder: Path | None, lesson: str | None) -> tuple[Any, Any]:
+    """Return trame's server and our page with the lessons of a folder, at one of them; both need trame."""
     try:
         from trame.app import get_server
 
@@ -311,7 +316,20 @@ def _toolkit(folder: Path | None) -> tuple[Any, Any]:
     except ImportError as error:
         raise _missing(error) from None
     found = load_lessons(LESSONS if folder is None else folder)
-    return get_server, lambda server, window, **options: LabPage(server, window, found, **options)
+    begin = None if lesson is None else _index_of(lesson, [each.name for each in found])
+    return get_server, lambda server, window, **options: LabPage(
+        server, window, found, begin=begin, **options
+    )
+
+
+def _index_of(lesson: str, names: list[str]) -> int:
+    """Return the index of a lesson that is given by its number, from 1 on, or by its name."""
+    known = {text: i for i, name in enumerate(names) for text in (str(i + 1), name)}
+    if lesson not in known:
+        raise InvalidInput(
+            f"--lesson: expected 1 to {len(names)}, or a name such as {names[0]}, got {lesson!r}"
+        )
+    return known[lesson]
 
 
 def _missing(error: ImportError) -> MissingPackage:

@@ -39,8 +39,8 @@ class LabPage(Page):
         As for `Page`.
     lessons
         The lessons.
-    in_lesson
-        Begin with the first lesson.
+    begin
+        Index of the lesson to begin with. None begins without a lesson.
     options
         Options of the `Sandbox`.
     """
@@ -51,7 +51,7 @@ class LabPage(Page):
         window: EditWindow,
         lessons: Sequence[Lesson],
         *,
-        in_lesson: bool = True,
+        begin: int | None = 0,
         **options: Any,
     ) -> None:
         self.lab = Lab(window, lessons)
@@ -63,8 +63,8 @@ class LabPage(Page):
         trigger("start_lesson")(self._restart)
         trigger("puzzle")(lambda text: self.sandbox.attempt(lambda: self._play(text)))
         trigger("guess")(lambda value: self.sandbox.attempt(lambda: self._guess(value)))
-        if in_lesson:
-            self.sandbox.open_lesson(0)
+        if begin is not None:
+            self.sandbox.open_lesson(begin)
         server.controller.on_server_exited.add(lambda **_: self.lab.close())
 
     def values(self) -> dict[str, Any]:

@@ -9,6 +9,12 @@ import { puzzleOf, share, showScores } from "./puzzles.mjs";
 
 const CALM = 60; // milliseconds without a change, after which the whole map is read
 
+// Select the text of an element, and copy it where the browser lets a page do that.
+function copy(element) {
+  getSelection().selectAllChildren(element);
+  navigator.clipboard?.writeText(element.textContent);
+}
+
 class LessonPage {
   // `live` holds functions of the measures and a point: formulas, texts of HTML, and what sliders read and write.
   constructor(root, viewer, lesson, live) {
@@ -29,6 +35,9 @@ class LessonPage {
     on("[name=back]", "click", () => viewer.history.go(-1));
     on("[name=check]", "click", () => this.changed((this.tried = true)));
     on("[name=share]", "click", () => share(this));
+    this.all("[name=copy]").forEach((one) =>
+      one.addEventListener("click", () => copy(one.previousElementSibling)),
+    );
     on("[name=skip]", "click", () => this.see(null));
     on(".send", "submit", (form) => send(this, form));
     on("form.guess", "submit", (form) => this.see(Number(form.guess.value)));

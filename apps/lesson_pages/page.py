@@ -2,6 +2,7 @@
 
 import html
 import json
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from itertools import cycle
@@ -14,7 +15,7 @@ from PIL import Image
 from blobtree.progress import Progress, reporting
 from decals.apps.lab.bindings import AXES, binding
 from decals.apps.lab.errors import InvalidLesson
-from decals.apps.lab.lesson import Guess, Lesson, Plot, Slider, Value
+from decals.apps.lab.lesson import LESSONS, Guess, Lesson, Plot, Slider, Value
 from decals.apps.lab.measures import MEASURES
 from decals.apps.lab.plots import COLORS, DASHES, SCALE, viridis
 from decals.apps.lab.script import script as python_lines
@@ -323,7 +324,7 @@ def _markup(
         for plot in _plots(lesson)
     )
     names = ["lessons", "about", "parameters", "values", "readings"]
-    names += ["check", "again", "needs", "later", "python"]
+    names += ["check", "again", "needs", "later", "python", "sandbox", "run", "copy"]
     undo = f'<button type="button" name="back">{words.page["undo"]}</button>'
     body = words.bodies.get(lesson.name, lesson.text)
     return {
@@ -348,9 +349,16 @@ def _markup(
         ),
         "SYMBOLS": "" if settings.space else _readings(words),
         "LINES": html.escape(python_lines(lesson, lesson.experiment())),
+        "COMMAND": html.escape(_command(lesson)),
         "PROBE": html.escape(words.page["probe"]),
         "PLOTS": plots,
     }
+
+
+def _command(lesson: Lesson) -> str:
+    """Return the line that opens a lesson in the sandbox; of other lessons it names their folder."""
+    folder = [] if lesson.folder == LESSONS else ["--lessons", lesson.folder.name]
+    return shlex.join(["implicit-decals", "sandbox", *folder, "--lesson", lesson.name])
 
 
 def _key(plot: Plot, words: Translation) -> str:

@@ -53,6 +53,9 @@ PAGE_TEXTS = {
     "guess": "Your guess",
     "truth": "It is now",
     "python": "Python for the first picture",
+    "sandbox": "Open in the sandbox",
+    "run": "A page starts no program. Install implicit-decals[browser] with pip, and run this in a terminal:",
+    "copy": "Copy",
     "lost": "A decal of the lesson was deleted: undo, or start again.",
 }
 """Texts of a page that belong to no lesson, by their names."""

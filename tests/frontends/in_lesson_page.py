@@ -285,7 +285,7 @@ async def typed(browser: Browser, path: Path, width: int, height: int) -> None:
 
 
 async def explained(browser: Browser, path: Path, width: int, height: int) -> None:
-    """A symbol of lesson 2 says what it means, and lights up its curve and region: finger, then mouse."""
+    """A symbol of lesson 2 says what it means, and lights up; a line that opens the lesson is copied."""
     page = await browser.new_page(viewport={"width": width, "height": height}, has_touch=True)
     await page.goto(path.as_uri())
     await press(page, "Skip the guess")
@@ -302,6 +302,14 @@ async def explained(browser: Browser, path: Path, width: int, height: int) -> No
     await page.locator(".body abbr[data-symbol='F']").first.hover()
     assert [await line.evaluate(LOOK, name) for line, name in lines.items()] == first
     await expect(page.locator(".chart path[data-symbol='F']")).to_have_css("stroke-width", "5px")
+    await page.get_by_text("Open in the sandbox").click()
+    line = "implicit-decals sandbox --lesson 2-two-decals"
+    assert await page.locator(".python[open] pre").inner_text() == line
+    await page.locator("[name=copy]:visible").click()
+    assert await page.evaluate("String(getSelection()).trim()") == line
+    if is_chromium(page):
+        await page.context.grant_permissions(["clipboard-read"])
+        assert await page.evaluate("navigator.clipboard.readText()") == line
     await page.close()
 
 

@@ -1,8 +1,11 @@
 """``implicit-decals sandbox`` without a browser: what it opens, and what it says."""
 
 import errno
+import html
 import os
 import re
+import shlex
+import shutil
 import socket
 import subprocess
 import sys
@@ -21,6 +24,8 @@ from decals import DecalImage
 from decals.apps.cli import run
 from decals.apps.commands import sandbox as sandbox_module
 from decals.apps.jupyter import TOKEN
+from decals.apps.lab.lesson import LESSONS, Lesson, load_lessons
+from decals.apps.lesson_pages.page import lesson_page
 from decals.editing import AddImage, recovery_path
 from decals.window import EditWindow
 
@@ -57,7 +62,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Server, EditWindow]]:
         pages.append((server, window))
 
     toolkit = (lambda *_, **__: Server()), page
-    monkeypatch.setattr(sandbox_module, "_toolkit", lambda _: toolkit)
+    monkeypatch.setattr(sandbox_module, "_toolkit", lambda *_: toolkit)
     return pages
 
 
@@ -164,11 +169,38 @@ def test_each_session_has_its_own_file(folder: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_a_session_of_the_lab_starts_again_in_the_lab(folder: Path) -> None:
-    command = sandbox_module._commands([], {"lab": True, "lessons": None}, None)
+    command = sandbox_module._commands([], {"lab": True, "lessons": None, "lesson": None}, None)
     first = command(2)
     assert first[4:] == ["--lab", "--save", "scene-2.json", "--port", "0", "--no-browser", "--session"]
     (folder / "scene-2.recovery.json").touch()
     assert command(2) == first
+
+
+def test_the_line_of_a_page_opens_its_lesson(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capture
+) -> None:
+    trame = pytest.importorskip("trame.app")
+    lab_page = pytest.importorskip("decals.apps.lab.page")
+    begun: list[object] = []
+
+    def page(server: Server, window: EditWindow, lessons: list[Lesson], *, begin: int, **_: Any) -> None:
+        begun.append(lessons[begin].name)
+
+    monkeypatch.setattr(lab_page, "LabPage", page)
+    monkeypatch.setattr(trame, "get_server", lambda *_, **__: Server())
+    serving = ["--share", "--no-browser", "--port", "0"]
+    shutil.copytree(LESSONS, folder / "own lessons")
+    for lesson in (load_lessons(LESSONS)[1], load_lessons(folder / "own lessons")[1]):
+        text = lesson_page(lesson).text
+        (line,) = re.findall(r"<pre[^>]*>(implicit-decals sandbox .*?)</pre>", text)
+        assert run([*shlex.split(html.unescape(line))[1:], *serving]) == 0
+    assert run(["sandbox", "--lesson", "3", *serving]) == 0
+    assert run(["sandbox", "--lab", *serving]) == 0
+    assert begun == ["2-two-decals", "2-two-decals", "3-contact-modes", "1-one-decal"]
+    assert run(["sandbox", "--lesson", "x", *serving]) == 2
+    assert "--lesson: expected 1 to 9, or a name such as 1-one-decal, got 'x'" in capsys.readouterr().err
+    assert run(["sandbox", "knot", "--lesson", "1", *serving]) == 2
+    assert "leave out the model" in capsys.readouterr().err
 
 
 def test_a_window_of_its_own_shows_a_session(

@@ -118,7 +118,7 @@ def serve(check: Check, *, lessons: bool = False, **options: Any) -> None:
     def new_page(server: Any, window: EditWindow) -> Page:
         if not lessons:
             return Page(server, window, **options)
-        return LabPage(server, window, load_lessons(LESSONS), **{"in_lesson": False, **options})
+        return LabPage(server, window, load_lessons(LESSONS), **{"begin": None, **options})
 
     async def run(window: EditWindow) -> None:
         server = get_server(f"connections {id(window)}", client_type="vue3")
