@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from blobtree._typing import Float64Array
 from blobtree.files import exists, is_file
 from blobtree.progress import Cancel, Progress
 from blobtree.validation import describe
@@ -213,20 +214,19 @@ class SandboxFiles:
         return self._across(self._window.camera.eye_and_target()[1], pixel)
 
     def put(self, place: object, edge: object = "") -> tuple[ArrayLike | None, float | None]:
-        """Return the middle of a part that is put at a place of the view, and its reach.
+        """Return the middle (3,) of a part that is put at a place of the view, and its reach.
 
         The part reaches to the place of its edge, as far away as its middle. Without one, its reach is None.
         """
         middle, pixel = self.point_at(place), self._pixel_at(edge)
-        end = None if middle is None or pixel is None else self._across(middle, pixel)
-        return middle, None if end is None else float(np.linalg.norm(np.subtract(end, middle))) or None
+        if middle is None or pixel is None or (end := self._across(middle, pixel)) is None:
+            return middle, None
+        return middle, float(np.linalg.norm(end - np.asarray(middle))) or None
 
-    def _across(self, point: ArrayLike, pixel: tuple[float, float]) -> ArrayLike | None:
-        """Return what a pixel shows of the plane through a point that faces the camera."""
-        ray = ray_through(self._window.subplot, *pixel)
-        return (
-            None if ray is None else on_plane(point, np.subtract(*self._window.camera.eye_and_target()), ray)
-        )
+    def _across(self, point: ArrayLike, pixel: tuple[float, float]) -> Float64Array | None:
+        """Return what a pixel shows of the plane through a point that faces the camera, shape (3,)."""
+        ray, (eye, target) = ray_through(self._window.subplot, *pixel), self._window.camera.eye_and_target()
+        return None if ray is None else on_plane(point, np.subtract(eye, target), ray)
 
     def _pixel_at(self, place: object) -> tuple[float, float] | None:
         """Return the pixel at a place of the view, from the lower left; None for other texts."""

@@ -13,6 +13,7 @@ import io
 import re
 import sys
 import tempfile
+import time
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from functools import partial
@@ -1059,6 +1060,80 @@ async def zones(browser: Page, _: Any, window: EditWindow) -> None:
     assert len(np.intersect1d(document.decals.numbers, numbers)) == 80 - len(chosen)
 
 
+async def snowman(picture: str | None = None) -> None:
+    """A snowman with scales, from the start page on, by the screen alone: with a mouse, and with a finger."""
+    for size, touch in ((WIDE, False), ((390, 844), True)):
+        file = Path(tempfile.mkdtemp()) / "snowman.json"
+        async with sandboxed(EMPTY, file, start=True, size=size, touch=touch) as (browser, _, window):
+            await browser.get_by_label("New model").wait_for()
+            began = time.monotonic()
+            clicks = await build_snowman(browser, window, touch=touch)
+            await until(file.exists)
+            print(f"{size[0]} x {size[1]}: {clicks} clicks, {time.monotonic() - began:.0f} s")
+            tree: Any = tree_of(window.document)
+            below, middle, head = tree.children
+            assert below.center[1] + 0.3 * below.radius < middle.center[1] < head.center[1]
+            assert below.radius > middle.radius > head.radius
+            assert len(window.document.decals) == 100
+            if picture is not None and not touch:
+                await browser.keyboard.press("Escape")
+                await shows(browser, window.plotter)
+                await save_picture(browser, Path(picture))
+
+
+async def build_snowman(browser: Page, window: EditWindow, *, touch: bool) -> int:
+    """Build it; the number of clicks, taps and drags."""
+    clicks, plotter = count(), window.plotter
+
+    async def press(found: Any) -> None:
+        """Click or tap on the middle of what is seen."""
+        next(clicks)
+        await browser.wait_for_function(REACHED, arg=await found.element_handle())  # menus and panels slide
+        await (found.tap() if touch else found.click())
+
+    async def stroke(start: tuple[float, float], along: float) -> None:
+        """Drag to the right, from a place that counts from the middle of the view, upward."""
+        next(clicks)
+        box = await browser.locator(PICTURE).first.bounding_box()
+        assert box is not None
+        x, y = start[0], -start[1]
+        if touch:
+            await fingers(browser, *([(x + share * along, y)] for share in (0.0, 0.4, 0.8, 1.0)))
+        else:
+            middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+            await pull(browser, (middle[0] + x, middle[1] + y), (along, 0.0))
+
+    def highest() -> float:
+        """How far above the middle of the view the model ends, in pixels."""
+        width, height = plotter.window_size
+        highest_row = max(y for y in range(int(height)) if window.tools.at(width / 2, y))
+        return highest_row - float(height) / 2
+
+    async def changed(label: str, number: int) -> None:
+        await until(lambda: window.session.labels[-1:] == (label,) and len(window.session.labels) == number)
+        await until(lambda: not window.busy)
+
+    await press(browser.get_by_label("New model"))
+    for number, size in enumerate((0, 62, 46)):
+        await press(browser.get_by_role("button", name="Add", exact=True))
+        if size:
+            await press(browser.get_by_title("place a Point by the mouse"))
+            await stroke((0.0, highest() + 0.2 * size), size)
+        else:
+            rows = browser.locator(".v-overlay--active .v-list-item-title")
+            await press(rows.get_by_text("Point", exact=True))
+        await changed("add Point" if number else "add point 1", number + 1)
+        await shows(browser, plotter)
+    if touch:
+        await press(browser.get_by_label("right panel").first)
+    await press(browser.get_by_role("button", name="Scatter decals"))
+    await changed("scatter", 4)
+    if touch:
+        await press(browser.get_by_label("right panel").first)
+    await press(browser.get_by_role("button", name=re.compile("^save")))
+    return next(clicks)
+
+
 async def filled() -> None:
     """A pull bares a part of the skin: the page counts the places, and one click fills them."""
     scene = decals.cover(BLOB, count=60, images=["tile", "scale"])
@@ -1384,6 +1459,7 @@ def main() -> None:
         "fields": fields,
         "filled": filled,
         "zone": zone,
+        "snowman": snowman,
         "shared": shared,
         "touch": touch,
         "keyboard": keyboard,

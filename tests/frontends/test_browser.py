@@ -58,6 +58,7 @@ def require(*modules: str) -> None:
         "fields",
         "filled",
         "zone",
+        "snowman",
         "shared",
         "keyboard",
     ],
