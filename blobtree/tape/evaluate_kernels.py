@@ -17,6 +17,29 @@ CONVERGED = 1e-6
 STALLED = 1e-4
 """Field error, in units of ISO, below which a step that does not halve it has met float32's rounding."""
 
+GOES_ON, ARRIVED, WORSE = wp.constant(0), wp.constant(1), wp.constant(2)
+"""What comes of a point of `newton_step`."""
+
+
+@wp.func
+def newton_step(
+    f: wp.vec4, gap_before: wp.float32, step: wp.int32, longest_step: wp.float32
+) -> tuple[wp.vec3, wp.int32]:
+    """Return a step of Newton's method for f = ISO from a point with (f, ∇f), and what comes of the point.
+
+    It is GOES_ON, ARRIVED if no step is left to make, or WORSE if rounding took the point away from the
+    surface. `gap_before` is ISO − f at the point before, where `step` > 0.
+    """
+    gap = ISO - f[0]
+    stalled = step > 0 and wp.abs(gap_before) <= STALLED * ISO and wp.abs(gap) > 0.5 * wp.abs(gap_before)
+    if stalled and wp.abs(gap) > wp.abs(gap_before):
+        return wp.vec3(), WORSE
+    g = wp.vec3(f[1], f[2], f[3])
+    steepness = wp.length(g)
+    if stalled or wp.abs(gap) <= CONVERGED * ISO or steepness == 0.0:
+        return wp.vec3(), ARRIVED
+    return g * (wp.clamp(gap / steepness, -longest_step, longest_step) / steepness), GOES_ON
+
 
 @wp.func
 def project_to_surface(
@@ -32,18 +55,15 @@ def project_to_surface(
     q = p
     for step in range(NEWTON_STEPS + 1):  # one call for all steps: a copy of it compiles as long again
         f = field_gradient(q, tape, span)
-        before = gap
-        gap = ISO - f[0]
-        stalled = step > 0 and wp.abs(before) <= STALLED * ISO and wp.abs(gap) > 0.5 * wp.abs(before)
-        if stalled and wp.abs(gap) > wp.abs(before):
+        way, state = newton_step(f, gap, step, longest_step)
+        if state == WORSE:
             break
+        gap = ISO - f[0]
         best = q
         f_best = f
-        g = wp.vec3(f[1], f[2], f[3])
-        steepness = wp.length(g)
-        if stalled or wp.abs(gap) <= CONVERGED * ISO or steepness == 0.0:
+        if state == ARRIVED:
             break
-        q += g * (wp.clamp(gap / steepness, -longest_step, longest_step) / steepness)
+        q += way
     return best, f_best
 
 

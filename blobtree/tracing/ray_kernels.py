@@ -89,6 +89,23 @@ def tape_of_block(block: wp.int32, cells: RayCells) -> wp.vec2i:
 
 
 @wp.func
+def whole_tape(cells: RayCells) -> wp.vec2i:
+    """Return the first texel of the tape of the whole model, and one past its last."""
+    return wp.vec2i(cells.start + 1, cells.start + 1 + int(cells.tape[cells.start][0]))
+
+
+@wp.func
+def tape_at(q: wp.vec3, cells: RayCells) -> wp.vec2i:
+    """Return the span of a tape that gives the field at q: that of the block around q, or the whole one."""
+    if cells.counts[0] == 0:
+        return whole_tape(cells)
+    block = block_at((q - cells.lower) / cells.block_size, cells)
+    if block >= 0:
+        return tape_of_block(block, cells)
+    return whole_tape(cells)
+
+
+@wp.func
 def passed_way(way: wp.float32, t: wp.float32) -> wp.float32:
     """Return t; up to `way` a ray is known to be free of surface.
 

@@ -1,5 +1,6 @@
-"""Tracing cells: the table of blocks that rays read, and the pruned tapes of blocks with surface."""
+"""Tracing cells: the table of blocks that rays and points read, and the pruned tapes of these blocks."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -9,7 +10,7 @@ import warp as wp
 from blobtree._typing import BoolArray, Float32Array, IndexArray, Int32Array
 from blobtree.cells.grid import BRANCHING, Grid, grid_from
 from blobtree.cells.refine_kernels import SURELY_OUTSIDE
-from blobtree.cells.sparse_cells import MIN_CULLED_TEXELS, SparseCells, build_cells
+from blobtree.cells.sparse_cells import MIN_CULLED_TEXELS, Level, SparseCells, build_cells
 from blobtree.device import known_device
 from blobtree.lazy import Lazy
 from blobtree.sized_cache import sized_cache
@@ -32,6 +33,9 @@ BLOCKS_PER_TEXEL = 1.0
 
 MAX_LAYERS = 16
 """Most layers of empty blocks that a ray skips at once."""
+
+MIN_POINT_TEXELS = 20
+"""Length of a tape from which blocks save time at points; a shorter one is read as fast as found."""
 
 WORD = 64
 """Bits of a word; no box has more blocks along its shortest side."""
@@ -183,17 +187,45 @@ def trace_tolerance(bounds: tuple[Float32Array, Float32Array]) -> float:
 @sized_cache(MAX_CELLS_BYTES)
 def _tracing_cells(tape: Tape, lower: Corner, upper: Corner, device: str, blocks: int) -> TracingCells:
     bounds = np.array(lower, np.float32), np.array(upper, np.float32)
-    cells = build_cells(tape, cells_grid(*bounds, blocks), device=device)
-    region, whole = np.split(tape.data, [tape.start])
-    length = np.array([[len(whole), 0.0, 0.0, 0.0]], np.float32)
-    block_size = cells.grid.cell_size * BRANCHING
-    table = block_table(cells, len(whole) + 1, block_counts(*bounds, block_size))
+    grid = cells_grid(*bounds, blocks)
+    cells = build_cells(tape, grid, device=device)
+    table = block_table(cells, len(_whole(tape)), block_counts(*bounds, grid.cell_size * BRANCHING))
+    return _assembled(tape, bounds, grid, table, cells.levels[-1:])
+
+
+def point_cells(tree: ImplicitModel, device: str) -> TracingCells:
+    """Return new cells for points near the surface; a device builds them.
+
+    Every block has a tape: its own if the surface may cross it, or else that of the smallest block around it
+    which the surface may cross. A tape shorter than MIN_POINT_TEXELS has no blocks.
+    """
+    tape, bounds = tree.tape, tree.support
+    grid = cells_grid(*bounds)
+    if len(tape.data) - tape.start < MIN_POINT_TEXELS:
+        return _assembled(tape, bounds, grid, np.zeros((0, 0, 0), np.int32), ())
+    cells = build_cells(tape, grid, device=device)
+    counts = block_counts(*bounds, grid.cell_size * BRANCHING)
+    table = _tape_table(cells, len(_whole(tape)), counts)
+    return _assembled(tape, bounds, grid, table, cells.levels[1:])
+
+
+def _whole(tape: Tape) -> Float32Array:
+    """Return the instructions of a tape behind a texel with their length."""
+    instructions = tape.data[tape.start :]
+    return np.concatenate([np.array([[len(instructions), 0.0, 0.0, 0.0]], np.float32), instructions])
+
+
+def _assembled(
+    tape: Tape, bounds: Corners, grid: Grid, table: Int32Array, levels: Sequence[Level]
+) -> TracingCells:
+    """Return cells with the whole tape and those of some levels, one after the other."""
+    tapes = [level.tape.numpy()[tape.start :] for level in levels]
     return TracingCells(
-        tape=np.concatenate([region, length, whole, cells.leaves.tape.numpy()[tape.start :]]),
+        tape=np.concatenate([tape.data[: tape.start], _whole(tape), *tapes]),
         start=tape.start,
         blocks=table.ravel(),
-        lower=cells.grid.origin.astype(np.float32),
-        block_size=block_size,
+        lower=grid.origin.astype(np.float32),
+        block_size=grid.cell_size * BRANCHING,
         counts=table.shape,
         tolerance=trace_tolerance(bounds),
         instruction_set=tape.instruction_set,
@@ -202,16 +234,40 @@ def _tracing_cells(tape: Tape, lower: Corner, upper: Corner, device: str, blocks
 
 def block_table(cells: SparseCells, shift: int, counts: IndexArray, model: int = 0) -> Int32Array:
     """Return `TracingCells.blocks` for the finest blocks (nx, ny, nz) of a model; tapes move by `shift`."""
-    known = np.full((1, 1, 1), model, np.int32)
-    for number, level in enumerate(cells.levels[1:], 2):
-        x, y, z = -(-counts // BRANCHING ** (len(cells.levels) - number))
-        known = _refined(known, level.children.numpy())[:x, :y, :z]
+    *_, (_leaves, known) = _tables(cells, counts, model)
     crossed, empty = known >= 0, known == SURELY_OUTSIDE
     order = np.argsort(empty.shape)[::-1]
     layers = _layers(empty.transpose(order)).transpose(np.argsort(order))
     blocks = np.where(empty, EMPTY - layers, known)
     blocks[crossed] = cells.leaves.spans.numpy()[known[crossed], 0] - 1 + shift
     return blocks
+
+
+def _tape_table(cells: SparseCells, shift: int, counts: IndexArray) -> Int32Array:
+    """Return for the finest blocks (nx, ny, nz) the texel in front of the tape of the smallest block around.
+
+    The tapes of all levels but the root's lie one after the other; those of the first move by `shift`.
+    """
+    start = cells.tape.start
+    texels = np.full((1, 1, 1), start, np.int32)
+    for level, known in _tables(cells, counts):
+        x, y, z = known.shape
+        for axis in range(3):
+            texels = texels.repeat(BRANCHING, axis)
+        texels = texels[:x, :y, :z]
+        crossed = known >= 0
+        texels[crossed] = level.spans.numpy()[known[crossed], 0] - 1 + shift
+        shift += len(level.tape) - start
+    return texels
+
+
+def _tables(cells: SparseCells, counts: IndexArray, model: int = 0) -> Iterator[tuple[Level, Int32Array]]:
+    """Yield each level below the root of a model with its blocks' entries, see `_refined`."""
+    known = np.full((1, 1, 1), model, np.int32)
+    for number, level in enumerate(cells.levels[1:], 2):
+        x, y, z = -(-counts // BRANCHING ** (len(cells.levels) - number))
+        known = _refined(known, level.children.numpy())[:x, :y, :z]
+        yield level, known
 
 
 def _refined(known: Int32Array, children: Int32Array) -> Int32Array:

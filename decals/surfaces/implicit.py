@@ -15,7 +15,7 @@ from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
 from blobtree.tape.codes import OPERATORS
 from blobtree.tracing.trace import trace
-from blobtree.tracing.tree_cells import device_cells
+from blobtree.tracing.tree_cells import DeviceCells, device_cells, point_cells
 from blobtree.validation import describe, point_array
 from decals.errors import InvalidMesh, InvalidScattering
 from decals.surfaces.curved import CurvedMesh
@@ -218,20 +218,23 @@ class ImplicitSurface(Immutable):
 
 
 class DeviceImplicitSurface:
-    """Tape of a tree, and the coarse mesh from which points start again, on one device."""
+    """Cells of a tree, and the coarse mesh from which points start again, on one device."""
 
     def __init__(
         self, tree: Node, coarse: DeviceMeshSurface, max_step: float, least_way: float = np.inf
     ) -> None:
         self._least_way = least_way
         self.device = coarse.device
-        self._tape = tree.tape.on(self.device)
         self._tree, self._project = tree, tree.tape.instruction_set.kernel_for(project_with_mesh)
         self._coarse, self._max_step = coarse, max_step
 
+    @Lazy
+    def _cells(self) -> DeviceCells:
+        return point_cells(self._tree, self.device).on(self.device)
+
     def project(self, points: Vectors, reaches: Scalars, positions: Vectors, normals: Vectors) -> None:
         """Write the points that Newton's method reaches, and the normals of the field there."""
-        inputs: list[Any] = [self._tape.data, self._tape.span, self._max_step, FIELD_TOLERANCE * ISO]
+        inputs: list[Any] = [self._cells.arrays, self._max_step, FIELD_TOLERANCE * ISO]
         inputs += [*self._coarse.query_inputs, self._least_way, points]
         launch(self._project, len(points), inputs, [positions, normals], device=self.device)
 

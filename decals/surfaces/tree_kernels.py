@@ -8,9 +8,9 @@ import warp as wp
 from blobtree.cells.refine_kernels import SURELY_INSIDE
 from blobtree.formulas.falloff import ISO
 from blobtree.kernels import KERNEL_OPTIONS
-from blobtree.tape.evaluate_kernels import project_to_surface
-from blobtree.tape.interpreter import field_value
-from blobtree.tracing.ray_kernels import RayCells, block_at, tape_of_block
+from blobtree.tape.evaluate_kernels import ARRIVED, NEWTON_STEPS, WORSE, newton_step, project_to_surface
+from blobtree.tape.interpreter import field_gradient, field_value
+from blobtree.tracing.ray_kernels import RayCells, block_at, tape_at, tape_of_block
 
 wp.set_module_options(KERNEL_OPTIONS)
 
@@ -23,6 +23,27 @@ OFFSETS = wp.constant(6)
 def has_converged(f: wp.vec4, tolerance: wp.float32) -> wp.bool:
     """Return True if a point with this field and gradient lies on the surface and has a normal."""
     return wp.abs(f[0] - ISO) <= tolerance and wp.length_sq(wp.vec3(f[1], f[2], f[3])) > 0.0
+
+
+@wp.func
+def project_in_cells(p: wp.vec3, longest_step: wp.float32, cells: RayCells) -> tuple[wp.vec3, wp.vec4]:
+    """Return what `project_to_surface` returns; each step reads the tape of its cell."""
+    best = p
+    f_best = wp.vec4()
+    gap = float(0.0)
+    q = p
+    for step in range(NEWTON_STEPS + 1):
+        f = field_gradient(q, cells.tape, tape_at(q, cells))
+        way, state = newton_step(f, gap, step, longest_step)
+        if state == WORSE:
+            break
+        gap = ISO - f[0]
+        best = q
+        f_best = f
+        if state == ARRIVED:
+            break
+        q += way
+    return best, f_best
 
 
 @wp.kernel
@@ -49,8 +70,7 @@ def project(
 @wp.kernel
 def project_with_mesh(
     first: wp.int32,
-    tape: wp.array(dtype=wp.vec4),
-    span: wp.vec2i,
+    cells: RayCells,
     max_step: wp.float32,
     tolerance: wp.float32,
     mesh: wp.uint64,
@@ -79,7 +99,7 @@ def project_with_mesh(
     mesh_normal = wp.vec3()
     nearest = wp.where(least_way == wp.inf, least_way, max_step)
     for turn in range(2 + 2 * OFFSETS):  # one call for all starts: a copy of it compiles as long again
-        q, f = project_to_surface(start, max_step, tape, span)
+        q, f = project_in_cells(start, max_step, cells)
         found = has_converged(f, tolerance)
         if turn == 0:
             p = q

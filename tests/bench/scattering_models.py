@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from blobtree import Node, Point, polygonize
+from blobtree import Node, Point, Sum, polygonize
 from decals.surfaces import ImplicitSurface, MeshSurface
+from tests.bench.blobtree import blobs
 
 
 def bumpy() -> Node:
@@ -23,6 +24,7 @@ def bumpy() -> Node:
 TREES: dict[str, Callable[[], list[Node]]] = {
     "bumpy": lambda: [bumpy()],
     "sphere": lambda: [Point((0, 0, 0), radius=1.0)],
+    "balls": lambda: [Sum(blobs(1000))],
     "touching": lambda: [Point((-1, 0, 0), radius=1.0), Point((1, 0, 0), radius=1.0)],
 }
 

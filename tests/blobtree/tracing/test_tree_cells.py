@@ -7,15 +7,23 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_cdt
 
-from blobtree import ISO, Box, Node, Point, Repeat, Tape
+from blobtree import ISO, Box, Node, Point, Repeat, Sum, Tape
 from blobtree._typing import Int32Array
 from blobtree.cells.refine_kernels import SURELY_INSIDE
 from blobtree.sized_cache import SizedCache
 from blobtree.tape.codes import PUSH, STRETCHED, UNWARP, WARP
-from blobtree.tape.model import values_at
+from blobtree.tape.model import gradients_at, values_at
 from blobtree.tracing import tree_cells
 from blobtree.tracing.ray_kernels import EMPTY
-from blobtree.tracing.tree_cells import BLOCKS_ALONG, MAX_LAYERS, TracingCells, device_cells, tracing_cells
+from blobtree.tracing.tree_cells import (
+    BLOCKS_ALONG,
+    MAX_LAYERS,
+    MIN_POINT_TEXELS,
+    TracingCells,
+    device_cells,
+    point_cells,
+    tracing_cells,
+)
 from tests.blobtree.tape.test_tape import instructions
 from tests.blobtree.trees import random_trees
 from tests.oracles import blobtree as oracle
@@ -94,6 +102,40 @@ def test_empty_layers_match_the_chessboard_distance(name: str | int) -> None:
     blocks = table(tracing_cells(TREES[name], device="cpu"))
     assert_empty_layers(blocks)
     assert blocks.min() < EMPTY
+
+
+def crowd(count: int) -> Node:
+    rng = np.random.default_rng(count)
+    return Sum(Point(center, radius=0.2) for center in rng.uniform(-1.0, 1.0, (count, 3)))
+
+
+@pytest.mark.parametrize("tree", [crowd(60), crowd(300), *random_trees(seed=53, count=10)], ids=range(12))
+def test_each_block_of_points_gives_the_field_of_the_whole_tree(tree: Node) -> None:
+    """Bit for bit: a point that is projected by pruned tapes comes to the same place."""
+    cells = point_cells(tree, "cpu")
+    if len(tree.tape.data) - tree.tape.start < MIN_POINT_TEXELS:
+        assert cells.counts == (0, 0, 0)
+        return
+    blocks = table(cells)
+    assert (blocks >= cells.start).all()
+    rng = np.random.default_rng(0)
+    places = rng.uniform(0.0, cells.counts, (20_000, 3))
+    points = (cells.lower + places * cells.block_size).astype(np.float32)
+    known = blocks[tuple(places.astype(int).T)]
+    for texel in np.unique(known)[:: max(1, len(np.unique(known)) // 100)]:
+        here = points[known == texel]
+        part = pruned(cells, texel, tree.tape)
+        np.testing.assert_array_equal(values_at(part, here), values_at(tree.tape, here))
+        np.testing.assert_array_equal(gradients_at(part, here), gradients_at(tree.tape, here))
+
+
+def test_blocks_of_points_without_surface_have_tapes_of_blocks_around_them() -> None:
+    tree = crowd(300)
+    of_points, of_rays = point_cells(tree, "cpu"), tracing_cells(tree, device="cpu")
+    empty = table(of_rays) <= EMPTY
+    lengths = of_points.tape[table(of_points)[empty], 0]
+    assert np.median(lengths) < 0.2 * (len(tree.tape.data) - tree.tape.start)
+    assert len(np.unique(lengths)) > 4
 
 
 def test_blocks_cover_the_box_of_the_tree() -> None:

@@ -4,11 +4,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blobtree import ISO, Box, Disc, Intersection, Node, Point, Repeat, Segment, SolidContact, Union
+from blobtree import ISO, Box, Disc, Intersection, Node, Point, Repeat, Segment, SolidContact, Sum, Union
 from decals import scatter
 from decals.errors import InvalidMesh, InvalidPoints
 from decals.surfaces import ImplicitSurface, Surface
-from decals.surfaces.implicit import project_without_mesh
+from decals.surfaces.implicit import FIELD_TOLERANCE, MAX_STEP, project_without_mesh
+from tests.blobtree.tape.evaluations import project
 from tests.vectors import random_units
 
 
@@ -59,6 +60,23 @@ def test_straight_onto_the_surface_is_the_same_without_a_mesh() -> None:
     assert far is not None
     assert np.abs(tree(far[0]) - 0.5).max() < 1e-4
     assert np.allclose(np.linalg.norm(far[1], axis=1), 1, atol=1e-5)
+
+
+@pytest.mark.parametrize("count", [2, 8, 200])
+def test_points_come_to_the_places_to_which_the_whole_tree_leads(count: int) -> None:
+    rng = np.random.default_rng(count)
+    tree = Sum(Point(center, radius=0.3) for center in rng.uniform(-1.0, 1.0, (count, 3)))
+    surface = ImplicitSurface(tree, resolution=32)
+    points = surface.sample(4000, seed=1)[0]
+    points = (points + rng.normal(0.0, 0.02, points.shape)).astype(np.float32)
+    low, high = tree.support
+    longest = MAX_STEP * float((high - low).max()) / 32
+    expected, normals = project(tree.tape, points, longest)
+    reached = np.abs(tree(expected) - ISO) < FIELD_TOLERANCE * ISO
+    assert reached.mean() > 0.99
+    found, found_normals = surface.project(points)
+    np.testing.assert_array_equal(found[reached], expected[reached])
+    np.testing.assert_array_equal(found_normals[reached], normals[reached])
 
 
 def test_what_does_not_lead_straight_onto_the_surface_is_said() -> None:
