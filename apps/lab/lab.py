@@ -84,6 +84,9 @@ class Lab:
         self._titles = [{"title": f"{i + 1}. {title}", "value": i} for i, title in enumerate(titles)]
         self._texts = [document(lesson.text) for lesson in lessons]
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="lab")
+        self._stepper = ThreadPoolExecutor(1, thread_name_prefix="relaxation")
+        self._steps: tuple[Recording, Future[int]] | None = None
+        self._starts, self._coming = 0, False
         self._pending: Future[Results] | None = None
         self._results: Results | None = None
         self._asked: object = None
@@ -197,6 +200,8 @@ class Lab:
 
     def refresh(self) -> None:
         """Go on with what is under way; call this regularly."""
+        if self._coming and self._window.background.busy_editing:
+            return
         self._follow_size()
         if self._recording is not None and self._step != self._target:
             self._relax(self._recording)
@@ -233,7 +238,8 @@ class Lab:
 
     def close(self) -> None:
         """End the thread."""
-        self._worker.shutdown(cancel_futures=True)
+        for threads in (self._worker, self._stepper):
+            threads.shutdown(cancel_futures=True)
 
     # -- events -----------------------------------------------------------------------------------------
 
@@ -254,7 +260,10 @@ class Lab:
         settings = lesson.settings
         self._window.actions.state.end_stroke()
 
+        before = self._starts
+
         def started() -> None:
+            self._starts, self._coming = before + 1, False
             if not window.actions.files.is_aside:
                 window.session.mark_saved()  # a lesson without edits needs no recovery
             self._number, self._asked, self._asking = number, None, False
@@ -275,6 +284,11 @@ class Lab:
         begin = begin if puzzle is None else puzzle.sized(begin)
         scene = begin.replace(drawing=window.document.drawing.overridden(**modes))
         window.actions.state.run(ReplaceScene(scene, f"lesson: {settings.title}"), started)
+        if self._starts == before:  # a thread builds surfaces first; the text is shown meanwhile
+            self._number, self._guess, self._coming = number, guess, True
+            self._results = self._pending = self._recording = None
+            self._step = self._target = 0
+            self.begun = window.session.changes + 1 if guess is None else self.begun
 
     def _frame(self) -> None:
         """Show the lesson as its camera does, and all of it in a narrow view."""
@@ -341,8 +355,14 @@ class Lab:
         self._mark_probe()
 
     def _relax(self, recording: Recording) -> None:
-        """Show the step that was asked for, or the last one that is known in time."""
-        self._step = recording.advance(self._target, STEPPING_SECONDS)
+        """Show the step that was asked for, or the last one that a thread knows in time."""
+        if self._steps is None or self._steps[0] is not recording:
+            steps = self._stepper.submit(recording.advance, self._target, STEPPING_SECONDS)
+            self._steps = recording, steps
+        if not self._steps[1].done():
+            return
+        (_, steps), self._steps = self._steps, None
+        self._step = min(steps.result(), self._target)
         numbers, decals = self.numbers, self._window.document.decals
         moved = move_decals(decals.take(np.array(numbers)), recording.points(self._step))
         arrays = {name: getattr(moved, name) for name in ("positions", "normals", "tangents")}

@@ -302,10 +302,13 @@ class ActionState:
         """Return a context in which threads alone compile kernels, if there are any."""
         return without_compiling() if self.background.threaded else nullcontext()
 
-    def asked(self, label: str, question: Callable[[Document], Answer]) -> Answer | None:
+    def asked(
+        self, label: str, question: Callable[[Document], Answer], *, quiet: bool = False
+    ) -> Answer | None:
         """Return the answer to a question about the document.
 
-        It is None if kernels must be compiled for it first. A thread does so, and a message says so.
+        It is None if kernels must be compiled for it first. A thread does so, and a message says so, unless
+        the question is asked again by itself (`quiet`).
         """
         try:
             with self._promptly():
@@ -313,7 +316,8 @@ class ActionState:
         except NotCompiled:
             fork = self.session.document.fork()
             self.background.prepare(label, lambda: question(fork))
-            self.show(COMPILING)
+            if not quiet:
+                self.show(COMPILING)
             return None
 
     def draw_with(self, label: str, *, last: bool = True, **options: Any) -> None:

@@ -18,6 +18,7 @@ from decals.model import LAYER_LIMIT, NO_IMAGE, Decals, Interaction
 from decals.options import inherit_descriptions
 from decals.rendering.options import Drawing
 from decals.scenes.camera import Camera
+from decals.scenes.objects import surface_is_known
 from decals.scenes.scene import DecalImage, Scene
 from decals.surfaces.surface import unit_rows
 from decals.validation import called, color_values, instance, whole_number
@@ -405,6 +406,11 @@ class ReplaceScene(EditCommand):
     scene: Scene
     label: str = "replace the scene"
     ignores_locks: ClassVar[bool] = True
+
+    @property
+    def long(self) -> bool:
+        """True if surfaces are to be built first; see `decals.editing.session.takes_long`."""
+        return not all(surface_is_known(item) for item in getattr(self.scene, "objects", ()))
 
     def compute(self, document: Document) -> Edit:
         """Return the edit."""

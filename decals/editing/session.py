@@ -518,7 +518,8 @@ class Fork(EditSession):
         return sum(len(states.numbers) for states, _ in self.applied) <= MAX_REPLAYED_DECALS
 
     def prepare(self, *, surfaces: bool) -> None:
-        """Build what the origin would have to build after `adopt`: the decal index, and surfaces."""
+        """Build what the origin would have to build after `adopt`: the decal index, kernels and surfaces."""
+        self.document.decals.load_kernels()
         if not self.small:
             self.document.decals.index  # noqa: B018  (the index is built on access)
         if surfaces:

@@ -64,9 +64,15 @@ class EditableIndex:
         """Number of levels."""
         return len(self._level_of)
 
-    def load_kernels(self) -> None:
-        """Load the kernels of the next change, so that a missing one raises before anything changes."""
-        load_together(BUILD_KERNELS if self.stale else EDIT_KERNELS, "cpu")
+    def load_kernels(self, *, ahead: bool = False) -> None:
+        """Load the kernels of the next change, so that a missing one raises before anything changes.
+
+        With `ahead`, load those of all changes.
+        """
+        if ahead or self.stale:
+            load_together(BUILD_KERNELS, "cpu")
+        if ahead or not self.stale:
+            load_together(EDIT_KERNELS, "cpu")
 
     def build(self, records: Float32Array, numbers: Int64Array, log: ChangeLog) -> bool:
         """Build the index of the decals of these numbers anew.

@@ -247,6 +247,10 @@ class DecalEditor:
         if not self._index.stale:
             self._index.check_nesting(self._rows.records, self.next_number)
 
+    def load_kernels(self) -> None:
+        """Load the kernels of all changes, so that none of them waits for a compilation."""
+        self._index.load_kernels(ahead=True)
+
     # -- changes ----------------------------------------------------------------------------------------
 
     @property

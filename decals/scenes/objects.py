@@ -293,6 +293,11 @@ def same_shape(item: SceneObject, other: SceneObject) -> bool:
     )
 
 
+def surface_is_known(item: SceneObject) -> bool:
+    """Return True if the surface of an object has been computed; that of a mesh always has."""
+    return not isinstance(item, TreeObject) or "surface" in vars(item)
+
+
 def forget_surface(item: SceneObject) -> None:
     """Drop what was computed for a tree's surface, some megabytes; it is computed again when needed."""
     if isinstance(item, TreeObject):

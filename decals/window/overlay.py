@@ -13,8 +13,8 @@ from vtkmodules.vtkInteractionWidgets import vtkSphereWidget
 
 from blobtree._typing import Float32Array, Float64Array
 from blobtree.nodes.paths import Path, node_in_world
+from decals.editing.action_state import ActionState
 from decals.editing.actions import KEYS, Actions
-from decals.editing.document import Document
 from decals.editing.queries import ANGLES, outlines
 from decals.field.mapping import ImageMapping
 from decals.field.rules import AnyContact
@@ -63,6 +63,8 @@ class Overlay:
     ----------
     plotter
         The plotter; its active subplot shows the overlay.
+    state
+        State of the window.
     draw_scale
         Returns the size of the surface's frame over that of the window.
 
@@ -76,8 +78,11 @@ class Overlay:
         True while a slider of a page moves: outlines, which take longer than a frame, follow at its end.
     """
 
-    def __init__(self, plotter: pv.BasePlotter, draw_scale: Callable[[], float] = lambda: 1.0) -> None:
+    def __init__(
+        self, plotter: pv.BasePlotter, state: ActionState, draw_scale: Callable[[], float] = lambda: 1.0
+    ) -> None:
         self._plotter: Any = plotter
+        self._state = state
         self._draw_scale = draw_scale
         self._renderer: Any = plotter.renderer
         self.moving = False
@@ -118,23 +123,31 @@ class Overlay:
 
     def outline(
         self,
-        document: Document,
         numbers: tuple[int, ...],
         nodes: Sequence[tuple[int, Path]],
         contact: AnyContact,
         mapping: ImageMapping,
     ) -> None:
-        """Outline the visible parts of decals, else nodes by the boxes around their own surfaces."""
+        """Outline the visible parts of decals, else nodes by the boxes around their own surfaces.
+
+        The outlines of decals follow later if kernels must be compiled for them first.
+        """
+        document = self._state.session.document
         drawn = (document.decals.version, numbers, contact, mapping) if numbers else nodes
         key = (document.objects, drawn) if drawn else ()
         if key == self._outlined:
             return
-        self._outlined = key
         last = numbers[-MAX_OUTLINES:]
         angles = ANGLES if len(last) == 1 else ANGLES // 2
-        lines = (
-            list(outlines(document, last, contact=contact, mapping=mapping, angles=angles)) if last else []
-        )
+        modes: dict[str, Any] = {"contact": contact, "mapping": mapping, "angles": angles}
+        lines: list[Any] | None = []
+        if last:
+            lines = self._state.asked(
+                "outline", lambda asked: list(outlines(asked, last, **modes)), quiet=True
+            )
+        if lines is None:
+            return
+        self._outlined = key
         if not last:
             trees = [(document.objects[number], path) for number, path in nodes]
             lines = [

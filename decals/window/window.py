@@ -175,7 +175,7 @@ class EditWindow:
             self._is_occluded,
             lambda points: pixels_of(self.subplot, points),
         )
-        self.overlay = Overlay(self.plotter, lambda: self.subplot.draw_scale)
+        self.overlay = Overlay(self.plotter, self.actions.state, lambda: self.subplot.draw_scale)
         self.handle = PrimitiveHandle(
             self.subplot.vtk_renderer,
             self.actions,
@@ -275,7 +275,7 @@ class EditWindow:
             self.handle.update()
         state = self.actions.state
         outlined = ((), ()) if dragging else (state.selection, state.nodes)  # outlines take longer
-        self.overlay.outline(self.document, *outlined, self.subplot.contact, self.subplot.shown_mapping)
+        self.overlay.outline(*outlined, self.subplot.contact, self.subplot.shown_mapping)
         self.actions.help_pages = self.overlay.show_help(self.actions.help_page)
         self.overlay.show_status(self._status())
         self._host.set_title(self.session.title_of(self.actions.files.path))

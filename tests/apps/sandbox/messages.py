@@ -12,7 +12,9 @@ browsers are alive: on a busy machine they would seem dead.
 
 They also say for how long the server's loop did not return to its other tasks: time on the clock, which other
 work on the machine lengthens, and processor time of the loop's thread. Those with most of that are listed
-with the last message, the mode of the view, and the place in the program at which they were late.
+with the last message, the mode of the view, and the place in the program at which they were late. Places at
+which that thread loads kernels are listed too, and each counts as a failure: it would wait for their
+compilation on a machine that has none.
 """
 
 import argparse
@@ -43,6 +45,7 @@ from decals.editing import KEYS
 from decals.window import EditWindow
 from tests.apps.sandbox.attacks import Server
 from tests.apps.sandbox.browsers import CALLS, SIZE, Browser, Connect, serve
+from tests.apps.sandbox.kernel_waits import KernelWaits, kernel_waits
 from tests.apps.sandbox.misuse import ask_as_stranger, random_steps
 from tests.decals.editing.scenes import digest
 from tests.endurance import growth, kept_megabytes
@@ -268,13 +271,23 @@ class Messages:
         Seed of the messages.
     shared
         The browsers share the page.
+    waits
+        Notes where the server's loop loads kernels.
     """
 
     def __init__(
-        self, window: EditWindow, page: Any, connect: Connect, folder: Path, seed: int, *, shared: bool
+        self,
+        window: EditWindow,
+        page: Any,
+        connect: Connect,
+        folder: Path,
+        seed: int,
+        *,
+        shared: bool,
+        waits: KernelWaits,
     ) -> None:
         self._window, self._page, self._connect = window, page, connect
-        self._folder, self._shared = folder, shared
+        self._folder, self._shared, self._waits = folder, shared, waits
         self._rng = random.Random(f"{seed}:{shared}")
         guard, port = page.guard, page._server.port
         nothing: Any = None
@@ -334,6 +347,7 @@ class Messages:
             **summary("clock", self._watch.clock),
             **summary("busy", self._watch.busy),
             "longest_pauses": [asdict(pause) for pause in longest[:LISTED_PAUSES]],
+            "kernel_waits": self._waits.places,
         }
 
     def _saved(self) -> tuple[str, bytes]:
@@ -561,9 +575,10 @@ def measure(
             import_ahead()
             loop = asyncio.get_running_loop()
             loop.set_exception_handler(lambda _, context: errors.append(repr(context)))
-            figures.update(
-                await Messages(window, page, connect, folder, seed, shared=shared).run(part, report)
-            )
+            waits.noting = True
+            messages = Messages(window, page, connect, folder, seed, shared=shared, waits=waits)
+            figures.update(await messages.run(part, report))
+            waits.noting = False
 
         serve(check, lessons=True, folder=folder, shared=shared)
         return figures
@@ -571,7 +586,11 @@ def measure(
     noted = Noted(logging.ERROR)
     logging.getLogger().addHandler(noted)
     try:
-        with tempfile.TemporaryDirectory() as name, patch.dict(os.environ, WSLINK_HEART_BEAT="0"):
+        with (
+            tempfile.TemporaryDirectory() as name,
+            patch.dict(os.environ, WSLINK_HEART_BEAT="0"),
+            kernel_waits() as waits,
+        ):
             figures = send(count - shared_count, Path(name), shared=False)
             others = send(shared_count, Path(name), shared=True)
     finally:
@@ -585,7 +604,7 @@ def measure(
 def faults(figures: dict[str, Any]) -> int:
     """Return the number of failures among the figures of a run."""
     counts: list[int] = [figures[name] for name in ("errors", "unanswered", "intrusions", "lost")]
-    return sum(counts) + (not figures["restored"])
+    return sum(counts) + (not figures["restored"]) + len(figures["kernel_waits"])
 
 
 def main() -> int:
