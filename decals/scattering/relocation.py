@@ -59,7 +59,7 @@ class Relocation:
         self._domain, self._sizes_at = domain, sizes_at
         self._points: OrientedPoints | None = None
         self._sizes: Float32Array | None = None
-        self._thin: BoolArray | None = None
+        self._thin: tuple[Any, BoolArray] | None = None
         self._next = 0
 
     def __call__(self, state: ParticleState, restore: Callable[[ParticleState], None]) -> Int64Array:
@@ -68,20 +68,20 @@ class Relocation:
         if len(movers) == 0:
             return movers
         restore(state)
-        candidates, sizes = self._next_batch(len(movers), state.count)
+        points, sizes = self._drawn(state.count)
+        rows = self._next_batch(len(movers), len(points))
         if self._domain.has_thin_parts:
-            thick = np.flatnonzero(~self._on_thin_parts(candidates.positions, state.count))
-            candidates, sizes = candidates[thick], sizes[thick]
-            movers = movers[~self._on_thin_parts(state.positions.numpy()[movers], state.count)]
-        return relocate(state, movers, candidates, sizes)
+            tree, thin = self._thin_points(state.count)
+            rows = rows[~thin[rows]]
+            movers = movers[~thin[tree.query(state.positions.numpy()[movers])[1]]]
+        return relocate(state, movers, points[rows], sizes[rows])
 
-    def _next_batch(self, mover_count: int, count: int) -> tuple[OrientedPoints, Float32Array]:
-        """Return enough points for some movers of `count` particles, and the spacings there."""
-        points, sizes = self._drawn(count)
-        batch_size = min(len(points), CANDIDATES_PER_MOVER * mover_count + 1000)
-        rows = (self._next + np.arange(batch_size)) % len(points)
-        self._next = (self._next + batch_size) % len(points)
-        return points[rows], sizes[rows]
+    def _next_batch(self, mover_count: int, count: int) -> Int64Array:
+        """Return the rows, of `count` points, of enough candidates for some movers."""
+        batch_size = min(count, CANDIDATES_PER_MOVER * mover_count + 1000)
+        rows = (self._next + np.arange(batch_size)) % count
+        self._next = (self._next + batch_size) % count
+        return rows
 
     def _drawn(self, particles: int) -> tuple[OrientedPoints, Float32Array]:
         """Return the candidates for so many particles, and the spacings there."""
@@ -92,21 +92,21 @@ class Relocation:
             self._sizes = self._sizes_at(self._points.positions)
         return self._points, self._sizes
 
-    def _on_thin_parts(self, positions: Float32Array, count: int) -> BoolArray:
-        """Return True for positions on parts thinner than `count` particles lie apart.
+    def _thin_points(self, count: int) -> tuple[Any, BoolArray]:
+        """Return a tree of all candidates, and True for those on parts thinner than particles lie apart.
 
         Particles neither come nor leave there. Their distances say nothing: those of the right number of
         particles on a hair are far larger than a spacing.
         """
-        from scipy.spatial import cKDTree  # most domains have no thin parts
-
-        points, sizes = self._drawn(count)
-        tree = cKDTree(points.positions)
         if self._thin is None:
-            nearby = tree.query_ball_point(points.positions, THIN_REACH * sizes, return_length=True)
+            from scipy.spatial import cKDTree  # most domains have no thin parts
+
+            points, sizes = self._drawn(count)
+            tree, radii = cKDTree(points.positions), THIN_REACH * sizes
+            nearby = tree.query_ball_point(points.positions, radii, return_length=True, workers=-1)
             flat = len(points) / count * np.pi * THIN_REACH**2 / (0.5 * np.sqrt(3.0))
-            self._thin = nearby < THIN_SHARE * flat
-        return np.asarray(self._thin[tree.query(positions)[1]], np.bool_)
+            self._thin = tree, np.asarray(nearby < THIN_SHARE * flat, np.bool_)
+        return self._thin
 
 
 def crowded_particles(state: ParticleState) -> Int64Array:
