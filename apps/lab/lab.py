@@ -14,6 +14,7 @@ import msgspec
 import numpy as np
 import pyvista as pv
 
+from decals.apps.lab import sketches
 from decals.apps.lab.bindings import AXES, MODES, binding
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Scope
@@ -145,6 +146,8 @@ class Lab:
         if results.key != self._key() or not (right or self._asked == results.key):
             right, text = False, ""
         guess = msgspec.to_builtins(lesson.settings.guess) or {}
+        if guess.get("sketch"):
+            guess["pad"] = sketches.pad(lesson)
         return {
             "lab_titles": self._titles,
             "lab_number": self._number,
@@ -421,6 +424,7 @@ def measured(
         truth = float(np.ravel(lesson.formulas[asked.truth].evaluate(scope))[0])
         compared = {"ends": [guess, truth if np.isfinite(truth) else None]}
         compared |= {"texts": [shown(guess), shown(truth)], "why": lesson.filled(asked.why, scope)}
+        compared["cells"] = sketches.truth(lesson, experiment, asked.outline) if asked.sketch else []
     numbers = (lesson.formulas[score.formula].evaluate(scope) for score in lesson.settings.scores)
     scores = tuple(float(np.ravel(number)[0]) for number in numbers)
     return Results(key, lesson.verdict(scope), values, plots, done, compared, scores, table(rows))

@@ -104,7 +104,10 @@ class Question(Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Guess(Struct, forbid_unknown_fields=True, frozen=True):
-    """A number to guess before contact is switched on, the formula of its true value, and an explanation."""
+    """A number to guess before contact is switched on, the formula of its true value, and an explanation.
+
+    With a text for a sketch, students may also draw an outline: the truth is where its formula is not 0.
+    """
 
     text: str
     label: str
@@ -113,6 +116,8 @@ class Guess(Struct, forbid_unknown_fields=True, frozen=True):
     low: float = 0.0
     high: float = 1.0
     step: float = 0.01
+    sketch: str = ""
+    outline: str = ""
 
 
 class Score(Struct, forbid_unknown_fields=True, frozen=True):
@@ -365,6 +370,8 @@ def _formulas(settings: Settings) -> Iterator[tuple[str, str, set[str]]]:
         yield f"question.checks[{i}]", check.holds, set()
     if settings.guess is not None:
         yield "guess.truth", settings.guess.truth, set()
+        if settings.guess.sketch or settings.guess.outline:
+            yield "guess.outline", settings.guess.outline, set()
 
 
 def _texts(settings: Settings) -> Iterator[tuple[str, str]]:

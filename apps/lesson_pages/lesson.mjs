@@ -2,6 +2,7 @@
 import { History } from "../../decals/pages/viewer/history.mjs";
 import { add, scaled, unit } from "../../decals/pages/viewer/vectors.mjs";
 import { mountOver } from "../../decals/pages/viewer/viewer.mjs";
+import { compared, draw, keep } from "../sandbox/sketch.mjs";
 import { send } from "./answers.mjs";
 import { Measures } from "./measures.mjs";
 import { drawCurves, drawMap } from "./plots.mjs";
@@ -40,7 +41,13 @@ class LessonPage {
     );
     on("[name=skip]", "click", () => this.see(null));
     on(".send", "submit", (form) => send(this, form));
-    on("form.guess", "submit", (form) => this.see(Number(form.guess.value)));
+    on("form.guess", "submit", (form) => {
+      keep(form);
+      this.see(Number(form.guess.value));
+    });
+    ["pointerdown", "pointermove"].forEach((name) =>
+      root.querySelector(".pad")?.addEventListener(name, draw),
+    );
     this.listenToProbe();
     viewer.on("view", () => this.showProbe());
     viewer.on("decals", () => this.changed());
@@ -210,7 +217,19 @@ class LessonPage {
     const said = value(failed < 0 ? live.right : this.tried ? live.checks[failed].otherwise : () => "");
     if (verdict.innerHTML !== said) verdict.innerHTML = said;
     this.tried = false; // another state has another answer
-    root.querySelector(".seen").innerHTML = this.guess === null ? "" : value(live.seen);
+    root.querySelector(".seen").innerHTML = this.guess === null ? "" : value(live.seen) + this.sketched();
+  }
+
+  // What stands under guess and truth: the outline that was drawn, above what is so now, and their difference.
+  sketched() {
+    const { live, lesson, measures: m, root } = this;
+    if (!lesson.half) return "";
+    const isTrue = (point) => point.exists > 0 && Boolean(live.outline(m, point));
+    const found = compared(() => m.onPad(lesson.half).map(isTrue), lesson.half);
+    if (!found) return "";
+    const pad = root.querySelector("form .pad svg").outerHTML.replace(/<polygon[^]*/, `${found.parts}</svg>`);
+    const said = lesson.words.sketched.replace("{difference}", m.say(100 * found.difference));
+    return `<div class="pad" role="img" aria-label="${said}">${pad}</div><p data-difference>${said}</p>`;
   }
 
   // Show the symbols at the probe, for the decal that shows and for its strongest neighbour.

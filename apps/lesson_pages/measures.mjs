@@ -98,6 +98,12 @@ export class Measures {
 
   // The points that pixels of a map show, row by row from the lowest; those that the surface has; points of the line.
   map = () => (this.known.map ??= this.read(this.view(), SIDE, SIDE));
+  // The points of a part of the map around its middle, row by row from the top.
+  onPad(half) {
+    const rows = this.read({ ...this.view(), half }, SIDE, SIDE);
+    return rows.map((_, i) => rows[(SIDE - 1 - Math.floor(i / SIDE)) * SIDE + (i % SIDE)]);
+  }
+
   surface = () => (this.known.surface ??= this.map().filter((point) => point.exists));
   curve = () => (this.known.curve ??= this.along(SAMPLES));
 

@@ -19,6 +19,7 @@ from decals.apps.lab.lesson import LESSONS, Guess, Lesson, Plot, Slider, Value
 from decals.apps.lab.measures import MEASURES
 from decals.apps.lab.plots import COLORS, DASHES, SCALE, viridis
 from decals.apps.lab.script import script as python_lines
+from decals.apps.lab.sketches import pad
 from decals.apps.lab.symbols import SYMBOL, document, marked, regions, styles
 from decals.apps.lesson_pages.code import (
     FORMS,
@@ -41,6 +42,8 @@ from decals.scenes.scene import Scene
 from decals.shaders import compose
 
 FILES = Path(__file__).parent
+SKETCH = FILES.parent / "sandbox" / "sketch.mjs"
+"""The module of sketches, which the contact lab has, too."""
 MODULES = "measures", "plots", "puzzles", "answers", "lesson"
 """Modules of a lesson, each after those that it imports."""
 
@@ -157,7 +160,9 @@ def no_page(lesson: Lesson) -> str | None:
 def lesson_script() -> str:
     """Return the viewer with the modules of lessons, as one ES module."""
     return viewer_script(
-        *((FILES / f"{name}.mjs").read_text(encoding="utf-8") for name in MODULES), name="begin"
+        SKETCH.read_text(encoding="utf-8"),
+        *((FILES / f"{name}.mjs").read_text(encoding="utf-8") for name in MODULES),
+        name="begin",
     )
 
 
@@ -204,6 +209,7 @@ def _record(lesson: Lesson, words: Translation, table: Table | None) -> dict[str
         "table": table.values if table else {},
         "colors": viridis(np.linspace(0.0, 1.0, COLORS_OF_MAP)).astype(int).tolist(),
         "guess": settings.guess is not None,
+        "half": pad(lesson)["half"] if settings.guess and settings.guess.sketch else None,
         "words": words.page,
         "shader": compose("page_measures.frag", version=None).text.replace(
             "decal_surface_receivers", f"{PREFIX}surface_receivers"
@@ -262,6 +268,7 @@ def _live(lesson: Lesson, words: Translation, table: Table | None) -> dict[str, 
         "checks": [{"holds": value(check.holds), "otherwise": text(check.otherwise)} for check in checks],
         "right": text(settings.question.right),
         "seen": guess and seen(guess),
+        "outline": guess and guess.sketch and value(guess.outline),
         "plots": [plotted(plot) for plot in _plots(lesson)],
         "sliders": [access(slider.path) for slider in settings.sliders],
     }
@@ -301,9 +308,18 @@ def _markup(
         for i, c in enumerate(settings.question.checks)
         if c.task
     )
+    sketch = (
+        guess
+        and guess.sketch
+        and (
+            f'<p>{text(guess.sketch)}</p><div class="pad" role="img" '
+            f'aria-label="{html.escape(words.said(guess.sketch))}">{pad(lesson)["picture"]}</div>'
+        )
+    )
     form = guess and (
-        f'<form class="guess"><p>{text(guess.text)}</p><p><label>{text(guess.label)} <input name="guess" '
-        f'type="number" required min="{guess.low:g}" max="{guess.high:g}" step="{guess.step:g}"></label> '
+        f'<form class="guess"><p>{text(guess.text)}</p>{sketch or ""}<p><label>{text(guess.label)} '
+        f'<input name="guess" type="number" required min="{guess.low:g}" max="{guess.high:g}" '
+        f'step="{guess.step:g}"></label> '
         f"<button>{words.page['see']}</button> "
         f'<button type="button" name="skip">{words.page["skip"]}</button></p></form>'
     )

@@ -53,6 +53,7 @@ PAGE_TEXTS = {
     "guess": "Your guess",
     "truth": "It is now",
     "python": "Python for the first picture",
+    "sketched": "Your outline is off by {difference} % of the true area, which is blue.",
     "sandbox": "Open in the sandbox",
     "run": "A page starts no program. Install implicit-decals[browser] with pip, and run this in a terminal:",
     "copy": "Copy",

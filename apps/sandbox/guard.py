@@ -31,6 +31,10 @@ from aiohttp.http_exceptions import HttpProcessingError
 if sys.platform != "win32":
     import resource
 
+PARTS = (Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("sketch.mjs", "page.js"))
+SCRIPT = "".join(PARTS).replace("export ", "") + "trame.utils.sketch = { draw, keep, compared };\n"
+"""The script of the page."""
+
 LOOPBACK = "127.0.0.1"
 """By default, the page is served to this machine only."""
 
@@ -396,8 +400,7 @@ def script_hashes() -> str:
     found = find_spec("trame_client")
     page = Path(found.origin or "").parent / "module" / "vue3-www" / "index.html" if found else Path()
     html = page.read_text(encoding="utf-8") if page.is_file() else ""
-    own = Path(__file__).with_name("page.js").read_text(encoding="utf-8")
-    scripts = [*re.findall(r"<script>(.*?)</script>", html, re.DOTALL), own]
+    scripts = [*re.findall(r"<script>(.*?)</script>", html, re.DOTALL), SCRIPT]
     digests = (hashlib.sha256(script.encode()).digest() for script in scripts)
     return " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
 

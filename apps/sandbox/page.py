@@ -13,7 +13,7 @@ from decals.apps.memory import keep_for_work
 from decals.apps.sandbox import panels
 from decals.apps.sandbox.connections import Connections
 from decals.apps.sandbox.folder import IMAGES, MODELS, thumbnails
-from decals.apps.sandbox.guard import Guard
+from decals.apps.sandbox.guard import SCRIPT, Guard
 from decals.apps.sandbox.panels import DEFAULTS, TEMPLATES, named, template
 from decals.apps.sandbox.sandbox import Sandbox
 from decals.apps.sandbox.view import StreamedView
@@ -49,9 +49,7 @@ TOOLBAR_HEIGHT = (
 )
 """Height of the toolbar, of which its density takes 16."""
 
-STYLE, SCRIPT = (
-    Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("page.css", "page.js")
-)
+STYLE = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
 QUIET = "({ install: () => { console.info = console.log = () => {}; } })"
 """The first plugin of Vue. It turns off trame's notes in the console; warnings and errors stay."""
 
@@ -321,10 +319,5 @@ class Page:
             html.P("{{ panel.doc }}", classes="text-caption mb-3")
             identifiers, key = "'node', c.name", "selected + c.name"
             panels.build_controls("panel.controls", self.sandbox.set_control, identifiers, key=key)
-            vuetify3.VBtn(
-                "Remove this modifier",
-                v_if="panel.operands === 1",
-                variant="tonal",
-                click=self.sandbox.unwrap,
-            )
+            template("unwrap")
         template("scene")

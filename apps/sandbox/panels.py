@@ -118,14 +118,7 @@ def build_view_menu(sandbox: Sandbox) -> None:
             for text, action in moves.items():
                 perform = sandbox.perform, f"['{action}']"
                 vuetify3.VBtn(text, title=SUMMARIES[action], size="x-small", click=perform)
-            vuetify3.VBtn("Keep this view", size="x-small", click=(sandbox.move_camera, "['keep']"))
-            vuetify3.VBtn(
-                "{{ name }}",
-                v_for="(name, i) in display.bookmarks",
-                key="name",
-                size="x-small",
-                click=(sandbox.move_camera, "['go', i]"),
-            )
+            template("bookmarks")
 
 
 # -- decals ---------------------------------------------------------------------------------------------

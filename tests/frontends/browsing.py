@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 from PIL import Image
-from playwright.async_api import Browser, ConsoleMessage, Page, Playwright, async_playwright, expect
+from playwright.async_api import Browser, ConsoleMessage, Locator, Page, Playwright, async_playwright, expect
 
 from decals.apps.sandbox.guard import Guard
 
@@ -160,6 +160,21 @@ async def pull(page: Page, start: tuple[float, float], by: tuple[float, float], 
     await page.mouse.move(*start)
     await page.mouse.down()
     await page.mouse.move(start[0] + by[0], start[1] + by[1], steps=steps)
+    await page.mouse.up()
+
+
+async def trace(page: Page, circle: Locator) -> None:
+    """Draw along a circle of the page with the mouse."""
+    await circle.scroll_into_view_if_needed()
+    box = await circle.bounding_box()
+    assert box is not None
+    angles = np.linspace(0.0, 2.0 * np.pi, 60)
+    right, down = box["width"] / 2 * np.cos(angles), box["height"] / 2 * np.sin(angles)
+    places = np.stack([box["x"] + box["width"] / 2 + right, box["y"] + box["height"] / 2 + down], axis=1)
+    await page.mouse.move(*places[0])
+    await page.mouse.down()
+    for place in places[1:]:
+        await page.mouse.move(*place)
     await page.mouse.up()
 
 

@@ -4,8 +4,8 @@
 
 Firefox needs a display, such as that of ``xvfb-run -a``; `touch` is for Chromium alone, and `sandbox` has no
 fingers there.
-``page``, ``sandbox``, ``panels``, ``lab`` and ``touch`` take a path behind their name, where they save the
-picture of their page of docs.
+``page``, ``sandbox``, ``panels``, ``snowman``, ``lab`` and ``touch`` take a path behind their name, where
+they save the picture of their page of docs.
 """
 
 import asyncio
@@ -24,6 +24,7 @@ from unittest.mock import patch
 from urllib.parse import urlsplit
 
 import numpy as np
+import pytest
 import pyvista as pv
 from PIL import Image
 from playwright.async_api import Page, expect
@@ -63,10 +64,11 @@ from tests.frontends.browsing import (
     seen,
     served,
     shows,
+    trace,
     until,
     violations,
 )
-from tests.oracles.contact import RIM, falloff
+from tests.oracles.contact import RIM, falloff, pressed_away
 
 SCROLLED_TWICE = """() => {
   const scrolls = (e) =>
@@ -1072,11 +1074,12 @@ async def snowman(picture: str | None = None) -> None:
             print(f"{size[0]} x {size[1]}: {clicks} clicks, {time.monotonic() - began:.0f} s")
             tree: Any = tree_of(window.document)
             below, middle, head = tree.children
-            assert below.center[1] + 0.3 * below.radius < middle.center[1] < head.center[1]
+            assert below.center[1] + below.radius < middle.center[1] < head.center[1]
             assert below.radius > middle.radius > head.radius
             assert len(window.document.decals) == 100
             if picture is not None and not touch:
                 await browser.keyboard.press("Escape")
+                await until(lambda window=window: not window.busy)  # type: ignore[misc]
                 await shows(browser, window.plotter)
                 await save_picture(browser, Path(picture))
 
@@ -1103,27 +1106,28 @@ async def build_snowman(browser: Page, window: EditWindow, *, touch: bool) -> in
             middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
             await pull(browser, (middle[0] + x, middle[1] + y), (along, 0.0))
 
-    def highest() -> float:
-        """How far above the middle of the view the model ends, in pixels."""
+    def rows() -> tuple[float, float]:
+        """Return the least and the greatest height of the model above the middle of the view, in pixels."""
         width, height = plotter.window_size
-        highest_row = max(y for y in range(int(height)) if window.tools.at(width / 2, y))
-        return highest_row - float(height) / 2
+        seen_rows = [y for y in range(int(height)) if window.tools.at(width / 2, y)]
+        return seen_rows[0] - float(height) / 2, seen_rows[-1] - float(height) / 2
 
     async def changed(label: str, number: int) -> None:
         await until(lambda: window.session.labels[-1:] == (label,) and len(window.session.labels) == number)
-        await until(lambda: not window.busy)
+        await until(lambda: not window.background.busy_editing)
 
+    add = browser.get_by_role("button", name="Add", exact=True)
     await press(browser.get_by_label("New model"))
-    for number, size in enumerate((0, 62, 46)):
-        await press(browser.get_by_role("button", name="Add", exact=True))
-        if size:
-            await press(browser.get_by_title("place a Point by the mouse"))
-            await stroke((0.0, highest() + 0.2 * size), size)
-        else:
-            rows = browser.locator(".v-overlay--active .v-list-item-title")
-            await press(rows.get_by_text("Point", exact=True))
-        await changed("add Point" if number else "add point 1", number + 1)
-        await shows(browser, plotter)
+    await press(add)
+    kinds = browser.locator(".v-overlay--active .v-list-item-title")
+    await press(kinds.get_by_text("Point", exact=True))
+    await changed("add point 1", 1)
+    radius = (rows()[1] - rows()[0]) / 2
+    for number, size in ((2, 0.85 * radius), (3, 0.65 * radius)):
+        await press(add)
+        await press(browser.get_by_title("place a Point by the mouse"))
+        await stroke((0.0, rows()[1] + 0.8 * size), size)
+        await changed("add Point", number)
     if touch:
         await press(browser.get_by_label("right panel").first)
     await press(browser.get_by_role("button", name="Scatter decals"))
@@ -1293,11 +1297,17 @@ async def guess(browser: Page, lab_page: LabPage) -> None:
     await browser.get_by_text("follow after your guess").wait_for()
     assert await browser.locator(".plot, [data-task]").count() == 0
     value = (question.low + question.high) / 2
+    if question.sketch:
+        await trace(browser, browser.locator(".pad circle").first)
     await browser.get_by_label(question.label).fill(f"{value:g}")
     await browser.get_by_role("button", name="See", exact=True).click()
     await browser.get_by_text(f"you guessed {shown(np.array(value))}, it is now ").wait_for()
     await browser.locator(".plot").first.wait_for()
     assert await browser.locator(".scale path").count() in (1, 2)
+    if question.sketch:
+        difference = float(await browser.locator("[data-difference]").inner_text())
+        assert difference == pytest.approx(pressed_away(), abs=2.0)
+        assert await browser.locator(".pad :is(path, polygon)").count() == 3  # the pad's outline is empty
 
 
 async def sliced(browser: Page, lab_page: LabPage, picture: str | None) -> None:

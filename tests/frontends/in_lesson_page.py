@@ -24,8 +24,9 @@ from decals.apps.lesson_pages.page import lesson_page, no_page
 from tests.apps.lab.answers import ANSWERS, SOLVED, Attempt
 from tests.apps.lesson_pages.test_classroom import serve, students
 from tests.apps.sandbox.test_sessions import TOKEN
-from tests.frontends.browsing import ERRORS, pull
+from tests.frontends.browsing import ERRORS, pull, trace
 from tests.frontends.in_html_page import Fingers, accessible, launched
+from tests.oracles.contact import pressed_away
 
 SIZE = {"width": 1280, "height": 800}
 SIZES = (390, 844), (820, 1180), (1280, 800)
@@ -313,6 +314,28 @@ async def explained(browser: Browser, path: Path, width: int, height: int) -> No
     await page.close()
 
 
+async def sketched(browser: Browser, path: Path, width: int, height: int) -> None:
+    """A student draws the rim of the orange image, and sees how much of it contact presses away."""
+    page = await browser.new_page(viewport={"width": width, "height": height}, has_touch=True)
+    await page.add_init_script(ERRORS)
+    await page.goto(path.as_uri())
+    await page.wait_for_function("document.getElementById('lesson').dataset.ready", timeout=PATIENCE)
+    await trace(page, page.locator(".pad circle").first)
+    await page.locator("[name=guess]").fill("0.5")
+    await press(page, "See")
+    await settled(page)
+    found = re.findall(r"off by ([\d.]+) %", await page.inner_text("[data-difference]"))
+    assert float(found[0]) == pytest.approx(pressed_away(), abs=2.0)
+    assert await page.evaluate(CUT) == []
+    await accessible(page)
+    await press(page, "Start again")
+    await press(page, "Skip the guess")
+    await settled(page)
+    assert not await page.locator("[data-difference]").count()
+    assert await page.evaluate("window.pageErrors") == []
+    await page.close()
+
+
 async def reach(page: Page, part: str, key: str = "Tab") -> None:
     """Press Tab until a part of the page has the focus, which can be seen."""
     for _ in range(60):
@@ -371,6 +394,7 @@ async def learn(name: str, numbers: set[int]) -> None:
                     if number == 2:
                         for size in SIZES:
                             await explained(browser, path, *size)
+                            await sketched(browser, path, *size)
                     if lesson.settings.scores:
                         for size in SIZES:
                             await played(browser, path, *size)

@@ -65,3 +65,10 @@ def rim_distance(complement: Any) -> Any:
     """r / r_h = g⁻¹(1 − E) / r_h, without cancellation."""
     c = np.cbrt(1 - complement)
     return np.sqrt(complement / (1 + c + c * c)) / RIM
+
+
+def pressed_away(first: float = 0.6, second: float = 0.4, distance: float = 0.8) -> float:
+    """What a rim without contact has beyond the image of the first of two decals, in % of that image."""
+    x, y = np.meshgrid(np.linspace(-1, 1, 2001), np.linspace(-1, 1, 2001))
+    own, other = falloff(np.hypot(x, y) * RIM / first), falloff(np.hypot(x - distance, y) * RIM / second)
+    return float(100.0 * ((own >= 0.5).sum() / ((own >= 0.5) & (own > other)).sum() - 1.0))

@@ -19,7 +19,7 @@ from decals.apps.lab.measures import MEASURES
 from decals.apps.lab.puzzles import Puzzle, read_puzzle
 from decals.apps.lab.symbols import DEFINITIONS
 from decals.apps.lesson_pages.code import FORMS, WORDS, javascript
-from decals.apps.lesson_pages.page import KNOWN, lesson_page, lesson_script, no_page
+from decals.apps.lesson_pages.page import KNOWN, SKETCH, lesson_page, lesson_script, no_page
 from decals.apps.lesson_pages.tables import MOST, positions_of, tabulated
 from decals.apps.lesson_pages.translation import LANGUAGES, translation
 from decals.errors import InvalidInput
@@ -158,6 +158,30 @@ console.log(JSON.stringify(data.links.map((link) => puzzleOf("#" + link, data)))
 
 
 @needs_node
+@pytest.mark.parametrize("seed", range(3))
+def test_an_outline_is_compared_cell_by_cell(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    half, side = 1.5, 40
+    angles = np.sort(random.uniform(0, 2 * np.pi, 12))
+    corners = random.uniform(-0.3, 0.3, 2) + np.stack([np.cos(angles), 0.7 * np.sin(angles)], axis=1)
+    steps = ((np.arange(side) + 0.5) / side * 2 - 1) * half
+    cells = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    true = np.hypot(*(cells - random.uniform(-0.5, 0.5, 2)).T) < 0.8
+    ways, offsets = np.roll(corners, -1, axis=0) - corners, cells[:, None] - corners
+    drawn = (ways[:, 0] * offsets[..., 1] > ways[:, 1] * offsets[..., 0]).all(axis=1)  # it is convex
+    script = f"""
+import {{ compared }} from {json.dumps(SKETCH.as_uri())};
+const found = compared(() => data.cells, data.half, data.corners);
+const none = compared(() => data.cells, data.half, [[0, 0], [1, 1]]);
+console.log(JSON.stringify([found.difference, found.parts, none]));"""
+    given = {"cells": true.tolist(), "half": half, "corners": corners.tolist()}
+    difference, parts, none = run_node(script, given)
+    assert difference == pytest.approx((drawn != true).sum() / true.sum())
+    assert parts.count("M") == true.sum()
+    assert none is None
+
+
+@needs_node
 def test_numbers_are_shown_as_in_the_lab() -> None:
     random = np.random.default_rng(2)
     values = [*(10.0 ** random.uniform(-4, 6, 200)), 0.0, 1e-9, -0.5, 99.96, 100.4, 0.25]
@@ -218,7 +242,7 @@ def test_choices_and_remarks_in_formulas_are_no_markup(tmp_path: Path) -> None:
 
 def texts_of(lesson: Lesson) -> list[str]:
     """Return the texts of a lesson that its page shows, but for its body; formulas alone are none."""
-    names = {"title", "label", "note", "text", "task", "otherwise", "right", "why", "red_label"}
+    names = {"title", "label", "note", "text", "task", "otherwise", "right", "why", "red_label", "sketch"}
 
     def found(part: Any) -> Iterator[str]:
         if isinstance(part, dict):
