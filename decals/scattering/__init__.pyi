@@ -1,3 +1,4 @@
+from .copies import on_copies
 from .creases import Creases
 from .density import PaintedImage, region_mask, vertex_density
 from .image_projections import Cylindrical, Planar, Spherical, TextureCoordinates
@@ -19,6 +20,7 @@ __all__ = [
     "Zone",
     "Zones",
     "gradient_of",
+    "on_copies",
     "region_mask",
     "remeshed_points",
     "vertex_density",

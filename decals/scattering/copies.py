@@ -1,0 +1,93 @@
+"""`on_copies`: the decals of one copy of a repeat on all of its copies."""
+
+import numpy as np
+
+from blobtree import PolarRepeat, Repeat
+from blobtree._typing import Float64Array
+from blobtree.nodes.tree import Transform
+from blobtree.validation import describe
+from decals.errors import InvalidDecals, InvalidScattering
+from decals.model import Decals
+from decals.surfaces.implicit import ImplicitSurface
+from decals.validation import instance
+
+ON_SURFACE = 1e-3
+"""Distance from the surface, in radii of a decal, up to which the decal keeps its place and its normal."""
+
+MAX_DISTANCE = 0.5
+"""Distance from the surface, in radii, beyond which a decal is left out: it lies inside another copy."""
+
+
+def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
+    """Return the decals of a repeat's child on all copies of the child, copy by copy.
+
+    The decals of each copy are those of the child, moved as the copy is. On a mirrored copy, places and the
+    tops of images are mirrored; images are not. Where copies blend, decals are projected onto the blend,
+    and those that it buries are left out. In a grid, a repeat of repeats, call it for the inner repeat first.
+
+    Parameters
+    ----------
+    decals
+        Decals on `repeat.child`, such as those of `scatter`.
+    repeat
+        The repeat. Endless repeats have no number of copies.
+
+    Returns
+    -------
+    Decals
+        ``n`` decals of each copy, less those that other copies bury.
+
+    Raises
+    ------
+    InvalidDecals
+        `decals` are not `Decals`.
+    InvalidScattering
+        `repeat` is another node.
+    InvalidMesh
+        The repeat has no surface.
+
+    See Also
+    --------
+    decals.scatter : of a repeat itself, covers each copy with decals of its own.
+
+    Examples
+    --------
+    >>> import blobtree, decals
+    >>> ball = blobtree.Point((0, 0, 0), radius=1.0)
+    >>> marks = decals.scatter(ball, count=40)
+    >>> row = blobtree.Repeat(ball, (3, 0, 0), 4)
+    >>> everywhere = decals.scattering.on_copies(marks, row)
+    >>> len(everywhere), (everywhere.positions[40] - marks.positions[0]).round(3).tolist()
+    (160, [3.0, 0.0, 0.0])
+    """
+    instance("decals", decals, Decals, InvalidDecals, "scatter returns some")
+    if not isinstance(repeat, (Repeat, PolarRepeat)):
+        raise InvalidScattering(f"repeat: expected a Repeat or a PolarRepeat, got {describe(repeat)}")
+    copies = Decals.concatenate(_moved(decals, matrix) for matrix in placements(repeat))
+    if len(copies) == 0:
+        return copies
+    positions, normals = ImplicitSurface(repeat).project(copies.positions)
+    ways = np.linalg.norm(positions - copies.positions, axis=1) / copies.radii
+    kept = np.flatnonzero(ways <= MAX_DISTANCE)
+    moved = (ways > ON_SURFACE)[kept, None]
+    return copies[kept].replace(
+        positions=np.where(moved, positions[kept], copies.positions[kept]),
+        normals=np.where(moved, normals[kept], copies.normals[kept]),
+    )
+
+
+def placements(repeat: Repeat | PolarRepeat) -> list[Float64Array]:
+    """Return the affine maps (3, 4) of a repeat's child to its copies, that of the child itself first."""
+    return [
+        np.eye(3, 4) if copy is repeat.child or not isinstance(copy, Transform) else np.array(copy.matrix)
+        for copy in repeat.expanded.children
+    ]
+
+
+def _moved(decals: Decals, matrix: Float64Array) -> Decals:
+    """Return decals under a rigid map (3, 4), which may be a reflection."""
+    linear, offset = matrix[:, :3], matrix[:, 3]
+    normals, tops = decals.normals @ linear.T, decals.bitangents @ linear.T
+    return decals.replace(
+        positions=decals.positions @ linear.T + offset, normals=normals, tangents=np.cross(tops, normals)
+    )

@@ -1,0 +1,107 @@
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from blobtree import Box, EndlessRepeat, Node, Point, PolarRepeat, Repeat
+from decals import Decals, evaluate, scatter
+from decals.errors import InvalidDecals, InvalidScattering
+from decals.scattering import on_copies
+from decals.surfaces import ImplicitSurface
+from tests.vectors import random_units
+
+STONE = Point((0.2, 0.1, 0.0), radius=0.5) + Point((-0.2, 0.0, 0.1), radius=0.4)
+
+
+@cache
+def marks_of(node: Node) -> Decals:
+    """Decals on the child of a repeat."""
+    return scatter(node, count=24, images=[3, 5])
+
+
+APART: dict[str, Repeat | PolarRepeat] = {
+    "row": Repeat(STONE, (2.0, 0.5, 0.0), 3),
+    "mirrored": Repeat(STONE, (0.0, 2.0, 1.0), 3, copies="mirrored"),
+    "ring": PolarRepeat(STONE.translate((2, 0, 0)), (0, 0, 1), 5, "union"),
+}
+
+
+@pytest.mark.parametrize("name", APART)
+def test_each_copy_shows_the_images_of_the_child(name: str) -> None:
+    """At a point of a copy, the owner and the place in its image are those of the child's point."""
+    repeat = APART[name]
+    marks = marks_of(repeat.child)
+    everywhere = on_copies(marks, repeat)
+    count = len(repeat.expanded.children)
+    assert len(everywhere) == count * len(marks)
+    points, normals = _on(repeat.child)
+    of_child = evaluate(marks, points, normals, contact="elastic")
+    for number, copy in enumerate(repeat.expanded.children):
+        linear, offset = _map(copy, repeat.child)
+        there = evaluate(everywhere, points @ linear.T + offset, normals @ linear.T, contact="elastic")
+        same = np.where(of_child.owner >= 0, of_child.owner + number * len(marks), -1) == there.owner
+        assert same.mean() > 0.995  # points on contact lines round to either side
+        sides = 1.0 if np.linalg.det(linear) > 0.0 else -1.0
+        expected = np.array(of_child.uv)[same & (of_child.owner >= 0)]
+        if sides < 0.0:
+            expected[:, 0] = 1.0 - expected[:, 0]
+        assert_allclose(np.array(there.uv)[same & (there.owner >= 0)], expected, atol=2e-3)
+
+
+def _on(node: Node) -> tuple[Any, Any]:
+    return ImplicitSurface(node).sample(2000, seed=0)
+
+
+def _map(copy: Node, child: Node) -> tuple[Any, Any]:
+    matrix = np.eye(3, 4) if copy is child else np.array(copy.matrix)  # type: ignore[attr-defined]
+    return matrix[:, :3], matrix[:, 3]
+
+
+def test_a_grid_takes_two_calls_and_keeps_all_columns() -> None:
+    row = Repeat(STONE, (2, 0, 0), 2)
+    grid = Repeat(row, (0, 2, 0), 3)
+    marks = marks_of(STONE).replace(
+        layers=np.arange(24) % 3, tints=random_units(np.random.default_rng(0), 24) ** 2
+    )
+    everywhere = on_copies(on_copies(marks, row), grid)
+    assert len(everywhere) == 6 * 24
+    for name in ("images", "layers", "tints", "radii", "opacities"):
+        assert_allclose(getattr(everywhere, name), np.concatenate([getattr(marks, name)] * 6))
+    corner = everywhere[5 * 24 :]
+    assert_allclose(corner.positions, marks.positions + np.array([2.0, 4.0, 0.0]), atol=1e-6)
+    assert_allclose(corner.tangents, marks.tangents, atol=1e-6)
+
+
+@settings(max_examples=12, deadline=None)
+@given(step=st.floats(0.5, 1.6), joining=st.sampled_from(["sum", "union"]))
+def test_decals_lie_on_copies_that_touch_and_none_is_buried(step: float, joining: Any) -> None:
+    row = Repeat(STONE, (step, 0.0, 0.0), 3, joining)
+    everywhere = on_copies(marks_of(STONE), row)
+    assert 24 < len(everywhere) <= 72
+    assert np.abs(row(everywhere.positions) - 0.5).max() < 1e-3
+    slopes = -row.gradient(everywhere.positions)
+    slopes /= np.linalg.norm(slopes, axis=1, keepdims=True)
+    assert np.median(np.einsum("ni,ni->n", slopes, everywhere.normals)) > 0.99
+    assert_allclose(np.einsum("ni,ni->n", everywhere.tangents, everywhere.normals), 0.0, atol=1e-5)
+
+
+def test_nothing_stays_nothing() -> None:
+    assert len(on_copies(Decals.empty(), APART["row"])) == 0
+
+
+@pytest.mark.parametrize(
+    "node", [STONE, EndlessRepeat(STONE, (3, 0, 0)), Box((0, 0, 0), (1, 1, 1), radius=0), None]
+)
+def test_other_nodes_are_refused(node: Any) -> None:
+    with pytest.raises(InvalidScattering, match="expected a Repeat or a PolarRepeat"):
+        on_copies(marks_of(STONE), node)
+
+
+def test_other_decals_are_refused() -> None:
+    wrong: Any = marks_of(STONE).positions
+    with pytest.raises(InvalidDecals, match="expected a Decals"):
+        on_copies(wrong, Repeat(STONE, (2, 0, 0), 2))
