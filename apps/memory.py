@@ -130,7 +130,14 @@ def _trim_for_ever(library: Any, seconds: float) -> None:
 
 
 def import_ahead(seconds: float = IMPORT_SECONDS) -> None:
-    """Import in a thread, after some time, what the first drag of a surface would wait for."""
-    timer = threading.Timer(seconds, importlib.import_module, (FIRST_USED,))
+    """Import and load in a thread, after some time, what the first clicks and drags would wait for."""
+
+    def make_ready() -> None:
+        importlib.import_module(FIRST_USED)
+        from decals.apps.first_inputs import load_first_kernels
+
+        load_first_kernels()
+
+    timer = threading.Timer(seconds, make_ready)
     timer.daemon = True
     timer.start()

@@ -156,7 +156,8 @@ export class Measures {
   g = (q, d) => falloff(d);
   d = (q, i) => length(subtract(q.position, this.row(i).position)) / this.influence(q, i);
   f = (q, i) => falloff(this.d(q, i));
-  top = (q) => Math.max(0, ...this.viewer.decals.numbers.map((number) => this.f(q, number)));
+  numbers = () => (this.known.numbers ??= this.viewer.decals.numbers); // listed once, not at each point
+  top = (q) => Math.max(0, ...this.numbers().map((number) => this.f(q, number)));
   F = (q) => (q.owner >= 0 ? q.field : Math.min(this.top(q), 0.5));
   h = (q, i, k) => factor(this.f(q, k), this.f(q, i));
 
@@ -178,7 +179,7 @@ export class Measures {
   lost = () => 1 - this.areaOf(({ owner }) => owner >= 0) / this.discs();
 
   overlapped = () => this.areaOf((point) => Math.max(this.over(point).length - 1, 0)) / this.discs();
-  over = (point) => this.viewer.decals.numbers.filter((number) => this.f(point, number) >= 0.5);
+  over = (point) => this.numbers().filter((number) => this.f(point, number) >= 0.5);
   areaOf = (formula) => sum(this.onMap(formula)) * (this.lesson.size / SIDE) ** 2;
   discs = () => sum(this.viewer.decals.numbers.map((number) => discOf(this.row(number))));
 

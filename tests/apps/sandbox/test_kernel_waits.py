@@ -6,8 +6,10 @@ import pytest
 
 import decals
 from blobtree import Point
+from decals.apps.first_inputs import load_first_kernels
 from decals.apps.lab.lesson import LESSONS, load_lessons
-from decals.editing import ReplaceScene
+from decals.editing import EditSession, ReplaceScene, ScaleDecals, pick
+from decals.editing.queries import outlines
 from decals.index.editor import DecalEditor
 from decals.scenes.objects import TreeObject
 from decals.window import EditWindow
@@ -20,6 +22,18 @@ pytest.importorskip("trame_vtk")
 
 STEPS = next(i for i, lesson in enumerate(load_lessons(LESSONS)) if lesson.settings.steps)
 """The lesson on scattering."""
+
+
+def test_first_clicks_and_edits_load_no_kernels_after_those_that_were_loaded_ahead() -> None:
+    with kernel_waits() as waits:
+        load_first_kernels()
+        waits.noting = True
+        session = EditSession(decals.cover(Point((0.2, 0, 0), radius=1.2), count=20, images=["eye"]))
+        found = pick(session.document, (0, 0, 9), (0, 0, -1))
+        assert found is not None
+        assert len(outlines(session.document, [found.owner]))
+        session.do(ScaleDecals([found.owner], 0.5))
+    assert waits.places == []
 
 
 def test_changes_of_decals_load_no_kernels_after_those_that_were_loaded_ahead() -> None:
