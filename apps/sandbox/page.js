@@ -30,6 +30,7 @@
   const HOVER_MS = 60;
   const DRAG_PIXELS = 6; // from which on a press is a drag
   const MENU_MS = 50; // until a menu is drawn
+  const MENU_TRIES = 40; // looks at a menu that closes
   const FIELD = ".v-overlay--active .v-sheet input";
   const hovering = { key: "", told: null };
 
@@ -168,7 +169,12 @@
       if (open && matchMedia("(pointer: fine)").matches) document.querySelector(FIELD)?.focus();
       if (open) return;
       trame.state.set("kind_sought", "");
-      if (document.activeElement === document.body) this.opener?.focus();
+      // Firefox leaves the focus in what is hidden, which may happen late.
+      const isHidden = () => !document.activeElement.checkVisibility();
+      for (let i = 0; i < MENU_TRIES && document.activeElement.closest(".v-overlay") && !isHidden(); i++) {
+        await new Promise((hidden) => setTimeout(hidden, MENU_MS));
+      }
+      if (document.activeElement === document.body || isHidden()) this.opener?.focus();
       setTimeout(() => this.hover(""), MENU_MS);
     },
     // Return the kinds of a family whose name has what is sought, then those whose description or group has it.
