@@ -15,38 +15,18 @@ MOUSE = "viewport.mouse.interaction"
 TRIGGER = "trame.trigger"
 STATE = "trame.state.get"
 UPDATE = "trame.state.update"
-SIZE, QUALITY = "viewport.image.push.original.size", "viewport.image.push.quality"
+IMAGE = "viewport.image.push"
+SIZE, QUALITY = f"{IMAGE}.original.size", f"{IMAGE}.quality"
 """Messages with the size of a browser's view, and with its pixels for each of a picture."""
 
 LIFECYCLE = "trame.lifecycle.update"
 ERROR = "trame.error.client"
-WATCHES = frozenset(
-    {
-        STATE,
-        LIFECYCLE,
-        "viewport.image.push",
-        "viewport.image.push.observer.add",
-        "viewport.image.push.quality.get",
-    }
-)
+WATCHES = frozenset({STATE, LIFECYCLE, IMAGE, f"{IMAGE}.observer.add", f"{IMAGE}.quality.get"})
 """Messages of browsers that only watch, which change nothing; all others of theirs are left out."""
 
-DRIVES = WATCHES | {
-    ERROR,
-    MOUSE,
-    SIZE,
-    TRIGGER,
-    UPDATE,
-    "viewport.image.animation.fps.get",
-    "viewport.image.animation.fps.max",
-    "viewport.image.animation.start",
-    "viewport.image.animation.stop",
-    "viewport.image.push.enabled",
-    "viewport.image.push.invalidate.cache",
-    "viewport.image.push.observer.remove",
-    QUALITY,
-    "viewport.mouse.zoom.wheel",
-}
+DRIVES = WATCHES | {ERROR, MOUSE, SIZE, TRIGGER, UPDATE, QUALITY, "viewport.mouse.zoom.wheel"}
+DRIVES |= {f"viewport.image.animation.{name}" for name in ("fps.get", "fps.max", "start", "stop")}
+DRIVES |= {f"{IMAGE}.{name}" for name in ("enabled", "invalidate.cache", "observer.remove")}
 """Messages of browsers that edit; trame and VTK have more, such as one that ends the server."""
 
 LIFE = frozenset({"client_connected", "client_exited", "client_unmounted"})

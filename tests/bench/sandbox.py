@@ -3,6 +3,9 @@
 Of all pages of lessons, ``lesson_first_s`` is the longest time to the first picture, and ``lesson_drag_ms``
 the longest median of the script of one step of a drag.
 
+``session_s`` is the time from the command of one session until its page is served, and
+``session_processor_s`` that of the processors, which other programs hardly affect.
+
 ``server_ms`` is the time of a drag on the server alone: from its message until the picture is sent.
 ``server_slider_ms`` is that of a slider. With ``--server-only``, ``server_traced_ms`` and so on are of a
 camera that turns, by the mode of the view.
@@ -16,8 +19,13 @@ graphics card, on the processor.
 """
 
 import asyncio
+import os
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable, Coroutine
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,6 +83,32 @@ WATCH = """([picture, changed]) => {
 
 LONGEST = 5.0
 """Seconds after which an event without a new frame counts as missed."""
+
+
+SESSION = ("-m", "decals", "sandbox", "--port", "0", "--no-browser", "--session")
+
+
+def session_start() -> dict[str, float]:
+    """Return the times until a new process serves the page of an empty session."""
+    began = time.perf_counter()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        subprocess.Popen(
+            [sys.executable, *SESSION], cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        ) as process,
+    ):
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write(b"0123456789abcdef\n")
+        process.stdin.flush()
+        next(line for line in process.stdout if line.startswith(b"http://"))
+        figures = {"session_s": time.perf_counter() - began}
+        stat = Path(f"/proc/{process.pid}/stat")
+        if stat.exists():  # Linux
+            user, system = map(int, stat.read_text(encoding="ascii").rpartition(")")[2].split()[11:13])
+            figures["session_processor_s"] = (user + system) / os.sysconf("SC_CLK_TCK")
+        process.stdin.close()
+    return figures
 
 
 async def measure(count: int, events: int, *, server_only: bool = False) -> dict[str, float]:
@@ -258,7 +292,8 @@ def main() -> None:
     parser.add_argument("--events", type=int, default=20)
     parser.add_argument("--server-only", action="store_true", help="no browser, only the server's times")
     options = parser.parse_args()
-    figures = asyncio.run(measure(options.decals, options.events, server_only=options.server_only))
+    figures = session_start()
+    figures |= asyncio.run(measure(options.decals, options.events, server_only=options.server_only))
     show(figures)
     write(options.json, figures)
 
