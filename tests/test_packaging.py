@@ -179,6 +179,18 @@ def test_every_folder_of_code_is_packaged(folder: str) -> None:
         assert ".".join([FOLDERS[folder], *folders]) in packages
 
 
+def test_files_beside_the_code_of_apps_are_packaged() -> None:
+    packaged: set[Path] = set()
+    for package, patterns in project()["tool"]["setuptools"]["package-data"].items():
+        if package.startswith("decals.apps"):
+            folder = ROOT.joinpath(*package.split(".")[1:])
+            packaged.update(path for pattern in patterns for path in folder.glob(pattern))
+    kinds = ".css", ".html", ".js", ".json", ".jpg", ".md", ".mjs", ".png", ".svg", ".toml"
+    files = [path for path in (ROOT / "apps").rglob("*") if path.suffix in kinds]
+    assert len(files) > 50
+    assert [path for path in files if path not in packaged] == []
+
+
 def test_every_package_is_typed() -> None:
     assert all((ROOT / folder / "py.typed").is_file() for folder in FOLDERS)
 
