@@ -55,10 +55,10 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
     >>> import blobtree, decals
     >>> ball = blobtree.Point((0, 0, 0), radius=1.0)
     >>> marks = decals.scatter(ball, count=40)
-    >>> row = blobtree.Repeat(ball, (3, 0, 0), 4)
+    >>> row = blobtree.Repeat(ball, (5, 0, 0), 4)
     >>> everywhere = decals.scattering.on_copies(marks, row)
     >>> len(everywhere), (everywhere.positions[40] - marks.positions[0]).round(3).tolist()
-    (160, [3.0, 0.0, 0.0])
+    (160, [5.0, 0.0, 0.0])
     """
     instance("decals", decals, Decals, InvalidDecals, "scatter returns some")
     if not isinstance(repeat, (Repeat, PolarRepeat)):
