@@ -4,6 +4,7 @@ from .density import PaintedImage, region_mask, vertex_density
 from .image_projections import Cylindrical, Planar, Spherical, TextureCoordinates
 from .orientation import Orientation, gradient_of
 from .remesh import remeshed_points
+from .seen import seen_from_outside
 from .variation import ImageChoice, Jitter
 from .zones import Zone, Zones
 
@@ -23,5 +24,6 @@ __all__ = [
     "on_copies",
     "region_mask",
     "remeshed_points",
+    "seen_from_outside",
     "vertex_density",
 ]
