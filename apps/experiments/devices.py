@@ -43,11 +43,11 @@ BY_KIND: dict[Kind, str] = {
         blobtree.with_numeric_values blobtree.split_creases decals.define_contact decals.load_image
         decals.load_model decals.load_scene decals.pose decals.save_scene decals.shader decals.skin
         decals.from_table decals.load_table decals.save_table decals.to_arrow decals.to_pandas
-        decals.scattering.region_mask decals.scattering.vertex_density decals.surfaces.check_mesh
-        decals.surfaces.linear_colors decals.surfaces.read_mesh decals.rendering.register
-        decals.pages.viewer_script decals.editing.recovery_path decals.window.browser_keys
-        decals.window.press_key decals.images.generate_image decals.images.image_pixels
-        decals.images.is_builtin decals.images.read_image decals.experiments.report
+        decals.scattering.on_copies decals.scattering.region_mask decals.scattering.vertex_density
+        decals.surfaces.check_mesh decals.surfaces.linear_colors decals.surfaces.read_mesh
+        decals.rendering.register decals.pages.viewer_script decals.editing.recovery_path
+        decals.window.browser_keys decals.window.press_key decals.images.generate_image
+        decals.images.image_pixels decals.images.is_builtin decals.images.read_image decals.experiments.report
     """,
     "rounding": """
         blobtree.Node.__call__ blobtree.Node.gradient blobtree.Node.colors blobtree.Node.raycast
@@ -55,7 +55,8 @@ BY_KIND: dict[Kind, str] = {
         blobtree.raycast_batch blobtree.sample blobtree.to_sdf
         decals.area_gradient decals.outlines decals.save_figure
         decals.evaluate decals.evaluate_batch decals.measure decals.displace decals.bake decals.export
-        decals.scattering.gradient_of decals.surfaces.as_surface decals.editing.first_hit
+        decals.scattering.gradient_of decals.scattering.seen_from_outside
+        decals.surfaces.as_surface decals.editing.first_hit
         decals.editing.nearest_points decals.editing.outline decals.editing.pick
     """,
     "seeded": "decals.cover decals.scatter decals.scattering.remeshed_points",

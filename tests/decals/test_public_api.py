@@ -41,8 +41,8 @@ OF_PACKAGES = {
     ],
     "scattering": [
         "Creases", "Cylindrical", "ImageChoice", "Jitter", "Orientation", "PaintedImage", "Planar",
-        "Spherical", "TextureCoordinates", "Zone", "Zones", "gradient_of", "region_mask", "remeshed_points",
-        "vertex_density",
+        "Spherical", "TextureCoordinates", "Zone", "Zones", "gradient_of", "on_copies", "region_mask",
+        "remeshed_points", "seen_from_outside", "vertex_density",
     ],
     "surfaces": [
         "BaseColor", "BaseTexture", "ImplicitSurface", "MeshCheck", "MeshSurface", "Model", "Surface", "Wrap",
