@@ -1,4 +1,4 @@
-"""What the first clicks and edits of a session need, made in a thread before they come."""
+"""The kernels of the first clicks and edits of a session, which a thread loads before they are needed."""
 
 from blobtree import Point
 from blobtree.device import core_left_free
@@ -11,7 +11,7 @@ from decals.scenes.cover import cover
 def load_first_kernels() -> None:
     """Load the kernels of meshes, scattering, picks, outlines and changes of decals, on a core less than all.
 
-    Where there are none, they are compiled, which takes a minute or more; nothing is reported of it.
+    Missing kernels are compiled, which takes a minute or more. No progress is reported.
     """
     with core_left_free(), reporting(lambda _stage, _fraction: None):
         document = EditSession(cover(Point((0, 0, 0), radius=1.0), count=3, images=["scale"])).document

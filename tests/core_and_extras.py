@@ -47,8 +47,8 @@ EXTRAS: dict[str, str] = {
         walk_cache
         """,
     "decals.scattering": """
-        bare_places center_normals covering creases deform density gap_filling
-        image_projections owned_points polish relocation remesh sheets zones
+        bare_places center_normals copies covering creases deform density gap_filling
+        image_projections owned_points polish relocation remesh seen sheets zones
         """,
     "decals.scenes": """
         animation area_gradient figure gaps measure outlines pose reproduction

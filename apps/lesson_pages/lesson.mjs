@@ -220,7 +220,7 @@ class LessonPage {
     root.querySelector(".seen").innerHTML = this.guess === null ? "" : value(live.seen) + this.sketched();
   }
 
-  // What stands under guess and truth: the outline that was drawn, above what is so now, and their difference.
+  // The part below guess and truth: the outline that was drawn, above the true area, and their difference.
   sketched() {
     const { live, lesson, measures: m, root } = this;
     if (!lesson.half) return "";

@@ -307,8 +307,8 @@ class ActionState:
     ) -> Answer | None:
         """Return the answer to a question about the document.
 
-        It is None if kernels must be compiled for it first. A thread does so, and a message says so, unless
-        the question is asked again by itself (`quiet`).
+        It is None if kernels must be compiled for it first. A thread compiles them. A message says so, except
+        with `quiet`, for callers that repeat the question in the next frame.
         """
         try:
             with self._promptly():

@@ -23,7 +23,8 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
 
     The decals of each copy are those of the child, moved as the copy is. On a mirrored copy, places and the
     tops of images are mirrored; images are not. Where copies blend, decals are projected onto the blend,
-    and those that it buries are left out. In a grid, a repeat of repeats, call it for the inner repeat first.
+    and decals inside the blend are left out. For a grid, a repeat of repeats, call it for the inner one
+    first.
 
     Parameters
     ----------
@@ -35,7 +36,7 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
     Returns
     -------
     Decals
-        ``n`` decals of each copy, less those that other copies bury.
+        ``n`` decals of each copy, without those that lie inside another copy.
 
     Raises
     ------
@@ -63,7 +64,7 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
     instance("decals", decals, Decals, InvalidDecals, "scatter returns some")
     if not isinstance(repeat, (Repeat, PolarRepeat)):
         raise InvalidScattering(f"repeat: expected a Repeat or a PolarRepeat, got {describe(repeat)}")
-    copies = Decals.concatenate(_moved(decals, matrix) for matrix in placements(repeat))
+    copies = Decals.concatenate(_moved(decals, matrix) for matrix in _placements(repeat))
     if len(copies) == 0:
         return copies
     positions, normals = ImplicitSurface(repeat).project(copies.positions)
@@ -76,7 +77,7 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
     )
 
 
-def placements(repeat: Repeat | PolarRepeat) -> list[Float64Array]:
+def _placements(repeat: Repeat | PolarRepeat) -> list[Float64Array]:
     """Return the affine maps (3, 4) of a repeat's child to its copies, that of the child itself first."""
     return [
         np.eye(3, 4) if copy is repeat.child or not isinstance(copy, Transform) else np.array(copy.matrix)

@@ -1,4 +1,4 @@
-"""`seen_from_outside`: a mask of what can be seen of models from outside."""
+"""`seen_from_outside`: a mask of the points that can be seen from outside the models."""
 
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -30,12 +30,12 @@ def seen_from_outside(
     """Return a mask of points from which a straight way leads out of the models.
 
     Give it to `scatter` or `cover`, and parts that are hidden get no decals: a seat in a car body with
-    small gaps, the inside of a vessel under its lid. What lies inside other closed surfaces gets none anyway.
+    small gaps, the inside of a vessel under its lid. Other closed surfaces hide their inside without it.
 
     Parameters
     ----------
     surfaces : Surface, Model or object of a scene, or a sequence of these
-        All that hides, see `decals.scatter`.
+        The models that hide points, see `decals.scatter`.
     directions
         Number of directions, spread evenly, in which ways are looked for; up to 100,000. Openings that appear
         smaller than 4π over this number, in steradians, may be missed.
