@@ -332,19 +332,27 @@
   );
 
   // Of the toolbar and of the outline, Tab reaches one button, the selected row; arrows lead from it to the others.
+  // Where one with the focus goes, the next one gets it.
   const BUTTONS = "button, [role=button]";
   const reachedOf = (group) =>
     (!group.contains(document.activeElement) && group.querySelector(".v-list-item--active")) || group.reached;
   const rove = (group, reached = reachedOf(group)) => {
     const buttons = [...group.querySelectorAll(BUTTONS)];
-    group.reached = buttons.includes(reached) ? reached : buttons[0];
+    group.reached = buttons.includes(reached)
+      ? reached
+      : buttons[Math.min(group.place ?? 0, buttons.length - 1)];
+    group.place = buttons.indexOf(group.reached);
     buttons.forEach((button) => (button.tabIndex = button === group.reached ? 0 : -1));
     return buttons;
   };
+  const focused = { button: null, group: null };
+  const keepFocus = (button, group) => Object.assign(focused, { button, group });
   document.addEventListener("focusin", ({ target }) => {
-    const group = target.closest("[data-roving]");
-    if (group && target.matches(BUTTONS)) rove(group, target);
+    const group = target.matches(BUTTONS) ? target.closest("[data-roving]") : null;
+    if (group) rove(group, target);
+    keepFocus(target, group);
   });
+  document.addEventListener("pointerdown", () => keepFocus(null, null), true);
   document.addEventListener(
     "keydown",
     (event) => {
@@ -391,6 +399,7 @@
     document.querySelectorAll("[role=application] [tabindex='0']").forEach((inner) => (inner.tabIndex = -1));
     document.querySelectorAll("img:not([alt])").forEach((image) => (image.alt = ""));
     document.querySelectorAll("[data-roving]").forEach((group) => rove(group));
+    if (focused.group && !focused.button.isConnected) focused.group.reached?.focus();
   };
   new MutationObserver(complete).observe(document, { childList: true, subtree: true });
 })();

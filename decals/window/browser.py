@@ -9,20 +9,23 @@ from decals.errors import InvalidEdit
 from decals.validation import any_number, instance
 from decals.window.window import EditWindow
 
-_FOCUS = (
-    "(field => field?.matches('input, textarea') && !field.taken"
-    " || $event.currentTarget.focus({preventScroll: true}))($event.currentTarget.ownerDocument.activeElement)"
-)
-"""Give the element under the pointer the focus, so that it receives keys, unless the user may be typing.
+_ENTER = "$event.currentTarget.entered = true"
+"""Note that the pointer is over the element, if only because something above it has closed."""
 
-A page sets `taken` of a field whose text has been taken.
-"""
-
-_RECORD_POSITION = (
+_MOVE = (
     "$event.currentTarget.dataset.at = [$event.offsetX / $event.target.clientWidth, "
-    "$event.offsetY / $event.target.clientHeight]"
+    "$event.offsetY / $event.target.clientHeight]; "
+    "if ($event.currentTarget.entered && ($event.movementX || $event.movementY)) {"
+    " $event.currentTarget.entered = false;"
+    " const field = $event.currentTarget.ownerDocument.activeElement;"
+    " if (!field?.matches('input, textarea') || field.taken)"
+    " $event.currentTarget.focus({preventScroll: true}) }"
 )
-"""Record the pointer's position: trame sends it only while a button is down."""
+"""Record the pointer's position, since trame sends it only while a button is down.
+
+A pointer that moves into the element gives it the focus, so that it receives keys, unless the user may be
+typing. A pointer that rests does not. A page sets `taken` of a field whose text has been taken.
+"""
 
 _KEY_ARGUMENTS = (
     "[$event.target.style.outline = 'none', ($event.ctrlKey || $event.metaKey) && $event.preventDefault(), "
@@ -69,8 +72,8 @@ def browser_keys(window: EditWindow) -> dict[str, Any]:
 
     return {
         "tabindex": 0,
-        "mouseenter": _FOCUS,
-        "mousemove": _RECORD_POSITION,
+        "mouseenter": _ENTER,
+        "mousemove": _MOVE,
         "keydown": (press, _KEY_ARGUMENTS),
     }
 

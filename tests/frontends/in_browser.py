@@ -501,11 +501,11 @@ async def keyboard() -> None:
     async with sandboxed(EMPTY, file, start=True) as (browser, _, window):
         press, toolbar = browser.keyboard.press, partial(browser.get_by_role, "button", exact=True)
 
-        async def tab_to(what: str) -> None:
+        async def tab_to(what: str, key: str = "Tab") -> None:
             """Press Tab until something is true of the element `e` with the focus."""
             steps = 0
             while not await browser.evaluate(f"(e => {what})(document.activeElement)"):
-                await press("Tab")
+                await press(key)
                 assert (steps := steps + 1) < 60, what
 
         async def add(sought: str, *keys: str) -> None:
@@ -548,12 +548,13 @@ async def keyboard() -> None:
         await until(lambda: window.session.labels == before)
         assert not await browser.locator("[role=application] [tabindex='0']").count()  # the view is one stop
         await tab_to("e.dataset.ctrlKeys")
-        await tab_to("e.innerText.trim() === 'Cylinder' && e.draggable")
+        await tab_to("e.innerText.trim() === 'Cylinder' && e.draggable", "Shift+Tab")
         await press("Delete")
         await until(lambda: window.session.labels[-1:] == ("remove a primitive",))
+        await expect(browser.locator("[draggable=true]:focus")).to_have_count(1)  # the next row has it
         await press("Control+z")
         await until(lambda: window.session.labels == before)
-        await tab_to("e.draggable")
+        await toolbar(name="Cylinder").wait_for()
         for _ in range(await browser.locator("[draggable=true]").count()):
             await press("ArrowUp")
         for name in ("Sum", "Point", "Cylinder"):
