@@ -1,12 +1,16 @@
-"""Prefix sums, compaction and ranges on a device; only totals are copied to the host."""
+"""Prefix sums, compaction and ranges on a device; only totals are copied to the host.
+
+On the processor NumPy finds indices, which takes less time than a launch.
+"""
 
 from typing import Any, TypeAlias
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from blobtree.cells.scan_kernels import enumerate_indices, flag_sign, gather, summarize
-from blobtree.device import launch
+from blobtree.device import array_on, launch
 from blobtree.errors import InvalidResolution
 
 DeviceArray: TypeAlias = Any
@@ -47,6 +51,8 @@ def exclusive_scan(counts: DeviceArray, noun: str, *, start: int = 0) -> tuple[D
 
 def compact(flags: DeviceArray) -> DeviceArray:
     """Return the indices at which int32 `flags` (n + 1), the last of which is 0, are 1."""
+    if flags.device.is_cpu:
+        return _indices(np.flatnonzero(flags.numpy()))
     starts, total = exclusive_scan(flags, "flags")
     indices: DeviceArray = wp.empty(total, dtype=wp.int32, device=flags.device)
     launch(gather, len(flags) - 1, [starts], [indices], str(flags.device))
@@ -55,9 +61,15 @@ def compact(flags: DeviceArray) -> DeviceArray:
 
 def where_negative(numbers: DeviceArray, *, negative: bool = True) -> DeviceArray:
     """Return the indices at which int32 `numbers` (n) are negative, or at which they are not."""
+    if numbers.device.is_cpu:
+        return _indices(np.flatnonzero((numbers.numpy() < 0) == negative))
     flags: DeviceArray = wp.zeros(len(numbers) + 1, dtype=wp.int32, device=numbers.device)
     launch(flag_sign, len(numbers), [numbers, negative], [flags], str(numbers.device))
     return compact(flags)
+
+
+def _indices(found: NDArray[np.intp]) -> DeviceArray:
+    return array_on("cpu", found.astype(np.int32), wp.int32)
 
 
 def arange(count: int, device: str) -> DeviceArray:

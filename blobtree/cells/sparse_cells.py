@@ -29,6 +29,7 @@ from blobtree.cells.refine_kernels import (
     match_children,
     refine_children,
 )
+from blobtree.cells.runs import Runs, copy_runs, long_runs
 from blobtree.cells.scan import DeviceArray, arange, exclusive_scan, where_negative
 from blobtree.cells.scan_kernels import summarize
 from blobtree.device import demand_memory, known_device, launch
@@ -217,6 +218,8 @@ class _Refinement:
             self._unchanged = where_negative(above.sources, negative=False)
         else:
             self._changed, self._unchanged = arange(len(above), cells.device), arange(0, cells.device)
+        in_place = self._old is not None and not any(self._shift)
+        self._runs = long_runs(self._unchanged, above.sources) if in_place else None
 
     def level(self, pieces: Int32Array | None) -> Level:
         """Return the level below; `pieces` are those of the root's tape, if it is to be culled."""
@@ -278,7 +281,9 @@ class _Refinement:
         inputs = [self._changed, self._above.arrays, self._grid, self._models, False]
         count = len(self._changed) * CHILDREN
         launch(self._kernel(refine_children), count, inputs, [*outputs, self._above.arrays], self._device)
-        if self._old is not None and len(self._unchanged):
+        if self._runs is not None:
+            self._inherit_texels(self._runs, *(array.numpy() for array in outputs))
+        elif self._old is not None and len(self._unchanged):
             inputs = [self._unchanged, self._above.sources, self._old.children, self._old.arrays]
             count = len(self._unchanged) * CHILDREN
             launch(inherit_child_texels, count, inputs, outputs, self._device)
@@ -293,10 +298,52 @@ class _Refinement:
         if self._old is None:
             return
         self._match(level, slots)
+        if self._runs is not None:
+            self._copy_children(self._runs, level, slots.numpy(), starts.numpy())
+            return
         inputs = [self._unchanged, self._above.sources, above, self._old.children, self._old.arrays]
         inputs += [slots, starts]
         count = len(self._unchanged) * CHILDREN
         launch(copy_children, count, inputs, [*outputs, level.sources], self._device)
+
+    def _inherit_texels(
+        self, runs: Runs, children: Int32Array, flags: Int32Array, texels: Int32Array
+    ) -> None:
+        """Do the same as the kernel `inherit_child_texels` for runs of parents."""
+        assert self._old is not None
+        old_children, spans = self._old.children.numpy(), self._old.spans.numpy()
+        for first, old_first, count in (CHILDREN * runs).tolist():
+            inherited = old_children[old_first : old_first + count]
+            kept = np.flatnonzero(inherited >= 0)
+            children[first : first + count] = inherited
+            if len(kept):
+                begins, ends = spans[inherited[kept[0]] : inherited[kept[-1]] + 1].T
+                flags[first + kept] = 1
+                texels[first + kept] = np.diff(begins, append=ends[-1] + 1)
+
+    def _copy_children(self, runs: Runs, level: Level, slots: Int32Array, starts: Int32Array) -> None:
+        """Do the same as the kernel `copy_children` for runs of parents; their blocks lie where they lay."""
+        assert self._old is not None
+        blocks: list[list[int]] = []
+        texels: list[list[int]] = []
+        old, old_spans = self._old, self._old.spans.numpy()
+        children, spans, sources = level.children.numpy(), level.spans.numpy(), level.sources.numpy()
+        for first, _, count in (CHILDREN * runs).tolist():
+            inherited = children[first : first + count]
+            kept = np.flatnonzero(inherited >= 0)
+            if not len(kept):
+                continue
+            slot, source, number = int(slots[first]), int(inherited[kept[0]]), len(kept)
+            begin, end = int(old_spans[source, 0]) - 1, int(old_spans[source + number - 1, 1])
+            blocks.append([slot, source, number])
+            texels.append([int(starts[first]), begin, end - begin])
+            inherited[kept] += slot - source
+            spans[slot : slot + number] = old_spans[source : source + number] + (starts[first] - begin)
+            sources[slot : slot + number] = np.arange(source, source + number)
+        block_runs, texel_runs = (np.array(rows, np.int64).reshape(-1, 3) for rows in (blocks, texels))
+        copy_runs(block_runs, old.blocks.numpy(), level.blocks.numpy())
+        copy_runs(block_runs, old.keys.numpy(), level.keys.numpy())
+        copy_runs(texel_runs, old.tape.numpy(), level.tape.numpy())
 
     def _match(self, level: Level, slots: DeviceArray) -> None:
         """Find the sources of rebuilt blocks that are the same as before."""

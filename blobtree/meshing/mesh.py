@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, IndexArray, Int32Array
 from blobtree.cells.grid import CHILDREN
+from blobtree.cells.runs import Runs, copy_indices, copy_runs, item_runs, long_runs, runs_of
 from blobtree.cells.scan import DeviceArray, arange, compact, exclusive_scan, where_negative
 from blobtree.cells.sparse_cells import SparseCells, child_grid
 from blobtree.device import demand_memory, launch, on_host
@@ -207,6 +208,7 @@ class _Extraction:
         self._arrays, self._sources = cells.arrays, cells.leaves.sources
         self._count = len(cells.leaves)
         self._tables = patch_tables(cells.device)
+        self._runs: Runs | None = None  # of unchanged blocks, if these are copied so
         if previous is not None:  # imported here, because all imported kernels of a package compile together
             from blobtree.meshing import reuse_kernels
 
@@ -263,7 +265,9 @@ class _Extraction:
         """Return the blocks whose cells or rows may have changed, and the others."""
         if self._old is None:
             return arange(self._count, self._device), arange(0, self._device)
-        return self._marked(self._reuse.mark_face_neighbors, where_negative(self._sources))
+        changed, unchanged = self._marked(self._reuse.mark_face_neighbors, where_negative(self._sources))
+        self._runs = long_runs(unchanged, self._sources)
+        return changed, unchanged
 
     def _users(self, changed: DeviceArray) -> tuple[DeviceArray, DeviceArray]:
         """Return the blocks whose triangles use vertices of changed blocks, and the others."""
@@ -304,7 +308,14 @@ class _Extraction:
         """Copy codes, rows, offsets, and the numbers of vertices and quads of unchanged blocks."""
         if self._old is None:
             return
-        old = self._old
+        old, runs = self._old, self._runs
+        if runs is not None:
+            cells: tuple[DeviceArray, ...] = old.codes, old.rows, old.offsets
+            for before, after in zip(cells, arrays, strict=True):
+                copy_runs(CHILDREN * runs, before.numpy(), after.numpy())
+            for starts, numbers in zip((old.vertex_starts, old.quad_starts), counts, strict=True):
+                copy_runs(runs, np.diff(starts.numpy()), numbers.numpy())
+            return
         for before, after in zip((old.codes, old.rows, old.offsets), arrays, strict=True):
             words = CHILDREN * after.strides[0] // WORD_BYTES
             inputs = [words, unchanged, self._sources, _as_words(before)]
@@ -335,11 +346,17 @@ class _Extraction:
         if total and unconverged.numpy().any():
             self._launch(self._kernel(bisect_unconverged), total, [*inputs, unconverged], [vertices])
 
-    def _copy_vertices(self, unchanged: DeviceArray, starts: DeviceArray, vertices: Any) -> DeviceArray:
-        """Copy the vertices of unchanged blocks, and return the new indices of old ones."""
+    def _copy_vertices(self, unchanged: DeviceArray, starts: DeviceArray, vertices: Any) -> Any:
+        """Copy the vertices of unchanged blocks, and return the new indices of old ones, or their runs."""
         if self._old is None:
             return None
         old = self._old
+        if self._runs is not None:
+            runs = item_runs(self._runs, starts.numpy(), old.vertex_starts.numpy())
+            copy_runs(runs, old.vertices.numpy(), vertices.positions.numpy())
+            copy_runs(runs, old.normals.numpy(), vertices.normals.numpy())
+            copy_runs(runs, old.colors.numpy(), vertices.colors.numpy())
+            return runs
         new_index = self._empty(len(old.vertices), wp.int32)
         before = vertex_arrays(old.vertices, old.normals, old.colors)
         inputs = [unchanged, self._sources, old.vertex_starts, starts, before]
@@ -347,10 +364,16 @@ class _Extraction:
         return new_index
 
     def _copy_faces(
-        self, others: DeviceArray, starts: DeviceArray, new_index: DeviceArray, faces: DeviceArray
+        self, others: DeviceArray, starts: DeviceArray, new_index: Any, faces: DeviceArray
     ) -> None:
         """Copy the triangles of blocks that use unchanged vertices alone."""
         if self._old is None:
+            return
+        if self._runs is not None:
+            blocks = runs_of(others.numpy(), self._sources.numpy())
+            runs = 2 * item_runs(blocks, starts.numpy(), self._old.quad_starts.numpy())
+            homes = np.searchsorted(self._runs[:, 0], blocks[:, 0], "right") - 1
+            copy_indices(runs, self._old.faces.numpy(), faces.numpy(), new_index, homes)
             return
         inputs = [others, self._sources, self._old.quad_starts, starts, self._old.faces, new_index]
         self._launch(self._reuse.copy_faces, len(others), inputs, [faces])

@@ -7,6 +7,8 @@ import pytest
 import warp as wp
 
 from blobtree.cells.scan import compact, exclusive_scan, where_negative
+from blobtree.cells.scan_kernels import flag_sign, gather
+from blobtree.device import launch
 from blobtree.errors import InvalidResolution
 
 LARGEST = np.iinfo(np.int32).max
@@ -42,3 +44,13 @@ def test_indices_of_flags_and_signs() -> None:
     numbers = uploaded([5, -1, 0, -7])
     assert where_negative(numbers).numpy().tolist() == [1, 3]
     assert where_negative(numbers, negative=False).numpy().tolist() == [0, 2]
+
+
+def test_kernels_find_the_same_indices() -> None:
+    """Only cards run these."""
+    flags = uploaded([0, 0, 0, 0])
+    launch(flag_sign, 4, [uploaded([5, -1, 0, -7]), True], [flags], "cpu")
+    assert flags.numpy().tolist() == [0, 1, 0, 1]
+    indices = uploaded([0, 0, 0])
+    launch(gather, 5, [uploaded([0, 0, 1, 2, 2, 3])], [indices], "cpu")
+    assert indices.numpy().tolist() == [1, 2, 4]

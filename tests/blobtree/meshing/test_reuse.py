@@ -8,6 +8,7 @@ import warp as wp
 from hypothesis import assume, given, settings
 
 from blobtree import Mesh, Node, Point, Polygonizer, Segment, Sum, Union, polygonize
+from blobtree.cells import runs
 from blobtree.errors import InvalidResolution
 from tests.blobtree.meshing.edits import edited
 from tests.blobtree.trees import random_trees, trees
@@ -38,6 +39,17 @@ def small_blobs(count: int = 300) -> list[Point]:
 @pytest.mark.slow_cases("1")
 @pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3, 4))])
 def test_random_edits_match_a_new_mesh(seed: int) -> None:
+    random_edits(seed)
+
+
+@pytest.mark.parametrize("min_run", [0, 1 << 30])
+def test_runs_and_kernels_copy_the_same(min_run: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On the processor, kernels copy what runs are too short for, and on cards everything."""
+    monkeypatch.setattr(runs, "MIN_RUN", min_run)
+    random_edits(5)
+
+
+def random_edits(seed: int) -> None:
     rng = np.random.default_rng(seed)
     reused = 0
     for tree in random_trees(500 + seed, 6):
