@@ -1,10 +1,12 @@
 """``implicit-decals scatter``: scattered decals as a scene, or as a table."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from blobtree import PolarRepeat, Repeat
 from decals import Scene, Sizing, save_scene, save_table
 from decals import scatter as scatter_decals
 from decals.apps.commands.options import (
@@ -26,10 +28,12 @@ from decals.apps.output import check_output, print_path
 from decals.apps.views import frame, parse_view
 from decals.errors import InvalidInput
 from decals.rendering import Drawing
-from decals.scattering import ImageChoice, Orientation, PaintedImage, Planar
+from decals.scattering import ImageChoice, Orientation, PaintedImage, Planar, on_copies
 from decals.scattering.neighbors import ideal_spacing
+from decals.scenes.objects import SceneObject, TreeObject
 from decals.scenes.recipe import Recipe
 from decals.scenes.tables import SUFFIXES as TABLE_SUFFIXES
+from decals.surfaces import ImplicitSurface
 
 SUFFIXES = (".json", *TABLE_SUFFIXES)
 MAX_IMAGES = 256
@@ -52,6 +56,7 @@ def scatter(
     black: Annotated[float | None, Parameter(show_default=False)] = None,
     zone: Annotated[list[str] | None, Parameter(negative=(), show_default=False)] = None,
     border_width: Annotated[float | None, Parameter(show_default=False)] = None,
+    same_on_copies: Annotated[bool, Parameter(negative=())] = False,
     regularity: float = 1.0,
     seed: Whole = 0,
     crease_angle: CreaseAngle = None,
@@ -97,6 +102,8 @@ def scatter(
         first zone at a place counts.
     border_width
         Width of the band in which decals of neighbouring zones mix. Default: 0, they press each other.
+    same_on_copies
+        Scatter over one copy of a repeat, and put the same decals on all copies. --count is that of one copy.
     regularity
         From 0 (random positions) to 1 (as even as possible).
     seed
@@ -110,6 +117,8 @@ def scatter(
         )
     if border_width is not None and not zone:
         raise InvalidInput("--border-width is that of zones; give --zone, or leave it out")
+    if same_on_copies and zone:
+        raise InvalidInput("--same-on-copies scatters over one copy without --zone; leave one of them out")
     painted_along, black = painted_along or "z", 0.1 if black is None else black
     if count is not None:
         check_count("--count", count, 0, MAX_DECALS)
@@ -124,7 +133,8 @@ def scatter(
             raise InvalidInput(f"expected a scene with objects, {model[0]!r} has none; add one with `edit`")
         own = loaded.images if images is None and isinstance(loaded, Scene) else ()
         pictures = own or scale_images(images or 1)
-        surfaces = [item.surface for item in objects]
+        repeats = _repeats_of(objects, model[0]) if same_on_copies else []
+        surfaces = [ImplicitSurface(repeats[-1].child)] if repeats else [item.surface for item in objects]
         if spacing is not None:
             _check_spacing(spacing, sum(surface.area for surface in surfaces))
         density = None
@@ -151,7 +161,11 @@ def scatter(
             )
         if count is None and spacing is None and not (zone and zones.have_spacings):
             options["count"] = 500
-        decals = scatter_decals(list(objects), density=density, seed=seed, progress=progress, **options)
+        decals = scatter_decals(
+            surfaces if repeats else list(objects), density=density, seed=seed, progress=progress, **options
+        )
+        for repeat in reversed(repeats):
+            decals = on_copies(decals, repeat)
         if output.suffix.lower() in TABLE_SUFFIXES:
             save_table(decals, output, images=own, origin=objects[0].origin)
         else:
@@ -163,9 +177,24 @@ def scatter(
                 options |= {"painted": str(painted), "painted_along": painted_along, "black": black}
             names = [item.name for item in objects]
             recipe = Recipe.of("decals.scatter", seed=seed, models=names, **options).giving(decals, objects)
-            kept: dict[str, Any] = {"drawing": drawing, "recipe": recipe}
+            kept: dict[str, Any] = {"drawing": drawing, "recipe": None if repeats else recipe}
             save_scene(Scene(objects=objects, camera=camera, images=pictures, decals=decals, **kept), output)
     print_path(output)
+
+
+def _repeats_of(objects: Sequence[SceneObject], model: str) -> list[Repeat | PolarRepeat]:
+    """Return the repeats at the root of the only model, the outer one first; InvalidInput without any."""
+    node = objects[0].tree if len(objects) == 1 and isinstance(objects[0], TreeObject) else None
+    repeats = []
+    while isinstance(node, Repeat | PolarRepeat):
+        repeats.append(node)
+        node = node.child
+    if not repeats:
+        raise InvalidInput(
+            f"--same-on-copies: expected one tree whose root is a Repeat or a PolarRepeat, got {model!r}; "
+            "leave the option out"
+        )
+    return repeats
 
 
 def _check_spacing(spacing: float, area: float) -> None:

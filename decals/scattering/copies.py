@@ -8,6 +8,7 @@ from blobtree.nodes.tree import Transform
 from blobtree.validation import describe
 from decals.errors import InvalidDecals, InvalidScattering
 from decals.model import Decals
+from decals.scattering.domain import MAX_PARTICLES
 from decals.surfaces.implicit import ImplicitSurface
 from decals.validation import instance
 
@@ -43,7 +44,7 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
     InvalidDecals
         `decals` are not `Decals`.
     InvalidScattering
-        `repeat` is another node.
+        `repeat` is another node, or there would be more than 100,000,000 decals.
     InvalidMesh
         The repeat has no surface.
 
@@ -64,6 +65,11 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
     instance("decals", decals, Decals, InvalidDecals, "scatter returns some")
     if not isinstance(repeat, (Repeat, PolarRepeat)):
         raise InvalidScattering(f"repeat: expected a Repeat or a PolarRepeat, got {describe(repeat)}")
+    if len(decals) * repeat.count > MAX_PARTICLES:
+        raise InvalidScattering(
+            f"decals: expected at most {MAX_PARTICLES:,} on all copies, got {len(decals):,} on each of "
+            f"{repeat.count:,}; take fewer"
+        )
     copies = Decals.concatenate(_moved(decals, matrix) for matrix in _placements(repeat))
     if len(copies) == 0:
         return copies

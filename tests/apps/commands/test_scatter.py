@@ -7,7 +7,7 @@ import pytest
 import pyvista as pv
 from PIL import Image
 
-from blobtree import Point, Segment, save
+from blobtree import Point, Repeat, Segment, save
 from decals import Camera, Scene, TreeObject, load_scene, reproduce, save_scene
 from decals.apps.cli import run
 from decals.scenes.cover import fitting_camera
@@ -143,9 +143,25 @@ def test_spacings_of_zones_set_the_count(folder: Path) -> None:
     assert "zones" in reproduce(scene).missing[0]
 
 
+def test_copies_of_a_grid_get_the_same_decals(folder: Path) -> None:
+    grid = Repeat(Repeat(Point((0, 0, 0), radius=0.4), (3, 0, 0), 3), (0, 2, 0), 2)
+    save(grid, "grid.json")
+    save(Point((0, 0, 0), radius=0.4), "ball.json")
+    for name, options in (("grid", ["--same-on-copies"]), ("ball", [])):
+        assert run(["scatter", f"{name}.json", "--count", "20", *options, "-o", f"{name}-scene.json"]) == 0
+    one, scene = (load_scene(folder / f"{name}-scene.json") for name in ("ball", "grid"))
+    places = [(x, y, 0) for y in (0, 2) for x in (0, 3, 6)]
+    expected = np.concatenate([one.decals.positions + place for place in places])
+    np.testing.assert_allclose(scene.decals.positions, expected, atol=1e-5)
+    assert len(scene.objects) == 1
+    assert scene.recipe is None  # it would scatter over all copies
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["--same-on-copies", "-o", "a.json"], "expected one tree whose root is a Repeat"),
+        (["--same-on-copies", "--zone", "*", "-o", "a.json"], "leave one of them out"),
         (["--zone", "tail", "-o", "a.json"], "expected a name of the models, which have 'spheres'"),
         (["--zone", "*:taste=1", "-o", "a.json"], "expected WHERE:KEY=VALUE"),
         (["--zone", "*:density=much", "-o", "a.json"], "expected WHERE:KEY=VALUE"),

@@ -105,3 +105,11 @@ def test_other_decals_are_refused() -> None:
     wrong: Any = marks_of(STONE).positions
     with pytest.raises(InvalidDecals, match="expected a Decals"):
         on_copies(wrong, Repeat(STONE, (2, 0, 0), 2))
+
+
+def test_more_decals_than_memory_holds_are_refused() -> None:
+    many = Decals.concatenate([marks_of(STONE)] * 417)
+    with pytest.raises(
+        InvalidScattering, match="at most 100,000,000 on all copies, got 10,008 on each of 10,000"
+    ):
+        on_copies(many, Repeat(STONE, (2, 0, 0), 10_000))
