@@ -13,7 +13,7 @@ import numpy as np
 from blobtree._typing import Float64Array
 from blobtree.declare.formula import Formula, result_of, shown
 from blobtree.declare.parameters import Parameter, Quantity
-from blobtree.transpile.python import Precision, vector
+from blobtree.transpile.python import Precision, Vector
 
 TRIAL_SPREAD = 2.0
 """Distance from their limits, or from 0, up to which numbers are drawn for trials."""
@@ -74,7 +74,7 @@ def _trial_number(parameter: Parameter, rng: np.random.Generator, trial: int) ->
 def in_precision(value: Any, precision: Precision) -> Any:
     """Return a number or a vector in a floating-point type; whole numbers stay as they are."""
     if isinstance(value, tuple):
-        return vector(*value, precision=precision)
+        return np.array(value, precision).view(Vector)
     return precision(value) if isinstance(value, float) else value
 
 
@@ -91,14 +91,9 @@ class Trial:
         self, function: Formula, leading: tuple[Any, ...], size: int, precision: Precision = np.float64
     ) -> Float64Array:
         """Return the result (size,) of a function of leading arguments, the point first, and the values."""
-        plain = function.reference(precision)
         arguments = [in_precision(value, precision) for value in (*leading, *self.values.values())]
         return result_of(
-            function,
-            lambda *given: np.atleast_1d(plain(*given)),
-            arguments,
-            lambda: self.where(leading),
-            size,
+            function, function.reference(precision), arguments, lambda: self.where(leading), size
         )
 
     def where(self, leading: tuple[Any, ...]) -> str:

@@ -32,10 +32,7 @@ def _sampled(source: Formula) -> Sampled:
     reference = source.reference()
 
     def sampled(distances: Floats) -> Floats:
-        results = [
-            result_of(source, lambda d: np.ravel(reference(d)), [d], partial("d = {:.6g}".format, d), 1)
-            for d in distances
-        ]
+        results = [result_of(source, reference, [d], partial("d = {:.6g}".format, d), 1) for d in distances]
         return np.concatenate(results)
 
     return sampled
@@ -90,7 +87,7 @@ def _check_single(source: Formula, distances: Floats, expected: Floats) -> None:
     reference = source.reference(np.float32)
     for d, value in zip(distances, expected, strict=True):
         arguments, where = [np.float32(d)], partial("d = {:.6g}".format, d)
-        single = result_of(source, lambda x: np.ravel(reference(x)), arguments, where, 1)[0]
+        single = result_of(source, reference, arguments, where, 1)[0]
         if abs(single - value) > SLOPE_TOLERANCE * (1.0 + abs(value)):
             raise source.refusal(
                 f"for d = {d:.6g} it returns {single:.6g} in single precision, {value:.6g} in double"

@@ -11,6 +11,7 @@ import ast
 import difflib
 import hashlib
 import inspect
+import math
 import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
@@ -268,12 +269,12 @@ def result_of(
     """
     try:
         with np.errstate(all="ignore"):
-            result = np.asarray(function(*arguments), np.float64)
+            result = np.array(function(*arguments), np.float64, ndmin=1)
     except ArithmeticError as error:
         raise source.refusal(f"for {where()} it fails: {error}; it must have a result everywhere") from error
     except Exception as error:  # the function is the user's own
         raise source.refusal(f"for {where()} it fails: {type(error).__name__}: {error}") from error
-    if result.shape != (size,) or not np.isfinite(result).all():
+    if result.shape != (size,) or not all(map(math.isfinite, result.tolist())):  # quicker than NumPy's
         wanted = "a finite number" if size == 1 else f"{size} finite numbers"
         raise source.refusal(f"for {where()} it returns {shown(result)}; expected {wanted}")
     return result

@@ -316,7 +316,9 @@ def _try_slope(trial: _Trial, formulas: OperatorFormulas, bound: Formula) -> Non
         steepest = float((partials if signed else np.abs(partials)) @ slopes)
         pairs = [vector(*pair, precision=np.float64) for pair in (slopes, (a, b))]
         arguments = [*pairs, *map(np.float64, trial.parameters)]
-        (most,) = result_of(bound, _single(bound), arguments, partial("slopes {}".format, shown(slopes)), 1)
+        (most,) = result_of(
+            bound, bound.reference(), arguments, partial("slopes {}".format, shown(slopes)), 1
+        )
         if steepest > most + VALUE_TOLERANCE * (1.0 + abs(most)):
             raise bound.refusal(
                 f"{trial.call(a, b)} rises by {steepest:.6g} where its operands rise by {shown(slopes)}, "
@@ -342,7 +344,7 @@ def _try_interval(trial: _Trial, _formulas: OperatorFormulas, interval: Formula)
 def _try_keeps(trial: _Trial, _formulas: OperatorFormulas, keeps: Formula) -> None:
     """Check that F is the operand, or 0, that `keeps` says."""
     for low, high, arguments, where in _boxes(trial):
-        (kept,) = result_of(keeps, _single(keeps), arguments, where, 1)
+        (kept,) = result_of(keeps, keeps.reference(), arguments, where, 1)
         if kept not in KEPT:
             raise keeps.refusal(f"expected 0, 1, 2 or 3 {where()}, got {kept:g}")
         for a, b in (low, high, 0.5 * (low + high)):
@@ -368,12 +370,6 @@ _CHECKS_OF_FORMULAS: dict[str, Callable[[_Trial, OperatorFormulas, Formula], Non
     "keeps": _try_keeps,
 }
 """Checks of formulas that replace what follows from claims."""
-
-
-def _single(formula: Formula) -> Callable[..., Any]:
-    """Return a formula of one number as a function that returns it in a list."""
-    function = formula.reference()
-    return lambda *arguments: [function(*arguments)]
 
 
 def _boxes(trial: _Trial) -> Iterator[tuple[Float64Array, Float64Array, list[Any], Callable[[], str]]]:
