@@ -163,14 +163,21 @@ async def pull(page: Page, start: tuple[float, float], by: tuple[float, float], 
     await page.mouse.up()
 
 
-async def trace(page: Page, circle: Locator) -> None:
-    """Draw along a circle of the page with the mouse."""
+async def trace(page: Page, circle: Locator, *, finger: bool = False) -> None:
+    """Draw along a circle of the page with the mouse, or in Chromium with a finger."""
     await circle.scroll_into_view_if_needed()
     box = await circle.bounding_box()
     assert box is not None
     angles = np.linspace(0.0, 2.0 * np.pi, 60)
     right, down = box["width"] / 2 * np.cos(angles), box["height"] / 2 * np.sin(angles)
     places = np.stack([box["x"] + box["width"] / 2 + right, box["y"] + box["height"] / 2 + down], axis=1)
+    if finger:
+        touch = await page.context.new_cdp_session(page)
+        points = [[{"x": x, "y": y}] for x, y in places.tolist()]
+        steps = [("touchStart", points[0]), *(("touchMove", at) for at in points[1:]), ("touchEnd", [])]
+        for kind, at in steps:
+            await touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": at})
+        return
     await page.mouse.move(*places[0])
     await page.mouse.down()
     for place in places[1:]:

@@ -82,8 +82,12 @@ BLOB = Point((0, 0, 0), radius=1.0) + Point((1.2, 0.4, 0), radius=0.6)
 DEFINED = "getComputedStyle(document.activeElement, '::after').content"
 """The definition that the page shows of the symbol with the focus."""
 EMPTY = empty_scene(["scale"], UPRIGHT["y"])
+BARE = decals.Scene(objects=(), camera=decals.Camera((0, 0, 8)))
+"""A scene without objects, in whose place a lesson comes."""
 WIDE = 1280, 800
 """Size of a laptop's window."""
+COLD = 400
+"""Seconds: lesson 6 compiles kernels of solids in contact, where the cache has none."""
 NUMBERS = count()
 """Of servers, which trame finds by their names."""
 
@@ -400,9 +404,16 @@ REACHED = """button => {
 
 
 async def touch(picture: str | None = None) -> None:
-    """On a phone and on a tablet, fingers reach everything, drag decals, and turn, zoom and move the view."""
-    await on_device("phone", (390, 844), picture)
-    await on_device("tablet", (820, 1180))
+    """On a phone and on a tablet, fingers reach everything, drag decals, and turn, zoom and move the view.
+
+    They draw the outline of a guess too.
+    """
+    for name, size in (("phone", (390, 844)), ("tablet", (820, 1180))):
+        await on_device(name, size, picture if name == "phone" else None)
+        lessons = load_lessons(LESSONS)
+        page = sandboxed(BARE, size=size, touch=True, kind=LabPage, lessons=lessons, begin=1)
+        async with page as (browser, lab_page, _):
+            await guess(browser, lab_page, finger=True)
 
 
 async def on_device(name: str, size: tuple[int, int], picture: str | None = None) -> None:
@@ -1163,9 +1174,8 @@ async def filled() -> None:
 
 async def lab(picture: str | None = None) -> None:
     """A student answers each lesson's question wrong, then right."""
-    empty = decals.Scene(objects=(), camera=decals.Camera((0, 0, 8)))
     requests: list[str] = []
-    async with sandboxed(empty, lessons=load_lessons(LESSONS), kind=LabPage) as (browser, lab_page, window):
+    async with sandboxed(BARE, lessons=load_lessons(LESSONS), kind=LabPage) as (browser, lab_page, window):
         browser.on("request", lambda request: requests.append(request.url))
         await arrives(browser, lab_page, window, 2)
         for number, attempts in enumerate(ANSWERS):
@@ -1245,9 +1255,11 @@ async def lab(picture: str | None = None) -> None:
         await browser.get_by_text("Open or new").click()
         await browser.get_by_role("button", name="Two decals", exact=True).click()
         see = browser.get_by_role("button", name="See", exact=True)
-        await browser.wait_for_function(REACHED, arg=await see.element_handle())  # the panel opens
+        await see.scroll_into_view_if_needed()  # below the pad of the outline, once the panel is open
+        await browser.wait_for_function(REACHED, arg=await see.element_handle())
         shown_view, panel = [
-            await browser.locator(part).bounding_box() for part in ("[role=application]", ".lesson-side")
+            await browser.locator(part).bounding_box()
+            for part in ("[role=application]", ".v-navigation-drawer:has(.lesson-side)")
         ]
         assert shown_view is not None
         assert panel is not None
@@ -1267,8 +1279,9 @@ async def arrives(browser: Page, lab_page: LabPage, window: EditWindow, number: 
     """The title of a lesson covers the picture of the one before at once, until its own is there."""
     title, cover = lab_page.lab.values()["lab_titles"][number]["title"], browser.locator(".coming")
     await cover.wait_for(state="detached")
+    before = lab_page.lab.begun
     await browser.get_by_role("combobox", name="lesson", exact=True).press("ArrowDown")
-    with patch.object(StreamedView, "shows", lambda *_: False):
+    with patch.object(StreamedView, "shows", lambda _, begun: begun == before):
         option = browser.get_by_role("option", name=title, exact=True)
         assert title in await option.evaluate(CHOSEN_AT_ONCE)
         await until(partial(shows_lesson, lab_page, number))
@@ -1291,7 +1304,7 @@ async def puzzle(browser: Page, lab_page: LabPage) -> None:
     await browser.get_by_text("Link to the puzzle:").get_by_text("#puzzle=0.5,0.45,0.4,0.3&par=").wait_for()
 
 
-async def guess(browser: Page, lab_page: LabPage) -> None:
+async def guess(browser: Page, lab_page: LabPage, *, finger: bool = False) -> None:
     """Guess before contact is switched on, and see the truth; nothing shows it before."""
     question = lab_page.lab.lesson.settings.guess
     assert question is not None
@@ -1299,10 +1312,11 @@ async def guess(browser: Page, lab_page: LabPage) -> None:
     assert await browser.locator(".plot, [data-task]").count() == 0
     value = (question.low + question.high) / 2
     if question.sketch:
-        await trace(browser, browser.locator(".pad circle").first)
+        await trace(browser, browser.locator(".pad circle").first, finger=finger)
     await browser.get_by_label(question.label).fill(f"{value:g}")
     await browser.get_by_role("button", name="See", exact=True).click()
-    await browser.get_by_text(f"you guessed {shown(np.array(value))}, it is now ").wait_for()
+    answered = browser.get_by_text(f"you guessed {shown(np.array(value))}, it is now ")
+    await answered.wait_for(timeout=1000 * COLD)
     await browser.locator(".plot").first.wait_for()
     assert await browser.locator(".scale path").count() in (1, 2)
     if question.sketch:

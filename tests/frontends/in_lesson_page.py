@@ -315,12 +315,16 @@ async def explained(browser: Browser, path: Path, width: int, height: int) -> No
 
 
 async def sketched(browser: Browser, path: Path, width: int, height: int) -> None:
-    """A student draws the rim of the orange image, and sees how much of it contact presses away."""
+    """A student draws the rim of the orange image, and sees how much of it contact presses away.
+
+    On a phone and a tablet a finger draws it, where the driver sends one.
+    """
     page = await browser.new_page(viewport={"width": width, "height": height}, has_touch=True)
     await page.add_init_script(ERRORS)
     await page.goto(path.as_uri())
     await page.wait_for_function("document.getElementById('lesson').dataset.ready", timeout=PATIENCE)
-    await trace(page, page.locator(".pad circle").first)
+    finger = is_chromium(page) and width < SIZE["width"]
+    await trace(page, page.locator(".pad circle").first, finger=finger)
     await page.locator("[name=guess]").fill("0.5")
     await press(page, "See")
     await settled(page)
