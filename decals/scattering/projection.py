@@ -10,7 +10,7 @@ from blobtree._typing import BoolArray, Float32Array, Int32Array
 from blobtree.device import launch
 from decals.scattering.step_kernels import offset_points
 from decals.surfaces.mesh import MeshSurface
-from decals.surfaces.surface import DeviceSurface, Scalars, Surface, Vectors, on_device
+from decals.surfaces.surface import DeviceSurface, Scalars, Surface, Vectors, on_device, vectors
 
 HIDING_OFFSET = 1e-4
 """Offset of a point along its normal before the test whether it lies inside another surface, in diagonals of
@@ -72,10 +72,8 @@ class SurfaceProjection:
                 launch(offset_points, last - first, inputs, [points], device=self.device)
                 for other in others:
                     self._on_device(other).mark_inside(points, forbidden[first:last])
-            for shell in self.shells(index):
-                self._mark_behind(
-                    shell, index, positions[first:last], normals[first:last], forbidden[first:last]
-                )
+            if self.shells(index):
+                self._mark_behind(index, positions[first:last], normals[first:last], forbidden[first:last])
         if self._forbidden is not None and len(positions):
             flags = forbidden.numpy() | self._forbidden(positions.numpy())
             forbidden.assign(flags.astype(np.int32))
@@ -85,24 +83,29 @@ class SurfaceProjection:
         surface = self._surfaces[index]
         return surface.shells if isinstance(surface, MeshSurface) else ()
 
-    def _mark_behind(
-        self, shell: MeshSurface, index: int, positions: Vectors, normals: Vectors, forbidden: Scalars
-    ) -> None:
+    def _mark_behind(self, index: int, positions: Vectors, normals: Vectors, forbidden: Scalars) -> None:
         """Write 1 where a point lies inside a part of its own surface.
 
         A part whose normals point inward contains the side above its own points, so it hides only points both
-        of whose sides it contains.
+        of whose sides it contains. Only points in the box of a part, which are often few, are tested.
         """
-        count = len(positions)
-        sides = []
-        for sign in (1.0, -1.0) if shell.inverted else (1.0,):
-            points: Any = wp.empty(count, dtype=wp.vec3, device=self.device)
-            inputs = [sign * float(self._heights[index]), positions, normals]
-            launch(offset_points, count, inputs, [points], device=self.device)
-            flags: Any = wp.zeros(count, dtype=wp.int32, device=self.device)
-            on_device(shell, self.device).mark_inside(points, flags)
-            sides.append(flags.numpy())
-        forbidden.assign(np.maximum(forbidden.numpy(), np.minimum.reduce(sides)))
+        height, places, flags = float(self._heights[index]), positions.numpy(), forbidden.numpy().copy()
+        for shell in self.shells(index):
+            lower, upper = shell.bounds
+            near = ((places >= lower - 2.0 * height) & (places <= upper + 2.0 * height)).all(axis=1)
+            rows = np.flatnonzero(near & (flags == 0))
+            if len(rows) == 0:
+                continue
+            own = [vectors(array.numpy()[rows], self.device) for array in (positions, normals)]
+            hidden = np.ones(len(rows), np.int32)
+            for sign in (1.0, -1.0) if shell.inverted else (1.0,):
+                points: Any = wp.empty(len(rows), dtype=wp.vec3, device=self.device)
+                launch(offset_points, len(rows), [sign * height, *own], [points], device=self.device)
+                inside: Any = wp.zeros(len(rows), dtype=wp.int32, device=self.device)
+                on_device(shell, self.device).mark_inside(points, inside)
+                hidden &= inside.numpy()
+            flags[rows] = hidden
+        forbidden.assign(flags)
 
     def overlapping(self, index: int) -> list[int]:
         """Return the other surfaces whose boxes intersect the box of this one."""
