@@ -146,20 +146,27 @@ class OwnedPoints:
 
         The image of the smallest must reach the point: the rule of `decals.field.radial.nested_owner`.
         """
-        powers = self.powers(radii)
+        return self._owners(radii, self.powers(radii))
+
+    def _owners(self, radii: Float64Array, powers: Float64Array) -> Int64Array:
+        """Return `owners` by the powers of the points."""
         columns: Int64Array = powers.argmin(axis=1)
-        lowest = np.take_along_axis(self.decals, columns[:, None], axis=1)
-        own, larger = radii[self.decals], radii[lowest]
-        smaller = (powers <= 0.0) & (own < larger)
+        own, larger = radii[self.decals], radii[self.decals[np.arange(len(columns)), columns]]
+        smaller = (powers <= 0.0) & (own < larger[:, None])
+        rows = np.flatnonzero(smaller.any(axis=1))
+        own, larger, smaller = own[rows], larger[rows, None], smaller[rows]
+        lowest = self.decals[rows, columns[rows]][:, None]
         least = MIN_KEPT_RADIUS * larger
         # nested decals are at most so far apart
         apart = least + np.sqrt(least**2 + larger**2 - np.where(smaller, own, larger) ** 2)
-        smaller &= self.centers.gaps[self.decals] <= apart
-        rows = np.flatnonzero(smaller.any(axis=1))
-        rows = rows[(smaller[rows] & self._nested(self.decals[rows], lowest[rows], radii)).any(axis=1)]
+        smaller &= self.centers.gaps[self.decals[rows]] <= apart
+        some = np.flatnonzero(smaller.any(axis=1))
+        rows, smaller, lowest = rows[some], smaller[some], lowest[some]
+        above = smaller & self._nested(self.decals[rows], lowest, radii)
+        some = np.flatnonzero(above.any(axis=1))
+        rows, above = rows[some], above[some]
         decals, own = self.decals[rows], powers[rows]
         facing = np.einsum("nki,ni->nk", self.centers.points.normals[decals], self.points.normals[rows])
-        above = smaller[rows] & self._nested(decals, lowest[rows], radii)
         above &= (facing > FACING_LIMIT + TOP_MARGIN) & (self.lengths[rows] <= radii[decals])
         for column in range(decals.shape[1]):
             lower = own < own[:, column : column + 1]
@@ -187,11 +194,12 @@ class OwnedPoints:
 
         On lines of contact, where several decals are as good as owners, it is the largest of theirs.
         """
-        columns = self.owners(radii)[:, None]
         powers = self.powers(radii)
-        shares = np.where(self.decals >= 0, self.lengths, 0.0) / radii[self.decals]
+        columns = self._owners(radii, powers)[:, None]
+        own_radii = radii[self.decals]
+        shares = np.where(self.decals >= 0, self.lengths, 0.0) / own_radii
         own = np.take_along_axis(powers, columns, 1)
-        tolerance = TIE * radii[np.take_along_axis(self.decals, columns, 1)] ** 2
+        tolerance = TIE * np.take_along_axis(own_radii, columns, 1) ** 2
         tied = (powers <= own + tolerance) & (own == powers.min(axis=1, keepdims=True))
         result: Float64Array = np.where(tied, shares, np.take_along_axis(shares, columns, 1)).max(axis=1)
         return result
@@ -202,13 +210,14 @@ class OwnedPoints:
         Points of one cube are compared if the same three decals meet there.
         """
         shares = self.shares(radii)
-        rows = np.flatnonzero(shares > share)
-        nearest = np.argsort(self.powers(radii)[rows], axis=1)[:, :3]
-        corners = np.take_along_axis(self.decals[rows], nearest, axis=1)
-        cubes = np.floor(self.points.positions[rows].astype(np.float64) / (apart or 1.0)).astype(np.int64)
+        outer = self[np.flatnonzero(shares > share)]
+        shares = shares[shares > share]
+        nearest = np.argsort(outer.powers(radii), axis=1)[:, :3]
+        corners = np.take_along_axis(outer.decals, nearest, axis=1)
+        cubes = np.floor(outer.points.positions.astype(np.float64) / (apart or 1.0)).astype(np.int64)
         places = np.hstack([corners, cubes])
-        order = np.lexsort((-shares[rows], *places.T))
-        return self[rows[order[firsts(places[order])]]]
+        order = np.lexsort((-shares, *places.T))
+        return outer[order[firsts(places[order])]]
 
     def joined(self, *others: "OwnedPoints") -> "OwnedPoints":
         """Return the points of all."""
