@@ -129,7 +129,10 @@ def covering_decals(
         return OrientedPoints(centers.positions, normals, centers.surface_ids)
 
     even = bool(spacings.max() <= EVEN * spacings.min())
-    decals = center_outsized(domain, centers, movable, spacings, samples, aim) if even else aim(centers)
+    if even:
+        decals = center_outsized(domain, centers, movable, spacings, samples, nearest, aim)
+    else:
+        decals = aim(centers)
     decals = on_single_sheets(domain, decals, samples, expected)
     radii = covering_radii(
         decals,

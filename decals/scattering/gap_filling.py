@@ -113,6 +113,7 @@ def center_outsized(
     movable: BoolArray,
     sizes: Float32Array,
     samples: OrientedPoints,
+    nearest: NearestFacing,
     aim: Aim,
 ) -> OrientedPoints:
     """Return the decals at centres, those of outsized decals moved toward the middle of their cells.
@@ -133,6 +134,8 @@ def center_outsized(
         Spacing at each centre, ``float32[n]``.
     samples
         Points spread evenly over the area to cover.
+    nearest
+        Finds the decals nearest to the samples. `aim` may use it for other normals of the decals.
     aim
         Returns the decals of centres.
     """
@@ -140,7 +143,7 @@ def center_outsized(
 
     movable = movable.copy()
     decals = aim(centers)
-    nearest = NearestFacing(samples.positions, samples.normals)
+    nearest = nearest.copy()
     radii, owners = _cells(decals, nearest)
     for _ in range(CENTERING_ROUNDS):
         rows = np.flatnonzero(movable & (radii > OUTSIZED * np.median(radii)))

@@ -1,5 +1,6 @@
 """Neighbour queries: on the device among the particles of a state, and on the host among oriented points."""
 
+from copy import copy
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.device import launch
+from blobtree.lazy import Lazy
 from blobtree.progress import check_cancelled
 from decals.model import FACING_LIMIT
 from decals.scattering.domain import OrientedPoints
@@ -223,19 +225,33 @@ class FacingTree:
         self._normals, self._heights = normals, heights
 
     def nearest(
-        self, points: Float32Array, normals: Float32Array, *, count: int = 1, skip_self: bool = False
+        self,
+        points: Float32Array,
+        normals: Float32Array,
+        *,
+        count: int = 1,
+        skip_self: bool = False,
+        reach: float = np.inf,
     ) -> tuple[Float64Array, Int64Array]:
         """Return distances and indices of the `count` nearest facing points, ``[n, count]`` each.
 
         Rows fill up with infinity and -1 where fewer than `count` of the last of `NEIGHBOR_COUNTS` nearest
         points face the point. With `skip_self` the points are the tree's own, and are not their own
-        neighbours.
+        neighbours. Points farther than the reach do not count.
         """
-        distances, indices, _ = self.nearest_and_doubts(points, normals, count=count, skip_self=skip_self)
+        distances, indices, _ = self.nearest_and_doubts(
+            points, normals, count=count, skip_self=skip_self, reach=reach
+        )
         return distances, indices
 
     def nearest_and_doubts(
-        self, points: Float32Array, normals: Float32Array, *, count: int = 1, skip_self: bool = False
+        self,
+        points: Float32Array,
+        normals: Float32Array,
+        *,
+        count: int = 1,
+        skip_self: bool = False,
+        reach: float = np.inf,
     ) -> tuple[Float64Array, Int64Array, Float32Array]:
         """Return what `nearest` does, and how little decides which of the examined points face each, ``[n]``.
 
@@ -244,6 +260,7 @@ class FacingTree:
         distances = np.full((len(points), count), np.inf)
         indices = np.full((len(points), count), -1, np.int64)
         doubts = np.full(len(points), np.inf, np.float32)
+        more = np.ones(len(points), np.bool_)
         open_rows = np.arange(len(points))
         for width in self._widths(count + skip_self):
             if len(open_rows) == 0:
@@ -253,10 +270,10 @@ class FacingTree:
                 check_cancelled("searching for neighbours")
                 rows = open_rows[first : first + ROWS_AT_ONCE]
                 own = rows if skip_self else None
-                found = self._nearest_among(points[rows], normals[rows], width, own)
+                found = self._nearest_among(points[rows], normals[rows], width, own, reach)
                 distances[rows, columns], indices[rows, columns] = (array[:, columns] for array in found[:2])
-                doubts[rows] = np.minimum(doubts[rows], found[2])
-            open_rows = open_rows[~np.isfinite(distances[open_rows, -1])]
+                doubts[rows], more[rows] = np.minimum(doubts[rows], found[2]), found[3]
+            open_rows = open_rows[more[open_rows] & ~np.isfinite(distances[open_rows, -1])]
         return distances, indices, doubts
 
     def around(self, count: int) -> tuple[Float64Array, Int64Array]:
@@ -280,15 +297,28 @@ class FacingTree:
         return widths[:1] + [wide for narrow, wide in pairwise(widths) if wide > narrow]
 
     def _nearest_among(
-        self, points: Float32Array, normals: Float32Array, width: int, own: Int64Array | None
-    ) -> tuple[Float64Array, Int64Array, Float32Array]:
-        """Sort the facing ones to the front of the `width` nearest points, and return how little decides."""
+        self,
+        points: Float32Array,
+        normals: Float32Array,
+        width: int,
+        own: Int64Array | None,
+        reach: float,
+    ) -> tuple[Float64Array, Int64Array, Float32Array, BoolArray]:
+        """Sort the facing ones to the front of the `width` nearest points, and return how little decides.
+
+        The last result is True for points with more neighbours within the reach.
+        """
+        columns, bound = np.arange(1, width + 1), np.nextafter(reach, np.inf)
         distances, indices = (
             array.reshape(len(points), width)
-            for array in self._tree.query(points, k=np.arange(1, width + 1), workers=_workers(len(points)))
+            for array in self._tree.query(
+                points, k=columns, distance_upper_bound=bound, workers=_workers(len(points))
+            )
         )
+        within = np.isfinite(distances)
+        indices = np.where(within, indices, 0)
         cosines = np.einsum("nki,ni->nk", self._normals[indices], normals)
-        facing = cosines > FACING_LIMIT
+        facing = within & (cosines > FACING_LIMIT)
         if self._heights is not None:
             offsets = points[:, None] - self._tree.data[indices]
             products = sheet_products(offsets, self._normals[indices], normals)
@@ -299,7 +329,7 @@ class FacingTree:
         facing = np.take_along_axis(facing, order, axis=1)
         distances = np.where(facing, np.take_along_axis(distances, order, axis=1), np.inf)
         indices = np.where(facing, np.take_along_axis(indices, order, axis=1), -1)
-        return distances, indices, np.abs(cosines - FACING_LIMIT).min(axis=1)
+        return distances, indices, np.abs(cosines - FACING_LIMIT).min(axis=1), within[:, -1]
 
 
 def sheet_products(offsets: Float64Array, centers: Float32Array, points: Float32Array) -> Float64Array:
@@ -333,32 +363,43 @@ class NearestFacing:
     """
 
     def __init__(self, positions: Float32Array, normals: Float32Array) -> None:
+        self._positions, self._normals = positions, normals
+        self._centers = self._center_normals = np.zeros((0, 3), np.float32)
+        self._heights = np.zeros(0)
+        self._distances, self._indices = np.zeros(0), np.zeros(0, np.int64)
+
+    @Lazy
+    def _tree(self) -> Any:
         from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
 
-        self._positions, self._normals = positions, normals
-        self._tree = cKDTree(positions)
-        self._centers = self._center_normals = np.zeros((0, 3), np.float32)
-        self._distances, self._indices = np.zeros(0), np.zeros(0, np.int64)
+        return cKDTree(self._positions)
+
+    def copy(self) -> "NearestFacing":
+        """Return one for the same points that knows the same centres, and changes on its own."""
+        other = copy(self)
+        other._distances, other._indices = self._distances.copy(), self._indices.copy()
+        return other
 
     def of(
         self, centers: Float32Array, normals: Float32Array, heights: Float64Array | None = None
     ) -> tuple[Float64Array, Int64Array]:
         """Return distance and index of the nearest facing centre of each point; infinity and -1 for none."""
-        every = np.arange(len(self._positions))
-        rows = self._outdated(centers, normals) if heights is None else every
+        finite = np.full(len(centers), np.inf) if heights is None else heights
+        rows = self._outdated(centers, normals, finite)
         tree = FacingTree(centers, normals, heights)
         found, which = tree.nearest(self._positions[rows], self._normals[rows])
         self._distances[rows], self._indices[rows] = found[:, 0], which[:, 0]
-        self._centers, self._center_normals = centers.copy(), normals.copy()
+        self._centers, self._center_normals, self._heights = centers.copy(), normals.copy(), finite.copy()
         return self._distances.copy(), self._indices.copy()
 
-    def _outdated(self, centers: Float32Array, normals: Float32Array) -> Int64Array:
+    def _outdated(self, centers: Float32Array, normals: Float32Array, heights: Float64Array) -> Int64Array:
         """Return the points whose nearest centre changed, or is farther than a changed one may be."""
         count = len(self._positions)
         if len(centers) != len(self._centers):
             self._distances, self._indices = np.full(count, np.inf), np.full(count, -1, np.int64)
             return np.arange(count)
         changed = ((centers != self._centers) | (normals != self._center_normals)).any(axis=1)
+        changed |= heights != self._heights
         owned = self._indices >= 0
         outdated = ~owned | (owned & changed[self._indices])
         if changed.any():

@@ -46,7 +46,8 @@ def on_single_sheets(
     if sheets is None or of_decals is None:
         return decals
     tree = FacingTree(decals.positions, decals.normals)
-    distances, rows = tree.nearest(samples.positions, samples.normals, count=CANDIDATES)
+    reach = max(REACH, COVERED) * float(radii.max())
+    distances, rows = tree.nearest(samples.positions, samples.normals, count=CANDIDATES, reach=reach)
     offsets = samples.positions[:, None].astype(np.float64) - decals.positions[rows]
     heights = sheet_products(offsets, decals.normals[rows], samples.normals) / radii[rows] ** 2
     reached = distances <= REACH * radii[rows]

@@ -240,6 +240,19 @@ def test_nearest_facing_neighbors_match_all_pairs(skip_self: bool) -> None:
     assert np.allclose(np.take_along_axis(expected, indices, axis=1), distances, atol=1e-5)
 
 
+def test_neighbors_beyond_the_reach_do_not_count() -> None:
+    rng = np.random.default_rng(4)
+    points = unit_rows(rng.normal(size=(900, 3)))
+    queries, tree = points[:200], FacingTree(points, points)
+    found = tree.nearest(queries, queries, count=9, reach=0.15)
+    distances, indices = tree.nearest(queries, queries, count=9)
+    near = distances <= 0.15
+    assert near[:, -1].any()
+    assert not near[:, -1].all()
+    np.testing.assert_array_equal(found[0], np.where(near, distances, np.inf))
+    np.testing.assert_array_equal(found[1], np.where(near, indices, -1))
+
+
 def test_missing_neighbors_are_infinitely_far() -> None:
     up, down = np.array([[0, 0, 1]], np.float32), np.array([[0, 0, -1]], np.float32)
     spot = np.zeros((1, 3), np.float32)
@@ -254,10 +267,16 @@ def test_the_nearest_facing_centres_are_right_after_every_change() -> None:
     rng = np.random.default_rng(3)
     points, centers = (unit_rows(rng.normal(size=(count, 3))) for count in (2000, 150))
     normals, nearest = centers, NearestFacing(points, points)
+    heights = np.full(len(centers), np.inf)
     for _ in range(6):
-        expected = FacingTree(centers, normals).nearest(points, points)
-        for found, exact in zip(nearest.of(centers, normals), expected, strict=True):
-            np.testing.assert_array_equal(found, exact[:, 0])
+        expected = FacingTree(centers, normals, heights).nearest(points, points)
+        apart = nearest.copy()
+        for searched in (nearest, apart):
+            for found, exact in zip(searched.of(centers, normals, heights), expected, strict=True):
+                np.testing.assert_array_equal(found, exact[:, 0])
+        apart.of(-centers, -normals)  # leaves the other as it is
+        heights = heights.copy()
+        heights[rng.integers(0, len(centers), 20)] = 0.01
         rows = rng.integers(0, len(centers), 4)
         centers, normals = centers.copy(), normals.copy()
         centers[rows] = unit_rows(centers[rows] + rng.normal(0.0, 0.3, (4, 3)))
