@@ -311,8 +311,8 @@ def _inside(field: float) -> float:
 def field_at(root: ProgramNode, distance: float) -> float:
     """Return the field of an operand alone at a distance from its surface, below 0 inside.
 
-    That is a property of its primitives. Of several it is the one whose field there is nearest to ½. Warps
-    and maps that scale directions differently count as if they kept lengths in the mean.
+    The operand's primitives decide it: of their fields at that distance, the one nearest to ½ counts. Warps,
+    and maps that scale directions differently, count as if they kept lengths in the mean.
     """
     fields = {0.0 if distance > 0.0 else 1.0}
     pending: list[tuple[ProgramNode, Placement, bool]] = [(root, WORLD, False)]

@@ -586,7 +586,7 @@ class BackgroundJobs:
     def write(self, label: str, write: Callable[[Progress], None], message: str) -> None:
         """Write a file of another format, then show a message; such files are written in turn.
 
-        `cancel` ends that at the next report of progress.
+        `cancel` ends the writing at its next report of progress.
 
         Raises
         ------
