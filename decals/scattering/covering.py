@@ -2,18 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import combinations
 from typing import TypeAlias
 
 import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.progress import reporting
+from decals.scattering.cell_corners import power_corners, surely_covered
 from decals.scattering.decal_normals import turned_normals
 from decals.scattering.domain import Domain, OrientedPoints
 from decals.scattering.gap_filling import EVEN, center_outsized
 from decals.scattering.neighbors import FacingTree, NearestFacing
-from decals.scattering.owned_points import CANDIDATES, DOUBTFUL, Centers, OwnedPoints, Shade, firsts
+from decals.scattering.owned_points import CANDIDATES, DOUBTFUL, Centers, OwnedPoints, Shade
 from decals.scattering.sheets import on_single_sheets
 from decals.scattering.sizing import EXPECTED_RADIUS, WithNormals
 from decals.surfaces.surface import unit_rows
@@ -82,13 +82,6 @@ LEAST_BEND = 0.05
 
 ON_PLANE = 0.01
 """Largest distance of a projected point from the plane of a face, in spreads, at which it lies there."""
-
-MAX_CORNER = 0.5
-"""Largest distance of a corner of a cell from the point by which it is found, in radii."""
-
-CORNER_SLACK = 0.1
-"""Power of a fourth decal at such a corner below that of its three, in squared radii, up to which it counts:
-the surface bends."""
 
 Project: TypeAlias = Callable[[OrientedPoints], tuple[OrientedPoints, Int64Array]]
 """Project points onto their own surfaces, drop those hidden there, and return the rows of the rest."""
@@ -226,15 +219,18 @@ def covering_radii(
     owned = first.peaks(PEAK_FRACTION * radii)
     owned = owned.joined(centers.find(project(circumcenters(owned, decals))[0]))
     _grow(radii, owned, limits)
+    usable = (1.0 + RADIUS_MARGIN) * _without_zeros(radii, centers.tree, decals)
+    sure = surely_covered(first, owned, usable)
     with reporting() as report:
         for done, spread in enumerate(TRIAL_SPREADS, start=2):
             report("measuring radii", done / (len(TRIAL_SPREADS) + 3))
             least = np.maximum(PEAK_FRACTION * radii, radii - TRIAL_RANGE * spread * sample_distance)
             owned = owned.peaks(least)
             reach = spread * sample_distance
+            unsure = owned[np.flatnonzero(~owned.belongs(sure))]
             trials = [
-                outward(owned, radii, reach),
-                random_points_around(owned.points, TRIALS_PER_PEAK, reach, rng),
+                outward(unsure, radii, reach),
+                random_points_around(unsure.points, TRIALS_PER_PEAK, reach, rng),
             ]
             owned = owned.joined(centers.find(projected(trials, reach, project)))
             _grow(radii, owned, limits)
@@ -323,18 +319,21 @@ class _Growth:
 
         Growth moves the cells of other decals, so all points near decals that grew are searched around again.
         """
-        every, grown = owned, np.ones(len(radii), np.bool_)
+        every = owned
         if self.speck > 0.0:  # all other points were searched with less tolerance
-            grown[:] = False
+            grown = np.zeros(len(radii), np.bool_)
             grown[owned.decals[owned.shares(radii) > 1.0 + self.speck]] = True
+            near = grown[owned.decals].any(axis=1)
+        else:
+            sure = surely_covered(owned, owned.peaks(PEAK_FRACTION * radii), radii)
+            near = ~owned.belongs(sure)
         for _ in range(MAX_REPEATS):
             before = radii.copy()
-            near = grown[every.decals].any(axis=1)
-            found = self._search(radii, every[np.flatnonzero(near)])
+            every = every.joined(self._search(radii, every[np.flatnonzero(near)]))
             grown = radii > before
-            every = every.joined(found)
             if not grown.any():
                 break
+            near = grown[every.decals].any(axis=1)
         return every
 
     def _search(self, radii: Float64Array, owned: OwnedPoints) -> OwnedPoints:
@@ -483,37 +482,6 @@ def along_edges(trials: OrientedPoints, height: float, project: Project) -> Orie
     points, rows = project(edges)
     moved = np.linalg.norm(points.positions - edges.positions[rows], axis=1)
     return edges[rows[moved < ON_PLANE * height]]
-
-
-def power_corners(owned: OwnedPoints, radii: Float64Array) -> OrientedPoints:
-    """Return the corners of cells near points: where three of the four least powers are equal.
-
-    With the offsets w of the centres and the powers c at a point q, the powers at q + a are c − 2 a·w + |a|².
-    So the corners in the tangent plane at q solve two linear equations. On a flat face without bends, the
-    point of a cell that is farthest from its decal is one of its corners, or lies on an edge of the surface.
-    """
-    decals, powers, offsets = owned.lowest(radii, 4)
-    reach = MAX_CORNER * radii[decals[:, 0]]
-    found: list[OrientedPoints] = []
-    for triple in combinations(range(decals.shape[1]), 3):
-        ids = np.sort(decals[:, triple], axis=1)
-        order = np.lexsort((powers[:, 0], *ids.T))
-        first = order[firsts(ids[order])]
-        rows = first[decals[first][:, triple].min(axis=1) >= 0]
-        w, c = offsets[rows][:, triple], powers[rows][:, triple]
-        a, b = w[:, 1] - w[:, 0], w[:, 2] - w[:, 0]
-        rises = 0.5 * (c[:, 1:] - c[:, :1])
-        cross = np.cross(a, b)
-        squared = np.einsum("ni,ni->n", cross, cross)
-        step = rises[:, :1] * np.cross(b, cross) + rises[:, 1:] * np.cross(cross, a)
-        step /= np.where(squared > 0.0, squared, 1.0)[:, None]
-        there = powers[rows] - 2.0 * np.einsum("nki,ni->nk", offsets[rows], step)
-        near = (squared > 0.0) & (np.einsum("ni,ni->n", step, step) < reach[rows] ** 2)
-        near &= there[:, triple[0]] <= there.min(axis=1) + CORNER_SLACK * radii[decals[rows, 0]] ** 2
-        rows = rows[near]
-        corners = (owned.points.positions[rows].astype(np.float64) + step[near]).astype(np.float32)
-        found.append(replace(owned.points[rows], positions=corners))
-    return OrientedPoints.joined(found)
 
 
 def random_points_around(

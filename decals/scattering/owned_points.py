@@ -27,6 +27,9 @@ NEARLY_BARE = 0.975
 CANDIDATES = 6
 """Nearest decals that face a point and may own it, whatever their radii."""
 
+OWNERS = 3
+"""Nearest decals that may own a point where the surface is smooth."""
+
 ARC_REACH = 2.0
 """Ratio of the distances of two decals from a point up to which the length to the farther one is measured."""
 
@@ -87,6 +90,11 @@ class OwnedPoints:
         """Return True for points that a decal reaches at its largest radius."""
         reached = (self.decals >= 0) & (self.lengths <= limits[self.decals])
         return np.asarray(reached.any(axis=1))
+
+    def belongs(self, flags: BoolArray) -> BoolArray:
+        """Return True for points whose `OWNERS` nearest decals exist and have a flag, ``bool[n]`` each."""
+        nearest = self.decals[:, :OWNERS]
+        return np.asarray(((nearest >= 0) & flags[nearest]).all(axis=1))
 
     def __getitem__(self, rows: Int64Array) -> "OwnedPoints":
         return replace(
