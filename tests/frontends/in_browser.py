@@ -884,7 +884,9 @@ async def panels(picture: str | None = None) -> None:
 
     scene = decals.cover(BLOB, count=40, images=["tile", "scale"])
     async with sandboxed(scene) as (browser, sandbox_page, window):
-        document, state, plotter = window.document, digest(window.document), window.plotter
+        document, state = window.document, digest(window.document)
+        await browser.emulate_media(reduced_motion="reduce")
+        await expect(browser.locator(".toolbar button").first).to_have_css("transition-duration", "0s")
         await rename("Point", "body")
         await rename("layer 0", "armour")
         await rename("model 1", "snail")
@@ -924,12 +926,14 @@ async def panels(picture: str | None = None) -> None:
             await save_picture(browser, Path(picture))
         await row("Drawing").click()
         await browser.get_by_label("background top").wait_for()
-        before = await shows(browser, plotter)
+        before = await seen(browser)
         await browser.get_by_label("background top").evaluate(
             "input => { input.value = '#ffe0c0'; input.dispatchEvent(new Event('change')); }"
         )
         await done("set background.top")
-        assert np.abs(await shows(browser, plotter) - before).mean() > 5
+        async with asyncio.timeout(PATIENCE):
+            while np.abs(await seen(browser) - before).mean() <= 5:
+                await asyncio.sleep(0.1)
         await choose(browser, "contact", "radial")
         await done("set contact")
         await row("snail").click(button="right")
@@ -1062,8 +1066,10 @@ async def zones(browser: Page, _: Any, window: EditWindow) -> None:
     await until(lambda: digest(document) == before)
     await browser.get_by_label("lasso: drag").click()
     width, height = window.plotter.window_size
-    corners = ((0.2, 0.2), (0.5, 0.2), (0.5, 0.8), (0.2, 0.8), (0.2, 0.25))
-    await drag(browser, window.plotter, *((int(x * width), int(y * height)) for x, y in corners))
+    x, y = (0.2, 0.5, 0.5, 0.2, 0.2), (0.2, 0.2, 0.8, 0.8, 0.25)  # corners; browsers send few moves when busy
+    path = (np.interp(np.linspace(0, 4, 33), range(5), part) for part in (x, y))
+    places = np.stack([*path], axis=1) * (width, height)
+    await drag(browser, window.plotter, *((int(right), int(up)) for right, up in places))
     await until(lambda: len(state.selection) > 3)
     chosen = state.selection
     await show("right")
