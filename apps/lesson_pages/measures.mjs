@@ -131,7 +131,7 @@ export class Measures {
       (x) => add(first, scaled(direction, x)),
     ];
     const seen = { target: placeOf(low + half), back, up: cross(back, direction), half };
-    const points = this.read(seen, count, 3).slice(count, 2 * count);
+    const points = this.read(seen, count, 1);
     return spread(low, high, count).map((x, i) => ({ ...placed(points[i], { position: placeOf(x) }), x }));
   }
 
@@ -139,7 +139,7 @@ export class Measures {
   above({ position, normal }) {
     const up = tangential(Math.abs(normal[0]) < 0.7 ? [1, 0, 0] : [0, 1, 0], normal);
     const seen = { target: position, back: normal, up, half: NEAR * this.lesson.size };
-    return placed(this.read(seen, 3, 3)[4], { position, normal });
+    return placed(this.read(seen, 1, 1)[0], { position, normal });
   }
 
   // -- numbers of the scene, and at points -----------------------------------------------------------------
