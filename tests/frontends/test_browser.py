@@ -61,6 +61,7 @@ def require(*modules: str) -> None:
         "snowman",
         "shared",
         "keyboard",
+        "touch",
     ],
 )
 def test_in_a_browser(check: str) -> None:
