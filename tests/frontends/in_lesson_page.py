@@ -8,6 +8,7 @@ runs in Chromium, where fingers use it and it is printed; see `in_html_page` for
 """
 
 import asyncio
+import os
 import re
 import sys
 import tempfile
@@ -408,6 +409,7 @@ async def learn(name: str, numbers: set[int]) -> None:
 def main() -> None:
     """Run the checks that the command line names."""
     if sys.argv[1:] == ["class"]:
+        os.chdir(tempfile.mkdtemp())  # the session leaves a file where it was started
         serve(taught)
     else:
         named = "firefox" if sys.argv[1:2] == ["firefox"] else "chromium"
