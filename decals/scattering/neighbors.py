@@ -293,7 +293,8 @@ class FacingTree:
         total = int(self._tree.n)
         if total == 0:
             return []
-        widths = [min(max(width, least + 3), total) for width in NEIGHBOR_COUNTS]
+        alone = [1] if least == 1 else []  # most often the nearest point faces
+        widths = alone + [min(max(width, least + 3), total) for width in NEIGHBOR_COUNTS]
         return widths[:1] + [wide for narrow, wide in pairwise(widths) if wide > narrow]
 
     def _nearest_among(
