@@ -27,6 +27,9 @@ FORM = b"implicit-decals 1"
 
 DIGEST_BYTES = 20
 
+MAX_NESTING = 900
+"""Most levels of lists and mappings in each other, as many as Python's own limit of recursion allows."""
+
 
 def content_hash(value: object) -> str:
     """Return the content hash of a value: 40 hexadecimal digits, equal for equal contents alone.
@@ -61,7 +64,7 @@ def content_hash(value: object) -> str:
     try:
         return _hash_of(value) if held is None else held
     except RecursionError:
-        raise InvalidInput("expected a value with a content hash, got one nested too deeply") from None
+        raise _too_deep() from None
 
 
 class Value(Immutable):
@@ -99,9 +102,13 @@ def _held_hash(value: object) -> str | None:
     return held if isinstance(held, str) else None
 
 
-def _hash_of(value: object) -> str:
+def _too_deep() -> InvalidInput:
+    return InvalidInput("expected a value with a content hash, got one nested too deeply")
+
+
+def _hash_of(value: object, depth: int = 0) -> str:
     digest = blake2b(FORM, digest_size=DIGEST_BYTES)
-    for part in _encoded(value):
+    for part in _encoded(value, depth):
         digest.update(part)
     return digest.hexdigest()
 
@@ -111,8 +118,10 @@ def _compared(value: Any) -> dict[str, Any]:
     return {field.name: getattr(value, field.name) for field in fields(value) if field.compare}
 
 
-def _encoded(value: Any) -> Iterable[bytes | memoryview]:
+def _encoded(value: Any, depth: int) -> Iterable[bytes | memoryview]:
     """Yield bytes that no other value has: a letter for the type, a length where it varies, the content."""
+    if depth > MAX_NESTING:
+        raise _too_deep()
     held = _held_hash(value)
     if held is not None:
         yield b"v" + held.encode()
@@ -129,20 +138,20 @@ def _encoded(value: Any) -> Iterable[bytes | memoryview]:
     elif isinstance(value, bytes | bytearray | memoryview):
         yield from _sized(b"b", bytes(value))
     elif isinstance(value, np.ndarray):
-        yield from _array(value)
+        yield from _array(value, depth)
     elif isinstance(value, os.PathLike):
         yield from _sized(b"b", _file_bytes(value))
     elif is_dataclass(value) and not isinstance(value, type):
         yield from _sized(b"d", type(value).__qualname__.encode())
-        yield from _encoded(_compared(value))
+        yield from _encoded(_compared(value), depth + 1)
     elif isinstance(value, Mapping):
-        yield from _sized(b"m", "".join(sorted(_hash_of(item) for item in value.items())).encode())
+        yield from _sized(b"m", "".join(sorted(_hash_of(item, depth + 1) for item in value.items())).encode())
     elif isinstance(value, AbstractSet):
-        yield from _sized(b"u", "".join(sorted(map(_hash_of, value))).encode())
+        yield from _sized(b"u", "".join(sorted(_hash_of(item, depth + 1) for item in value)).encode())
     elif isinstance(value, Sequence):
         yield b"l%d:" % len(value)
         for item in value:
-            yield from _encoded(item)
+            yield from _encoded(item, depth + 1)
     else:
         raise InvalidInput(
             f"expected a value with a content hash, got {describe(value)}; give numbers, texts, arrays, "
@@ -162,11 +171,11 @@ def _number(value: Any) -> bytes:
     return b"r" + struct.pack("<d", math.nan if math.isnan(number) else number)
 
 
-def _array(array: NDArray[Any]) -> Iterable[bytes | memoryview]:
+def _array(array: NDArray[Any], depth: int) -> Iterable[bytes | memoryview]:
     """Yield an array of numbers, truth values or texts, the last axis fastest, in little-endian bytes."""
     if array.dtype.kind in "OTU":
         yield from _sized(b"a", f"text {array.shape}".encode())
-        yield from _texts(array.ravel().tolist())
+        yield from _texts(array.ravel().tolist(), depth)
         return
     if array.dtype.kind not in "biuf":
         raise InvalidInput(f"expected an array of numbers or texts, got one of {array.dtype}; convert it")
@@ -179,12 +188,12 @@ def _array(array: NDArray[Any]) -> Iterable[bytes | memoryview]:
     yield plain.reshape(-1).view(np.uint8).data
 
 
-def _texts(texts: list[Any]) -> Iterable[bytes | memoryview]:
+def _texts(texts: list[Any], depth: int) -> Iterable[bytes | memoryview]:
     """Yield many texts at once, or a list of other values."""
     if not all(isinstance(text, str) for text in texts):
-        yield from _encoded(texts)
+        yield from _encoded(texts, depth + 1)
         return
-    yield from _array(np.array([len(text) for text in texts], np.int64))
+    yield from _array(np.array([len(text) for text in texts], np.int64), depth)
     yield from _sized(b"s", "".join(texts).encode("utf-8", "surrogatepass"))
 
 

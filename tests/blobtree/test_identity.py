@@ -21,6 +21,7 @@ from blobtree import (
     Segment,
     content_hash,
     from_json,
+    identity,
     numeric_parameters,
     numeric_values,
     to_json,
@@ -140,6 +141,18 @@ def nested() -> list[Any]:
 def test_values_without_contents_are_refused(value: Any) -> None:
     with pytest.raises(InvalidInput, match="expected"):
         content_hash([value])
+
+
+def test_nesting_has_a_limit_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Programs may raise Python's limit of recursion; each level would then cost more than the one before."""
+    monkeypatch.setattr(identity, "MAX_NESTING", 50)
+    deep: list[Any] = [1]
+    for _ in range(48):
+        deep = [deep]
+    assert len(content_hash(deep)) == 40
+    for value in ([[deep]], {"a": {"b": deep}}, np.array([[[deep]], None], object)):
+        with pytest.raises(InvalidInput, match="nested too deeply"):
+            content_hash(value)
 
 
 # -- trees ----------------------------------------------------------------------------------------------

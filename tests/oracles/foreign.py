@@ -14,8 +14,12 @@ DEPTH = 20_000
 
 def lipschitz(scene: Any, points: Floats) -> Floats:
     """The distances (n,) of a scene of Lipschitz Pruning."""
-    sys.setrecursionlimit(max(DEPTH, sys.getrecursionlimit()))
-    return _distance(scene, points, np.eye(4))
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(DEPTH, before))
+    try:
+        return _distance(scene, points, np.eye(4))
+    finally:
+        sys.setrecursionlimit(before)
 
 
 def _distance(node: Any, points: Floats, above: Floats) -> Floats:
