@@ -1,9 +1,10 @@
 """`on_copies`: the decals of one copy of a repeat on all of its copies."""
 
 import numpy as np
+from numpy.typing import NDArray
 
-from blobtree import PolarRepeat, Repeat
-from blobtree._typing import Float64Array
+from blobtree import ISO, PolarRepeat, Repeat
+from blobtree._typing import Float32Array, Float64Array
 from blobtree.nodes.tree import Transform
 from blobtree.validation import describe
 from decals.errors import InvalidDecals, InvalidScattering
@@ -23,9 +24,9 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
     """Return the decals of a repeat's child on all copies of the child, copy by copy.
 
     The decals of each copy are those of the child, moved as the copy is. On a mirrored copy, places and the
-    tops of images are mirrored; images are not. Where copies blend, decals are projected onto the blend,
-    and decals inside the blend are left out. For a grid, a repeat of repeats, call it for the inner one
-    first.
+    tops of images are mirrored; images are not. Where copies blend, decals are projected onto the blend.
+    Decals inside the blend, or in the fold of a union, are left out. For a grid, a repeat of repeats, call
+    it for the inner one first.
 
     Parameters
     ----------
@@ -75,12 +76,23 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
         return copies
     positions, normals = ImplicitSurface(repeat).project(copies.positions)
     ways = np.linalg.norm(positions - copies.positions, axis=1) / copies.radii
-    kept = np.flatnonzero(ways <= MAX_DISTANCE)
-    moved = (ways > ON_SURFACE)[kept, None]
+    moved = ways > ON_SURFACE
+    kept = np.flatnonzero((ways <= MAX_DISTANCE) & (~moved | _on_surface(repeat, positions, copies.radii)))
+    moved = moved[kept, None]
     return copies[kept].replace(
         positions=np.where(moved, positions[kept], copies.positions[kept]),
         normals=np.where(moved, normals[kept], copies.normals[kept]),
     )
+
+
+def _on_surface(
+    repeat: Repeat | PolarRepeat, positions: Float32Array, radii: Float32Array
+) -> NDArray[np.bool_]:
+    """Return False for projected points that have not reached the surface: those in the fold of a union."""
+    gaps = np.abs(repeat(positions) - ISO)
+    slopes = np.linalg.norm(repeat.gradient(positions), axis=1)
+    reached: NDArray[np.bool_] = gaps <= ON_SURFACE * radii * slopes
+    return reached
 
 
 def _placements(repeat: Repeat | PolarRepeat) -> list[Float64Array]:

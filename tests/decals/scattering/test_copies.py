@@ -3,7 +3,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
@@ -78,6 +78,8 @@ def test_a_grid_takes_two_calls_and_keeps_all_columns() -> None:
 
 @settings(max_examples=12, deadline=None)
 @given(step=st.floats(0.5, 1.6), joining=st.sampled_from(["sum", "union"]))
+@example(step=1.21, joining="union")
+@example(step=1.29, joining="union")
 def test_decals_lie_on_copies_that_touch_and_none_is_buried(step: float, joining: Any) -> None:
     row = Repeat(STONE, (step, 0.0, 0.0), 3, joining)
     everywhere = on_copies(marks_of(STONE), row)
