@@ -29,6 +29,9 @@ PICTURE = "canvas, img.image-display-area"
 """Where trame's views show what they get."""
 ABOVE = "svg, .brush { visibility: hidden !important }"
 """Hides the orientation cube, handles and the circle of the brush."""
+REST_MS = 300
+"""Milliseconds for which a finger rests before it is lifted."""
+
 ERRORS = """window.pageErrors = [];
 window.addEventListener('error', event => window.pageErrors.push(event.message));"""
 """Collects the errors that a page shows in its console, also those of observers."""
@@ -176,6 +179,10 @@ async def trace(page: Page, circle: Locator, *, finger: bool = False) -> None:
         points = [[{"x": x, "y": y}] for x, y in places.tolist()]
         steps = [("touchStart", points[0]), *(("touchMove", at) for at in points[1:]), ("touchEnd", [])]
         for kind, at in steps:
+            if (
+                kind == "touchEnd"
+            ):  # a finger that is lifted in motion glides on, and the next tap ends that alone
+                await page.wait_for_timeout(REST_MS)
             await touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": at})
         return
     await page.mouse.move(*places[0])
