@@ -29,6 +29,13 @@ PICTURE = "canvas, img.image-display-area"
 """Where trame's views show what they get."""
 ABOVE = "svg, .brush { visibility: hidden !important }"
 """Hides the orientation cube, handles and the circle of the brush."""
+ON_SCREEN = """circle => {
+  const onto = circle.getScreenCTM();
+  const {x, y} = new DOMPoint(circle.cx.baseVal.value, circle.cy.baseVal.value).matrixTransform(onto);
+  return [x, y, circle.r.baseVal.value * onto.a];
+}"""
+"""Centre and radius of a circle on the screen; the boxes of browsers hold more or less of its line too."""
+
 REST_MS = 300
 """Milliseconds for which a finger rests before it is lifted."""
 
@@ -169,14 +176,12 @@ async def pull(page: Page, start: tuple[float, float], by: tuple[float, float], 
 async def trace(page: Page, circle: Locator, *, finger: bool = False) -> None:
     """Draw along a circle of the page with the mouse, or in Chromium with a finger."""
     await circle.scroll_into_view_if_needed()
-    box = await circle.bounding_box()
-    assert box is not None
+    x, y, radius = await circle.evaluate(ON_SCREEN)
     angles = np.linspace(0.0, 2.0 * np.pi, 60)
-    right, down = box["width"] / 2 * np.cos(angles), box["height"] / 2 * np.sin(angles)
-    places = np.stack([box["x"] + box["width"] / 2 + right, box["y"] + box["height"] / 2 + down], axis=1)
+    places = np.stack([x + radius * np.cos(angles), y + radius * np.sin(angles)], axis=1)
     if finger:
         touch = await page.context.new_cdp_session(page)
-        points = [[{"x": x, "y": y}] for x, y in places.tolist()]
+        points = [[{"x": right, "y": down}] for right, down in places.tolist()]
         steps = [("touchStart", points[0]), *(("touchMove", at) for at in points[1:]), ("touchEnd", [])]
         for kind, at in steps:
             if (
