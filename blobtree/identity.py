@@ -28,7 +28,7 @@ FORM = b"implicit-decals 1"
 DIGEST_BYTES = 20
 
 MAX_NESTING = 900
-"""Most levels of lists and mappings in each other, as many as Python's own limit of recursion allows."""
+"""Most levels of lists and mappings in each other, about as many as Python's usual limit allows."""
 
 
 def content_hash(value: object) -> str:

@@ -332,7 +332,7 @@
   );
 
   // Of the toolbar and of the outline, Tab reaches one button, the selected row; arrows lead from it to the others.
-  // Where one with the focus goes, the next one gets it.
+  // If the button with the focus is removed, the next one gets the focus.
   const BUTTONS = "button, [role=button]";
   const reachedOf = (group) =>
     (!group.contains(document.activeElement) && group.querySelector(".v-list-item--active")) || group.reached;

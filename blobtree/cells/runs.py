@@ -1,4 +1,4 @@
-"""Runs: blocks that follow each other before an edit and after it, and what belongs to them, copied at once.
+"""Runs: blocks that follow each other before an edit and after it; a run and its items are copied at once.
 
 An edit changes blocks in a few places, so unchanged blocks form few runs. On the processor a run is one piece
 of memory, and its copy takes a fraction of the time that a kernel takes block by block.
@@ -31,7 +31,7 @@ def runs_of(blocks: Int32Array, sources: Int32Array) -> Runs:
 
 
 def long_runs(listed: DeviceArray, sources: DeviceArray) -> Runs | None:
-    """Return the same for arrays of a device; None where kernels are faster: on cards, and for short runs."""
+    """Return the runs of a device's blocks; None where kernels are faster: on cards, and for short runs."""
     if not listed.device.is_cpu:
         return None
     runs = runs_of(listed.numpy(), sources.numpy())

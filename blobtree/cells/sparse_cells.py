@@ -322,7 +322,7 @@ class _Refinement:
                 texels[first + kept] = np.diff(begins, append=ends[-1] + 1)
 
     def _copy_children(self, runs: Runs, level: Level, slots: Int32Array, starts: Int32Array) -> None:
-        """Do the same as the kernel `copy_children` for runs of parents; their blocks lie where they lay."""
+        """Do the same as the kernel `copy_children` for runs of parents whose blocks have not moved."""
         assert self._old is not None
         blocks: list[list[int]] = []
         texels: list[list[int]] = []

@@ -208,7 +208,7 @@ class _Extraction:
         self._arrays, self._sources = cells.arrays, cells.leaves.sources
         self._count = len(cells.leaves)
         self._tables = patch_tables(cells.device)
-        self._runs: Runs | None = None  # of unchanged blocks, if these are copied so
+        self._runs: Runs | None = None  # of unchanged blocks, where runs are copied rather than blocks
         if previous is not None:  # imported here, because all imported kernels of a package compile together
             from blobtree.meshing import reuse_kernels
 
@@ -219,6 +219,7 @@ class _Extraction:
         """Sample the field, place the vertices, connect them."""
         report("sampling the field", 0.0)
         changed, unchanged = self._changed_blocks()
+        self._runs = long_runs(unchanged, self._sources)
         needed = len(changed) * SAMPLES * SAMPLE_BYTES + self._count * BLOCK_BYTES
         demand_memory(needed, self._device, f"the surface in {self._count:,} blocks of cells")
         if values is None:
@@ -233,13 +234,13 @@ class _Extraction:
         vertices, normals, colors = (self._empty(vertex_total, wp.vec3) for _ in range(3))
         arrays = vertex_arrays(vertices, normals, colors)
         self._place(changed, values, patches, arrays, partial(report, "placing vertices"))
-        new_index = self._copy_vertices(unchanged, vertex_starts, arrays)
+        moved = self._copy_vertices(unchanged, vertex_starts, arrays)
         report("placing vertices", 1.0)
         faces = self._empty(2 * quad_total, wp.vec3i)
         users, others = self._users(changed)
         inputs = [users, self._arrays, patches, quad_starts, vertices]
         self._launch(connect_vertices, len(users), inputs, [faces])
-        self._copy_faces(others, quad_starts, new_index, faces)
+        self._copy_faces(others, quad_starts, moved, faces)
         report("connecting vertices", 1.0)
         return DeviceMesh(
             self._cells, codes, rows, offsets, vertex_starts, quad_starts, vertices, normals, colors, faces
@@ -265,9 +266,7 @@ class _Extraction:
         """Return the blocks whose cells or rows may have changed, and the others."""
         if self._old is None:
             return arange(self._count, self._device), arange(0, self._device)
-        changed, unchanged = self._marked(self._reuse.mark_face_neighbors, where_negative(self._sources))
-        self._runs = long_runs(unchanged, self._sources)
-        return changed, unchanged
+        return self._marked(self._reuse.mark_face_neighbors, where_negative(self._sources))
 
     def _users(self, changed: DeviceArray) -> tuple[DeviceArray, DeviceArray]:
         """Return the blocks whose triangles use vertices of changed blocks, and the others."""
@@ -347,7 +346,7 @@ class _Extraction:
             self._launch(self._kernel(bisect_unconverged), total, [*inputs, unconverged], [vertices])
 
     def _copy_vertices(self, unchanged: DeviceArray, starts: DeviceArray, vertices: Any) -> Any:
-        """Copy the vertices of unchanged blocks, and return the new indices of old ones, or their runs."""
+        """Copy the vertices of unchanged blocks, and return how they moved: new indices of all, or runs."""
         if self._old is None:
             return None
         old = self._old
@@ -363,9 +362,7 @@ class _Extraction:
         self._launch(self._reuse.copy_vertices, len(unchanged), inputs, [vertices, new_index])
         return new_index
 
-    def _copy_faces(
-        self, others: DeviceArray, starts: DeviceArray, new_index: Any, faces: DeviceArray
-    ) -> None:
+    def _copy_faces(self, others: DeviceArray, starts: DeviceArray, moved: Any, faces: DeviceArray) -> None:
         """Copy the triangles of blocks that use unchanged vertices alone."""
         if self._old is None:
             return
@@ -373,9 +370,9 @@ class _Extraction:
             blocks = runs_of(others.numpy(), self._sources.numpy())
             runs = 2 * item_runs(blocks, starts.numpy(), self._old.quad_starts.numpy())
             homes = np.searchsorted(self._runs[:, 0], blocks[:, 0], "right") - 1
-            copy_indices(runs, self._old.faces.numpy(), faces.numpy(), new_index, homes)
+            copy_indices(runs, self._old.faces.numpy(), faces.numpy(), moved, homes)
             return
-        inputs = [others, self._sources, self._old.quad_starts, starts, self._old.faces, new_index]
+        inputs = [others, self._sources, self._old.quad_starts, starts, self._old.faces, moved]
         self._launch(self._reuse.copy_faces, len(others), inputs, [faces])
 
 

@@ -25,8 +25,8 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
 
     The decals of each copy are those of the child, moved as the copy is. On a mirrored copy, places and the
     tops of images are mirrored; images are not. Where copies blend, decals are projected onto the blend.
-    Decals inside the blend, or in the fold of a union, are left out. For a grid, a repeat of repeats, call
-    it for the inner one first.
+    Decals inside the blend, or in the crease between united copies, are left out. For a grid, a repeat of
+    repeats, call it for the inner one first.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def on_copies(decals: Decals, repeat: Repeat | PolarRepeat) -> Decals:
 def _on_surface(
     repeat: Repeat | PolarRepeat, positions: Float32Array, radii: Float32Array
 ) -> NDArray[np.bool_]:
-    """Return False for projected points that have not reached the surface: those in the fold of a union."""
+    """Return False for projected points that are not on the surface, as in creases between united copies."""
     gaps = np.abs(repeat(positions) - ISO)
     slopes = np.linalg.norm(repeat.gradient(positions), axis=1)
     reached: NDArray[np.bool_] = gaps <= ON_SURFACE * radii * slopes

@@ -330,7 +330,8 @@ class FacingTree:
         facing = np.take_along_axis(facing, order, axis=1)
         distances = np.where(facing, np.take_along_axis(distances, order, axis=1), np.inf)
         indices = np.where(facing, np.take_along_axis(indices, order, axis=1), -1)
-        return distances, indices, np.abs(cosines - FACING_LIMIT).min(axis=1), within[:, -1]
+        doubts = np.where(within, np.abs(cosines - FACING_LIMIT), np.inf).min(axis=1)
+        return distances, indices, doubts, within[:, -1]
 
 
 def sheet_products(offsets: Float64Array, centers: Float32Array, points: Float32Array) -> Float64Array:
@@ -385,12 +386,12 @@ class NearestFacing:
         self, centers: Float32Array, normals: Float32Array, heights: Float64Array | None = None
     ) -> tuple[Float64Array, Int64Array]:
         """Return distance and index of the nearest facing centre of each point; infinity and -1 for none."""
-        finite = np.full(len(centers), np.inf) if heights is None else heights
-        rows = self._outdated(centers, normals, finite)
+        limits = np.full(len(centers), np.inf) if heights is None else heights
+        rows = self._outdated(centers, normals, limits)
         tree = FacingTree(centers, normals, heights)
         found, which = tree.nearest(self._positions[rows], self._normals[rows])
         self._distances[rows], self._indices[rows] = found[:, 0], which[:, 0]
-        self._centers, self._center_normals, self._heights = centers.copy(), normals.copy(), finite.copy()
+        self._centers, self._center_normals, self._heights = centers.copy(), normals.copy(), limits.copy()
         return self._distances.copy(), self._indices.copy()
 
     def _outdated(self, centers: Float32Array, normals: Float32Array, heights: Float64Array) -> Int64Array:

@@ -1,5 +1,7 @@
 """Copies of runs against copies of one block after the other."""
 
+from unittest.mock import patch
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -81,12 +83,8 @@ def test_indices_follow_their_items(blocks: Blocks, old_counts: NDArray[np.int64
         return
     source = rng.choice(kept, (int(old_row_starts[-1]), 3)).astype(np.int32)
     target = np.full((int(row_starts[-1]), 3), -1, np.int32)
-    at_once_before = runs_module.INDICES_AT_ONCE
-    runs_module.INDICES_AT_ONCE = 3 * at_once
-    try:
+    with patch.object(runs_module, "INDICES_AT_ONCE", 3 * at_once):
         copy_indices(rows, source, target, items, np.arange(len(rows)))
-    finally:
-        runs_module.INDICES_AT_ONCE = at_once_before
     expected = np.full_like(target, -1)
     for block in listed:
         kept_rows = slice(*old_row_starts[sources[block] : sources[block] + 2])
