@@ -1,5 +1,6 @@
 """``implicit-decals scatter``: scattered decals as a scene, or as a table."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -135,8 +136,9 @@ def scatter(
         pictures = own or scale_images(images or 1)
         repeats = _repeats_of(objects, model[0]) if same_on_copies else []
         surfaces = [ImplicitSurface(repeats[-1].child)] if repeats else [item.surface for item in objects]
+        copies = math.prod(repeat.count for repeat in repeats)
         if spacing is not None:
-            _check_spacing(spacing, sum(surface.area for surface in surfaces))
+            _check_spacing(spacing, copies * sum(surface.area for surface in surfaces))
         density = None
         if painted is not None:
             density = PaintedImage(painted, Planar.over(surfaces, painted_along)).density(black=black)
@@ -161,6 +163,11 @@ def scatter(
             )
         if count is None and spacing is None and not (zone and zones.have_spacings):
             options["count"] = 500
+        if copies * (options["count"] or 0) > MAX_DECALS:
+            raise InvalidInput(
+                f"--count: expected at most {MAX_DECALS:,} decals on all copies, got {options['count']:,} on "
+                f"each of {copies:,}; take fewer"
+            )
         decals = scatter_decals(
             surfaces if repeats else list(objects), density=density, seed=seed, progress=progress, **options
         )

@@ -157,6 +157,16 @@ def test_copies_of_a_grid_get_the_same_decals(folder: Path) -> None:
     assert scene.recipe is None  # it would scatter over all copies
 
 
+def test_too_many_decals_on_copies_are_refused_before_work(folder: Path, capsys: Capture) -> None:
+    save(Repeat(Repeat(Point((0, 0, 0), radius=0.4), (3, 0, 0), 300), (0, 2, 0), 300), "grid.json")
+    for options, message in (
+        (["--count", "20"], "at most 1,000,000 decals on all copies, got 20 on each of 90,000"),
+        (["--spacing", "0.3"], "which makes 1,000,000 decals, got 0.3"),
+    ):
+        assert run(["scatter", "grid.json", "--same-on-copies", *options, "-o", "a.json"]) == 2
+        assert message in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
