@@ -36,7 +36,7 @@ DEMO_FUNCTION = "implicit-decals demo"
 COUNT = 1100
 EYE_RADIUS = 0.23
 _EYE_CLEARANCE = 0.24
-"""Distance from an eye within which scales are removed: nested with it, they would lie above it."""
+"""Distance from an eye within which no scale lies: nested with it, it would lie above it."""
 _EYES = np.array([[1.06, 2.29, 0.45], [1.06, 2.29, -0.45]], np.float32)
 """Positions of the creature's eyes, before they are projected onto its surface."""
 
@@ -133,9 +133,11 @@ def nest_scene(*, progress: Progress) -> Scene:
         Reports the scattering.
     """
     objects = TreeObject("creature", creature()), _egg()
+    eyes = _eyes(objects[0])
     scales = scatter(
         [item.surface for item in objects],
         count=COUNT,
+        mask=lambda points: _distances(points, eyes.positions) > _EYE_CLEARANCE,
         direction=_directions,
         progress=progress,
     )
@@ -144,7 +146,7 @@ def nest_scene(*, progress: Progress) -> Scene:
         objects=objects,
         camera=Camera(position=(4.1, 2.7, 6.6), target=(0.10, 1.16, 0.10), fov=24.0),
         images=tuple(DecalImage.load(name) for name in (*_SCALES, "eye")),
-        decals=_with_eyes(scales, objects[0]),
+        decals=Decals.concatenate([scales, eyes]),
     )
 
 
@@ -177,15 +179,18 @@ def _choose_images(points: Float32Array) -> Int32Array:
     return np.clip(np.rint(gradient * (len(_SCALES) - 1) + jitter), 0, len(_SCALES) - 1).astype(np.int32)
 
 
-def _with_eyes(scales: Decals, body: TreeObject) -> Decals:
-    """Replace the scales at the eyes by two eyes."""
+def _eyes(body: TreeObject) -> Decals:
     positions, normals = body.surface.project(_EYES)
-    gaps = np.linalg.norm(scales.positions[:, None] - positions, axis=2).min(axis=1)
-    eyes = Decals(
+    return Decals(
         positions=positions,
         normals=normals,
         tangents=np.cross(_UP, normals),
         radii=np.full(len(positions), EYE_RADIUS, np.float32),
         images=np.full(len(positions), len(_SCALES), np.int32),
     )
-    return Decals.concatenate([scales[gaps > _EYE_CLEARANCE], eyes])
+
+
+def _distances(points: Float32Array, centers: Float32Array) -> Float32Array:
+    """Return the distance of each point from the closest centre."""
+    gaps: Float32Array = np.linalg.norm(points[:, None] - centers, axis=2).min(axis=1)
+    return gaps

@@ -11,7 +11,7 @@ import pyvista as pv
 from numpy.typing import NDArray
 
 from blobtree import polygonize
-from decals import MeshObject, TreeObject
+from decals import MeshObject, TreeObject, measure
 from decals.apps.commands.demo import nest_scene, tile_scene
 from decals.apps.gallery import spanning
 from decals.apps.models.samples import SAMPLES, axes_of, sample, sample_mesh
@@ -110,6 +110,7 @@ def test_decals_run_across_creature_and_egg(monkeypatch: pytest.MonkeyPatch) -> 
     radii = scene.decals.radii
     crossing = (np.maximum(*distance) < 0.8 * radii) & (np.minimum(*distance) < 1e-3)
     assert crossing.sum() >= 3
+    assert measure(scene).coverage > 0.9995  # scales end at the eyes
     tiles = tile_scene(scene)
     assert np.array_equal(tiles.decals.positions, scene.decals.positions)
     assert set(tiles.decals.images.tolist()) == set(range(len(tiles.images)))
