@@ -300,7 +300,10 @@ SIZES = (400, 300), (320, 640), (700, 300)
 
 
 async def sizes(browser: str) -> None:
-    """Pages of several sizes, with tools and without, show models as pictures of these sizes do."""
+    """Pages of several sizes, with tools and without, show models as pictures of these sizes do.
+
+    Their first picture has a third of the pixels along each side, and the next one all of them.
+    """
     scene = meshed(tree_scene())
     turned = scene.replace(camera=scene.camera.turned(50))
     for case, controls in ((scene, True), (turned, False)):
@@ -311,7 +314,19 @@ async def sizes(browser: str) -> None:
                 share = share_of_equal(await pixels(page), case)
                 print(f"{width} x {height}, controls {controls}: {share:.4f}", flush=True)
                 assert share >= EQUAL, (width, height, controls, share)
+            await page.add_init_script(FIRST)
+            await page.reload()
+            await page.wait_for_function(STARTED, timeout=120_000)
+            await page.wait_for_function(RESIZED, arg=[width, height])
+            canvas = page.locator("canvas")
+            assert await page.evaluate("first") == round(await canvas.evaluate("c => c.width") / 3)
 
+
+FIRST = """performance.mark = new Proxy(performance.mark, { apply(mark, of, names) {
+  window.first = document.querySelector("canvas").width;
+  return Reflect.apply(mark, of, names);
+} })"""
+"""Note the width of the first picture once it is there."""
 
 RESIZED = """([width, height]) =>
   innerWidth === width && innerHeight === height && viewer.canvas.width === viewer.canvas.clientWidth

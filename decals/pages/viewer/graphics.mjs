@@ -12,17 +12,17 @@ export class Program {
       gl.attachShader(program, shader);
       return shader;
     });
-    gl.linkProgram(program);
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
-      const logs = [gl.getProgramInfoLog(program), ...shaders.map((shader) => gl.getShaderInfoLog(shader))];
-      throw new Error(`this device refuses a shader: ${logs.join(" ")}`);
-    }
-    Object.assign(this, { gl, program });
+    gl.linkProgram(program); // beside other programs, until one of them is used
+    Object.assign(this, { gl, program, shaders });
   }
 
   // Use the program with the values of its uniforms: a texture's name, or the ending and the arguments of `uniform…`.
   use(values, textures) {
-    const { gl, program } = this;
+    const { gl, program, shaders } = this;
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
+      const logs = [gl.getProgramInfoLog(program), ...shaders.map((shader) => gl.getShaderInfoLog(shader))];
+      throw new Error(`this device refuses a shader: ${logs.join(" ")}`);
+    }
     gl.useProgram(program);
     let unit = 0;
     for (const [name, value] of Object.entries(values)) {

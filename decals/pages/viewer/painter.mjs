@@ -26,18 +26,17 @@ export class Painter {
     this.surfaces = header.surfaces.map((surface) => this.surfaceOf(surface, arrays));
   }
 
-  // A surface with its program, and with a vertex array of its attributes.
-  surfaceOf({ program: name, attributes, faces, parts, box }, arrays) {
+  // A surface with a vertex array of its attributes.
+  surfaceOf({ program, attributes, faces, parts, box }, arrays) {
     const { gl } = this;
     const array = gl.createVertexArray();
-    const program = (this.programs[name] ??= new Program(gl, this.header.programs[name]));
     gl.bindVertexArray(array);
     const store = (target, data) => {
       gl.bindBuffer(target, gl.createBuffer());
       gl.bufferData(target, arrays[data], gl.STATIC_DRAW);
     };
     for (const [attribute, [data, size, kind]] of Object.entries(attributes)) {
-      const place = gl.getAttribLocation(program.program, attribute);
+      const place = gl.getAttribLocation(this.surfaceProgram(program).program, attribute);
       store(gl.ARRAY_BUFFER, data);
       gl.enableVertexAttribArray(place);
       gl.vertexAttribPointer(place, size, gl[kind], true, 0, 0);
@@ -45,6 +44,9 @@ export class Painter {
     store(gl.ELEMENT_ARRAY_BUFFER, faces);
     return { program, array, parts, box };
   }
+
+  // The program of surfaces of a kind, compiled when it is first used.
+  surfaceProgram = (name) => (this.programs[name] ??= new Program(this.gl, this.header.programs[name]));
 
   // The program that draws, or picks, in a contact mode, compiled when it is first used.
   decalProgram(kind, { mode, decals }) {
@@ -76,7 +78,7 @@ export class Painter {
       gl.bindVertexArray(array);
       if (box) gl.enable(gl.CULL_FACE); // its back has one fragment for each ray
       for (const { values, first, count } of parts) {
-        program.use(values, this.textures);
+        this.surfaceProgram(program).use(values, this.textures);
         gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 4 * first);
       }
       gl.disable(gl.CULL_FACE);
@@ -111,6 +113,7 @@ export class Painter {
   // Draw one sample of the picture over the mean of those before it; the page's background shows around it.
   draw(state, sample = 0) {
     const { gl } = this;
+    this.decalProgram("color", state); // compiled beside those of surfaces
     this.look(state.camera, this.header.samples[sample]);
     gl.enable(gl.BLEND);
     gl.blendColor(0, 0, 0, 1 / (sample + 1));
@@ -121,9 +124,7 @@ export class Painter {
     gl.flush();
   }
 
-  get isBusy() {
-    return this.gl.clientWaitSync(this.fence, 0, 0) === this.gl.TIMEOUT_EXPIRED;
-  }
+  isBusy = () => this.gl.clientWaitSync(this.fence, 0, 0) === this.gl.TIMEOUT_EXPIRED;
 
   // What a camera sees at a place of the picture, from −1 to 1 to the right and upward: the number of the decal, −1 for
   // none, and the surface as a point and the normal on the outside, null for none.

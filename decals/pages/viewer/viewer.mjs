@@ -15,6 +15,7 @@ const ROUNDS = 4; // in which the closest surface is found
 const NARROW = 1; // angle of view, in degrees, of a look along one ray
 const STEP = 0.25; // of a decal, in radii, at a press
 const ORBIT = Math.PI / 24; // of the model, at a press
+const COARSE = 1 / 3; // side of the first picture, in sides of the next ones: it is there sooner
 const KEPT_AFTER = 500; // milliseconds without a change after which the address holds the state
 const LOST = "The graphics card has let this picture go. It returns as soon as the browser allows it.";
 
@@ -68,10 +69,11 @@ export class Viewer {
 
   // -- the picture ----------------------------------------------------------------------------------------
 
-  resize() {
+  // Let the picture have the pixels of the screen, or for a coarse one only a part of them along each side.
+  resize(part = 1) {
     const { canvas } = this;
-    canvas.width = Math.max(1, Math.round(canvas.clientWidth * devicePixelRatio));
-    canvas.height = Math.max(1, Math.round(canvas.clientHeight * devicePixelRatio));
+    canvas.width = Math.max(1, Math.round(canvas.clientWidth * devicePixelRatio * part));
+    canvas.height = Math.max(1, Math.round(canvas.clientHeight * devicePixelRatio * part));
     this.aspect = canvas.width / canvas.height;
     this.camera.fitTo(this.aspect);
     this.changed("view", false);
@@ -104,7 +106,7 @@ export class Viewer {
   // Draw the next sample of the picture; further ones follow, each after the one before it, until it changes.
   draw() {
     if (this.painter.gl.isContextLost()) return;
-    if (this.sample > 0 && this.painter.isBusy) return this.request();
+    if (this.sample > 0 && this.painter.isBusy()) return this.request();
     if (!this.decals.rows[this.selected]) this.selected = -1;
     this.painter.draw(this, this.sample);
     this.controls.show(this);
@@ -198,7 +200,7 @@ export class Viewer {
 export async function mount(root, data, options = {}) {
   const viewer = new Viewer(root, await unpacked(data), options);
   if (options.link) viewer.set({ link: options.link });
-  viewer.resize();
+  viewer.resize(COARSE); // the observer of the canvas calls for a fine picture next
   options.prepare?.(viewer); // of pages that have more than a viewer
   viewer.draw();
   const { gl } = viewer.painter;
