@@ -22,7 +22,13 @@ from blobtree.tracing.ray_kernels import RayCells
 from blobtree.tracing.shade_kernels import shade_hits
 from blobtree.tracing.tables import device_tables, numpy_tables
 from blobtree.tracing.trace import Hits, checked_rays, load_ray_kernels, raycast, shaded
-from blobtree.tracing.tree_cells import block_counts, cells_grid, trace_tolerance
+from blobtree.tracing.tree_cells import (
+    BLOCKS_ALONG,
+    block_counts,
+    blocks_along,
+    cells_grid,
+    trace_tolerance,
+)
 from blobtree.validation import axis_count, describe, items
 
 MAX_JOINT_MODELS = 64
@@ -96,7 +102,7 @@ def raycast_batch(
 
     Trees of the same kinds of nodes are traced together, in few launches. On a graphics card that is much
     faster than a loop over small trees. On a processor the results equal those of a loop bit for bit. Trees
-    of very many primitives are traced alone.
+    of very many primitives, and flat and long ones of many, are traced alone.
 
     Parameters
     ----------
@@ -142,8 +148,9 @@ def raycast_batch(
     counts = [len(starts) for starts, _ in rays]
 
     def kind(tree: ImplicitModel) -> Hashable | None:
-        depth = cells_grid(*tree.support).depth
-        return (id(tree.tape.instruction_set), depth) if is_small(tree) else None
+        if not is_small(tree) or blocks_along(tree.tape, *tree.support) > BLOCKS_ALONG:
+            return None
+        return id(tree.tape.instruction_set), cells_grid(*tree.support).depth
 
     def joint(numbers: list[int]) -> list[Hits]:
         return _joint_hits([models[n] for n in numbers], [rays[n] for n in numbers], device)

@@ -30,7 +30,7 @@ STEPS_PER_TOLERANCE = 32.0
 
 MISS = -1.0
 
-MAX_BLOCKS = 4096
+MAX_BLOCKS = 32768
 """More blocks than any ray can cross."""
 
 MAX_DISTANCE = 1e30

@@ -22,7 +22,8 @@ def numpy_tables(cells: SparseCells, counts: IndexArray, shift: int) -> tuple[An
 
     The tapes of blocks lie `shift` texels behind their places in `cells`.
     """
-    tables = [block_table(cells, shift, count, model).ravel() for model, count in enumerate(counts)]
+    places = cells.leaves.spans.numpy()[:, 0] - 1 + shift
+    tables = [block_table(cells, places, count, model).ravel() for model, count in enumerate(counts)]
     return wp.array(np.concatenate(tables), dtype=wp.int32, device=cells.device), _starts(counts)
 
 

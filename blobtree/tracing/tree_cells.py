@@ -7,10 +7,10 @@ from typing import Any, TypeAlias
 import numpy as np
 import warp as wp
 
-from blobtree._typing import BoolArray, Float32Array, IndexArray, Int32Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray, Int32Array
 from blobtree.cells.grid import BRANCHING, Grid, grid_from
 from blobtree.cells.refine_kernels import SURELY_OUTSIDE
-from blobtree.cells.sparse_cells import MIN_CULLED_TEXELS, Level, SparseCells, build_cells
+from blobtree.cells.sparse_cells import MAX_BLOCKS, Level, SparseCells, build_cells
 from blobtree.device import known_device
 from blobtree.lazy import Lazy
 from blobtree.sized_cache import sized_cache
@@ -18,6 +18,7 @@ from blobtree.tape.instruction_set import InstructionSet
 from blobtree.tape.model import ImplicitModel
 from blobtree.tape.tape import Tape
 from blobtree.tracing.ray_kernels import EMPTY, RayCells
+from blobtree.tracing.sharing import shared_tapes
 
 RELATIVE_TOLERANCE = 1e-5
 """Distance to the surface at which a ray hits, over the diagonal of the model's box."""
@@ -25,11 +26,11 @@ RELATIVE_TOLERANCE = 1e-5
 BLOCKS_ALONG = 64
 """Finest blocks along the longest side of a model's box."""
 
-MOST_BLOCKS_ALONG = 2048
+MOST_BLOCKS_ALONG = 16384
 """The same for a long box that holds much; a ray crosses less than `ray_kernels.MAX_BLOCKS`."""
 
-BLOCKS_PER_TEXEL = 1.0
-"""Finest blocks per texel of a long tape, if the box is flat or long: fewer hold too many primitives each."""
+BLOCKS_PER_TEXEL = 16.0
+"""Finest blocks per texel of a tape, if the box is flat or long: fewer hold too many primitives each."""
 
 MAX_LAYERS = 16
 """Most layers of empty blocks that a ray skips at once."""
@@ -139,8 +140,7 @@ def tracing_cells(
     """
     box = within or tree.support
     if blocks is None:
-        is_long = len(tree.tape.data) >= MIN_CULLED_TEXELS
-        blocks = blocks_along(tree.tape, *box) if is_long else BLOCKS_ALONG
+        blocks = blocks_along(tree.tape, *box)
     lower, upper = (tuple(corner.tolist()) for corner in box)
     return _tracing_cells(tree.tape, lower, upper, known_device(device), blocks)
 
@@ -155,15 +155,20 @@ def device_cells(
 def blocks_along(tape: Tape, lower: Float32Array, upper: Float32Array) -> int:
     """Return the number of finest blocks along the longest side of a model's box.
 
-    A long tape in a flat or long box has more than `BLOCKS_ALONG`, with as many blocks as a cube has at most.
+    A long tape in a flat or long box has more than `BLOCKS_ALONG`, with `MAX_BLOCKS` in all at most, and no
+    more than `WORD` along the shortest side.
     """
     extent = (upper - lower).astype(np.float64) / float((upper - lower).max())
 
-    def count(blocks: int) -> int:
-        return int(np.maximum(np.ceil(blocks * extent), 1.0).prod())
+    def counts(blocks: int) -> Float64Array:
+        sides: Float64Array = np.maximum(np.ceil(blocks * extent), 1.0)
+        return sides
 
-    blocks, wanted = BLOCKS_ALONG, BLOCKS_PER_TEXEL * len(tape.data)
-    while blocks < MOST_BLOCKS_ALONG and count(blocks) < wanted and count(2 * blocks) <= BLOCKS_ALONG**3:
+    blocks, wanted = BLOCKS_ALONG, BLOCKS_PER_TEXEL * (len(tape.data) - tape.start)
+    while blocks < MOST_BLOCKS_ALONG and counts(blocks).prod() < wanted:
+        finer = counts(2 * blocks)
+        if finer.prod() > MAX_BLOCKS or finer.min() > WORD:
+            break
         blocks *= 2
     return blocks
 
@@ -189,8 +194,14 @@ def _tracing_cells(tape: Tape, lower: Corner, upper: Corner, device: str, blocks
     bounds = np.array(lower, np.float32), np.array(upper, np.float32)
     grid = cells_grid(*bounds, blocks)
     cells = build_cells(tape, grid, device=device)
-    table = block_table(cells, len(_whole(tape)), block_counts(*bounds, grid.cell_size * BRANCHING))
-    return _assembled(tape, bounds, grid, table, cells.levels[-1:])
+    if blocks > BLOCKS_ALONG:
+        tapes, places = shared_tapes(cells.leaves)
+    else:
+        tapes = cells.leaves.tape.numpy()[tape.start :]
+        places = cells.leaves.spans.numpy()[:, 0] - 1 - tape.start
+    places += tape.start + len(_whole(tape))
+    table = block_table(cells, places, block_counts(*bounds, grid.cell_size * BRANCHING))
+    return _assembled(tape, bounds, grid, table, [tapes])
 
 
 def point_cells(tree: ImplicitModel, device: str) -> TracingCells:
@@ -206,7 +217,8 @@ def point_cells(tree: ImplicitModel, device: str) -> TracingCells:
     cells = build_cells(tape, grid, device=device)
     counts = block_counts(*bounds, grid.cell_size * BRANCHING)
     table = _tape_table(cells, len(_whole(tape)), counts)
-    return _assembled(tape, bounds, grid, table, cells.levels[1:])
+    tapes = [level.tape.numpy()[tape.start :] for level in cells.levels[1:]]
+    return _assembled(tape, bounds, grid, table, tapes)
 
 
 def _whole(tape: Tape) -> Float32Array:
@@ -216,10 +228,9 @@ def _whole(tape: Tape) -> Float32Array:
 
 
 def _assembled(
-    tape: Tape, bounds: Corners, grid: Grid, table: Int32Array, levels: Sequence[Level]
+    tape: Tape, bounds: Corners, grid: Grid, table: Int32Array, tapes: Sequence[Float32Array]
 ) -> TracingCells:
-    """Return cells with the whole tape and those of some levels, one after the other."""
-    tapes = [level.tape.numpy()[tape.start :] for level in levels]
+    """Return cells with the whole tape and those of blocks, one after the other."""
     return TracingCells(
         tape=np.concatenate([tape.data[: tape.start], _whole(tape), *tapes]),
         start=tape.start,
@@ -232,14 +243,17 @@ def _assembled(
     )
 
 
-def block_table(cells: SparseCells, shift: int, counts: IndexArray, model: int = 0) -> Int32Array:
-    """Return `TracingCells.blocks` for the finest blocks (nx, ny, nz) of a model; tapes move by `shift`."""
+def block_table(cells: SparseCells, places: Int32Array, counts: IndexArray, model: int = 0) -> Int32Array:
+    """Return `TracingCells.blocks` for the finest blocks (nx, ny, nz) of a model.
+
+    `places` has the texel in front of the tape of each block of `cells`.
+    """
     *_, (_leaves, known) = _tables(cells, counts, model)
     crossed, empty = known >= 0, known == SURELY_OUTSIDE
     order = np.argsort(empty.shape)[::-1]
     layers = _layers(empty.transpose(order)).transpose(np.argsort(order))
     blocks = np.where(empty, EMPTY - layers, known)
-    blocks[crossed] = cells.leaves.spans.numpy()[known[crossed], 0] - 1 + shift
+    blocks[crossed] = places[known[crossed]]
     return blocks
 
 

@@ -8,7 +8,17 @@ import pytest
 import warp as wp
 
 import blobtree
-from blobtree import Mesh, Node, Point, Sum, from_sdf, polygonize, polygonize_batch, raycast_batch
+from blobtree import (
+    Mesh,
+    Node,
+    Point,
+    Repeat,
+    Sum,
+    from_sdf,
+    polygonize,
+    polygonize_batch,
+    raycast_batch,
+)
 from blobtree.cells import joint_cells, sparse_cells
 from blobtree.cells.joint_cells import build_joint_cells, joint_tape
 from blobtree.cells.sparse_cells import first_blocks
@@ -119,6 +129,14 @@ def test_batches_of_volumes_are_loops() -> None:
     trees = volumes(4)
     assert_same_meshes(polygonize_batch(trees, resolution=CELLS), trees, resolution=CELLS)
     rays = rays_around(3)
+    assert_same_hits(raycast_batch(trees, *rays), trees, [rays] * 4)
+
+
+def test_flat_trees_of_many_primitives_are_traced_as_alone() -> None:
+    """Their blocks are finer than those of other trees."""
+    row = Repeat(Point((-2, 0, 0), radius=0.3), (1, 0, 0), 100)
+    trees = [Point((0, 0, 0), radius=1.0), row, Repeat(row, (0, 1, 0), 2), Point((0, 0, 0), radius=1.5)]
+    rays = rays_around(2)
     assert_same_hits(raycast_batch(trees, *rays), trees, [rays] * 4)
 
 

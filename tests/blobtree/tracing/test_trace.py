@@ -9,7 +9,8 @@ from blobtree._typing import Float32Array, Float64Array
 from blobtree.errors import InvalidPoints
 from blobtree.tracing.ray_kernels import MAX_DISTANCE, box_interval, exit_distance, reciprocal
 from blobtree.tracing.trace import trace
-from blobtree.tracing.tree_cells import trace_tolerance
+from blobtree.tracing.tree_cells import BLOCKS_ALONG, trace_tolerance, tracing_cells
+from tests.blobtree.tracing.flat_trees import FLAT_TREES
 from tests.blobtree.transpile.warp_functions import call
 from tests.blobtree.trees import random_trees
 from tests.oracles import blobtree as oracle
@@ -87,17 +88,26 @@ def test_a_capsule() -> None:
 
 
 RAYS, STEPS = 40, 1500
+FLAT_RAYS = 12
 
 
-def checked_hits(tree: Node, origins: Float64Array, directions: Float64Array) -> int:
-    """Compare rays with dense marching in float64; return the number of hits.
+def checked_hits(
+    tree: Node,
+    origins: Float64Array,
+    directions: Float64Array,
+    *,
+    reach: float | None = None,
+    steps: int = STEPS,
+) -> int:
+    """Compare rays with dense marching in float64 up to `reach`; return the number of hits.
 
     They end at the first sample inside or before, and on the surface.
     """
-    reach = 2.0 * float(np.linalg.norm(tree.support[1] - tree.support[0]))
-    places = np.linspace(0.0, reach, STEPS)
+    if reach is None:
+        reach = 2.0 * float(np.linalg.norm(tree.support[1] - tree.support[0]))
+    places = np.linspace(0.0, reach, steps)
     samples = origins[:, None] + places[:, None] * directions[:, None]
-    inside = oracle.value(tree, samples.reshape(-1, 3)).reshape(len(origins), STEPS) > 0.5 + 1e-5
+    inside = oracle.value(tree, samples.reshape(-1, 3)).reshape(len(origins), steps) > 0.5 + 1e-5
     first = np.where(inside.any(axis=1), places[inside.argmax(axis=1)], np.inf)
     seen = cast(tree, origins, directions)
     tolerance = trace_tolerance(tree.support)
@@ -115,6 +125,20 @@ def checked_hits(tree: Node, origins: Float64Array, directions: Float64Array) ->
 def test_no_ray_passes_through_a_random_tree_unseen(seed: int) -> None:
     rng, trees = np.random.default_rng(seed), random_trees(seed=20 + seed, count=6, depth=3)
     assert sum(checked_hits(tree, *rays_through(rng, tree, RAYS)) for tree in trees) > 25
+
+
+@pytest.mark.ordinary_cases("blended row", "mirrored row", "grid")
+@pytest.mark.parametrize("name", FLAT_TREES)
+def test_rays_through_many_copies_end_where_the_oracle_does(name: str) -> None:
+    tree = FLAT_TREES[name]
+    cells = tracing_cells(tree)
+    assert max(cells.counts) > BLOCKS_ALONG
+    rng = np.random.default_rng(0)
+    places = rng.choice(np.argwhere(cells.blocks.reshape(cells.counts) >= 0), FLAT_RAYS)
+    targets = cells.lower + cells.block_size * rng.uniform(places, places + 1.0)
+    directions = random_units(rng, FLAT_RAYS)
+    origins = (targets - 2.0 * directions).astype(np.float32).astype(np.float64)
+    assert checked_hits(tree, origins, directions, reach=4.0, steps=200) > FLAT_RAYS // 4
 
 
 @pytest.mark.slow_cases("400.0")

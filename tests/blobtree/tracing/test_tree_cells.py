@@ -2,6 +2,7 @@
 
 import gc
 import weakref
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,17 +10,24 @@ from scipy.ndimage import distance_transform_cdt
 
 from blobtree import ISO, Box, Node, Point, Repeat, Sum, Tape
 from blobtree._typing import Int32Array
+from blobtree.cells.grid import BRANCHING
 from blobtree.cells.refine_kernels import SURELY_INSIDE
+from blobtree.cells.sparse_cells import MAX_BLOCKS
 from blobtree.sized_cache import SizedCache
 from blobtree.tape.codes import PUSH, STRETCHED, UNWARP, WARP
 from blobtree.tape.model import gradients_at, values_at
-from blobtree.tracing import tree_cells
+from blobtree.tracing import ray_kernels, tree_cells
 from blobtree.tracing.ray_kernels import EMPTY
 from blobtree.tracing.tree_cells import (
     BLOCKS_ALONG,
     MAX_LAYERS,
     MIN_POINT_TEXELS,
+    MOST_BLOCKS_ALONG,
+    WORD,
     TracingCells,
+    block_counts,
+    blocks_along,
+    cells_grid,
     device_cells,
     point_cells,
     tracing_cells,
@@ -152,7 +160,7 @@ def test_a_long_box_that_holds_much_has_more_blocks(step: tuple[float, float, fl
     row = Repeat(Box((0, 0, 0), (0.6, 0.6, 0.6), radius=0), step, 1000, "union")
     cells = tracing_cells(row, device="cpu")
     blocks, along = table(cells), int(np.argmax(step))
-    assert cells.counts[along] > 1000
+    assert cells.counts[along] > 4000
     assert_empty_layers(blocks)
     places = np.random.default_rng(0).integers(0, 1000, 2000)
     origins = places[:, None] * np.array(step) + 5.0 * np.roll(step, 1)
@@ -160,13 +168,37 @@ def test_a_long_box_that_holds_much_has_more_blocks(step: tuple[float, float, fl
     np.testing.assert_allclose(hits.distances, 4.7, atol=1e-3)
 
 
-def test_a_flat_box_that_holds_much_has_as_many_blocks_as_a_cube_at_most() -> None:
+def flat_grid(child: Node, side: int) -> Node:
+    """Copies of a child in a square."""
+    return Repeat(Repeat(child, (1, 0, 0), side, "union"), (0, 1, 0), side, "union")
+
+
+def test_a_flat_box_has_more_blocks_the_more_it_holds() -> None:
     ball = Point((0, 0, 0), radius=0.3)
-    counts = tracing_cells(Repeat(Repeat(ball, (1, 0, 0), 70), (0, 1, 0), 70), device="cpu").counts
-    assert BLOCKS_ALONG < counts[0] == counts[1]
-    assert np.prod(counts) <= BLOCKS_ALONG**3
-    few = Repeat(Repeat(ball, (1, 0, 0), 20), (0, 1, 0), 20)
-    assert tracing_cells(few, device="cpu").counts[0] == BLOCKS_ALONG
+    counts = [tracing_cells(flat_grid(ball, side), device="cpu").counts for side in (5, 30, 100)]
+    assert [x for x, _, _ in counts] == [y for _, y, _ in counts] == [64, 128, 512]
+    assert np.prod(counts[-1]) <= MAX_BLOCKS
+
+
+def test_visible_copies_have_as_long_tapes_in_a_large_grid_as_in_a_small_one() -> None:
+    brick = Box((0, 0, 0), (0.6, 0.6, 0.6), radius=0)
+    lengths = []
+    for side in (10, 20, 40):
+        cells = tracing_cells(flat_grid(brick, side), device="cpu")
+        lengths.append(float(cells.tape[cells.blocks[cells.blocks >= 0], 0].mean()))
+    assert max(lengths) < 1.5 * min(lengths)
+
+
+@pytest.mark.parametrize("sides", [(1.0, 1.0, 1.0), (1.0, 1.0, 0.4), (1.0, 0.5, 0.5), (1.0, 0.01, 0.001)])
+def test_no_box_has_more_blocks_than_a_level_or_a_word_holds(sides: tuple[float, float, float]) -> None:
+    tape = replace(CORNERS.tape, data=np.zeros((1 << 20, 4), np.float32))
+    lower, upper = np.zeros(3, np.float32), np.array(sides, np.float32)
+    blocks = blocks_along(tape, lower, upper)
+    counts = block_counts(lower, upper, cells_grid(lower, upper, blocks).cell_size * BRANCHING)
+    assert counts.prod() <= MAX_BLOCKS
+    assert counts.min() <= WORD
+    assert blocks <= MOST_BLOCKS_ALONG
+    assert counts.sum() < ray_kernels.MAX_BLOCKS
 
 
 def test_all_blocks_of_an_empty_tree_are_empty() -> None:
