@@ -282,7 +282,7 @@ class Decals(Value):
     @property
     def influence(self) -> Float32Array:
         """Radius s at which each decal's field ends (paper, figure 1): float32[n], radii / 0.454202."""
-        return (self.radii / np.float64(RIM)).astype(np.float32)
+        return influence_of(self.radii)
 
     @property
     def ranks(self) -> Int32Array:
@@ -355,6 +355,24 @@ class Decals(Value):
         record[:, 3, :3] = decode_srgb(self.tints.astype(np.float64))
         record[:, 3, 3] = self.opacities
         return record.reshape(-1, 4)
+
+
+def influence_of(radii: Float32Array) -> Float32Array:
+    """Return the influence radii of visible ones, see `Decals.influence`."""
+    return (radii / np.float64(RIM)).astype(np.float32)
+
+
+def checked_column(name: str, values: Any, count: int) -> NDArray[Any]:
+    """Return a new array for a column other than normals and tangents, checked as by `Decals`.
+
+    Positions may have another length than `count`.
+
+    Raises
+    ------
+    InvalidDecals
+        A value is invalid.
+    """
+    return _positions(values) if name == "positions" else _CHECKS[name](values, count)
 
 
 def _positions(values: Any) -> Float32Array:

@@ -71,7 +71,7 @@ class EditableIndex:
         """
         if ahead or self.stale:
             load_together(BUILD_KERNELS, "cpu")
-        if ahead or not self.stale:
+        if ahead or not (self.stale or self._launches):  # recorded launches have loaded kernels
             load_together(EDIT_KERNELS, "cpu")
 
     def build(self, records: Float32Array, numbers: Int64Array, log: ChangeLog) -> bool:

@@ -1,6 +1,7 @@
 """`DecalEditor`: decals and their index as arrays that change in place."""
 
 import copy
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -13,8 +14,8 @@ from decals.errors import InvalidDecals
 from decals.index.change_log import ChangeLog, DirtyBalls, Range
 from decals.index.editable_index import IDS, LEVELS, TABLE, EditableIndex
 from decals.index.index import DecalIndex, has_nested
-from decals.index.rows import DecalRows, runs_of
-from decals.model import RECORD, Decals
+from decals.index.rows import DIRECT, DecalRows, runs_of
+from decals.model import RECORD, Decals, checked_column
 from decals.receivers import codes_of
 from decals.validation import instance
 
@@ -201,7 +202,13 @@ class DecalEditor:
         InvalidDecals
             The number has no decal, or a value is invalid. Nothing changes then.
         """
-        after = self[number].replace(**arrays)
+        rows = self._rows.require(number)
+        if len(rows) == 1 and arrays.keys() <= DIRECT:
+            columns = {name: checked_column(name, values, 1) for name, values in arrays.items()}
+            if len(columns.get("positions", rows)) == 1:
+                self._edit(rows, rows, lambda: self._write_columns(int(rows[0]), columns))
+                return
+        after = self._rows.take(number).replace(**arrays)
         _require_one(after)
         self.assign([number], after)
 
@@ -232,17 +239,20 @@ class DecalEditor:
         rows = self._rows.require_assignable(numbers, len(decals))
         if decals.limited:
             codes_of(decals.receivers, self._rows.receiver_table)  # raises for too many different ones
+        self._edit(rows, rows[self._rows.contains(rows)], lambda: self._write(rows, decals))
+
+    def _edit(self, rows: Int64Array, existing: Int64Array, write: Callable[[], None]) -> None:
+        """Write rows, of which some existed before, and bring the index up to date."""
         self._prepare_index(rows)
-        version, existing = self._log.version + 1, rows[self._rows.contains(rows)]
-        balls_before = self._rows.balls(existing)
+        version, balls_before = self._log.version + 1, self._rows.balls(existing)
         self._remove_from_index(existing)
-        self._write(rows, decals)
+        write()
         self._dirty.add(version, np.concatenate([balls_before, self._rows.balls(rows)]))
         if not self._index.stale:
             records = self._rows.records
             self._index.stale = not all(
                 self._index.insert(records, number, rank, self._log)
-                for number, rank in zip(rows.tolist(), decals.ranks.tolist(), strict=True)
+                for number, rank in zip(rows.tolist(), self._rows.ranks(rows).tolist(), strict=True)
             )
         if not self._index.stale:
             self._index.check_nesting(self._rows.records, self.next_number)
@@ -307,6 +317,10 @@ class DecalEditor:
             self._log.add(RECORDS, (RECORD * first, RECORD * (last + 1)))
             if limited:
                 self._log.add(LIMITS, (first, last + 1))
+
+    def _write_columns(self, row: int, columns: Mapping[str, NDArray[Any]]) -> None:
+        self._rows.write(row, columns)
+        self._log.add(RECORDS, (RECORD * row, RECORD * (row + 1)))
 
     def _update_index(self) -> None:
         """Rebuild a stale index, with spare room."""

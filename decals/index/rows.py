@@ -2,6 +2,7 @@
 
 import copy
 from collections import Counter
+from collections.abc import Callable, Mapping
 from typing import Any, Self
 
 import numpy as np
@@ -9,13 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from blobtree._typing import BoolArray, Float32Array, Int32Array, Int64Array
 from decals.errors import InvalidDecals
-from decals.model import COLUMNS, LAYER_LIMIT, RECORD, Decals, Interaction
+from decals.model import LAYER_LIMIT, RECORD, Decals, Interaction, influence_of
 
 MIN_SPARE_ROWS = 1024
 """Smallest number of spare rows of an array; arrays grow by half."""
 
 KEPT = "radii", "tints", "receivers", "fade_angles", "fade_depths", "single_sheets"
 """Columns with arrays of their own."""
+
+DIRECT = frozenset(("positions", "radii", "images", "opacities"))
+"""Columns that `DecalRows.write` writes: no rank, limit or other column depends on them."""
 
 INTERACTION_MASK = 3
 """Mask of a rank's `Interaction`."""
@@ -75,7 +79,9 @@ class DecalRows:
 
     def contains(self, numbers: ArrayLike) -> BoolArray:
         """Return True for each number that has a decal, ``bool[n]``."""
-        rows = as_numbers(numbers)
+        return self._contains(as_numbers(numbers))
+
+    def _contains(self, rows: Int64Array) -> BoolArray:
         inside = (rows >= 0) & (rows < self.end)
         present: BoolArray = inside & self._present[np.where(inside, rows, 0)]
         return present
@@ -83,7 +89,7 @@ class DecalRows:
     def require(self, numbers: ArrayLike) -> Int64Array:
         """Return numbers of existing decals, each at most once; raise `InvalidDecals` otherwise."""
         rows = as_numbers(numbers)
-        missing = ~self.contains(rows)
+        missing = ~self._contains(rows)
         if missing.any():
             number = int(rows[missing][0])
             raise InvalidDecals(f"expected the number of a decal, got {number}; it was deleted or never was")
@@ -103,31 +109,16 @@ class DecalRows:
     def take(self, numbers: ArrayLike) -> Decals:
         """Return the decals of these numbers, in this order."""
         rows = self.require(numbers)
-        return Decals.of_rows({name: self.column(name, rows) for name in COLUMNS})
+        packed = self.records.reshape(-1, RECORD, 4)[rows]  # one copy of all columns
+        columns = {name: form(packed[place]) for name, (place, form) in _PACKED.items()}
+        return Decals.of_rows({**columns, **{name: array[rows] for name, array in self._kept.items()}})
 
     def column(self, name: str, rows: Int64Array) -> NDArray[Any]:
         """Return one array of `Decals` for these rows."""
-        packed = self.records.reshape(-1, RECORD, 4)
         if name in KEPT:
             return self._kept[name][rows]
-        match name:
-            case "positions":
-                return packed[:, 0, :3][rows]
-            case "normals":
-                return packed[:, 1, :3][rows]
-            case "tangents":
-                return packed[:, 2, :3][rows]
-            case "images":
-                return packed[:, 2, 3][rows].astype(np.int32)
-            case "spill":
-                return packed[:, 1, 3][rows] % 1.0 > 0.25
-            case "interactions":
-                return self._ranks(rows) & INTERACTION_MASK
-            case "layers":
-                return (self._ranks(rows) >> 2) - LAYER_LIMIT
-            case "opacities":
-                return packed[:, 3, 3][rows]
-        raise KeyError(name)
+        place, form = _PACKED[name]
+        return form(self.records.reshape(-1, RECORD, 4)[place][rows])
 
     def balls(self, rows: Int64Array) -> Float32Array:
         """Return centres and influence radii, ``float32[n, 4]``."""
@@ -159,20 +150,53 @@ class DecalRows:
         self.count += int((~self._present[rows]).sum())
         self._present[rows] = True
 
+    def write(self, row: int, columns: Mapping[str, NDArray[Any]]) -> None:
+        """Write checked values (1, …) of columns of DIRECT for a decal that exists."""
+        record = self.records[RECORD * row : RECORD * (row + 1)]
+        for name, values in columns.items():
+            match name:
+                case "positions":
+                    record[0, :3] = values[0]
+                case "radii":
+                    self._kept["radii"][row] = values[0]
+                    record[0, 3] = influence_of(values)[0]
+                case "images":
+                    record[2, 3] = values[0]
+                case "opacities":
+                    record[3, 3] = values[0]
+
     def remove(self, rows: Int64Array) -> None:
         """Leave gaps in these rows."""
         self._uncount(rows)
         self.count -= int(self._present[rows].sum())
         self._present[rows] = False
 
-    def _ranks(self, rows: Int64Array) -> Int32Array:
-        """Return the ranks of decals; a record adds a half for decals that spill."""
-        ranks: Int32Array = np.floor(self.records[RECORD * rows + 1, 3]).astype(np.int32)
-        return ranks
+    def ranks(self, rows: Int64Array) -> Int32Array:
+        """Return `Decals.ranks` for these rows."""
+        return _whole_ranks(self.records[RECORD * rows + 1, 3])
 
     def _uncount(self, rows: Int64Array) -> None:
         """Subtract the decals in these rows from the counts of ranks."""
-        self._rank_counts.subtract(Counter(self._ranks(rows[self._present[rows]]).tolist()))
+        self._rank_counts.subtract(Counter(self.ranks(rows[self._present[rows]]).tolist()))
+
+
+def _whole_ranks(ranks: Float32Array) -> Int32Array:
+    """Return the ranks of records, which have a half more for decals that spill."""
+    whole: Int32Array = np.floor(ranks).astype(np.int32)
+    return whole
+
+
+_PACKED: dict[str, tuple[Any, Callable[[Float32Array], NDArray[Any]]]] = {
+    "positions": (np.s_[:, 0, :3], np.ascontiguousarray),
+    "normals": (np.s_[:, 1, :3], np.ascontiguousarray),
+    "tangents": (np.s_[:, 2, :3], np.ascontiguousarray),
+    "images": (np.s_[:, 2, 3], lambda images: images.astype(np.int32)),
+    "spill": (np.s_[:, 1, 3], lambda ranks: ranks % 1.0 > 0.25),
+    "interactions": (np.s_[:, 1, 3], lambda ranks: _whole_ranks(ranks) & INTERACTION_MASK),
+    "layers": (np.s_[:, 1, 3], lambda ranks: (_whole_ranks(ranks) >> 2) - LAYER_LIMIT),
+    "opacities": (np.s_[:, 3, 3], np.ascontiguousarray),
+}
+"""Where in records (n, RECORD, 4) the other columns lie, and how they are read from there."""
 
 
 def as_numbers(numbers: ArrayLike) -> Int64Array:

@@ -1,6 +1,8 @@
 """Editing: after any edits, look-ups find who acts, as in an index built anew; only their bytes changed."""
 
+import re
 from collections.abc import Callable
+from dataclasses import fields
 from itertools import pairwise
 from typing import Any
 
@@ -14,7 +16,7 @@ from decals import Decals, evaluate
 from decals.errors import InvalidDecals
 from decals.index import DecalEditor, DecalIndex
 from decals.index.change_log import ChangeLog
-from decals.index.editor import IDS, RECORDS, TABLE
+from decals.index.editor import IDS, LIMITS, RECORDS, TABLE
 from decals.record import NEIGHBOR_REACH
 
 
@@ -110,6 +112,104 @@ def test_many_edits_of_many_decals() -> None:
         else:
             editor.delete(number)
     check(editor, rng.normal(size=(2000, 3)).astype(np.float32))
+
+
+CHANGES: dict[str, Callable[[np.random.Generator, Decals], dict[str, Any]]] = {
+    "position": lambda rng, one: {"positions": one.positions + rng.normal(scale=0.3, size=(1, 3))},
+    "position far away": lambda rng, _: {"positions": 50.0 * rng.normal(size=(1, 3))},
+    "radius": lambda rng, _: {"radii": 10.0 ** rng.uniform(-2, 0.5, 1)},
+    "one radius for all": lambda rng, _: {"radii": float(rng.uniform(0.1, 1.0))},
+    "position and radius": lambda rng, _: {
+        "positions": rng.normal(size=(1, 3)),
+        "radii": rng.uniform(0.1, 1, 1),
+    },
+    "image": lambda rng, _: {"images": rng.integers(-1, 9, 1)},
+    "the usual image": lambda _rng, _one: {"images": None},
+    "opacity": lambda rng, _: {"opacities": rng.uniform(0, 1, 1)},
+    "nothing": lambda _rng, _one: {},
+    "layer": lambda rng, _: {"layers": rng.integers(-3, 3, 1)},
+    "tint and position": lambda rng, one: {
+        "tints": rng.uniform(0, 1, (1, 3)),
+        "positions": one.positions * 1.5,
+    },
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_change_is_the_assignment_of_a_changed_decal(name: str) -> None:
+    """Bit for bit: decals, arrays, and what changed; but a change of few columns leaves the limits alone."""
+    rng = np.random.default_rng(len(name))
+    decals = some(rng, 60).replace(
+        images=rng.integers(-1, 9, 60),
+        spill=rng.uniform(size=60) < 0.5,
+        opacities=rng.uniform(0, 1, 60),
+        fade_depths=rng.choice([0.0, 0.5], 60),
+    )
+    changed, assigned = DecalEditor(decals), DecalEditor(decals)
+    for _ in range(30):
+        number = int(rng.integers(60))
+        one = assigned[number]
+        values = CHANGES[name](rng, one)
+        versions = changed.version, assigned.version
+        changed.change(number, **values)
+        assigned.assign([number], one.replace(**values))
+        rows, expected = changed.changed_rows(versions[0]), assigned.changed_rows(versions[1])
+        assert {**expected, **rows} == expected
+        assert set(expected) - set(rows) <= {LIMITS}
+        balls = changed.changed_balls(versions[0]), assigned.changed_balls(versions[1])
+        assert (balls[0] is None) == (balls[1] is None)
+        if balls[0] is not None and balls[1] is not None:
+            assert balls[0].tobytes() == balls[1].tobytes()
+    for key, array in assigned.arrays.items():
+        assert changed.arrays[key].tobytes() == array.tobytes()
+    assert changed.decals.content_hash == assigned.decals.content_hash
+    assert changed.layered == assigned.layered
+
+
+WRONG_CHANGES: list[dict[str, Any]] = [
+    {"positions": [[0, 0, np.nan]]},
+    {"positions": [[0, 0]]},
+    {"positions": [[0, 0, 0], [1, 0, 0]]},
+    {"radii": [0.0]},
+    {"radii": [1.0, 2.0]},
+    {"radii": ["wide"]},
+    {"images": [0.5]},
+    {"opacities": [1.5]},
+    {"positions": [[9, 9, 9]], "radii": [-1.0]},
+]
+
+
+@pytest.mark.parametrize("values", WRONG_CHANGES)
+def test_a_wrong_change_raises_as_a_wrong_decal_does_and_changes_nothing(values: dict[str, Any]) -> None:
+    editor = DecalEditor(some(np.random.default_rng(0), 9))
+    before, version = {name: array.copy() for name, array in editor.arrays.items()}, editor.version
+    with pytest.raises(InvalidDecals) as expected:
+        DecalEditor(editor.decals).assign([3], editor[3].replace(**values))
+    with pytest.raises(InvalidDecals, match=re.escape(str(expected.value))):
+        editor.change(3, **values)
+    assert editor.version == version
+    for name, array in editor.arrays.items():
+        assert array.tobytes() == before[name].tobytes()
+
+
+def test_decals_are_taken_as_their_columns_say() -> None:
+    rng = np.random.default_rng(4)
+    decals = some(rng, 40).replace(spill=rng.uniform(size=40) < 0.5, images=rng.integers(-1, 9, 40))
+    editor = DecalEditor(decals)
+    rows = rng.permutation(40)[:7]
+    for taken, expected in (
+        (editor.take(rows), decals[rows]),
+        (editor[3], decals[[3]]),
+        (editor.decals, decals),
+    ):
+        for field in fields(Decals):
+            seen, wanted = getattr(taken, field.name), getattr(expected, field.name)
+            assert seen.dtype == wanted.dtype
+            assert seen.flags.c_contiguous
+            assert not seen.flags.writeable
+            assert seen.tobytes() == wanted.tobytes()
+    for field in fields(Decals):
+        assert editor.column(field.name).tobytes() == getattr(decals, field.name).tobytes()
 
 
 def test_many_changes_one_after_the_other_lay_the_index_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
