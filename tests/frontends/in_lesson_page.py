@@ -248,7 +248,7 @@ async def played(browser: Browser, path: Path, width: int, height: int) -> None:
 
 async def packed(page: Page) -> None:
     """Drag the images of the puzzle to a good answer, with a finger or the mouse."""
-    await page.evaluate("scrollTo(0, 0)")
+    await page.evaluate("scrollTo({ top: 0, behavior: 'instant' })")  # else Firefox still moves
     fingers = Fingers(await page.context.new_cdp_session(page)) if is_chromium(page) else None
     for start, end in await page.evaluate(PLACES, SOLVED):
         if fingers:
