@@ -4,9 +4,10 @@ import numpy as np
 
 from blobtree._typing import Float64Array
 from blobtree.formulas.falloff import RIM
+from blobtree.tape.bounds import leaf_boxes
 from blobtree.tape.grown import leaf_tape
 from blobtree.tape.model import ImplicitModel, gradients_at
-from blobtree.tape.part_sizes import has_warps, leaf_boxes
+from blobtree.tape.part_sizes import has_warps
 from blobtree.tape.program import PlacedPrimitive, ProgramPrimitive, Run, influence_radii
 from blobtree.tape.tape import Tape
 
@@ -44,7 +45,7 @@ def limit_by_gaps(
     """
     if not lengths.any():
         return
-    lower, upper = leaf_boxes(tree)
+    lower, upper = leaf_boxes(tree._program)
     beside = {}
     for number in np.flatnonzero(lengths).tolist():
         apart = np.maximum(lower - upper[number], lower[number] - upper).max(axis=1)

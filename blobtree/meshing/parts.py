@@ -36,6 +36,7 @@ from blobtree.meshing.mesh import Mesh
 from blobtree.meshing.part_kernels import measure_parts
 from blobtree.meshing.walls import Walls
 from blobtree.progress import Progress
+from blobtree.tape.bounds import leaf_boxes
 from blobtree.tape.model import ImplicitModel, values_at
 from blobtree.tape.operands import has_walls, leaves_of
 from blobtree.tape.part_sizes import (
@@ -43,7 +44,6 @@ from blobtree.tape.part_sizes import (
     fitting_scale,
     fitting_wall_scale,
     has_warps,
-    leaf_boxes,
     part_sizes,
     sized_tape,
 )
@@ -461,7 +461,7 @@ def _too_thin(tree: ImplicitModel, cells: SparseCells, smallest: float) -> list[
 
     Tips of cones are left out: only their end is missing.
     """
-    needed, (lower, upper) = part_sizes(tree)[1] / BALL_CELLS, leaf_boxes(tree)
+    needed, (lower, upper) = part_sizes(tree)[1] / BALL_CELLS, leaf_boxes(tree._program)
     leaves, middles = _leaves(tree), 0.5 * (lower + upper)
     found = {at: ThinPart(float(needed[at]), middles[at]) for at in np.flatnonzero(needed < smallest)}
     if has_warps(tree):
@@ -535,7 +535,7 @@ def _name_of_part(tree: ImplicitModel, part: ThinPart) -> str:
         return "one between " + " and ".join(sorted(_name_of_leaf(tree, leaves[at]) for at in nearest))
     least, most = np.log(part_sizes(tree)) - np.log(BALL_CELLS * part.size)
     misfit = np.round(np.maximum(least, -most).clip(0.0), 1)
-    lower, upper = leaf_boxes(tree)
+    lower, upper = leaf_boxes(tree._program)
     gaps = np.linalg.norm(np.maximum(lower - part.place, part.place - upper).clip(0.0), axis=1)
     return _name_of_leaf(tree, leaves[np.lexsort([gaps, misfit])[0]])
 

@@ -43,9 +43,10 @@ from blobtree.meshing.thickening_kernels import (
 )
 from blobtree.meshing.walls import WALL_CELLS
 from blobtree.progress import Progress
+from blobtree.tape.bounds import leaf_boxes
 from blobtree.tape.grown import GrownModel, leaf_tape, runs_of_leaves
 from blobtree.tape.model import ImplicitModel, gradients_at, values_at
-from blobtree.tape.part_sizes import has_warps, leaf_boxes, part_sizes
+from blobtree.tape.part_sizes import has_warps, part_sizes
 from blobtree.tape.program import PlacedPrimitive, ProgramPrimitive, Run, influence_radii
 
 MAX_ATTEMPTS = 6
@@ -248,7 +249,7 @@ class _Vertices:
         nearness = wp.full(count, value=float(ISO), dtype=wp.float32, device=device)
         owners = wp.full(count, value=-1, dtype=wp.int32, device=device)
         feet = wp.zeros(count, dtype=wp.vec3, device=device)
-        lower, upper = leaf_boxes(growth.grown)
+        lower, upper = leaf_boxes(growth.grown._program)
         warped = has_warps(growth.tree)
         for number in np.flatnonzero((growth.aims >= 0.0) & (growth.amounts != 0.0)).tolist():
             near = ((self.starts >= lower[number]) & (self.starts <= upper[number])).all(axis=1) | warped
@@ -516,7 +517,7 @@ class _Sides:
 def _without_vertices(tree: ImplicitModel, sides: _Sides, growth: _Growth) -> BoolArray:
     """Return the leaves that grew where the surface of a leaf has no vertices (n,)."""
     grown, leaves = growth.amounts != 0.0, list(runs_of_leaves(tree._program))
-    lower, upper = leaf_boxes(growth.grown)
+    lower, upper = leaf_boxes(growth.grown._program)
     failed = np.zeros(len(grown), bool)
     for number, (_, placed) in enumerate(leaves):
         beside = grown & ((lower <= upper[number]) & (upper >= lower[number])).all(axis=1)

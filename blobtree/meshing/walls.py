@@ -30,9 +30,10 @@ from blobtree.meshing.gaps import connected_blocks
 from blobtree.meshing.part_kernels import UNLIMITED
 from blobtree.meshing.patches import EDGES
 from blobtree.meshing.wall_kernels import climb, measure_walls, place_samples
+from blobtree.tape.bounds import leaf_boxes
 from blobtree.tape.model import ImplicitModel
 from blobtree.tape.operands import Operand, leaves_of, operands_of
-from blobtree.tape.part_sizes import leaf_boxes, part_sizes
+from blobtree.tape.part_sizes import part_sizes
 from blobtree.tape.program import ProgramLeaf
 from blobtree.tape.tape import DeviceTape, Tape
 
@@ -205,7 +206,7 @@ class Walls:
         small = np.flatnonzero(radii < grid.cell_size)
         if not len(small):
             return {}
-        lower, upper = leaf_boxes(tree)
+        lower, upper = leaf_boxes(tree._program)
         needed = np.maximum(radii / BALL_CELLS, (upper - lower).max(axis=1) / LEAF_CELLS)
         tapes, result = list(leaves_of(tree._program, tree.tape)), dict[int, Ends]()
         for number in small[needed[small] < grid.cell_size].tolist():

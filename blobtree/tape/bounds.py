@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from blobtree._typing import Box, Float32Array
 from blobtree.declare.claims import OperatorRow, Support
 from blobtree.declare.field import FieldKind
+from blobtree.declare.skeleton import Skeleton
 from blobtree.tape.program import (
     EnterWarp,
     Instruction,
@@ -123,6 +124,16 @@ def field_boxes(placed_fields: list[PlacedPrimitive]) -> Box:
     middle = np.einsum("nij,nj->ni", linear, 0.5 * (lower + upper)) + offset
     half = np.einsum("nij,nj->ni", np.abs(linear), 0.5 * (upper - lower))
     return middle - half, middle + half
+
+
+def leaf_boxes(program: list[Instruction]) -> Box:
+    """Return boxes (n, 3), (n, 3) around the supports of the leaves of a tree, without warps."""
+    boxes = [
+        primitive_boxes(run.primitives) if isinstance(run.kind, Skeleton) else field_boxes(run.primitives)
+        for run in program
+        if isinstance(run, Run)
+    ]
+    return np.concatenate([lower for lower, _ in boxes]), np.concatenate([upper for _, upper in boxes])
 
 
 def _combine_all(operator: OperatorRow, box: Box, boxes: Box) -> Box:

@@ -4,6 +4,7 @@ import reprlib
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
@@ -11,7 +12,7 @@ from blobtree._typing import Float32Array
 from blobtree.errors import InvalidNode
 from blobtree.kernels import loaded
 from blobtree.lazy import Lazy
-from blobtree.tape.bounds import is_endless, support_box
+from blobtree.tape.bounds import is_endless, leaf_boxes, support_box
 from blobtree.tape.evaluate_kernels import evaluate_colors, evaluate_gradients, evaluate_values
 from blobtree.tape.program import Instruction, ProgramNode, compile_program
 from blobtree.tape.tape import Tape, compile_tape
@@ -45,6 +46,12 @@ class ImplicitModel(ProgramNode):
                 "solid, as in `tree & Box((0, 0, 0), (4, 4, 4), radius=0)`, or trace rays with `far=`"
             )
         return self.field_box
+
+    @Lazy
+    def _leaf_size(self) -> float:
+        """Length of a usual primitive with its influence: the median of the longest sides of their boxes."""
+        lower, upper = leaf_boxes(self._program)
+        return float(np.median((upper - lower).max(axis=1)))
 
     @Lazy
     def field_box(self) -> tuple[Float32Array, Float32Array]:

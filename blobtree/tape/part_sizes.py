@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from blobtree._typing import Box, Float32Array, Float64Array
+from blobtree._typing import Float32Array, Float64Array
 from blobtree.declare.skeleton import BALL_CELLS, PLATE_CELLS, TUBE_CELLS, Skeleton
 from blobtree.formulas.falloff import RIM
-from blobtree.tape.bounds import field_boxes, primitive_boxes
+from blobtree.tape.bounds import leaf_boxes
 from blobtree.tape.model import ImplicitModel
 from blobtree.tape.operands import operands_of
 from blobtree.tape.program import EnterWarp, Run, distinct_placements, influence_radii
@@ -62,16 +62,6 @@ def _breadths(run: Run) -> Float64Array:
     return breadths
 
 
-def leaf_boxes(tree: ImplicitModel) -> Box:
-    """Return boxes (n, 3), (n, 3) around the supports of the leaves, without warps."""
-    runs = [step for step in tree._program if isinstance(step, Run)]
-    boxes = [
-        primitive_boxes(run.primitives) if isinstance(run.kind, Skeleton) else field_boxes(run.primitives)
-        for run in runs
-    ]
-    return np.concatenate([lower for lower, _ in boxes]), np.concatenate([upper for _, upper in boxes])
-
-
 def has_small_parts(tree: ImplicitModel, size: float) -> bool:
     """Return True if a leaf may be thinner than `size`, whatever warps do to it."""
     least, _ = part_sizes(tree)
@@ -97,7 +87,7 @@ def fitting_scale(tree: ImplicitModel, size: float) -> float:
     Cells are halved until they are small enough. So a part may take four times the triangles that it needs.
     """
     sizes = part_sizes(tree)[0] / BALL_CELLS
-    lower, upper = leaf_boxes(tree)
+    lower, upper = leaf_boxes(tree._program)
     lengths = np.linalg.norm(upper - lower, axis=1) / sizes
     runs = [step for step in tree._program if isinstance(step, Run)]
     powers = np.repeat(

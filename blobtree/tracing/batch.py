@@ -25,7 +25,7 @@ from blobtree.tracing.trace import Hits, checked_rays, load_ray_kernels, raycast
 from blobtree.tracing.tree_cells import (
     BLOCKS_ALONG,
     block_counts,
-    blocks_along,
+    blocks_of,
     cells_grid,
     trace_tolerance,
 )
@@ -148,7 +148,7 @@ def raycast_batch(
     counts = [len(starts) for starts, _ in rays]
 
     def kind(tree: ImplicitModel) -> Hashable | None:
-        if not is_small(tree) or blocks_along(tree.tape, *tree.support) > BLOCKS_ALONG:
+        if not is_small(tree) or blocks_of(tree, *tree.support) > BLOCKS_ALONG:
             return None
         return id(tree.tape.instruction_set), cells_grid(*tree.support).depth
 

@@ -32,6 +32,9 @@ MOST_BLOCKS_ALONG = 16384
 BLOCKS_PER_TEXEL = 16.0
 """Finest blocks per texel of a tape, if the box is flat or long: fewer hold too many primitives each."""
 
+BLOCKS_PER_LEAF = 5.0
+"""Finest blocks along a usual primitive with its influence; finer ones are about as full."""
+
 MAX_LAYERS = 16
 """Most layers of empty blocks that a ray skips at once."""
 
@@ -140,7 +143,7 @@ def tracing_cells(
     """
     box = within or tree.support
     if blocks is None:
-        blocks = blocks_along(tree.tape, *box)
+        blocks = blocks_of(tree, *box)
     lower, upper = (tuple(corner.tolist()) for corner in box)
     return _tracing_cells(tree.tape, lower, upper, known_device(device), blocks)
 
@@ -152,20 +155,32 @@ def device_cells(
     return tracing_cells(tree, device=device, within=within).on(known_device(device))
 
 
-def blocks_along(tape: Tape, lower: Float32Array, upper: Float32Array) -> int:
+def blocks_of(tree: ImplicitModel, lower: Float32Array, upper: Float32Array) -> int:
+    """Return the number of finest blocks along the longest side of a box of a model, see `blocks_along`."""
+    texels = len(tree.tape.data) - tree.tape.start
+    if blocks_along(texels, 0.0, lower, upper) == BLOCKS_ALONG:
+        return BLOCKS_ALONG  # whatever the sizes of its primitives are
+    return blocks_along(texels, tree._leaf_size, lower, upper)
+
+
+def blocks_along(texels: int, size: float, lower: Float32Array, upper: Float32Array) -> int:
     """Return the number of finest blocks along the longest side of a model's box.
 
-    A long tape in a flat or long box has more than `BLOCKS_ALONG`, with `MAX_BLOCKS` in all at most, and no
-    more than `WORD` along the shortest side.
+    `texels` is the length of its tape, `size` that of a usual primitive. A long tape of small primitives in a
+    flat or long box has more than `BLOCKS_ALONG`, with `MAX_BLOCKS` in all at most, and no more than `WORD`
+    along the shortest side.
     """
-    extent = (upper - lower).astype(np.float64) / float((upper - lower).max())
+    longest = float((upper - lower).max())
+    extent = (upper - lower).astype(np.float64) / longest
 
     def counts(blocks: int) -> Float64Array:
         sides: Float64Array = np.maximum(np.ceil(blocks * extent), 1.0)
         return sides
 
-    blocks, wanted = BLOCKS_ALONG, BLOCKS_PER_TEXEL * (len(tape.data) - tape.start)
-    while blocks < MOST_BLOCKS_ALONG and counts(blocks).prod() < wanted:
+    blocks = BLOCKS_ALONG
+    while blocks < MOST_BLOCKS_ALONG and counts(blocks).prod() < BLOCKS_PER_TEXEL * texels:
+        if blocks * size >= BLOCKS_PER_LEAF * longest:
+            break
         finer = counts(2 * blocks)
         if finer.prod() > MAX_BLOCKS or finer.min() > WORD:
             break

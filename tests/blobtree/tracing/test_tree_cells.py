@@ -2,7 +2,6 @@
 
 import gc
 import weakref
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -189,11 +188,18 @@ def test_visible_copies_have_as_long_tapes_in_a_large_grid_as_in_a_small_one() -
     assert max(lengths) < 1.5 * min(lengths)
 
 
+@pytest.mark.parametrize(("radius", "blocks"), [(0.02, 128), (0.15, BLOCKS_ALONG)])
+def test_primitives_that_overlap_widely_have_no_finer_blocks(radius: float, blocks: int) -> None:
+    """They would be as full."""
+    places = np.random.default_rng(0).uniform(-1.0, 1.0, (1000, 2)).tolist()
+    cells = tracing_cells(Sum(Point((x, y, 0), radius=radius) for x, y in places), device="cpu")
+    assert max(cells.counts) == blocks
+
+
 @pytest.mark.parametrize("sides", [(1.0, 1.0, 1.0), (1.0, 1.0, 0.4), (1.0, 0.5, 0.5), (1.0, 0.01, 0.001)])
 def test_no_box_has_more_blocks_than_a_level_or_a_word_holds(sides: tuple[float, float, float]) -> None:
-    tape = replace(CORNERS.tape, data=np.zeros((1 << 20, 4), np.float32))
     lower, upper = np.zeros(3, np.float32), np.array(sides, np.float32)
-    blocks = blocks_along(tape, lower, upper)
+    blocks = blocks_along(1 << 20, 1e-9, lower, upper)
     counts = block_counts(lower, upper, cells_grid(lower, upper, blocks).cell_size * BRANCHING)
     assert counts.prod() <= MAX_BLOCKS
     assert counts.min() <= WORD
