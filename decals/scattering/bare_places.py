@@ -110,7 +110,7 @@ def filling_points(
     """
     reaches = FILLED * usual
     nearest = NearestFacing(samples.positions, samples.normals)
-    centers = samples[_apart(samples, depths, FIRST_DISTANCE * reaches)]
+    centers = samples[spread_apart(samples, depths, FIRST_DISTANCE * reaches)]
     for turn in range(MAX_TURNS):
         check_cancelled("filling bare places")
         for _ in range(EVEN_ROUNDS if turn < MAX_TURNS - 1 else 0):
@@ -120,7 +120,7 @@ def filling_points(
         rows = np.flatnonzero(distances > reaches)
         if len(rows) == 0:
             break
-        more = rows[_apart(samples[rows], distances[rows], reaches[rows])]
+        more = rows[spread_apart(samples[rows], distances[rows], reaches[rows])]
         centers = OrientedPoints.joined([centers, samples[more]])
     distances, owners = nearest.of(centers.positions, centers.normals)
     farthest, sizes = np.zeros(len(centers)), np.zeros(len(centers))
@@ -134,8 +134,13 @@ def filling_points(
     return centers[kept], np.clip(farthest / FILLED, LEAST_RADIUS * sizes, LARGEST * sizes)[kept]
 
 
-def _apart(points: OrientedPoints, depths: Float64Array, distances: Float64Array) -> Int64Array:
-    """Return some of the points, the deepest first, none within its distance of another that faces it."""
+def spread_apart(
+    points: OrientedPoints, depths: Float64Array, distances: Float64Array, least_cosine: float = 0.0
+) -> Int64Array:
+    """Return some of the points, the deepest first, none within its distance of another that faces it.
+
+    Two points face each other if the cosine of their normals is above the least one.
+    """
     from scipy.spatial import cKDTree
 
     tree, chosen = cKDTree(points.positions), list[int]()
@@ -144,7 +149,7 @@ def _apart(points: OrientedPoints, depths: Float64Array, distances: Float64Array
         if free[row]:
             chosen.append(row)
             near = np.array(tree.query_ball_point(points.positions[row], distances[row]), np.int64)
-            free[near[points.normals[near] @ points.normals[row] > 0.0]] = False
+            free[near[points.normals[near] @ points.normals[row] > least_cosine]] = False
             free[row] = False
     return np.array(chosen, np.int64)
 

@@ -15,6 +15,9 @@ RULES: dict[Sizing, Rule] = {}
 RELOCATIONS: list[Callable[..., Any]] = []
 """Made of a domain and spacings; called at intervals, they move particles of a state and return which."""
 
+PLACEMENTS: list[Callable[..., Any]] = []
+"""Functions that move particles of a state to places that repulsion leaves bare, and return which."""
+
 SEPARATIONS: list[Callable[..., Any]] = []
 """Functions that part close pairs of a state after the last step."""
 
@@ -28,11 +31,13 @@ with if_present():
     from decals.scattering.covering import covering_decals
     from decals.scattering.deform import carried
     from decals.scattering.gap_filling import fill_gaps
+    from decals.scattering.narrow_places import reach_narrow_places
     from decals.scattering.polish import polish
     from decals.scattering.relocation import PartShares, Relocation
 
     RULES[Sizing.COVERING] = covering_decals
     RELOCATIONS += [Relocation, PartShares]
+    PLACEMENTS.append(reach_narrow_places)
     SEPARATIONS.append(polish)
     FILLINGS.append(fill_gaps)
     CARRIERS.append(carried)

@@ -171,6 +171,12 @@ class ParticleState:
         launch(scatter_rows, len(rows), inputs, [self.particles], device=self.device)
         self.end_epoch()
 
+    def hold(self, rows: Int64Array) -> None:
+        """Let some particles no longer move."""
+        self.movable = self.movable.copy()
+        self.movable[rows] = False
+        self.device_movable = wp.array(self.movable.astype(np.int32), dtype=wp.int32, device=self.device)
+
     def mirror_planes(self, points: Particles, surface_ids: Scalars, enabled: Scalars) -> MirrorPlanes:
         """Return the mirror planes of points on the surfaces of the given ids, where enabled (1).
 

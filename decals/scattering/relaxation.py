@@ -21,7 +21,7 @@ from decals.scattering.domain import (
     particle_count,
     remaining_counts,
 )
-from decals.scattering.extras import CARRIERS, FILLINGS, RELOCATIONS, SEPARATIONS
+from decals.scattering.extras import CARRIERS, FILLINGS, PLACEMENTS, RELOCATIONS, SEPARATIONS
 from decals.scattering.local_relaxation import relax_near
 from decals.scattering.neighbors import (
     CLOSE_DISTANCE,
@@ -40,6 +40,15 @@ from decals.validation import allowed_number, count_number, function_or_none, re
 
 RELOCATION_SCHEDULE = (0.1, 0.8, 0.05)
 """First and last part of the schedule at which crowded particles are relocated, and the interval."""
+
+PLACEMENT_SCHEDULE = (0.5, 0.7, 1.0)
+"""Parts of the schedule at which particles move to places that repulsion leaves bare.
+
+Particles leave such places between these times, hardly any after the last.
+"""
+
+STEPS_TO_REST = 40
+"""Least number of steps before that, in which particles come nearly to rest."""
 
 MIN_RELOCATION_INTERVAL = 6
 """Least number of steps between two relocations, in which relocated particles come to rest."""
@@ -100,7 +109,8 @@ class Relaxation:
     tangent planes and are projected back onto their own surfaces. Particles of different surfaces repel each
     other too; those on two sides of a wall do not, as their normals differ. Particles never lie or move
     inside another, closed surface. Each surface keeps its share of the count, by visible area and density. At
-    intervals crowded particles are relocated to gaps, and after the last step `polish` parts close pairs.
+    intervals crowded particles are relocated to gaps, some move to places that no particle faces, such as the
+    inner side of a rim, and after the last step `polish` parts close pairs.
 
     Parameters
     ----------
@@ -183,6 +193,8 @@ class Relaxation:
         first, last, interval = (int(part * self.iterations) for part in RELOCATION_SCHEDULE)
         self._relocation_steps = set(range(max(first, 1), last + 1, max(interval, MIN_RELOCATION_INTERVAL)))
         self._relocations = [make(self.domain, self.sizes_at) for make in RELOCATIONS]
+        placements = (int(part * self.iterations) for part in PLACEMENT_SCHEDULE)
+        self._placement_steps = {step for step in placements if step >= STEPS_TO_REST}
         self._anchors = _DensityAnchors(self.sizes_at)
         self._points: OrientedPoints | None = joined[order]
         self._state: ParticleState | None = None
@@ -333,6 +345,8 @@ class Relaxation:
             return
         if self.steps in self._relocation_steps:
             self._relocate()
+        if self.steps in self._placement_steps:
+            self._place()
         self._repel()
 
     def _relocate(self) -> None:
@@ -342,6 +356,14 @@ class Relaxation:
         state = self._device_state()
         for relocate in self._relocations:
             moved = relocate(state, self._restore_density)
+            if len(moved):
+                self._anchors.set(state, moved)
+
+    def _place(self) -> None:
+        """Move crowded particles to places that repulsion leaves bare."""
+        state = self._device_state()
+        for place in PLACEMENTS:
+            moved = place(state)
             if len(moved):
                 self._anchors.set(state, moved)
 
