@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import cdist
 
 from blobtree import Point
 from blobtree._typing import Float32Array, Float64Array
@@ -36,9 +37,9 @@ def rimmed(bend: float, depth: float) -> MeshSurface:
 def farthest(relaxation: Relaxation) -> Float64Array:
     """Return the distance of samples from the nearest facing particle, in spacings, by brute force."""
     domain = relaxation.domain
-    samples = domain.sample(apportion(domain.masses, 20_000), stream=5)
+    samples = domain.sample(apportion(domain.masses, 8_000), stream=5)
     positions = relaxation.positions.astype(np.float64)
-    distances = np.linalg.norm(samples.positions[:, None] - positions, axis=2)
+    distances = cdist(samples.positions, positions)
     facing = samples.normals @ relaxation.normals.T > FACING_LIMIT
     gaps: Float64Array = np.where(facing, distances, np.inf).min(axis=1) / relaxation.spacing
     return gaps
@@ -54,7 +55,7 @@ def unreached(seed: int) -> int:
 
 
 def test_rims_get_particles(monkeypatch: pytest.MonkeyPatch) -> None:
-    seeds = range(3)
+    seeds = range(2)
     reached = sum(unreached(seed) for seed in seeds)
     monkeypatch.setattr("decals.scattering.relaxation.PLACEMENTS", [])
     assert reached < 0.3 * sum(unreached(seed) for seed in seeds)
