@@ -180,6 +180,7 @@ def _choose_images(points: Float32Array) -> Int32Array:
 
 
 def _eyes(body: TreeObject) -> Decals:
+    """Return the two eyes of the creature."""
     positions, normals = body.surface.project(_EYES)
     return Decals(
         positions=positions,

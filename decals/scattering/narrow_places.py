@@ -6,22 +6,23 @@ from blobtree._typing import Float64Array, Int64Array
 from decals.model import FACING_LIMIT
 from decals.scattering.bare_places import spread_apart
 from decals.scattering.domain import OrientedPoints, apportion
-from decals.scattering.neighbors import NeighborQuery, local_maxima
+from decals.scattering.gap_filling import EVEN
+from decals.scattering.neighbors import NeighborQuery
 from decals.scattering.particle_state import ParticleState
-from decals.scattering.relocation import MIN_SEPARATION
+from decals.scattering.relocation import most_crowded
 
 FIRST_SAMPLES, SAMPLES = 16, 64
-"""Points for each particle, at which narrow places are looked for first, and once there are any."""
+"""Samples for each particle: in the first search for narrow places, and in a second one if that finds any."""
 
 MOST_FIRST_SAMPLES, MOST_SAMPLES = 100_000, 200_000
-"""Largest numbers of these points."""
+"""Largest numbers of these samples."""
 
 UNREACHED = 1.0
 """Distance from all facing particles, in spacings, beyond which a sample lies in a narrow place. In a
 hexagonal tiling no point is farther than 0.577."""
 
 NARROW = 1.8
-"""The same for at least one of the samples: particles do not move for smaller gaps."""
+"""Distance, in spacings, beyond which at least one sample must lie: smaller gaps move no particle."""
 
 APART = 0.9
 """Least distance of particles that move to narrow places, in spacings."""
@@ -31,9 +32,6 @@ REACH = 2.0
 
 MAX_SHARE = 0.12
 """Largest share of the particles that move to narrow places."""
-
-EVEN = 1.1
-"""Largest ratio of spacings at which the density counts as even."""
 
 _SAMPLE_STREAM = 1002
 
@@ -60,7 +58,7 @@ def reach_narrow_places(state: ParticleState) -> Int64Array:
         return np.zeros(0, np.int64)
     distances = np.full(len(samples), APART * state.spacing)
     targets = samples[spread_apart(samples, gaps, distances, FACING_LIMIT)]
-    movers = _crowded(state)
+    movers = most_crowded(state, np.flatnonzero(state.movable), int(MAX_SHARE * state.count))
     rows, chosen = [], []
     for surface in np.unique(targets.surface_ids):
         own_movers = movers[state.surface_ids[movers] == surface]
@@ -81,13 +79,3 @@ def _unreached(state: ParticleState, count: int) -> tuple[OrientedPoints, Float6
     gaps = NeighborQuery(state, REACH).owners(samples.positions, samples.normals)[0]
     rows = np.flatnonzero(gaps > UNREACHED)
     return samples[rows], gaps[rows].astype(np.float64)
-
-
-def _crowded(state: ParticleState) -> Int64Array:
-    """Return particles that may move, the most crowded first; of neighbours only one."""
-    rows = np.flatnonzero(state.movable)
-    rows = rows[np.argsort(-state.energies[rows], kind="stable")]
-    separations = MIN_SEPARATION * state.host_sizes[rows]
-    points = state.positions.numpy()[rows]
-    maxima = local_maxima(points, state.energies[rows], separations, device=state.device)
-    return rows[maxima][: int(MAX_SHARE * state.count)]

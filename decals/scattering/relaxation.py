@@ -44,11 +44,11 @@ RELOCATION_SCHEDULE = (0.1, 0.8, 0.05)
 PLACEMENT_SCHEDULE = (0.5, 0.7, 1.0)
 """Parts of the schedule at which particles move to places that repulsion leaves bare.
 
-Particles leave such places between these times, hardly any after the last.
+Some particles leave such places between two of these times; hardly any do after the last one.
 """
 
 STEPS_TO_REST = 40
-"""Least number of steps before that, in which particles come nearly to rest."""
+"""Least number of steps before such a move: particles come nearly to rest in them."""
 
 MIN_RELOCATION_INTERVAL = 6
 """Least number of steps between two relocations, in which relocated particles come to rest."""

@@ -116,11 +116,17 @@ def crowded_particles(state: ParticleState) -> Int64Array:
     rows = np.flatnonzero(state.movable & (energies > MIN_ENERGY_RATIO * np.median(energies)))
     if len(rows) == 0:
         return rows
+    return most_crowded(state, rows, max_count)
+
+
+def most_crowded(state: ParticleState, rows: Int64Array, most: int) -> Int64Array:
+    """Return at most so many of some particles, the most crowded first; of neighbours only one."""
+    energies = state.energies
     rows = rows[np.argsort(-energies[rows], kind="stable")]
     points = state.positions.numpy()[rows]
     separations = MIN_SEPARATION * state.host_sizes[rows]
     maxima = local_maxima(points, energies[rows], separations, device=state.device)
-    return rows[maxima][:max_count]
+    return rows[maxima][:most]
 
 
 def relocate(
