@@ -20,6 +20,7 @@ from decals.apps.lab.formulas import Formula, parse
 from decals.apps.lab.measures import MEASURES
 from decals.errors import ImplicitDecalsError
 from decals.field.mapping import ImageMapping
+from decals.input_files import read_text
 from decals.model import Interaction
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 from decals.scenes.files import load_scene
@@ -277,7 +278,7 @@ def _order(path: Path) -> list[str | int]:
 def load_lesson(path: Path) -> Lesson:
     """Return the lesson of a file; see `load_lessons`."""
     try:
-        return _parsed(path.read_text(encoding="utf-8"), path)
+        return _parsed(read_text(path), path)
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidLesson(f"could not read the lesson {str(path)!r} ({error})") from error
     except ImplicitDecalsError as error:

@@ -10,6 +10,7 @@ from msgspec import Struct
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.lesson import PLACEHOLDER
 from decals.apps.lab.symbols import DEFINITIONS
+from decals.input_files import read_text
 
 LANGUAGES = Path(__file__).parent / "languages"
 """The folder of the languages that are installed, but for English, in which lessons are written."""
@@ -122,7 +123,7 @@ def translation(code: str, folder: Path = LANGUAGES) -> Translation:
         raise InvalidLesson(f"language: expected one of {', '.join(known)}, got {code!r}")
     path = folder / f"{code}.toml"
     try:
-        loaded = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), type=_File)
+        loaded = msgspec.convert(tomllib.loads(read_text(path)), type=_File)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
         raise InvalidLesson(f"{str(path)!r}: {error}; correct the TOML") from error
     if missing := sorted(set(PAGE_TEXTS) ^ set(loaded.page)):

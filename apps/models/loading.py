@@ -10,12 +10,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from blobtree.files import is_file
 from decals import ImplicitDecalsError, Scene
 from decals import load_model as load_file
 from decals.apps.models.samples import SAMPLES, sample, sample_mesh
 from decals.apps.models.tables import with_table
 from decals.errors import InvalidInput
+from decals.input_files import no_file
 from decals.scenes.objects import MeshObject, SceneObject, as_crease_angle, as_objects
 
 
@@ -42,11 +42,11 @@ def load_model(
         return _creased(loaded, angle)
     if model in SAMPLES:
         return sample(model)
-    if not is_file(Path(model)):
+    if reason := no_file(model):
         raise InvalidInput(
             "expected a mesh file, a BlobTree or scene in JSON, a program (.vm, .frep), or a sample "
             f"({', '.join(SAMPLES)}); "
-            f"found no file {model!r}"
+            f"{reason}"
         )
     try:
         return load_file(model, samples=sample_mesh, trust=trust)
@@ -111,10 +111,8 @@ def import_definitions(modules: Sequence[str] | None) -> None:
 def import_module_or_file(option: str, module: str) -> ModuleType:
     """Import the module that an option names: a Python file, or a dotted name; errors are those above."""
     path = Path(module)
-    if path.suffix == ".py" and not is_file(path):
-        raise InvalidInput(
-            f"{option}: expected a Python file or the name of a module, found no file {module!r}"
-        )
+    if path.suffix == ".py" and (reason := no_file(module)):
+        raise InvalidInput(f"{option}: expected a Python file or the name of a module, {reason}")
     try:
         return _import(module)
     except (Exception, SystemExit) as error:

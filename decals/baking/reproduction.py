@@ -12,6 +12,7 @@ from typing import Any
 from blobtree.progress import Progress
 from decals.baking.export import EXPORT_FUNCTION, export
 from decals.errors import ImplicitDecalsError, InvalidInput
+from decals.input_files import read_file
 from decals.scenes.files import from_json
 from decals.scenes.provenance import changes_since, device_text, package_versions, provenance
 from decals.scenes.records import SampleLoader
@@ -53,7 +54,11 @@ def reproduce_export(
     InvalidInput
         The file cannot be read.
     """
-    before = _Content.of(path.read_bytes(), path)
+    try:
+        content = read_file(path)
+    except OSError as error:
+        raise InvalidInput(f"could not read {str(path)!r} ({error.strerror}); check the path") from error
+    before = _Content.of(content, path)
     recipe = before.extras.get("export")
     if not isinstance(recipe, Mapping) or recipe.get("function") != EXPORT_FUNCTION:
         return Reproduction((NO_RECIPE,))

@@ -22,6 +22,7 @@ from blobtree.file_lock import FileLock
 from blobtree.files import PREFIX, replacing, write_atomically
 from decals.errors import InvalidInput
 from decals.experiments.outcome import Row
+from decals.input_files import read_file
 
 FORMAT = 1
 """Format of the folder; a higher one belongs to a newer version."""
@@ -50,7 +51,7 @@ def described(folder: Path) -> dict[str, Any]:
         The folder holds no experiment, or one of a newer version.
     """
     try:
-        about: dict[str, Any] = json.loads((folder / EXPERIMENT).read_text(encoding="utf-8"))
+        about: dict[str, Any] = json.loads(read_file(folder / EXPERIMENT))
         newer = about["format"] > FORMAT
         if not newer:
             about = msgspec.to_builtins(msgspec.convert(about, _About))
@@ -58,6 +59,8 @@ def described(folder: Path) -> dict[str, Any]:
         raise InvalidInput(
             f"{folder}: expected the folder of an experiment, but it has no {EXPERIMENT}"
         ) from None
+    except OSError as error:
+        raise UnusableFile.of(error, folder / EXPERIMENT, "read") from error
     except (ValueError, KeyError, TypeError) as error:  # errors of msgspec are ValueError
         raise InvalidInput(f"{folder / EXPERIMENT}: damaged ({error}); choose another folder") from error
     if newer:

@@ -22,6 +22,7 @@ from decals.errors import InvalidImage
 from decals.images.builtin import BUILTIN_IMAGES, generate_image, is_builtin
 from decals.images.extras import DECODERS
 from decals.images.texels import MAX_IMAGE_EDGE, Pixels, check_size
+from decals.input_files import no_file
 from decals.validation import MAX_LIGHT, require_rgba
 
 PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM", "TGA", "JPEG2000", "AVIF")
@@ -310,8 +311,8 @@ def read_image(path: Path, *, advice: str = _ADVICE) -> Pixels:
     >>> read_image(Path("grey.png"))[0, 0].tolist()
     [128, 128, 128, 255]
     """
-    if not is_file(path):
-        raise InvalidImage(f"expected an image, found no file {str(path)!r}; {advice}")
+    if reason := no_file(path):
+        raise InvalidImage(f"expected an image, {reason}; {advice}")
     try:
         with path.open("rb") as file:
             start = file.read(PNG_DEPTH + 1)

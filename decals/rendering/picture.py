@@ -17,6 +17,7 @@ from blobtree._typing import Float32Array, Int32Array, UInt8Array
 from blobtree.errors import UnusableFile
 from blobtree.files import write_atomically
 from decals.errors import InvalidScene
+from decals.input_files import read_file
 from decals.rendering.options import STUDIO, Size
 from decals.rendering.targets import Targets
 from decals.rendering.viewpoint import Tile
@@ -134,7 +135,7 @@ def picture_recipe(path: Path) -> dict[str, Any] | None:
         It is no PNG file.
     """
     try:
-        with Image.open(path, formats=["PNG"]) as image:
+        with Image.open(BytesIO(read_file(path)), formats=["PNG"]) as image:
             image.load()  # texts may stand behind the pixels
             recipe = json.loads(image.info.get(RECIPE_KEY, "null"))
     except UnidentifiedImageError:

@@ -17,6 +17,7 @@ from blobtree.nodes.paths import Path, node_in_world
 from blobtree.nodes.surgery import without_branches
 from blobtree.validation import describe
 from decals.errors import InvalidImage, InvalidScattering
+from decals.input_files import no_file
 from decals.scattering.appearance import Appearance
 from decals.scattering.covering import random_points_around
 from decals.scattering.density import PaintedImage, grey_values, region_mask
@@ -537,7 +538,10 @@ def _named_region(wanted: str, name: str, hosts: Sequence[Host], named: Sequence
     parts = [(index, region()) for index, known, region in named if known == wanted]
     if not parts:
         names = ", ".join(sorted({repr(known) for _, known, _ in named})[:12]) or "none"
-        raise InvalidScattering(f"{name}: expected a name of the models, which have {names}; got {wanted!r}")
+        hint = ", which is no file either" if "." in wanted and no_file(wanted) else ""
+        raise InvalidScattering(
+            f"{name}: expected a name of the models, which have {names}; got {wanted!r}{hint}"
+        )
     return _on_hosts(parts, hosts)
 
 

@@ -43,6 +43,7 @@ from blobtree.validation import truth
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.images.builtin import is_builtin
 from decals.images.load import embedded_image, is_embedded, load_image
+from decals.input_files import read_file
 from decals.model import Decals
 from decals.scenes.camera import Camera, Fit, Vector
 from decals.scenes.drawing_record import DrawingRecord, drawing_of_record, drawing_record
@@ -197,7 +198,7 @@ def load_scene(
     """
     path = as_path(path)
     try:
-        text = path.read_bytes()
+        text = read_file(path)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "no file can have this name"
         raise InvalidScene(f"could not read the scene {str(path)!r} ({reason}); check the path") from error
@@ -411,6 +412,6 @@ def is_scene_file(path: Path) -> bool:
     if path.suffix.lower() != ".json" or not is_file(path):
         return False
     try:
-        return is_scene(path.read_bytes())
+        return is_scene(read_file(path))
     except OSError:  # reported by the function that reads the model
         return False

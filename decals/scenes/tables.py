@@ -21,10 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree._typing import Float64Array
-from blobtree.files import is_file, replacing, write_atomically
+from blobtree.files import replacing, write_atomically
 from blobtree.validation import describe, finite_vector, items, truth
 from decals.errors import InvalidDecals, InvalidInput
 from decals.images.load import AnyImage
+from decals.input_files import no_file, read_file
 from decals.model import Decals, Interaction
 from decals.receivers import TEXT
 from decals.scenes.files import image_record, images_of
@@ -315,8 +316,8 @@ def load_table(path: str | os.PathLike[str], *, origin: Origin = WORLD, trust: b
     """
     source, shifts = as_path(path, InvalidDecals), finite_vector("origin", origin, InvalidDecals)
     trust = truth("trust", trust, InvalidDecals)
-    if not is_file(source):
-        raise InvalidDecals(f"{str(path)!r}: expected a table of decals, found no such file")
+    if reason := no_file(source):
+        raise InvalidDecals(f"expected a table of decals, {reason}; check the path")
     if source.suffix.lower() == ".parquet":
         return _loaded(source, _arrays_of(read_parquet(source)), lambda row: f"row {row + 1}", trust)
     columns, lines = _csv_columns(source)
@@ -490,7 +491,7 @@ def _shifted(texts: NDArray[Any], shift: float) -> NDArray[Any]:
 def _csv_columns(path: Path) -> tuple[dict[str, NDArray[Any]], list[int]]:
     """Return the columns of a text file as texts, and the lines on which rows end."""
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        text = read_file(path).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidDecals(f"{str(path)!r}: expected a table in UTF-8 ({error}); save it as such") from error
     header = text.partition("\n")[0].strip()

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 import blobtree
 from blobtree import Mesh, Node
-from blobtree.files import is_file
 from blobtree.validation import describe, point_array
 from decals.errors import ImplicitDecalsError, InvalidMesh
+from decals.input_files import no_file
 from decals.model import MAX_COORDINATE
 from decals.surfaces.base_color import BaseColor, checked_color, linear_colors
 from decals.surfaces.extras import READERS
@@ -96,8 +96,8 @@ def as_shape(
     if isinstance(model, Node):
         return model
     if isinstance(model, str | os.PathLike):
-        if not is_file(Path(model)):
-            raise error(f"{name}: expected a model, found no file {os.fspath(model)!r}; check the path")
+        if reason := no_file(model):
+            raise error(f"{name}: expected a model, {reason}; check the path")
         return read_shape(model)
     if _is_dataset(model):
         data: MeshData = READERS["dataset"](model, name=name)

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blobtree._typing import Float64Array, Int64Array
-from blobtree.files import is_file
 from blobtree.validation import describe
 from decals.child_process import can_isolate
 from decals.errors import InvalidMesh
+from decals.input_files import no_file, read_file
 from decals.surfaces.base_color import checked_color
 from decals.surfaces.dataset_colors import dataset_color, has_colors
 from decals.surfaces.files.content import encoding_of, without_mark
@@ -168,8 +168,8 @@ def read_mesh_data(path: str | PathLike[str]) -> MeshData:
 def _existing(path: str | PathLike[str]) -> Path:
     """Return the path of a file; raise `InvalidMesh` where no file is."""
     path = as_path(path, InvalidMesh)
-    if not is_file(path):
-        raise InvalidMesh(f"expected a mesh file, found none at {str(path)!r}; check the path")
+    if reason := no_file(path):
+        raise InvalidMesh(f"expected a mesh file, {reason}; check the path")
     return path
 
 
@@ -303,7 +303,7 @@ def _check_mark(path: Path) -> None:
 
 def _check_pieces(path: Path) -> None:
     """Refuse a structured grid whose pieces leave points out: VTK gives those what its memory holds."""
-    head = path.read_bytes().partition(b"<AppendedData")[0]
+    head = read_file(path).partition(b"<AppendedData")[0]
     whole, pieces = _boxes(head, b"StructuredGrid", b"WholeExtent"), _boxes(head, b"Piece", b"Extent")
     if len(whole) != 1:
         raise InvalidMesh(f"expected one whole extent of six integers in {str(path)!r}; export it again")
@@ -341,7 +341,7 @@ def _read_legacy(path: Path) -> "pv.DataSet | pv.MultiBlock":
     """
     import pyvista as pv
 
-    content = without_mark(path.read_bytes()) + b"\n"
+    content = without_mark(read_file(path)) + b"\n"
     reader: Any = pv.get_reader(path)  # type: ignore[no-untyped-call]
     reader.reader.SetBinaryInputString(content, len(content))
     reader.reader.ReadFromInputStringOn()

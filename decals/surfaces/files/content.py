@@ -11,6 +11,7 @@ import numpy as np
 
 from blobtree._typing import Float64Array, Int64Array
 from decals.errors import InvalidMesh
+from decals.input_files import read_file
 
 T = TypeVar("T")
 
@@ -49,7 +50,7 @@ class Line(NamedTuple):
 def file_bytes(path: Path) -> bytes:
     """Return the content of a file; InvalidMesh if the system refuses it."""
     try:
-        return path.read_bytes()
+        return read_file(path)
     except OSError as error:
         raise InvalidMesh(
             f"could not read {str(path)!r} ({error.strerror}); check its permissions"

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+from decals.input_files import read_file
 from decals.surfaces.files.faults import Notes, reading
 from decals.surfaces.files.gltf_accessors import Accessors
 from decals.surfaces.files.gltf_buffers import Buffers
@@ -35,7 +36,7 @@ def gltf_objects(path: Path) -> dict[str, MeshData]:
 def _nodes(path: Path) -> list[tuple[str, list[Piece]]]:
     """Return the pieces of each node of the default scene that has a mesh."""
     with reading(path, "glTF") as notes:
-        content = path.read_bytes()
+        content = read_file(path)
         budget = Budget()
         budget.grow(len(content))
         document, binary = parse(content, notes)

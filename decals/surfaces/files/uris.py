@@ -5,6 +5,7 @@ import re
 from pathlib import Path, PureWindowsPath
 from urllib.parse import unquote, unquote_to_bytes
 
+from decals.input_files import read_file
 from decals.surfaces.files.faults import Unreadable
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")  # two letters or more, for one is a drive of Windows
@@ -55,6 +56,6 @@ def _inside(folder: Path, path: str, name: str) -> Path | None:
 
 def _file(path: Path, name: str) -> bytes:
     try:
-        return path.read_bytes()
+        return read_file(path)
     except OSError as error:
         raise Unreadable(f"{name}, {path.name!r}: {error.strerror}", "check its permissions") from error

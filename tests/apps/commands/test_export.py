@@ -105,7 +105,7 @@ def test_check_prints_a_table_for_written_objects_and_for_files(saved: Path, cap
         (["scene.json", "-o", "a.fbx"], "expected an output file that ends in .glb"),
         (["scene.json", "-o", "nowhere/a.ply"], "'nowhere' does not exist"),
         (["nothing.json", "-o", "a.ply"], "found no file 'nothing.json'"),
-        (["--check", "nothing.ply"], "found none at 'nothing.ply'"),
+        (["--check", "nothing.ply"], "found no file 'nothing.ply'"),
         (["scene.json", "-o", "a.stl", "--attribute", "owner"], "attributes: expected none for 'a.stl'"),
         (["scene.json", "-o", "a.ply", "--samples", "99"], "--samples: expected"),
     ],

@@ -15,7 +15,7 @@ from decals.errors import NoGraphics
     [
         (["render", "nowhere.ply", "-o", "a.png"], "nowhere.ply"),
         (["render", "nowhere", "-o", "a.png"], "creature, dragon, horse, knot, spheres"),
-        (["render", ".", "-o", "a.png"], "found no file"),
+        (["render", ".", "-o", "a.png"], "'.' is a folder"),
         (["render", "ball.ply"], "render: missing -o FILE"),
         (["render", "--decals", "5", "-o", "a.png"], "render: missing MODEL"),
         (["render", "ball.ply", "-o"], "missing a value after -o"),

@@ -72,7 +72,7 @@ def test_commands_take_the_written_table(suffix: str, folder: Path, capsys: Capt
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--table", "none.csv"], "'none.csv': expected a table of decals, found no such file"),
+        (["--table", "none.csv"], "expected a table of decals, found no file 'none.csv'"),
         (["--table", "bad.csv"], "'bad.csv': line 2, column 'radius': expected a finite number, got 'nan'"),
         (["--table", "good.csv", "--decals", "5"], "a saved scene or table has its own decals"),
         (["--table", "good.csv", "--image", "eye"], "--table: decals refer to 3 images, got 1"),

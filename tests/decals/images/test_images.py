@@ -365,7 +365,7 @@ def test_messages_say_an_before_a_vowel() -> None:
 
 
 def test_a_folder_is_no_image(tmp_path: Path) -> None:
-    with pytest.raises(InvalidImage, match="found no file"):
+    with pytest.raises(InvalidImage, match="is a folder"):
         read_image(tmp_path)
 
 

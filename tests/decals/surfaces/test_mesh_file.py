@@ -290,7 +290,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["a" * 5000 + ".ply", "a\0b.ply"])
 def test_a_path_that_no_file_can_have(name: str) -> None:
-    with pytest.raises(InvalidMesh, match="found none"):
+    with pytest.raises(InvalidMesh, match="found no file"):
         read_mesh(name)
 
 
