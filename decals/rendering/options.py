@@ -26,7 +26,7 @@ from decals.validation import count_number, instance, whole_number
 Size: TypeAlias = tuple[int, int]
 """Width and height."""
 
-MAX_PICTURE_SIDE = 1 << 20
+MAX_PICTURE_SIDE = 16384
 """Pixels along each side of a picture, at most."""
 
 MAX_SAMPLES = 1024

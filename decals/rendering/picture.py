@@ -16,7 +16,7 @@ from PIL.PngImagePlugin import PngInfo
 from blobtree._typing import Float32Array, Int32Array, UInt8Array
 from blobtree.errors import UnusableFile
 from blobtree.files import write_atomically
-from decals.errors import InvalidScene
+from decals.errors import InvalidScene, TooMuchData
 from decals.input_files import read_file
 from decals.rendering.options import STUDIO, Size
 from decals.rendering.targets import Targets
@@ -198,7 +198,13 @@ class TiledArray:
     """An array ``[h, w, channels]`` that is filled tile by tile; tiles count its rows from below."""
 
     def __init__(self, size: Size, channels: int, dtype: type[np.generic]) -> None:
-        self.array: NDArray[Any] = np.zeros((size[1], size[0], channels), dtype)
+        try:
+            self.array: NDArray[Any] = np.zeros((size[1], size[0], channels), dtype)
+        except MemoryError:
+            raise TooMuchData(
+                f"size: expected a picture that fits in memory, got {size[0]} x {size[1]} pixels; "
+                "make it smaller"
+            ) from None
 
     def insert(self, block: NDArray[Any], tile: Tile, samples: int = 1) -> None:
         """Copy a tile's pixels, its lowest row first, into the array."""

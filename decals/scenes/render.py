@@ -74,7 +74,7 @@ def render(
         A scene; or a model as `decals.cover` takes it, a list of such models, or the path of a model or a
         scene.
     size : (int, int)
-        Width and height in pixels.
+        Width and height in pixels, each at most 16384.
     samples : int, optional
         Samples along each axis of a pixel; 2 means 4 samples a pixel.
     contact : Contact or str, optional
@@ -108,7 +108,7 @@ def render(
     NoGraphics
         If there is no OpenGL; the message says what to install.
     TooMuchData
-        If the scene does not fit on the GPU.
+        If the scene does not fit on the GPU, or the picture in memory.
 
     See Also
     --------

@@ -5,9 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+import blobtree
+import decals
 from decals import Camera, Contact, ImageMapping
-from decals.errors import ImplicitDecalsError, InvalidPoints, InvalidScene
+from decals.errors import ImplicitDecalsError, InvalidPoints, InvalidScene, TooMuchData
 from decals.rendering import TRANSPARENT, Background, Drawing, Light, Lighting, Renderer, RenderOptions
+from decals.rendering.picture import TiledArray
 from tests.decals.editing.scenes import one, scene
 
 SIZE = (16, 12)
@@ -130,3 +133,19 @@ def test_a_background_has_a_name(renderer: Renderer) -> None:
         Drawing(background="no colour")
     with pytest.raises(InvalidScene, match="background: expected"):
         Drawing(background=5)  # type: ignore[arg-type]
+
+
+def test_a_picture_has_at_most_16384_pixels_a_side(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert RenderOptions(size=(16384, 1)).size == (16384, 1)
+    for size in ((100_000, 100_000), (16385, 1)):
+        with pytest.raises(
+            InvalidScene, match=f"size: expected a whole number from 1 to 16384, got {size[0]}"
+        ):
+            decals.render(blobtree.Point((0, 0, 0), radius=1), size=size)
+
+    def full(*_: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setattr(np, "zeros", full)
+    with pytest.raises(TooMuchData, match="fits in memory, got 16384 x 9000 pixels; make it smaller"):
+        TiledArray((16384, 9000), 4, np.uint8)
