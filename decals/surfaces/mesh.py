@@ -1,5 +1,6 @@
 """`MeshSurface`: a triangle mesh, on the host and on devices, and its edges."""
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -38,6 +39,17 @@ MIN_FACE_QUALITY = 1e-6
 Warp's mesh queries skip the same faces.
 """
 
+SQUARED_AREAS = 2.0**-126, 2.0**127
+"""Range of the square of a face's doubled area: Warp's queries divide by it, in float32."""
+
+MAX_ODD_AREA = 0.01
+"""Share of the area in faces outside of that range above which a mesh is refused."""
+
+REPORTED_AREA = 1e-4
+"""Share of the area in faces that are left out from which on the log says so."""
+
+_logger = logging.getLogger(__name__)
+
 MAX_SAMPLES = 1 << 30
 """Most points that `sample` returns."""
 
@@ -52,6 +64,7 @@ class MeshSurface(Value):
     """Triangle mesh as a `Surface`, with a bounding volume hierarchy for all queries.
 
     Degenerate faces and copies of other faces are allowed, but get no samples and no projected points. Faces
+    that are thinner than a millionth of their length are degenerate; the log says so if they have area. Faces
     that wind differently from their neighbours are turned, and the log says so. Closed parts that wind inward
     are turned too, with the parts inside them. A mesh contains points only if it is closed: with equal
     vertices welded, every edge is used equally often in both directions.
@@ -71,7 +84,8 @@ class MeshSurface(Value):
     Raises
     ------
     InvalidMesh
-        Wrong shapes; NaN, infinite or huge vertices; indices out of range; no faces or no area.
+        Wrong shapes; NaN, infinite or huge vertices; indices out of range; no faces or no area; areas of
+        triangles that are too small or too large for float32, as in a model of 1e-9 units (but with "keep").
     InvalidDevice
         Warp has no such device.
 
@@ -110,6 +124,9 @@ class MeshSurface(Value):
         turned = np.flatnonzero(windings.turned)
         self.faces[turned] = self.faces[turned][:, ::-1]
         triangles = triangles.turned(turned)
+        if rule is not MeshOrientation.KEEP:  # of a tree, whose own queries correct those of the mesh
+            _require_scale(triangles)
+            _report_thin(triangles)
         self._take_sound(_sound_faces(triangles, windings.copies), triangles)
         self._one_sided = windings.one_sided[self.sound]
 
@@ -382,12 +399,42 @@ def have_area(triangles: Triangles) -> BoolArray:
 
 def _sound_faces(triangles: Triangles, copies: BoolArray) -> Int64Array:
     """Return the rows of the faces that have a normal and are no copies."""
-    sound = have_area(triangles) & ~copies
-    if not sound.any():
+    usable = have_area(triangles)
+    if usable.any():
+        return np.flatnonzero(usable & ~copies)
+    if triangles.doubled_areas.any():
         raise InvalidMesh(
-            f"expected a mesh with area, got {len(copies)} degenerate faces; check its units and its indices"
+            "expected a mesh of triangles that are wider than a millionth of their length, got "
+            f"{len(copies)} thinner ones; divide them along their length, or check the indices"
         )
-    return np.flatnonzero(sound)
+    raise InvalidMesh(
+        f"expected a mesh with area, got {len(copies)} triangles without any; check its units and its indices"
+    )
+
+
+def _require_scale(triangles: Triangles) -> None:
+    """Raise `InvalidMesh` if triangles with much of the area are too small or too large for the queries."""
+    doubled, (low, high) = triangles.doubled_areas, SQUARED_AREAS
+    odd = have_area(triangles) & ((doubled * doubled < low) | (doubled * doubled > high))
+    if doubled[odd].sum() > MAX_ODD_AREA * doubled.sum():
+        raise InvalidMesh(
+            f"expected triangles of an area from {0.5 * low**0.5:.0e} to {0.5 * high**0.5:.0e}, got "
+            f"{odd.sum()} others of {len(odd)}; rescale the model"
+        )
+
+
+def _report_thin(triangles: Triangles) -> None:
+    """Log that faces without a usable normal are left out, if they have area worth mentioning."""
+    thin, doubled = ~have_area(triangles), triangles.doubled_areas
+    share = float(doubled[thin].sum() / max(doubled.sum(), np.finfo(np.float64).tiny))
+    if REPORTED_AREA < share < 1.0:
+        _logger.warning(
+            "Left out %d of %d triangles that are thinner than a millionth of their length, %.2g %% of the "
+            "area; divide them along their length",
+            (doubled[thin] > 0.0).sum(),
+            len(thin),
+            100.0 * share,
+        )
 
 
 def _is_closed(vertices: Float32Array, faces: Int32Array) -> bool:

@@ -194,3 +194,44 @@ def test_parts_of_large_faces_get_their_share_and_neighbours_are_chance(seed: in
     np.fill_diagonal(distances, np.inf)
     nearest = distances.min(axis=1)
     assert nearest.std() / nearest.mean() > 0.35
+
+
+@pytest.mark.parametrize("unit", [1e-46, 1e-30, 3e-11, 1e-9, 1e12])
+def test_a_mesh_whose_triangles_float32_cannot_compute_is_refused(unit: float) -> None:
+    """The queries divide by the squares of areas: beyond this range they return corners of triangles."""
+    ball = sphere()
+    with pytest.raises(InvalidMesh, match=r"rescale the model$|check its units"):
+        MeshSurface(ball.vertices.astype(np.float64) * unit, ball.faces)
+
+
+@pytest.mark.parametrize("unit", [1e-7, 1e-3, 1e3, 1e10])
+def test_queries_of_a_mesh_in_any_accepted_unit_are_exact(unit: float) -> None:
+    ball = sphere()
+    surface = MeshSurface(ball.vertices.astype(np.float64) * unit, ball.faces)
+    centers = surface.vertices[surface.faces].astype(np.float64).mean(axis=1)
+    found = surface.project(centers)[0]
+    assert np.linalg.norm(found - centers, axis=1).max() < 1e-6 * unit
+
+
+def test_a_few_tiny_triangles_are_accepted() -> None:
+    ball = sphere()
+    n = len(ball.vertices)
+    corner = np.array([[0, 0, 3], [1e-12, 0, 3], [0, 1e-12, 3]])
+    surface = MeshSurface(np.vstack([ball.vertices, corner]), np.vstack([ball.faces, [[n, n + 1, n + 2]]]))
+    assert surface.area == pytest.approx(ball.area)
+
+
+def test_the_log_names_thin_triangles_with_area(caplog: pytest.LogCaptureFixture) -> None:
+    strip = [[0, 0, 0], [1000, 0, 0], [1000, 1e-3, 0], [0, 1e-3, 0]]
+    vertices = [*strip, [0, 0, 5], [0.5, 0, 5], [0, 0.5, 5]]
+    surface = MeshSurface(vertices, [[0, 1, 2], [0, 2, 3], [4, 5, 6]])
+    assert surface.area == pytest.approx(0.125)
+    (said,) = caplog.messages
+    assert said.startswith(
+        "Left out 2 of 3 triangles that are thinner than a millionth of their length, 89 %"
+    )
+    with pytest.raises(InvalidMesh, match="wider than a millionth of their length, got 2 thinner ones"):
+        MeshSurface(strip, [[0, 1, 2], [0, 2, 3]])
+    caplog.clear()
+    MeshSurface(vertices, [[0, 0, 1], [4, 5, 6]])
+    assert caplog.messages == []
