@@ -210,6 +210,8 @@ def is_unicode(text: str) -> bool:
 
 def as_path(path: object, error: type[ImplicitDecalsError] = InvalidScene) -> Path:
     """Return the path of a file; raise an error for values of other types."""
+    if path == "":
+        raise error("path: expected the path of a file, got an empty text")
     try:
         return Path(cast("str | os.PathLike[str]", path))
     except TypeError:
@@ -219,7 +221,7 @@ def as_path(path: object, error: type[ImplicitDecalsError] = InvalidScene) -> Pa
 def checked_path(path: str | os.PathLike[str], suffixes: tuple[str, ...]) -> Path:
     """Return the path of a file with one of these suffixes that can be written, or raise InvalidScene."""
     known = " or ".join(suffixes)
-    if not isinstance(path, str | os.PathLike):
+    if not isinstance(path, str | os.PathLike) or path == "":
         raise InvalidScene(f"path: expected the path of a {known} file, got {describe(path)}")
     path = Path(path)
     if path.suffix.lower() not in suffixes:

@@ -116,6 +116,10 @@ def import_module_or_file(option: str, module: str) -> ModuleType:
     try:
         return _import(module)
     except (Exception, SystemExit) as error:
+        if isinstance(error, ModuleNotFoundError) and f"{module}.".startswith(f"{error.name}."):
+            raise InvalidInput(
+                f"{option}: expected a Python file (.py) or the name of a module, got {module!r} ({error})"
+            ) from error
         frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.name == "<module>"]
         raise _failed(f"{option} {module}", frames, error) from error
 

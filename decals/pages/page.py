@@ -2,6 +2,7 @@
 
 import base64
 import html
+import inspect
 import math
 import os
 import re
@@ -256,6 +257,10 @@ def save_html(
     >>> decals.save_html(scene, "ball.html", resolution=16)
     """
     path = checked_path(path, SUFFIXES)  # before the long work
+    known = inspect.signature(page).parameters
+    for name in options:
+        if name not in known:
+            raise TypeError(f"save_html() got an unexpected keyword argument {name!r}")
     page(scene, **options).save(path)
 
 

@@ -14,8 +14,10 @@ from blobtree.validation import point_array, truth
 from decals.errors import InvalidScattering
 from decals.scattering.domain import MAX_PARTICLES
 from decals.sorting import ranges
+from decals.surfaces.convert import Model, as_mesh_surface
 from decals.surfaces.mesh import MeshSurface, edges_of
-from decals.validation import allowed_number, instance
+from decals.surfaces.surface import Surface
+from decals.validation import allowed_number
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -35,7 +37,7 @@ class Creases:
 
     Parameters
     ----------
-    surface : MeshSurface
+    surface : Model
         The mesh. Vertices at the same position count as one.
     angle : float, default: 40.0
         Least angle between the normals of two faces, in degrees, at which their edge is a crease.
@@ -68,14 +70,8 @@ class Creases:
     16
     """
 
-    def __init__(self, surface: MeshSurface, *, angle: float = 40.0, boundary: bool = True) -> None:
-        instance(
-            "surface",
-            surface,
-            MeshSurface,
-            InvalidScattering,
-            "polygonize a tree first",
-        )
+    def __init__(self, surface: Model | Surface, *, angle: float = 40.0, boundary: bool = True) -> None:
+        mesh = as_mesh_surface(surface, "polygonize a tree first", name="surface", error=InvalidScattering)
         allowed_number(
             "angle",
             angle,
@@ -84,7 +80,7 @@ class Creases:
             InvalidScattering,
         )
         ends = truth("boundary", boundary, InvalidScattering)
-        self._vertices, self._edges = _sharp_edges(surface, angle, ends)
+        self._vertices, self._edges = _sharp_edges(mesh, angle, ends)
         self.segments: Float64Array = self._vertices[self._edges]
 
     def __repr__(self) -> str:

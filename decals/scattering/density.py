@@ -12,8 +12,10 @@ from decals.errors import InvalidImage, InvalidScattering
 from decals.images.load import AnyImage, image_pixels
 from decals.images.texels import as_bytes
 from decals.scattering.image_projections import Projection
+from decals.surfaces.convert import Model, as_mesh_surface, is_model
 from decals.surfaces.mesh import MeshSurface
-from decals.validation import allowed_number, function_values, instance, real_array
+from decals.surfaces.surface import Surface
+from decals.validation import allowed_number, function_values, real_array
 
 BLENDED_VERTICES = 3
 """Number of nearest vertices from which a value is interpolated where there are no faces."""
@@ -21,17 +23,19 @@ BLENDED_VERTICES = 3
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Weights of red, green and blue in grey (Rec. 709)."""
 
+_ADVICE = "for a tree, give a function of points"
+
 
 def vertex_density(
-    vertices: MeshSurface | ArrayLike, values: ArrayLike
+    vertices: Model | Surface | ArrayLike, values: ArrayLike
 ) -> Callable[[Float32Array], Float64Array]:
     """Return a density that interpolates values at vertices, for `scatter` and `Relaxation`.
 
     Parameters
     ----------
-    vertices : MeshSurface or array_like
-        A mesh, in whose faces values are interpolated linearly; or ``float[n, 3]``, of which the nearest
-        three are blended by inverse distance.
+    vertices : Model or array_like
+        A mesh of any kind that `scatter` takes, in whose faces values are interpolated linearly; or
+        ``float[n, 3]``, of which the nearest three are blended by inverse distance.
     values : array_like
         Relative densities at the vertices, ``float[n]``, above zero.
 
@@ -43,7 +47,7 @@ def vertex_density(
     Raises
     ------
     InvalidScattering
-        If values and vertices differ in number, or a value is not finite and above zero.
+        If values and vertices differ in number, a value is not finite and above zero, or the model is a tree.
 
     Examples
     --------
@@ -52,7 +56,10 @@ def vertex_density(
     >>> density([[0, 0, 0], [0.5, 0, 0], [1, 0, 0]]).round(2)
     array([1. , 2.5, 4. ])
     """
-    positions = vertices.vertices if isinstance(vertices, MeshSurface) else point_array(vertices, "vertices")
+    is_pair = isinstance(vertices, tuple) and np.ndim(vertices[0]) == 2
+    is_mesh = is_pair or (not isinstance(vertices, tuple) and is_model(vertices))
+    mesh = as_mesh_surface(vertices, _ADVICE, name="vertices", error=InvalidScattering) if is_mesh else None
+    positions = point_array(vertices, "vertices") if mesh is None else mesh.vertices
     densities = real_array("values", values, InvalidScattering)
     if densities.shape != (len(positions),) or len(positions) == 0:
         raise InvalidScattering(
@@ -60,18 +67,19 @@ def vertex_density(
         )
     if not (np.isfinite(densities).all() and (densities > 0).all()):
         raise InvalidScattering("values: expected finite numbers above zero; bar regions by a mask")
-    if isinstance(vertices, MeshSurface):
-        return _interpolated_in_faces(vertices, densities)
+    if mesh is not None:
+        return _interpolated_in_faces(mesh, densities)
     return _blended_from_vertices(positions, densities)
 
 
-def region_mask(surface: MeshSurface, flags: ArrayLike) -> Callable[[Float32Array], BoolArray]:
+def region_mask(surface: Model | Surface, flags: ArrayLike) -> Callable[[Float32Array], BoolArray]:
     """Return a mask of a region of a mesh, for `scatter` and `Relaxation`.
 
     Parameters
     ----------
-    surface : MeshSurface
-        The mesh. If it has as many faces as vertices, flags are those of the faces.
+    surface : Model
+        A mesh of any kind that `scatter` takes. If it has as many faces as vertices, flags are those of the
+        faces.
     flags : array_like
         True inside the region: for each face, ``bool[m]``, or for each vertex, ``bool[n]``; or numbers from 0
         to 1. Those of vertices are interpolated, and the border lies at 1/2.
@@ -97,21 +105,19 @@ def region_mask(surface: MeshSurface, flags: ArrayLike) -> Callable[[Float32Arra
     >>> lower(np.float32([[0.9, 0.1, 0], [0.1, 0.9, 0]]))
     array([ True, False])
     """
-    instance("surface", surface, MeshSurface, InvalidScattering, "for a tree, give a function of points")
-    values, (faces, vertices) = (
-        real_array("flags", flags, InvalidScattering, truths=True),
-        (len(surface.faces), len(surface.vertices)),
-    )
+    mesh = as_mesh_surface(surface, _ADVICE, name="surface", error=InvalidScattering)
+    values = real_array("flags", flags, InvalidScattering, truths=True)
+    faces, vertices = len(mesh.faces), len(mesh.vertices)
     shaped = values.shape in ((faces,), (vertices,))
     if not shaped or not ((values >= 0.0) & (values <= 1.0)).all():
         raise InvalidScattering(
             f"flags: expected true or false, or numbers from 0 to 1, for each of {faces} faces or {vertices} "
             f"vertices, got {'others' if shaped else f'shape {list(values.shape)}'}"
         )
-    corners = np.repeat(values[:, None], 3, axis=1) if values.shape == (faces,) else values[surface.faces]
+    corners = np.repeat(values[:, None], 3, axis=1) if values.shape == (faces,) else values[mesh.faces]
 
     def mask(points: Float32Array) -> BoolArray:
-        rows, weights = surface.locate(points)
+        rows, weights = mesh.locate(points)
         inside: BoolArray = (weights * corners[rows]).sum(axis=1) >= 0.5
         return inside
 

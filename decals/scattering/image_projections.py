@@ -15,9 +15,9 @@ from blobtree._typing import Box, Float32Array, Float64Array
 from blobtree.validation import describe, finite_vector
 from decals.errors import InvalidScattering
 from decals.scattering.domain import as_surfaces
-from decals.surfaces.mesh import MeshSurface
+from decals.surfaces.convert import Model, as_mesh_surface
 from decals.surfaces.surface import Surface
-from decals.validation import instance, real_array
+from decals.validation import real_array
 
 Projection: TypeAlias = Callable[[Float32Array], Float64Array]
 """``points[n, 3]`` to ``uv[n, 2]``."""
@@ -211,8 +211,8 @@ class TextureCoordinates:
 
     Parameters
     ----------
-    surface : MeshSurface
-        The mesh.
+    surface : Model
+        A mesh of any kind that `scatter` takes.
     uv : array_like
         Positions in the image: for each vertex, ``float[n, 2]``, or for each corner of each face,
         ``float[m, 3, 2]``, for textures with seams.
@@ -234,17 +234,18 @@ class TextureCoordinates:
     array([[0.5 , 0.25]])
     """
 
-    def __init__(self, surface: MeshSurface, uv: ArrayLike) -> None:
-        instance("surface", surface, MeshSurface, InvalidScattering, "only meshes have texture coordinates")
+    def __init__(self, surface: Model | Surface, uv: ArrayLike) -> None:
+        advice = "only meshes have texture coordinates"
+        mesh = as_mesh_surface(surface, advice, name="surface", error=InvalidScattering)
         coordinates = real_array("uv", uv, InvalidScattering)
-        vertices, faces = len(surface.vertices), len(surface.faces)
+        vertices, faces = len(mesh.vertices), len(mesh.faces)
         if coordinates.shape not in ((vertices, 2), (faces, 3, 2)) or not np.isfinite(coordinates).all():
             raise InvalidScattering(
                 f"uv: expected finite numbers of shape [{vertices}, 2] or [{faces}, 3, 2], "
                 f"got {list(coordinates.shape)}"
             )
-        self._surface = surface
-        self._corners = coordinates[surface.faces] if coordinates.ndim == 2 else coordinates
+        self._surface = mesh
+        self._corners = coordinates[mesh.faces] if coordinates.ndim == 2 else coordinates
 
     def __call__(self, points: Float32Array) -> Float64Array:
         """Return the position in the image of the closest point of the mesh, ``float64[n, 2]``."""

@@ -8,8 +8,9 @@ import numpy as np
 
 from blobtree._typing import Float32Array
 from decals.errors import InvalidScattering
-from decals.surfaces.mesh import MeshSurface
-from decals.validation import count_number, instance
+from decals.surfaces.convert import Model, as_mesh_surface
+from decals.surfaces.surface import Surface
+from decals.validation import count_number
 
 VERTICES_PER_CLUSTER = 12
 """Vertices that a mesh needs for each cluster; coarser meshes are subdivided first."""
@@ -20,7 +21,7 @@ MAX_POINTS = 1_000_000
 """Largest number of points of a remesh; clustering takes a minute for so many."""
 
 
-def remeshed_points(surface: MeshSurface, count: int) -> Float32Array:
+def remeshed_points(surface: Model | Surface, count: int) -> Float32Array:
     """Return the vertices of a uniform remesh, projected back onto the mesh.
 
     The remesh uses approximated centroidal Voronoi diagrams (Valette and Chassery 2004) of pyacvd. Pass the
@@ -29,8 +30,8 @@ def remeshed_points(surface: MeshSurface, count: int) -> Float32Array:
 
     Parameters
     ----------
-    surface : MeshSurface
-        The mesh.
+    surface : Model
+        A mesh of any kind that `scatter` takes.
     count : int
         Approximate number of points, from 4 to 1,000,000.
 
@@ -52,7 +53,7 @@ def remeshed_points(surface: MeshSurface, count: int) -> Float32Array:
     >>> points = decals.scattering.remeshed_points(square, 30)
     >>> rivets = decals.scatter(square, fixed=points, count=len(points))
     """
-    instance("surface", surface, MeshSurface, InvalidScattering, "polygonize a tree first")
+    given = as_mesh_surface(surface, "polygonize a tree first", name="surface", error=InvalidScattering)
     count = count_number("count", count, 4, MAX_POINTS, InvalidScattering)
     try:
         clustering, pyvista = import_module("pyacvd").Clustering, import_module("pyvista")
@@ -60,15 +61,15 @@ def remeshed_points(surface: MeshSurface, count: int) -> Float32Array:
         raise InvalidScattering(
             "expected the package pyacvd, which is not installed; run pip install 'implicit-decals[remesh]'"
         ) from error
-    faces = np.column_stack([np.full(len(surface.sound), 3), surface.faces[surface.sound]])
-    mesh: Any = pyvista.PolyData(surface.vertices.astype(np.float64), faces.reshape(-1)).clean()
+    faces = np.column_stack([np.full(len(given.sound), 3), given.faces[given.sound]])
+    mesh: Any = pyvista.PolyData(given.vertices.astype(np.float64), faces.reshape(-1)).clean()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # pyacvd 0.4 asks pyvista for names that it has deprecated
         clusters = clustering(mesh)
         clusters.subdivide(_subdivisions(mesh.n_points, count))
         clusters.cluster(count)
         vertices: Float32Array = np.asarray(clusters.create_mesh().points, np.float32)
-    return surface.project(vertices)[0]
+    return given.project(vertices)[0]
 
 
 def _subdivisions(vertices: int, count: int) -> int:

@@ -139,6 +139,19 @@ def as_surface(
     return ImplicitSurface(shape) if isinstance(shape, Node) else MeshSurface(shape.vertices, shape.faces)
 
 
+def as_mesh_surface(
+    model: object, advice: str, *, name: str, error: type[ImplicitDecalsError]
+) -> MeshSurface:
+    """Return a model with vertices as a surface; raise an error with advice for a tree or another surface."""
+    for known in (model, getattr(model, "surface", None)):
+        if isinstance(known, MeshSurface):
+            return known
+    shape = None if is_surface(model) or hasattr(model, "tree") else as_shape(model, name=name, error=error)
+    if not isinstance(shape, MeshData):
+        raise error(f"{name}: expected a mesh, got {describe(model)}; {advice}")
+    return MeshSurface(shape.vertices, shape.faces)
+
+
 def is_model(value: object) -> bool:
     """Return True if the value is one model, so not a sequence of models."""
     known = (Node, str, os.PathLike, MeshLike)
@@ -220,6 +233,11 @@ def _polygons(faces: ArrayLike | Sequence[Any], name: str) -> Any:
     except (TypeError, ValueError, OverflowError):  # rows of different lengths
         polygons = _ragged(faces)
     listed = [polygons] if isinstance(polygons, np.ndarray) else polygons
+    if listed and all(row.dtype.kind == "f" for row in listed):
+        raise InvalidMesh(
+            f"{name}: expected faces as rows of whole numbers, got {listed[0].dtype}; convert them with "
+            ".astype(int)"
+        )
     if not listed or any(row.dtype.kind not in "iu" or row.ndim not in (1, 2) for row in listed):
         raise InvalidMesh(f"{name}: expected faces as rows of corner indices, got {describe(faces)}")
     if any(row.shape[-1] < 3 for row in listed) and isinstance(polygons, np.ndarray):

@@ -20,7 +20,7 @@ from blobtree.validation import describe, point_array
 from decals.errors import InvalidMesh, InvalidScattering
 from decals.surfaces.curved import CurvedMesh
 from decals.surfaces.extras import SMALL_PARTS
-from decals.surfaces.mesh import DeviceMeshSurface, MeshSurface
+from decals.surfaces.mesh import DeviceMeshSurface, MeshSurface, have_area
 from decals.surfaces.surface import (
     Scalars,
     Vectors,
@@ -30,7 +30,7 @@ from decals.surfaces.surface import (
     vectors,
 )
 from decals.surfaces.tree_kernels import mark_above, project, project_with_mesh
-from decals.surfaces.windings import MeshOrientation
+from decals.surfaces.windings import MeshOrientation, Triangles
 from decals.validation import whole_number
 
 FIELD_TOLERANCE = 1e-4
@@ -105,10 +105,10 @@ class ImplicitSurface(Immutable):
         creases = not CREASED.isdisjoint(tree.tape.operators)
         coarse = polygonize(tree, resolution=resolution, creases=creases, device=device)
         cells = RESOLUTION if resolution is None else resolution
-        if len(coarse.faces) == 0:
+        if not have_area(Triangles.of(coarse.vertices, coarse.faces)).any():
             raise InvalidMesh(
-                f"expected a tree with a surface, got none in {cells} cells; "
-                "its parts may be too small, or cut each other away"
+                f"expected a tree with a surface, got none in {cells} cells; its parts may be too small, "
+                "or cut each other away, or the largest field value may be just the iso value"
             )
         self._finds_parts = resolution is None and bool(SMALL_PARTS)
         self.has_small_parts = self._finds_parts and SMALL_PARTS["find"](

@@ -382,7 +382,9 @@ def _as_faces(faces: ArrayLike, vertex_count: int) -> Int32Array:
             f"faces: expected shape [m, 3] with m > 0, got {list(indices.shape)}; triangulate polygons first"
         )
     if not np.issubdtype(indices.dtype, np.integer):
-        raise InvalidMesh(f"faces: expected integers, got {indices.dtype}")
+        raise InvalidMesh(
+            f"faces: expected whole numbers, got {indices.dtype}; convert them with .astype(int)"
+        )
     if indices.min() < 0 or indices.max() >= vertex_count:
         bad = indices.min() if indices.min() < 0 else indices.max()
         raise InvalidMesh(f"faces: expected indices from 0 to {vertex_count - 1}, got {bad}")

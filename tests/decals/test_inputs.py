@@ -13,8 +13,10 @@ from PIL import Image
 import blobtree
 import decals
 from blobtree import Point
+from decals import scattering
 from decals.errors import InvalidImage, InvalidInput, InvalidScene
 from decals.images import generate_image, image_pixels
+from decals.surfaces import MeshSurface, as_surface
 
 SIZE = (48, 36)
 BALL = Point((0, 0, 0), radius=1.0)
@@ -211,3 +213,61 @@ def test_the_advice_about_pixels_without_alpha_works() -> None:
     with pytest.raises(InvalidScene, match=r"got uint8\[4, 4, 3\]; use decals\.DecalImage\.load"):
         decals.DecalImage("grey", pixels)
     assert decals.DecalImage.load(pixels).pixels.tolist() == [[[9, 9, 9, 255]] * 4] * 4
+
+
+@pytest.mark.parametrize("kind", ["pyvista", "trimesh", "arrays", "mesh file", "object"])
+def test_values_of_vertices_go_with_a_mesh_of_each_kind(kind: str, tmp_path: Path) -> None:
+    mesh = models(tmp_path)[kind]
+    surface = as_surface(mesh)
+    assert isinstance(surface, MeshSurface)
+    points, _ = surface.sample(200, seed=0)
+    across = surface.vertices[:, 0] - surface.vertices[:, 0].min()
+    low = surface.vertices[:, 0].min()
+    density = scattering.vertex_density(mesh, 1.0 + across)
+    np.testing.assert_allclose(density(points), 1.0 + points[:, 0] - low, atol=1e-5)
+    half = scattering.region_mask(mesh, across > 0.5)
+    np.testing.assert_array_equal(half(points), scattering.region_mask(surface, across > 0.5)(points))
+    assert 0 < half(points).sum() < len(points)
+    image = scattering.TextureCoordinates(mesh, surface.vertices[:, :2])
+    np.testing.assert_allclose(image(points), points[:, :2], atol=1e-5)
+    assert scattering.Creases(mesh).length == pytest.approx(4.0)
+    for call in (scattering.vertex_density, scattering.region_mask):
+        with pytest.raises(
+            InvalidInput, match=r"expected a mesh, got .*; for a tree, give a function of points"
+        ):
+            call(BALL, [1.0])
+
+
+def test_two_points_as_a_tuple_are_points() -> None:
+    density = scattering.vertex_density(([0, 0, 0], [1, 0, 0]), [1.0, 4.0])
+    assert density(np.float32([[0.5, 0, 0]])) == pytest.approx(2.5)
+
+
+def test_a_model_without_vertices_has_no_remesh() -> None:
+    with pytest.raises(InvalidInput, match=r"surface: expected a mesh, got .*; polygonize a tree first"):
+        scattering.remeshed_points(BALL, 50)
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda: decals.cover(Point((0, 0, 0), radius=1, weight=0.5), count=5), "tree with a surface"),
+        (lambda: decals.cover((SQUARE[0], 1.0 * SQUARE[1]), count=5), r"whole numbers, .*\.astype\(int\)"),
+        (lambda: MeshSurface(SQUARE[0], 1.0 * SQUARE[1]), r"whole numbers, .*\.astype\(int\)"),
+        (lambda: decals.cover("/", count=5), "expected a model, '/' is a folder"),
+        (lambda: decals.cover(BALL, count=1, images="/"), "expected an image, '/' is a folder"),
+        (lambda: decals.render(BALL, size=SIZE).save(""), "path of a file, got an empty text"),
+        (lambda: decals.load_scene(""), "path: expected the path of a file, got an empty text"),
+        (lambda: decals.cover(BALL, count=1).save(""), "path of a file, got an empty text"),
+    ],
+)  # fmt: skip
+def test_messages_say_what_is_wrong(call: Any, says: str) -> None:
+    with pytest.raises(InvalidInput, match=says):
+        call()
+
+
+def test_an_unknown_option_of_a_page_names_the_function_that_was_called(tmp_path: Path) -> None:
+    scene = decals.cover(BALL, count=1)
+    with pytest.raises(TypeError, match=r"^save_html\(\) got an unexpected keyword argument 'bogus'$"):
+        scene.save_html(tmp_path / "a.html", bogus=1)
+    assert not list(tmp_path.iterdir())

@@ -140,7 +140,8 @@ def test_a_failing_module_is_named_with_file_and_line(
 
 def test_missing_modules_are_named(folder: Path, capfd: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "path", sys.path[:])
-    for module, message in (("gone.py", "found no file 'gone.py'"), ("gone.away", "No module named 'gone'")):
+    wanted = "expected a Python file (.py) or the name of a module, got 'gone.away' (No module named 'gone')"
+    for module, message in (("gone.py", "found no file 'gone.py'"), ("gone.away", wanted)):
         assert run(["polygonize", "spheres", "--define", module, "-o", "x.ply"]) == 2
         assert message in capfd.readouterr().err
     assert not list(folder.iterdir())

@@ -152,7 +152,7 @@ def test_invalid_surfaces(wrong: Any) -> None:
         lambda surface: remeshed_points(surface, 50),
         lambda surface: TextureCoordinates(surface, []),
     ):
-        assert "surface: expected a MeshSurface" in error_of(make, wrong)
+        assert "surface: expected a model" in error_of(make, wrong)
 
 
 @pytest.mark.parametrize("wrong", ["x", 1.5, 0, -1, None, True, 10**400])
