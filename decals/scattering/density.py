@@ -1,7 +1,7 @@
 """Densities and masks from data: values at vertices, regions of faces, painted images."""
 
 from collections.abc import Callable
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,10 +56,10 @@ def vertex_density(
     >>> density([[0, 0, 0], [0.5, 0, 0], [1, 0, 0]]).round(2)
     array([1. , 2.5, 4. ])
     """
-    is_pair = isinstance(vertices, tuple) and np.ndim(vertices[0]) == 2
-    is_mesh = is_pair or (not isinstance(vertices, tuple) and is_model(vertices))
-    mesh = as_mesh_surface(vertices, _ADVICE, name="vertices", error=InvalidScattering) if is_mesh else None
-    positions = point_array(vertices, "vertices") if mesh is None else mesh.vertices
+    given: Any = vertices
+    is_mesh = np.ndim(given[0]) == 2 if isinstance(given, tuple) and given else is_model(given)
+    mesh = as_mesh_surface(given, _ADVICE, name="vertices", error=InvalidScattering) if is_mesh else None
+    positions = point_array(given, "vertices") if mesh is None else mesh.vertices
     densities = real_array("values", values, InvalidScattering)
     if densities.shape != (len(positions),) or len(positions) == 0:
         raise InvalidScattering(

@@ -240,7 +240,7 @@ def test_values_of_vertices_go_with_a_mesh_of_each_kind(kind: str, tmp_path: Pat
 
 def test_two_points_as_a_tuple_are_points() -> None:
     density = scattering.vertex_density(([0, 0, 0], [1, 0, 0]), [1.0, 4.0])
-    assert density(np.float32([[0.5, 0, 0]])) == pytest.approx(2.5)
+    assert density(np.array([[0.5, 0, 0]], np.float32)) == pytest.approx(2.5)
 
 
 def test_a_model_without_vertices_has_no_remesh() -> None:

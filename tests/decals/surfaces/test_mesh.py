@@ -222,8 +222,9 @@ def test_a_few_tiny_triangles_are_accepted() -> None:
 
 
 def test_the_log_names_thin_triangles_with_area(caplog: pytest.LogCaptureFixture) -> None:
-    strip = [[0, 0, 0], [1000, 0, 0], [1000, 1e-3, 0], [0, 1e-3, 0]]
-    vertices = [*strip, [0, 0, 5], [0.5, 0, 5], [0, 0.5, 5]]
+    strip = np.array([[0, 0, 0], [1000, 0, 0], [1000, 1e-3, 0], [0, 1e-3, 0]])
+    patch = np.array([[0, 0, 5], [0.5, 0, 5], [0, 0.5, 5]])
+    vertices = np.vstack([strip, patch])
     surface = MeshSurface(vertices, [[0, 1, 2], [0, 2, 3], [4, 5, 6]])
     assert surface.area == pytest.approx(0.125)
     (said,) = caplog.messages
