@@ -228,6 +228,8 @@ def _host_rows(name: str, values: Any, shape: tuple[int, ...]) -> Float32Array:
         raise InvalidPoints(f"{name}: expected numbers of shape [{expected}], got {got}") from None
     except Exception as error:  # of any kind, by the library of the array
         raise _unreadable(name, error) from None
+    if array.shape == (0,):  # of an empty list
+        return array.reshape(0, *shape)
     if array.shape[1:] != shape:
         raise InvalidPoints(
             f"{name}: expected shape [{expected}], got {list(array.shape)}; give one row per point"

@@ -187,6 +187,10 @@ def test_nothing_and_nonsense() -> None:
     assert evaluate(decals, np.zeros((3, 3)), np.zeros((3, 3))).owner.tolist() == [-1] * 3
     assert evaluate(decals, np.zeros((0, 3)), np.zeros((0, 3))).uv.shape == (0, 2)
     one = Decals([[0, 0, 0]], [[0, 0, 1]], [[1, 0, 0]], [1.0])
+    nowhere = evaluate(one, [], [], jacobian=True, normal_derivatives=[])
+    assert (nowhere.owner.shape, nowhere.uv.shape) == ((0,), (0, 2))
+    assert nowhere.jacobian is not None
+    assert nowhere.jacobian.shape == (0, 2, 3)
     strange = [[np.nan, 0, 0], [np.inf, 0, 0], [3e38, -3e38, 0]]
     samples = evaluate(one, strange, np.tile([0, 0, 1], (3, 1)))
     assert samples.owner.tolist() == [-1] * 3
