@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from blobtree.files import is_folder, is_read_only, is_too_long, make_folder
+from blobtree.files import exists, is_folder, is_read_only, is_too_long, make_folder
 from decals.errors import InvalidInput
 
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
@@ -34,12 +34,15 @@ def check_output(path: Path, suffixes: tuple[str, ...]) -> None:
 
 
 def check_animation(path: Path, suffixes: tuple[str, ...]) -> None:
-    """Check that a folder of pictures, or a file of one of these formats, can be written; make the folder."""
+    """Check that a folder of pictures, or a file of one of these formats, can be written."""
     if path.suffix and not is_folder(path):
         check_output(path, suffixes)
     else:
+        known = exists(path)
         make_folder(path, InvalidInput)
         _check_writable(path)
+        if not known:  # the first picture makes it
+            path.rmdir()
 
 
 def _check_writable(folder: Path) -> None:

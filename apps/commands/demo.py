@@ -14,7 +14,6 @@ from rich.console import Console
 
 from blobtree import Progress
 from blobtree._typing import Float32Array, Int32Array
-from blobtree.files import make_folder
 from blobtree.graphics import require_screen
 from decals import Camera, DecalImage, Decals, MeshObject, Scene, TreeObject, scatter
 from decals.apps.commands.activation import command_lines
@@ -24,6 +23,7 @@ from decals.apps.gallery import spanning
 from decals.apps.models.shapes import creature, egg
 from decals.apps.output import check_output, print_path
 from decals.errors import InvalidInput, NoGraphics
+from decals.output_folder import output_folder
 from decals.rendering import Picture, Renderer
 from decals.rendering.options import RenderOptions, Size
 from decals.scenes.render import picture_record
@@ -85,12 +85,12 @@ def demo(
     """
     pixels = parse_size(size)
     check_count("--samples", samples, 1, MAX_SAMPLES)
-    make_folder(output, InvalidInput)
-    for name in PICTURES:
-        check_output(output / name, (".png",))
-    with progress_bars() as progress:
-        for name, picture in demo_pictures(PICTURES, pixels, samples, progress):
-            picture.save(output / name)
+    with output_folder(output, InvalidInput):
+        for name in PICTURES:
+            check_output(output / name, (".png",))
+        with progress_bars() as progress:
+            for name, picture in demo_pictures(PICTURES, pixels, samples, progress):
+                picture.save(output / name)
     for name in PICTURES:
         print_path(output / name)
     lines = "\n".join(f"  {line}" for line in command_lines(next_commands()))

@@ -6,11 +6,11 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from blobtree.files import make_folder
 from decals.apps import gallery as examples
 from decals.apps.commands.options import Whole, check_count
 from decals.apps.output import PICTURE_SUFFIXES, check_output, print_names, print_path
 from decals.errors import InvalidInput
+from decals.output_folder import output_folder
 
 FOLDER = Path("gallery")
 """Default folder of the pictures of all examples."""
@@ -45,8 +45,8 @@ def gallery(
         raise InvalidInput(f"expected --all or the name of an example, got both; leave out {name!r} or --all")
     if all_:
         folder = output or FOLDER
-        make_folder(folder, InvalidInput)
-        _draw({each: folder / f"{each}.png" for each in examples.EXAMPLES}, side)
+        with output_folder(folder, InvalidInput):
+            _draw({each: folder / f"{each}.png" for each in examples.EXAMPLES}, side)
     elif name is not None:
         _draw({name: output or Path(f"{name}.png")}, side)
     elif output is not None:

@@ -6,10 +6,10 @@ from typing import Annotated
 from cyclopts import Parameter
 from rich.console import Console
 
-from blobtree.files import make_folder
 from decals.apps.commands.progress_bars import progress_bars
 from decals.apps.output import print_path
 from decals.errors import InvalidInput
+from decals.output_folder import output_folder
 
 
 def lessons(
@@ -42,23 +42,23 @@ def lessons(
     shown = [lesson for lesson in loaded if not reasons[lesson.name]]
     if not shown:
         raise InvalidInput(f"lessons: none has a page: {'; '.join(map(str, reasons.values()))}")
-    make_folder(output, InvalidInput)
-    for code, own in words.items():
+    with output_folder(output, InvalidInput):
+        for code, own in words.items():
 
-        def name(lesson: str, code: str = code) -> str:
-            return f"{lesson}.html" if code == next(iter(words)) else f"{lesson}.{code}.html"
+            def name(lesson: str, code: str = code) -> str:
+                return f"{lesson}.html" if code == next(iter(words)) else f"{lesson}.{code}.html"
 
-        for number, lesson in enumerate(shown):
-            beside = {"previous": number - 1, "next": number + 1}
-            links = [
-                (f"{own.page[which]}: {own.said(shown[at].settings.title)}", name(shown[at].name))
-                for which, at in beside.items()
-                if 0 <= at < len(shown)
-            ]
-            links += [(other.name, name(lesson.name, to)) for to, other in words.items() if to != code]
-            path = output / name(lesson.name)
-            with progress_bars() as progress:
-                lesson_page(lesson, language=code, links=links, progress=progress).save(path)
-            print_path(path)
+            for number, lesson in enumerate(shown):
+                beside = {"previous": number - 1, "next": number + 1}
+                links = [
+                    (f"{own.page[which]}: {own.said(shown[at].settings.title)}", name(shown[at].name))
+                    for which, at in beside.items()
+                    if 0 <= at < len(shown)
+                ]
+                links += [(other.name, name(lesson.name, to)) for to, other in words.items() if to != code]
+                path = output / name(lesson.name)
+                with progress_bars() as progress:
+                    lesson_page(lesson, language=code, links=links, progress=progress).save(path)
+                print_path(path)
     for reason in filter(None, reasons.values()):
         Console().print(f"left out: {reason}", soft_wrap=True, highlight=False, markup=False)

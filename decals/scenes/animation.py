@@ -12,10 +12,11 @@ from typing import Protocol
 from PIL import Image
 
 from blobtree._typing import UInt8Array
-from blobtree.files import is_file, is_folder, make_folder, replacing
+from blobtree.files import is_file, is_folder, replacing
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.validation import describe, finite_number
 from decals.errors import InvalidScene
+from decals.output_folder import output_folder
 from decals.rendering.options import Size, check_scene, drawing_of
 from decals.rendering.picture import Picture, on_white
 from decals.rendering.renderer import Renderer
@@ -226,7 +227,6 @@ def _sink(target: Path, size: Size, rate: float) -> Iterator[_Sink]:
                 finally:
                     stream.close()
         case _:
-            make_folder(target, InvalidScene)
             count = 0
 
             def write(picture: Picture, number: int) -> None:
@@ -234,7 +234,8 @@ def _sink(target: Path, size: Size, rate: float) -> Iterator[_Sink]:
                 picture.save(target / f"frame_{number:04d}.png")
                 count = number
 
-            yield write
+            with output_folder(target, InvalidScene):
+                yield write
             _remove_later_frames(target, count)
 
 

@@ -203,3 +203,14 @@ def test_the_command_turns_and_poses(vtk_display: None, folder: Path, capsys: Ca
 def test_invalid_commands(bad: Callable[..., str], options: list[str], message: str) -> None:
     Path("empty.py").write_text("")
     assert message in bad("animate", "ball.ply", *options)
+
+
+def test_work_that_fails_leaves_no_folder(folder: Path, capsys: Capture) -> None:
+    decals.save_scene(scene(), folder / "s.json")
+    (folder / "junk.ply").write_bytes(b"ply")
+    assert run(["animate", "s.json", "--poses", "junk.ply", "-o", "new", *SMALL]) == 2
+    assert "--poses: expected a Python file" in capsys.readouterr().err
+    (folder / "poses.py").write_text("def pose(t):\n    return 1 / 0\n")
+    assert run(["animate", "s.json", "--poses", "poses.py", "-o", "new", *SMALL]) == 2
+    assert "ZeroDivisionError" in capsys.readouterr().err
+    assert not (folder / "new").exists()

@@ -93,3 +93,14 @@ def test_the_list_is_printed_by_the_module_too() -> None:
     ran = subprocess.run(command_line, capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stderr) == (0, "")
     assert len(ran.stdout.splitlines()) == len(gallery.EXAMPLES)
+
+
+@pytest.mark.usefixtures("two_examples")
+def test_an_interrupt_leaves_no_empty_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted() -> None:
+        assert (folder / "pictures").is_dir()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sphere, "panels", interrupted)
+    assert run(["gallery", "--all", "-o", "pictures", "--side", "16"]) not in (0, 2)
+    assert not list(folder.iterdir())
