@@ -16,7 +16,7 @@ BRUSHES = {
     Brush.PAINT: ("Shift+w", "paint: drag over decals to select them"),
     Brush.PULL: ("z", "pull: drag the surface, and the selected node follows"),
     Brush.SCATTER: ("s", "scatter brush: drag to place decals"),
-    Brush.PUSH: ("y", "push brush: drag to push decals, neighbours yield"),
+    Brush.PUSH: ("y", "push brush: drag to push decals; neighbours make room"),
     Brush.ERASE: ("e", "erase brush: drag to delete decals"),
     Brush.RELAX: ("Shift+x", "relax brush: drag to even decals out"),
     Brush.ALIGN: ("Shift+a", "align brush: drag to turn images along the stroke"),

@@ -130,7 +130,7 @@ def page(
 ) -> Page:
     """Return a scene as one HTML page that shows it in any browser, without a server and without a network.
 
-    Decals can be picked, dragged, turned, scaled, added and deleted there; their neighbours yield at once. A
+    Decals can be picked, dragged, turned, scaled, added and deleted there; neighbours make room at once. A
     link keeps the state, and the scene can be saved as a file for `decals.load_scene`. The page needs WebGL 2
     and shows a picture without it.
 
