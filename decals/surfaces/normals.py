@@ -15,6 +15,10 @@ MAX_FACES_PER_EDGE = 4
 """Number of faces at an edge that are compared with each other; at an edge of more, some are not."""
 
 
+COPY_COSINE = 1.0 - 1e-6
+"""Cosine between faces that run along an edge in the same direction from which on they count as copies."""
+
+
 @dataclass(frozen=True, eq=False)
 class SplitMesh:
     """A mesh whose vertices at creases are split, so that each has one normal.
@@ -42,10 +46,11 @@ def split_at_creases(
 ) -> SplitMesh:
     """Split a mesh at its creases.
 
-    A crease is an edge where the normals of two faces differ by more than the crease angle. The faces around
-    a vertex on a crease form groups: two faces that share another edge belong to one group. Each group gets a
-    vertex, whose normal is the sum of the group's normals weighted by area. A vertex without crease keeps the
-    normal of `vertex_normals`.
+    A crease is an edge where the normals of two faces differ by more than the crease angle. An edge along
+    which two faces run in the same direction, like pages of a book, is a crease too, unless they are copies.
+    The faces around a vertex on a crease form groups: two faces that share another edge belong to one group.
+    Each group gets a vertex, and its normal is the sum of the group's normals weighted by area. A vertex
+    without crease keeps the normal of `vertex_normals`.
 
     Parameters
     ----------
@@ -159,6 +164,7 @@ def _neighbors(
     sharp = np.clip(cosines, -1.0, 1.0) < np.cos(np.radians(crease_angle)) - 1e-9
     following = edges - edges % 3 + (edges + 1) % 3
     alike = starts[edges[:, :1]] == starts[edges[:, 1:]]
+    sharp |= alike[:, 0] & (cosines < COPY_COSINE)  # one face folds back onto the other
     at_start = np.where(alike, edges, np.stack([edges[:, 0], following[:, 1]], axis=1))
     at_end = np.where(alike, following, np.stack([following[:, 0], edges[:, 1]], axis=1))
     return crosses, np.concatenate([at_start, at_end]), np.concatenate([sharp, sharp])

@@ -77,3 +77,39 @@ def test_other_angles_are_refused(angle: Any) -> None:
         decals.MeshObject("box", box().vertices, box().faces, crease_angle=angle)
     with pytest.raises(InvalidScene, match="crease_angle"):
         decals.cover((box().vertices, box().faces), count=1, crease_angle=angle)
+
+
+def book(pages: int, *, turned: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Pages around one edge, as rectangles of two triangles; every other one may wind the other way round."""
+    vertices, faces = [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]], []
+    for page, turn in enumerate(np.arange(pages) * 2.0 * np.pi / pages):
+        x, y, i = np.cos(turn), np.sin(turn), len(vertices)
+        vertices += [[x, y, 0.0], [x, y, 1.0]]
+        step = -1 if turned and page % 2 else 1
+        faces += [[0, i, i + 1][::step], [0, i + 1, 1][::step]]
+    return np.array(vertices, np.float32), np.array(faces, np.int32)
+
+
+@pytest.mark.parametrize("pages", [3, 6, 12, 20, 24])
+def test_each_page_at_an_edge_of_many_faces_keeps_its_normal(pages: int) -> None:
+    vertices, faces = book(pages)
+    split = split_at_creases(vertices, faces)
+    a, b, c = (vertices[faces[:, k]].astype(np.float64) for k in range(3))
+    flat = np.cross(b - a, c - a)
+    flat /= np.linalg.norm(flat, axis=1, keepdims=True)
+    np.testing.assert_allclose(split.normals[split.faces], np.repeat(flat[:, None], 3, axis=1), atol=1e-6)
+
+
+def test_copies_of_faces_change_no_normal() -> None:
+    cube = box()
+    split = split_at_creases(cube.vertices, cube.faces)
+    doubled = split_at_creases(cube.vertices, np.vstack([cube.faces, cube.faces]))
+    twice = np.vstack([split.normals[split.faces]] * 2)
+    np.testing.assert_allclose(doubled.normals[doubled.faces], twice, atol=1e-6)
+    assert len(doubled.rows) == len(split.rows)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_pages_of_a_book_are_covered_without_gaps(turned: bool) -> None:
+    scene = decals.cover(book(12, turned=turned), count=100)
+    assert decals.measure(scene).coverage > 0.9999
