@@ -8,6 +8,7 @@ import numpy as np
 from blobtree._typing import IndexArray
 from blobtree.cells.grid import BRANCHING, Grid
 from blobtree.cells.joint_cells import build_joint_cells, model_starts
+from blobtree.cells.surface_box import longest_side, surface_box
 from blobtree.device import known_device
 from blobtree.joint_work import checked_trees, is_small, of_tree, work_together
 from blobtree.meshing.dual_kernels import sample_blocks
@@ -78,8 +79,8 @@ def polygonize_batch(
     sizes, grids = [], []
     for number, tree in enumerate(models):
         with of_tree(number):
-            sizes.append(cell_size_of(tree, resolution, cell_size))
-            grids.append(grid_around(tree, sizes[-1]))
+            sizes.append(cell_size_of(tree, resolution, cell_size, device))
+            grids.append(grid_around(tree, sizes[-1], device))
     thin_matters = resolution is None and cell_size is None
 
     def kind(tree: ImplicitModel, grid: Grid) -> Hashable | None:
@@ -109,8 +110,7 @@ def polygonize_batch(
 
 def _expected_blocks(tree: ImplicitModel, cell_size: float) -> float:
     """Return about as many blocks as the surface crosses, or more."""
-    lower, upper = tree.support
-    along = float((upper - lower).max()) / (cell_size * BRANCHING) + 1.0
+    along = longest_side(surface_box(tree)) / (cell_size * BRANCHING) + 1.0
     return SURFACE_BLOCKS * along**2
 
 

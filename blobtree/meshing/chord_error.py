@@ -72,7 +72,7 @@ def within_chord_error(
     from blobtree.meshing.distance_kernels import measure_triangles  # imported here: most meshes need none
 
     passes: list[tuple[float, float]] = []
-    size = cell_size_of(tree, FIRST_RESOLUTION, None)
+    size = cell_size_of(tree, FIRST_RESOLUTION, None, device)
     load_kernels(tree, device, creases, sample_blocks, place_vertices, measure_triangles)
     for number in range(1, MAX_PASSES + 1):
         pass_report = _numbered(report, number)
@@ -106,13 +106,13 @@ def adaptive_within_chord_error(
 
     load_kernels(tree, device, creases, *ADAPTIVE_KERNELS)
     wish = f"chord_error: {chord_error:g}"
-    size = cell_size_of(tree, FIRST_RESOLUTION, None)
+    size = cell_size_of(tree, FIRST_RESOLUTION, None, device)
     passes: AdaptivePasses | None = None
     for number in range(1, MAX_ADAPTIVE_PASSES + 1):
         pass_report = _never_decreasing(_numbered(report, number))
         pass_report(_STAGES[0], 0.0)
         if passes is None:
-            cells = build_cells(tree.tape, grid_around(tree, size), device=device, report=pass_report)
+            cells = build_cells(tree.tape, grid_around(tree, size, device), device=device, report=pass_report)
             passes = AdaptivePasses(cells, chord_error, creases)
         within = passes.run(pass_report)
         pass_report(_STAGES[-1], 1.0)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from blobtree._typing import Float64Array
+from blobtree.cells.surface_box import surface_box
 from blobtree.formulas.falloff import RIM
 from blobtree.tape.bounds import leaf_boxes
 from blobtree.tape.grown import leaf_tape
@@ -71,7 +72,7 @@ class _Skeleton:
 
     def __init__(self, tree: ImplicitModel, placed: PlacedPrimitive, number: int, reach: float) -> None:
         scale = float(np.linalg.svd(placed.placement.matrix[:3, :3], compute_uv=False)[-1])
-        lower, upper = tree.support
+        lower, upper = surface_box(tree)
         box = float(np.linalg.norm(upper - lower))
         self.radius = 0.0
         if isinstance(placed.primitive, ProgramPrimitive):

@@ -21,6 +21,7 @@ import warp as wp
 from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray
 from blobtree.cells.grid import BRANCHING, CHILDREN, Grid
 from blobtree.cells.sparse_cells import SparseCells, build_cells
+from blobtree.cells.surface_box import longest_side, surface_box
 from blobtree.declare.skeleton import BALL_CELLS
 from blobtree.device import launch
 from blobtree.errors import InvalidResolution
@@ -66,11 +67,11 @@ SPARE_SHARE = 1 / 16
 """Part of these blocks that small parts take in any case, once larger ones have taken all."""
 
 LEAST_CELL = 3e-5
-"""Smallest cells, over the longest side of the support; parts that need smaller ones are left out."""
+"""Smallest cells, over the longest side of the surface's box; parts that need smaller ones are left out."""
 
 FINE_CELL, MAX_FINE_CELLS = 5.5e-5, 100_000
-"""Cells of walls thinner than a ten-thousandth, over the longest side of the support. A wall that takes more
-of them is left out."""
+"""Cells of walls thinner than a ten-thousandth, over the longest side of the surface's box. A wall that takes
+more of them is left out."""
 
 CROSSED_CELLS = 16.0
 """Cells of a block that a plane through its middle crosses."""
@@ -161,7 +162,7 @@ class PartCells(AdaptiveCells):
     def __init__(self, first: "FirstCells", tolerance: float, least: float) -> None:
         tree, walls = first.blocks, first.walls
         super().__init__(tree, tolerance)
-        self._least, self._walls, self._support = least, walls, first.support
+        self._least, self._walls, self._box = least, walls, first.box
         self.unresolved: list[ThinPart] = []
         """Parts for whose cells there is no room."""
         self._in_walls = np.empty(0, bool)
@@ -207,8 +208,8 @@ class PartCells(AdaptiveCells):
             self.replace(blocks[kept], largest > needed[kept])
 
     def _outside(self, grid: Grid, first: int) -> BoolArray:
-        """Return True for blocks without surface: bounds of warps are loose beyond the support."""
-        side, (lower, upper) = 4 * grid.cell_size, self._support
+        """Return True for blocks without surface: bounds of warps are loose beyond its box."""
+        side, (lower, upper) = 4 * grid.cell_size, self._box
         corners = grid.origin + self.tree.coordinates[first:] * side
         return np.asarray(((corners > upper) | (corners + side < lower)).any(axis=1))
 
@@ -342,28 +343,29 @@ class FirstCells:
     blocks: BlockTree
     walls: Walls | None
     """None for a tree without operators that leave walls."""
-    support: tuple[Float32Array, Float32Array]
-    """Lower and upper corner of the tree's support."""
+    box: tuple[Float32Array, Float32Array]
+    """Lower and upper corner of the box of the surface."""
 
 
 def first_cells(
     tree: ImplicitModel, grid_of: Callable[[float], Grid], device: str | None, report: Progress
 ) -> FirstCells:
     """Return the first cells, with the size at which thin parts take the fewest; `grid_of` scales cells."""
-    return _sampled(tree, grid_of(fitting_scale(tree, grid_of(1.0).cell_size)), device, report)
+    longest = longest_side(surface_box(tree, device))
+    scale = fitting_scale(tree, grid_of(1.0).cell_size, longest)
+    return _sampled(tree, grid_of(scale), device, report)
 
 
 def _sampled(tree: ImplicitModel, grid: Grid, device: str | None, report: Progress) -> FirstCells:
     """Return cells of a grid, and the walls that they show."""
     blocks = BlockTree(build_cells(sized_tape(tree), grid, device=device, report=report))
     walls = Walls(tree, blocks, _least_cell(tree)) if has_walls(tree._program) else None
-    return FirstCells(blocks, walls, tree.support)
+    return FirstCells(blocks, walls, surface_box(tree))
 
 
 def _least_cell(tree: ImplicitModel) -> float:
     """Return the size of the smallest cells."""
-    lower, upper = tree.support
-    return LEAST_CELL * float((upper - lower).max())
+    return LEAST_CELL * longest_side(surface_box(tree))
 
 
 def mesh_of_parts(
@@ -506,8 +508,7 @@ def warn_of_thin_parts(tree: ImplicitModel, unresolved: list[ThinPart]) -> None:
 
 def _wishes(tree: ImplicitModel, unresolved: list[ThinPart]) -> str:
     """Return names of parts with the resolutions that they need, the thinnest first."""
-    lower, upper = tree.support
-    longest = float((upper - lower).max())
+    longest = longest_side(surface_box(tree))
     texts: dict[str, str] = {}
     for part in sorted(unresolved, key=lambda part: part.size):
         at = ", ".join(f"{x:.4g}" for x in part.place)

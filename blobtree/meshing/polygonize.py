@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from blobtree.cells.surface_box import surface_box
 from blobtree.errors import InvalidResolution
 from blobtree.lazy import if_present
 from blobtree.meshing.mesh import Mesh
@@ -61,7 +62,8 @@ def polygonize(
     tree : Node
         The model.
     resolution : int, optional
-        Cells along the longest side of the tree's support, all of one size.
+        Cells along the longest side of the tree's support, all of one size; along that of a box around the
+        surface where this is much smaller.
     cell_size : float, optional
         Side of a cell, in the model's units. Features thinner than a cell may be lost.
     chord_error : float, optional
@@ -134,7 +136,7 @@ def polygonize(
         raise InvalidResolution(
             "expected one of resolution, cell_size and chord_error, got several; drop the others"
         )
-    chord_error = _chord_error(tree, chord_error)
+    chord_error = _chord_error(tree, chord_error, device)
     most = positive_count("max_triangles", max_triangles, InvalidResolution)
     truth("creases", creases, InvalidResolution)
     adaptive = truth("adaptive", adaptive, InvalidResolution)
@@ -143,10 +145,10 @@ def polygonize(
         return within(tree, chord_error, most, creases, device, report)
 
 
-def _chord_error(tree: ImplicitModel, value: object) -> float:
+def _chord_error(tree: ImplicitModel, value: object, device: str | None) -> float:
     """Return `value` as a chord error that float32 can resolve."""
     chord_error = above_zero("chord_error", "length", value)
-    smallest = MIN_RELATIVE_ERROR * float(np.abs(tree.support).max())
+    smallest = MIN_RELATIVE_ERROR * float(np.abs(surface_box(tree, device)).max())
     if chord_error < smallest:
         raise InvalidResolution(
             f"chord_error: {chord_error:g} is below what float32 can tell there; allow {smallest:.2g} or more"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from blobtree.cells.grid import Grid, aligned_grid
 from blobtree.cells.sparse_cells import CELL_KERNELS, build_cells
+from blobtree.cells.surface_box import MAX_SIDE, MIN_SIDE, longest_side, surface_box
 from blobtree.device import known_device
 from blobtree.errors import InvalidResolution
 from blobtree.kernels import load_together
@@ -28,9 +29,6 @@ DEFAULT_RESOLUTION = 64
 
 MAX_RESOLUTION = 1 << 20
 """Cells along a side beyond which 32 bits cannot hold their coordinates."""
-
-MIN_MODEL_SIZE, MAX_MODEL_SIZE = 1e-15, 1e15
-"""Sizes between which squared distances, in cells too, neither vanish nor overflow in float32."""
 
 Sharpened: TypeAlias = tuple[DeviceMesh, NDArray[np.uint8] | None]
 """A mesh with vertices on creases, and the number of sheets that meet in each."""
@@ -89,7 +87,7 @@ class Polygonizer:
         checked_tree(tree)
         self._device = device
         self._creases = truth("creases", creases, InvalidResolution)
-        self._cell_size = cell_size_of(tree, resolution, cell_size)
+        self._cell_size = cell_size_of(tree, resolution, cell_size, device)
         with reporting(progress, cancel) as report:
             load_kernels(tree, device, self._creases, sample_blocks, place_vertices)
             self._dual_mesh, self._device_mesh, self._sheet_counts = self._extract(tree, None, report)
@@ -145,7 +143,7 @@ class Polygonizer:
         self, tree: ImplicitModel, previous: DeviceMesh | None, report: Progress
     ) -> tuple[DeviceMesh, DeviceMesh, NDArray[np.uint8] | None]:
         """Return `dual_mesh`, `device_mesh` and the sheet counts of the vertices."""
-        grid = grid_around(tree, self._cell_size)
+        grid = grid_around(tree, self._cell_size, self._device)
         old_cells = previous.cells if previous is not None else None
         cells = build_cells(tree.tape, grid, device=self._device, previous=old_cells, report=report)
         mesh = extract_mesh(cells, report, previous)
@@ -160,10 +158,11 @@ def sharpened(mesh: DeviceMesh, creases: bool, report: Progress) -> Sharpened:
     return mesh, sheet_counts
 
 
-def cell_size_of(tree: ImplicitModel, resolution: int | None, cell_size: float | None) -> float:
+def cell_size_of(
+    tree: ImplicitModel, resolution: int | None, cell_size: float | None, device: str | None
+) -> float:
     """Return the side of a cell from `resolution` or `cell_size`, once it is checked."""
-    lower, upper = (corner.astype(np.float64) for corner in tree.support)
-    longest = float((upper - lower).max())
+    longest = longest_side(surface_box(tree, device))
     if resolution is not None and cell_size is not None:
         raise InvalidResolution("expected either resolution or cell_size, got both; drop one")
     if cell_size is None:
@@ -175,9 +174,9 @@ def cell_size_of(tree: ImplicitModel, resolution: int | None, cell_size: float |
             )
         cell_size = longest / int(cells)
     cell_size = above_zero("cell_size", "size", cell_size)
-    if not MIN_MODEL_SIZE < longest < MAX_MODEL_SIZE:
+    if not MIN_SIDE < longest < MAX_SIDE:
         raise InvalidResolution(
-            f"the model is {longest:.3g} long; between {MIN_MODEL_SIZE:g} and {MAX_MODEL_SIZE:g} float32 can "
+            f"the model is {longest:.3g} long; between {MIN_SIDE:g} and {MAX_SIDE:g} float32 can "
             "square its distances: scale it"
         )
     if longest / cell_size > MAX_RESOLUTION:
@@ -199,7 +198,7 @@ def above_zero(name: str, noun: str, value: object) -> float:
     return number
 
 
-def grid_around(tree: ImplicitModel, cell_size: float) -> Grid:
-    """Return cells around the support, and one more on every side so that the surface is closed."""
-    lower, upper = (corner.astype(np.float64) for corner in tree.support)
+def grid_around(tree: ImplicitModel, cell_size: float, device: str | None) -> Grid:
+    """Return cells around the surface's box, and one more on every side so that the surface is closed."""
+    lower, upper = (corner.astype(np.float64) for corner in surface_box(tree, device))
     return aligned_grid(lower - cell_size, upper + cell_size, cell_size)

@@ -24,6 +24,7 @@ import warp as wp
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray, Int32Array
 from blobtree.cells.grid import Grid
+from blobtree.cells.surface_box import longest_side, surface_box
 from blobtree.declare.skeleton import BALL_CELLS, PLATE_CELLS, Skeleton
 from blobtree.device import known_device, launch
 from blobtree.errors import InvalidNode
@@ -83,8 +84,8 @@ SAGITTA_CELLS = 2.0
 """Size of cells over √(thickness · radius of curvature), up to which both sides of a wall stay apart."""
 
 THINNEST_BEND = 1e-5
-"""Thickness over the longest side of the support, below which triangles of both sides may cross where they
-bend."""
+"""Thickness over the longest side of the surface's box, below which triangles of both sides may cross where
+they bend."""
 
 MAX_FIELD_ERROR = 0.05
 """Largest error of the field at a vertex that is back on the surface of the thinnest parts."""
@@ -371,7 +372,7 @@ def _grown_walls(tree: ImplicitModel, first: FirstCells, size: float, limits: Fl
     """
     leaves, halves = list(runs_of_leaves(tree._program)), part_sizes(tree)[0]
     lengths, scales, depths = np.zeros(len(leaves)), np.ones(len(leaves)), np.zeros(len(leaves))
-    longest = float((tree.support[1] - tree.support[0]).max())
+    longest = longest_side(surface_box(tree))
     for wall in first.walls.thin if first.walls is not None else ():
         if wall.thickness > WALL_CELLS * THIN * size or not wall.facing.tool:
             continue

@@ -36,10 +36,10 @@ def polygonize_parts(
 
     truth("creases", creases, InvalidResolution)
     with reporting(progress, cancel) as report:
-        size = cell_size_of(tree, resolution, None)
+        size = cell_size_of(tree, resolution, None, device)
         if not shows_thin_parts(tree, resolution, device):
             load_kernels(tree, device, creases, sample_blocks, place_vertices)
-            cells = build_cells(tree.tape, grid_around(tree, size), device=device, report=report)
+            cells = build_cells(tree.tape, grid_around(tree, size, device), device=device, report=report)
             mesh = mesh_without_gaps(cells, report)
             if mesh is not None:
                 return download(*sharpened(mesh, creases, report))
@@ -53,14 +53,14 @@ def shows_thin_parts(tree: ImplicitModel, resolution: int, device: str | None) -
 
 def shows_small_parts(tree: ImplicitModel, resolution: int, size: float, device: str | None) -> bool:
     """Return True if a part is thinner than `size` cells of `resolution`; where there are warps, look."""
-    cell = cell_size_of(tree, resolution, None)
+    cell = cell_size_of(tree, resolution, None, device)
     small = has_small_parts(tree, size * cell)
     if not small or not has_warps(tree):
         return small
     from blobtree.meshing.parts import PART_KERNELS, least_size  # imported here, as above
 
     load_kernels(tree, device, False, *PART_KERNELS)
-    cells = build_cells(sized_tape(tree), grid_around(tree, cell), device=device)
+    cells = build_cells(sized_tape(tree), grid_around(tree, cell, device), device=device)
     return least_size(cells, 0.0) < size * cell
 
 
@@ -75,7 +75,7 @@ def _mesh_of_thin_parts(
         return Polygonizer(model, cell_size=size, creases=creases, device=device, progress=report).mesh
 
     def grid_of(model: ImplicitModel, scale: float) -> Grid:
-        return grid_around(model, scale * size)
+        return grid_around(model, scale * size, device)
 
     load_kernels(tree, device, creases, *PART_KERNELS)
     return mesh_of_thin_parts(tree, grid_of, uniform, device, creases, report)

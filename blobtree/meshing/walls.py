@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray
 from blobtree.cells.grid import BRANCHING, Grid
 from blobtree.cells.sparse_cells import SparseCells, build_cells
+from blobtree.cells.surface_box import longest_side, surface_box
 from blobtree.declare.skeleton import BALL_CELLS, PLATE_CELLS
 from blobtree.device import launch
 from blobtree.formulas.falloff import ISO
@@ -56,7 +57,7 @@ PARALLEL = np.radians(25.0)
 """Angle between the sides of a wall below which they are nearly parallel."""
 
 THINNEST = 1e-6
-"""Thickness of a wall over the longest side of the support, from which on float32 tells both sides apart."""
+"""Thickness of a wall over the longest side of the surface's box, from which float32 tells sides apart."""
 
 FLAT = 2e-3
 """Angle between the sides of a wall below which it is as thin all around, and no edge of a wedge."""
@@ -169,8 +170,7 @@ class Walls:
     def __init__(self, tree: ImplicitModel, blocks: BlockTree, least: float) -> None:
         """Find the walls; `least` is the size of the smallest cells."""
         self._blocks, self._least = blocks, EDGE_SHARE * least
-        lower, upper = tree.support
-        self._thinnest = THINNEST * float((upper - lower).max())
+        self._thinnest = THINNEST * longest_side(surface_box(tree))
         cells = blocks.cells
         self._device, self._kernel = cells.device, cells.tape.instruction_set.kernel_for
         self._operands = operands = operands_of(tree._program, tree.tape)

@@ -28,8 +28,8 @@ class Model(ImplicitModel):
         """Lower and upper corner of the surface, float32[3] each; `support` is the larger box of the field.
 
         The box of the vertices of ``polygonize(self)``, which lie on the surface. It may be too small by a
-        cell at most, a 64th of the longest side of the support. A tree without a surface raises
-        `InvalidNode`.
+        cell at most, a 64th of the longest side of the support, or of a box around a surface that takes less
+        than an eighth of it. A tree without a surface raises `InvalidNode`.
 
         Examples
         --------

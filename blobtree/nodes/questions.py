@@ -311,7 +311,7 @@ class Questions(Model):
         Parameters
         ----------
         resolution : int, optional
-            Cells along the longest side of the support; see `polygonize` for the default.
+            Cells along the longest side of the support, see `polygonize`, also for the default.
         options
             Arguments of ``pyvista.PolyData.plot``, such as ``color`` and ``screenshot``.
 

@@ -81,9 +81,10 @@ def has_warps(tree: ImplicitModel) -> bool:
     return any(isinstance(step, EnterWarp) for step in tree._program)
 
 
-def fitting_scale(tree: ImplicitModel, size: float) -> float:
+def fitting_scale(tree: ImplicitModel, size: float, longest: float) -> float:
     """Return the factor of `size`, one of CELL_SCALES, with which thin parts take the fewest cells.
 
+    `longest` is the longest side of the box of the tree's surface.
     Cells are halved until they are small enough. So a part may take four times the triangles that it needs.
     """
     sizes = part_sizes(tree)[0] / BALL_CELLS
@@ -94,7 +95,7 @@ def fitting_scale(tree: ImplicitModel, size: float) -> float:
         [_DIMENSIONS.get(getattr(run.kind, "cells", 0.0), 0.0) for run in runs],
         [len(run.primitives) for run in runs],
     )
-    whole = (float((tree.support[1] - tree.support[0]).max()) / size) ** 2
+    whole = (longest / size) ** 2
     return _cheapest_scale(size, sizes, lengths**powers, whole)
 
 

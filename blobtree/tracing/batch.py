@@ -12,6 +12,7 @@ from blobtree._typing import BoolArray, Float32Array, Int64Array
 from blobtree.cells.grid import BRANCHING
 from blobtree.cells.joint_cells import build_joint_cells
 from blobtree.cells.sparse_cells import MAX_TEXELS, SparseCells
+from blobtree.cells.surface_box import surface_box
 from blobtree.device import known_device, launch
 from blobtree.errors import InvalidPoints, InvalidResolution
 from blobtree.joint_work import checked_trees, is_small, work_together
@@ -148,9 +149,9 @@ def raycast_batch(
     counts = [len(starts) for starts, _ in rays]
 
     def kind(tree: ImplicitModel) -> Hashable | None:
-        if not is_small(tree) or blocks_of(tree, *tree.support) > BLOCKS_ALONG:
+        if not is_small(tree) or blocks_of(tree, *surface_box(tree, device)) > BLOCKS_ALONG:
             return None
-        return id(tree.tape.instruction_set), cells_grid(*tree.support).depth
+        return id(tree.tape.instruction_set), cells_grid(*surface_box(tree, device)).depth
 
     def joint(numbers: list[int]) -> list[Hits]:
         return _joint_hits([models[n] for n in numbers], [rays[n] for n in numbers], device)
@@ -224,13 +225,14 @@ def _joint_hits(
 
 def _ray_tables(models: Sequence[ImplicitModel], device: str) -> Any:
     """Return an array of `RayCells`, one for each model, see `tree_cells.TracingCells`."""
-    grids = [cells_grid(*model.support) for model in models]
+    boxes = [surface_box(model, device) for model in models]
+    grids = [cells_grid(*box) for box in boxes]
     cells = build_joint_cells(models, grids, device)
     example: Any = RayCells()
     example.tape, starts = _joined_tapes(cells, [len(model.tape.data) - model.tape.start for model in models])
     shift = len(example.tape) - len(cells.leaves.tape)
     size = [grid.cell_size * BRANCHING for grid in grids]
-    counts = np.array([block_counts(*model.support, one) for model, one in zip(models, size, strict=True)])
+    counts = np.array([block_counts(*box, one) for box, one in zip(boxes, size, strict=True)])
     tables_on = numpy_tables if wp.get_device(device).is_cpu else device_tables
     blocks, ends = tables_on(cells, counts, shift)
     return struct_rows(
@@ -243,7 +245,7 @@ def _ray_tables(models: Sequence[ImplicitModel], device: str) -> Any:
             "lower": [grid.origin for grid in grids],
             "block_size": size,
             "counts": counts,
-            "tolerance": [trace_tolerance(model.support) for model in models],
+            "tolerance": [trace_tolerance(box) for box in boxes],
             "start": starts,
         },
     )

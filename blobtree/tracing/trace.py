@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from blobtree._typing import BoolArray, Float32Array
 from blobtree.cells.sparse_cells import CELL_KERNELS
+from blobtree.cells.surface_box import Corners
 from blobtree.device import known_device, launch
 from blobtree.errors import InvalidPoints
 from blobtree.kernels import load_together
@@ -18,7 +19,7 @@ from blobtree.tape.instruction_set import InstructionSet
 from blobtree.tape.model import ImplicitModel
 from blobtree.tracing.ray_kernels import trace_rays
 from blobtree.tracing.shade_kernels import shade_hits
-from blobtree.tracing.tree_cells import Corners, DeviceCells, device_cells
+from blobtree.tracing.tree_cells import DeviceCells, device_cells
 from blobtree.validation import points_or_point, positive_number
 
 BOX_MARGIN = 1e-3

@@ -11,6 +11,7 @@ from blobtree._typing import BoolArray, Float32Array, Float64Array, IndexArray, 
 from blobtree.cells.grid import BRANCHING, Grid, grid_from
 from blobtree.cells.refine_kernels import SURELY_OUTSIDE
 from blobtree.cells.sparse_cells import MAX_BLOCKS, Level, SparseCells, build_cells
+from blobtree.cells.surface_box import Corners, surface_box
 from blobtree.device import known_device
 from blobtree.lazy import Lazy
 from blobtree.sized_cache import sized_cache
@@ -48,9 +49,6 @@ MAX_CELLS_BYTES = 1 << 22
 """Bytes of the last cells, which are kept though no drawing uses them; those of a model take 1 MB or more."""
 
 Corner: TypeAlias = tuple[float, ...]
-
-Corners: TypeAlias = tuple[Float32Array, Float32Array]
-"""Lower and upper corner (3,) of a box."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,10 +136,10 @@ def tracing_cells(
     """Return the cells for rays through `tree`.
 
     `device` is the Warp device that builds them, by default the current one. `blocks` is the number of finest
-    blocks along the longest side, by default `blocks_along`. `within` is the box of the cells, by default the
-    support.
+    blocks along the longest side, by default `blocks_along`. `within` is the box of the cells, by default
+    `surface_box`.
     """
-    box = within or tree.support
+    box = within or surface_box(tree, device)
     if blocks is None:
         blocks = blocks_of(tree, *box)
     lower, upper = (tuple(corner.tolist()) for corner in box)
@@ -225,7 +223,7 @@ def point_cells(tree: ImplicitModel, device: str) -> TracingCells:
     Every block has a tape: its own if the surface may cross it, or else that of the smallest block around it
     which the surface may cross. A tape shorter than MIN_POINT_TEXELS has no blocks.
     """
-    tape, bounds = tree.tape, tree.support
+    tape, bounds = tree.tape, surface_box(tree, device)
     grid = cells_grid(*bounds)
     if len(tape.data) - tape.start < MIN_POINT_TEXELS:
         return _assembled(tape, bounds, grid, np.zeros((0, 0, 0), np.int32), ())
