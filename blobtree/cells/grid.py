@@ -91,8 +91,9 @@ def aligned_grid(lower: FloatArray, upper: FloatArray, cell_size: float) -> Grid
     if not farthest <= MAX_CELL_COORDINATE:
         distance = farthest * cell_size
         raise InvalidResolution(
-            f"cells of {cell_size:g} cannot be told apart {distance:.3g} from the origin; take larger cells "
-            f"({distance / MAX_CELL_COORDINATE:.3g} at least), or move the model to the origin"
+            f"the model is too far from the origin, {distance:.3g}: float32 tells no cells of {cell_size:g} "
+            "apart there; move it to the origin, or mesh it with a cell_size of "
+            f"{distance / MAX_CELL_COORDINATE:.3g} at least"
         )
     depth = 1
     while True:

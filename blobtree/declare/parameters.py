@@ -171,8 +171,7 @@ class Parameter:
             return result
         ends = math.isfinite(self.low) and math.isfinite(self.high)
         span = f"{self.low:g} to {self.high:g}" if ends else f"a number {self.range}"
-        hint = f"; {self.hint}" if self.hint else ""
-        raise InvalidNode(f"{self.name}: expected {span}, got {result!r}{hint}")
+        raise InvalidNode(f"{self.name}: expected {span}, got {result!r}{self._advice}")
 
     @property
     def is_bounded(self) -> bool:
@@ -204,7 +203,7 @@ class Parameter:
         result: float | tuple[float, ...]
         if self.size == 1:
             number = finite_number(self.name, value)
-            if self.whole and (number != int(number) or abs(number) > LARGEST_INTEGER):
+            if self.whole and number != int(number):
                 raise InvalidNode(f"{self.name}: expected a whole number, got {value!r}")
             measure, result = number, int(number) if self.whole else number
         else:
@@ -217,8 +216,18 @@ class Parameter:
             measure, result = math.hypot(*components), components
         if not self.low <= measure <= self.high:
             noun = "a number" if self.size == 1 else "a vector of length"
-            raise InvalidNode(f"{self.name}: expected {noun} {self.range}, got {value!r}")
+            raise InvalidNode(f"{self.name}: expected {noun} {self.range}, got {value!r}{self._advice}")
+        if self.whole and abs(measure) > LARGEST_INTEGER:
+            raise InvalidNode(
+                f"{self.name}: expected a number up to {LARGEST_INTEGER:,}, got {value!r}; float32 counts no "
+                "further"
+            )
         return result
+
+    @property
+    def _advice(self) -> str:
+        """The hint behind a message."""
+        return f"; {self.hint}" if self.hint else ""
 
 
 def _falloff(name: str, value: Any) -> Falloff:

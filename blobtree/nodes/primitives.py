@@ -646,6 +646,11 @@ class Box(SolidPrimitive):
     _: KW_ONLY
     radius: float = par.radius("visible radius of the edges, 0 for sharp ones", low=0.0)
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.radius == min(self.size) == 0.0:
+            raise InvalidNode(f"radius: expected one above 0 for a box without thickness, size {self.size}")
+
     @formula
     def closest(q: wp.vec3, center: wp.vec3, size: wp.vec3) -> wp.vec3:
         """Return the closest point of the box."""

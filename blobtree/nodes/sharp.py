@@ -451,9 +451,7 @@ class Frustum(Pieces):
 
 
 def sharp_box(box: Any) -> Node:
-    """Return the direct field of a box without a radius; a side of length 0 leaves nothing."""
-    if min(box.size) == 0.0:
-        raise InvalidNode(f"radius: expected one above 0 for a box without thickness, size {box.size}")
+    """Return the direct field of a box without a radius."""
     return _SharpBox(box.center, box.size, mean=0.5 * min(box.size), **shared_of(box))
 
 

@@ -113,6 +113,7 @@ def test_the_support_holds_the_field() -> None:
         (lambda: Noise((0, 0, 0), (1, 1, 1), 1.0, fade=0.0), "fade: expected 0.001 to 1, got 0.0"),
         (lambda: Noise((0, 0, 0), (1, 1, 1), 1.0, seed=300), "seed: expected a number from 0 to 288"),
         (lambda: Noise((0, 0, 0), (1, 1, 1), 1.0, seed=1.5), "seed: expected a whole number"),  # type: ignore[arg-type]
+        (lambda: Noise((0, 0, 0), (1, 1, 1), 1.0, seed=10**9), "seed: expected a number"),
         (lambda: SPONGE.offset(-0.2).tape, "offset: -0.2 leaves nothing of Gyroid"),
         (lambda: PILLOW.offset(-0.5).tape, "offset: -0.5 leaves nothing of Superquadric"),
     ],

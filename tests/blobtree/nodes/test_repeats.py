@@ -157,6 +157,7 @@ def test_a_file_holds_one_child() -> None:
             "step: expected a shorter one, the last copy is 9",
         ),
         (lambda: Repeat(BALL, (1, 0, 0), 0), "count: expected a number from 1 to 10000"),
+        (lambda: Repeat(BALL, (1, 0, 0), 10**9), "count: expected a number from 1 to 10000.*repeat a repeat"),
         (lambda: Repeat(BALL, (1, 0, 0), 2.5), "count: expected a whole number"),  # type: ignore[arg-type]
         (lambda: Repeat(BALL, (1, 0, 0), 2, "blend"), "joining: expected 'sum' or 'union'"),
         (lambda: endless(BALL, (0, 0, 0)), "step: expected a direction"),

@@ -141,7 +141,7 @@ def test_a_pose_moves_the_solid(solid: Any) -> None:
     ("make", "message"),
     [
         (
-            lambda: Box((0, 0, 0), (1, 0, 1), radius=0).tape,
+            lambda: Box((0, 0, 0), (1, 0, 1), radius=0),
             "expected one above 0 for a box without thickness",
         ),
         (lambda: Cone((0, 0, 0), (1, 0, 0), radius=0, end_radius=0), "a radius above 0 at one end"),
