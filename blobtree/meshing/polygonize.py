@@ -4,6 +4,7 @@ Cells of one size are those of `Polygonizer`. They are smaller where parts are t
 from a chord error (`chord_error`).
 """
 
+import logging
 from collections.abc import Callable
 
 import numpy as np
@@ -16,6 +17,8 @@ from blobtree.meshing.polygonizer import Polygonizer, above_zero
 from blobtree.progress import Cancel, Progress, reporting
 from blobtree.tape.model import ImplicitModel, checked_tree
 from blobtree.validation import positive_count, truth
+
+_logger = logging.getLogger(__name__)
 
 WAYS: dict[str, Callable[..., Mesh]] = {}
 """Ways of meshing beside cells of one size."""
@@ -123,7 +126,7 @@ def polygonize(
     if resolution is None and cell_size is None and chord_error is None and "parts" in WAYS:
         return WAYS["parts"](tree, creases=creases, device=device, progress=progress, cancel=cancel)
     if chord_error is None:
-        return Polygonizer(
+        polygonizer = Polygonizer(
             tree,
             resolution=resolution,
             cell_size=cell_size,
@@ -131,7 +134,14 @@ def polygonize(
             device=device,
             progress=progress,
             cancel=cancel,
-        ).mesh
+        )
+        if not len(polygonizer.mesh.faces):
+            _logger.warning(
+                "the mesh is empty: cells of %g show no surface; if the tree has one, its parts are thinner "
+                "than these, and need a larger resolution or none",
+                polygonizer.cell_size,
+            )
+        return polygonizer.mesh
     if resolution is not None or cell_size is not None:
         raise InvalidResolution(
             "expected one of resolution, cell_size and chord_error, got several; drop the others"

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from blobtree import ISO, Mesh, Node, Point, Polygonizer, Segment, Sum, Union, polygonize
+from blobtree import ISO, Mesh, Node, Point, Polygonizer, Segment, Shell, Sum, Union, polygonize
 from blobtree._typing import Float64Array
 from blobtree.errors import InvalidResolution
 from blobtree.kernels import COMPILING
@@ -268,3 +268,12 @@ def test_an_edit_in_wide_cells_matches_a_new_mesh() -> None:
     assert np.array_equal(again.vertices, fresh.vertices)
     assert np.array_equal(again.faces, fresh.faces)
     assert np.array_equal(again.normals, fresh.normals)
+
+
+def test_a_surface_that_cells_lose_is_named(caplog: pytest.LogCaptureFixture) -> None:
+    thin = Shell(BALL, 1e-3)
+    assert len(polygonize(thin, resolution=32).faces) == 0
+    assert "the mesh is empty: cells of 0.13" in caplog.text
+    caplog.clear()
+    assert len(polygonize(BALL, resolution=32).faces) > 0
+    assert not caplog.records
