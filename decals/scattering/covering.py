@@ -9,11 +9,12 @@ import numpy as np
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.progress import reporting
 from decals.scattering.cell_corners import power_corners, surely_covered
-from decals.scattering.decal_normals import turned_normals
+from decals.scattering.decal_normals import DecalNormals
 from decals.scattering.domain import Domain, OrientedPoints
-from decals.scattering.gap_filling import EVEN, center_outsized
+from decals.scattering.gap_filling import EVEN
 from decals.scattering.neighbors import FacingTree, NearestFacing
 from decals.scattering.owned_points import CANDIDATES, DOUBTFUL, Centers, OwnedPoints, Shade
+from decals.scattering.rearrangement import rearranged
 from decals.scattering.sheets import on_single_sheets
 from decals.scattering.sizing import EXPECTED_RADIUS, WithNormals
 from decals.surfaces.surface import unit_rows
@@ -98,7 +99,7 @@ def covering_decals(
 ) -> tuple[OrientedPoints, Float64Array]:
     """Return decals at centres, with their own normals, and the least radii without gaps; see `Rule`.
 
-    At even density, some are moved by `center_outsized` and turned by `turned_normals`.
+    `DecalNormals` turns some of them. At even density, `rearranged` moves some.
     """
 
     def project(trials: OrientedPoints) -> tuple[OrientedPoints, Int64Array]:
@@ -106,27 +107,18 @@ def covering_decals(
         rows = np.flatnonzero(allowed)
         return projected[rows], rows
 
+    def with_sheets(decals: OrientedPoints) -> OrientedPoints:
+        return on_single_sheets(domain, decals, samples, expected)
+
     expected = EXPECTED_RADIUS * spacings.astype(np.float64)
-    bent = with_normals(centers, spacings)
-    bent_at = centers.positions
     nearest = NearestFacing(samples.positions, samples.normals)
-
-    def aim(centers: OrientedPoints) -> OrientedPoints:
-        nonlocal bent, bent_at
-        moved = np.flatnonzero((centers.positions != bent_at).any(axis=1))
-        normals = bent.normals.copy()
-        normals[moved] = with_normals(centers[moved], spacings[moved]).normals
-        bent = OrientedPoints(centers.positions, normals, centers.surface_ids)
-        bent_at = centers.positions
-        normals = turned_normals(bent, centers.normals, samples, nearest, expected)
-        return OrientedPoints(centers.positions, normals, centers.surface_ids)
-
+    normals = DecalNormals(centers, spacings, samples, with_normals)
     even = bool(spacings.max() <= EVEN * spacings.min())
     if even:
-        decals = center_outsized(domain, centers, movable, spacings, samples, nearest, aim)
+        spacing = float(np.median(spacings))
+        decals = rearranged(domain, centers, movable, spacing, samples, nearest, normals, with_sheets)
     else:
-        decals = aim(centers)
-    decals = on_single_sheets(domain, decals, samples, expected)
+        decals = with_sheets(normals.of(centers))
     radii = covering_radii(
         decals,
         samples,

@@ -9,6 +9,7 @@ from blobtree._typing import Float32Array, Float64Array, Int64Array
 from decals.model import FACING_LIMIT
 from decals.scattering.domain import OrientedPoints
 from decals.scattering.neighbors import NearestFacing
+from decals.scattering.sizing import EXPECTED_RADIUS, WithNormals
 from decals.surfaces.surface import unit_rows
 
 MEAN_RADIUS = 0.5
@@ -53,6 +54,9 @@ surface's points over the centre, along their normals, in distances."""
 
 TURN_MARGIN = 0.03
 """Amount by which a decal turns beyond the facing limit, as a cosine."""
+
+SMALL_MOVE = 0.05
+"""Distance in spacings up to which decals keep their mean normals while a place for them is looked for."""
 
 MAX_TURN = 20.0
 """Largest angle in degrees by which a decal turns away from surface behind a wall."""
@@ -120,6 +124,51 @@ def _ball_points(
     ball = directions * lengths[:, None]
     points = positions[rows][:, None] + reaches[rows][:, None, None] * ball
     return points.reshape(-1, 3).astype(np.float32), np.repeat(rows, count)
+
+
+class DecalNormals:
+    """Finds the normals of decals, again while some of their centres move.
+
+    Parameters
+    ----------
+    centers
+        Centres, with the normals of their surfaces.
+    spacings
+        Spacing at each centre, ``float32[n]``.
+    samples
+        Points spread evenly over the area to cover.
+    with_normals
+        Gives centres the normals of decals, before some turn.
+    tolerance
+        Distance, in spacings, up to which a decal that moves keeps the normal that it has before it turns.
+    """
+
+    def __init__(
+        self,
+        centers: OrientedPoints,
+        spacings: Float32Array,
+        samples: OrientedPoints,
+        with_normals: WithNormals,
+        tolerance: float = 0.0,
+    ) -> None:
+        self._spacings, self._samples, self._with_normals = spacings, samples, with_normals
+        self._tolerance = tolerance * spacings.astype(np.float64)
+        self._decals = with_normals(centers, spacings)
+        self._nearest = NearestFacing(samples.positions, samples.normals)
+
+    def part(self, centers: OrientedPoints, rows: Int64Array, samples: OrientedPoints) -> "DecalNormals":
+        """Return one for some of the decals and the samples around them, with the tolerance `SMALL_MOVE`."""
+        return DecalNormals(centers, self._spacings[rows], samples, self._with_normals, SMALL_MOVE)
+
+    def of(self, centers: OrientedPoints) -> OrientedPoints:
+        """Return the decals at centres, turned as `turned_normals` says."""
+        distances = np.linalg.norm(centers.positions - self._decals.positions, axis=1)
+        moved = np.flatnonzero(distances > self._tolerance)
+        self._decals = self._decals.replaced(moved, self._with_normals(centers[moved], self._spacings[moved]))
+        radii = EXPECTED_RADIUS * self._spacings.astype(np.float64)
+        bent = OrientedPoints(centers.positions, self._decals.normals, centers.surface_ids)
+        normals = turned_normals(bent, centers.normals, self._samples, self._nearest, radii)
+        return OrientedPoints(centers.positions, normals, centers.surface_ids)
 
 
 def turned_normals(

@@ -73,6 +73,12 @@ class OrientedPoints:
     def __getitem__(self, rows: slice | Int64Array) -> "OrientedPoints":
         return OrientedPoints(self.positions[rows], self.normals[rows], self.surface_ids[rows])
 
+    def replaced(self, rows: Int64Array, others: "OrientedPoints") -> "OrientedPoints":
+        """Return these points with some of them at the places of others."""
+        positions, normals = self.positions.copy(), self.normals.copy()
+        positions[rows], normals[rows] = others.positions, others.normals
+        return OrientedPoints(positions, normals, self.surface_ids)
+
     @staticmethod
     def empty() -> "OrientedPoints":
         """Return no points."""

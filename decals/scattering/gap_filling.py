@@ -1,13 +1,10 @@
-"""Particles beside wide gaps, and decals that would be outsized, move toward the middle of their cells."""
-
-from collections.abc import Callable
-from typing import TypeAlias
+"""Particles beside wide gaps move toward the middle of their cells."""
 
 import numpy as np
 
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from decals.scattering.domain import Domain, OrientedPoints
-from decals.scattering.neighbors import FacingTree, NearestFacing, NeighborQuery
+from decals.scattering.neighbors import FacingTree, NeighborQuery
 from decals.scattering.particle_state import ParticleState
 
 WIDE_GAP = 0.8
@@ -35,21 +32,6 @@ MOVE = 0.5
 
 ENCLOSING_STEPS = 24
 """Steps toward the centre of the least ball around points (Bădoiu and Clarkson 2003)."""
-
-OUTSIZED = 1.3
-"""Ratio of a decal's radius to the median, at samples alone, from which it moves."""
-
-CENTERING_ROUNDS = 6
-"""Largest number of rounds in which outsized decals move."""
-
-MIN_DISTANCE = 0.7
-"""Least distance of a decal that moved, in spacings."""
-
-NEIGHBORS = 8
-"""Nearest decals whose largest radius must fall when a decal moves."""
-
-Aim: TypeAlias = Callable[[OrientedPoints], OrientedPoints]
-"""A function of centres, with the normals of their surfaces, to these with the normals of decals there."""
 
 
 def fill_gaps(state: ParticleState, least: float) -> None:
@@ -107,104 +89,34 @@ def _outlines(
     return projected[found], around[found]
 
 
-def center_outsized(
-    domain: Domain,
-    centers: OrientedPoints,
-    movable: BoolArray,
-    sizes: Float32Array,
-    samples: OrientedPoints,
-    nearest: NearestFacing,
-    aim: Aim,
-) -> OrientedPoints:
-    """Return the decals at centres, those of outsized decals moved toward the middle of their cells.
-
-    The decals' normals decide which of them face a point, so that beside lips and thin walls some cells are
-    larger than those of the particles. A decal stays where its move would make one of its neighbours larger,
-    or bring it nearer to one than `MIN_DISTANCE`.
-
-    Parameters
-    ----------
-    domain
-        The surfaces.
-    centers
-        The centres, with the normals of their surfaces.
-    movable
-        True for centres that may move, ``bool[n]``.
-    sizes
-        Spacing at each centre, ``float32[n]``.
-    samples
-        Points spread evenly over the area to cover.
-    nearest
-        Finds the decals nearest to the samples. `aim` may use it for other normals of the decals.
-    aim
-        Returns the decals of centres.
-    """
-    from scipy.spatial import cKDTree  # imported where it is used: it takes a quarter of a second
-
-    movable = movable.copy()
-    decals = aim(centers)
-    nearest = nearest.copy()
-    radii, owners = _cells(decals, nearest)
-    for _ in range(CENTERING_ROUNDS):
-        rows = np.flatnonzero(movable & (radii > OUTSIZED * np.median(radii)))
-        if len(rows) == 0:
-            break
-        moved = _moved(domain, centers, rows, samples.positions, owners)
-        tree = FacingTree(centers.positions, centers.normals)
-        now, then = (_apart(tree, some, rows) for some in (centers[rows], moved))
-        keep = np.flatnonzero(_far_enough(moved, now, then, MIN_DISTANCE * sizes[rows]))
-        rows, moved = rows[keep], moved[keep]
-        if len(rows) == 0:
-            break
-        trial = _replaced(centers, rows, moved)
-        count = min(NEIGHBORS, len(centers))
-        around = cKDTree(centers.positions).query(centers.positions[rows], k=np.arange(1, count + 1))[1]
-        turned = aim(trial)
-        after = _cells(turned, nearest)
-        worse = after[0][around].max(axis=1) >= radii[around].max(axis=1)
-        if worse.any():
-            back = rows[worse]
-            movable[back] = False
-            trial = _replaced(trial, back, centers[back])
-            turned = aim(trial)
-            after = _cells(turned, nearest)
-        centers, decals, (radii, owners) = trial, turned, after
-    return decals
-
-
-def _replaced(points: OrientedPoints, rows: Int64Array, others: OrientedPoints) -> OrientedPoints:
-    """Return points with some of them at others' places."""
-    positions, normals = points.positions.copy(), points.normals.copy()
-    positions[rows], normals[rows] = others.positions, others.normals
-    return OrientedPoints(positions, normals, points.surface_ids)
-
-
-def _cells(decals: OrientedPoints, nearest: NearestFacing) -> tuple[Float64Array, Int64Array]:
-    """Return the distance of each decal's farthest sample, and the decal nearest to each sample."""
-    distances, owners = nearest.of(decals.positions, decals.normals)
-    radii = np.zeros(len(decals))
-    owned = owners >= 0
-    np.maximum.at(radii, owners[owned], distances[owned])
-    return radii, owners
-
-
 def _moved(
     domain: Domain, points: OrientedPoints, rows: Int64Array, samples: Float32Array, owners: Int64Array
 ) -> OrientedPoints:
     """Return some particles after their moves, the others' place where these would be hidden."""
-    targets = points.positions[rows].astype(np.float64)
-    order = np.argsort(owners, kind="stable")
-    starts = np.searchsorted(owners[order], rows)
-    ends = np.searchsorted(owners[order], rows, side="right")
-    for k, (start, end) in enumerate(zip(starts, ends, strict=True)):
-        targets[k] += MOVE * (_center(samples[order[start:end]].astype(np.float64), targets[k]) - targets[k])
     before = points[rows]
+    starts = before.positions.astype(np.float64)
+    targets = starts + MOVE * (cell_middles(points, rows, samples, owners) - starts)
     after, allowed = domain.project(
         OrientedPoints(targets.astype(np.float32), before.normals, before.surface_ids)
     )
-    positions = np.where(allowed[:, None], after.positions, before.positions)
-    normals = np.where(allowed[:, None], after.normals, before.normals)
-    return OrientedPoints(positions, normals, before.surface_ids)
+    kept = np.flatnonzero(allowed)
+    return before.replaced(kept, after[kept])
+
+
+def cell_middles(
+    points: OrientedPoints, rows: Int64Array, samples: Float32Array, owners: Int64Array
+) -> Float64Array:
+    """Return the centres of the least balls around the cells of some points, ``float64[k, 3]``.
+
+    A cell is the samples that a point owns; without any, its middle is the point.
+    """
+    middles = points.positions[rows].astype(np.float64)
+    order = np.argsort(owners, kind="stable")
+    starts = np.searchsorted(owners[order], rows)
+    ends = np.searchsorted(owners[order], rows, side="right")
+    for k in np.flatnonzero(starts < ends):
+        middles[k] = _center(samples[order[starts[k] : ends[k]]].astype(np.float64), middles[k])
+    return middles
 
 
 def _center(points: Float64Array, start: Float64Array) -> Float64Array:
@@ -214,13 +126,6 @@ def _center(points: Float64Array, start: Float64Array) -> Float64Array:
         far = points[np.einsum("ni,ni->n", points - center, points - center).argmax()]
         center += (far - center) / (step + 1)
     return center
-
-
-def _apart(tree: FacingTree, points: OrientedPoints, own: Int64Array) -> Float64Array:
-    """Return the distance of each point to the nearest centre of a tree but its own."""
-    distances, others = tree.nearest(points.positions, points.normals, count=2)
-    nearest: Float64Array = np.where(others == own[:, None], np.inf, distances).min(axis=1)
-    return nearest
 
 
 def _far_enough(
