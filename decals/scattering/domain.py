@@ -397,7 +397,8 @@ def on_nearest(surfaces: Sequence[Surface], points: Float32Array) -> OrientedPoi
 def particle_count(count: int | None, spacing: float | None, mass: float) -> int:
     """Return the count, or the number of particles that lie a spacing apart in a hexagonal tiling."""
     if (count is None) == (spacing is None):
-        raise InvalidScattering("expected either a count or a spacing, got both or none; give one of them")
+        got = "none" if count is None else "both"
+        raise InvalidScattering(f"expected a count or a spacing, got {got}; give one of them")
     if count is not None:
         return count_number("count", count, 0, MAX_PARTICLES, InvalidScattering)
     length = allowed_number(

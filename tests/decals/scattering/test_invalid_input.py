@@ -283,3 +283,9 @@ def test_errors_name_the_members_of_enumerations() -> None:
     assert "'random', 'size', 'curvature'" in error_of(scatter, BALL, count=3, choice="largest")
     assert Sizing("covering") is Sizing.COVERING
     assert ImageChoice("size") is ImageChoice.SIZE
+
+
+@pytest.mark.parametrize(("options", "got"), [({}, "none"), ({"count": 5, "spacing": 0.1}, "both")])
+def test_one_of_count_and_spacing_is_needed(options: dict[str, float], got: str) -> None:
+    with pytest.raises(InvalidScattering, match=f"got {got}; give one"):
+        Relaxation(sphere(8), **options)  # type: ignore[arg-type]
