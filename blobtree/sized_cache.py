@@ -1,9 +1,9 @@
-"""Values that are kept up to a size: those that were used last, and all that are still in use."""
+"""Values that are kept: those that were used last, up to a size, and those of objects that live."""
 
 import threading
 import weakref
 from collections.abc import Callable, Hashable
-from typing import Generic, ParamSpec, Protocol, TypeVar
+from typing import Any, Concatenate, Generic, ParamSpec, Protocol, TypeVar
 
 
 class Sized(Protocol):
@@ -19,6 +19,7 @@ Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result", bound=Sized)
 Key = TypeVar("Key", bound=Hashable)
 Value = TypeVar("Value")
+First = TypeVar("First")
 
 
 class LastUsed(Generic[Key, Value]):
@@ -91,3 +92,35 @@ def sized_cache(
 ) -> Callable[[Callable[Arguments, Result]], SizedCache[Arguments, Result]]:
     """Return a decorator that makes a function a `SizedCache` of so many bytes."""
     return lambda function: SizedCache(function, max_bytes)
+
+
+class KeptWith(Generic[First, Arguments, Value]):
+    """A function that keeps its result as long as an object of its first argument lives.
+
+    Parameters
+    ----------
+    function
+        The function. Its further arguments must not change its result.
+    owner
+        Returns the object of a first argument.
+    """
+
+    def __init__(
+        self, function: Callable[Concatenate[First, Arguments], Value], owner: Callable[[First], Any]
+    ) -> None:
+        self._function, self._owner = function, owner
+        self._results: weakref.WeakKeyDictionary[Any, Value] = weakref.WeakKeyDictionary()
+
+    def __call__(self, first: First, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Value:
+        """Return the kept result for the first argument, or compute it."""
+        owner = self._owner(first)
+        if owner not in self._results:
+            self._results.setdefault(owner, self._function(first, *args, **kwargs))
+        return self._results[owner]
+
+
+def kept_with(
+    owner: Callable[[First], Any],
+) -> Callable[[Callable[Concatenate[First, Arguments], Value]], KeptWith[First, Arguments, Value]]:
+    """Return a decorator that makes a function a `KeptWith` the owners of its first arguments."""
+    return lambda function: KeptWith(function, owner)

@@ -4,14 +4,15 @@ A field ends far from its surface where a primitive is much wider than its radiu
 most of another away. Cells in the box of the field would be too large for the surface then.
 """
 
+from operator import attrgetter
 from typing import TypeAlias
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from blobtree._typing import Float32Array
 from blobtree.cells.grid import BRANCHING, RELATIVE_PAD, grid_from
 from blobtree.cells.sparse_cells import build_cells
+from blobtree.sized_cache import kept_with
 from blobtree.tape.model import ImplicitModel
 from blobtree.tape.tape import Tape
 
@@ -34,9 +35,8 @@ MIN_SIDE, MAX_SIDE = 1e-15, 1e15
 Corners: TypeAlias = tuple[Float32Array, Float32Array]
 """Lower and upper corner (3,) of a box."""
 
-_found: WeakKeyDictionary[Tape, Corners] = WeakKeyDictionary()
 
-
+@kept_with(attrgetter("tape"))
 def surface_box(tree: ImplicitModel, device: str | None = None) -> Corners:
     """Return the lower and upper corner (3,) of a box that holds the surface of a tree.
 
@@ -44,20 +44,6 @@ def surface_box(tree: ImplicitModel, device: str | None = None) -> Corners:
     eighth where bounds of the field are loose. `device` is the Warp device of the first search, by default
     the current one; later calls return the same box.
     """
-    found = _found.get(tree.tape)
-    if found is None:
-        found = _found.setdefault(tree.tape, _searched(tree, device))
-    return found
-
-
-def longest_side(box: Corners) -> float:
-    """Return the longest side of a box."""
-    lower, upper = (corner.astype(np.float64) for corner in box)
-    return float((upper - lower).max())
-
-
-def _searched(tree: ImplicitModel, device: str | None) -> Corners:
-    """Return the box of `surface_box`, from box to box of the blocks that the surface may cross."""
     box = whole = tree.support
     texels = len(tree.tape.data) - tree.tape.start
     depth = LONG_DEPTH if texels > LONG_TAPE else DEPTH
@@ -69,6 +55,12 @@ def _searched(tree: ImplicitModel, device: str | None) -> Corners:
             return whole
         box = crossed
     return box if longest_side(box) <= MAX_SHARE * longest_side(whole) else whole
+
+
+def longest_side(box: Corners) -> float:
+    """Return the longest side of a box."""
+    lower, upper = (corner.astype(np.float64) for corner in box)
+    return float((upper - lower).max())
 
 
 def _is_divisible(box: Corners, depth: int) -> bool:

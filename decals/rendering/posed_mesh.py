@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 from typing import Protocol, runtime_checkable
-from weakref import WeakKeyDictionary
 
 import moderngl
 import numpy as np
 
+from blobtree.sized_cache import kept_with
 from decals.rendering.context import Context
 from decals.rendering.mesh import ColoredMesh, MeshDrawable, mesh_program, mesh_variant, split_mesh
 from decals.rendering.pixel_pass import attach_camera, set_uniform
@@ -70,15 +70,10 @@ class PosedMeshDrawable(MeshDrawable):
         super().release()
 
 
-_rest_splits: WeakKeyDictionary[ColoredMesh, SplitMesh] = WeakKeyDictionary()
-
-
+@kept_with(lambda rest: rest)
 def _rest_split(rest: ColoredMesh) -> SplitMesh:
     """Return the split of a rest pose, which all poses share."""
-    split = _rest_splits.get(rest)
-    if split is None:
-        split = _rest_splits[rest] = split_mesh(rest)
-    return split
+    return split_mesh(rest)
 
 
 def _rest_program(context: Context) -> moderngl.Program:

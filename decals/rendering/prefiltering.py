@@ -9,12 +9,12 @@ Fourier transform computes without noise.
 
 from functools import cache
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blobtree._typing import Float32Array, Float64Array
+from blobtree.sized_cache import kept_with
 from decals.rendering.environment import Panorama
 from decals.rendering.studio import ENVIRONMENTS
 from decals.shaders import constants
@@ -35,20 +35,13 @@ MIN_FACING = constants("material.glsl")["MIN_FACING"]
 """Least cosine between normal and eye."""
 
 
+@kept_with(lambda panorama: panorama)
 def prefiltered(panorama: Panorama) -> NDArray[np.float16]:
     """Return what ``shaders/image_environment.glsl`` reads: all grids, and the table below them.
 
     It is kept as long as the panorama.
     """
-    if panorama not in _kept:
-        _kept[panorama] = _prefiltered(panorama.light)
-    return _kept[panorama]
-
-
-_kept: WeakKeyDictionary[Panorama, NDArray[np.float16]] = WeakKeyDictionary()
-
-
-def _prefiltered(light: Float32Array) -> NDArray[np.float16]:
+    light = panorama.light
     blocks = [_mirror_grid(panorama_cells(light, GRID_ROWS[0]))]
     for level, rows in enumerate(GRID_ROWS[1:], 1):
         blocks.append(lobe_means(panorama_cells(light, rows), level_alpha(level)))

@@ -1,9 +1,11 @@
-"""Results that are kept up to a number of bytes."""
+"""Results that are kept up to a number of bytes, or as long as an object lives."""
+
+import gc
 
 import numpy as np
 
 from blobtree._typing import UInt8Array
-from blobtree.sized_cache import sized_cache
+from blobtree.sized_cache import kept_with, sized_cache
 
 computed: list[int] = []
 
@@ -43,3 +45,29 @@ def test_a_result_that_is_still_held_is_found_again() -> None:
     zeros(90)
     zeros(60)
     assert computed == [90, 60]
+
+
+class Owner:
+    """An object that results are kept with."""
+
+
+def owner_of(pair: tuple[Owner, float]) -> Owner:
+    return pair[0]
+
+
+def test_a_result_is_kept_as_long_as_its_owner_lives() -> None:
+    counted: list[float] = []
+
+    @kept_with(owner_of)
+    def scaled(pair: tuple[Owner, float], factor: float = 2.0) -> float:
+        counted.append(pair[1])
+        return factor * pair[1]
+
+    one, other = Owner(), Owner()
+    assert scaled((one, 3.0)) == 6.0
+    assert scaled((one, 4.0)) == 6.0  # of the same owner
+    assert scaled((other, 4.0), factor=0.5) == 2.0
+    assert counted == [3.0, 4.0]
+    del other
+    gc.collect()
+    assert len(scaled._results) == 1
