@@ -210,7 +210,7 @@ def is_unicode(text: str) -> bool:
 
 def as_path(path: object, error: type[ImplicitDecalsError] = InvalidScene) -> Path:
     """Return the path of a file; raise an error for values of other types."""
-    if path == "":
+    if isinstance(path, str) and not path:
         raise error("path: expected the path of a file, got an empty text")
     try:
         return Path(cast("str | os.PathLike[str]", path))

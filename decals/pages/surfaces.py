@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from blobtree.cells.surface_box import surface_box
 from blobtree.progress import Progress
 from blobtree.tracing.tree_cells import tracing_cells
 from decals.baking.meshes import BakeMesh, bake_mesh
@@ -94,7 +95,7 @@ class Surfaces:
     def _add_tree(self, item: TreeObject, blocks: int) -> None:
         number, tree = len(self.records), item.tree
         cells = tracing_cells(tree, blocks=blocks)
-        lower, upper = np.asarray(tree.support)
+        lower, upper = np.asarray(surface_box(tree))
         self.corners.append(np.array([lower, upper]))
         box = {"box_lower": tuple(lower.tolist()), "box_upper": tuple(upper.tolist())}
         values: dict[str, Any] = {
@@ -114,7 +115,7 @@ class Surfaces:
     def _add_mesh(self, item: object, mesh: BakeMesh) -> None:
         number, base = len(self.records), mesh.base
         corners = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-        self.corners.append(np.asarray(item.tree.support if isinstance(item, TreeObject) else corners))
+        self.corners.append(np.asarray(surface_box(item.tree) if isinstance(item, TreeObject) else corners))
         attributes: list[tuple[str, NDArray[Any], int]] = [
             ("vertex_position", mesh.vertices, 3),
             ("vertex_normal", np.rint(NORMAL_LEVELS * mesh.normals).astype(np.int16), 3),

@@ -6,6 +6,7 @@ import moderngl
 import numpy as np
 
 from blobtree import Node
+from blobtree.cells.surface_box import surface_box
 from blobtree.tracing.tree_cells import TracingCells, tracing_cells
 from decals.rendering.context import Context
 from decals.rendering.data_texture import DataTexture
@@ -41,7 +42,7 @@ class TreeDrawable:
         cells = tracing_cells(tree)
         self._tree, self._context, self.kinds = tree, context, Kinds.of(tree.tape)
         self._cells = cells  # others that need them find them while they are drawn
-        self._bounds = tree.support
+        self._bounds = surface_box(tree)
         self._textures = (DataTexture(context, cells.tape), DataTexture(context, cells.blocks))
         self._uniforms = {**tracing_uniforms(cells), "tape": 0, "blocks": 1}
         self._gl = context.gl
@@ -64,7 +65,7 @@ class TreeDrawable:
 
     @property
     def bounds(self) -> Bounds:
-        """The tree's support."""
+        """A box around the surface, see `surface_box`."""
         return self._bounds
 
     @property

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from blobtree import ISO, Node, polygonize
 from blobtree._typing import BoolArray, Float32Array, Int64Array
+from blobtree.cells.surface_box import longest_side, surface_box
 from blobtree.device import known_device, launch
 from blobtree.immutable import Immutable
 from blobtree.lazy import Lazy
@@ -38,10 +39,10 @@ FIELD_TOLERANCE = 1e-4
 
 
 RESOLUTION = 64
-"""Cells of the coarse mesh along the longest side of the tree's support."""
+"""Cells of the coarse mesh along the longest side of the surface's box."""
 
 MAX_RESOLUTION = 128
-"""Largest number of cells along the longest side of the tree's support in `ImplicitSurface.triangulated`."""
+"""Largest number of cells along the longest side of the surface's box in `ImplicitSurface.triangulated`."""
 
 MAX_STEP = 0.5
 """Longest step of Newton's method, in cells."""
@@ -134,8 +135,7 @@ class ImplicitSurface(Immutable):
 
         The mesh of a resolution stays the same as long as something holds it.
         """
-        low, high = self.tree.support
-        cells = float((high - low).max()) / max(cell, 1e-30)
+        cells = longest_side(surface_box(self.tree)) / max(cell, 1e-30)
         resolution = RESOLUTION if cells <= RESOLUTION else MAX_RESOLUTION
         mesh = self._meshes.get(resolution)
         if mesh is None:
@@ -260,8 +260,7 @@ def _marked(tree: Node, least: float, device: str, points: Float32Array) -> Bool
 
 def _cell_size(tree: Node, resolution: int) -> float:
     """Return the size of the cells of a uniform mesh."""
-    low, high = tree.support
-    return float((high - low).max()) / resolution
+    return longest_side(surface_box(tree)) / resolution
 
 
 def project_without_mesh(

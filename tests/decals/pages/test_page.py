@@ -88,6 +88,13 @@ def test_options_reach_the_page(scene: Scene) -> None:
     assert header_of(page(scene, contact="radial", stiffness=3.0, resolution=16).text)["mode"] == "radial"
 
 
+@pytest.mark.parametrize("surface", ["traced", "mesh"])
+def test_the_camera_of_a_page_sees_the_surface_of_a_wide_field(surface: str) -> None:
+    wide = decals.cover(Point((0, 0, 0), radius=1.0, width=1e3), count=20)
+    header = header_of(page(wide, surface=surface, resolution=16).text)
+    assert np.abs(np.abs(header["bounds"]) - 1.0).max() < 0.3
+
+
 def test_a_traced_page_has_trees_and_no_meshes_of_them(scene: Scene) -> None:
     header = header_of(page(scene, surface="traced").text)
     assert [surface["program"] for surface in header["surfaces"]] == ["tree 0"]

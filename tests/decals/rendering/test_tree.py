@@ -99,6 +99,18 @@ def test_an_eye_in_the_box(fragment: Renderer, compute: Renderer, camera: Camera
     assert_same(*(drawing.buffers(view, RenderOptions(size=(40, 30))) for drawing in (fragment, compute)))
 
 
+@pytest.mark.parametrize("width", [20.0, 1e3])
+def test_a_wide_field_is_drawn_where_its_surface_is(fragment: Renderer, width: float) -> None:
+    wide = Point((0, 0, 0), radius=1.0, width=width)
+    view = View((TreeObject("ball", wide),), Camera((0.0, 0.0, 3.0)))
+    found = fragment.buffers(view, RenderOptions(size=(60, 60)))
+    usual = View((TreeObject("ball", Point((0, 0, 0), radius=1.0)),), view.camera)
+    expected = fragment.buffers(usual, RenderOptions(size=(60, 60)))
+    assert (found.object_id == expected.object_id).mean() > 0.99
+    seen = found.object_id == 0
+    assert np.abs(np.linalg.norm(found.position[seen], axis=1) - 1.0).max() < 1e-3
+
+
 def orthographic(scale: float) -> Projection:
     """A look along −z at the square of half side `scale`, from z = 1 to z = −1."""
     return Projection(np.diag([0.75 / scale, 1.0 / scale, -1.0, 1.0]))

@@ -209,7 +209,7 @@ def test_a_few_polygons_with_many_corners_are_no_transposed_faces() -> None:
 def test_messages_name_the_model() -> None:
     with pytest.raises(InvalidScene, match=r"model 2: expected a model, got 5; give a BlobTree"):
         decals.cover(BALL, 5)  # type: ignore[arg-type]
-    with pytest.raises(InvalidMesh, match=r"surface: expected faces as rows of corner indices"):
+    with pytest.raises(InvalidMesh, match=r"surface: expected faces as rows of whole numbers"):
         as_surface(square(faces=[[0.5, 1, 2]]))
 
 

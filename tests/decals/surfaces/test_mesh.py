@@ -143,7 +143,7 @@ SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]], float)
         (SQUARE / [[1e-300, 1, 1]], [[0, 1, 2]], "finite"),
         (SQUARE, [[0, 1, 3]], "indices from 0 to 2, got 3"),
         (SQUARE, [[0, 1, -1]], "got -1"),
-        (SQUARE, [[0.0, 1.0, 2.0]], "integers"),
+        (SQUARE, [[0.0, 1.0, 2.0]], "whole numbers"),
         (SQUARE, [[0, 1, 1]], "mesh with area"),
         (SQUARE * [1, 0, 1], [[0, 1, 2]], "mesh with area"),
     ],
