@@ -24,6 +24,7 @@ from blobtree.declare.parameters import OPTIONAL, fields_of
 from blobtree.declare.registry import CUSTOM_KINDS, CUSTOM_TAGS
 from blobtree.errors import ImplicitDecalsError, InvalidFile, UnusableFile
 from blobtree.files import write_atomically
+from blobtree.input_files import read_file
 from blobtree.json_errors import json_reason
 from blobtree.nodes.attributes import Attributes, AttributeValue
 from blobtree.nodes.kinds import NODE_KINDS
@@ -263,7 +264,7 @@ def load(path: str | os.PathLike[str]) -> Node:
     """
     path = _checked_path(path)
     try:
-        return from_json(Path(path).read_bytes())
+        return from_json(read_file(Path(path)))
     except OSError as error:
         raise UnusableFile.of(error, path, "read") from error
     except InvalidFile as error:

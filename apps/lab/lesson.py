@@ -13,6 +13,7 @@ import numpy as np
 from msgspec import Struct, field
 
 from blobtree import SolidContact, Union
+from blobtree.input_files import read_text
 from decals.apps.lab.bindings import MODES, OWN, binding
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Scope
@@ -20,7 +21,6 @@ from decals.apps.lab.formulas import Formula, parse
 from decals.apps.lab.measures import MEASURES
 from decals.errors import ImplicitDecalsError
 from decals.field.mapping import ImageMapping
-from decals.input_files import read_text
 from decals.model import Interaction
 from decals.record import DEFAULT_CONTACT, DEFAULT_STIFFNESS, Contact
 from decals.scenes.files import load_scene

@@ -7,10 +7,10 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
+from blobtree.input_files import read_text
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.lesson import PLACEHOLDER
 from decals.apps.lab.symbols import DEFINITIONS
-from decals.input_files import read_text
 
 LANGUAGES = Path(__file__).parent / "languages"
 """The folder of the languages that are installed, but for English, in which lessons are written."""

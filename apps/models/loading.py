@@ -10,12 +10,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from blobtree.input_files import no_file
 from decals import ImplicitDecalsError, Scene
 from decals import load_model as load_file
 from decals.apps.models.samples import SAMPLES, sample, sample_mesh
 from decals.apps.models.tables import with_table
 from decals.errors import InvalidInput
-from decals.input_files import no_file
 from decals.scenes.objects import MeshObject, SceneObject, as_crease_angle, as_objects
 
 

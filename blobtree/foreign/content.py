@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from blobtree.errors import InvalidFile, UnusableFile
+from blobtree.input_files import read_file
 from blobtree.validation import describe
 
 
@@ -21,7 +22,7 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
         The file cannot be read.
     """
     try:
-        return Path(path).read_bytes().removeprefix(codecs.BOM_UTF8)
+        return read_file(Path(path)).removeprefix(codecs.BOM_UTF8)
     except OSError as error:
         raise UnusableFile.of(error, os.fspath(path), "read") from error
     except (TypeError, ValueError):

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from blobtree.input_files import read_file
 from blobtree.progress import Progress
 from decals.baking.export import EXPORT_FUNCTION, export
 from decals.errors import ImplicitDecalsError, InvalidInput
-from decals.input_files import read_file
 from decals.scenes.files import from_json
 from decals.scenes.provenance import changes_since, device_text, package_versions, provenance
 from decals.scenes.records import SampleLoader

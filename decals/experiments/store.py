@@ -20,9 +20,9 @@ import msgspec
 from blobtree.errors import UnusableFile
 from blobtree.file_lock import FileLock
 from blobtree.files import PREFIX, replacing, write_atomically
+from blobtree.input_files import read_file
 from decals.errors import InvalidInput
 from decals.experiments.outcome import Row
-from decals.input_files import read_file
 
 FORMAT = 1
 """Format of the folder; a higher one belongs to a newer version."""

@@ -17,12 +17,12 @@ from PIL import Image, ImageOps, UnidentifiedImageError
 
 from blobtree._typing import Float32Array
 from blobtree.files import is_file
+from blobtree.input_files import no_file
 from blobtree.validation import describe
 from decals.errors import InvalidImage
 from decals.images.builtin import BUILTIN_IMAGES, generate_image, is_builtin
 from decals.images.extras import DECODERS
 from decals.images.texels import MAX_IMAGE_EDGE, Pixels, check_size
-from decals.input_files import no_file
 from decals.validation import MAX_LIGHT, require_rgba
 
 PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM", "TGA", "JPEG2000", "AVIF")

@@ -16,8 +16,8 @@ from PIL.PngImagePlugin import PngInfo
 from blobtree._typing import Float32Array, Int32Array, UInt8Array
 from blobtree.errors import UnusableFile
 from blobtree.files import write_atomically
+from blobtree.input_files import read_file
 from decals.errors import InvalidScene, TooMuchData
-from decals.input_files import read_file
 from decals.rendering.options import STUDIO, Size
 from decals.rendering.targets import Targets
 from decals.rendering.viewpoint import Tile

@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 from blobtree import ISO, Node
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.errors import InvalidNode
+from blobtree.input_files import no_file
 from blobtree.lazy import Lazy
 from blobtree.nodes.paths import Path, node_in_world
 from blobtree.nodes.surgery import without_branches
 from blobtree.validation import describe
 from decals.errors import InvalidImage, InvalidScattering
-from decals.input_files import no_file
 from decals.scattering.appearance import Appearance
 from decals.scattering.covering import random_points_around
 from decals.scattering.density import PaintedImage, grey_values, region_mask

@@ -37,13 +37,13 @@ import msgspec
 from msgspec import Raw, Struct
 
 from blobtree.files import is_file, is_folder, write_atomically
+from blobtree.input_files import read_file
 from blobtree.json_errors import json_reason
 from blobtree.progress import Progress, reporting
 from blobtree.validation import truth
 from decals.errors import ImplicitDecalsError, InvalidScene
 from decals.images.builtin import is_builtin
 from decals.images.load import embedded_image, is_embedded, load_image
-from decals.input_files import read_file
 from decals.model import Decals
 from decals.scenes.camera import Camera, Fit, Vector
 from decals.scenes.drawing_record import DrawingRecord, drawing_of_record, drawing_record

@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 
 from blobtree._typing import Float64Array
 from blobtree.files import replacing, write_atomically
+from blobtree.input_files import no_file, read_file
 from blobtree.validation import describe, finite_vector, items, truth
 from decals.errors import InvalidDecals, InvalidInput
 from decals.images.load import AnyImage
-from decals.input_files import no_file, read_file
 from decals.model import Decals, Interaction
 from decals.receivers import TEXT
 from decals.scenes.files import image_record, images_of

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 import blobtree
 from blobtree import Mesh, Node
+from blobtree.input_files import no_file
 from blobtree.validation import describe, point_array
 from decals.errors import ImplicitDecalsError, InvalidMesh
-from decals.input_files import no_file
 from decals.model import MAX_COORDINATE
 from decals.surfaces.base_color import BaseColor, checked_color, linear_colors
 from decals.surfaces.extras import READERS

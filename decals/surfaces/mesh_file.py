@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blobtree._typing import Float64Array, Int64Array
+from blobtree.input_files import no_file, read_file
 from blobtree.validation import describe
 from decals.child_process import can_isolate
 from decals.errors import InvalidMesh
-from decals.input_files import no_file, read_file
 from decals.surfaces.base_color import checked_color
 from decals.surfaces.dataset_colors import dataset_color, has_colors
 from decals.surfaces.files.content import encoding_of, without_mark

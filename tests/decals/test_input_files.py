@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 import pyvista
 
+import blobtree
 import decals
+from blobtree.foreign import read_tree
+from blobtree.input_files import no_file, read_file, read_text
 from decals.apps.commands.zone_options import parse_zones
 from decals.apps.lab.lesson import load_lesson
 from decals.apps.models.loading import import_module_or_file, load_model
@@ -18,13 +21,14 @@ from decals.baking.reproduction import reproduce_export
 from decals.errors import ImplicitDecalsError
 from decals.experiments.store import described
 from decals.images import read_image
-from decals.input_files import no_file, read_file, read_text
 from decals.rendering.picture import picture_recipe
 from decals.surfaces import read_mesh
 
 READERS: dict[str, tuple[str, Callable[[Path], Any]]] = {
     "scene": (".json", decals.load_scene),
     "model": (".json", decals.load_model),
+    "tree": (".json", blobtree.load),
+    "program": (".frep", read_tree),
     "covered": (".ply", lambda path: decals.cover(path, count=5)),
     "mesh": (".obj", read_mesh),
     "VTK mesh": (".vtp", read_mesh),

@@ -10,8 +10,8 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from blobtree._typing import Float64Array, Int64Array
+from blobtree.input_files import read_file
 from decals.errors import InvalidMesh
-from decals.input_files import read_file
 
 T = TypeVar("T")
 
