@@ -290,6 +290,9 @@ FACING = 0.3
 HIDDEN_DEPTH = 0.5
 """A decal counts as hidden if another surface lies so far in front of its centre, in its radii."""
 
+AT_CENTER = 1e-3
+"""Distance, in radii, from a centre to the first surface along a ray, up to which the centre is seen."""
+
 
 def facing_decals(
     document: Document, numbers: ArrayLike, rays: Sequence[tuple[ArrayLike, ArrayLike]]
@@ -306,6 +309,7 @@ def facing_decals(
         first = np.minimum(first, item.surface.raycast(origins, directions))
     toward = np.einsum("ni,ni->n", decals.normals, directions) < FACING
     seen: BoolArray = toward & (first > depths - HIDDEN_DEPTH * decals.radii)
+    seen |= np.abs(first - depths) < AT_CENTER * decals.radii
     return seen
 
 

@@ -251,7 +251,7 @@ def test_a_model_without_vertices_has_no_remesh() -> None:
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        (lambda: decals.cover(Point((0, 0, 0), radius=1, weight=0.5), count=5), "tree with a surface"),
+        (lambda: decals.cover(Point((0, 0, 0), radius=1, weight=0.499), count=5), "tree with a surface"),
         (lambda: decals.cover((SQUARE[0], 1.0 * SQUARE[1]), count=5), r"whole numbers, .*\.astype\(int\)"),
         (lambda: MeshSurface(SQUARE[0], 1.0 * SQUARE[1]), r"whole numbers, .*\.astype\(int\)"),
         (lambda: decals.cover("/", count=5), "expected a model, '/' is a folder"),
