@@ -48,7 +48,7 @@ LINK = 1.5
 """Distance up to which two decals belong to one group, in spacings."""
 
 LARGEST = 1.65
-"""Largest usual radius of a decal, in expected ones: a height ends at the same share of the radius."""
+"""Largest radius of most decals, in expected ones. Heights of sheets grow with the radius."""
 
 NEIGHBORS = 6
 """Nearest decals of each that are looked at."""
