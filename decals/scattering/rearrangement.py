@@ -17,6 +17,9 @@ from decals.surfaces.surface import unit_rows
 LEAST_DISTANCE = 0.865
 """Distance of two decals, in spacings, below which they are too near."""
 
+MIN_DISTANCE = 0.7
+"""Distance of two decals, in spacings, below which no radius makes up for them: the fault counts 1."""
+
 PUSHED_TO = 0.88
 """Distance, in spacings, to which two decals push each other."""
 
@@ -173,7 +176,8 @@ class _Task:
         faults = np.clip(radii / (OUTSIZED * self.usual) - 1.0, 0.0, MAX_EXCESS) ** 2
         pairs, distances = _near_pairs(centers, decals.heights, self.pushed_to * self.spacing)
         lacks = np.maximum(1.0 - distances / (LEAST_DISTANCE * self.spacing), 0.0)
-        np.add.at(faults, pairs, 0.5 * lacks[:, None] ** 2)
+        overlap = distances < MIN_DISTANCE * self.spacing
+        np.add.at(faults, pairs, (0.5 * lacks**2 + overlap)[:, None])
         return _Arrangement(centers, decals, radii, owners, pairs, distances, faults)
 
     def moved(self, start: _Arrangement, share: float) -> OrientedPoints:

@@ -62,7 +62,7 @@ def test_evenness_is_that_of_the_seeds_on_thin_models(name: str, thickness: floa
         assert found.rho > 0.8
 
 
-@pytest.mark.ordinary_cases("tube-0.05")
+@pytest.mark.ordinary_cases("tube-0.05", "plate-0.05")
 @pytest.mark.parametrize("thickness", THICKNESSES)
 @pytest.mark.parametrize("name", THIN_MODELS)
 def test_turned_decals_of_thin_models_are_no_neighbors_through_them(name: str, thickness: float) -> None:
