@@ -1,4 +1,4 @@
-"""Folders for output, which work that fails leaves behind only with something in them."""
+"""Folders for output. Work that fails leaves no empty one behind."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -10,7 +10,7 @@ from decals.errors import InvalidInput
 
 @contextmanager
 def output_folder(folder: Path, error: type[InvalidInput]) -> Iterator[None]:
-    """Create a folder if there is none; remove it if the work in the block fails and leaves it empty.
+    """Create a folder if it does not exist. If the block fails, remove a new folder that is still empty.
 
     Raises
     ------

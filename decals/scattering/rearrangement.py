@@ -173,7 +173,7 @@ class _Task:
     def arrangement(self, centers: OrientedPoints, decals: OrientedPoints) -> _Arrangement:
         """Return the arrangement of decals at centres."""
         radii, owners = _cells(decals, self.nearest)
-        faults = np.clip(radii / (OUTSIZED * self.usual) - 1.0, 0.0, MAX_EXCESS) ** 2
+        faults = np.clip(radii / max(OUTSIZED * self.usual, 1e-30) - 1.0, 0.0, MAX_EXCESS) ** 2
         pairs, distances = _near_pairs(centers, decals.heights, self.pushed_to * self.spacing)
         lacks = np.maximum(1.0 - distances / (LEAST_DISTANCE * self.spacing), 0.0)
         overlap = distances < MIN_DISTANCE * self.spacing

@@ -43,10 +43,10 @@ SQUARED_AREAS = 2.0**-126, 2.0**127
 """Range of the square of a face's doubled area: Warp's queries divide by it, in float32."""
 
 MAX_ODD_AREA = 0.01
-"""Share of the area in faces outside of that range above which a mesh is refused."""
+"""Largest share of the area in faces outside of that range; a mesh with more is refused."""
 
 REPORTED_AREA = 1e-4
-"""Share of the area in faces that are left out from which on the log says so."""
+"""The log names faces that are left out if they have at least this share of the area."""
 
 _logger = logging.getLogger(__name__)
 

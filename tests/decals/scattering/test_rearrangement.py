@@ -94,6 +94,14 @@ def test_fixed_decals_stay(relaxation: Relaxation) -> None:
     assert not stays.all()
 
 
+def test_many_decals_at_one_point_stay_there(relaxation: Relaxation) -> None:
+    """Most of them own no sample, so the median radius is 0."""
+    centers = on_ball(np.repeat([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], [40, 2], axis=0))
+    found = moved(relaxation, centers, np.arange(42) == 41)
+    np.testing.assert_array_equal(found.positions[:41], centers.positions[:41])
+    assert np.isfinite(found.positions).all()
+
+
 def test_even_decals_stay(relaxation: Relaxation) -> None:
     centers = on_ball(relaxation.positions.astype(np.float64))
     found = moved(relaxation, centers, np.ones(COUNT, np.bool_))
