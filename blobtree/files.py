@@ -1,15 +1,18 @@
-"""Output files and folders. Files are written whole or not at all: every writer goes through `replacing`.
+"""Files and folders: only regular files are read, and files are written whole or not at all.
 
-A writer fills a temporary file in the folder of its target, which then takes the target's place. A crash, a
-kill or a full disk leaves the old file. The next save into the folder removes what a killed process left.
+A device may never end, and a pipe may never begin. Every writer goes through `replacing`: it fills a
+temporary file in the folder of its target, which then takes the target's place. A crash, a kill or a full
+disk leaves the old file. The next save into the folder removes what a killed process left.
 """
 
 import errno
 import hashlib
+import io
 import os
 import platform
 import re
 import shutil
+import stat
 import time
 import uuid
 from collections.abc import Iterator, Mapping
@@ -26,6 +29,32 @@ NAME = re.compile(re.escape(PREFIX) + r"(?P<machine>[0-9a-f]{8})-(?P<process>\d+
 
 MAX_AGE = 86_400.0
 """Seconds after which a temporary file of another machine counts as left behind."""
+
+
+def read_file(path: Path) -> bytes:
+    """Return the content of a regular file.
+
+    Raises
+    ------
+    OSError
+        There is no file, it is a folder, a device or a pipe, or it cannot be read.
+    ValueError
+        No file can have this name.
+    """
+    with open(path, "rb", opener=_open_at_once) as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise OSError(errno.EINVAL, "it is a device or a pipe", str(path))
+        return file.read()
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a regular file in UTF-8, whose lines end in one letter; errors are those above."""
+    return io.StringIO(read_file(path).decode(), newline=None).read()
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    """Open a file without waiting for a program that writes into a pipe."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 @contextmanager
@@ -168,6 +197,16 @@ def is_file(path: str | os.PathLike[str]) -> bool:
 def is_folder(path: str | os.PathLike[str]) -> bool:
     """Return True for an existing folder; False also for an impossible path."""
     return os.path.isdir(path)  # noqa: PTH112
+
+
+def no_file(path: str | os.PathLike[str]) -> str:
+    """Return what is at a path instead of a regular file, for a message; "" for a regular file."""
+    name = repr(os.fspath(path))
+    if is_file(path):
+        return ""
+    if is_folder(path):
+        return f"{name} is a folder"
+    return f"{name} is a device or a pipe" if exists(path) else f"found no file {name}"
 
 
 def is_too_long(path: str | os.PathLike[str]) -> bool:

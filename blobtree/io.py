@@ -23,8 +23,7 @@ from blobtree.declare.falloff import Falloff
 from blobtree.declare.parameters import OPTIONAL, fields_of
 from blobtree.declare.registry import CUSTOM_KINDS, CUSTOM_TAGS
 from blobtree.errors import ImplicitDecalsError, InvalidFile, UnusableFile
-from blobtree.files import write_atomically
-from blobtree.input_files import read_file
+from blobtree.files import read_file, write_atomically
 from blobtree.json_errors import json_reason
 from blobtree.nodes.attributes import Attributes, AttributeValue
 from blobtree.nodes.kinds import NODE_KINDS

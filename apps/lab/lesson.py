@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import Struct, field
 
 from blobtree import SolidContact, Union
-from blobtree.input_files import read_text
+from blobtree.files import read_text
 from decals.apps.lab.bindings import MODES, OWN, binding
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.experiment import Experiment, Scope

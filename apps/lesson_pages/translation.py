@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 from msgspec import Struct
 
-from blobtree.input_files import read_text
+from blobtree.files import read_text
 from decals.apps.lab.errors import InvalidLesson
 from decals.apps.lab.lesson import PLACEHOLDER
 from decals.apps.lab.symbols import DEFINITIONS

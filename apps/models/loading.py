@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from blobtree.input_files import no_file
+from blobtree.files import no_file
 from decals import ImplicitDecalsError, Scene
 from decals import load_model as load_file
 from decals.apps.models.samples import SAMPLES, sample, sample_mesh

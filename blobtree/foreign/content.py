@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from blobtree.errors import InvalidFile, UnusableFile
-from blobtree.input_files import read_file
+from blobtree.files import read_file
 from blobtree.validation import describe
 
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from blobtree.input_files import read_file
+from blobtree.files import read_file
 from blobtree.progress import Progress
 from decals.baking.export import EXPORT_FUNCTION, export
 from decals.errors import ImplicitDecalsError, InvalidInput

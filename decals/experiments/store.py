@@ -19,8 +19,7 @@ import msgspec
 
 from blobtree.errors import UnusableFile
 from blobtree.file_lock import FileLock
-from blobtree.files import PREFIX, replacing, write_atomically
-from blobtree.input_files import read_file
+from blobtree.files import PREFIX, read_file, replacing, write_atomically
 from decals.errors import InvalidInput
 from decals.experiments.outcome import Row
 

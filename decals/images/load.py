@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageOps, UnidentifiedImageError
 
 from blobtree._typing import Float32Array
-from blobtree.files import is_file
-from blobtree.input_files import no_file
+from blobtree.files import is_file, no_file
 from blobtree.validation import describe
 from decals.errors import InvalidImage
 from decals.images.builtin import BUILTIN_IMAGES, generate_image, is_builtin

@@ -15,8 +15,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from blobtree._typing import Float32Array, Int32Array, UInt8Array
 from blobtree.errors import UnusableFile
-from blobtree.files import write_atomically
-from blobtree.input_files import read_file
+from blobtree.files import read_file, write_atomically
 from decals.errors import InvalidScene, TooMuchData
 from decals.rendering.options import STUDIO, Size
 from decals.rendering.targets import Targets

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from blobtree import ISO, Node
 from blobtree._typing import BoolArray, Float32Array, Float64Array, Int64Array
 from blobtree.errors import InvalidNode
-from blobtree.input_files import no_file
+from blobtree.files import no_file
 from blobtree.lazy import Lazy
 from blobtree.nodes.paths import Path, node_in_world
 from blobtree.nodes.surgery import without_branches

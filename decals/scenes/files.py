@@ -36,8 +36,7 @@ from typing import Any, Literal
 import msgspec
 from msgspec import Raw, Struct
 
-from blobtree.files import is_file, is_folder, write_atomically
-from blobtree.input_files import read_file
+from blobtree.files import is_file, is_folder, read_file, write_atomically
 from blobtree.json_errors import json_reason
 from blobtree.progress import Progress, reporting
 from blobtree.validation import truth

@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blobtree._typing import Float64Array
-from blobtree.files import replacing, write_atomically
-from blobtree.input_files import no_file, read_file
+from blobtree.files import no_file, read_file, replacing, write_atomically
 from blobtree.validation import describe, finite_vector, items, truth
 from decals.errors import InvalidDecals, InvalidInput
 from decals.images.load import AnyImage

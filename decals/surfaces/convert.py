@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import blobtree
 from blobtree import Mesh, Node
-from blobtree.input_files import no_file
+from blobtree.files import no_file
 from blobtree.validation import describe, point_array
 from decals.errors import ImplicitDecalsError, InvalidMesh
 from decals.model import MAX_COORDINATE

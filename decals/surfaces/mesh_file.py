@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from blobtree._typing import Float64Array, Int64Array
-from blobtree.input_files import no_file, read_file
+from blobtree.files import no_file, read_file
 from blobtree.validation import describe
 from decals.child_process import can_isolate
 from decals.errors import InvalidMesh

@@ -12,8 +12,8 @@ import pyvista
 
 import blobtree
 import decals
+from blobtree.files import no_file, read_file, read_text
 from blobtree.foreign import read_tree
-from blobtree.input_files import no_file, read_file, read_text
 from decals.apps.commands.zone_options import parse_zones
 from decals.apps.lab.lesson import load_lesson
 from decals.apps.models.loading import import_module_or_file, load_model

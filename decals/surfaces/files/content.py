@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from blobtree._typing import Float64Array, Int64Array
-from blobtree.input_files import read_file
+from blobtree.files import read_file
 from decals.errors import InvalidMesh
 
 T = TypeVar("T")

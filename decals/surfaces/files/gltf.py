@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from blobtree.input_files import read_file
+from blobtree.files import read_file
 from decals.surfaces.files.faults import Notes, reading
 from decals.surfaces.files.gltf_accessors import Accessors
 from decals.surfaces.files.gltf_buffers import Buffers

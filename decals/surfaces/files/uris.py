@@ -5,7 +5,7 @@ import re
 from pathlib import Path, PureWindowsPath
 from urllib.parse import unquote, unquote_to_bytes
 
-from blobtree.input_files import read_file
+from blobtree.files import read_file
 from decals.surfaces.files.faults import Unreadable
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")  # two letters or more, for one is a drive of Windows
