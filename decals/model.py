@@ -17,7 +17,7 @@ from blobtree.validation import describe, items
 from decals.errors import InvalidDecals, InvalidRow
 from decals.images.texels import decode_srgb
 from decals.options import Values
-from decals.receivers import codes_of, receiver_array
+from decals.receivers import TEXT, codes_of, receiver_array
 from decals.validation import (
     bool_array,
     check_range,
@@ -365,14 +365,19 @@ def influence_of(radii: Float32Array) -> Float32Array:
 def checked_column(name: str, values: Any, count: int) -> NDArray[Any]:
     """Return a new array for a column other than normals and tangents, checked as by `Decals`.
 
-    Positions may have another length than `count`.
+    None stands for the default. Positions may have another length than `count`.
 
     Raises
     ------
     InvalidDecals
         A value is invalid.
     """
-    return _positions(values) if name == "positions" else _CHECKS[name](values, count)
+    if name == "positions":
+        return _positions(values)
+    if values is None and name in _DEFAULTS:
+        value, dtype = _DEFAULTS[name]
+        return np.full((count, *np.shape(value)), value, dtype)
+    return _CHECKS[name](values, count)
 
 
 def _positions(values: Any) -> Float32Array:
@@ -396,10 +401,12 @@ def _radii(values: Any, count: int) -> Float32Array:
     return radii.astype(np.float32)
 
 
-def _fades(name: str, values: Any, count: int, low: float, high: float) -> Float32Array:
-    """Return fade angles or depths as a new array; 0 in each row for None."""
-    given = np.zeros(count) if values is None else one_or_each(values, count)
-    array = finite_array(name, given, (count,))
+def _opacities(values: Any, count: int) -> Float32Array:
+    return unit_interval("opacities", one_or_each(values, count), (count,)).astype(np.float32)
+
+
+def _fades(name: str, low: float, high: float, values: Any, count: int) -> Float32Array:
+    array = finite_array(name, one_or_each(values, count), (count,))
     check_range(name, np.where(array == 0.0, low, array), low, high, advice="0 is no fade")
     return array.astype(np.float32)
 
@@ -409,7 +416,7 @@ def _checked(values: Mapping[str, Any], names: Collection[str], count: int) -> d
     arrays: dict[str, NDArray[Any]] = {}
     if not _FRAME.isdisjoint(names):
         arrays |= _frames(values, count)
-    arrays |= {name: _CHECKS[name](values[name], count) for name in names if name not in _FRAME}
+    arrays |= {name: checked_column(name, values[name], count) for name in names if name not in _FRAME}
     return arrays
 
 
@@ -418,25 +425,31 @@ COLUMNS = tuple(field.name for field in fields(Decals))
 
 _FRAME = frozenset(("normals", "tangents"))
 
+_DEFAULTS: dict[str, tuple[Any, Any]] = {
+    "images": (0, np.int32),
+    "spill": (False, np.bool_),
+    "interactions": (Interaction.PUSH, np.int32),
+    "layers": (0, np.int32),
+    "tints": ((1.0, 1.0, 1.0), np.float32),
+    "opacities": (1.0, np.float32),
+    "receivers": ("", TEXT),
+    "fade_angles": (0.0, np.float32),
+    "fade_depths": (0.0, np.float32),
+    "single_sheets": (False, np.bool_),
+}
+"""Value of a decal and type of the array, of columns that may be left out."""
+
 _CHECKS: dict[str, Callable[[Any, int], NDArray[Any]]] = {
     "radii": _radii,
-    "images": lambda values, count: whole_array(
-        "images", values, count, low=NO_IMAGE, high=MAX_IMAGES - 1, default=0
-    ),
+    "images": partial(whole_array, "images", low=NO_IMAGE, high=MAX_IMAGES - 1),
     "spill": partial(bool_array, "spill"),
-    "interactions": lambda values, count: member_array(
-        "interactions", values, count, Interaction, Interaction.PUSH
-    ),
-    "layers": lambda values, count: whole_array(
-        "layers", values, count, low=-LAYER_LIMIT, high=LAYER_LIMIT - 1, default=0
-    ),
-    "tints": lambda values, count: color_array("tints", values, count).astype(np.float32),
-    "opacities": lambda values, count: unit_interval(
-        "opacities", one_or_each(values, count), (count,)
-    ).astype(np.float32),
+    "interactions": partial(member_array, "interactions", kind=Interaction),
+    "layers": partial(whole_array, "layers", low=-LAYER_LIMIT, high=LAYER_LIMIT - 1),
+    "tints": partial(color_array, "tints"),
+    "opacities": _opacities,
     "receivers": partial(receiver_array, "receivers"),
-    "fade_angles": lambda values, count: _fades("fade_angles", values, count, *FADE_ANGLES),
-    "fade_depths": lambda values, count: _fades("fade_depths", values, count, *FADE_DEPTHS),
+    "fade_angles": partial(_fades, "fade_angles", *FADE_ANGLES),
+    "fade_depths": partial(_fades, "fade_depths", *FADE_DEPTHS),
     "single_sheets": partial(bool_array, "single_sheets"),
 }
 """Checks of the columns besides positions and frames: of given values and a number of rows."""

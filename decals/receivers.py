@@ -39,12 +39,12 @@ def label_names(name: str, text: object, error: type[ImplicitDecalsError]) -> tu
 
 
 def receiver_array(name: str, values: Any, count: int) -> NDArray[Any]:
-    """Return the receivers of decals as a new array of texts; one text stands for all, None is any object."""
+    """Return the receivers of decals as a new array of texts; one text stands for all."""
     is_text = isinstance(values, np.ndarray) and values.shape == (count,) and values.dtype == TEXT
     if is_text and not (values != "").any():  # empty texts, as most decals have them, need no check of each
         return np.zeros(count, TEXT)
     given = values.tolist() if isinstance(values, np.ndarray) else values
-    rows = [given or ""] * count if given is None or isinstance(given, str) else given
+    rows = [given] * count if isinstance(given, str) else given
     if not isinstance(rows, list | tuple) or len(rows) != count:
         raise InvalidDecals(
             f"{name}: expected one text, or one for each of {count} decals, got {describe(values)}"

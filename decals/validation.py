@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from blobtree._typing import BoolArray, Float64Array, Int32Array
+from blobtree._typing import BoolArray, Float32Array, Float64Array, Int32Array
 from blobtree.colors import color_rgb, is_named
 from blobtree.files import is_folder, is_read_only, is_too_long
 from blobtree.validation import (
@@ -321,9 +321,9 @@ def orthogonal_vectors(tangents: Float64Array, normals: Float64Array) -> Float64
     return np.where(keep[:, None], tangents, across / np.maximum(lengths, MIN_TANGENT_SINE)[:, None])
 
 
-def whole_array(name: str, values: Any, count: int, *, low: int, high: int, default: int) -> Int32Array:
-    """Return whole numbers from low to high as a new array; one stands for all rows, None for the default."""
-    array = np.array(one_or_each(default if values is None else values, count))
+def whole_array(name: str, values: Any, count: int, *, low: int, high: int) -> Int32Array:
+    """Return whole numbers from low to high as a new array; one stands for all rows."""
+    array = np.array(one_or_each(values, count))
     _check_shape(name, array.shape, (count,))
     if (count and array.dtype.kind not in "iu") or array.dtype.kind not in "iuf":
         first = f" such as {array[0]}" if count and array.dtype.kind == "f" else ""
@@ -337,8 +337,8 @@ def whole_array(name: str, values: Any, count: int, *, low: int, high: int, defa
     return array.astype(np.int32)
 
 
-def member_array(name: str, values: Any, count: int, kind: type[IntEnum], default: IntEnum) -> Int32Array:
-    """Return members of an enumeration as a new array of their numbers; the default in each row for None.
+def member_array(name: str, values: Any, count: int, kind: type[IntEnum]) -> Int32Array:
+    """Return members of an enumeration as a new array of their numbers.
 
     Members may be given by name. A single one stands for all rows.
     """
@@ -347,7 +347,7 @@ def member_array(name: str, values: Any, count: int, kind: type[IntEnum], defaul
     values = _items(values)
     if isinstance(values, list | tuple):
         values = [member(name, one, kind, InvalidDecals) if isinstance(one, str) else one for one in values]
-    return whole_array(name, values, count, low=min(kind), high=max(kind), default=default)
+    return whole_array(name, values, count, low=min(kind), high=max(kind))
 
 
 def color_values(name: str, values: Any, error: type[ImplicitDecalsError]) -> Any:
@@ -362,14 +362,13 @@ def color_values(name: str, values: Any, error: type[ImplicitDecalsError]) -> An
     return values
 
 
-def color_array(name: str, values: Any, count: int) -> Float64Array:
-    """Return sRGB colours as a new array ``[count, 3]``; one stands for all rows, None is white."""
-    if values is None:
-        return np.ones((count, 3))
+def color_array(name: str, values: Any, count: int) -> Float32Array:
+    """Return sRGB colours as a new array ``[count, 3]``; one stands for all rows."""
     numbers = color_values(name, values, InvalidDecals)
     channels = list(numbers) if isinstance(numbers, list | tuple) or np.ndim(numbers) == 1 else []
     single = len(channels) == 3 and all(isinstance(one, int | float | np.number) for one in channels)
-    return unit_interval(name, np.tile(numbers, (count, 1)) if single else numbers, (count, 3))
+    rows = np.tile(numbers, (count, 1)) if single else numbers
+    return unit_interval(name, rows, (count, 3)).astype(np.float32)
 
 
 def _items(values: Any) -> Any:
@@ -384,15 +383,15 @@ def one_or_each(values: Any, count: int) -> Any:
 
 
 def unit_interval(name: str, values: Any, shape: tuple[int, ...]) -> Float64Array:
-    """Return numbers from 0 to 1 as a new array; ones for None."""
-    array = finite_array(name, np.ones(shape) if values is None else values, shape)
+    """Return numbers from 0 to 1 as a new array."""
+    array = finite_array(name, values, shape)
     check_range(name, array, 0.0, 1.0, advice="divide colours in bytes by 255")
     return array
 
 
 def bool_array(name: str, values: Any, count: int) -> BoolArray:
-    """Return truth values as a new array; one stands for all rows, None is False."""
-    array = np.array(one_or_each(False if values is None else values, count))
+    """Return truth values as a new array; one stands for all rows."""
+    array = np.array(one_or_each(values, count))
     if not isinstance(values, str):
         _check_shape(name, array.shape, (count,))
     if count and array.dtype != np.bool_:

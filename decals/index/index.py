@@ -107,7 +107,7 @@ class DecalIndex:
         reach = finite_array("influence", influence, (len(centres),))
         check_range("influence", reach, 0.0, MAX_INFLUENCE)
         order = np.full(len(centres), ranks) if np.ndim(ranks) == 0 else ranks
-        order = whole_array("ranks", order, len(centres), low=0, high=MAX_RANK, default=DEFAULT_RANK)
+        order = whole_array("ranks", order, len(centres), low=0, high=MAX_RANK)
         arrays = build_index(*device_arrays(centres, reach, order, known_device("cpu")))
         lists = arrays.levels.numpy(), arrays.table.numpy(), arrays.ids.numpy()
         return cls(*lists, count=len(centres), parity=arrays.parity, floor=arrays.floor)
